@@ -43,7 +43,7 @@ def named(name):
 
 
 def information(name, turbine=None):
-    """What a controller of CONTROLLERS or an agent uses: Measurement fields and PRIVILEGED_INPUTS.
+    """Return what a controller of CONTROLLERS or an agent uses: Measurement fields and PRIVILEGED_INPUTS.
 
     turbine: a descriptions.turbine.Turbine; None: the NREL 5 MW one. Without published gains a law also uses
     the plant's equations. Raises: InputError for an unknown name.

@@ -1,4 +1,4 @@
-"""Constant commands: what is measured at the start, or given figures."""
+"""Constant commands: what is measured at the start, or given values."""
 
 from enum import IntEnum
 

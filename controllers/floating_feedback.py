@@ -1,14 +1,10 @@
-"""PI law with feedback of the platform's fore-aft motion to blade pitch and torque.
+"""Defines the PI law with feedback of the platform's fore-aft motion to blade pitch and torque.
 
-A turbine that holds its speed with the blades lets the thrust fall when the wind on the rotor rises. When
-the platform leans into the wind that takes its aerodynamic damping away. Feathering while the tower top
-moves downwind, by FEEDBACK (rad) per m/s, gives it back. Rotor speed pays for it: where the pitch loop alone
-would have given way, the rotor now slows and speeds up with the platform; the torque channel can carry part
-of that.
-
-The fed-back signal passes a first-order high pass, since a mean motion needs no damping, and two equal
-first-order low passes, which leave out most of the waves. The blade-pitch part fades in over the first
-degree (the region-3 pitch) of what the PI law asks for, so that nothing is fed back below rated.
+Blade-pitch control of the rotor speed reduces thrust as the relative wind rises, which removes aerodynamic
+damping of the platform pitch. Feathering while the tower top moves downwind restores it at the cost of
+rotor-speed deviations, of which the torque channel can compensate a part. The signal passes a first-order
+high pass, which removes mean motion, and two equal first-order low passes, which remove most of the waves.
+The blade-pitch part fades in over the first degree (the region-3 pitch) of the PI law's target.
 """
 
 from dataclasses import dataclass
@@ -45,7 +41,7 @@ class FeedbackSettings:
     """What is fed back and how. Raises: InputError naming the key, value and allowed range.
 
     The controller of that name takes what `fowt design tune` found; controllers/tuned.toml has it with its
-    figures.
+    values.
     """
 
     signal: str = "nacelle_velocity"
@@ -86,7 +82,7 @@ class FeedbackMemory(IntEnum):
 
 @kernel
 def band_passed(signal, parameters, memory):
-    """The signal after high pass and low passes; advances them by one period."""
+    """Return the signal after high pass and low passes; advances them by one period."""
     decay = parameters[FeedbackParameter.HIGH_DECAY]
     slow = (1.0 - decay) * signal + decay * memory[FeedbackMemory.SLOW]
     memory[FeedbackMemory.SLOW] = slow
@@ -100,7 +96,7 @@ def band_passed(signal, parameters, memory):
 
 @control_kernel
 def feedback_law(parameters, memory, measurement, command):
-    """One period: the PI law, plus the band-passed motion on blade pitch and torque."""
+    """Advance the PI law by one period, with the band-passed motion on blade pitch and torque."""
     p = parameters
     error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])
     pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
@@ -134,8 +130,7 @@ class FloatingFeedback(PI):
             FeedbackParameter.SCHEDULED: feedback.scheduled,
         }
         self.parameters = np.append(self.parameters, np.zeros(len(own)))
-        for entry, value in own.items():
-            self.parameters[entry] = value
+        self.parameters[list(own)] = list(own.values())
         self.memory = np.zeros(len(Memory) + len(FeedbackMemory))
 
     def reset(self, measurement):

@@ -1,14 +1,10 @@
-"""Gains of the scheduled PI law: the published formula, and what it gives a turbine without published gains.
+"""Computes gains of the scheduled PI law by the published formula, for turbines without published gains.
 
-Jonkman's design (NREL/TP-500-38060, section 7.4; theory.md, section 4) holds the rotor speed alone, with the
-slope dP/d theta of the aerodynamic power over the blade pitch at rated speed, the induced flow held, along
-the steady curve:
-K_P = 2 I w0 zeta w_r/(N (-dP/d theta)), K_I = I w0^2 w_r/(N (-dP/d theta)), both at zero pitch, and the
-schedule 1/(1 + theta/theta_K), with theta_K from a straight line through the slopes over the pitch.
-
-A floating turbine's rotor loop is slower than its platform pitches (NREL/TP-500-47535; Larsen and Hanson,
-2007): w0 is DETUNED times the platform's own pitch frequency, and never above that of the land set, LAND
-times the rated rotor speed over that of the NREL 5 MW turbine.
+The formula is Jonkman's (NREL/TP-500-38060, section 7.4), (A6) of theory.md, with the slope dP/d theta of the
+aerodynamic power over blade pitch at rated speed and frozen induction along the steady curve, and theta_K of
+the schedule from a straight line through the slopes. On a floater the frequency of the rotor loop is DETUNED
+times the platform's pitch frequency (NREL/TP-500-47535; Larsen and Hanson, 2007), at most that of the land
+set, LAND times the rated rotor speed over that of the NREL 5 MW turbine.
 """
 
 from dataclasses import replace
@@ -17,7 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluctuations
+from fowt_env.analysis.statics import central_difference, mean_derivative
+from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
 from fowt_env.caches import Cache
 from fowt_env.descriptions.checks import check_number
@@ -33,6 +30,7 @@ DETUNED = 0.915  # w0 over the platform's pitch frequency: 0.2 over 0.2185 rad/s
 LAND = 0.6  # rad/s, of the NREL 5 MW turbine on land
 FLOATING = 0.2  # rad/s, of OC3-Hywind: scaled alike where no platform is known
 REFERENCE_SPEED = 1.267109  # rad/s, rated rotor speed of that turbine
+POSITIVE = ("design_frequency", "damping", "inertia", "rated_speed", "gear_ratio")  # arguments of gains
 SETS = ("floating", "land")
 OTHER_NAMES = {"oc3": "floating"}  # of the sets: what the NREL 5 MW turbine's file calls its floating one
 AIR = 1.225  # kg/m3, where no scene is known
@@ -60,20 +58,14 @@ class PowerSlope(NamedTuple):
 
 
 def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch):
-    """Gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
+    """Return the gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
 
     inertia: I_D about the low-speed shaft, kg m2; rated_speed: w_b0 of the rotor, rad/s; dP_dpitch:
     slope of the aerodynamic power at rated speed, W/rad, negative. theory.md, section 4.
     Raises: InputError unless all are finite, dP_dpitch < 0 and the others > 0.
     """
-    given = {
-        "design_frequency": design_frequency,
-        "damping": damping,
-        "inertia": inertia,
-        "rated_speed": rated_speed,
-        "gear_ratio": gear_ratio,
-    }
-    for key, value in given.items():
+    values = (design_frequency, damping, inertia, rated_speed, gear_ratio)
+    for key, value in zip(POSITIVE, values, strict=True):
         check_number(key, value, 0.0, low_open=True, allowed="positive and finite")
     check_number("dP_dpitch", dP_dpitch, high=0.0, high_open=True, allowed="negative and finite, W/rad")
     scale = inertia * rated_speed / (gear_ratio * -dP_dpitch)
@@ -84,9 +76,9 @@ _SLOPES = Cache(16)  # (id of the turbine, density) -> (turbine, PowerSlope)
 
 
 def power_slope(turbine, density=AIR):
-    """PowerSlope of a turbine's rotor in uniform steady wind, from its blade elements.
+    """Return the PowerSlope of a turbine's rotor in uniform steady wind, from its blade elements.
 
-    Raises: InputError where the rotor cannot reach rated torque below cut-out, or does not lose power by
+    Raises: InputError if the rotor cannot reach rated torque below cut-out, or does not lose power by
     pitching there.
     """
     found = _SLOPES.get((id(turbine), float(density)), lambda: (turbine, _power_slope(turbine, density)))
@@ -144,7 +136,7 @@ def _power_slope(turbine, density):
 
 
 def land_frequency(turbine):
-    """w0 (rad/s) of the land set of a turbine without published gains."""
+    """Return w0 (rad/s) of the land set of a turbine without published gains."""
     return LAND * turbine.rated_rotor_speed / REFERENCE_SPEED
 
 
@@ -158,7 +150,7 @@ def derived_gains(turbine, frequency, damping=DAMPING, density=AIR):
 
 
 def published_set(turbine, gain_set):
-    """PitchGains of a turbine's file by name; None where it has none, and they are to be derived.
+    """Return the PitchGains of a turbine's file by name; None where it has none, and they are to be derived.
 
     gain_set: a name in the file, or one of SETS or OTHER_NAMES, of which "floating" and "oc3" are the same.
     Raises: InputError for any other name.
@@ -173,7 +165,7 @@ def published_set(turbine, gain_set):
 
 
 def gains_of_turbine(turbine, gain_set="oc3"):
-    """PitchGains of a set: the published ones, else those of the rotor with no platform known.
+    """Return the PitchGains of a set: the published ones, else those of the rotor with no platform known.
 
     Of a floating set without published gains the frequency is FLOATING over the rated rotor speeds; of_scene
     gives that of a platform.
@@ -189,15 +181,15 @@ _MODES = Cache(64)  # (plant, water) -> eigenvalues, shares
 
 
 def platform_pitch_frequency(scene):
-    """platform_frequency of the platform's pitch."""
+    """Return platform_frequency of the platform's pitch."""
     return platform_frequency(scene, State.PLATFORM_PITCH)
 
 
 def platform_frequency(scene, motion):
-    """Undamped natural frequency (rad/s) of a platform motion about a scene's trim in rated wind.
+    """Return the undamped natural frequency (rad/s) of a platform motion about a scene's trim in rated wind.
 
     motion: State.SURGE ... State.YAW; the frequency is that of the mode in which it has the greatest share.
-    From the accelerations that small displacements give, with a tower that bends where it comes to rest under
+    From the accelerations that small displacements give, with a flexible tower where it comes to rest under
     them; whatever else has states of its own (a wake, the memory of radiated waves) is held. Remembered per
     plant.
     Raises: InputError as trim, and where nothing restores the motion.
@@ -223,25 +215,21 @@ def _modes(scene):
     handle = without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body).handle()
     dx, mean = np.zeros_like(x), np.zeros_like(x)
 
+    def mean_rates():
+        mean_derivative(handle, x, u, AZIMUTHS, dx, mean)
+        return mean.copy()
+
     def rates(entry, step):
-        found = []
-        keep = x[entry]
-        for sign in (1.0, -1.0):
-            x[entry] = keep + sign * step
-            mean_derivative(handle, x, u, AZIMUTHS, dx, mean)
-            found.append(mean.copy())
-        x[entry] = keep
-        return (found[0] - found[1]) / (2.0 * step)
+        return central_difference(mean_rates, x, entry, step)
 
     tower = {block.name: range(block.offset, block.offset + block.size) for block in scene.blocks}
     bent, bending = (tower.get(name, ()) for name in ("tower_deflection", "tower_velocity"))
     moved = [*zip(range(6), POSITION_STEPS, strict=True), *((i, POSITION_STEPS[0]) for i in bent)]
     speeds = [*range(State.VX, State.VX + 6), *bending]
     stiffness = np.array([rates(i, step)[speeds] for i, step in moved]).T
-    if bent:  # its top goes with the platform
-        stiffness = stiffness[:6, :6] - stiffness[:6, 6:] @ np.linalg.solve(
-            stiffness[6:, 6:], stiffness[6:, :6]
-        )
+    if bent:  # the tower top moves with the platform
+        follows = np.linalg.solve(stiffness[6:, 6:], stiffness[6:, :6])
+        stiffness = stiffness[:6, :6] - stiffness[:6, 6:] @ follows
     kinematics = np.array([rates(State.VX + i, 1e-5)[:6] for i in range(6)]).T
     values, vectors = np.linalg.eig(kinematics @ stiffness)
     arm = 0.5 * scene.platform.draft
@@ -250,7 +238,7 @@ def _modes(scene):
 
 
 def floating_frequency(scene):
-    """w0 (rad/s) of the floating set for the platform of a scene."""
+    """Return w0 (rad/s) of the floating set for the platform of a scene."""
     return min(DETUNED * platform_pitch_frequency(scene), land_frequency(scene.turbine))
 
 
@@ -258,7 +246,7 @@ _TURBINES = Cache(64)  # (id of the turbine, plant, water) -> (turbine, the one 
 
 
 def with_gains(scene):
-    """The scene's turbine with gains for its platform: itself where its file has both sets.
+    """Return the scene's turbine with gains for its platform: itself where its file has both sets.
 
     What the file lacks of SETS is added: "floating" and "land" of the published formula.
     """

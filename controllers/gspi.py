@@ -1,14 +1,13 @@
-"""Jonkman's gain-scheduled PI controllers of the NREL 5 MW turbine, sampled as they were published.
+"""Defines Jonkman's gain-scheduled PI controllers of the NREL 5 MW turbine at their published sampling.
 
 Sources: NREL/TP-500-38060 (land: constant power above rated) and NREL/TP-500-47535 (OC3-Hywind: detuned
-gains, constant torque above rated). The published laws run at every step of FAST, 0.0125 s. A plant stepped
-more coarsely is sampled every control_dt; in between the law runs its own periods of at most SAMPLING on the
-straight line through the last two measured speeds, so that filter, integral and rate limits are those of the
-published sampling; only the command waits for the next control instant.
+gains, constant torque above rated). The published laws run at every step of FAST, 0.0125 s. With a longer
+control_dt the law runs periods of at most SAMPLING on the line through the last two measured speeds, so that
+filter, integral and rate limits are those of the published sampling; commands change at control instants.
 
-It departs from the published code in one way: the rate limit of the blade pitch counts from the last
-command. The code counts from the measured pitch, which with an actuator lag of 0.2 s would hold the blades
-to 0.5 deg/s. controllers/openfast_baseline.py keeps that too, for the deck without an actuator.
+One difference: the rate limit of the blade pitch counts from the last command, in the published code from
+the measured pitch, which with an actuator lag of 0.2 s would limit the blades to 0.5 deg/s
+(controllers/openfast_baseline.py does so, for the deck without an actuator).
 """
 
 from enum import IntEnum

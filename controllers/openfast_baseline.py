@@ -1,22 +1,19 @@
-"""The controller of the OpenFAST runs that this project is validated against: the OC3-Hywind DISCON law.
+"""Defines the OC3-Hywind DISCON law of the OpenFAST reference runs of the validation.
 
-Source: DISCON_OC3Hywind.f90 (old-NWTC/FAST 0badc8d0; same parameters as OpenFAST/r-test's), which
-Bladed-style controllers call with the measured generator speed and blade pitch. It differs from pi.py in
-four ways, each deliberate there and kept here:
+Source: DISCON_OC3Hywind.f90 (old-NWTC/FAST 0badc8d0; same parameters as OpenFAST/r-test's), called through
+the Bladed interface with the measured generator speed and blade pitch. It differs from pi.py in four ways:
 
-- at the start the integral alone holds the blade pitch, whatever the speed error, and the torque starts on
-  the curve;
+- at the start the integral balances the measured blade pitch for any speed error, and the torque is on the
+  curve;
 - the rate limit of the blade pitch counts from the measured pitch, not from the last command;
-- every call advances by its own elapsed time, of which the first has none;
-- what one call commands takes effect a sample later (OpenFAST hands it over at the next step).
+- every call advances by its elapsed time, the first by none;
+- a command takes effect one sample later (OpenFAST applies it at the next step).
 """
 
 from enum import IntEnum
 
-import numpy as np
-
 from fowt_env.controllers.pi import GainScheduled, Parameter, PISettings, curve_of, schedule_gain
-from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.drivetrain import clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
@@ -31,10 +28,9 @@ class Memory(IntEnum):
     CALLS = 4  # 0 before the first call
 
 
-@kernel
-def discon_step(parameters, memory, measurement, command):
-    """One call of the law: the last call's commands to the plant, this call's ones into memory."""
-    p = parameters
+@control_kernel
+def discon_law(p, memory, measurement, command):
+    """Command the result of the last call and store that of this call in memory."""
     first = memory[Memory.CALLS] == 0.0
     dt = 0.0 if first else p[Parameter.CONTROL_DT]
     decay = 1.0 if first else p[Parameter.FILTER_DECAY]
@@ -44,8 +40,7 @@ def discon_step(parameters, memory, measurement, command):
 
     torque = generator_torque(speed, last_pitch, curve_of(p))
     if not first:
-        step = dt * p[Parameter.TORQUE_RATE_LIMIT]
-        torque = rate_limit(last_torque, torque, step)
+        torque = rate_limit(last_torque, torque, dt * p[Parameter.TORQUE_RATE_LIMIT])
 
     gain = schedule_gain(last_pitch, p[Parameter.SCHEDULE_PITCH])
     ratio = p[Parameter.GEAR_RATIO]
@@ -54,8 +49,7 @@ def discon_step(parameters, memory, measurement, command):
     error = speed - ratio * p[Parameter.RATED_SPEED]
     integral = clamp(memory[Memory.INTEGRAL] + error * dt, low / slope, high / slope)
     target = clamp(gain * p[Parameter.PROPORTIONAL] / ratio * error + slope * integral, low, high)
-    step = dt * p[Parameter.PITCH_RATE_LIMIT]
-    pitch = clamp(rate_limit(measured_pitch, target, step), low, high)
+    pitch = clamp(rate_limit(measured_pitch, target, dt * p[Parameter.PITCH_RATE_LIMIT]), low, high)
 
     memory[Memory.FILTERED_SPEED] = speed
     memory[Memory.INTEGRAL] = integral
@@ -64,12 +58,6 @@ def discon_step(parameters, memory, measurement, command):
     memory[Memory.CALLS] += 1.0
     command[0] = torque if first else last_torque
     command[1] = last_pitch
-
-
-@control_kernel
-def discon_law(parameters, memory, measurement, command):
-    """Compiled form of discon_step, one type for all control laws."""
-    discon_step(parameters, memory, measurement, command)
 
 
 class Discon(GainScheduled):
@@ -86,9 +74,8 @@ class Discon(GainScheduled):
         p = self.parameters
         pitch = measurement.blade_pitch
         slope = schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH]) * p[Parameter.INTEGRAL]
-        self.memory[:] = np.array(
-            [measurement.generator_speed, p[Parameter.GEAR_RATIO] * pitch / slope, 0.0, pitch, 0.0]
-        )
+        integral = p[Parameter.GEAR_RATIO] * pitch / slope
+        self.memory[:] = (measurement.generator_speed, integral, 0.0, pitch, 0.0)
 
 
 def openfast_oc3(turbine, control_dt):

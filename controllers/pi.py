@@ -1,7 +1,7 @@
-"""The baseline: torque law and gain-scheduled PI on rotor speed, Eq. (8) in its consistent form.
+"""Defines the baseline: torque law and gain-scheduled PI on rotor speed, Eq. (8), theory.md sections 3 and 4.
 
-theory.md, sections 3 and 4. Above rated the torque is constant (or the power, by name) and the
-blade pitch holds the rotor speed; below rated the pitch rests on its minimum and the torque curve rules.
+Above rated the torque (or, by name, the power) is constant and blade pitch controls the rotor speed; below
+rated the pitch is at its minimum and the torque follows its curve.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -124,7 +124,7 @@ class PISettings:
         return replace(self, derived="", **changes)
 
     def parameters(self, control_dt):
-        """(n,) parameter array of the law at this control period, in the order of Parameter."""
+        """Return (n,) parameter array of the law at this control period, in the order of Parameter."""
         filtered = not isinf(self.speed_filter_corner)
         head = {
             Parameter.CONTROL_DT: control_dt,
@@ -141,30 +141,24 @@ class PISettings:
             Parameter.TORQUE_RATE_LIMIT: self.torque_rate_limit,
         }
         values = np.empty(Parameter.CURVE + len(self.curve))
-        for entry, value in head.items():
-            values[entry] = value
+        values[list(head)] = list(head.values())
         values[Parameter.CURVE :] = self.curve
         return values
 
 
 @kernel
-def curve_of(parameters):
-    """TorqueCurve stored in a parameter array from Parameter.CURVE on."""
-    i = Parameter.CURVE
+def curve_at(p, i):
+    """Return the TorqueCurve stored in a parameter array from the entry i onwards."""
     return TorqueCurve(
-        parameters[i],
-        parameters[i + 1],
-        parameters[i + 2],
-        parameters[i + 3],
-        parameters[i + 4],
-        parameters[i + 5],
-        parameters[i + 6],
-        parameters[i + 7],
-        parameters[i + 8],
-        parameters[i + 9],
-        parameters[i + 10],
-        parameters[i + 11],
-    )
+        p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5],
+        p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10], p[i + 11],
+    )  # fmt: skip
+
+
+@kernel
+def curve_of(parameters):
+    """Return the TorqueCurve stored in the parameter array of the PI law."""
+    return curve_at(parameters, Parameter.CURVE)
 
 
 @kernel
@@ -175,7 +169,7 @@ def schedule_gain(blade_pitch, schedule_pitch):
 
 @kernel
 def schedule_pitch_of(parameters, memory, measured_pitch):
-    """Blade pitch that sets the gain and the torque region: the last command or the measured one."""
+    """Return blade pitch that sets the gain and the torque region: the last command or the measured one."""
     if parameters[Parameter.SCHEDULE_MEASURED] > 0.5:
         low, high = parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM]
         return clamp(measured_pitch, low, high)
@@ -184,7 +178,7 @@ def schedule_pitch_of(parameters, memory, measured_pitch):
 
 @kernel
 def speed_error(parameters, memory, generator_speed):
-    """Error e = w_f - w_b0 of the filtered rotor speed, rad/s; advances the filter by one period.
+    """Return the error e = w_f - w_b0 of the filtered rotor speed, rad/s; advances the filter by one period.
 
     The filter is a single pole held exactly over the period (exponential smoothing).
     """
@@ -196,10 +190,9 @@ def speed_error(parameters, memory, generator_speed):
 
 @kernel
 def write_commands(blade_pitch, target, extra_torque, parameters, memory, command):
-    """Write the torque of the curve and the pitch target, both within their limits of value and rate.
+    """Write the torque of the curve and the pitch target, within their limits of value and rate per period.
 
-    blade_pitch: the one that may force region 3; extra_torque is added to the curve. The rates are those
-    of the commands, per period.
+    blade_pitch: that which may force region 3; extra_torque is added to the curve.
     """
     dt = parameters[Parameter.CONTROL_DT]
     torque, pitch = memory[Memory.TORQUE_COMMAND], memory[Memory.PITCH_COMMAND]
@@ -207,15 +200,11 @@ def write_commands(blade_pitch, target, extra_torque, parameters, memory, comman
     target_torque = generator_torque(memory[Memory.FILTERED_SPEED], blade_pitch, curve)
     if extra_torque != 0.0:
         target_torque = clamp(target_torque + extra_torque, 0.0, curve.maximum_torque)
-    step = dt * parameters[Parameter.TORQUE_RATE_LIMIT]
-    torque = rate_limit(torque, target_torque, step)
+    torque = rate_limit(torque, target_torque, dt * parameters[Parameter.TORQUE_RATE_LIMIT])
     target_pitch = clamp(target, parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM])
-    step = dt * parameters[Parameter.PITCH_RATE_LIMIT]
-    pitch = rate_limit(pitch, target_pitch, step)
-    memory[Memory.TORQUE_COMMAND] = torque
-    memory[Memory.PITCH_COMMAND] = pitch
-    command[0] = torque
-    command[1] = pitch
+    pitch = rate_limit(pitch, target_pitch, dt * parameters[Parameter.PITCH_RATE_LIMIT])
+    memory[Memory.TORQUE_COMMAND] = command[0] = torque
+    memory[Memory.PITCH_COMMAND] = command[1] = pitch
 
 
 @kernel
@@ -238,7 +227,7 @@ def pi_target(pitch, error, parameters, memory):
 
 @kernel
 def pi_step(parameters, memory, generator_speed, measured_pitch, command):
-    """One period of the sampled PI law, theory.md Eq. (8), with the torque law of section 3."""
+    """Advance the sampled PI law, theory.md Eq. (8), by one period, with the torque law of section 3."""
     error = speed_error(parameters, memory, generator_speed)
     pitch = schedule_pitch_of(parameters, memory, measured_pitch)
     target = pi_target(pitch, error, parameters, memory)
@@ -247,7 +236,7 @@ def pi_step(parameters, memory, generator_speed, measured_pitch, command):
 
 @control_kernel
 def pi_law(parameters, memory, measurement, command):
-    """Compiled form of pi_step, one type for all control laws."""
+    """Apply pi_step in the common form of control laws."""
     speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
     pi_step(parameters, memory, speed, pitch, command)
 
@@ -261,7 +250,7 @@ class GainScheduled(CompiledController):
 
     @property
     def information(self):
-        """What the law is given; the plant's equations too, where its gains are derived from them."""
+        """Return what the law is given; the plant's equations too, where its gains are derived from them."""
         if self.settings.derived and "plant_model" not in self.inputs:
             return (*self.inputs, "plant_model")
         return self.inputs
@@ -288,12 +277,11 @@ class PI(GainScheduled):
         self.bumpless = True
 
     def reset(self, measurement):
-        """Start so that act() on this same measurement commands the measured blade pitch.
+        """Start so that act() on the same measurement commands the measured blade pitch.
 
-        The filter starts at the measured speed and the torque at the measured torque (at the curve
-        where none is measured); the integral balances the proportional term, as far as anti-windup
-        allows. Where the blade rests on a limit several integrals do, and the limit itself is taken:
-        it is where a long stay there ends, so no wound-up integral is left behind.
+        The filter starts at the measured speed and the torque at the measured torque (without one on the
+        curve); the integral balances the proportional term within the anti-windup limits. With the blade at
+        a limit the integral term is that limit, so that no windup remains.
         """
         p = self.parameters
         low, high = p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM]
@@ -301,12 +289,7 @@ class PI(GainScheduled):
         gain = schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH])
         error = measurement.generator_speed / p[Parameter.GEAR_RATIO] - p[Parameter.RATED_SPEED]
         proportional = gain * p[Parameter.PROPORTIONAL] * error
-        if pitch <= low:
-            term = low
-        elif pitch >= high:
-            term = high
-        else:
-            term = min(max(pitch - proportional, low), high)
+        term = pitch if pitch in (low, high) else min(max(pitch - proportional, low), high)
         first = min(max(proportional + term, low), high)
         self.bumpless = bool(abs(first - measurement.blade_pitch) <= BUMPLESS)
         # the first act() adds this instant's error before it uses the integral

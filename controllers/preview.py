@@ -1,13 +1,10 @@
-"""PI law with feedforward of the wind that is still on its way, as a lidar on the nacelle would see it.
+"""Defines the PI law with feedforward of the previewed wind.
 
-The steady schedule beta_ss(V) says how far the blades have to turn for a change of wind: d beta = (d
-beta_ss/dV) dV. The law adds to its integral what moves its own pitch by these increments, so anti-windup,
-schedule and limits stay those of the PI law, and whatever beta_ss gets wrong the integral takes back. The
-gain schedule multiplies the integral and falls as the blades turn: at rest beta = GK(beta) KI I, so
-dI = d beta (1 + 2 beta/beta_K)/KI, theory.md (A7). The wind is the
-rotor-averaged one, `preview_time` ahead of the rotor, as the run foresees it. Two equal first-order low
-passes whose delay, with that of the blade-pitch actuator and half a control period, adds up to the preview
-time, keep the blades from following every gust.
+The steady schedule beta_ss(V) determines the pitch change d beta = (d beta_ss/dV) dV. The law adds it to its
+integral, dI = d beta (1 + 2 beta/beta_K)/KI by theory.md (A7), so that anti-windup, schedule and limits are
+those of the PI law and the integral corrects errors of beta_ss. The wind is the rotor-averaged preview at
+`preview_time`. Two equal first-order low passes, whose delay with that of the blade-pitch actuator and half a
+control period equals the preview time, smooth the gusts.
 """
 
 from dataclasses import dataclass, replace
@@ -41,7 +38,7 @@ BELOW_RATED = 0.5  # m/s below the published rated wind that the schedule starts
 
 @dataclass(frozen=True)
 class PreviewSettings:
-    """How the preview is used. Raises: InputError naming the key, value and allowed range."""
+    """Defines the use of the preview. Raises: InputError naming the key, value and allowed range."""
 
     preview_time: float = 3.0  # s that the wind is known ahead
     gain: float = 1.0  # fraction of the steady schedule that is fed forward
@@ -69,7 +66,7 @@ class PreviewMemory(IntEnum):
 
 @kernel
 def scheduled_pitch(wind, parameters):
-    """Blade pitch (rad) times GAIN of the steady schedule at a wind (m/s); its ends are held."""
+    """Return the blade pitch (rad) times GAIN of the steady schedule at a wind (m/s); its ends are held."""
     first, last = PreviewParameter.WIND, PreviewParameter.PITCH - 1
     gain, pitch = parameters[PreviewParameter.GAIN], PreviewParameter.PITCH - PreviewParameter.WIND
     if wind <= parameters[first]:
@@ -97,7 +94,7 @@ def foreseen_change(wind, parameters, memory):
 
 @control_kernel
 def preview_law(parameters, memory, measurement, command):
-    """One period: what the wind's change asks for goes into the integral, then the PI law."""
+    """Add the feedforward of the wind's change to the integral and advance the PI law by one period."""
     p = parameters
     change = foreseen_change(measurement[N_MEASUREMENTS], p, memory)
     error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])

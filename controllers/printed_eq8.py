@@ -1,8 +1,8 @@
-"""DEMONSTRATION ONLY: Eq. (8) of the source paper as printed, whose gain grows with time.
+"""DEMONSTRATION ONLY: defines Eq. (8) of the source paper as printed, whose gain grows with time.
 
-theory.md, section 4. The printed law has t (w_b - w_b0) where the integral of the speed error
-belongs. So it is a proportional controller with the gain G (1 + t/tau_i): it leaves a speed offset
-that fades only like 1/t, depends on the choice of t = 0, and ends unstable. Do not control with it.
+The printed law has t (w_b - w_b0) instead of the integral of the speed error (theory.md, section 4): a
+proportional controller with the gain G (1 + t/tau_i), whose speed offset decays as 1/t, which depends on the
+choice of t = 0 and becomes unstable.
 """
 
 from enum import IntEnum
@@ -31,24 +31,18 @@ class LiteralMemory(IntEnum):
 
 @kernel
 def literal_gain(time, parameters):
-    """Gain of the printed law, rad per rad/s of rotor speed: G (1 + t/tau_i), without the schedule."""
+    """Return gain of the printed law, rad per rad/s of rotor speed: G (1 + t/tau_i), without the schedule."""
     return parameters[Parameter.PROPORTIONAL] + parameters[Parameter.INTEGRAL] * time
 
 
-@kernel
-def literal_step(parameters, memory, measurement, command):
-    """One period of the printed law; filter, schedule, limits and torque are those of the PI law."""
+@control_kernel
+def literal_law(parameters, memory, measurement, command):
+    """Advance the printed law by one period; filter, schedule, limits and torque are those of the PI law."""
     error = speed_error(parameters, memory, measurement[Measure.GENERATOR_SPEED])
     pitch = schedule_pitch_of(parameters, memory, measurement[Measure.BLADE_PITCH])
     time = measurement[Measure.TIME] - memory[LiteralMemory.START_TIME]
     gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH]) * literal_gain(time, parameters)
     write_commands(pitch, memory[LiteralMemory.START_PITCH] + gain * error, 0.0, parameters, memory, command)
-
-
-@control_kernel
-def literal_law(parameters, memory, measurement, command):
-    """Compiled form of literal_step, one type for all control laws."""
-    literal_step(parameters, memory, measurement, command)
 
 
 class Eq8Literal(GainScheduled):

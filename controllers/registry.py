@@ -1,4 +1,4 @@
-"""The built-in controllers by name. A file may name these and no others: any other name runs code."""
+"""Lists the built-in controllers by name. A file may name only these, because any other name runs code."""
 
 from fowt_env.controllers.constant import constant
 from fowt_env.controllers.floating_feedback import floating_feedback

@@ -1,23 +1,19 @@
-"""ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
+"""Runs ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
 
 Abbas et al., Wind Energ. Sci. 7, 2022. The library (libdiscon of the PyPI wheel `rosco`, installed with
---no-deps: its toolbox is not used) is called like OpenFAST calls it, by the Bladed interface. Its data
-of the plant are written for the scene at hand: DISCON.IN from the turbine's description, and the Cp, Ct,
-Cq table from this project's blade elements. A turbine whose file names a DISCON.IN of its own is controlled
-by that one as it stands, with the table that it names, or this project's where there is none. Else gains and
-schedule of the blade pitch are those published for OC3-Hywind, as no ROSCO tuning of it is published and the
-automatic one turns the proportional gain positive beyond 16 deg (or those of controllers/gains.py); torque
-above rated is constant as there. Below rated ROSCO does what it does by default: an extended Kalman filter
-estimates the wind and the torque tracks the best tip-speed ratio, with the set-point smoother between the
-regions and no peak shaving.
+--no-deps: its toolbox is not used) is called through the Bladed interface, as OpenFAST does. DISCON.IN is
+written for the scene from the turbine's description, the Cp, Ct, Cq table from the blade elements. If the
+turbine file names a DISCON.IN, that file is used unchanged with its table, or with a computed table if it
+has none. Otherwise gains and schedule are those published for OC3-Hywind (or of controllers/gains.py),
+because no ROSCO tuning of it is published and the automatic one has a positive proportional gain above 16
+deg; torque above rated is constant. Below rated ROSCO has its defaults: wind estimation by an extended
+Kalman filter, tracking of the best tip-speed ratio, set-point smoother, no peak shaving.
 
-Its individual pitch control integrates the tilt and yaw moment of the hub to cyclic pitch. It is switched on
-in the turbine's own DISCON.IN, whose gains stay. Else the integral gain is that of `ipc`
-(controllers/ipc/design.py) at zero blade pitch, as the library has no schedule for it, with the azimuth lead
-for the lag of the drive and the limits of its toolbox.
+Its individual pitch control integrates the tilt and yaw moment of the hub. The gains are those of the
+turbine's DISCON.IN, otherwise the integral gain of `ipc` (controllers/ipc/design.py) at zero blade pitch, as
+the library has no schedule for it, with the azimuth lead for the drive's lag and the limits of its toolbox.
 
-A loaded library is one controller that can be started once. So every reset() loads a private copy of the
-file and drops the one before.
+A loaded library is one controller that can start once: every reset() loads a private copy of the file.
 """
 
 import ctypes
@@ -121,7 +117,7 @@ class Discon:
 
     @property
     def mode(self):
-        """Fl_Mode, which says what acceleration the library is given."""
+        """Return the Fl_Mode, which says what acceleration the library is given."""
         return int(self.values["Fl_Mode"])
 
     def texts(self, changes, table):
@@ -147,7 +143,7 @@ class Discon:
 
 
 def find_library():
-    """(path of libdiscon, [paths of the libraries that it needs]) of the installed wheel.
+    """Return (path of libdiscon, [paths of the libraries that it needs]) of the installed wheel.
 
     Raises: InputError with what to install.
     """
@@ -163,7 +159,7 @@ def find_library():
 
 
 def _load(path):
-    """The library at a path. Raises: InputError saying what is wrong with it."""
+    """Return the library at a path. Raises: InputError saying what is wrong with it."""
     try:
         library = ctypes.CDLL(str(path))
         library.DISCON.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
@@ -186,7 +182,7 @@ def _preload(paths):
 
 
 def _flush():
-    """Function that writes out what the Fortran library has buffered for standard output."""
+    """Return the function that writes out what the Fortran library has buffered for standard output."""
     for library in _needed:
         if hasattr(library, "_gfortran_flush_i4"):
             return library._gfortran_flush_i4
@@ -260,8 +256,8 @@ class Rosco:
     def reset(self, measurement):
         """Load a fresh copy of the library and start it at a Measurement.
 
-        Raises: InputError where prepare() was not called or the library does not load; ControllerError with
-        ROSCO's own words where it refuses to start.
+        Raises: InputError if prepare() was not called or the library does not load; ControllerError with
+        the message of ROSCO if it does not start.
         """
         if self._files is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
@@ -272,7 +268,7 @@ class Rosco:
         self._first = (measurement.time, self._call(0, measurement))
 
     def act(self, measurement):
-        """(generator torque, blade pitch or that of each blade).
+        """Return (generator torque, blade pitch or that of each blade).
 
         Raises: ControllerError with ROSCO's own words where it fails.
         """
@@ -399,7 +395,7 @@ _tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table): runs of
 
 
 def _table(turbine, density):
-    """Table of a turbine's blade elements."""
+    """Return the Table of a turbine's blade elements."""
     key = (id(turbine), density)
 
     def make():
@@ -410,7 +406,7 @@ def _table(turbine, density):
 
 
 def poles(turbine, density, table):
-    """(wind m/s, pole 1/s) of the rotor speed alone at its steady states, from cut-in to cut-out."""
+    """Return (wind m/s, pole 1/s) of the rotor speed alone at its steady states, from cut-in to cut-out."""
     radius = turbine.rotor.tip_radius
     scale = 0.5 * density * pi * radius**3
     inertia = _inertia(turbine)
@@ -431,7 +427,7 @@ def poles(turbine, density, table):
 
 
 def best_ratio(turbine, table):
-    """Tip-speed ratio of most power at the finest blade pitch."""
+    """Return the tip-speed ratio of most power at the finest blade pitch."""
     power = RectBivariateSpline(table.ratio, table.blade_pitch, table.cp)
     fine = np.linspace(table.ratio[0], table.ratio[-1], 2000)
     return float(fine[np.argmax(power(fine, turbine.pitch_drive.minimum)[:, 0])])
@@ -446,7 +442,7 @@ def _inertia(turbine):
 def pitch_gains(turbine, gain_set="oc3"):
     """(KP, KI), each (n,), over SCHEDULE in ROSCO's sign: blade pitch over reference less measured speed.
 
-    Raises: InputError where a proportional gain would not be negative.
+    Raises: InputError if a proportional gain would not be negative.
     """
     published = published_set(turbine, gain_set)
     schedule = 1.0 / (1.0 + SCHEDULE / published.gain_schedule_pitch)
@@ -457,7 +453,7 @@ def pitch_gains(turbine, gain_set="oc3"):
 
 
 def deck(turbine, density, table, settings):
-    """{name: value} of DISCON.IN for a turbine; values are numbers, texts or sequences of numbers."""
+    """Return {name: value} of DISCON.IN for a turbine; values are numbers, texts or sequences of numbers."""
     law, drive, ratio = turbine.torque_law, turbine.pitch_drive, turbine.drivetrain.gear_ratio
     inertia, radius = _inertia(turbine), turbine.rotor.tip_radius
     winds, pole = poles(turbine, density, table)
@@ -555,7 +551,7 @@ def individual_entries(turbine, control_dt):
 
 
 def _words(value):
-    """Text of a value of the deck."""
+    """Return the text of a value of the deck."""
     if isinstance(value, str):
         return value
     if isinstance(value, int):
@@ -564,13 +560,13 @@ def _words(value):
 
 
 def deck_text(values):
-    """DISCON.IN of a deck: a value and its name on each line."""
+    """Return DISCON.IN of a deck: a value and its name on each line."""
     lines = ["! ROSCO deck, written for one run"]
     return "\n".join([*lines, *(f"{_words(value)}   ! {name} -" for name, value in values.items()), ""])
 
 
 def table_text(table):
-    """Text of a Table as ROSCO reads it."""
+    """Return the text of a Table as ROSCO reads it."""
     lines = ["# Rotor performance", "#", "#", "# Pitch angle vector (deg)"]
     lines += [_words(table.blade_pitch / DEGREE), "# TSR vector", _words(table.ratio)]
     lines += ["# Wind speed vector", "0", ""]

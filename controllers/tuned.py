@@ -1,7 +1,7 @@
-"""The settings in tuned.toml, which training/design/tune.py has found on OC3-Hywind, for any turbine.
+"""Reads the settings that training/design/tune.py found on OC3-Hywind (tuned.toml), for any turbine.
 
-Others than the NREL 5 MW turbine take them in their own units: velocities by the rated wind, frequencies by
-the rated rotor speed, torques by the rated torque. Nobody has searched for better ones there.
+For turbines other than the NREL 5 MW they are scaled: velocities by the rated wind, frequencies by the rated
+rotor speed, torques by the rated torque. They are not tuned again.
 """
 
 import tomllib
@@ -14,7 +14,7 @@ TUNED = Path(__file__).parent / "tuned.toml"
 
 
 def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
-    """The settings of a controller in the units of a turbine; as they are for the NREL 5 MW turbine."""
+    """Return settings of a controller in the units of a turbine; as they are for the NREL 5 MW turbine."""
     wind = turbine.rated_wind_speed / RATED_WIND
     frequency = turbine.rated_rotor_speed / ROTOR_SPEED
     factors = {
@@ -28,5 +28,5 @@ def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
 
 
 def tuned(name: str) -> dict[str, Any]:
-    """{setting: value} of a controller that `fowt design tune` has tuned."""
+    """Return {setting: value} of a controller that `fowt design tune` has tuned."""
     return tomllib.loads(TUNED.read_text())[name]["settings"]

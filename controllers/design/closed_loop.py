@@ -24,7 +24,7 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     The gain schedule counts with its slope: the integral term is GK(beta) times the integral, so a rise
     of beta lowers GK. With the schedule on the last command that divides every gain by 2 - GK; on the
     measured pitch it adds -(1 - GK) times that pitch to the command.
-    Raises: InputError where the pitch rests on a limit (below rated the loop is open).
+    Raises: InputError if the pitch rests on a limit (below rated the loop is open).
     """
     model = with_pitch_lag(model)
     point = model.point
@@ -74,7 +74,7 @@ def nearest_to_platform(found, model):
 
 
 def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
-    """{gain set: [damping ratio of the platform-pitch mode at each wind]} on the floating platform.
+    """Return {gain set: [damping ratio of the platform-pitch mode at each wind]} on the floating platform.
 
     gain_sets: {name: changes of PISettings.published, e.g. {"gain_set": "land"}}. The mode is the one
     named platform pitch with the period nearest to that of the platform alone. Viscous damping is not

@@ -1,8 +1,7 @@
-"""PI gains and gain schedule from a specified frequency and damping ratio, on linear models over the wind.
+"""Designs PI gains and schedule for a frequency and damping ratio, on linear models over the wind.
 
-The rotor alone, as in the published design (theory.md, Eq. (A6)): its acceleration per blade pitch is taken
-from each linear model, the aerodynamic damping of its speed is left out. What the platform makes of the
-gains is computed afterwards from the whole plant.
+As in the published design (theory.md, Eq. (A6)) the design model is the rotor alone, without the aerodynamic
+damping of its speed; the effect on the platform is computed afterwards from the complete plant.
 """
 
 from dataclasses import dataclass
@@ -80,7 +79,7 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
 
 
 def _platform_damping(model, settings):
-    """Damping ratio of the platform-pitch mode of the whole plant under a PI law."""
+    """Return the damping ratio of the platform-pitch mode of the whole plant under a PI law."""
     a, names = closed_loop_matrix(model, settings)
     found = modes(a, names, model.cm_height, model.arm)
     pitching = [mode for mode in found if mode.name == "platform_pitch"]

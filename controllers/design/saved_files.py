@@ -1,8 +1,7 @@
-"""Controllers saved as files: plain JSON with a version, whose every value is checked when it is read.
+"""Saves and loads controllers as JSON files with a version, whose every value is checked.
 
-A design of kind "pi" holds gains and schedule; one of kind "lqr" holds its settings and the linear models
-that it is made for, so that it can be run at any control period and does not know a plant that was changed
-since. Used by name as design:FILE.
+A design of kind "pi" contains gains and schedule, one of kind "lqr" its settings and linear models, so that
+it runs at any control period and independently of later changes of the plant. Used by name as design:FILE.
 """
 
 import json
@@ -28,7 +27,7 @@ SPACING = 1.0  # m/s, between the models of a design of kind "lqr"
 
 
 def save_design(path, kind, scene, settings, command, **further):
-    """The path written: a design for the scene's platform and turbine.
+    """Return the path written: a design for the scene's platform and turbine.
 
     settings: PI_KEYS, or "lqg" and "models" for kind "lqr" (lqr_settings); command: what made it, to be
     read by people; further: tables of the design, which are not read back.
@@ -55,13 +54,13 @@ def save_design(path, kind, scene, settings, command, **further):
 
 
 def lqr_settings(chosen, models):
-    """Settings of kind "lqr" for save_design, of LQGSettings and DesignModels."""
+    """Return the settings of kind "lqr" for save_design, of LQGSettings and DesignModels."""
     rows = [{key: np.asarray(value).tolist() for key, value in vars(model).items()} for model in models]
     return {"lqg": asdict(chosen), "models": rows}
 
 
 def load_design(path):
-    """Factory (turbine, control_dt) -> controller of a saved design.
+    """Return the factory (turbine, control_dt) -> controller of a saved design.
 
     Raises: InputError that names file, key and value; on the call, for a turbine it was not made for.
     """
@@ -75,7 +74,7 @@ def load_design(path):
 
 
 def _factory(content, where, name="design"):
-    """Factory of the checked contents of a design."""
+    """Return the factory of the checked contents of a design."""
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise InputError(f'{where}: no design of a controller ("format" must be {FORMAT!r})')
     if content.get("version") != VERSION:
@@ -116,14 +115,14 @@ def _check_keys(given, expected, place, where):
 
 
 def _finite(key, value):
-    """A finite number as a float. Raises: InputError that shows a text without quotation marks."""
+    """Return a finite number as a float. Raises: InputError that shows a text without quotation marks."""
     if not is_number(value):
         raise InputError(f"{key} = {str(value)[:60]}: must be a finite number")
     return float(value)
 
 
 def _pi(settings, where):
-    """Maker of a PI controller from its settings; a gain_schedule_pitch of null means no schedule."""
+    """Return maker of a PI controller from its settings; a gain_schedule_pitch of null means no schedule."""
     values = {}
     for key, value in settings.items():
         free = key == "gain_schedule_pitch" and value is None
@@ -132,7 +131,7 @@ def _pi(settings, where):
 
 
 def _lqr(settings, where):
-    """Maker of an lqr controller from its LQGSettings and models."""
+    """Return the maker of an lqr controller from its LQGSettings and models."""
     known = [item.name for item in fields(LQGSettings)]
     _check_keys(settings["lqg"], known, "settings.lqg", where)
     values = {key: _finite(f"{where}: settings.lqg.{key}", value) for key, value in settings["lqg"].items()}
@@ -170,7 +169,7 @@ def _lqr(settings, where):
 
 
 def _model(row, place, where):
-    """DesignModel of one entry of settings.models."""
+    """Return the DesignModel of one entry of settings.models."""
     _check_keys(row, MODEL_SHAPES, place, where)
     values = {}
     for key, shape in MODEL_SHAPES.items():

@@ -1,14 +1,13 @@
-"""What individual pitch control needs of a turbine: how its blades answer to pitch, and how its drive lags.
+"""Computes the design data of individual pitch control: response of the blades to pitch, lag of the drive.
 
 A cyclic pitch theta_i = theta_t cos psi_i + theta_y sin psi_i of blades at the azimuths psi_i changes the
-root moments out of the rotor plane, and in multi-blade coordinates
+out-of-plane root moments, and in multi-blade coordinates
 
 M_tilt = 2/3 sum M_i cos psi_i,    M_yaw = 2/3 sum M_i sin psi_i
 
-both by the slope G = dM/d theta of a single blade, since a blade that is stiff answers at once and the rotor
-is alike in all azimuths: (M_tilt, M_yaw) changes by G (theta_t, theta_y), and tilt and yaw are coupled by
-nothing but the lag of the pitch drive at one cycle a revolution (1P), which turns the vector by its phase.
-Bossanyi, Wind Energy 6(2), 2003, and 8(4), 2005; the offset of the azimuth that turns it back: Mulders,
+by the slope G = dM/d theta of a single rigid blade: (M_tilt, M_yaw) changes by G (theta_t, theta_y). Tilt
+and yaw are coupled only by the lag of the pitch drive at 1P, which rotates the vector by its phase.
+Bossanyi, Wind Energy 6(2), 2003, and 8(4), 2005; azimuth offset that compensates the lag: Mulders,
 Pamososuryo, Disario and van Wingerden, Wind Energy 22(6), 2019.
 """
 

@@ -1,27 +1,22 @@
-"""Individual pitch control: the PI law for torque and mean pitch, and a cyclic pitch against 1P loads.
+"""Defines individual pitch control: PI law for torque and mean pitch, cyclic pitch against 1P loads.
 
-The root moments out of the rotor plane become tilt and yaw moment M of the hub in axes that do not turn
-(multi-blade coordinates, controllers/ipc/design.py). The moment without cyclic pitch theta is estimated as
-M - G theta with the slope G of the root moment, scheduled on the mean pitch. It passes a notch at three times
-the rotor speed, where the blades' own second and fourth harmonics appear, and theta follows what would cancel
-it, -(M - G theta)/G, with a first-order lag. Without the notch this is integral control of M with the gain
-bandwidth/|G|, and at rest M = 0 whatever the error of G; with the estimate, notches and limits leave the loop
-damped. There is no proportional part: below the notch the rotor answers at once, and all that it would add
-is turbulence. Back in the blades' axes the azimuth leads by what the pitch drive and the control period lag
-at one cycle a revolution (1P), so that tilt stays tilt and yaw yaw.
+The out-of-plane root moments are transformed to the hub's tilt and yaw moment M (multi-blade coordinates,
+controllers/ipc/design.py). The moment without cyclic pitch theta is estimated as M - G theta with the slope G
+of the root moment, scheduled on the mean pitch. After a notch at 3P, where the blades' second and fourth
+harmonics appear, theta follows -(M - G theta)/G with a first-order lag. Without the notch this is integral
+control of M with the gain bandwidth/|G|; the estimate keeps the loop damped with notches and limits. A
+proportional part would only add turbulence. The azimuth of the inverse transformation leads by the lag of
+pitch drive and control period at 1P, which decouples tilt and yaw.
 
-The cyclic amplitude is limited to `amplitude`, to what the drive's rate allows at the present rotor speed,
-and to the distance of the mean pitch from the drive's ends. So it fades in above rated with the mean pitch;
-what is cut off is not wound up.
+The cyclic amplitude is limited to `amplitude`, by the drive's rate at the present rotor speed, and to the
+distance of the mean pitch from the drive's ends, so that it fades in above rated; there is no windup.
 
-With a `bound` only what exceeds it is cancelled: theta follows -(1 - bound/|M - G theta|) (M - G theta)/G,
-and nothing within the bound. So the least cyclic pitch that keeps the moment at the bound is used, in the
-direction of the load: output-constrained control of the magnitude of tilt and yaw together, Hummel, Kober and
-Mulders, Wind Energ. Sci. 10, 2005-2024, 2025.
+With a `bound` theta follows -(1 - bound/|M - G theta|) (M - G theta)/G, and zero within the bound:
+output-constrained control of the magnitude of tilt and yaw together, Hummel, Kober and Mulders, Wind Energ.
+Sci. 10, 2005-2024, 2025.
 
-A platform can be left alone: the yaw moment is then cancelled below `yaw_corner` only, and the estimated tilt
-moment passes `tilt_notches` at frequencies of the platform. The yaw moment turns the platform, and the cyclic
-pitch against the tilt moment drives sway and roll, by the blades' tangential loads.
+To avoid excitation of the platform, the yaw moment, which yaws the platform, is cancelled below `yaw_corner`
+only, and the tilt moment, whose control excites sway and roll by tangential loads, passes `tilt_notches`.
 """
 
 from dataclasses import dataclass, replace
@@ -41,7 +36,7 @@ from fowt_env.plant.drivetrain import TorqueCurve, clamp, rate_limit
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.state import BLADES, Command, State
 
-TILT_NOTCHES = 3  # at most, beside that at 3P
+TILT_NOTCHES = 3  # at most, in addition at 3P
 COEFFICIENTS = 5  # of a notch: b0, b1, b2, a1, a2
 NYQUIST_SHARE = 0.9  # of half the sampling frequency, beyond which no notch is placed
 BELOW_PLATFORM = 0.25  # of the slowest platform frequency: corner of the yaw moment of ipc_floating
@@ -50,7 +45,7 @@ CONSTRAINED_BOUND = 0.1  # of the greatest root moment in steady wind, of ipc_co
 
 @dataclass(frozen=True)
 class IPCSettings:
-    """What shapes the cyclic pitch. Raises: InputError naming the key, value and allowed range."""
+    """Defines the cyclic pitch control. Raises: InputError naming the key, value and allowed range."""
 
     bandwidth: float = BANDWIDTH
     amplitude: float = 5.0 * DEGREE  # rad, greatest cyclic pitch
@@ -113,7 +108,7 @@ N_MEMORY = CyclicMemory.FILTERS + 2 * (2 + TILT_NOTCHES)
 
 @kernel
 def notch_coefficients(frequency, damping, dt):
-    """(b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2) at w = frequency, rad/s.
+    """Return (b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2) at w = frequency, rad/s.
 
     Bilinear, exact at w.
     """
@@ -125,7 +120,7 @@ def notch_coefficients(frequency, damping, dt):
 
 @kernel
 def filtered(value, coefficients, memory, at, started):
-    """Output of a second-order filter; advances its two states in memory by one period.
+    """Return the output of a second-order filter; advances its two states in memory by one period.
 
     Where it has not started it rests at this value.
     """
@@ -141,7 +136,7 @@ def filtered(value, coefficients, memory, at, started):
 
 @kernel
 def without_platform(tilt, yaw, parameters, memory, started):
-    """(tilt, yaw) moment (N m) without what the platform is left alone with."""
+    """Return (tilt, yaw) moment (N m) after tilt notches and the low pass of the yaw moment."""
     for k in range(TILT_NOTCHES):
         i = CyclicParameter.NOTCHES + k * COEFFICIENTS
         c = parameters[i], parameters[i + 1], parameters[i + 2], parameters[i + 3], parameters[i + 4]
@@ -154,14 +149,14 @@ def without_platform(tilt, yaw, parameters, memory, started):
 
 @kernel
 def share_beyond(tilt, yaw, bound):
-    """Share of a moment (N m) by which its magnitude exceeds the bound; 0 within it."""
+    """Return the fraction of a moment (N m) by which its magnitude exceeds the bound; 0 within it."""
     magnitude = hypot(tilt, yaw)
     return 0.0 if magnitude <= bound else 1.0 - bound / magnitude
 
 
 @kernel
 def greatest_amplitude(mean_pitch, rotor_speed, parameters):
-    """Greatest cyclic pitch (rad) at a mean pitch (rad) and rotor speed, rad/s."""
+    """Return the greatest cyclic pitch (rad) at a mean pitch (rad) and rotor speed, rad/s."""
     p = parameters
     room = min(mean_pitch - p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM] - mean_pitch)
     room = min(room, p[CyclicParameter.AMPLITUDE])
@@ -172,7 +167,7 @@ def greatest_amplitude(mean_pitch, rotor_speed, parameters):
 
 @kernel
 def cyclic_step(parameters, memory, measurement, command):
-    """One period of the cyclic pitch on top of the mean pitch that stands in command."""
+    """Advance the cyclic pitch by one period and add it to the mean pitch in command."""
     p = parameters
     dt, mean = p[Parameter.CONTROL_DT], command[Command.BLADE_PITCH]
     rotor_speed = memory[Memory.FILTERED_SPEED] / p[Parameter.GEAR_RATIO]
@@ -213,7 +208,7 @@ def cyclic_step(parameters, memory, measurement, command):
 
 @control_kernel
 def ipc_law(parameters, memory, measurement, command):
-    """One period: torque and mean pitch of the PI law, and the cyclic pitch of each blade."""
+    """Command torque and mean pitch of the PI law, and the cyclic pitch of each blade."""
     speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
     pi_step(parameters, memory, speed, pitch, command)
     cyclic_step(parameters, memory, measurement, command)
@@ -238,15 +233,15 @@ class IPC(PI):
         self.parameters, self.memory = own, np.zeros(N_MEMORY)
 
     def cyclic_settings(self, scene):
-        """The IPCSettings for a scene."""
+        """Return the IPCSettings for a scene."""
         return self.cyclic
 
     def prepare(self, scene):
-        """Take the gains of the scene's turbine, and of its platform where the law asks for it."""
+        """Set the parameters for the scene's turbine and, if the law needs it, its platform."""
         super().prepare(scene)
         turbine, cyclic, p = scene.turbine, self.cyclic_settings(scene), self.parameters
         slope, rated = root_slope(turbine), turbine.rated_rotor_speed
-        for entry, value in {
+        values = {
             CyclicParameter.DECAY: exp(-self.law_dt * cyclic.bandwidth * rated),
             CyclicParameter.SLOPE: slope.at_zero,
             CyclicParameter.DOUBLING: slope.doubling,
@@ -255,11 +250,9 @@ class IPC(PI):
             CyclicParameter.NOTCH_DAMPING: cyclic.notch_damping,
             CyclicParameter.LEAD_TIME: lead_time(turbine, self.law_dt) if cyclic.lead else 0.0,
             CyclicParameter.BOUND: cyclic.bound * slope.moment,
-            CyclicParameter.YAW_DECAY: exp(-self.law_dt * cyclic.yaw_corner)
-            if cyclic.yaw_corner < inf
-            else 0.0,
-        }.items():
-            p[entry] = value
+            CyclicParameter.YAW_DECAY: exp(-self.law_dt * cyclic.yaw_corner),  # 0 without a corner
+        }
+        p[list(values)] = list(values.values())
         coefficients = np.zeros((TILT_NOTCHES, COEFFICIENTS))
         coefficients[:, 0] = 1.0  # passes everything
         for k, frequency in enumerate(cyclic.tilt_notches):
@@ -269,7 +262,7 @@ class IPC(PI):
     def reset(self, measurement):
         """Start as PI.reset, each blade from its measured pitch and with no cyclic pitch.
 
-        Raises: InputError where prepare() was not called.
+        Raises: InputError if prepare() was not called.
         """
         if np.isnan(self.parameters[CyclicParameter.SLOPE]):
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
@@ -280,16 +273,15 @@ class IPC(PI):
 
 
 class FloatingIPC(IPC):
-    """IPC that leaves sway, roll and yaw of the platform alone, as far as their own frequencies go."""
+    """IPC that does not act at the platform's frequencies of sway, roll and yaw."""
 
     inputs = (*IPC.inputs, "plant_model")
 
     def cyclic_settings(self, scene):
-        """The IPCSettings with notches at sway and roll, and a corner well below the slowest of the three."""
+        """Return the IPCSettings with notches at sway and roll, and a corner below the slowest frequency."""
         sway, roll, yaw = (platform_frequency(scene, m) for m in (State.SWAY, State.ROLL, State.YAW))
-        return replace(
-            self.cyclic, tilt_notches=(sway, roll), yaw_corner=BELOW_PLATFORM * min(sway, roll, yaw)
-        )
+        corner = BELOW_PLATFORM * min(sway, roll, yaw)
+        return replace(self.cyclic, tilt_notches=(sway, roll), yaw_corner=corner)
 
 
 def ipc(turbine, control_dt):

@@ -1,14 +1,13 @@
-"""LQG design of blade pitch and generator torque on the linear models of a scene, and what it predicts.
+"""Designs LQG control of blade pitch and generator torque on the linear models of a scene.
 
 Per wind speed: surge, platform pitch, rotor and pitch actuator in the plane, the rotor-averaged wind as a
-second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance acting with
-the hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command.
-Radiation memory, a tower that bends and other internal states have no state here but act on those that have
-(analysis/reduced_model.py); what that leaves out, the estimator takes as a moment on the platform.
+second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance with the
+hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command. Other
+internal states are residualised (analysis/reduced_model.py); the estimator represents the rest by a moment
+on the platform.
 
-Winds, travels and moments that were found for the NREL 5 MW turbine are scaled to others: winds by the
-difference of the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub
-height.
+Winds, travels and moments of the NREL 5 MW turbine are scaled to other turbines: winds by the difference of
+the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub height.
 """
 
 from dataclasses import asdict, dataclass, fields, replace
@@ -41,7 +40,7 @@ N_PLANT, N_SENSORS = len(PLANT), len(SENSORS)
 N_STATE = N_PLANT + 5  # estimated: plant, two wind states, two wave states, slow moment on the platform
 N_FEEDBACK = N_PLANT + 7  # fed back: plant, torque, pitch command, speed integral, wind and wave states
 WIND, WAVE, MOMENT = N_PLANT, N_PLANT + 2, N_PLANT + 4
-SHARE_WIND = 18.0  # m/s, where the share of platform pitch holds as given
+SHARE_WIND = 18.0  # m/s, where the fraction of platform pitch holds as given
 SHARE_RANGE = (0.02, 0.98)  # over the wind
 WAVE_DAMPING = 0.2  # of the resonance that stands for the sea's spectrum
 # Per sample: rad/s, rad, rad, rad/s, m/s2. With that of the blade pitch as large as a cheap encoder's, what
@@ -86,14 +85,14 @@ class LQGSettings:
                 check_number(item.name, value, 0.0, low_open=True, allowed="finite and positive")
 
     def changed(self, **changes):
-        """A copy with some settings changed. Raises: InputError for unknown names."""
+        """Return a copy with some settings changed. Raises: InputError for unknown names."""
         for key in changes:
             if key not in asdict(self):
                 raise unknown("setting of lqr", key, asdict(self))
         return replace(self, **changes)
 
     def share_at(self, wind):
-        """Share of platform pitch at a wind (m/s) of the NREL 5 MW turbine (equivalent_wind)."""
+        """Return the share of platform pitch at a wind (m/s) of the NREL 5 MW turbine (equivalent_wind)."""
         low, high = SHARE_RANGE
         return min(max(self.share + self.share_growth * (wind - SHARE_WIND), low), high)
 
@@ -128,7 +127,7 @@ MODEL_SHAPES = {  # of the fields of DesignModel
 
 
 def design_winds(turbine):
-    """Winds (m/s, 1 apart) of the models of a turbine, above cut-in and up to cut-out."""
+    """Return the winds (m/s, 1 apart) of the models of a turbine, above cut-in and up to cut-out."""
     return tuple(range(floor(turbine.cut_in_wind_speed) + 1, floor(turbine.cut_out_wind_speed) + 1))
 
 
@@ -138,28 +137,28 @@ def lowest_design_wind(turbine):
 
 
 def winds_above_rated(turbine):
-    """Whole winds (m/s) at which the blades of a turbine are pitched, up to cut-out."""
+    """Return the whole winds (m/s) at which the blades of a turbine are pitched, up to cut-out."""
     return tuple(range(lowest_design_wind(turbine), floor(turbine.cut_out_wind_speed) + 1))
 
 
 def equivalent_wind(turbine, wind):
-    """The wind of the NREL 5 MW turbine that is as far from rated wind, m/s."""
+    """Return the wind of the NREL 5 MW turbine that is as far from rated wind, m/s."""
     return wind - (turbine.rated_wind_speed - RATED_WIND)
 
 
 def travel_scale(turbine):
-    """Blade-pitch travel of a turbine over that of the NREL 5 MW turbine: as much in as many turns."""
+    """Return blade-pitch travel of a turbine over that of the NREL 5 MW turbine: as much in as many turns."""
     return turbine.rated_rotor_speed / ROTOR_SPEED
 
 
 def moment_scale(turbine):
-    """Moments on a turbine's platform over those on the NREL 5 MW turbine's."""
+    """Return the moments on a turbine's platform over those on the NREL 5 MW turbine's."""
     return (turbine.rotor.tip_radius / TIP_RADIUS) ** 2 * (turbine.rotor.hub_height / HUB_HEIGHT)
 
 
 @cached(64)
 def wind_filter(speed, height, diameter):
-    """(T1, T2, noise): v = noise white / ((1 + T1 s)(1 + T2 s)) like the rotor-averaged Kaimal wind.
+    """Return (T1, T2, noise): v = noise white / ((1 + T1 s)(1 + T2 s)) like the rotor-averaged Kaimal wind.
 
     Fitted to the log spectrum from 1/300 to 0.2 Hz; noise so that the variances agree.
     """
@@ -182,13 +181,13 @@ def wind_filter(speed, height, diameter):
 
 
 def scene_at(scene, speed):
-    """The scene in a steady wind (m/s) and flat water."""
+    """Return the scene in a steady wind (m/s) and flat water."""
     speed = float(speed)
     return replace(without_fluctuations(scene, speed), wind=speed, sea=None, wind_speed=speed)
 
 
 def design_model(scene, speed):
-    """DesignModel of a scene's plant at a wind speed, m/s."""
+    """Return the DesignModel of a scene's plant at a wind speed, m/s."""
     try:
         sea = sea_state_of(joint_sea_state(SITE, min(float(speed), LAST_SEA_WIND)))
     except InputError as error:
@@ -230,7 +229,7 @@ def design_model(scene, speed):
 
 
 def _state_rows():
-    """Entries of PLANT in the state vector."""
+    """Return the entries of PLANT in the state vector."""
     from fowt_env.plant.state import State
 
     return [State[name.upper()] for name in PLANT]
@@ -249,7 +248,7 @@ def design_models(scene):
 
 
 def sampled_noise(a, q, dt):
-    """Covariance that noise of intensity q adds over dt (Van Loan)."""
+    """Return the covariance that noise of intensity q adds over dt (Van Loan)."""
     n = a.shape[0]
     block = np.zeros((2 * n, 2 * n))
     block[:n, :n], block[:n, n:], block[n:, n:] = -a, q, a.T

@@ -1,18 +1,12 @@
-"""The Kalman filter of lqr: estimates platform, rotor-averaged wind and waves from measured channels.
+"""Defines the Kalman filter of lqr: platform, rotor-averaged wind and waves from measured channels.
 
-Parameters are a head, the torque curve and a block per wind, between which it interpolates; the memory begins
-with the estimate.
+Parameters are a head, the torque curve and a block per wind, between which they are interpolated; the memory
+begins with the estimate.
 """
 
 from enum import IntEnum
 
-from fowt_env.controllers.lqr.design import (
-    N_FEEDBACK,
-    N_PLANT,
-    N_SENSORS,
-    N_STATE,
-    WIND,
-)
+from fowt_env.controllers.lqr.design import N_FEEDBACK, N_PLANT, N_SENSORS, N_STATE, WIND
 from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, clamp
 from fowt_env.plant.measurement import Measure
@@ -67,7 +61,7 @@ N_MEMORY = STARTED + 1
 
 @kernel
 def between(p, low, fraction, place):
-    """Entry of the blocks at `place`, between two winds."""
+    """Return the entry of the blocks at `place`, between two winds."""
     return (1.0 - fraction) * p[low + place] + fraction * p[low + BLOCK + place]
 
 
@@ -84,7 +78,7 @@ def deviate(p, low, fraction, memory):
 
 @kernel
 def correct(p, low, fraction, memory, measurement):
-    """Correct the estimate with what is measured of rotor, blades, platform and nacelle."""
+    """Correct the estimate by measurements of rotor, blades, platform and nacelle."""
     y = memory[INNOVATION : INNOVATION + N_SENSORS]
     y[0] = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - between(p, low, fraction, TRIM + ROTOR)
     y[1] = measurement[Measure.BLADE_PITCH] - between(p, low, fraction, TRIM + ROTOR + 1)
@@ -116,7 +110,7 @@ def predict(p, low, fraction, memory, torque, pitch):
 
 @kernel
 def block_of(p, memory):
-    """(start of the block of the wind below the operating wind, fraction of the way to the next block)."""
+    """Return (start of the block below the operating wind, fraction of the distance to the next block)."""
     last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
     place = (clamp(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[Head.WIND_STEP]
     node = min(int(place), int(p[Head.WINDS]) - 2)
@@ -125,9 +119,9 @@ def block_of(p, memory):
 
 @kernel
 def estimate(p, memory, measurement, command):
-    """Bring the estimate to the present: over the last period under its command, then what is measured.
+    """Advance the estimate over the last period under its command, then correct it by the measurement.
 
-    At the first instant reset has left the estimate, and no command has acted.
+    At the first instant the estimate is that of reset, without a command.
     """
     if memory[STARTED] != 0.0:
         low, fraction = block_of(p, memory)
@@ -142,5 +136,5 @@ def estimate(p, memory, measurement, command):
 
 @control_kernel
 def estimator_law(parameters, memory, measurement, command):
-    """The estimate alone; the command in force is read and stays."""
+    """Advance the estimate; the applied command is read and not changed."""
     estimate(parameters, memory, measurement, command)

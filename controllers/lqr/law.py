@@ -1,12 +1,12 @@
-"""LQG control of torque and blade pitch with a wind-speed estimator, scheduled over the wind.
+"""Defines LQG control of torque and blade pitch with a wind-speed estimator, scheduled over the wind.
 
 A Kalman filter on measured channels estimates platform, rotor-averaged wind and waves; state feedback on
-the estimates moves both commands by their rates, so limits need no further care. The models, trims and
-gains of controllers/lqr/design.py are interpolated in a slow mean of the estimated wind. Where the pitch
-rests near its minimum the torque law of theory.md, section 3, takes over.
+the estimates sets the rates of both commands, so that limits cause no windup. Models, trims and gains of
+controllers/lqr/design.py are interpolated in a slow mean of the estimated wind. Near the minimum pitch the
+torque law of theory.md, section 3, is applied.
 
-Filter and feedback go on from the command in force, whoever gave it: what the residual mode of the
-environment adds to one command stays in the next, so that it is an addition to the rates.
+Filter and feedback start from the applied command: an addition of the residual mode of the environment stays
+in the next command, so that it is an addition to the rates.
 """
 
 from math import exp
@@ -17,14 +17,7 @@ from fowt_env.caches import Cache
 from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr import design
-from fowt_env.controllers.lqr.design import (
-    MOMENT,
-    N_FEEDBACK,
-    N_PLANT,
-    WAVE,
-    WIND,
-    LQGSettings,
-)
+from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, WAVE, WIND, LQGSettings
 from fowt_env.controllers.lqr.estimator import (
     BLOCK,
     BLOCKS,
@@ -48,9 +41,10 @@ from fowt_env.controllers.lqr.estimator import (
     estimator_law,
 )
 from fowt_env.controllers.lqr.optimum import optimal_gains
+from fowt_env.controllers.pi import curve_at
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
+from fowt_env.plant.drivetrain import build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
 HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
@@ -76,9 +70,9 @@ def speed_integral(integral, error, turning, dt):
     return integral * (1.0 - FORGETTING * dt)
 
 
-@kernel
-def lqr_step(p, memory, measurement, command):
-    """One period of the sampled law."""
+@control_kernel
+def lqr_law(p, memory, measurement, command):
+    """Advance the sampled law by one period."""
     dt, rated = p[Head.CONTROL_DT], p[Head.RATED_SPEED]
     estimate(p, memory, measurement, command)
     low, fraction = block_of(p, memory)
@@ -99,29 +93,16 @@ def lqr_step(p, memory, measurement, command):
 
     rate = clamp(feed_back(p, low, fraction, memory, 1), -p[Head.PITCH_RATE_LIMIT], p[Head.PITCH_RATE_LIMIT])
     pitch = clamp(pitch + dt * rate, p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM])
-    i = Head.CURVE
-    curve = TorqueCurve(
-        p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5],
-        p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10], p[i + 11],
-    )  # fmt: skip
     target = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, fraction, memory, 0)
     target = clamp(target, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
-    by_curve = generator_torque(p[Head.GEAR_RATIO] * memory[ROTOR], pitch, curve)
+    by_curve = generator_torque(p[Head.GEAR_RATIO] * memory[ROTOR], pitch, curve_at(p, Head.CURVE))
     blend = clamp((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
     target = blend * target + (1.0 - blend) * by_curve
-    step = dt * p[Head.TORQUE_RATE_LIMIT]
-    torque = rate_limit(torque, target, step)
-    command[0], command[1] = torque, pitch
-
-
-@control_kernel
-def lqr_law(parameters, memory, measurement, command):
-    """Compiled form of lqr_step, one type for all control laws."""
-    lqr_step(parameters, memory, measurement, command)
+    command[0], command[1] = rate_limit(torque, target, dt * p[Head.TORQUE_RATE_LIMIT]), pitch
 
 
 def blocks(models, settings, turbine, dt):
-    """(n, BLOCK) trims, estimator and feedback of each wind, sampled every dt."""
+    """Return (n, BLOCK) trims, estimator and feedback of each wind, sampled every dt."""
     rows = []
     for model, gain in zip(models, optimal_gains(models, settings, turbine, dt), strict=True):
         a, b = design.sampled(model.A, model.B, dt)
@@ -139,14 +120,9 @@ class LQR(CompiledController):
 
     kernel = staticmethod(lqr_law)
     information = (
-        "generator_speed",
-        "blade_pitch",
-        "generator_torque",
-        "nacelle_acceleration",
-        "platform_pitch",
-        "platform_pitch_rate",
-        "plant_model",
-    )
+        "generator_speed", "blade_pitch", "generator_torque", "nacelle_acceleration", "platform_pitch",
+        "platform_pitch_rate", "plant_model",
+    )  # fmt: skip
 
     def __init__(self, turbine, control_dt, settings=None, name="lqr", models=None):
         super().__init__(name, np.zeros(BLOCKS), N_MEMORY)
@@ -177,11 +153,11 @@ class LQR(CompiledController):
     def take(self, models):
         """Take the gains for DesignModels of winds 1 m/s apart."""
         known = (id(models), self.settings, self.control_dt)
-        # the models are kept with what was made of them, so that their id stays theirs
-        made = _BLOCKS.get(
-            known, lambda: (models, blocks(models, self.settings, self.turbine, self.control_dt))
-        )
-        self.install(models[0].wind, made[1])
+
+        def make():  # the models are kept with their blocks, so that their id stays valid
+            return models, blocks(models, self.settings, self.turbine, self.control_dt)
+
+        self.install(models[0].wind, _BLOCKS.get(known, make)[1])
 
     def install(self, first_wind, table):
         """Take the blocks of winds 1 m/s apart."""
@@ -205,8 +181,7 @@ class LQR(CompiledController):
             Head.HANDOVER_LOW: HANDOVER[0],
             Head.HANDOVER_HIGH: HANDOVER[1],
         }
-        for entry, value in values.items():
-            head[entry] = value
+        head[list(values)] = list(values.values())
         head[Head.CURVE :] = build_torque_curve(law)
         self.parameters = np.concatenate([head, np.ravel(table)])
         self.prepared = True
@@ -214,7 +189,7 @@ class LQR(CompiledController):
     def reset(self, measurement):
         """Start the estimate at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured.
 
-        Raises: InputError where prepare() was not called.
+        Raises: InputError if prepare() was not called.
         """
         if not self.prepared:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
@@ -231,9 +206,8 @@ class LQR(CompiledController):
         memory[1], memory[3] = measurement.platform_pitch, measurement.platform_pitch_rate
         memory[ROTOR], memory[ROTOR + 1] = speed, measurement.blade_pitch
         memory[WIND:WAVE] = memory[OPERATING_WIND] = wind
-        memory[PITCH_COMMAND] = min(
-            max(measurement.blade_pitch, p[Head.PITCH_MINIMUM]), p[Head.PITCH_MAXIMUM]
-        )
+        low, high = p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM]
+        memory[PITCH_COMMAND] = min(max(measurement.blade_pitch, low), high)
         torque = measurement.generator_torque
         if not np.isfinite(torque):
             torque = np.interp(wind, winds, table[:, TORQUE])

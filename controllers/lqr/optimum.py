@@ -1,10 +1,10 @@
-"""Feedback of lqr at one wind: the linear optimum, at the control period, under limits on what it may spend.
+"""Computes the feedback of lqr at one wind: the linear optimum at the control period under limits.
 
 Minimised is (1 - share) var(rotor speed) + share var(platform pitch), each over that of gspi_oc3 on the same
-linear model, with the blade-pitch travel, the deviations of power and torque and that of the shaft torque
-within limits. By duality that is a quadratic cost with a multiplier per limit, and the multipliers are found
-by iteration: each grows while its limit is exceeded and shrinks while it is kept. Deviations are those of
-the sampled loop with the Kalman filter and the noise of its sensors.
+linear model, with limits on blade-pitch travel and on the deviations of power, torque and shaft torque. By
+duality that is a quadratic cost with a multiplier per limit, found by iteration: it increases while its
+limit is exceeded and decreases otherwise. Deviations are those of the sampled loop with Kalman filter and
+sensor noise.
 """
 
 from dataclasses import dataclass
@@ -64,7 +64,7 @@ class Deviations:
 
 
 def stationary_covariance(a, q):
-    """Covariance X = A X A' + Q of a stable sampled system, by doubling."""
+    """Return the covariance X = A X A' + Q of a stable sampled system, by doubling."""
     x = q
     while True:
         more = a @ x @ a.T
@@ -98,7 +98,7 @@ class SampledLoop:
         self.rows = self._rows()
 
     def _rows(self):
-        """{field of Deviations: (row on the states (13,), row on the inputs (2,))}."""
+        """Return {field of Deviations: (row on the states (13,), row on the inputs (2,))}."""
         eye, none = np.eye(N_FEEDBACK), np.zeros(2)
         rated, per_step = self.turbine.rated_rotor_speed, GAUSSIAN_MEAN / self.dt
         acceleration = np.zeros(N_FEEDBACK)
@@ -120,7 +120,7 @@ class SampledLoop:
         return drive.gear_ratio * drive.generator_inertia / self.model.torque
 
     def gain(self, weights, integral, torque_rate):
-        """(2, N_FEEDBACK) gain K of least cost: inputs are -K x.
+        """Return (2, N_FEEDBACK) gain K of least cost: inputs are -K x.
 
         weights: {field of Deviations: weight of its square}; integral, torque_rate: of the squared speed
         integral and torque input. Travel is paid for at the command: a price on the blades' own rate would
@@ -140,7 +140,7 @@ class SampledLoop:
         return np.linalg.solve(r + self.b.T @ p @ self.b, self.b.T @ p @ self.a + s.T)
 
     def closed(self, k, noise=SENSOR_NOISE):
-        """(A, Q, u, v): the loop under gain k on the filter's estimates, as the law runs it.
+        """Return (A, Q, u, v): the loop under gain k on the filter's estimates, as the law runs it.
 
         States: those fed back, then the filter's prediction (N_STATE,); Q: covariance of what a period adds;
         inputs are u x + v white, with white noise of the sensors. noise: their standard deviations.
@@ -235,7 +235,7 @@ def limits(settings, wind, baseline, turbine):
 
 
 def optimal_gain(loop, settings, start=None):
-    """(gain (2, N_FEEDBACK), its Deviations, logarithms of the multipliers) for LQGSettings at a wind.
+    """Return (gain (2, N_FEEDBACK), its Deviations, logarithms of the multipliers) for LQGSettings at a wind.
 
     start: multipliers of a neighbouring wind. Where not all limits are met within ROUNDS rounds, it is the
     gain of the round whose largest excess is the smallest.
@@ -266,7 +266,7 @@ def optimal_gain(loop, settings, start=None):
 
 
 def optimal_gains(models, settings, turbine, dt):
-    """[(2, N_FEEDBACK)] gains of DesignModels in rising order of wind.
+    """Return [(2, N_FEEDBACK)] gains of DesignModels in rising order of wind.
 
     Below lowest_design_wind, where the pitch rests, those of the first wind designed for hold.
     """

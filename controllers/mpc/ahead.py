@@ -1,12 +1,12 @@
-"""Prediction of the wind from the estimate at the rotor and from a preview that errs.
+"""Predicts the wind from the estimate at the rotor and from a preview with errors.
 
-The estimate errs least for the coming seconds, a lidar further on. So the filter's prediction e(k) of the
-wind k periods ahead is corrected by a share of what the preview p(k) differs from it,
+The estimate is more accurate for the first seconds, a lidar beyond. The filter's prediction e(k) of the wind
+k periods ahead is corrected by a fraction of its difference from the preview p(k),
 
 w(k) = e(k) + g(k) (p(k) - e(k)),    g(k) = E[(v - e(k)) (p(k) - e(k))] / E[(p(k) - e(k))^2],
 
-which errs least of all such w: v is the wind that came, by the estimate at that time. Both means are learnt
-while running, each k by itself, so that a preview without information ends up with no share.
+with the least mean square error: v is the estimated wind when it has arrived. Both means are estimated
+online for each k, so that an uninformative preview has no influence.
 """
 
 import numpy as np

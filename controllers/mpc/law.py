@@ -1,11 +1,10 @@
-"""Model predictive control of torque and blade pitch on the estimate of lqr's Kalman filter.
+"""Defines model predictive control of torque and blade pitch on the estimate of lqr's Kalman filter.
 
-Every period the coming half minute is predicted: platform and waves by the linear models of
-controllers/lqr/design.py, the rotor's loads by its table of coefficients, the wind as its filter expects
-it. A wind ahead that is shown replaces that or, where it errs, corrects it (ahead.py). One Newton step
-(plan.py) improves the plan of torque and blade-pitch rates; where it would pass a limit OSQP takes that step
-instead. The rates hold until the next period. An integral of the rotor speed's error leaves it without
-offset.
+Every period a horizon of half a minute is predicted: platform and waves by the linear models of
+controllers/lqr/design.py, rotor loads by a coefficient table, the wind by its filter. An exact preview
+replaces the predicted wind, another corrects it (ahead.py). One Newton step (plan.py) improves the plan of
+torque and blade-pitch rates; if it would exceed a limit, OSQP computes the step. The rates are constant until
+the next period. An integral of the speed error removes the offset.
 """
 
 from enum import IntEnum
@@ -15,13 +14,7 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.control import check_control_dt
-from fowt_env.controllers.lqr.design import (
-    MOMENT,
-    N_FEEDBACK,
-    N_PLANT,
-    design_models,
-    lowest_design_wind,
-)
+from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, design_models, lowest_design_wind
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator, speed_integral
@@ -106,31 +99,22 @@ def move(estimated, p, memory, curve, command):
 
 
 LIDAR_HORIZON = 3.0  # s: what four beams 160 m ahead of the rotor leave at 24 m/s
-_MODELS = Cache(
-    16
-)  # all that they are made of -> (design models, table, (first wind, WindModel of all winds))
+_MODELS = Cache(16)  # inputs -> (design models, table, (first wind, WindModel of all winds))
 
 
 class MPC:
-    """Predictive law of an MPCSettings; prepare(scene) before reset.
+    """Predictive law of an MPCSettings; call prepare(scene) before reset.
 
-    preview: whether it is shown the wind ahead. exact: whether that is the wind itself; a preview that errs
-    corrects what the estimate foretells. nonlinear: whether the rotor's loads are those of its table;
-    else they are linear in the operating wind. constrained: whether plans mind limits; what is applied does.
-    Attribute unsolved: plans since reset for which OSQP found no solution, and the LQ feedback acted instead.
+    preview: use a wind preview. exact: the preview is exact; another preview corrects the predicted wind.
+    nonlinear: rotor loads from the table, else linear about the operating wind. constrained: plans satisfy
+    limits; applied commands always do.
+    Attribute unsolved: plans since reset without a solution of OSQP, in which the LQ feedback is applied.
     """
 
     def __init__(
-        self,
-        turbine,
-        control_dt,
-        settings=None,
-        name="mpc",
-        preview=False,
-        nonlinear=True,
-        constrained=True,
+        self, turbine, control_dt, settings=None, name="mpc", preview=False, nonlinear=True, constrained=True,
         exact=True,
-    ):
+    ):  # fmt: skip
         self.name, self.turbine, self.control_dt = name, turbine, check_control_dt(control_dt)
         self.settings = MPCSettings() if settings is None else settings
         self.nonlinear, self.constrained, self.exact = bool(nonlinear), bool(constrained), bool(exact)
@@ -151,7 +135,7 @@ class MPC:
 
     @property
     def period(self):
-        """Time between plans, s: a whole number of control periods."""
+        """Return the time between plans, s: a whole number of control periods."""
         return self.every * self.control_dt
 
     def _parameters(self):
@@ -185,31 +169,23 @@ class MPC:
         models, density = design_models(scene), scene.platform.environment.air_density
         self.table = rotor_table(scene.turbine, density)
         known = (id(models), id(self.table), self.turbine.torque_law.rated_torque, self.settings, self.period)
-        # kept with what they were made of, so that the ids stay theirs
-        self.first_wind, self.models = _MODELS.get(
-            known, lambda: (models, self.table, (models[0].wind, self._wind_models(models)))
-        )[2]
+
+        def make():  # with its inputs, so that their ids stay valid
+            return models, self.table, (models[0].wind, self._wind_models(models))
+
+        self.first_wind, self.models = _MODELS.get(known, make)[2]
 
     def _wind_models(self, models):
-        """WindModel of arrays with a row per wind."""
+        """Return the WindModel of arrays with a row per wind."""
         lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
-        made = [
-            wind_model(
-                m,
-                m if m.wind >= lowest.wind else lowest,
-                self.settings,
-                self.turbine,
-                self.table,
-                self.period,
-            )
-            for m in models
-        ]
+        same = (self.settings, self.turbine, self.table, self.period)
+        made = [wind_model(m, m if m.wind >= lowest.wind else lowest, *same) for m in models]
         return WindModel(*(np.array(rows) for rows in zip(*made, strict=True)))
 
     def reset(self, measurement):
         """Start at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured, without a plan.
 
-        Raises: InputError where prepare() was not called.
+        Raises: InputError if prepare() was not called.
         """
         if self.table is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
@@ -228,7 +204,7 @@ class MPC:
         self.calls = self.unsolved = 0
 
     def act(self, measurement):
-        """(generator torque, blade pitch) for a Measurement."""
+        """Return (generator torque, blade pitch) for a Measurement."""
         values = np.array(measurement, dtype=np.float64)
         estimated = self.estimator.memory
         observe(self.estimator.parameters, estimated, values, self.command, self.parameters, self.memory)
@@ -240,7 +216,7 @@ class MPC:
 
     @property
     def _slow(self):
-        """Factor per period by which what is learnt of the wind ahead is forgotten."""
+        """Return the factor per period by which what is learnt of the wind ahead is forgotten."""
         return exp(-self.period / self.settings.schedule_time)
 
     def _ahead(self, measurement):
@@ -268,15 +244,13 @@ class MPC:
         return ahead + (self.share.learn(now, expected, differing) * differing)[:, None]
 
     def _model(self):
-        """(WindModel, wind m/s) of the operating wind, within those of the models."""
-        place = self.memory[Memory.OPERATING_WIND] - self.first_wind
+        """Return (WindModel, wind m/s) of the operating wind, within those of the models."""
         count = len(self.models.trim)
-        place = min(max(place, 0.0), count - 1.0)
+        place = min(max(self.memory[Memory.OPERATING_WIND] - self.first_wind, 0.0), count - 1.0)
         node = min(int(place), count - 2)
         f = place - node
-        return WindModel(*((1.0 - f) * part[node] + f * part[node + 1] for part in self.models)), (
-            self.first_wind + place
-        )
+        model = WindModel(*((1.0 - f) * part[node] + f * part[node + 1] for part in self.models))
+        return model, self.first_wind + place
 
     def _replan(self, ahead):
         """Improve the plan, and take its first move."""
@@ -294,18 +268,10 @@ class MPC:
         references, end = np.zeros(len(self.rows)), np.zeros(N_FEEDBACK)
         references[0] = end[SPEED] = rated - model.trim[SPEED]
         rate = turbine.torque_law.max_torque_rate / torque
-        p = self.parameters
-        limits = np.array(
-            [
-                *(-rate, rate, -drive.rate_limit, drive.rate_limit),
-                *(
-                    p[Entry.TORQUE_LOW] / torque - model.trim[TORQUE],
-                    p[Entry.TORQUE_HIGH] / torque - model.trim[TORQUE],
-                ),
-                *(drive.minimum - model.trim[COMMAND], drive.maximum - model.trim[COMMAND]),
-                *(-rated, settings.speed_limit * rated - model.trim[SPEED]),
-            ]
-        )
+        torques = self.parameters[[Entry.TORQUE_LOW, Entry.TORQUE_HIGH]] / torque - model.trim[TORQUE]
+        pitches = np.array([drive.minimum, drive.maximum]) - model.trim[COMMAND]
+        speeds = (-rated, settings.speed_limit * rated - model.trim[SPEED])
+        limits = np.array([-rate, rate, -drive.rate_limit, drive.rate_limit, *torques, *pitches, *speeds])
         units = np.array([0.05, 0.2 * DEGREE, 0.05, DEGREE, 0.05 * rated])
         old = np.zeros_like(self.plan)
         shifted(self.plan, self.grid, old)
@@ -331,7 +297,7 @@ class MPC:
         self.memory[Memory.PITCH_RATE] = min(max(u[1], -drive.rate_limit), drive.rate_limit)
 
     def __getstate__(self):
-        """Without the solver, which is made anew: each solution starts from what it is given."""
+        """Without the solver, which is recreated: each solution starts from what it is given."""
         return self.__dict__ | {"program": None}
 
 

@@ -1,8 +1,8 @@
-"""The discrete model of each wind, the LQ feedback and the cost-to-go that end the prediction.
+"""Computes the discrete model of each wind, the LQ feedback and the terminal cost of the prediction.
 
 States are those of feedback_plant in controllers/lqr/design.py, less the trim of the wind: platform, rotor
-and blades, torque (rated torques), pitch command, integral of the rotor speed's error, wind filter and waves.
-Inputs are the rates of torque and pitch command, held over a period.
+and blades, torque (rated torques), pitch command, integral of the rotor speed's error, wind filter and
+waves. Inputs are the rates of torque and pitch command, constant over a period.
 """
 
 from typing import NamedTuple
@@ -48,7 +48,7 @@ class WindModel(NamedTuple):
 
 
 def cost_rows(rated_speed):
-    """(N_COST, n) of the states in the squared terms; those of the two rates are zero."""
+    """Return (N_COST, n) of the states in the squared terms; those of the two rates are zero."""
     rows = np.zeros((N_COST, N_FEEDBACK))
     for row, state in enumerate((SPEED, LEAN, LEAN_RATE, TORQUE)):
         rows[row, state] = 1.0
@@ -58,7 +58,7 @@ def cost_rows(rated_speed):
 
 
 def cost_weights(settings, wind, rated_speed, period):
-    """(N_COST,) weights of the squared terms over a period (s) at an equivalent_wind, m/s."""
+    """Return (N_COST,) weights of the squared terms over a period (s) at an equivalent_wind, m/s."""
     s, ratio = settings, wind / WEIGHT_WIND
     below = ratio < 1.0
     pitch_rate = s.pitch_rate * ratio ** (s.pitch_rate_growth if below else s.pitch_rate_growth_above)
@@ -84,7 +84,7 @@ def _loads_at(wind, rotor_speed, blade_pitch, table, loads):
 
 
 def wind_model(model, feedback, settings, turbine, table, period):
-    """WindModel of a DesignModel, its feedback and cost to go designed on another (or the same)."""
+    """Return WindModel of a DesignModel, its feedback and cost to go designed on another (or the same)."""
     rated, law = turbine.rated_rotor_speed, turbine.torque_law
     a, b = _plant(model, turbine)
     loads = np.empty(8)
@@ -105,14 +105,14 @@ def wind_model(model, feedback, settings, turbine, table, period):
 
 
 def _plant(model, turbine):
-    """(A, B) of feedback_plant with the torque in rated torques at every wind."""
+    """Return (A, B) of feedback_plant with the torque in rated torques at every wind."""
     a, b, _ = feedback_plant(model, turbine.rated_rotor_speed)
     a[:N_PLANT, TORQUE] *= turbine.torque_law.rated_torque / model.torque
     return a, b
 
 
 def lq(a, b, weights, rated_speed, period):
-    """(K, P) of the discrete LQ problem with the squared terms of cost_rows at each period's start."""
+    """Return (K, P) of the discrete LQ problem with the squared terms of cost_rows at each period's start."""
     ad, bd = sampled(a, b, period)
     rows = cost_rows(rated_speed)
     q, r = rows.T @ (weights[:, None] * rows), np.diag(weights[-2:])

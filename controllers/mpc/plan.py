@@ -1,10 +1,10 @@
-"""One Newton step of the optimal control problem: prediction, its slopes over the moves, quadratic program.
+"""Computes one Newton step of the optimal control problem: prediction, sensitivities, quadratic program.
 
 Moves are u = -K x + c with corrections c that are constant over blocks. With the LQ gain as K, c = 0 is the
-plan where no limit is met, no other wind is ahead than the filter's and the rotor's loads are linear
-(Rossiter, Kouvaritakis and Rice, Automatica 34, 1998). Rotor loads are those of the table: the linear model
-takes what they differ by as a further input. One step is taken per period, from the plan before (real-time
-iteration: Diehl, Bock and Schloeder, SIAM J. Control Optim. 43, 2005).
+plan without active limits, without a preview and with linear rotor loads (Rossiter, Kouvaritakis and Rice,
+Automatica 34, 1998). Rotor loads are those of the table; their difference from the linear model is an
+additional input. One step is taken per period, from the previous plan (real-time iteration: Diehl, Bock and
+Schloeder, SIAM J. Control Optim. 43, 2005).
 """
 
 from enum import IntEnum
@@ -13,16 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.controllers.lqr.design import N_FEEDBACK
-from fowt_env.controllers.mpc.model import (
-    COMMAND,
-    FILTER,
-    LEAN_RATE,
-    N_COST,
-    SPEED,
-    SURGE_RATE,
-    TORQUE,
-    WIND,
-)
+from fowt_env.controllers.mpc.model import COMMAND, FILTER, LEAN_RATE, N_COST, SPEED, SURGE_RATE, TORQUE, WIND
 from fowt_env.controllers.mpc.rotor_table import rotor_loads
 from fowt_env.plant.compile.decorators import entry, kernel
 
@@ -68,7 +59,7 @@ class Work(NamedTuple):
 
 
 def grid_of(settings, period):
-    """Grid of an MPCSettings."""
+    """Return the Grid of an MPCSettings."""
     total, lengths, length = round(settings.horizon / period), [], 1.0
     while sum(lengths) < total:
         if len(lengths) >= FIRST_BLOCKS:
@@ -78,24 +69,14 @@ def grid_of(settings, period):
 
 
 def work_of(grid):
-    """Work for a Grid."""
+    """Return the Work arrays for a Grid."""
     steps, moves = len(grid.block_of), 2 * len(grid.ends)
     rows = 2 * RATED_BLOCKS + len(LIMITED) * len(grid.ends)
-    n = N_FEEDBACK
-    return Work(
-        np.zeros((steps + 1, n)),
-        np.zeros((steps + 1, n, moves)),
-        np.zeros((moves, moves)),
-        np.zeros(moves),
-        np.zeros((rows, moves)),
-        np.zeros(rows),
-        np.zeros(rows),
-        np.zeros(8),
-        np.zeros(2),
-        np.zeros((2, 3)),
-        np.zeros((2, moves)),
-        np.zeros(moves),
-    )
+    shapes = (
+        (steps + 1, N_FEEDBACK), (steps + 1, N_FEEDBACK, moves), (moves, moves), moves, (rows, moves), rows,
+        rows, 8, 2, (2, 3), (2, moves), moves,
+    )  # fmt: skip
+    return Work(*map(np.zeros, shapes))
 
 
 @kernel

@@ -31,7 +31,7 @@ _tables = Cache(16)  # (id of the turbine, density) -> (turbine, RotorTable)
 
 
 def rotor_table(turbine, density):
-    """RotorTable of a turbine's blade elements in air of a density, kg/m3."""
+    """Return the RotorTable of a turbine's blade elements in air of a density, kg/m3."""
 
     def make():
         _, thrust, torque = performance(build_blade_elements(turbine, density), RATIOS, PITCHES)
@@ -81,7 +81,7 @@ def rotor_loads(wind, rotor_speed, blade_pitch, table, loads):
 
 @kernel
 def _between(values, k, i, j, f, g):
-    """Entry k of the table between four of its nodes."""
+    """Return the entry k of the table between four of its nodes."""
     low = (1.0 - g) * values[k, i, j] + g * values[k, i, j + 1]
     high = (1.0 - g) * values[k, i + 1, j] + g * values[k, i + 1, j + 1]
     return (1.0 - f) * low + f * high

@@ -6,7 +6,7 @@ from math import inf
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
 
-RANGES = {  # of what is not simply 0 or more: (low, high, low left out)
+RANGES = {  # of what is not simply 0 or more: (low, high, low omitted)
     "pitch_rate": (0.0, inf, True),
     "torque_rate": (0.0, inf, True),
     "schedule_time": (0.0, inf, True),
@@ -57,7 +57,7 @@ class MPCSettings:
             check_number(key, value, low, high, low_open=left_out)
 
     def changed(self, **changes):
-        """A copy with some settings changed. Raises: InputError for unknown names."""
+        """Return a copy with some settings changed. Raises: InputError for unknown names."""
         for key in changes:
             if key not in asdict(self):
                 raise unknown("mpc setting", key, asdict(self))

@@ -1,4 +1,4 @@
-"""The quadratic programs of the predictive law, by OSQP (Stellato et al., Math. Prog. Comp. 12, 2020)."""
+"""Solves quadratic programs of the predictive law by OSQP (Stellato et al., Math. Prog. Comp. 12, 2020)."""
 
 import numpy as np
 from scipy import sparse
@@ -21,7 +21,7 @@ SETTINGS = {
 
 
 def load():
-    """The module osqp. Raises: InputError that names the extra where it is missing."""
+    """Return the module osqp. Raises: InputError that names the extra where it is missing."""
     try:
         import osqp
     except ImportError as error:
@@ -52,7 +52,7 @@ class Program:
         self.solver.setup(p, self.gradient, a, -wide, wide, **SETTINGS)
 
     def solve(self, h, g, c, low, high, start):
-        """(moves,) solution, or None where the solver did not find it; start: a first guess."""
+        """Return (moves,) solution, or None where the solver did not find it; start: a first guess."""
         size = 1.0 / np.sqrt(np.diag(h))
         h, c = h * size[:, None] * size, c * size
         self.gradient[: self.moves] = g * size

@@ -1,4 +1,4 @@
-"""Whether a platform can be what its file means: figures at rest, natural periods, and what does not fit."""
+"""Checks whether a platform file is plausible: statics at rest, natural periods, inconsistencies."""
 
 from math import cos, degrees, hypot, pi, sin, sqrt, tan
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.analysis.equilibrium import MOTION_LABELS, causes_of, evaluated, metacentre
-from fowt_env.analysis.statics import Evaluation, Statics, statics
+from fowt_env.analysis.statics import Evaluation, Statics, named_periods, rotation_of, statics
 from fowt_env.analysis.tower_frequencies import TowerFrequency, tower_frequencies
 from fowt_env.analysis.trim import DIFFERENCE_STEPS, trim
 from fowt_env.errors import InputError, muted
@@ -70,7 +70,7 @@ def check_platform(platform, **options):
 
 
 def _static_faults(scene, figures):
-    """{name: sentence} of weight, buoyancy, lines and stability of the undisplaced platform."""
+    """Return {name: sentence} of weight, buoyancy, lines and stability of the undisplaced platform."""
     evaluation = Evaluation(scene)
     rest = np.zeros(scene.n_state)
     evaluation.at(rest, LoadCache.TOTAL)
@@ -86,13 +86,13 @@ def _held_by_lines(figures):
 
 
 def _rest(state):
-    """{motion: m or deg} of a state."""
+    """Return {motion: m or deg} of a state."""
     values = [float(value) for value in state[:6]]
     return dict(zip(MOTION_LABELS, [*values[:3], *map(degrees, values[3:])], strict=True))
 
 
 def _rest_faults(scene, rest):
-    """{name: sentence} of a rest far from where the platform's file puts it."""
+    """Return {name: sentence} of a rest far from where the platform's file puts it."""
     faults, depth, draft = {}, scene.platform.environment.water_depth, scene.platform.draft
     drift = hypot(rest["surge"], rest["sway"])
     if drift > DRIFT * depth:
@@ -111,7 +111,7 @@ def _rest_faults(scene, rest):
 
 
 def _period_faults(periods, hub_height):
-    """{name: sentence} of natural periods that no floating turbine of this size has."""
+    """Return {name: sentence} of natural periods that no floating turbine of this size has."""
     faults, scale = {}, sqrt(hub_height / FULL_SIZE)  # Froude's, of times
     for motion, period in periods.items():
         low, high = BANDS[motion][0] * min(scale, 1.0), BANDS[motion][1] * max(scale, 1.0)
@@ -125,7 +125,7 @@ def _period_faults(periods, hub_height):
 
 
 def natural_modes(scene, point):
-    """({motion: undamped natural period s}, {mode: TowerFrequency}) about an operating point.
+    """Return ({motion: undamped natural period s}, {mode: TowerFrequency}) about an operating point.
 
     From stiffness and mass. A potential-flow body has the added mass of each mode's own frequency. Modes are
     named by their largest motion about the centre of mass, angles weighted with half the draft; inf: nothing
@@ -158,10 +158,9 @@ def natural_modes(scene, point):
 
 
 def _kinematics(x):
-    """(6, 6) rates of the motions by the velocities in body components, at a state."""
-    pose, roll, pitch = pose_of(np.ascontiguousarray(x)), x[State.ROLL], x[State.PLATFORM_PITCH]
-    found = np.zeros((6, 6))
-    found[:3, :3] = [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
+    """Return (6, 6) rates of the motions by the velocities in body components, at a state."""
+    roll, pitch, found = x[State.ROLL], x[State.PLATFORM_PITCH], np.zeros((6, 6))
+    found[:3, :3] = rotation_of(pose_of(np.ascontiguousarray(x)))
     found[3:, 3:] = [
         [1.0, sin(roll) * tan(pitch), cos(roll) * tan(pitch)],
         [0.0, cos(roll), -sin(roll)],
@@ -171,24 +170,18 @@ def _kinematics(x):
 
 
 def _periods(moved, mass, slopes, height, arm):
-    """{motion: s} of the six modes of a mass matrix and the slopes of the loads over the motions."""
+    """Return {motion: s} of the six modes of a mass matrix and the slopes of the loads over the motions."""
     values, vectors = np.linalg.eig(moved @ np.linalg.solve(mass, slopes))
     shapes = vectors.copy()
     shapes[0] += height * vectors[4]  # at the water line a pitch mode moves more in surge than in pitch
     shapes[1] -= height * vectors[3]
     shapes = np.abs(shapes) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
     shapes /= shapes.sum(axis=0)
-    found, free = {}, set(range(6))
-    for mode in np.argsort(-shapes.max(axis=0)):  # most clear-cut modes first
-        motion = max(free, key=lambda i: shapes[i, mode])
-        free.discard(motion)
-        square = -values[mode].real
-        found[motion] = float(2.0 * pi / np.sqrt(square)) if square > 1e-9 else float("inf")
-    return {label: found[motion] for motion, label in enumerate(MOTION_LABELS)}
+    return named_periods(values, shapes, MOTION_LABELS)
 
 
 def _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potential):
-    """Natural period, s, of a motion with the added mass at its own frequency."""
+    """Return the natural period, s, of a motion with the added mass at its own frequency."""
     for _ in range(ROUNDS):
         if not np.isfinite(period):
             return period
@@ -201,7 +194,7 @@ def _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potentia
 
 
 def _added_mass(potential, omega):
-    """(6, 6) added mass of a PotentialFlow at a frequency, rad/s, linear between its own."""
+    """Return (6, 6) added mass of a PotentialFlow at a frequency, rad/s, linear between its own."""
     known, values = potential.omega, potential.added_mass
     if potential.added_mass_zero is not None:
         known = np.concatenate([[0.0], known])

@@ -1,11 +1,11 @@
-"""Whether a steady state is one that a platform can be in, and what pulls at it where there is none."""
+"""Checks whether a steady state is possible for a platform, and explains a failed search for one."""
 
 from math import acos, cos, degrees, hypot, isnan, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.analysis.statics import statics
+from fowt_env.analysis.statics import rotation_of, statics
 from fowt_env.errors import InputError, warn_once
 from fowt_env.plant.advance import CAPSIZE
 from fowt_env.plant.model import LoadCache
@@ -39,7 +39,7 @@ class Evaluated(NamedTuple):
 
 
 def evaluated(x, data):
-    """Evaluated of the state that the last evaluation was of."""
+    """Return the Evaluated of the state that the last evaluation was of."""
     return Evaluated(x.copy(), data.cache.copy(), data.lines.copy())
 
 
@@ -100,13 +100,13 @@ def unbalanced(scene, start, end, ending=None):
 
 
 def label(scene):
-    """Name of a scene's platform and its wind, for messages."""
+    """Return the name of a scene's platform and its wind, for messages."""
     wind = "without wind" if scene.wind_speed is None else f"in wind of {scene.wind_speed:g} m/s"
     return f"platform {scene.label!r} {wind}"
 
 
 def impossible_place(scene, heave, upright):
-    """{what is beyond its bounds: text} of a platform's place that no platform can have.
+    """Return {what is beyond its bounds: text} of a platform's place that no platform can have.
 
     heave: m; upright: vertical component of the tower axis. Keys: "bed", "air", "tower base", "tilt".
     """
@@ -129,7 +129,7 @@ def impossible_place(scene, heave, upright):
 
 
 def causes_of(scene, start):
-    """{name: sentence} of what is wrong with the undisplaced platform."""
+    """Return {name: sentence} of what is wrong with the undisplaced platform."""
     model, platform = scene.model, scene.platform
     weight = model.rigid_body.mass * model.rigid_body.gravity
     net = start.cache[LoadCache.TOTAL + 2]
@@ -197,7 +197,7 @@ def _mooring_causes(mooring, start, weight, net):
 
 
 def metacentre(scene, figures):
-    """Sentence on the stability of the undisplaced platform as a floating body; figures: its Statics."""
+    """Sentence on the stability of the undisplaced platform as a floating body; values: its Statics."""
     buoyancy, height = figures.buoyancy_centre[2], figures.metacentric_height
     shown = "" if isnan(buoyancy) else f", that of buoyancy at {buoyancy:.3g} m"
     return (
@@ -238,10 +238,7 @@ def _left(scene, end):
 
 def _by_load(scene, end):
     """{load: (6,)} of all loads: force in inertial axes, moment about the centre of mass in body axes."""
-    pose, body = pose_of(end.x), scene.model.rigid_body
-    to_inertial = np.array(
-        [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
-    )
+    to_inertial, body = rotation_of(pose_of(end.x)), scene.model.rigid_body
     centre = np.array([body.s_x, body.s_y or 0.0, body.s_z]) / body.mass
     weight = -body.mass * body.gravity * to_inertial[2]
     wrenches = {name: end.cache[first : first + 6] for name, first in LOADS.items()}
@@ -255,7 +252,7 @@ def _by_load(scene, end):
 
 
 def _place(x):
-    """Surge, heave and platform pitch of a state, in words."""
+    """Return the surge, heave and platform pitch of a state, in words."""
     return (
         f"surge {x[State.SURGE]:.4g} m, heave {x[State.HEAVE]:.4g} m, platform pitch"
         f" {degrees(x[State.PLATFORM_PITCH]):.3g} deg"
@@ -263,7 +260,7 @@ def _place(x):
 
 
 def _sentences(causes):
-    """The causes as sentences in a row."""
+    """Return the causes as sentences in a row."""
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in causes.values())
 
 
@@ -273,5 +270,5 @@ def _shown(value):
 
 
 def _kilo(value):
-    """A number of N or N m in kN or kN m."""
+    """Return a number of N or N m in kN or kN m."""
     return _shown(value / 1e3)

@@ -1,12 +1,11 @@
-"""The drag of a hull in a random sea as a linear load: damping and wave force, by stochastic linearisation.
+"""Linearises the drag of a hull in a random sea stochastically: damping and wave force.
 
-The drag of a strip, 0.5 rho C_D D |r| r per length with r the velocity of the water relative to it across the
-axis, is replaced by the linear force with the least mean square error. For a Gaussian r its gain is the mean
-slope, 0.5 rho C_D D E[|r| I + r r'/|r|]; in one direction without current that is
-0.5 rho C_D D sqrt(8/pi) sigma_r (Borgman, 1967, J. Waterways and Harbors Division 93, 129-156; Price and Wu,
-1985). The gain depends on the motion of the hull, and the motion on the gain: callers iterate. So is the
-quadratic damping matrix of a body: column j times sqrt(8/pi) sigma_j of the hull's velocity j alone, since
-the matrix knows no water.
+The drag of a strip, 0.5 rho C_D D |r| r per length with the relative velocity r across the axis, is replaced
+by the linear force with the least mean square error. For a Gaussian r its gain is the mean slope, 0.5 rho
+C_D D E[|r| I + r r'/|r|], in one direction without current 0.5 rho C_D D sqrt(8/pi) sigma_r (Borgman, 1967,
+J. Waterways and Harbors Division 93, 129-156; Price and Wu, 1985). The gain depends on the motion of the
+hull, so callers iterate. Column j of a body's quadratic damping matrix is multiplied with sqrt(8/pi) sigma_j
+of the hull's velocity j alone.
 """
 
 from dataclasses import dataclass, replace
@@ -15,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.analysis.statics import rotation_of
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.members import AX, AXIAL_DRAG, DRAG
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET
@@ -86,13 +86,13 @@ class _Drag(NamedTuple):
 
 
 def linear_drag(scene, state, omega, sea, motion=AT_REST):
-    """LinearDrag of a scene's hull about a state, in a sea and with a motion of the hull.
+    """Return the LinearDrag of a scene's hull about a state, in a sea and with a motion of the hull.
 
     omega: (n,) rad/s, rising, of the sea's spectrum, of motion.waves and of the excitation. sea: a
     descriptions.SeaState with a spectrum, or None. Nodes are those of the exact strips below the mean water
     surface on the axis, and those of members in their undisplaced place. A quadratic damping matrix takes
     part with the hull's own velocities. A current of the scene is the mean of the relative velocity; what it
-    does to the mean of the drag is left out. Zero without hydrodynamics.
+    does to the mean of the drag is omitted. Zero without hydrodynamics.
     Raises: InputError for a sea that has no spectrum.
     """
     omega = np.asarray(omega, dtype=float)
@@ -134,7 +134,7 @@ def linear_drag(scene, state, omega, sea, motion=AT_REST):
 
 
 def _of_strips(part, height, rotation):
-    """[_Drag] of the strips' sides and keel; empty without strips."""
+    """Return [_Drag] of the strips' sides and keel; empty without strips."""
     if part is None or part.shape is None:
         return []
     strips = part.shape
@@ -151,7 +151,7 @@ def _of_strips(part, height, rotation):
 
 
 def _of_members(members):
-    """[_Drag] of the members' sides and ends; empty without members."""
+    """Return [_Drag] of the members' sides and ends; empty without members."""
     if members is None:
         return []
     found = []
@@ -168,7 +168,7 @@ def _of_members(members):
 
 
 def _of_matrix(matrices, rotation, weight, motion):
-    """(6, 6) linear damping for the quadratic one of BodyMatrices, on velocities in inertial axes."""
+    """Return (6, 6) linear damping for the quadratic one of BodyMatrices, on velocities in inertial axes."""
     if matrices is None or not matrices.quadratic_damping.any():
         return np.zeros((6, 6))
     turn = np.kron(np.eye(2), rotation)
@@ -189,7 +189,7 @@ def with_drag(model, drag):
 
 
 def mean_slope(mean, covariance):
-    """E[|r| I + r r'/|r|] (m, k, k) of Gaussian vectors r of k = 1 or 2 components.
+    """Return E[|r| I + r r'/|r|] (m, k, k) of Gaussian vectors r of k = 1 or 2 components.
 
     mean (m, k); covariance (m, k, k). The mean over directions is a sum of even steps, that over sizes exact
     without a mean and by Gauss-Legendre nodes with one.
@@ -219,21 +219,19 @@ def mean_slope(mean, covariance):
 
 
 def _slopes(r):
-    """|r| I + r r'/|r| of vectors (..., k)."""
+    """Return |r| I + r r'/|r| of vectors (..., k)."""
     size = np.linalg.norm(r, axis=-1)[..., None, None]
     outer = r[..., :, None] * r[..., None, :]
     return size * np.eye(r.shape[-1]) + np.divide(outer, size, out=np.zeros_like(outer), where=size > 0.0)
 
 
 def _axes(state):
-    """(rotation (3, 3) from body to inertial components, height of the body origin, m) at a state."""
-    pose = pose_of(np.ascontiguousarray(state))
-    rows = [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
-    return np.array(rows), float(state[State.HEAVE])
+    """Return (rotation (3, 3) from body to inertial components, height of the body origin, m) at a state."""
+    return rotation_of(pose_of(np.ascontiguousarray(state))), float(state[State.HEAVE])
 
 
 def _nodes(strips, height, rotation):
-    """Body z, length and diameter (m,) of the strips' nodes below the mean surface on the axis."""
+    """Return the body z, length and diameter (m,) of the strips' nodes below the mean surface on the axis."""
     surface = min(max(-height / max(rotation[2, 2], 0.1), strips.keel_z), strips.top_z)
     places, lengths, diameters = [], [], []
     for number, cells in enumerate(strips.cells):
@@ -261,7 +259,7 @@ def _wave_velocity(omega, number, place, heading, depth):
 
 
 def _current(current, place, depth):
-    """(m, 3) velocity of the current at places (m, 3)."""
+    """Return (m, 3) velocity of the current at places (m, 3)."""
     flow = np.zeros_like(place)
     if current is not None:
         fraction = np.clip((depth + place[:, 2]) / depth, 0.0, 1.0) ** current.exponent

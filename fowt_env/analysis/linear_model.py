@@ -1,4 +1,4 @@
-"""Linear models of a scene about an operating point, by central differences of the nonlinear plant."""
+"""Linearises a scene about an operating point by central differences of the nonlinear plant."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from fowt_env.analysis.statics import central_difference, named_periods, rotation_of
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.descriptions.checks import check_number, is_number, short
@@ -79,7 +80,7 @@ UNITS = {  # of states, inputs and outputs, SI
 
 
 def sampled(a, b, dt):
-    """(exp(A dt), integral of exp(A s) ds B) for inputs held over dt."""
+    """Return (exp(A dt), integral of exp(A s) ds B) for inputs held over dt."""
     n, m = b.shape
     block = np.zeros((n + m, n + m))
     block[:n, :n], block[:n, n:] = a, b
@@ -88,7 +89,7 @@ def sampled(a, b, dt):
 
 
 def _python_control(where):
-    """The module control. Raises: InputError that names the extra to install."""
+    """Return the module control. Raises: InputError that names the extra to install."""
     try:
         import control
     except ImportError as error:
@@ -113,7 +114,7 @@ class DiscreteModel:
     outputs: tuple
 
     def to_statespace(self):
-        """control.StateSpace in discrete time. Raises: InputError that names the extra to install."""
+        """Return control.StateSpace in discrete time. Raises: InputError that names the extra to install."""
         return _python_control("to_statespace").ss(
             self.A, self.B, self.C, self.D, self.dt, states=list(self.states), inputs=list(self.inputs),
             outputs=list(self.outputs), name="fowt_sampled",
@@ -126,7 +127,7 @@ class LinearModel:
 
     A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
     and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
-    are plant.state.STATES; those of dynamic inflow follow, wake_1 and so on, those of a tower that bends, its
+    are plant.state.STATES; those of dynamic inflow follow, wake_1 and so on, those of a flexible tower, its
     deflections (TOWER) and their rates (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where
     the plant has them, and last those of a body with radiation memory, radiation_1 and so on.
 
@@ -150,7 +151,7 @@ class LinearModel:
     scene: object = field(repr=False)
 
     def index(self, name):
-        """Row of a state. Raises: InputError for an unknown name."""
+        """Return the row of a state. Raises: InputError for an unknown name."""
         if name not in self.states:
             for state, field in MEASURED_AS.items():
                 if field == name and state in self.states:
@@ -159,7 +160,7 @@ class LinearModel:
         return self.states.index(name)
 
     def output_index(self, name):
-        """Row of an output. Raises: InputError for an unknown name."""
+        """Return the row of an output. Raises: InputError for an unknown name."""
         if name not in self.outputs:
             raise unknown("output", name, self.outputs)
         return self.outputs.index(name)
@@ -171,14 +172,14 @@ class LinearModel:
 
     @property
     def x0(self):
-        """(m,) the states at the operating point."""
+        """Return (m,) the states at the operating point."""
         names, rows, _ = plant_states(self.scene)
         row_of = dict(zip(names, rows, strict=True))
         return np.array([self.point.state[row_of[n]] if n in row_of else 0.0 for n in self.states])
 
     @property
     def equilibrium(self):
-        """pandas.Series (m,) of the states at the operating point, by name; units has their units."""
+        """Return pandas.Series (m,) of the states at the operating point, by name; units has their units."""
         import pandas as pd
 
         return pd.Series(self.x0, index=list(self.states), name="equilibrium")
@@ -194,7 +195,7 @@ class LinearModel:
 
     @property
     def units(self):
-        """{name: unit} of the states, inputs and outputs, SI; "" for those of memory and wake."""
+        """Return {name: unit} of the states, inputs and outputs, SI; "" for those of memory and wake."""
         known = UNITS | {name: "N" for name in self.outputs if name.startswith("fairlead_tension_")}
         return {name: known.get(name, "") for name in (*self.states, *self.inputs, *self.outputs)}
 
@@ -205,7 +206,7 @@ class LinearModel:
 
     @property
     def _observed(self):
-        """The states. Raises: InputError where some are not measured."""
+        """Return the states. Raises: InputError if some are not measured."""
         hidden = [name for name in self.states if name not in MEASURED_AS]
         if hidden:
             raise InputError(
@@ -216,13 +217,13 @@ class LinearModel:
 
     @cached_property
     def _from_measurement(self):
-        """(places in a Measurement, (m, m) matrix, (m,) equilibrium) of state()."""
+        """Return (places in a Measurement, (m, m) matrix, (m,) equilibrium) of state()."""
         places = [int(Measure[MEASURED_AS[name].upper()]) for name in self._observed]
         return places, self._turning(euler=True), self.x0
 
     @cached_property
     def _from_frame(self):
-        """(columns of a run's DataFrame, (m, m) matrix times the factors to SI, (m,) equilibrium)."""
+        """Return (columns of a run's DataFrame, (m, m) matrix times the factors to SI, (m,) equilibrium)."""
         channels = {channel.name: channel for channel in FIXED_CHANNELS}
         found = [channels[COLUMNS[name]] for name in self._observed]
         columns = [channel.column for channel in found]
@@ -234,30 +235,25 @@ class LinearModel:
         euler: angular velocities are given as rates of the Euler angles, else by inertial axes.
         """
         turn = np.eye(len(self.states))
-        pose = pose_of(self.point.state)
-        body = np.array(
-            [[pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]]
-        ).T
+        body = rotation_of(pose_of(self.point.state)).T
         first, roll, pitch = self.index("vx"), *self.point.state[[State.ROLL, State.PLATFORM_PITCH]]
         turn[first : first + 3, first : first + 3] = body
-        turn[first + 3 : first + 6, first + 3 : first + 6] = (
-            [
+        if euler:
+            body = [
                 [1.0, 0.0, -np.sin(pitch)],
                 [0.0, np.cos(roll), np.sin(roll) * np.cos(pitch)],
                 [0.0, -np.sin(roll), np.cos(roll) * np.cos(pitch)],
             ]
-            if euler
-            else body
-        )
+        turn[first + 3 : first + 6, first + 3 : first + 6] = body
         return turn
 
     def state(self, measured):
-        """(m,) deviation of the states from the operating point, from what is measured.
+        """Return (m,) deviation of the states from the operating point, from what is measured.
 
         measured: a Measurement (a controller has to declare `fields`), or a row of the DataFrame that
         simulate returns, as a mapping of columns; of a whole DataFrame (rows, m).
         Velocities are turned into body axes at the operating point's attitude, right to first order.
-        Raises: InputError where the model has states that are not measured, or a column is missing.
+        Raises: InputError if the model has states that are not measured, or a column is missing.
         """
         if isinstance(measured, Measurement):
             places, turn, rest = self._from_measurement
@@ -285,21 +281,21 @@ class LinearModel:
 
     @property
     def pitch_rests(self):
-        """Whether the blade pitch rests on a limit: below rated, where no controller moves it."""
+        """Return whether the blade pitch rests on a limit: below rated, where no controller moves it."""
         drive, pitch = self.scene.turbine.pitch_drive, self.point.state[State.BLADE_PITCH]
         return not drive.minimum + 1e-6 < pitch < drive.maximum - 1e-6
 
     def modes(self):
-        """[Mode] of the plant without control, slowest first."""
+        """Return [Mode] of the plant without control, slowest first."""
         return modes(self.A, self.states, self.cm_height, self.arm)
 
     @cached_property
     def wave_filter(self):
-        """WaveFilter: the causal model of the wave force that to_statespace() uses."""
+        """Return the WaveFilter: the causal model of the wave force that to_statespace() uses."""
         return fit_wave_filter(self.scene, self.point.state)
 
     def response(self, omega, inputs=("generator_torque", "blade_pitch_command", "wind_speed")):
-        """(n, outputs, inputs) complex frequency response at omega (n,) rad/s, waves without any fit.
+        """Return (n, outputs, inputs) complex frequency response at omega (n,) rad/s, waves without any fit.
 
         inputs: names of inputs or "wave_elevation", the elevation at the hull's mean place.
         """
@@ -319,7 +315,7 @@ class LinearModel:
         return result
 
     def to_statespace(self, waves=None, inputs=None, outputs=None, name=None):
-        """control.StateSpace with named states, inputs and outputs (SI).
+        """Return control.StateSpace with named states, inputs and outputs (SI).
 
         waves: whether it has the force of waves; None: where the scene has a sea. It then has a last input,
         wave_elevation, the elevation at the hull's mean place wave_filter.lead seconds ahead: the force of
@@ -415,13 +411,13 @@ class Mode(NamedTuple):
 
 
 def modes(a, names, cm_height, arm):
-    """[Mode] of a system matrix a (n, n) with these state names, slowest first.
+    """Return [Mode] of a system matrix a (n, n) with these state names, slowest first.
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
     platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s,
     deflections of the tower as they are.
     Those of the radiation memory, of dynamic inflow, of a pitch drive with inertia and of single blades'
-    pitches are left out: to which their states contribute most, by participation factors.
+    pitches are omitted: to which their states contribute most, by participation factors.
     """
     values, vectors = np.linalg.eig(a)
     found = []
@@ -447,15 +443,14 @@ def modes(a, names, cm_height, arm):
             **{deflection: abs(part[deflection]) for deflection in TOWER if deflection in part},
         }
         name = max(participation, key=participation.get)
-        found.append(
-            Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / abs(value)), float(abs(value)))
-        )
+        size = abs(value)
+        found.append(Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / size), float(size)))
     return sorted(found, key=lambda mode: -mode.period)
 
 
 @inlined_kernel
 def fill_response(x, u, force, model, data, dx, measurement, row):
-    """Fill state rates, measurement and output row under u and further hull forces (6,)."""
+    """Fill state rates, measurement and output row under u and additional hull forces (6,)."""
     evaluate_loads(0.0, x, model, data, dx)
     for j in range(6):
         data.cache[LoadCache.TOTAL + j] += force[j]
@@ -467,7 +462,7 @@ def fill_response(x, u, force, model, data, dx, measurement, row):
 
 @entry
 def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
-    """Azimuth means of state rates, measurement and output row under u and further hull forces (6,)."""
+    """Fill azimuth means of state rates, measurement and output row under u and additional hull forces."""
     model, data = model_of(handle), data_of(handle)
     start = x[State.AZIMUTH]
     rates[:] = 0.0
@@ -500,7 +495,7 @@ class _Plant:
         self.means = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
 
     def __call__(self, x, u, force):
-        """Rates of plant_states and the outputs."""
+        """Return the rates of plant_states and the outputs."""
         _mean_response(self.handle, x, u, force, AZIMUTHS, *self.scratch, *self.means)
         rates, measured, recorded = self.means
         of_states = rates[self.states]
@@ -521,7 +516,7 @@ def check_linear(scene, known=LINEAR):
 
 
 def steady_parts(scene, point):
-    """{path: part} of the model that is differentiated about an OperatingPoint."""
+    """Return {path: part} of the model that is differentiated about an OperatingPoint."""
     body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
     return {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
 
@@ -551,56 +546,57 @@ def linearize(scene, operating_point=None, *, wind=None):
         scene = scene.with_weather(wind=check_number("wind", wind, 0.0))
     point = trim(scene) if operating_point is None else operating_point
     parts = steady_parts(scene, point)
-    body = parts["rigid_body"]
-    plant = _Plant(without_fluctuations(scene, point.wind_speed).with_model(parts), scene.n_lines)
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
-    def slopes(vector, indices, steps):
-        columns = []
-        for index, step in zip(indices, steps, strict=True):
-            keep = vector[index].copy()
-            vector[index] = keep + step
-            up = plant(x, u, force)
-            vector[index] = keep - step
-            down = plant(x, u, force)
-            vector[index] = keep
-            columns.append((up - down) / (2.0 * step))
-        return np.array(columns).T
+    def plant_at(speed):
+        return _Plant(without_fluctuations(scene, speed).with_model(parts), scene.n_lines)
 
+    plant = plant_at(point.wind_speed)
     names, rows, state_steps = plant_states(scene)
+
+    def slopes(vector, indices, steps):
+        def evaluate():
+            return plant(x, u, force)
+
+        return [central_difference(evaluate, vector, *each) for each in zip(indices, steps, strict=True)]
+
     of_states = slopes(x, of_all_blades(scene, rows), state_steps)
-    of_inputs = np.zeros((of_states.shape[0], len(INPUTS)))
-    of_inputs[:, :2] = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
-    of_forces = slopes(force, [[i] for i in range(6)], FORCE_STEPS)
-    if point.wind_speed is not None:
-        step = INPUT_STEPS[2]
-        sides = []
-        for sign in (1.0, -1.0):
-            air = without_fluctuations(scene, point.wind_speed + sign * step).with_model(parts)
-            sides.append(_Plant(air, scene.n_lines)(x, u, force))
-        of_inputs[:, 2] = (sides[0] - sides[1]) / (2.0 * step)
-    n = len(names)
+    of_inputs = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
+    of_inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force), point, of_inputs[0]))
+    of_forces = slopes(force, range(6), FORCE_STEPS)
+    return assembled(scene, point, (of_states, of_inputs, of_forces), names)
+
+
+def wind_slope(evaluate, point, like):
+    """Return the central difference of evaluate(wind speed) about an OperatingPoint; zeros without wind."""
+    if point.wind_speed is None:
+        return np.zeros_like(like)
+    up, down = (evaluate(point.wind_speed + sign * INPUT_STEPS[2]) for sign in (1.0, -1.0))
+    return (up - down) / (2.0 * INPUT_STEPS[2])
+
+
+def assembled(scene, point, columns, states, inputs=(), outputs=()):
+    """Return the LinearModel of columns by states, inputs and forces, with additional names."""
+    of_states, of_inputs, of_forces = (np.array(found).T for found in columns)
+    n, body = len(states), scene.model.rigid_body
     tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
     model = LinearModel(
         of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
-        names, INPUTS, (*MEASURED, *RECORDED, *tensions),
+        states, (*INPUTS, *inputs), (*MEASURED, *RECORDED, *tensions, *outputs),
         point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
     )  # fmt: skip
     return with_memory(model, linear_memory(scene))
 
 
 def with_memory(model, memory):
-    """The LinearModel with the states of a scene.radiation_fit.LinearMemory; itself where that is None.
+    """Return LinearModel with the states of a scene.radiation_fit.LinearMemory; unchanged if that is None.
 
     The platform rests at the operating point, so velocities turn into inertial axes by its attitude alone.
     """
     if memory is None:
         return model
-    pose = pose_of(model.point.state)
     turn = np.zeros((6, 6))
-    turn[:3, :3] = turn[3:, 3:] = [
-        [pose.r11, pose.r12, pose.r13], [pose.r21, pose.r22, pose.r23], [pose.r31, pose.r32, pose.r33]
-    ]  # fmt: skip
+    turn[:3, :3] = turn[3:, 3:] = rotation_of(pose_of(model.point.state))
     m, n = memory.A.shape[0], len(model.states)
     speeds = [model.index(name) for name in VELOCITIES]
     force = -turn.T @ memory.C
@@ -618,9 +614,9 @@ def with_memory(model, memory):
 
 
 def natural_periods(scene):
-    """{motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
+    """Return {motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
-    Those of a tower that bends follow, named by TOWER. A motion without restoring (no moorings) gets inf.
+    Those of a flexible tower follow, named by TOWER. A motion without restoring (no moorings) gets inf.
     Modes are named by their largest motion, angles weighted with half the draft. With radiation memory the
     mass is that at the motion's own frequency.
     """
@@ -637,7 +633,7 @@ def natural_periods(scene):
 
 
 def _periods(model, omega):
-    """{motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
+    """Return {motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
     deflections = [name for name in TOWER if name in model.states]
     names = (*MOTIONS, *deflections)
     n = len(names)
@@ -654,13 +650,4 @@ def _periods(model, omega):
         stiffness = np.linalg.solve(np.eye(n) + out @ np.linalg.solve(square, into), stiffness)
     values, vectors = np.linalg.eig(kinematics @ stiffness)
     scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm, *(1.0 for _ in deflections)])
-    shapes = np.abs(vectors) * scale[:, None]
-    periods = {}
-    free = set(range(n))
-    for motion in np.argsort(-shapes.max(axis=0)):  # most clear-cut modes first
-        order = np.argsort(-shapes[:, motion])
-        name = next(i for i in order if i in free)
-        free.discard(name)
-        square = -values[motion].real
-        periods[names[name]] = float(2.0 * np.pi / np.sqrt(square)) if square > 1e-9 else float("inf")
-    return {name: periods[name] for name in names}
+    return named_periods(values, np.abs(vectors) * scale[:, None], names)

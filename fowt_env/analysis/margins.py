@@ -1,7 +1,7 @@
-"""Stability margins of a linear model under a linear controller, with the loop broken at the plant's input.
+"""Computes stability margins of a linear model under a linear controller at the plant's input.
 
-With G from the inputs that the controller moves to what it reads, and its law u = K y, the sensitivity there
-is S = (I - K G)^-1 and the loop transfer L = -K G. An input that is broken alone, the others closed, has
+With G from the controller's commands to its measurements and the law u = K y, the sensitivity is
+S = (I - K G)^-1 and the loop transfer L = -K G. With one input opened and the others closed,
 1 + L_i = 1/S_ii. Sources: Skogestad and Postlethwaite, Multivariable Feedback Control, 2nd ed. (2005),
 sections 2.4 and 6.2 (margins, peak of S); Seiler, Packard and Gahinet, An introduction to disk margins, IEEE
 Control Systems 40(5), 2020.
@@ -38,7 +38,7 @@ class LinearLaw(NamedTuple):
 
 
 class LoopMargins(NamedTuple):
-    """Margins of one input, broken alone, the others closed; inf where no frequency limits it."""
+    """Margins of one input, opened alone, the others closed; inf where no frequency limits it."""
 
     gain: float  # smallest factor above 1 on the loop's gain that makes it unstable
     gain_reduction: float  # largest factor below 1 that does; 0: none
@@ -64,22 +64,22 @@ class Margins:
 
     @property
     def modulus(self) -> float:
-        """1/Ms, for one input the least distance of the Nyquist curve from -1."""
+        """Return 1/Ms, for one input the least distance of the Nyquist curve from -1."""
         return 1.0 / self.sensitivity_peak
 
     @property
     def gain(self) -> float:
-        """Smallest gain margin of the inputs, each broken alone."""
+        """Return the smallest gain margin of the inputs, each opened alone."""
         return min(loop.gain for loop in self.loops.values())
 
     @property
     def phase(self) -> float:
-        """Smallest phase margin (deg) of the inputs, each broken alone."""
+        """Return the smallest phase margin (deg) of the inputs, each opened alone."""
         return min(loop.phase for loop in self.loops.values())
 
     @property
     def disk_gain(self) -> tuple[float, float]:
-        """(low, high) factors that all inputs may have at once, each its own."""
+        """Return (low, high) factors that all inputs may have at once, each its own."""
         half = 0.5 * self.disk
         if half >= 1.0:
             return 0.0, inf
@@ -87,7 +87,7 @@ class Margins:
 
     @property
     def disk_phase(self) -> float:
-        """Largest phase (deg) that all inputs may have at once, each its own."""
+        """Return the largest phase (deg) that all inputs may have at once, each its own."""
         return degrees(2.0 * atan(0.5 * self.disk))
 
 
@@ -97,7 +97,7 @@ def linear_law(
     outputs: str | Sequence[str] | None = None,
     inputs: str | Sequence[str] | None = None,
 ) -> LinearLaw:
-    """LinearLaw of a controller in any of its forms, see margins. Raises: InputError."""
+    """Return the LinearLaw of a controller in any of its forms, see margins. Raises: InputError."""
     if isinstance(controller, LinearLaw):
         return controller
     known = (*model.outputs, *(name for name in model.states if name not in model.outputs))
@@ -140,7 +140,7 @@ def margins(
     outputs: str | Sequence[str] | None = None,
     inputs: str | Sequence[str] | None = None,
 ) -> Margins:
-    """Margins of a LinearModel under a linear controller, in continuous time.
+    """Return the margins of a LinearModel under a linear controller, in continuous time.
 
     controller: the law u = K y of deviations with the sign that it has on the turbine (the gain of an LQR,
     u = -K x, is given as -K), as
@@ -198,7 +198,7 @@ def least_size(matrices: np.ndarray) -> np.ndarray:
 
 
 def _plant_of(model, law):
-    """(A, B, C, D) of the model from what the law moves to what it reads."""
+    """Return (A, B, C, D) of the model from what the law moves to what it reads."""
     columns = [model.inputs.index(name) for name in law.inputs]
     rows, direct = [], []
     for name in law.outputs:
@@ -213,7 +213,7 @@ def _plant_of(model, law):
 
 
 def closed_loop(plant: tuple, law: LinearLaw) -> np.ndarray:
-    """(n + k, n + k) system matrix of a plant (A, B, C, D) and a law that reads its outputs."""
+    """Return (n + k, n + k) system matrix of a plant (A, B, C, D) and a law that reads its outputs."""
     a, b, c, d = plant
     # u = N (Dk C x + Ck xk) with N = (I - Dk D)^-1
     inverse = np.linalg.inv(np.eye(b.shape[1]) - law.D @ d)
@@ -223,7 +223,7 @@ def closed_loop(plant: tuple, law: LinearLaw) -> np.ndarray:
 
 
 def _sensitivity(plant, law):
-    """Function of frequencies (k,) that returns S (k, m, m)."""
+    """Return the function of frequencies (k,) that returns S (k, m, m)."""
     a, b, c, d = plant
     m = b.shape[1]
 
@@ -242,7 +242,7 @@ def _sensitivity(plant, law):
 
 
 def _frequencies(poles):
-    """Increasing frequencies (rad/s) of the search, closer about each pole."""
+    """Return the increasing frequencies (rad/s) of the search, closer about each pole."""
     decades = np.log10(HIGHEST / LOWEST)
     found = [np.logspace(np.log10(LOWEST), np.log10(HIGHEST), int(decades * PER_DECADE) + 1)]
     for pole in poles:
@@ -252,7 +252,7 @@ def _frequencies(poles):
 
 
 def _largest(function: Callable[[float], float], grid, values):
-    """(largest value, frequency) of a function known on a grid, refined about its peak."""
+    """Return (largest value, frequency) of a function known on a grid, refined about its peak."""
     k = int(np.argmax(values))
     low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
     found = minimize_scalar(
@@ -262,13 +262,13 @@ def _largest(function: Callable[[float], float], grid, values):
 
 
 def _crossings(function, grid, values):
-    """Frequencies at which a real function, known on a grid, changes its sign."""
+    """Return the frequencies at which a real function, known on a grid, changes its sign."""
     places = np.flatnonzero(np.diff(np.signbit(values)))
     return [brentq(function, grid[k], grid[k + 1], xtol=TOLERANCE * grid[k], rtol=1e-13) for k in places]
 
 
 def _loop_margins(loop: Callable[[float], complex], grid, values):
-    """LoopMargins of a loop transfer L, a function of frequency with its values on a grid."""
+    """Return the LoopMargins of a loop transfer L, a function of frequency with its values on a grid."""
     gains = []  # (factor, frequency) of each crossing of the negative real axis
     for w in _crossings(lambda w: loop(w).imag, grid, values.imag):
         value = loop(w)

@@ -1,10 +1,9 @@
-"""Linear models of a rotor whose blades have pitches of their own, in multi-blade coordinates.
+"""Linearises a rotor with individual blade pitch in multi-blade coordinates.
 
 A quantity q_i of the blades i = 1, 2, 3 at the azimuths psi_i is q_i = q_0 + q_c cos psi_i + q_s sin psi_i,
-psi = 0 up: q_0 is collective, q_c tilts the load of the rotor and q_s yaws it. At each azimuth the plant is
-differentiated by these coordinates and its answers are turned into them; then the derivatives are averaged
-over the azimuth. What varies within a third of a turn, in wind with shear at three times the rotor's
-frequency, is left out.
+psi = 0 up: q_0 is collective, q_c the tilt and q_s the yaw component. At each azimuth the plant is
+differentiated by these coordinates and its outputs are transformed to them; the derivatives are averaged
+over the azimuth. Variations at 3P in sheared wind are omitted.
 """
 
 from math import cos, pi, sin
@@ -15,18 +14,18 @@ from fowt_env.analysis.linear_model import (
     CYCLIC,
     FORCE_STEPS,
     INPUT_STEPS,
-    INPUTS,
     LINEAR,
     MEASURED,
     RECORDED,
-    LinearModel,
+    assembled,
     check_linear,
     fill_response,
     of_all_blades,
     plant_states,
     steady_parts,
-    with_memory,
+    wind_slope,
 )
+from fowt_env.analysis.statics import central_difference
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.errors import InputError
 from fowt_env.plant.channels import N_FIXED
@@ -35,7 +34,6 @@ from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import BLADES, Command, State
-from fowt_env.scene.radiation_fit import linear_memory
 
 CYCLIC_INPUTS = ("tilt_pitch_command", "yaw_pitch_command")
 NOT_TURNING = ("hub_tilt_moment", "hub_yaw_moment", "yaw_bearing_tilt_moment", "yaw_bearing_yaw_moment")
@@ -48,7 +46,7 @@ def _mean_response(
     handle, x, u, force, cyclic, places, azimuths, y, v, dx, measurement, row, rates, turned, measured,
     moments, recorded,
 ):  # fmt: skip
-    """Means over the azimuth of what a state with cyclic parts answers.
+    """Fill the azimuth means of rates and outputs at a state with cyclic parts.
 
     cyclic (k + 1, 2): cosine and sine parts of what each blade has, by the rows of places (k, 3), its indices
     in the state, and of the pitch commands. turned (k, 2): those of the rates; moments: as MOMENTS. y, v, dx,
@@ -113,7 +111,7 @@ class _Plant:
         self.means = (np.zeros(n), turned, np.zeros(fields), np.zeros(len(MOMENTS)), np.zeros(rows))
 
     def __call__(self, x, u, force, cyclic):
-        """Rates of the states and of the cyclic ones, then the outputs."""
+        """Return the rates of the states and of the cyclic ones, then the outputs."""
         _mean_response(self.handle, x, u, force, cyclic, self.places, AZIMUTHS, *self.scratch, *self.means)
         rates, turned, measured, moments, recorded = self.means
         return np.r_[
@@ -151,32 +149,13 @@ def linearize_blades(scene, operating_point=None):
     plant = plant_at(point.wind_speed)
 
     def slope(array, index, step):
-        keep = np.array(array[index])
-        sides = []
-        for sign in (1.0, -1.0):
-            array[index] = keep + sign * step
-            sides.append(plant(x, u, force, cyclic))
-        array[index] = keep
-        return (sides[0] - sides[1]) / (2.0 * step)
+        return central_difference(lambda: plant(x, u, force, cyclic), array, index, step)
 
     columns = [slope(x, indices, step) for indices, step in zip(together, state_steps, strict=True)]
     columns += [slope(cyclic, (k, part), state_steps[i]) for k, i in enumerate(own) for part in range(2)]
     inputs = [slope(u, 0, INPUT_STEPS[0]), slope(u, list(range(1, scene.n_commands)), INPUT_STEPS[1])]
-    if point.wind_speed is None:
-        inputs.append(np.zeros_like(inputs[0]))
-    else:
-        sides = [plant_at(point.wind_speed + sign * INPUT_STEPS[2])(x, u, force, cyclic) for sign in (1, -1)]
-        inputs.append((sides[0] - sides[1]) / (2.0 * INPUT_STEPS[2]))
+    inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force, cyclic), point, inputs[0]))
     inputs += [slope(cyclic, (len(own), part), INPUT_STEPS[1]) for part in range(2)]
     forces = [slope(force, i, FORCE_STEPS[i]) for i in range(6)]
-    of_states, of_inputs, of_forces = (np.array(found).T for found in (columns, inputs, forces))
     states = (*names, *(f"{part}{names[i].removeprefix('blade_')}" for i in own for part in CYCLIC))
-    n = len(states)
-    tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
-    body = scene.model.rigid_body
-    model = LinearModel(
-        of_states[:n], of_inputs[:n], of_states[n:], of_inputs[n:], of_forces[:n], of_forces[n:],
-        states, (*INPUTS, *CYCLIC_INPUTS), (*MEASURED, *RECORDED, *tensions, *MOMENTS),
-        point, body.s_z / body.mass, 0.5 * scene.platform.draft, scene,
-    )  # fmt: skip
-    return with_memory(model, linear_memory(scene))
+    return assembled(scene, point, (columns, inputs, forces), states, CYCLIC_INPUTS, MOMENTS)

@@ -20,7 +20,7 @@ MOST_PANELS = 20_000  # dense matrices of this many panels take 13 GB
 def solve_mesh(
     path, omega, heading, *, water_depth, water_density=1025.0, gravity=9.80665, lid=True, report=None
 ):
-    """PotentialFlow of the hull whose panel mesh is in a file, about the mesh's origin at still water.
+    """Return PotentialFlow of the hull whose panel mesh is in a file, about the mesh's origin at still water.
 
     path         of a mesh that Capytaine reads (.gdf, .pnl, .dat, .stl, .msh ...), in metres, z up from still
                  water, normals outwards; panels above the water are cut off
@@ -29,7 +29,7 @@ def solve_mesh(
     water_depth  m
     lid          close the interior water plane, which keeps irregular frequencies away
     report       called with (text, problems done, problems in all)
-    Added mass at infinite frequency is solved too; that at zero is left out, as Capytaine has no limit of it
+    Added mass at infinite frequency is solved too; that at zero is omitted, as Capytaine has no limit of it
     in finite depth.
     Raises: InputError without Capytaine, for a file that is no mesh, for frequencies that it cannot solve.
     """
@@ -104,7 +104,7 @@ def _check_omega(omega, depth, gravity):
 
 
 def _body(cpt, path, lid):
-    """Capytaine's body of a mesh file, cut at the water, with its six motions."""
+    """Return capytaine's body of a mesh file, cut at the water, with its six motions."""
     path = Path(path)
     if not path.is_file():
         raise InputError(f"mesh file {str(path)!r} does not exist")
@@ -137,7 +137,7 @@ def _volume(mesh):
 
 
 def _hydrostatics(mesh, density, gravity):
-    """(volume, centre, (6, 6) stiffness without weight) of a cut mesh."""
+    """Return (volume, centre, (6, 6) stiffness without weight) of a cut mesh."""
     volume, centre = _volume(mesh)
     x, y = mesh.faces_centers[:, 0], mesh.faces_centers[:, 1]
     plane = -mesh.faces_areas * mesh.faces_normals[:, 2]  # of the water plane, per panel below it

@@ -1,19 +1,15 @@
-"""Linear models as designs of controllers take them: the states of the rigid bodies alone, blades that lag.
+"""Reduces linear models to the states of the rigid bodies, with a lag of the blades, for controller design.
 
-The other states z follow the rigid bodies' x by z' = A_zz z + A_zx x + B_z u + E_z f. To cut them off would
-leave out what they pass on (a tower that bends, all of the rotor's thrust on the platform), so they are
-residualised (Kokotovic, Khalil and O'Reilly, Singular Perturbation Methods in Control, 1986):
+The other states z, z' = A_zz z + A_zx x + B_z u + E_z f, are residualised (Kokotovic, Khalil and O'Reilly,
+Singular Perturbation Methods in Control, 1986), because truncation would remove their steady effect:
 
-A tower that bends, the wake of dynamic inflow, a pitch drive with inertia and a generator that lags are where
-they come to rest under x, u and f: z = -A_zz^-1 (A_zx x + B_z u + E_z f). The tower is then a static spring
-without velocity, which moves the mass of its top with the platform; the drive is the lag that trails a
-slow command as far.
+- flexible tower, wake, second-order pitch drive and generator lag are in equilibrium,
+  z = -A_zz^-1 (A_zx x + B_z u + E_z f): a static spring that moves the top mass with the platform, a drive
+  with the same lag for slow commands;
+- radiation memory, as slow as the platform, is replaced by its complex gain at a frequency w: the real part
+  acts with x, the imaginary part over w with dx/dt, which are added mass and damping at w.
 
-Radiation memory decays as slowly as the platform moves. At a frequency w its states are a complex gain times
-x, u and f, whose real part acts with x and whose imaginary part, over w, with dx/dt. So its force becomes the
-added mass and the damping of that frequency, exactly there and nearly about it.
-
-Blades that follow their command at once are no state: designs give them LEAST_LAG.
+Blades that follow their command at once have no state: designs use LEAST_LAG.
 """
 
 from dataclasses import replace
@@ -31,7 +27,7 @@ FAR = 0.3  # of the undamped frequency, within which its mode is
 
 
 def with_pitch_lag(model):
-    """The LinearModel with blades that lag; itself where its pitch drive has a time constant."""
+    """Return the LinearModel with blades that lag; unchanged if its pitch drive has a time constant."""
     if model.scene.turbine.pitch_drive.lag > 0.0:
         return model
     a, b, blade = model.A.copy(), model.B.copy(), model.index("blade_pitch")
@@ -41,7 +37,7 @@ def with_pitch_lag(model):
 
 
 def platform_frequency(model):
-    """Frequency (rad/s) of platform_mode, or the undamped one where no mode oscillates near it."""
+    """Return the frequency (rad/s) of platform_mode, or the undamped one where no mode oscillates near it."""
     found = platform_mode(model)
     return _undamped(model) if found is None else found.frequency
 
@@ -61,8 +57,8 @@ def platform_mode(model):
 
 
 def _undamped(model):
-    """Frequency (rad/s) of restoring and mass alone in which the pitch has its largest share."""
-    model = _settled(model)  # the mass on a tower that bends is the platform's too
+    """Return the frequency (rad/s) of restoring and mass alone in which the pitch has its largest share."""
+    model = _settled(model)  # the mass on a flexible tower is the platform's too
     positions = [model.index(name) for name in MOTIONS]
     speeds = [model.index(name) for name in VELOCITIES]
     kinematics, stiffness = model.A[np.ix_(positions, speeds)], model.A[np.ix_(speeds, positions)]
@@ -74,11 +70,11 @@ def _undamped(model):
 
 
 def residualised(model, omega=None):
-    """Return the LinearModel with the states of plant.state.STATES alone; itself where it has no others.
+    """Return the LinearModel with the states of plant.state.STATES alone; unchanged if it has no others.
 
     omega: rad/s, where added mass and damping of radiation memory are exact; None: platform_frequency of the
     model without its other internal states.
-    Raises: InputError where some of those do not come to rest by themselves.
+    Raises: InputError if some of those do not come to rest by themselves.
     """
     model = _settled(model)
     memory = [name for name in model.states if name not in STATES]
@@ -88,13 +84,13 @@ def residualised(model, omega=None):
 
 
 def _settled(model):
-    """The LinearModel whose states besides STATES and radiation memory are where they come to rest."""
+    """Return the LinearModel whose states besides STATES and radiation memory are where they come to rest."""
     names = [name for name in model.states if name not in STATES and not name.startswith(MEMORY)]
     return _following(model, names, 0.0)
 
 
 def _following(model, names, omega):
-    """The LinearModel whose states of these names follow the others as at omega, rad/s; 0: at rest."""
+    """Return the LinearModel whose states of these names follow the others as at omega, rad/s; 0: at rest."""
     if not names:
         return model
     gone = [model.index(name) for name in names]
@@ -105,13 +101,13 @@ def _following(model, names, omega):
     response = np.linalg.inv(1j * omega * np.eye(len(gone)) - own)
 
     def moved(drive):
-        """(with the value, with its rate) of the states that go per what drives them."""
+        """Return (with the value, with its rate) of the states that go per what drives them."""
         gain = response @ drive
         return gain.real, gain.imag / omega if omega else np.zeros_like(drive)
 
     by_state, by_rate = moved(model.A[np.ix_(gone, kept)])
     into, out = model.A[np.ix_(kept, gone)], model.C[:, gone]
-    # the inputs change slowly beside the platform: what their rates do to these states is left out
+    # the inputs change slowly beside the platform: what their rates do to these states is omitted
     inertia = np.linalg.inv(np.eye(len(kept)) - into @ by_rate)
     rates = {
         "A": inertia @ (model.A[np.ix_(kept, kept)] + into @ by_state),

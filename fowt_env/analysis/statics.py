@@ -1,4 +1,4 @@
-"""A platform at rest where its file puts it: weight, buoyancy, stability, pull of its lines."""
+"""Computes the statics of an undisplaced platform, and tools of other analyses: differences, modes."""
 
 from math import pi
 from typing import NamedTuple
@@ -16,21 +16,21 @@ TILT_STEP = 1e-4  # rad, of the slope of the righting moment
 
 
 class Statics(NamedTuple):
-    """Figures of an undisplaced platform in still water without wind, SI, body axes about the body origin."""
+    """Holds statics of an undisplaced platform in still water without wind, SI, in body axes."""
 
     weight: float  # N
     buoyancy: float  # N
-    volume: float  # m3 of water that weighs as much
+    volume: float  # m3 of water of the same weight
     pull: float  # of all lines, downwards, N
     mass_centre: np.ndarray  # (3,), m
-    buoyancy_centre: np.ndarray  # (3,), m; nan in z where a potential-flow body does not say it
+    buoyancy_centre: np.ndarray  # (3,), m; nan in z if a potential-flow body does not specify it
     metacentric_height: np.ndarray  # (2,) in roll and pitch, of the water alone, m
     tension: np.ndarray  # (n_lines,) at the fairleads, N
 
 
 @entry
 def mean_derivative(handle, x, u, azimuths, dx, mean):
-    """Mean of dx over the azimuths, into mean (n_state,)."""
+    """Fill mean (n_state,) with dx averaged over the azimuths."""
     start = x[State.AZIMUTH]
     mean[:] = 0.0
     for i in range(azimuths):
@@ -41,8 +41,37 @@ def mean_derivative(handle, x, u, azimuths, dx, mean):
     x[State.AZIMUTH] = start
 
 
+def rotation_of(pose):
+    """Return the rotation matrix (3, 3) of a Pose, from body to inertial components."""
+    return np.array([[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])
+
+
+def central_difference(evaluate, array, index, step):
+    """Return the central difference of evaluate(), whose results are new arrays, by entries of an array."""
+    keep, sides = np.array(array[index]), []
+    for sign in (1.0, -1.0):
+        array[index] = keep + sign * step
+        sides.append(evaluate())
+    array[index] = keep
+    return (sides[0] - sides[1]) / (2.0 * step)
+
+
+def named_periods(values, shapes, names):
+    """Return {name: undamped natural period s} of modes x'' = value x; inf without restoring.
+
+    Each mode, a column of shapes (n, n) >= 0, is named by its largest row that is free, dominant modes first.
+    """
+    found, free = {}, set(range(len(names)))
+    for mode in np.argsort(-shapes.max(axis=0)):
+        row = max(free, key=lambda i: shapes[i, mode])
+        free.discard(row)
+        square = -values[mode].real
+        found[names[row]] = float(2.0 * pi / np.sqrt(square)) if square > 1e-9 else float("inf")
+    return {name: found[name] for name in names}
+
+
 class Evaluation:
-    """Evaluations of a scene's loads: at(x) leaves them in data."""
+    """Evaluates a scene's loads; at(x) stores them in data."""
 
     def __init__(self, scene):
         self.data = scene.data()
@@ -51,13 +80,13 @@ class Evaluation:
         self.dx, self.mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
 
     def at(self, x, block):
-        """(6,) wrench of an entry of LoadCache at a state."""
+        """Return (6,) wrench of an entry of LoadCache at a state."""
         mean_derivative(self.handle, x, self.u, 1, self.dx, self.mean)
         return self.data.cache[block : block + 6].copy()
 
 
 def statics(scene):
-    """Statics of a scene without fluctuations; one without water displaces nothing."""
+    """Return the statics of a scene without fluctuations; one without water displaces nothing."""
     body, site, evaluation = scene.model.rigid_body, scene.platform.environment, Evaluation(scene)
     rest = np.zeros(scene.n_state)
     water = evaluation.at(rest, LoadCache.HYDRO)

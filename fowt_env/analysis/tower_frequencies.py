@@ -1,4 +1,4 @@
-"""Natural frequencies of a tower that bends: clamped at its base, and on its floating platform."""
+"""Natural frequencies of a flexible tower: clamped at its base, and on its floating platform."""
 
 from typing import NamedTuple
 
@@ -32,7 +32,7 @@ class _Bending(NamedTuple):
 
 
 def tower_frequencies(scene, mass, slopes, kinematics, count=None):
-    """{mode: TowerFrequency} of a scene's platform; empty where its file has no [tower.modes].
+    """Return {mode: TowerFrequency} of a scene's platform; empty where its file has no [tower.modes].
 
     mass        (6, 6) of the rigid turbine with the added mass, about the body origin
     slopes      (6, 6) of the loads on it by its motions
@@ -62,7 +62,7 @@ def tower_frequencies(scene, mass, slopes, kinematics, count=None):
 
 
 def _frequencies(matrix):
-    """((n,) Hz, (n, n) shapes) of x'' = -matrix x; 0 of what is not restored."""
+    """Return ((n,) Hz, (n, n) shapes) of x'' = -matrix x; 0 of what is not restored."""
     squares, shapes = np.linalg.eig(matrix)
     return np.sqrt(np.maximum(squares.real, 0.0)) / (2.0 * np.pi), shapes
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
-from fowt_env.analysis.statics import mean_derivative
+from fowt_env.analysis.statics import central_difference, mean_derivative
 from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
@@ -40,7 +40,7 @@ DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     int(State.ROTOR_SPEED): 1e-4,
     int(State.BLADE_PITCH): 1e-5,
 }
-DEFLECTION_STEP = 1e-3  # m, of those of a tower that bends
+DEFLECTION_STEP = 1e-3  # m, of those of a flexible tower
 PLATFORM_MODES = ("floating", "fixed")
 
 
@@ -77,7 +77,7 @@ class OperatingPoint(Mapping):
         return len(self._values)
 
     def copy(self):
-        """The same point with arrays of its own."""
+        """Return the same point with separate arrays."""
         return OperatingPoint(
             dict(self._values), self.state.copy(), self.command.copy(), self.wind_speed, self.platform
         )
@@ -99,7 +99,7 @@ class OperatingPoint(Mapping):
 
 
 def without_fluctuations(scene, wind_speed=None):
-    """The scene in steady mean wind and flat water: same types, so nothing is compiled anew.
+    """Return the scene in steady mean wind and flat water: same types, so no recompilation.
 
     Nothing of its waves is left in it. A box of wind becomes its mean over time, which is its own.
     """
@@ -153,7 +153,7 @@ class _Steady:
         self.slope = None  # last Jacobian of the motions
 
     def rates(self):
-        """Azimuth-averaged derivative at the present state and command, with actuators at rest."""
+        """Return the azimuth-averaged derivative at the present state and command, with actuators at rest."""
         rest_actuators(self.scene.model, self.x, self.u)
         for block in self.scene.blocks:
             if block.steady == "settled":
@@ -166,7 +166,7 @@ class _Steady:
     def settle_internal(self, block):
         """Set a block of internal states to where its rates are zero, for the rest held as it is.
 
-        Raises: InputError where there is no such place, as of an integral.
+        Raises: InputError if there is no such place, as of an integral.
         """
         if block.name == "wake":
             settle_wake(self.handle, self.x, self.dx)
@@ -200,7 +200,7 @@ class _Steady:
         self.x[rows] = values
 
     def rotor_acceleration(self, rotor_speed, blade_pitch):
-        """w_b' with the torque of the static curve, platform as it is and a tower that bends at rest."""
+        """w_b' with the torque of the static curve, platform as it is and a flexible tower at rest."""
         ratio = self.scene.turbine.drivetrain.gear_ratio
         self.x[State.ROTOR_SPEED] = rotor_speed
         self.u[Command.GENERATOR_TORQUE] = generator_torque(ratio * rotor_speed, blade_pitch, self.curve)
@@ -213,7 +213,7 @@ class _Steady:
         return rates[State.ROTOR_SPEED] + body.coupling / body.rotor_row * self._shaft_turning(rates)
 
     def _shaft_turning(self, rates):
-        """Angular acceleration of the nacelle about the shaft, rad/s2, of a turbine at rest."""
+        """Return the angular acceleration of the nacelle about the shaft, rad/s2, of a turbine at rest."""
         tower = self.scene.model.tower
         bent, bending = self.x[self.deflections()], rates[[self._acceleration(i) for i in self.deflections()]]
         a, b = tower.slope[0::2] @ bent[0::2], -tower.slope[1::2] @ bent[1::2]  # about y, then about x
@@ -233,51 +233,44 @@ class _Steady:
         """Set rotor speed, blade pitch and torque to their steady values for the present platform."""
         turbine = self.scene.turbine
         drive = turbine.pitch_drive
-        wind = self.scene.wind_speed
-        if wind is None or wind <= 0.0:
-            self.rotor_acceleration(0.0, min(max(0.0, drive.minimum), drive.maximum))
-            return
-        if wind > turbine.cut_out_wind_speed:
-            self.rotor_acceleration(0.0, min(FEATHERED, drive.maximum))
-            return
-        rated = turbine.rated_rotor_speed
-        finest = drive.minimum
-        if self.rotor_acceleration(rated, finest) > 0.0:
-            high = 0.8
-            beta = self._root(lambda b: self.rotor_acceleration(rated, b), finest, high)
-            self.rotor_acceleration(rated, beta)
-            return
+        wind, rated, finest = self.scene.wind_speed, turbine.rated_rotor_speed, drive.minimum
         slow = 0.02 * rated
-        if self.rotor_acceleration(slow, finest) <= 0.0:
-            self.rotor_acceleration(0.0, finest)
-            return
-        speed = self._root(lambda w: self.rotor_acceleration(w, finest), slow, rated)
-        self.rotor_acceleration(speed, finest)
+        if wind is None or wind <= 0.0:
+            speed, pitch = 0.0, min(max(0.0, finest), drive.maximum)
+        elif wind > turbine.cut_out_wind_speed:
+            speed, pitch = 0.0, min(FEATHERED, drive.maximum)
+        elif self.rotor_acceleration(rated, finest) > 0.0:
+            speed, pitch = rated, self._root(lambda b: self.rotor_acceleration(rated, b), finest, 0.8)
+        elif self.rotor_acceleration(slow, finest) <= 0.0:
+            speed, pitch = 0.0, finest
+        else:
+            speed, pitch = self._root(lambda w: self.rotor_acceleration(w, finest), slow, rated), finest
+        self.rotor_acceleration(speed, pitch)
 
     def _root(self, excess, low, high):
-        """Zero of the rotor's acceleration. Raises: InputError where a falling platform leaves none."""
+        """Zero of the rotor's acceleration. Raises: InputError if a falling platform leaves none."""
         if not excess(low) * excess(high) <= 0.0:
             raise self.refusal("where no rotor speed and blade pitch balance the torque")
         return brentq(excess, low, high, xtol=1e-14, rtol=1e-14)
 
     def motions(self):
-        """Indices of the positions that the scene's platform can change."""
+        """Return the indices of the positions that the scene's platform can change."""
         body = self.scene.model.rigid_body
         if body.platform_fixed:
             return []
         return [0, 1, 2, 3, 4, 5] if body.plane is None else [0, 2, 4]
 
     def deflections(self):
-        """Indices of the deflections of a tower that bends."""
+        """Return the indices of the deflections of a flexible tower."""
         tower = self.scene.model.tower
         return [] if tower is None else list(range(tower.first, tower.first + len(tower.slope)))
 
     def positions(self):
-        """Indices of the platform's motions and of the tower's deflections."""
+        """Return the indices of the platform's motions and of the tower's deflections."""
         return self.motions() + self.deflections()
 
     def free_states(self):
-        """Indices of the states that a trim finds: positions, pitch or speed of a turning rotor."""
+        """Return indices of the states that a trim finds: positions, pitch or speed of a turning rotor."""
         positions = self.positions()
         wind = self.scene.wind_speed
         if wind is None or not 0.0 < wind <= self.scene.turbine.cut_out_wind_speed:
@@ -288,7 +281,7 @@ class _Steady:
         return [*positions, int(State.ROTOR_SPEED)] if rotor_speed > 0.0 else positions
 
     def residual(self, free):
-        """Accelerations of the free states, which vanish in the steady one."""
+        """Return the accelerations of the free states, which vanish in the steady one."""
         if free[-1:] in ([State.BLADE_PITCH], [State.ROTOR_SPEED]):
             self.rotor_acceleration(self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH])
         else:
@@ -296,27 +289,22 @@ class _Steady:
         return self.mean[[self._acceleration(index) for index in free]]
 
     def _acceleration(self, index):
-        """Index of the state whose rate is the acceleration that balances with a free state."""
+        """Return the index of the state whose rate is the acceleration that balances with a free state."""
         if index in (State.BLADE_PITCH, State.ROTOR_SPEED):
             return State.ROTOR_SPEED
         return State.VX + index if index < State.AZIMUTH else index + len(self.deflections())
 
     def jacobian(self, free):
-        """Derivatives of the residual by the free states, central differences."""
-        columns = []
-        for index in free:
-            step = DIFFERENCE_STEPS.get(index, DEFLECTION_STEP)
-            keep = self.x[index]
-            self.x[index] = keep + step
-            up = self.residual(free)
-            self.x[index] = keep - step
-            down = self.residual(free)
-            self.x[index] = keep
-            columns.append((up - down) / (2.0 * step))
+        """Return the derivatives of the residual by the free states, central differences."""
+        steps = [DIFFERENCE_STEPS.get(index, DEFLECTION_STEP) for index in free]
+        columns = [
+            central_difference(lambda: self.residual(free), self.x, index, step)
+            for index, step in zip(free, steps, strict=True)
+        ]
         return np.array(columns).T
 
     def settle(self, free):
-        """Newton on the free states for zero acceleration; returns the remaining one.
+        """Solve for zero acceleration by Newton's method on the free states; return the remaining one.
 
         The Jacobian is kept while it brings the residual down tenfold a round. A step that does not
         lower the residual is halved: far from the solution lines go taut within metres.
@@ -355,9 +343,8 @@ class _Steady:
         return size
 
     def _of_motions(self, jacobian):
-        """The part of a Jacobian that has the motions alone."""
-        n = len(self.motions())
-        return jacobian[:n, :n]
+        """Return the part of a Jacobian that has the motions alone."""
+        return jacobian[: len(self.motions()), : len(self.motions())]
 
     def refusal(self, ending=None):
         """InputError of a search that ends at this state without a steady one; ending as in unbalanced."""
@@ -377,7 +364,7 @@ class _Steady:
 
 
 def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
-    """OperatingPoint of a scene: steady state in its mean wind, waves flat.
+    """Return the OperatingPoint of a scene: steady state in its mean wind, waves flat.
 
     platform: "floating" finds the six motions too; "fixed" holds them at zero. Deflections of a tower that
     bends are found either way. Rotor speed and
@@ -397,7 +384,7 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
 
 
 def _trim(scene, platform):
-    """What trim gives, found anew."""
+    """Recompute a trim."""
     fixed = platform == "fixed"
     body = scene.model.rigid_body._replace(platform_fixed=fixed, rotor_fixed=False)
     steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
@@ -416,7 +403,7 @@ def _trim(scene, platform):
 
 
 def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
-    """OperatingPoint with the rotor driven at a speed (rad/s) and a locked blade pitch (rad).
+    """Return the OperatingPoint with the rotor driven at a speed (rad/s) and a locked blade pitch (rad).
 
     For model tests, where a motor holds the rotor speed: theory.md Eq. (20). Mean wind, waves flat.
     Raises: InputError as trim does.
@@ -435,7 +422,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
 
 
 def _point(scene, steady, platform):
-    """OperatingPoint at the present state, channels averaged over the azimuth."""
+    """Return the OperatingPoint at the present state, channels averaged over the azimuth."""
     rest_actuators(scene.model, steady.x, steady.u)
     state, command = steady.x.copy(), steady.u.copy()
     rows = []

@@ -14,7 +14,7 @@ _TRIMS = Cache(4096)  # (plant, water, shear exponent, wind speed) -> (state, co
 
 
 def plant_key(scene):
-    """Hash of all that a trim depends on, apart from the wind; the same in every process."""
+    """Return the hash of all that a trim depends on, apart from the wind; the same in every process."""
     weather = ("duration", "wave_components")
     options = {name: _values(value) for name, value in scene.options.items() if name not in weather}
     loads = tuple(load.key() for load in scene.loads)
@@ -30,12 +30,12 @@ def water_key(scene):
 
 
 def _values(part):
-    """A record as plain values: as an object it carries a set, whose order is each process's own."""
+    """Return a record as plain values: as an object it carries a set, whose order is each process's own."""
     return part.model_dump() if isinstance(part, Record) else part
 
 
 def cached_trim(scene, key, speed):
-    """(state, command) of trim() at a mean wind speed (m/s); computed once per process.
+    """Return (state, command) of trim() at a mean wind speed (m/s); computed once per process.
 
     The arrays are shared: copy before writing. A box of wind has a profile of its own, so that its
     trim is not remembered.
@@ -51,7 +51,7 @@ def _state_and_command(point):
 
 
 def interpolated_trim(scene, key, speed):
-    """(state, command) at a mean wind speed (m/s), linear between exact trims GRID apart.
+    """Return (state, command) at a mean wind speed (m/s), linear between exact trims GRID apart.
 
     Exact in the cell that holds the cut-out wind, where the operating point jumps.
     """

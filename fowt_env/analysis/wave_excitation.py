@@ -1,10 +1,9 @@
-"""First-order wave force on a hull over frequency, and a causal state-space model fitted to it.
+"""Computes the first-order wave force on a hull over frequency, and fits a causal state-space model.
 
-The force of a wave on the strips is not a causal function of the elevation at the hull: water deep down is
-moved by an average over elevations before and after. So the state-space model takes the elevation some
-seconds ahead (its lead), and says how well it fits in which band. The elevation is that at the hull's
-mean place, not at the origin: the way between is dispersive, and no low-order model fits that. (The
-excitation of a potential-flow body is that of its undisplaced position: there the hull stands at the origin.)
+The strip force is not a causal function of the elevation at the hull, because deep water averages elevations
+before and after. The state-space model therefore takes the elevation some seconds ahead (its lead). The
+elevation is that at the hull's mean position, because no low-order model fits the dispersion from the origin
+(for a potential-flow body the undisplaced position).
 """
 
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ from math import pi
 
 import numpy as np
 
+from fowt_env.analysis.statics import rotation_of
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.hydro.member_series import N_WATER, motion_amplitudes
@@ -23,7 +23,7 @@ from fowt_env.weather.waves import build_waves
 
 BAND = (0.15, 2.0)  # rad/s, of the fit: periods of 3.1 to 42 s
 GRID = 150  # frequencies of the fit
-AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is left out: first order to 1e-6
+AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is omitted: first order to 1e-6
 PAIRS = 8  # pairs of poles: 16 states
 POLE_DAMPING = 0.5  # neighbours then overlap
 LEADS = np.arange(0.0, 12.01, 0.5)  # s, of which the best fit is taken
@@ -64,35 +64,31 @@ def wave_force(scene, state, omega):
         force = excitation_at(body, omega, 0.0)
         if scene.options["planar"]:
             force[:, OUT_OF_PLANE] = 0.0
-        pose = pose_of(state)
-        rotation = np.array(
-            [[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)]
-        )  # body to inertial
+        rotation = rotation_of(pose_of(state))
         result[:, :3] += force[:, :3] @ rotation
         result[:, 3:] += force[:, 3:] @ rotation
     return result
 
 
+def _waves(scene, sea):
+    """Return the Waves of a regular sea or of components at the site of a scene."""
+    site = scene.platform.environment
+    place = {"depth": site.water_depth, "density": site.water_density, "gravity": site.gravity}
+    return build_waves(sea, **place, seed=0, duration=1.0)
+
+
 def _strip_forces(scene, state, omega, strips):
-    """(n, 6) complex force of the strips."""
+    """Return (n, 6) complex force of the strips."""
     result = np.zeros((omega.size, 6), dtype=complex)
     strips = strips._replace(drag_coefficient=0.0, axial_drag_coefficient=0.0)
     x = np.zeros_like(state)
     x[: State.AZIMUTH] = state[: State.AZIMUTH]
     x[State.SURGE] = x[State.SWAY] = 0.0  # the wave's phase counts from the hull
-    site = scene.platform.environment
     kinematics = np.zeros((7, strips.nodes))
     quarters = np.zeros((4, 6))
     for i, frequency in enumerate(omega):
-        waves = build_waves(
-            sea_state_of({"kind": "regular", "H": 2.0 * AMPLITUDE, "T": 2.0 * pi / frequency}),
-            depth=site.water_depth,
-            density=site.water_density,
-            gravity=site.gravity,
-            seed=0,
-            duration=1.0,
-        )
-        waves = waves._replace(ramp=0.0)
+        sea = sea_state_of({"kind": "regular", "H": 2.0 * AMPLITUDE, "T": 2.0 * pi / frequency})
+        waves = _waves(scene, sea)._replace(ramp=0.0)
         for quarter in range(4):
             t = quarter * 0.5 * pi / frequency
             _strip_force(strips, waves, x, t, kinematics, quarters[quarter])
@@ -102,18 +98,11 @@ def _strip_forces(scene, state, omega, strips):
 
 
 def _member_forces(scene, state, omega, members):
-    """(n, 6) complex force of the members' fluid inertia and pressure."""
-    site, nodes, pose = scene.platform.environment, members.nodes, pose_of(state)
-    rotation = np.array([[getattr(pose, f"r{i}{j}") for j in (1, 2, 3)] for i in (1, 2, 3)])
+    """Return (n, 6) complex force of the members' fluid inertia and pressure."""
+    nodes, rotation = members.nodes, rotation_of(pose_of(state))
     still = np.zeros(omega.size)
-    waves = build_waves(
-        SeaState(kind="components", omega=omega, amplitude=still + 1.0, phase=still, heading=still),
-        depth=site.water_depth,
-        density=site.water_density,
-        gravity=site.gravity,
-        seed=0,
-        duration=1.0,
-    )
+    sea = SeaState(kind="components", omega=omega, amplitude=still + 1.0, phase=still, heading=still)
+    waves = _waves(scene, sea)
     place = nodes[:, :3]
     if members.instantaneous_position:
         place = place @ rotation.T + [0.0, 0.0, state[State.HEAVE]]
@@ -146,7 +135,7 @@ class WaveFilter:
     errors: dict
 
     def response(self, omega):
-        """(n, 6) complex force per elevation at the hull (the lead taken back)."""
+        """Return (n, 6) complex force per elevation at the hull (the lead taken back)."""
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
         eye = np.eye(self.A.shape[0])
         filtered = np.array([np.linalg.solve(1j * w * eye - self.A, self.B) for w in omega])
@@ -154,7 +143,7 @@ class WaveFilter:
 
 
 def fit_wave_filter(scene, state):
-    """WaveFilter fitted to wave_force over BAND, with the lead that fits best.
+    """Return the WaveFilter fitted to wave_force over BAND, with the lead that fits best.
 
     Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable:
     PAIRS of them for strips, BODY_PAIRS for a potential-flow body.
@@ -190,7 +179,7 @@ def fit_wave_filter(scene, state):
 
 
 def _resonators(frequencies, damping):
-    """(A, B) of second-order resonators side by side, all driven by the input."""
+    """Return (A, B) of second-order resonators side by side, all driven by the input."""
     n = len(frequencies)
     a, b = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
     for i, frequency in enumerate(frequencies):

@@ -34,7 +34,7 @@ def build_converter(drivetrain, first_state):
 
 
 def drive_states(actuator, pitches):
-    """{name of a block: number of states} of a pitch actuator."""
+    """Return {name of a block: number of states} of a pitch actuator."""
     blades = 1 if pitches is None else BLADES
     moving = isinstance(actuator, PitchDrive)
     held = moving and actuator.held is not None
@@ -53,7 +53,7 @@ def rest_actuators(model, x, u):
 
 
 def linear_actuator(actuator):
-    """The actuator as a linear model has it: without deadband and friction."""
+    """Return the actuator as a linear model has it: without deadband and friction."""
     if not isinstance(actuator, PitchDrive):
         return actuator
     return actuator._replace(deadband=0.0, friction=0.0)

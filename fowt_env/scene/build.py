@@ -43,7 +43,7 @@ def build_scene(
     loads: Sequence[Load] = (),
     **options: Any,
 ) -> Scene:
-    """Scene of a platform, a wind and a sea.
+    """Return the scene of a platform, a wind and a sea.
 
     platform  built-in name, path to a TOML file, or a descriptions.platform.Platform
     wind      None: no aerodynamics; 0.0: still air; a speed (m/s); "ntm:18:B" (KIND:SPEED:CLASS); a path to a
@@ -61,7 +61,7 @@ def build_scene(
               wind with three rotor loads per step), within 1e-3 of "reference" and a thousand times faster;
               "reference": everything solved exactly, Runge-Kutta 4, some 20 times real time; "fast": the
               rotor as one table
-    loads     further loads on platform and tower, of one's own (fowt_env.Load)
+    loads     further loads on platform and tower, defined by the user (fowt_env.Load)
     options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
               alone move; of ntm and etm turbulence the part in the plane is kept
 

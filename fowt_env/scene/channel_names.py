@@ -9,7 +9,7 @@ UNITS = {channel.name: channel.unit for channel in (*FIXED_CHANNELS, *BLADE_CHAN
 
 
 def channel_name(name: Any) -> Any:
-    """The bare name of a channel: "RotSpeed" of "RotSpeed_[rpm]"; what is no text as it is.
+    """Return the bare name of a channel: "RotSpeed" of "RotSpeed_[rpm]"; what is no text as it is.
 
     Raises: InputError for a unit other than the channel's own.
     """
@@ -23,5 +23,5 @@ def channel_name(name: Any) -> Any:
 
 
 def channel_unit(name: str) -> str:
-    """Unit of a channel by its bare name; "" for the loads of a user, which other parts know."""
+    """Return the unit of a channel by its bare name; "" for the loads of a user, which other parts know."""
     return "kN" if name.startswith(("FAIRTEN", "ANCHTEN")) else UNITS.get(name, "")

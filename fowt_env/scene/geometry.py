@@ -1,4 +1,4 @@
-"""Whether the places in a platform file can be meant: lines, anchors, fairleads, members."""
+"""Checks positions in a platform file for plausibility: lines, anchors, fairleads, members."""
 
 from math import degrees, dist
 
@@ -14,7 +14,7 @@ UPRIGHT = 0.2  # horizontal over vertical span of a tendon, whose anchor may lie
 
 
 def geometry_faults(platform):
-    """{name: sentence} of what can hardly be meant in a Platform's places; empty where nothing is."""
+    """Return {name: sentence} of what can hardly be meant in a Platform's places; empty where nothing is."""
     return _line_faults(platform) | _member_faults(platform)
 
 
@@ -40,7 +40,7 @@ def in_radians(anchors, fairleads):
 
 
 def _reach(platform):
-    """Largest distance of the hull from the tower axis, m; None where the file does not say it."""
+    """Return the largest distance of the hull from the tower axis, m; None where the file does not say it."""
     reach = [0.5 * diameter for diameter in platform.hull.diameter] if platform.hull is not None else []
     for member in platform.members:
         ends = zip((member.start, member.end), member.diameter, strict=True)
@@ -49,7 +49,7 @@ def _reach(platform):
 
 
 def _line_faults(platform):
-    """{name: sentence} of the lines."""
+    """Return {name: sentence} of the lines."""
     found, depth = {}, platform.environment.water_depth
     reach, draft = _reach(platform), platform.draft
     for number, line in enumerate(platform.lines, 1):
@@ -86,7 +86,7 @@ def _line_faults(platform):
 
 
 def _member_faults(platform):
-    """{name: sentence} of the members."""
+    """Return {name: sentence} of the members."""
     found, depth = {}, platform.environment.water_depth
     for number, member in enumerate(platform.members, 1):
         low = min(member.start[2], member.end[2])

@@ -1,4 +1,4 @@
-"""The loads of the plant: where each is computed and kept, what leaves it out, what scales it to nothing."""
+"""Lists the loads of the plant: where each is computed and stored, how it is disabled or scaled to zero."""
 
 from collections.abc import Mapping
 from types import MappingProxyType

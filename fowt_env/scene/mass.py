@@ -14,7 +14,7 @@ SPAN_POINTS = 8  # along a blade, for the mean wind over the blades in the outpu
 
 
 def assemble(bodies):
-    """(6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), inertia about it).
+    """Return (6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), inertia about it).
 
     inertia: (3,) about the body axes, or a (3, 3) tensor.
     """
@@ -42,7 +42,7 @@ def _rotor_body(rotor):
 
 
 def _upper_bodies(platform, turbine):
-    """Tower, nacelle and rotor as (mass, centre, inertia)."""
+    """Return the tower, nacelle and rotor as (mass, centre, inertia)."""
     tower, nacelle = platform.tower, turbine.nacelle
     return [
         (tower.mass, (0.0, 0.0, tower.cm_height), tower.inertia),
@@ -52,7 +52,7 @@ def _upper_bodies(platform, turbine):
 
 
 def top_mass_matrix(platform, turbine):
-    """(6, 6) mass matrix of nacelle and rotor about the body origin."""
+    """Return (6, 6) mass matrix of nacelle and rotor about the body origin."""
     return assemble(_upper_bodies(platform, turbine)[1:])
 
 
@@ -85,7 +85,7 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
 
 
 def with_masses(modes, platform, turbine):
-    """TowerModes (or None) with the mass properties of what is below and above the tower's top.
+    """Return the TowerModes (or None) with the mass properties of what is below and above the tower's top.
 
     Floater and straight tower are one rigid body, nacelle and rotor another, as in build_rigid_body.
     """
@@ -109,7 +109,7 @@ def with_masses(modes, platform, turbine):
 
 
 def build_blade_masses(platform, turbine):
-    """BladeMasses of a turbine. Raises: InputError where its file does not have them."""
+    """Return the BladeMasses of a turbine. Raises: InputError if its file does not have them."""
     rotor = turbine.rotor
     if rotor.blade_mass is None:
         raise InputError(
@@ -128,7 +128,7 @@ def build_blade_masses(platform, turbine):
 
 
 def build_layout(platform, turbine, individual=False):
-    """Layout part: points and masses that outputs need; individual: those of single blades too."""
+    """Return the layout part: points and masses that outputs need; individual: those of single blades too."""
     rotor = turbine.rotor
     hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
     return Layout(

@@ -41,7 +41,7 @@ class Fidelity(NamedTuple):
 
 
 def least_lag(dt, integrator):
-    """Shortest time constant (s) of the wake that an integrator follows with the step dt (s)."""
+    """Return the shortest time constant (s) of the wake that an integrator follows with the step dt (s)."""
     return LAG_MARGIN * dt / INTEGRATORS[integrator].decay_limit
 
 
@@ -150,7 +150,7 @@ def choose_parts(fidelity, rotor, options):
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in tuple(ROTORS):
         raise unknown("rotor model", rotor, ROTORS)
-    # not every table has what a wake needs; a level falls back to what has it, an explicit choice is refused
+    # not every table has what a wake needs; a level falls back to what has it, an explicit choice is rejected
     wanted = [name for name in WAKE_OPTIONS if options[name]]
     able = [name for name, model in ROTORS.items() if set(wanted) <= set(model.wake)]
     if rotor is not None and rotor not in able:
@@ -184,7 +184,7 @@ def default_step(options, fastest=0.0):
 
 
 def checked_options(given, platform):
-    """Options with defaults, the platform file's own ones and the caller's, checked."""
+    """Return the options with defaults, the platform file's own ones and the caller's, checked."""
     options = {name: default for name, (default, _) in OPTIONS.items()}
     if platform.hull is None:
         options |= UNDISPLACED
@@ -218,7 +218,7 @@ def checked_options(given, platform):
 
 
 def samples_per_step(options, field):
-    """Evaluations of the rotor's load per step."""
+    """Return the evaluations of the rotor's load per step."""
     asked, integrator = options["rotor_samples"], options["integrator"]
     able = INTEGRATORS[integrator].samples_rotor
     if asked not in (None, 1) and not able:
@@ -233,7 +233,7 @@ def samples_per_step(options, field):
 
 
 def chosen_stations(count, turbine):
-    """Indices of that many of the file's blade stations, root and tip among them; None: all."""
+    """Return the indices of that many of the file's blade stations, root and tip among them; None: all."""
     if count is None:
         return None
     known = len(turbine.blade.radius)

@@ -1,4 +1,4 @@
-"""Parts of the plant's model from the descriptions: rotor, hull, moorings, current."""
+"""Builds parts of the plant's model from the descriptions: rotor, hull, moorings, current."""
 
 from math import cos, radians, sin
 
@@ -38,13 +38,13 @@ from fowt_env.weather.waves import flat_waves, is_flat
 
 
 def wake_states(aero):
-    """Number of states of the wake of an Aero part or None."""
+    """Return the number of states of the wake of an Aero part or None."""
     rotor = None if aero is None else aero.rotor
     return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
 
 
 def build_elements(turbine, density, count):
-    """BladeElements of a turbine with that many of its stations; None: all. Raises: InputError."""
+    """Return the BladeElements of a turbine with that many of its stations; None: all. Raises: InputError."""
     stations = chosen_stations(count, turbine)
     if stations is None or not is_curved(turbine):
         return build_blade_elements(turbine, density, stations)
@@ -52,7 +52,7 @@ def build_elements(turbine, density, count):
 
 
 def build_aero(platform, turbine, air, rotor, options):
-    """Aero part of a scene with wind."""
+    """Return the aero part of a scene with wind."""
     density = platform.environment.air_density
     elements = build_elements(turbine, density, options["blade_stations"])
     model = ROTORS[rotor].build(elements, options)
@@ -61,7 +61,7 @@ def build_aero(platform, turbine, air, rotor, options):
 
 
 def build_blade_pitches(turbine, rotor, first_state):
-    """BladePitches of a rotor whose blades have pitches of their own, with states from first_state on.
+    """Return BladePitches of a rotor whose blades have individual pitch, with states from first_state on.
 
     Raises: InputError for another number of blades, and for a rotor model that knows one pitch alone.
     """
@@ -80,36 +80,35 @@ def build_blade_pitches(turbine, rotor, first_state):
 
 
 def build_hydro(platform, waves, current, options, dt, first_state=N_RIGID):
-    """Hydro part of a scene in water stepped by dt (s); states of waves and memory begin at first_state."""
-    site, spar = platform.environment, platform.hull is not None
+    """Return the Hydro of a scene with time step dt (s); states of waves and memory begin at first_state."""
+    site, spar, kinematics = platform.environment, platform.hull is not None, _kinematics(platform, options)
     strips = None
     if spar:
-        shape = _strips(platform, options)
+        shape = build_strips(platform.hull, platform.hydro, **kinematics)
         strips = ExactStrips(shape, None)
         if takes_wave_bands(options, waves, shape):
             quadrature = build_quadrature(platform.hull, shape, _refinement(waves))
             strips = BandedStrips(shape, quadrature, None, None)
     excitation = excitation_in_waves(platform, waves, options, first_state)
     first_state += 0 if excitation is None or excitation.position is None else 2
+    members = build_members(platform.members, gravity=site.gravity, **kinematics)
     return Hydro(
-        hull=build_hull(platform.hull, site.water_density, site.gravity) if spar else None,
+        hull=build_hull(platform.hull, *_water(site)) if spar else None,
         strips=strips_in_waves(strips, waves, options),
         waves=waves,
         current=current,
         damping=build_damping(platform.hydro) if spar else None,
         added_inertia=build_added_inertia(platform.hydro.added_mass) if spar else None,
-        matrices=build_body_matrices(
-            platform.potential_flow, platform.additional, site.water_density, site.gravity
-        ),
+        matrices=build_body_matrices(platform.potential_flow, platform.additional, *_water(site)),
         radiation=build_radiation(platform.potential_flow, options, dt, first_state),
-        members=members_in_waves(_members(platform, options), waves, options),
+        members=members_in_waves(members, waves, options),
         excitation=excitation,
         depth=float(site.water_depth),
     )
 
 
 def hydro_in_waves(hydro, waves, platform, options):
-    """Hydro of a scene with a sea in other waves (None: still water) of the same types.
+    """Return the hydro of a scene with a sea in other waves (None: still water) of the same types.
 
     Raises: InputError for a sea beyond the fast path.
     """
@@ -132,18 +131,21 @@ def hydro_in_waves(hydro, waves, platform, options):
 
 
 def still_hydro(hydro, platform, options):
-    """Hydro of a scene with a sea in flat water: the same types, and nothing of that sea but its strip nodes.
+    """Return the Hydro of a scene with a sea in flat water: the same types and strip nodes.
 
-    One component of no height stands for the water, which is summed: a table would only take longer.
+    One component of zero height represents the water; it is summed, which is faster than a table.
     """
     waves = _flat_waves_of(platform)
-    members = hydro.members
     return hydro._replace(
         waves=waves,
         strips=strips_in_waves(hydro.strips, waves, options),
-        members=None if members is None else members._replace(series=no_series()),
+        members=members_in_waves(hydro.members, None, options),
         excitation=still_excitation(hydro.excitation),
     )
+
+
+def _water(site):
+    return site.water_density, site.gravity
 
 
 def _flat_waves_of(platform):
@@ -152,7 +154,7 @@ def _flat_waves_of(platform):
 
 
 def excitation_in_waves(platform, waves, options, first_state):
-    """Excitation of a potential-flow body in waves, with states from first_state on; None without either.
+    """Return the Excitation of a potential-flow body in waves, with states from first_state; None without.
 
     Raises: InputError for a sea beyond the body's coefficients, or second order without a QTF.
     """
@@ -165,40 +167,31 @@ def excitation_in_waves(platform, waves, options, first_state):
     position = None
     if options["excitation_position"] == "filtered":
         position = build_filtered_position(first_state, options["excitation_cutoff"])
-    return build_excitation(
-        body,
-        waves,
-        position=position,
-        duration=options["duration"],
-        fast=options["wave_loads"] == "fast",
-        planar=options["planar"],
-        second_order=second,
-        cutoff=options["second_order_cutoff"],
-    )
+    settings = {name: options[name] for name in ("duration", "planar", "second_order")}
+    settings |= {"fast": options["wave_loads"] == "fast", "cutoff": options["second_order_cutoff"]}
+    return build_excitation(body, waves, position=position, **settings)
 
 
 def _refinement(waves):
-    """How many times as many nodes the strips take as in a sea."""
+    """Return the factor on the number of strip nodes, higher in still water."""
     return STILL_REFINEMENT if is_flat(waves) else 1
 
 
 def strips_in_waves(strips, waves, options):
-    """Strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
+    """Return the strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
     if strips is None:
         return None
     diffracting = options["diffraction"] == "maccamy_fuchs" and waves is not None
     if isinstance(strips, ExactStrips):
-        return strips._replace(
-            diffraction=build_strip_diffraction(waves, strips.shape) if diffracting else None
-        )
+        part = build_strip_diffraction(waves, strips.shape) if diffracting else None
+        return strips._replace(diffraction=part)
     bands = wave_bands_of(waves, strips.shape)
-    return strips._replace(
-        bands=bands, diffraction=build_band_diffraction(bands, strips.quadrature) if diffracting else None
-    )
+    part = build_band_diffraction(bands, strips.quadrature) if diffracting else None
+    return strips._replace(bands=bands, diffraction=part)
 
 
 def takes_wave_bands(options, waves, strips):
-    """Whether the strip loads take the fast path; where a level asks for it, seas beyond it go exact."""
+    """Return whether the strip loads are fast; a fidelity falls back to exact ones for unsuitable seas."""
     if options["wave_loads"] != "fast":
         return False
     if waves is None or can_use_bands(waves, strips):
@@ -212,7 +205,7 @@ def takes_wave_bands(options, waves, strips):
 
 
 def wave_bands_of(waves, strips):
-    """WaveBands of the waves, None in still water. Raises: InputError for a sea beyond the fast path."""
+    """Return the WaveBands, None in still water. Raises: InputError for a sea of several headings."""
     if waves is None:
         return None
     if not can_use_bands(waves, strips):
@@ -223,14 +216,12 @@ def wave_bands_of(waves, strips):
 
 
 def check_symmetry(lines, current, members=()):
-    """Refuse what pulls a planar scene out of its plane."""
+    """Check that lines, current and members of a planar scene are symmetric. Raises: InputError."""
     if current is not None and abs(current.v) > IN_PLANE * abs(current.u):
         raise InputError("current.heading: must be 0 or 180 deg in a planar scene")
     mirror = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
-    rows = [
-        np.array([*line.anchor, *line.fairlead, line.length, line.wet_weight, line.EA, line.seabed_friction])
-        for line in lines
-    ]
+    keys = ("length", "wet_weight", "EA", "seabed_friction")
+    rows = [np.array([*line.anchor, *line.fairlead, *(getattr(line, key) for key in keys)]) for line in lines]
     for row in rows:
         if not any(np.allclose(other, mirror * row, rtol=1e-6, atol=1e-3) for other in rows):
             raise InputError(
@@ -241,11 +232,8 @@ def check_symmetry(lines, current, members=()):
     for member, shape in zip(members, shapes, strict=True):
         image = shape.copy()
         image[:, 1] *= -1.0
-        if not any(
-            np.allclose(other, seen, rtol=1e-6, atol=1e-3)
-            for other in shapes
-            for seen in (image, image[::-1])
-        ):
+        ways = (image, image[::-1])
+        if not any(np.allclose(other, way, rtol=1e-6, atol=1e-3) for other in shapes for way in ways):
             raise InputError(
                 f"member from {list(member.start)} to {list(member.end)} has no mirror image across y = 0; a"
                 " planar scene needs one (planar = False)"
@@ -253,43 +241,24 @@ def check_symmetry(lines, current, members=()):
 
 
 def _shape_of(member):
-    """(2, n) of a Member: what each of its ends has."""
+    """Return (2, n) values at both ends of a Member."""
     flow = float(member.potential_flow)
     ends = (member.start, member.end)
     pairs = (value for name, value in member if name not in ("start", "end", "potential_flow"))
     return np.column_stack([ends, *(np.array(pair) for pair in pairs), (flow, flow)])
 
 
-def _strips(platform, options):
+def _kinematics(platform, options):
+    """Return the keywords that strips and members share: site, and options of the wave kinematics."""
     site = platform.environment
-    return build_strips(
-        platform.hull,
-        platform.hydro,
-        density=site.water_density,
-        depth=site.water_depth,
-        position=options["kinematics_position"],
-        surface=options["surface"],
-        stretching=options["stretching"],
-        cell=options["strip_length"],
-    )
-
-
-def _members(platform, options):
-    site = platform.environment
-    return build_members(
-        platform.members,
-        density=site.water_density,
-        gravity=site.gravity,
-        depth=site.water_depth,
-        position=options["kinematics_position"],
-        surface=options["surface"],
-        stretching=options["stretching"],
-        cell=options["strip_length"],
-    )
+    return {
+        "density": site.water_density, "depth": site.water_depth, "position": options["kinematics_position"],
+        "surface": options["surface"], "stretching": options["stretching"], "cell": options["strip_length"],
+    }  # fmt: skip
 
 
 def members_in_waves(members, waves, options):
-    """Members in waves (None: still water), with a table of the water's motion on the fast path."""
+    """Return members in waves (None: still water), with a table of the water's motion on the fast path."""
     if members is None:
         return None
     still = members.scratch_nodes == 0 and not members.wheeler
@@ -301,7 +270,7 @@ def members_in_waves(members, waves, options):
 
 
 def build_current(spec):
-    """Current part, or None where its speed is zero."""
+    """Return the Current part, None for zero speed. Raises: InputError."""
     if spec is None:
         return None
     if not isinstance(spec, dict):
@@ -320,5 +289,5 @@ def build_current(spec):
 
 
 def build_moorings(lines, wanted):
-    """Mooring part, None without lines or where none is wanted."""
+    """Return the mooring part, None without lines or with mooring=False."""
     return build_mooring(lines, tabulated=wanted == "table") if wanted else None

@@ -1,4 +1,4 @@
-"""What is odd about the wind and the sea of a scene, and warned of when it is built."""
+"""Describes implausible winds and seas of a scene, for warnings of build_scene."""
 
 from math import pi, tanh
 
@@ -41,7 +41,7 @@ def wind_faults(air, turbine):
 
 
 def sea_faults(sea, site):
-    """Sentences on a SeaState in which the waves would break, by Miche's limit.
+    """Return the sentences on a SeaState in which the waves would break, by Miche's limit.
 
     Height over length at most 1/7 tanh(k depth) (R. Miche, Annales des Ponts et Chaussees 114, 1944;
     DNV-RP-C205, 3.4.6). Of a spectrum it is the significant height over the length at the peak, which real

@@ -1,12 +1,10 @@
-"""Radiation memory from potential-flow coefficients: a rational approximation, or convolution.
+"""Fits the radiation memory of potential-flow coefficients by a rational approximation, or convolves it.
 
-The retardation of a body is K(i w) = B(w) + i w (A(w) - A_inf), and follows from B alone, since it is causal.
-So both forms have the K of B: files give an A that agrees with their B to some per cent, where panels are
-coarse or inner waves resonate, and by far more than the fit is in error. The rational approximation has real
-coefficients, stable poles, K(0) = 0 and no direct term, and the poles of motions that are coupled are common
-to all entries between them. Poles are found by vector fitting (Gustavsen and Semlyen, IEEE Trans. Power
-Delivery 14(3), 1999; relaxed as in 21(3), 2006) and then by nonlinear least squares; residues by linear least
-squares under the condition that Re K is positive semidefinite (theory.md, 5.8).
+Both forms use the retardation K(i w) = B(w) + i w (A(w) - A_inf) that follows from B by causality: the A of
+files agrees with their B only to some per cent. The rational approximation has real coefficients, stable
+poles, K(0) = 0 and no direct term; coupled motions share poles. Poles are found by vector fitting (Gustavsen
+and Semlyen, IEEE Trans. Power Delivery 14(3), 1999; relaxed as in 21(3), 2006) and nonlinear least squares,
+residues by linear least squares with Re K positive semidefinite (theory.md, 5.8).
 """
 
 import hashlib
@@ -27,19 +25,19 @@ from fowt_env.plant.state import MOTIONS
 BAND = (0.15, 2.5)  # rad/s, in which errors are counted: periods of 2.5 to 42 s
 OUTSIDE, BELOW = 0.1, 0.6  # weight of higher frequencies, and times frequency (rad/s) of lower ones
 FEWEST_KNOWN = 8  # frequencies of a file within BAND
-NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is left out
+NEGLIGIBLE = 1e-3  # of the geometric mean of the diagonals: weaker coupling is omitted
 FEWEST, MOST = 2, 10  # pairs of poles of an entry
 ALIKE = 2e-3  # rms in BAND by which the normal K of two blocks may differ to share a fit
 ROUNDS = 12  # of relocating poles
 EVALUATIONS = 20  # of the nonlinear least squares
-POLISHED = 2.0  # times the error that is asked for, below which poles are worth them
+POLISHED = 2.0  # times the error that is requested, below which poles are worth them
 DECAY = (0.05, 8.0)  # 1/s, of a pole: one of less would outlast SPAN, and is narrower than files resolve
 FREQUENCY = (0.01, 8.0)  # rad/s, of a pole
 PASSIVE_UP_TO = 10.0  # rad/s
 PASSIVE_MARGIN = 1e-4  # least Re K at which residues are held, of its size there
 PASSIVE_ROUNDS = 60
 CHECKED = 4001  # frequencies up to there at which a fit is judged
-NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is refused
+NOT_PASSIVE = 1e-4  # of an entry's largest value: beyond it a fit is rejected
 SPAN = 60.0  # s of past velocities in a convolution
 FADE = 15.0  # s at its end in which K goes to zero: cut off, it would damp slow motions, or drive them
 SPACING = 0.005  # rad/s, of the cosine transform: its period of 1257 s is far beyond SPAN
@@ -70,7 +68,7 @@ class RadiationFit:
     asked: float  # error
 
     def response(self, omega):
-        """(n, 6, 6) complex K(i omega), omega (n,) rad/s."""
+        """Return (n, 6, 6) complex K(i omega), omega (n,) rad/s."""
         s = 1j * np.asarray(omega, dtype=float)[:, None]
         result = np.zeros((s.size, 6, 6), dtype=complex)
         for (i, j), residue in self.residues.items():
@@ -80,11 +78,11 @@ class RadiationFit:
 
     @property
     def states(self):
-        """Number of states: two for each pair of poles of each motion."""
+        """Return the number of states: two for each pair of poles of each motion."""
         return 2 * sum(pole.size for pole in self.poles.values())
 
     def table(self):
-        """Text, a line for each entry: order, rms errors in BAND, passivity."""
+        """Return the text, a line for each entry: order, rms errors in BAND, passivity."""
         lines = [f"{'entry':<24}{'order':>6}{'rms error':>11}{'of A and B':>12}{'least Re K':>12}"]
         for (i, j), entry in sorted(self.entries.items()):
             name = MOTIONS[i] if i == j else f"{MOTIONS[i]}, {MOTIONS[j]}"
@@ -94,14 +92,14 @@ class RadiationFit:
 
 
 def retardation(body):
-    """(n, 6, 6) complex B + i w (A - A_inf) of a PotentialFlow at its frequencies, made symmetric."""
+    """Return (n, 6, 6) complex B + i w (A - A_inf) of a PotentialFlow at its frequencies, made symmetric."""
     change = body.added_mass - body.added_mass_infinite
     k = body.damping + 1j * body.omega[:, None, None] * change
     return 0.5 * (k + k.transpose(0, 2, 1))
 
 
 def retardation_kernel(body, time):
-    """(n, 6, 6) K(t) of a PotentialFlow, 2/pi integral of B(w) cos(w t) dw, N/m ...; time (n,) s.
+    """Return (n, 6, 6) K(t) of a PotentialFlow, 2/pi integral of B(w) cos(w t) dw, N/m ...; time (n,) s.
 
     B goes from B(0) = 0 through the file's values by monotone cubics, and to zero within TAPER times the last
     frequency.
@@ -118,7 +116,7 @@ def retardation_kernel(body, time):
 
 
 def causal_retardation(body, omega):
-    """(n, 6, 6) complex K(i omega) of retardation_kernel over TRANSFORMED s; omega (n,) rad/s."""
+    """Return (n, 6, 6) complex K(i omega) of retardation_kernel over TRANSFORMED s; omega (n,) rad/s."""
     step = 0.1 / (TAPER * body.omega[-1])
     time = np.arange(0.0, TRANSFORMED, step)
     kernel = retardation_kernel(body, time).reshape(time.size, 36) * step
@@ -139,18 +137,18 @@ def _columns(s, poles):
 
 
 def _free(poles):
-    """(2 m, 2 m - 1) residues that keep K(0) = 0."""
+    """Return (2 m, 2 m - 1) residues that keep K(0) = 0."""
     at_zero = _columns(np.zeros(1, complex), poles).real
     return np.linalg.svd(at_zero)[2][1:].T
 
 
 def _real(a):
-    """Real and imaginary rows one above the other."""
+    """Return the real and imaginary rows one above the other."""
     return np.concatenate([a.real, a.imag])
 
 
 def _residues(s, f, w, poles):
-    """(fit (n, e), [residues]) of least squares with K(0) = 0."""
+    """Return (fit (n, e), [residues]) of least squares with K(0) = 0."""
     columns, free = _columns(s, poles), _free(poles)
     base = columns @ free
     left = _real(base * w[:, None])
@@ -159,7 +157,7 @@ def _residues(s, f, w, poles):
 
 
 def _relocated(s, f, w, poles):
-    """Poles after one round of relaxed vector fitting, in pairs; all stable."""
+    """Return the poles after one round of relaxed vector fitting, in pairs; all stable."""
     columns, free = _columns(s, poles), _free(poles)
     n, m = free.shape
     base, rows = columns @ free, []
@@ -183,7 +181,7 @@ def _relocated(s, f, w, poles):
 
 
 def _pairs(poles, count):
-    """That many upper poles of pairs within DECAY and FREQUENCY; two real ones become a pair."""
+    """Return the upper poles of `count` pairs within DECAY and FREQUENCY; two real ones become a pair."""
     upper = list(poles[poles.imag > 1e-9])
     real = np.sort(np.abs(poles[np.abs(poles.imag) <= 1e-9].real))
     upper += [complex(-np.sqrt(a * b), 0.5 * (b - a)) for a, b in zip(real[::2], real[1::2], strict=False)]
@@ -192,13 +190,13 @@ def _pairs(poles, count):
 
 
 def _bounded(poles):
-    """Poles moved into DECAY and FREQUENCY, with room for differences."""
+    """Return the poles moved into DECAY and FREQUENCY, with room for differences."""
     decay = np.clip(np.abs(poles.real), 1.001 * DECAY[0], 0.999 * DECAY[1])
     return -decay + 1j * np.clip(poles.imag, 1.001 * FREQUENCY[0], 0.999 * FREQUENCY[1])
 
 
 def _fit_poles(omega, f, w, count, starts, wanted):
-    """(largest error, poles) of the best of `count` pairs that vector fitting finds.
+    """Return (largest error, poles) of the best of `count` pairs that vector fitting finds.
 
     What is below `wanted` is polished by nonlinear least squares.
     """
@@ -306,7 +304,7 @@ def _passive_residues(omega, f, w, poles, places, size, counted):
 
 
 def _blocks(size):
-    """[motions that are coupled] of the (6, 6) rms of K, those without any left out."""
+    """Return [motions that are coupled] of the (6, 6) rms of K, those without any omitted."""
     scale = np.sqrt(np.diag(size))
     coupled = size > NEGLIGIBLE * np.outer(scale, scale)
     left, blocks = [i for i in range(6) if size[i, i] > 0.0], []
@@ -320,7 +318,7 @@ def _blocks(size):
 
 
 def _fit_block(omega, k, block, coupled, w, asked, known):
-    """(poles, {entry: residues}) of motions that share poles.
+    """Return (poles, {entry: residues}) of motions that share poles.
 
     known: [(normal K, poles, normal residues)] of earlier blocks, to which this one is added; a block that is
     one of them but for scales and signs, as sway and roll are of many floaters, has its fit.
@@ -357,7 +355,7 @@ def _fit_block(omega, k, block, coupled, w, asked, known):
 
 
 def _residues_by_entry(pairs, rows, units):
-    """{entry: complex residues}, both ways, of rows of their real and imaginary parts."""
+    """Return {entry: complex residues}, both ways, of rows of their real and imaginary parts."""
     residues = {}
     for (i, j), row, unit in zip(pairs, rows, units, strict=True):
         half = row.size // 2
@@ -369,10 +367,10 @@ _FITS = Cache(16)  # (hash of the coefficients, error) -> RadiationFit
 
 
 def fit_radiation(body, error=0.02):
-    """RadiationFit of a PotentialFlow: as many poles as the error asks for, MOST pairs at most.
+    """Return the RadiationFit of a PotentialFlow: as many poles as the error asks for, MOST pairs at most.
 
     error  rms over BAND of an entry, of the entry's rms there
-    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError where Re K of
+    Warns (PlantWarning) where an entry is left with more than twice that. Raises: InputError if Re K of
     the fit cannot be held positive, or with fewer than FEWEST_KNOWN frequencies within BAND.
     """
     digest = hashlib.sha256()
@@ -382,7 +380,7 @@ def fit_radiation(body, error=0.02):
 
 
 def _fit(body, asked):
-    """What fit_radiation gives, found anew."""
+    """Return what fit_radiation gives, recomputed."""
     known = _in_band(body.omega)
     if known.sum() < FEWEST_KNOWN:
         raise InputError(
@@ -418,12 +416,12 @@ def _fit(body, asked):
 
 
 def _in_band(omega):
-    """Whether frequencies are in BAND."""
+    """Return whether frequencies are in BAND."""
     return (omega >= BAND[0] - 1e-6) & (omega <= BAND[1] + 1e-6)
 
 
 def _misses(fit, omega, k):
-    """(6, 6) rms error of a fit to K at omega, of the rms of K; 0 where there is none."""
+    """Return (6, 6) rms error of a fit to K at omega, of the rms of K; 0 where there is none."""
     size = np.sqrt((np.abs(k) ** 2).mean(axis=0))
     miss = np.sqrt((np.abs(fit.response(omega) - k) ** 2).mean(axis=0))
     return np.divide(miss, size, out=np.zeros((6, 6)), where=size > 0.0)
@@ -456,7 +454,7 @@ def _check(fit):
 
 
 def build_radiation(body, options, dt, first):
-    """The memory part of a PotentialFlow or None, as the options have it.
+    """Return the memory part of a PotentialFlow or None, as the options have it.
 
     dt     s, of the steps of a convolution
     first  of the states of a state space in the state vector
@@ -470,14 +468,14 @@ def build_radiation(body, options, dt, first):
 
 
 def memory_for_step(memory, body, dt, planar):
-    """The memory part for steps of dt (s): itself, but for a convolution of another step."""
+    """Return the memory part for steps of dt (s): itself, but for a convolution of another step."""
     if not isinstance(memory, ConvolutionMemory) or abs(memory.dt - dt) <= 1e-9 * dt:
         return memory
     return build_convolution(body, dt, IN_PLANE if planar else range(6))
 
 
 def build_state_space(fit, first, motions=range(6)):
-    """StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
+    """Return StateSpaceMemory of a RadiationFit, for these motions; None where none of them has a memory."""
     counts = [fit.poles[j].size if j in motions and j in fit.poles else 0 for j in range(6)]
     groups = [whole_groups(count, PAIR_LANES) for count in counts]
     begin = np.concatenate([[0], np.cumsum(groups)]).astype(np.int64)
@@ -506,7 +504,7 @@ def build_state_space(fit, first, motions=range(6)):
 
 
 def build_convolution(body, dt, motions=range(6)):
-    """ConvolutionMemory of a PotentialFlow over SPAN for steps of dt (s); None without any damping."""
+    """Return ConvolutionMemory of a PotentialFlow over SPAN for steps of dt (s); None without any damping."""
     k = retardation(body)
     size = np.sqrt((np.abs(k) ** 2).mean(axis=0))
     _, coupled = _blocks(size)

@@ -57,7 +57,7 @@ class Scene:
     rotor: str
     options: dict
     wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
-    loads: tuple[Load, ...] = ()  # the user's own
+    loads: tuple[Load, ...] = ()  # the user's
     label: str = ""  # the platform as it was given: name or path
     trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
 
@@ -71,7 +71,7 @@ class Scene:
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """What the entries of this scene's state vector are, in order."""
+        """Return what the entries of this scene's state vector are, in order."""
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
         bending = tower_states(self.model.tower) // 2
@@ -88,34 +88,34 @@ class Scene:
 
     @property
     def n_commands(self) -> int:
-        """Generator torque and the blades' pitch, or that of each of them."""
+        """Return the generator torque and the blades' pitch, or that of each of them."""
         return N_COMMANDS if self.model.pitches is None else N_INDIVIDUAL_COMMANDS
 
     @property
     def pitch_states(self) -> tuple[int, ...]:
-        """Indices in the state of the blades' pitch, or of that of each of them."""
+        """Return the indices in the state of the blades' pitch, or of that of each of them."""
         pitches = self.model.pitches
         others = () if pitches is None else range(pitches.first, pitches.first + BLADES - 1)
         return (int(State.BLADE_PITCH), *others)
 
     @property
     def n_measurements(self) -> int:
-        """Fields of a Measurement and, where every blade has a pitch of its own, of a BladeMeasurement."""
+        """Fields of a Measurement and, with individual blade pitch, of a BladeMeasurement."""
         return N_MEASUREMENTS + (0 if self.model.pitches is None else N_BLADE_MEASUREMENTS)
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Output channels of this scene, in row order."""
+        """Return the output channels of this scene, in row order."""
         return channels(self.n_lines, self.load_names, self.channel_groups)
 
     @property
     def channel_groups(self) -> tuple[str, ...]:
-        """Names of the GROUPS of channels that this scene has beside the fixed ones."""
+        """Return the names of the GROUPS of channels that this scene has beside the fixed ones."""
         parts = {"tower": self.model.tower, "blades": self.model.pitches}
         return tuple(name for name, part in parts.items() if part is not None)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
-        """Output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
+        """Return the output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
 
         Where the plant's wind is a rotor average, Wind1VelX to Z become those of a point at the hub.
         overwrite: into the rows themselves; a copy of a long run costs as much as a tenth of it.
@@ -152,7 +152,7 @@ class Scene:
         return aero is not None, field, waves, "" if hydro is None else type(hydro.strips).__name__
 
     def data(self) -> Data:
-        """Fresh scratch arrays for one plant of this scene."""
+        """Return the fresh scratch arrays for one plant of this scene."""
         hydro = self.model.hydro
         strips = None if hydro is None else hydro.strips
         members = None if hydro is None else hydro.members
@@ -181,19 +181,17 @@ class Scene:
         )
 
     def handle(self, data: Data | None = None) -> Handle:
-        """The model and data in the form that kernels take from Python."""
+        """Return the model and data in the form that kernels take from Python."""
         return Handle(self.model, self.data() if data is None else data)
 
     def first_nonfinite_load(self, data: Data) -> str | None:
         """Words for the load of the user's that made a run not finite with this data; None where none did."""
         return first_nonfinite_load(self.loads, data.user)
 
-    def with_weather(
-        self, wind: Wind = UNCHANGED, sea: Sea = UNCHANGED, seed: int | None = None
-    ) -> "Scene":
+    def with_weather(self, wind: Wind = UNCHANGED, sea: Sea = UNCHANGED, seed: int | None = None) -> "Scene":
         """Return the scene in another wind, sea or seed, with a model of the same types: nothing is compiled.
 
-        What is left out stays as it is. sea None is still water. In a scene that was built with a sea it is a
+        What is omitted stays as it is. sea None is still water. In a scene that was built with a sea it is a
         wave without height: to rounding the loads of a scene built in still water, in twice the time.
         Raises: InputError, also where aerodynamics, a box of wind or a sea would be gained, or the first two
         lost (build a scene for that).
@@ -230,7 +228,7 @@ class Scene:
         return default_step(self.options, tower_frequency(self.model.tower))
 
     def with_step(self, dt: float) -> "Scene":
-        """This scene, made to be stepped by dt (s).
+        """Return the this scene, made to be stepped by dt (s).
 
         A convolution of radiation is of one step alone, and dynamic inflow has no lag too short for it.
         """
@@ -244,7 +242,7 @@ class Scene:
         return self.with_model(parts) if parts else self
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
-        """A copy with some parts of the model replaced (same types: no recompilation).
+        """Return a copy with some parts of the model replaced (same types: no recompilation).
 
         parts: {path: part}, as {"hydro.damping": ...}; slots: those at the top, as rigid_body=...
         """
@@ -286,11 +284,11 @@ def check_scene(scene: Any) -> None:
 
 
 def _default(name):
-    """Default of an option, None where its fidelity decides it."""
+    """Return the default of an option, None where its fidelity decides it."""
     return OPTIONS[name][0] if name in OPTIONS else None
 
 
 def _replaced(part, path, value):
-    """A part of a model with that at a path of field names replaced."""
+    """Return a part of a model with that at a path of field names replaced."""
     name, *rest = path
     return part._replace(**{name: _replaced(getattr(part, name), rest, value) if rest else value})

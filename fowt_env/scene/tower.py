@@ -1,7 +1,4 @@
-"""The bending of the tower as the plant has it: integrals of mass, stiffness and weight along the modes.
-
-Sums over ElastoDyn's elements, mass and stiffness at their middles (theory.md, section 2.8).
-"""
+"""Integrates mass, stiffness and weight of the tower along its bending modes (theory.md, section 2.8)."""
 
 import numpy as np
 
@@ -14,7 +11,7 @@ MODES = {"rigid": 0, "modes": 1, "modes2": 2}  # option tower: modes in each dir
 
 
 def modes_asked(options):
-    """Modes in each direction that a scene's options ask for. Raises: InputError in a planar scene."""
+    """Return modes in each direction that a scene's options ask for. Raises: InputError in a planar scene."""
     count = MODES[options["tower"]]
     if count and options["planar"]:
         raise InputError(
@@ -41,9 +38,9 @@ def shape_values(shapes, fraction, derivative=0):
 
 
 def build_tower_modes(platform, turbine, count, first_state):
-    """TowerModes of that many modes in each direction, their states from first_state on; None for none.
+    """TowerModes of that many modes in each direction, their states from first_state on; None without modes.
 
-    Raises: InputError where the platform file says too little of the tower.
+    Raises: InputError if the platform file says too little of the tower.
     """
     if count == 0:
         return None
@@ -86,7 +83,7 @@ def build_tower_modes(platform, turbine, count, first_state):
 
 
 def tower_states(modes):
-    """Number of states of TowerModes or None: deflections and their velocities."""
+    """Return the number of states of TowerModes or None: deflections and their velocities."""
     return 0 if modes is None else 2 * modes.slope.shape[0]
 
 
@@ -128,12 +125,12 @@ def _option(count):
 
 
 def _drag_points():
-    """Height fractions of the points of aero.tower_drag.build_tower_drag."""
+    """Return the height fractions of the points of aero.tower_drag.build_tower_drag."""
     return 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
 
 
 def _stiffness(bending, middle, curvature, fore_aft, cell, count):
-    """(n, n) of EI times two curvatures, with the root of the product of both modes' tuners."""
+    """Return (n, n) of EI times two curvatures, with the root of the product of both modes' tuners."""
     known = bending.height_fraction
     sides = (np.interp(middle, known, bending.side_side_stiffness),
              np.interp(middle, known, bending.fore_aft_stiffness))  # fmt: skip
@@ -158,7 +155,7 @@ def _damping(bending, stiffness, generalised, count):
 
 
 def _each(fore_aft, side_side, count):
-    """(n,) of figures of the modes in the plant's order."""
+    """Return (n,) of values of the modes in the plant's order."""
     return np.array(
         [value for pair in zip(fore_aft[:count], side_side[:count], strict=True) for value in pair]
     )

@@ -1,4 +1,4 @@
-"""Loads of one's own, compiled into the plant: a kernel, its numbers and the point where it acts."""
+"""Loads defined by the user, compiled into the plant: a kernel, its numbers and the point where it acts."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -12,6 +12,7 @@ import numba
 import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
+from scipy.spatial.transform import Rotation
 
 from fowt_env.descriptions.records import is_number
 from fowt_env.errors import InputError
@@ -32,7 +33,7 @@ TRIALS = (  # states that a load is tried in: surge, sway, heave, roll, pitch, y
 
 
 class LoadKernel(types.WrapperAddressProtocol):
-    """What load_kernel makes of a function: callable, and a first-class function to compiled code."""
+    """Wraps a function for load_kernel: callable in Python, and a first-class function in compiled code."""
 
     def __init__(self, function: Callable[..., None]) -> None:
         self.function = function
@@ -47,11 +48,11 @@ class LoadKernel(types.WrapperAddressProtocol):
         return self._compiled.address
 
     def signature(self) -> Any:
-        """Its numba signature."""
+        """Return the numba signature."""
         return SIGNATURE
 
     def __call__(self, parameters: np.ndarray, motion: np.ndarray, force: np.ndarray) -> None:
-        """Run it as plain Python."""
+        """Run the function as plain Python."""
         self.function(parameters, motion, force)
 
     def __reduce__(self) -> str:
@@ -61,13 +62,15 @@ class LoadKernel(types.WrapperAddressProtocol):
         return f"<load kernel {self.__module__}.{self.__qualname__}>"
 
     def fingerprint(self) -> str:
-        """Hash of what it does, the same in every process."""
+        """Return a hash of the function's code and constants, identical in every process."""
         return sha256(repr(_meaning(self.function)).encode()).hexdigest()
 
 
 def _compiled(function):
-    """The function as a numba.cfunc. Compiled anew in each process, a tenth of a second: numba's cache on
-    disk would not notice an edit of what it calls in another file."""
+    """Return the function as a numba.cfunc, compiled in each process in a tenth of a second.
+
+    Numba's cache on disk would not notice an edit of a called function in another file.
+    """
     try:
         return numba.cfunc(SIGNATURE, error_model="numpy")(function)
     except NumbaError as error:
@@ -102,15 +105,15 @@ def _known(outer, names, above):
 
 
 def load_kernel(function: Callable[..., None]) -> LoadKernel:
-    """LoadKernel of a function (parameters, motion, force) that numba can compile; a decorator.
+    """Return the LoadKernel of a function (parameters, motion, force) that numba can compile; a decorator.
 
     parameters  (n,) numbers of the Load; read only
-    motion      (N_MOTION + states,) what the load may depend on, indexed by Motion; read only
-    force       (N_FORCE + states,) zeros, to be filled, indexed by Force: force (N) at the load's point and
+    motion      (N_MOTION + states,) inputs of the load, indexed by Motion; read only
+    force       (N_FORCE + states,) zeros to be filled, indexed by Force: force (N) at the load's point and
                 moment (N m) about it, in the axes of the load, and the rates of its states
 
-    It must be a function of a module (for worker processes find it by its name), depend on nothing else
-    than its arguments, and keep nothing from call to call: several calls make one step.
+    It must be a function of a module (worker processes import it by name), depend only on its arguments, and
+    have no memory between calls: several calls make one step.
 
     Raises: InputError for another number of arguments, or what numba cannot compile.
     """
@@ -127,28 +130,27 @@ def load_kernel(function: Callable[..., None]) -> LoadKernel:
 
 @dataclass(frozen=True)
 class Load:
-    """A load of one's own on the floating platform or the tower and nacelle, for build_scene(loads=...).
+    """Defines a user load on the floating platform or the tower and nacelle, for build_scene(loads=...).
 
-    name        begins the names of its output channels: NAMEFxi ... NAMEMzi, force (N) and moment about
-                the body origin (N m) in inertial axes
-    kernel      made with load_kernel
-    parameters  numbers that the kernel is given: a list, an array or a NamedTuple
-    point       where it acts, body axes, m: x downwind, z up from the still-water level. At or above the
-                tower base it counts in the tower-base loads, and where the tower bends it acts on the
-                nacelle: motion, body axes and the force's are then the nacelle's, angles the platform's
+    name        prefix of its output channels NAMEFxi ... NAMEMzi: force (N) and moment about the body
+                origin (N m) in inertial axes
+    kernel      result of load_kernel
+    parameters  numbers passed to the kernel: a list, an array or a NamedTuple
+    point       point of action, body axes, m: x downwind, z up from the still-water level. At or above the
+                tower base the load is included in the tower-base loads and, with a flexible tower, acts on
+                the nacelle: motion and body axes are then those of the nacelle, angles those of the platform
     axes        "inertial" or "body": of velocities and force
     water       whether the kernel reads the motion of the water at its point (Motion.WATER_X ...), whose
                 sum over 225 wave components takes 6 microseconds, as three steps at fidelity "standard"
                 without wind (a load without it: 0.4, eight of them: 0.6 a step)
-    states      number of states of its own, integrated with the plant: motion[Motion.STATE + i] is one, and
-                force[Force.RATE + i] its rate. A run starts where their rates are zero, as a
-                trim has them
+    states      number of states, integrated with the plant: motion[Motion.STATE + i] is a state and
+                force[Force.RATE + i] its rate. A run starts with zero rates, as in a trim
 
-    It may depend on the wind, the waves, the rotor and the time, and not on accelerations: give mass and
-    added mass to the platform file. The rotor shaft feels it through the platform alone. A trim and a
-    linear model take it at time 0.
+    A load may depend on wind, waves, rotor and time, but not on accelerations: put mass and added mass into
+    the platform file. It acts on the rotor shaft only through the platform. Trims and linear models evaluate
+    it at time 0.
 
-    Raises: InputError that names the load, and what of it cannot be used.
+    Raises: InputError that names the load and the invalid setting.
     """
 
     name: str
@@ -182,13 +184,13 @@ class Load:
             )
 
     def key(self) -> tuple:
-        """All that it does, as plain values that are the same in every process."""
+        """Return all properties as plain values, identical in every process."""
         own = self.name, self.kernel.fingerprint(), self.parameters, self.point, self.axes, self.water
         return (*own, self.states)
 
 
 def _numbers(where, key, values):
-    """The values as a tuple of floats. Raises: InputError."""
+    """Return the values as a tuple of floats. Raises: InputError."""
     try:
         listed = tuple(values)
     except TypeError:
@@ -199,7 +201,7 @@ def _numbers(where, key, values):
 
 
 def checked_loads(loads: Any, n_lines: int, planar: bool) -> tuple[Load, ...]:
-    """The loads as a tuple, each tried as plain Python in some states.
+    """Check the loads by plain Python calls in some states; return them as a tuple.
 
     Raises: InputError that names the load.
     """
@@ -228,19 +230,12 @@ def checked_loads(loads: Any, n_lines: int, planar: bool) -> tuple[Load, ...]:
 
 
 def _rotation(roll, pitch, yaw):
-    """Body to inertial axes of 3-2-1 Euler angles."""
-    (s1, s2, s3), (c1, c2, c3) = np.sin([roll, pitch, yaw]), np.cos([roll, pitch, yaw])
-    return np.array(
-        [
-            [c3 * c2, c3 * s2 * s1 - s3 * c1, c3 * s2 * c1 + s3 * s1],
-            [s3 * c2, s3 * s2 * s1 + c3 * c1, s3 * s2 * c1 - c3 * s1],
-            [-s2, c2 * s1, c2 * c1],
-        ]
-    )
+    """Return the rotation matrix from body to inertial axes of 3-2-1 Euler angles."""
+    return Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
 
 
 def _motion(load, position, rate):
-    """Motion array of a state: six positions, and velocity and angular velocity in inertial axes."""
+    """Return motion array of a state: six positions, and velocity and angular velocity in inertial axes."""
     turn = _rotation(*position[3:])
     arm = turn @ load.point
     axes = turn.T if load.axes == "body" else np.eye(3)
@@ -288,7 +283,7 @@ def _try(load, position, rate, planar):
 
 
 def build_user_loads(loads: Sequence[Load], base_height: float, first_state: int) -> UserLoads | None:
-    """UserLoads part of checked loads, None without any. first_state: index of the first of their states."""
+    """Return the UserLoads part of checked loads, None without loads, with states from first_state."""
     if not loads:
         return None
     sizes = [len(load.parameters) for load in loads]
@@ -308,9 +303,9 @@ def build_user_loads(loads: Sequence[Load], base_height: float, first_state: int
 
 
 def first_nonfinite_load(loads: Sequence[Load], user_data: np.ndarray) -> str | None:
-    """Words for the load that first gave a number that is not finite; None where none did.
+    """Return a text on the first load with a force that is not finite; None if all are finite.
 
-    user_data: what plant.user_loads.evaluate_user_loads filled.
+    user_data: filled by plant.user_loads.evaluate_user_loads.
     """
     if not loads or not user_data[6 * len(loads)]:
         return None

@@ -31,7 +31,7 @@ class Air(NamedTuple):
 
 
 def build_air(wind, seed, turbine, rotor, shear, duration):
-    """Air of a wind specification."""
+    """Return the air of a wind specification."""
     wind = wind_of(wind)
     hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
     if not is_field(wind):
@@ -57,7 +57,7 @@ def build_air(wind, seed, turbine, rotor, shear, duration):
 
 
 def build_weather(wind, sea, seed, platform, turbine, rotor, options):
-    """(Air, Waves or None) of a wind and sea specification."""
+    """Return (Air, Waves or None) of a wind and sea specification."""
     site = platform.environment
     shear = site.shear_exponent if options["shear_exponent"] is None else options["shear_exponent"]
     air = build_air(wind, seed, turbine, rotor, shear, options["duration"])

@@ -1,4 +1,4 @@
-"""Moving pictures of finished runs: GIF or MP4 of one to four controllers side by side.
+"""Writes animations of finished runs: GIF or MP4 of one to four controllers side by side.
 
 Needs pygame and pillow (GIF), and imageio with ffmpeg for MP4: pip install "fowt-env[render]" or "[video]".
 """
@@ -13,41 +13,41 @@ import numpy as np
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
-from fowt_env.visual.rendering import AT_REST, LOOSE, RGB_COLOURS, TIGHT, TRACES, WINDOW, YELLOW, View
+from fowt_env.visual.rendering import (
+    AT_REST,
+    LOOSE,
+    MOTIONS,
+    RGB_COLOURS,
+    TIGHT,
+    TRACES,
+    WINDOW,
+    YELLOW,
+    View,
+)
 from fowt_env.visual.style import short_names
 
 SUFFIXES = (".gif", ".mp4")
 MOST_RUNS = 4
-DRAWN = (
-    "Time",
-    "PtfmSurge",
-    "PtfmSway",
-    "PtfmHeave",
-    "PtfmRoll",
-    "PtfmPitch",
-    "PtfmYaw",
-    "Azimuth",
-    "RotSpeed",
-)
-GIF_COLOURS = 64  # a palette that keeps files small; the sky has few shades anyway
-CLEAR = GIF_COLOURS - 1  # place in the palette that means: as in the picture before
-UNSEEN = 6  # of 255: smaller changes of a pixel wait until they have added up
-MOST_STILL = 2.0  # windows: shorter animations show all of their time throughout
-# small or rare in a picture, but to be kept in the palette: this many rows of the sample are given to them
+DRAWN = ("Time", *MOTIONS, "Azimuth", "RotSpeed")
+GIF_COLOURS = 64  # a palette that keeps files small; the sky has few shades
+CLEAR = GIF_COLOURS - 1  # palette entry of pixels that do not change
+UNSEEN = 6  # of 255: smaller changes of a pixel are drawn once they have accumulated
+MOST_STILL = 2.0  # windows: shorter animations have a fixed time axis
+# small or rare colours that the palette must contain: SWATCH rows of its sample show them
 SHADE = (178, 141, 30)  # of yellow, away from the light
 KEY_COLOURS = (*RGB_COLOURS, YELLOW, SHADE, LOOSE, AT_REST, TIGHT)
 SWATCH = 160
 
 
 def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0, progress=None):
-    """The path written: an animation of runs {label: frame of simulate} of one scene.
+    """Write an animation of runs {label: frame of simulate} of one scene; return its path.
 
     speed     seconds of the run per second of the animation
-    fps       pictures a second; a GIF counts in hundredths of a second and takes the nearest
+    fps       pictures per second; a GIF uses the nearest hundredth of a second
     size      pixels, both even
-    start     time of the first picture, s: what comes before is not shown
+    start     time of the first picture, s
     progress  called as progress(done, total)
-    Raises: InputError for settings that cannot be used, or where a library is missing.
+    Raises: InputError for invalid settings, or if a library is missing.
     """
     path = animation_path(path)
     if not 1 <= len(runs) <= MOST_RUNS:
@@ -80,7 +80,7 @@ def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0,
 
 
 def animation_path(path):
-    """`path` as a Path. Raises: InputError for an ending that is none of SUFFIXES."""
+    """Return `path` as a Path. Raises: InputError for an ending not in SUFFIXES."""
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"animation {str(path)!r}: must end with {' or '.join(SUFFIXES)}")
@@ -88,13 +88,13 @@ def animation_path(path):
 
 
 def _limits(tracks, channel, start):
-    """(least, greatest) value of a channel of all tracks from a time on."""
+    """Return (smallest, largest) value of a channel of all tracks from a time onwards."""
     kept = [track.values[channel][track.time >= start] for track in tracks]
     return min(values.min() for values in kept), max(values.max() for values in kept)
 
 
 class _Track:
-    """The channels of one run that are drawn, at any time; after its end it stands still."""
+    """Interpolates the drawn channels of one run; after its end they stay constant."""
 
     def __init__(self, label, frame):
         wanted = dict.fromkeys((*DRAWN, *(trace.channel for trace in TRACES)))
@@ -107,7 +107,7 @@ class _Track:
         self.time = self.values["Time"]
 
     def at(self, time):
-        """Row of channels at a time, linear between the run's own."""
+        """Return the row of channels at a time, interpolated linearly."""
         row = {name: float(np.interp(time, self.time, values)) for name, values in self.values.items()}
         return row | {"Time": time}
 
@@ -115,7 +115,7 @@ class _Track:
 def _write_gif(pictures, path, pause):
     """Write pictures as a looping GIF of one palette: that of the first picture and KEY_COLOURS.
 
-    A frame holds what has changed: elsewhere it is transparent, which packs to nothing.
+    A frame contains the changed pixels; the others are transparent and compress well.
     """
     try:
         from PIL import GifImagePlugin, Image

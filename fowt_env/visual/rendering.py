@@ -1,7 +1,7 @@
-"""Pictures of a turbine at sea: the side view to scale, its mooring, and strips of live traces.
+"""Draws a floating turbine: side view and mooring to scale, and strips of live time series.
 
-Everything is drawn from a row of channels {OpenFAST name: value} and the scene, so the same code shows
-a running environment and a finished run. Needs pygame: pip install "fowt-env[render]".
+The input is a row of channels {OpenFAST name: value} and the scene, so the same code shows a running
+environment and a finished run. Needs pygame: pip install "fowt-env[render]".
 """
 
 import os
@@ -10,6 +10,8 @@ from math import cos, pi, radians, sin
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 from fowt_env.descriptions.ratings import OVERSPEED, RATED_POWER, RATED_SPEED, ratings
 from fowt_env.errors import InputError
@@ -19,48 +21,39 @@ from fowt_env.plant.mooring import catenary, line_shape
 SIZE = (960, 640)  # pixels of a view
 FPS = 30
 WINDOW = 60.0  # s of a trace
-SIDES = (160, 4000)  # pixels: least and greatest side of a view
-SAMPLING = 3  # the side view is drawn this much larger and then averaged
-LETTERS = 4  # and so is writing: a font's hinting would misplace small letters
-DEPTH_SHIFT = 0.28  # cabinet projection: how far a metre across the wind is shifted, so that the rotor shows
+SIDES = (160, 4000)  # pixels: smallest and largest side of a view
+SAMPLING = 3  # enlargement of the side view before it is averaged down
+LETTERS = 4  # enlargement of text: hinting of the font would misplace small letters
+DEPTH_SHIFT = 0.28  # cabinet projection: shift per metre across the wind, so that the rotor is visible
 LINE_POINTS = 81
-MOST_TENSIONS = 4  # that are written out; of more lines, the least and the largest
+MOST_TENSIONS = 4  # written in full; of more lines only the smallest and the largest
 LEAST_SEA = 0.55  # rotor radii of water shown below a flat hull
-SPLASH = 0.1  # of the draft: what is seen from boats is yellow from there up
+SPLASH = 0.1  # of the draft: the hull is yellow above this depth
 WAVE_STEP = 9  # pixels of the enlarged picture between points of the sea surface
-LEAST_BLADE = 0.0055, 0.0022  # of the picture's height: least half width of a drawn blade at root and tip
-FIRST_WINDOWS = (15.0, 30.0, WINDOW)  # s shown while a run is young
+LEAST_BLADE = 0.0055, 0.0022  # of the picture's height: smallest half width of a drawn blade at root and tip
+FIRST_WINDOWS = (15.0, 30.0, WINDOW)  # s shown at the start of a run
+ANGLES = ("PtfmRoll", "PtfmPitch", "PtfmYaw")
+MOTIONS = ("PtfmSurge", "PtfmSway", "PtfmHeave", *ANGLES)
 
-INK, SOFT, FAINT, CARD, PAGE = (
-    (30, 38, 50),
-    (110, 120, 134),
-    (224, 229, 235),
-    (255, 255, 255),
-    (240, 243, 247),
-)
+INK, SOFT, FAINT, CARD, PAGE = (30, 38, 50), (110, 120, 134), (224, 229, 235), (255,) * 3, (240, 243, 247)
 SKY = ((196, 220, 242), (246, 250, 253))
 SEA = ((58, 136, 178, 150), (14, 48, 84, 240))
-SEABED, CREST, STEEL, YELLOW, WHITE = (
-    (122, 104, 82),
-    (238, 247, 252),
-    (168, 176, 186),
-    (240, 190, 40),
-    (246, 247, 249),
-)
-LEVEL = (120, 128, 140)  # of lines across a strip
+SEABED, CREST, STEEL = (122, 104, 82), (238, 247, 252), (168, 176, 186)
+YELLOW, WHITE = (240, 190, 40), (246, 247, 249)
+LEVEL = (120, 128, 140)  # of horizontal lines in a strip
 RGB_COLOURS = ((0, 114, 178), (213, 94, 0), (0, 158, 115), (204, 121, 167))
-LOOSE, AT_REST, TIGHT = (90, 170, 230), (250, 236, 150), (220, 50, 40)  # of a line, by its tension
+LOOSE, AT_REST, TIGHT = (90, 170, 230), (250, 236, 150), (220, 50, 40)  # of a mooring line
 
 
 class Trace(NamedTuple):
-    """A strip of live values."""
+    """Defines a strip of live values."""
 
     label: str
     channel: str
     unit: str
     form: str
-    least: float  # smallest height of the strip
-    levels: tuple = ()  # (text, rating) of the lines across it, which are always in sight
+    least: float  # smallest range of the strip, in the unit
+    levels: tuple = ()  # (text, rating) of horizontal lines, always inside the range
 
 
 TRACES = (
@@ -74,14 +67,14 @@ TRACES = (
 
 
 class Agent(NamedTuple):
-    """What an environment's picture shows of its agent."""
+    """Holds the agent's data in the picture of an environment."""
 
-    action: tuple  # the last, each in [-1, 1]
-    reward: float | None  # of the last step; None before the first
+    action: tuple  # the last action, each entry in [-1, 1]
+    reward: float | None  # of the last step; None before the first step
 
 
 def check_size(name, size):
-    """Raises: InputError unless size is None or two whole numbers within SIDES."""
+    """Check that size is None or two whole numbers within SIDES. Raises: InputError."""
     if size is None:
         return
     sides = tuple(size) if isinstance(size, tuple | list) else ()
@@ -92,7 +85,7 @@ def check_size(name, size):
 
 
 def load_pygame():
-    """The pygame module. Raises: InputError that names the extra to install."""
+    """Import pygame and return the module. Raises: InputError that names the extra to install."""
     os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
     try:
         import pygame
@@ -103,7 +96,7 @@ def load_pygame():
 
 
 class Writer:
-    """Writing at any size, evenly spaced: set large, then averaged down. Texts are kept, as most repeat."""
+    """Renders text of any size, evenly spaced: enlarged, then averaged down. Keeps rendered texts."""
 
     MOST = 600  # texts kept
 
@@ -112,7 +105,7 @@ class Writer:
         self._fonts, self._kept = {}, {}
 
     def render(self, text, height, colour):
-        """Surface with the text, which must not be empty, `height` pixels per line."""
+        """Return the Surface of a text, which must not be empty, with `height` pixels per line."""
         key = text, height, colour
         if key not in self._kept:
             if not text:
@@ -127,29 +120,28 @@ class Writer:
             self._kept[key] = self.pygame.transform.smoothscale(large, shape)
         return self._kept[key]
 
+    def put(self, picture, text, place, height, colour, *, right=False):
+        """Draw a text at the (x, y) of its left or right upper corner; return the x of the other corner."""
+        words = self.render(text, height, colour)
+        width = words.get_width()
+        picture.blit(words, (place[0] - width if right else place[0], place[1]))
+        return place[0] - width if right else place[0] + width
+
 
 class PlatformPose:
-    """Where the platform is: position (3,), m, and rotation (3, 3) from body to inertial axes."""
+    """Holds the platform's position (3,), m, and rotation (3, 3) from body to inertial axes."""
 
     def __init__(self, row):
-        self.position = np.array([row["PtfmSurge"], row["PtfmSway"], row["PtfmHeave"]])
-        roll, pitch, yaw = (radians(row[name]) for name in ("PtfmRoll", "PtfmPitch", "PtfmYaw"))
-        cr, sr, cp, sp, cy, sy = cos(roll), sin(roll), cos(pitch), sin(pitch), cos(yaw), sin(yaw)
-        self.rotation = np.array(
-            [
-                [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-                [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-                [-sp, cp * sr, cp * cr],
-            ]
-        )
+        self.position = np.array([row[name] for name in MOTIONS[:3]])
+        self.rotation = Rotation.from_euler("ZYX", [row[name] for name in ANGLES[::-1]], True).as_matrix()
 
     def inertial(self, points):
-        """Inertial coordinates (..., 3) of body-fixed points (..., 3)."""
+        """Return the inertial coordinates (..., 3) of body-fixed points (..., 3)."""
         return self.position + np.asarray(points, dtype=float) @ self.rotation.T
 
 
 def mooring_shapes(scene, pose):
-    """[((n, 3) inertial points from anchor to fairlead, fairlead tension N)] of the lines of a scene."""
+    """Return [((n, 3) inertial points from anchor to fairlead, fairlead tension N)] of all mooring lines."""
     mooring = scene.model.mooring
     shapes = []
     for i in range(scene.n_lines):
@@ -166,7 +158,7 @@ def mooring_shapes(scene, pose):
 
 
 class Surface:
-    """Elevation of the sea along x at y = 0, summed over all components of the scene's waves."""
+    """Computes the wave elevation along x at y = 0 from all components of the scene's waves."""
 
     def __init__(self, waves, x):
         self.waves = waves
@@ -176,7 +168,7 @@ class Surface:
             self.even, self.odd = waves.amplitude * np.cos(phase), waves.amplitude * np.sin(phase)
 
     def at(self, time):
-        """(len(x),) elevation at a time, m."""
+        """Return the elevation (len(x),) at a time, m."""
         if self.waves is None:
             return np.zeros(len(self.x))
         turned = self.waves.omega * time
@@ -187,39 +179,35 @@ class Surface:
 
 
 def tension_colour(tension, at_rest):
-    """Colour of a line: blue where loose, yellow at its tension at rest, red at one and a half of it."""
+    """Return the colour of a line: blue if loose, yellow at its tension at rest, red at 1.5 times that."""
     fraction = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
     other, fraction = (TIGHT, min(fraction, 1.0)) if fraction > 0.0 else (LOOSE, min(-fraction, 1.0))
     return tuple(round(a + fraction * (b - a)) for a, b in zip(AT_REST, other, strict=True))
 
 
-class _Part(NamedTuple):
-    """A round part of a hull."""
+class _SideView:
+    """Projects inertial points to pixels: x to the right, z up, y by DEPTH_SHIFT; left, top in m."""
 
-    start: tuple
-    end: tuple
-    diameter: tuple  # at both
+    left = top = 0.0
+    scale = 1.0  # pixels per metre
 
-
-def _outline(points):
-    """The corners of the convex hull of points (n, 2), in order."""
-    ordered = sorted(map(tuple, points))
-    sides = []
-    for run in (ordered, ordered[::-1]):
-        chain = []
-        for x, y in run:
-            while len(chain) > 1 and (
-                (chain[-1][0] - chain[-2][0]) * (y - chain[-2][1])
-                <= (chain[-1][1] - chain[-2][1]) * (x - chain[-2][0])
-            ):
-                chain.pop()
-            chain.append((x, y))
-        sides += chain[:-1]
-    return sides
+    def pixels(self, points):
+        """Return the pixels (n, 2) of inertial points (n, 3)."""
+        points = np.atleast_2d(points)
+        across = (points[:, 0] + DEPTH_SHIFT * points[:, 1] - self.left) * self.scale
+        return np.column_stack([across, (self.top - points[:, 2]) * self.scale])
 
 
-class TurbinePanel:
-    """The side view of one turbine: x to the right (downwind), z up, to scale."""
+def _shades(colour):
+    """Yield (from, to, colour) of the strips of a lit cylinder, -1 to 1 across."""
+    edges = np.linspace(-1.0, 1.0, 8)
+    for low, high in zip(edges[:-1], edges[1:], strict=True):
+        light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
+        yield low, high, [round(c * light) for c in colour]
+
+
+class TurbinePanel(_SideView):
+    """Draws one turbine to scale; its pixels are those of the picture before averaging."""
 
     def __init__(self, pygame, scene, size):
         self.pygame = pygame
@@ -243,17 +231,15 @@ class TurbinePanel:
         self.enter(scene)
 
     def enter(self, scene):
-        """Show this scene from now on: the same turbine, other weather."""
+        """Change the scene: the same turbine in other weather."""
         self.scene = scene
         waves = None if scene.model.hydro is None else scene.model.hydro.waves
         self.surface = Surface(waves, self._pixels / self.scale + self.left)
-        rest = PlatformPose(
-            dict.fromkeys(("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw"), 0.0)
-        )
+        rest = PlatformPose(dict.fromkeys(MOTIONS, 0.0))
         self.tension_at_rest = [tension for _, tension in mooring_shapes(scene, rest)]
 
     def _gradient(self, colours, end, begin=0):
-        """Surface whose colour runs from the first to the second between two heights."""
+        """Return a Surface with a colour gradient between two heights."""
         pygame = self.pygame
         picture = pygame.Surface(self.inner, pygame.SRCALPHA)
         for y in range(self.inner[1]):
@@ -262,14 +248,8 @@ class TurbinePanel:
             pygame.draw.line(picture, mixed, (0, y), (self.inner[0], y))
         return picture
 
-    def pixels(self, points):
-        """(n, 2) pixels, of the enlarged picture, of inertial points (n, 3)."""
-        points = np.atleast_2d(points)
-        across = (points[:, 0] + DEPTH_SHIFT * points[:, 1] - self.left) * self.scale
-        return np.column_stack([across, (self.top - points[:, 2]) * self.scale])
-
     def draw(self, row, label=None, colour=None, speed=None):
-        """The picture of a row of channels, at its final size, with `label`, its `colour` and `speed`."""
+        """Return the picture of a row of channels with `label`, its `colour` and `speed`."""
         pygame, canvas = self.pygame, self._canvas
         pose = PlatformPose(row)
         canvas.blit(self._sky, (0, 0))
@@ -284,105 +264,89 @@ class TurbinePanel:
         self._words(picture, row, label, colour, speed)
         return picture
 
+    def _polygon(self, canvas, colour, pose, points):
+        """Fill a polygon of body-fixed points."""
+        self.pygame.draw.polygon(canvas, colour, self.pixels(pose.inertial(points)))
+
     def _tapered(self, canvas, pose, heights, diameters, colour):
-        """A shaded body of revolution about the platform's axis."""
-        edges = np.linspace(-1.0, 1.0, 8)
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
-            light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
+        """Draw a shaded body of revolution about the platform's axis."""
+        for low, high, shade in _shades(colour):
             sides = [(low, heights, diameters), (high, heights[::-1], diameters[::-1])]
             body = [(0.5 * s * d, 0.0, z) for s, zs, ds in sides for z, d in zip(zs, ds, strict=True)]
-            shade = [round(c * light) for c in colour]
-            self.pygame.draw.polygon(canvas, shade, self.pixels(pose.inertial(body)))
+            self._polygon(canvas, shade, pose, body)
 
     def _cylinder(self, canvas, pose, ends, diameters, colour):
-        """A shaded cylinder or cone of any direction between two body-fixed points."""
+        """Draw a shaded cylinder or cone of any direction between two body-fixed points."""
         first, second = self.pixels(pose.inertial(ends))
         radii = 0.5 * self.scale * np.asarray(diameters)
         along = second - first
         length = float(np.hypot(*along))
-        if length < 0.5 * self.scale * np.linalg.norm(np.subtract(*ends)):  # seen rather from its end
+        if length < 0.5 * self.scale * np.linalg.norm(np.subtract(*ends)):  # seen along its axis
             self.pygame.draw.circle(canvas, [round(0.85 * c) for c in colour], second, max(radii[1], 1.0))
         if length < 1.0:
             return
         across = np.array([-along[1], along[0]]) / length
-        edges = np.linspace(-1.0, 1.0, 8)
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
-            light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
+        for low, high, shade in _shades(colour):
             corners = [(first, low, 0), (second, low, 1), (second, high, 1), (first, high, 0)]
             body = [point + side * radii[end] * across for point, side, end in corners]
-            self.pygame.draw.polygon(canvas, [round(c * light) for c in colour], body)
+            self.pygame.draw.polygon(canvas, shade, body)
 
-    def _members(self, canvas, pose, members, draft):
-        """The members of a hull, farthest first, yellow from the splash zone up."""
-        limit = -SPLASH * draft
-        for member in sorted(members, key=lambda member: -(member.start[1] + member.end[1])):
-            ends, diameters = np.array([member.start, member.end]), np.array(member.diameter)
-            heights = ends[:, 2]
-            self._cylinder(canvas, pose, ends, diameters, STEEL if heights.min() < limit else YELLOW)
-            if heights.min() < limit < heights.max():
-                share = (limit - heights[0]) / (heights[1] - heights[0])
-                cut = ends[0] + share * (ends[1] - ends[0])
-                wide = diameters[0] + share * (diameters[1] - diameters[0])
-                top = int(np.argmax(heights))
-                self._cylinder(canvas, pose, np.array([cut, ends[top]]), (wide, diameters[top]), YELLOW)
+    def _member(self, canvas, pose, ends, diameters, limit):
+        """Draw a cylinder or cone, yellow above the height `limit`."""
+        heights = ends[:, 2]
+        self._cylinder(canvas, pose, ends, diameters, STEEL if heights.min() < limit else YELLOW)
+        if heights.min() < limit < heights.max():
+            share = (limit - heights[0]) / (heights[1] - heights[0])
+            cut, wide = (pair[0] + share * (pair[1] - pair[0]) for pair in (ends, diameters))
+            top = int(np.argmax(heights))
+            self._cylinder(canvas, pose, np.array([cut, ends[top]]), (wide, diameters[top]), YELLOW)
 
-    def _shapes(self, canvas, pose, shapes, draft):
-        """The shapes of a hull as its file gives them for pictures, farthest first."""
-        for shape in sorted(shapes, key=lambda shape: -(shape.start[1] + shape.end[1])):
-            if shape.diameter is not None:
-                self._members(canvas, pose, [_Part(shape.start, shape.end, (shape.diameter,) * 2)], draft)
-            else:
-                self._beam(canvas, pose, shape, draft)
-
-    def _beam(self, canvas, pose, shape, draft):
-        """A straight box: what is seen of it from the side and, of its far half, from above."""
-        start, end = np.array(shape.start), np.array(shape.end)
-        width, height = shape.section
+    def _beam(self, canvas, pose, ends, section, limit):
+        """Draw a straight box: outline dark, near side light, yellow above the height `limit`."""
+        start, end = ends
+        width, height = section
         along = (end - start) / np.linalg.norm(end - start)
         across = np.array([-along[1], along[0], 0.0]) * 0.5 * width / np.hypot(*along[:2])
-        up, limit = np.array([0.0, 0.0, 0.5 * height]), -SPLASH * draft
-        middle = 0.5 * (start[2] + end[2])
-        layers = [(-1.0, 1.0, STEEL if middle < limit else YELLOW)]
+        up, middle = np.array([0.0, 0.0, 0.5 * height]), 0.5 * (start[2] + end[2])
+        near = min((-1, 1), key=lambda side: (start + side * across)[1])
         share = (limit - middle) / (0.5 * height)
+        layers = [(-1.0, 1.0, STEEL if middle < limit else YELLOW)]
         if -1.0 < share < 1.0:
             layers = [(-1.0, share, STEEL), (share, 1.0, YELLOW)]
         for low, high, colour in layers:
-            corners = [
-                p + side * across + z * up for p in (start, end) for side in (-1, 1) for z in (low, high)
-            ]
+            corners = [p + s * across + z * up for p in ends for s in (-1, 1) for z in (low, high)]
             seen = self.pixels(pose.inertial(corners))
-            self.pygame.draw.polygon(canvas, [round(0.85 * c) for c in colour], _outline(seen))
-            near = sorted((-1, 1), key=lambda side: (start + side * across)[1])[0]
+            dark = [round(0.85 * c) for c in colour]
+            self.pygame.draw.polygon(canvas, dark, seen[ConvexHull(seen).vertices])
             face = [(start, low), (end, low), (end, high), (start, high)]
-            front = self.pixels(pose.inertial([p + near * across + z * up for p, z in face]))
-            self.pygame.draw.polygon(canvas, colour, front)
-
-    def _box(self, canvas, pose, draft, volume):
-        """A box of this draft and displaced volume, of a hull that has no shape in its file."""
-        half, deck = 0.5 * np.sqrt(volume / draft), 0.5 * draft
-        for low, high, colour in ((-draft, -SPLASH * draft, STEEL), (-SPLASH * draft, deck, YELLOW)):
-            corners = [(-half, 0.0, low), (half, 0.0, low), (half, 0.0, high), (-half, 0.0, high)]
-            self.pygame.draw.polygon(canvas, colour, self.pixels(pose.inertial(corners)))
+            self._polygon(canvas, colour, pose, [p + near * across + z * up for p, z in face])
 
     def _hull(self, canvas, pose):
-        platform = self.scene.platform
-        hull, tower = platform.hull, platform.tower
+        """Draw hull and tower: the spar, else shapes of the platform file, else members, else a box."""
+        platform, tower = self.scene.platform, self.scene.platform.tower
+        hull, draft, limit = platform.hull, platform.draft, -SPLASH * platform.draft
+        solids = platform.shapes or platform.members
         if hull is not None:
             z, diameter = np.array(hull.z), np.array(hull.diameter)
             self._tapered(canvas, pose, z, diameter, STEEL)
             splash = np.array([max(z[0], -SPLASH * abs(z[0])), z[-1]])
             self._tapered(canvas, pose, splash, np.interp(splash, z, diameter), YELLOW)
-        elif platform.shapes:
-            self._shapes(canvas, pose, platform.shapes, platform.draft)
-        elif not platform.members:
-            self._box(canvas, pose, platform.draft, platform.potential_flow.volume)
-        if not platform.shapes:
-            self._members(canvas, pose, platform.members, platform.draft)
+        elif not solids:
+            half = 0.5 * np.sqrt(platform.potential_flow.volume / draft)
+            for low, high, colour in ((-draft, limit, STEEL), (limit, 0.5 * draft, YELLOW)):
+                box = [(-half, 0.0, low), (half, 0.0, low), (half, 0.0, high), (-half, 0.0, high)]
+                self._polygon(canvas, colour, pose, box)
+        for solid in sorted(solids, key=lambda solid: -(solid.start[1] + solid.end[1])):  # farthest first
+            ends = np.array([solid.start, solid.end])
+            if solid.diameter is None:
+                self._beam(canvas, pose, ends, solid.section, limit)
+            else:
+                self._member(canvas, pose, ends, np.broadcast_to(solid.diameter, 2), limit)
         heights = np.array([tower.base_height, tower.top_height])
         self._tapered(canvas, pose, heights, np.array([tower.base_diameter, tower.top_diameter]), WHITE)
 
     def _sea_over(self, canvas, time):
-        """Lay the sea over what is under the surface."""
+        """Draw the sea over the parts below the surface."""
         pygame = self.pygame
         level = (self.top - self.surface.at(time)) * self.scale
         curve = np.column_stack([self._pixels, level])
@@ -406,8 +370,8 @@ class TurbinePanel:
         half = 0.032 * radius
         corners = [(-0.06, -1), (-0.075, 0.3), (-0.05, 1), (0.16, 1), (0.17, -0.4), (0.15, -1)]
         nacelle = [(x * radius, 0.0, rotor.hub_height + z * half) for x, z in corners]
-        # a blade turned away from the viewer lies behind the nacelle; all are upwind of it
-        pygame.draw.polygon(canvas, (226, 230, 235), self.pixels(pose.inertial(nacelle)))
+        # the nacelle first: all blades are upwind of it
+        self._polygon(canvas, (226, 230, 235), pose, nacelle)
         pygame.draw.polygon(canvas, (140, 150, 162), self.pixels(pose.inertial(nacelle)), SAMPLING)
         turn, pitch = radians(row["Azimuth"]), radians(row["BldPitch1"])
         least = self.inner[1] * np.array(LEAST_BLADE)
@@ -420,7 +384,7 @@ class TurbinePanel:
         pygame.draw.circle(canvas, (200, 206, 214), centre, max(3.0, 0.035 * radius * self.scale))
 
     def _blade(self, azimuth, pitch):
-        """(n, 3) outline of a blade about the hub, body axes: chord and twist of the turbine's own blade."""
+        """Return the outline (n, 3) of a blade about the hub in body axes."""
         blade = self.scene.turbine.blade
         e_r = np.array([0.0, -sin(azimuth), cos(azimuth)])
         e_t = np.array([0.0, -cos(azimuth), -sin(azimuth)])  # the way the blade moves
@@ -433,9 +397,9 @@ class TurbinePanel:
 
     @staticmethod
     def _thick(outline, least):
-        """A blade's outline in pixels, widened where it is narrower than twice `least` (2,), root and tip.
+        """Return a blade's outline in pixels, widened to at least twice `least` (2,) at root and tip.
 
-        Seen edge-on a blade to scale is a hair that a small picture loses.
+        An edge-on blade to scale would be invisible in a small picture.
         """
         count = len(outline) // 2
         one, tip, other = outline[:count], outline[count], outline[:count:-1]
@@ -446,13 +410,12 @@ class TurbinePanel:
             return outline
         across = np.array([-along[1], along[0]]) / length
         reach = half @ across
-        wanted = np.linspace(least[0], least[1], count)
         side = -1.0 if reach.sum() < 0.0 else 1.0  # one for all: a twisted blade would cross itself
-        wide = (side * np.maximum(side * reach, wanted))[:, None] * across
+        wide = (side * np.maximum(side * reach, np.linspace(*least, count)))[:, None] * across
         return np.vstack([middle + wide, tip, (middle - wide)[::-1]])
 
     def _wind(self, canvas, row):
-        """An arrow at hub height whose length is the wind speed."""
+        """Draw an arrow at hub height with the length of the wind speed."""
         pygame, rotor = self.pygame, self.scene.turbine.rotor
         speed = row["Wind1VelX"]
         y = (self.top - rotor.hub_height) * self.scale
@@ -465,29 +428,27 @@ class TurbinePanel:
         self._wind_text = f"{speed:.1f} m/s", x / SAMPLING, (y + 1.2 * head) / SAMPLING
 
     def _words(self, picture, row, label, colour, speed):
-        """Write time, label and wind onto the finished picture: letters are averaged on their own."""
+        """Write time, speed, label and wind onto the picture after averaging, which would blur text."""
         text, x, y = self._wind_text
-        picture.blit(self._writer.render(text, self._small, RGB_COLOURS[0]), (x, y + 2))
-        margin = round(0.02 * self.size[1])
-        time = self._writer.render(f"{row['Time']:.1f} s", self._large, INK)
-        picture.blit(time, (self.size[0] - time.get_width() - margin, margin))
+        put, margin = self._writer.put, round(0.02 * self.size[1])
+        put(picture, text, (x, y + 2), self._small, RGB_COLOURS[0])
+        right = self.size[0] - margin
+        put(picture, f"{row['Time']:.1f} s", (right, margin), self._large, INK, right=True)
         if speed is not None:
-            words = self._writer.render(f"{speed:.3g} x real time", self._small, SOFT)
-            place = self.size[0] - words.get_width() - margin, margin + 1.2 * self._large
-            picture.blit(words, place)
+            place = right, margin + 1.2 * self._large
+            put(picture, f"{speed:.3g} x real time", place, self._small, SOFT, right=True)
         if label:
-            name = self._writer.render(label, self._large, INK)
             chip = 0
             if colour is not None:
                 chip = round(0.75 * self._large)
                 box = self.pygame.Rect(margin, margin + 1, chip, round(0.6 * self._large))
                 self.pygame.draw.rect(picture, colour, box, border_radius=2)
                 chip += margin // 2
-            picture.blit(name, (margin + chip, margin))
+            put(picture, label, (margin + chip, margin), self._large, INK)
 
 
-class MooringPanel:
-    """The whole mooring to scale, down to the seabed, with the tension of each line."""
+class MooringPanel(_SideView):
+    """Draws the mooring to scale, down to the seabed, with the tension of each line."""
 
     def __init__(self, pygame, scene, size):
         self.pygame, self.size = pygame, size
@@ -498,17 +459,11 @@ class MooringPanel:
         height = scene.turbine.rotor.hub_height
         low, high = min(ends.min(), -height), max(ends.max(), height)
         self.scale = min((size[0] - 24) / (high - low), (size[1] - 62) / (self.depth + 1.1 * height))
-        self.middle = 0.5 * (low + high)
         self.level = size[1] - 42 - self.depth * self.scale
-
-    def pixels(self, points):
-        """(n, 2) pixels of inertial points (n, 3)."""
-        points = np.atleast_2d(points)
-        across = 0.5 * self.size[0] + (points[:, 0] + DEPTH_SHIFT * points[:, 1] - self.middle) * self.scale
-        return np.column_stack([across, self.level - points[:, 2] * self.scale])
+        self.left, self.top = 0.5 * (low + high - size[0] / self.scale), self.level / self.scale
 
     def draw(self, row, scene, at_rest):
-        """The picture of a row of channels."""
+        """Return the picture of a row of channels."""
         pygame = self.pygame
         picture = pygame.Surface(self.size)
         picture.fill(CARD)
@@ -530,28 +485,25 @@ class MooringPanel:
         shown = ", ".join(texts)
         if len(texts) > MOST_TENSIONS:
             shown = f"{min(texts, key=int)} to {max(texts, key=int)}"
-        words = self._writer.render(f"fairlead tension: {shown} kN", 16, SOFT)
-        picture.blit(words, (10, self.size[1] - 34))
+        self._writer.put(picture, f"fairlead tension: {shown} kN", (10, self.size[1] - 34), 16, SOFT)
         tension_key(pygame, picture, self._writer, (10, self.size[1] - 16), self.size[0] - 20)
         return picture
 
 
 def tension_key(pygame, picture, writer, place, width):
-    """Draw what the colours of lines mean: tension over that at rest, from a half to one and a half."""
-    (x, y), ends = place, (0.5, 1.5)
-    left = writer.render("tension / at rest: 0.5", 15, SOFT)
-    right = writer.render("1.5", 15, SOFT)
-    picture.blit(left, (x, y))
-    begin, end = x + left.get_width() + 6, x + min(width, 300) - right.get_width() - 6
+    """Draw the colour scale of mooring lines: tension over that at rest, from 0.5 to 1.5."""
+    x, y = place
+    end = x + min(width, 300) - writer.render("1.5", 15, SOFT).get_width() - 6
+    begin = writer.put(picture, "tension / at rest: 0.5", place, 15, SOFT) + 6
     for column in range(begin, end):
-        share = ends[0] + (ends[1] - ends[0]) * (column - begin) / max(1, end - begin - 1)
+        share = 0.5 + (column - begin) / max(1, end - begin - 1)
         pygame.draw.line(picture, tension_colour(share, 1.0), (column, y + 2), (column, y + 8))
     pygame.draw.rect(picture, SOFT, (begin - 1, y + 1, end - begin + 2, 9), 1)
-    picture.blit(right, (end + 6, y))
+    writer.put(picture, "1.5", (end + 6, y), 15, SOFT)
 
 
 def nice_range(low, high):
-    """(low, high, step) that enclose the two on round numbers, with about three steps."""
+    """Return round (low, high, step) that enclose a range, with about three steps."""
     rough = (high - low) / 3.0
     power = 10.0 ** np.floor(np.log10(rough))
     step = next(power * m for m in (1.0, 2.0, 2.5, 5.0, 10.0) if power * m >= rough * 0.999)
@@ -559,10 +511,10 @@ def nice_range(low, high):
 
 
 class TracePanel:
-    """Strips of the last WINDOW seconds of some channels, of one or several runs, with their scales.
+    """Draws strips of the last WINDOW seconds of some channels of one or several runs, with scales.
 
-    levels: {rating: value} of the lines across them. span: (begin, end) s that is shown throughout; None:
-    what is past, up to WINDOW. limits: {channel: (low, high)} of the values to come, so that scales rest.
+    levels: {rating: value} of horizontal lines. span: (begin, end) s of a fixed time axis; None: the last
+    WINDOW s. limits: {channel: (low, high)} of all values to come, which keep the scales constant.
     """
 
     def __init__(self, pygame, size, runs=1, levels=None, span=None, limits=None):
@@ -572,12 +524,12 @@ class TracePanel:
         self.histories = [deque() for _ in range(runs)]
 
     def clear(self):
-        """Forget what was shown."""
+        """Delete the history."""
         for history in self.histories:
             history.clear()
 
     def add(self, rows):
-        """Take in one row of channels per run; a time that runs backwards starts the traces anew."""
+        """Append one row of channels per run; a decreasing time clears the history."""
         time = rows[0]["Time"]
         if self.histories[0] and time < self.histories[0][-1][0]:
             self.clear()
@@ -589,87 +541,88 @@ class TracePanel:
                 history.popleft()
 
     def _times(self, data):
-        """(begin, end) of the time axis."""
+        """Return (begin, end) of the time axis."""
         if self.span is not None:
             return self.span
         first, last = data[0][0, 0], data[0][-1, 0]
         window = next((w for w in FIRST_WINDOWS if last - first <= w), WINDOW)
         return max(first, last - window), max(first, last - window) + window
 
+    def _levels(self, trace):
+        """Return [(text, value)] of the horizontal lines of a strip."""
+        return [(text, self.levels[rating]) for text, rating in trace.levels if rating in self.levels]
+
     def scale(self, trace, values):
-        """(low, high, step) of a strip: encloses its values, its levels and its limits, on round numbers."""
-        levels = [self.levels[rating] for _, rating in trace.levels if rating in self.levels]
+        """Return round (low, high, step) of a strip that include its values, levels and limits."""
+        levels = [level for _, level in self._levels(trace)]
         ends = [*levels, *self.limits.get(trace.channel, ()), values.min(), values.max()]
         low, high = min(ends), max(ends)
         spare = max(0.0, trace.least - (high - low)) / 2.0
         return nice_range(low - spare, high + spare)
 
     def draw(self):
-        """The picture of the traces."""
-        pygame, write = self.pygame, self._writer.render
-        picture = pygame.Surface(self.size)
+        """Return the picture of all strips."""
+        picture, zoom = self.pygame.Surface(self.size), self._writer.zoom
         picture.fill(CARD)
-        foot = round(16 * self._writer.zoom)
-        strip = (self.size[1] - foot) / len(TRACES)
-        head = round(20 * self._writer.zoom)
+        foot, head, gutter = round(16 * zoom), round(20 * zoom), round(42 * zoom)
+        height = (self.size[1] - foot) / len(TRACES)
         data = [np.array(history) for history in self.histories]
-        begin, end = self._times(data)
-        gutter = round(42 * self._writer.zoom)
+        times = self._times(data)
         for number, trace in enumerate(TRACES):
-            top = number * strip
-            shown = np.concatenate([history[:, 1 + number] for history in data])
-            low, high, step = self.scale(trace, shown)
-            box = pygame.Rect(gutter, round(top + head), self.size[0] - gutter - 10, round(strip - head - 7))
-            pygame.draw.rect(picture, PAGE, box)
-
-            def height(value, box=box, low=low, high=high):
-                return box.bottom - 1 - (box.height - 2) * (value - low) / (high - low)
-
-            ticks = np.arange(low, high + 0.5 * step, step)
-            for tick in ticks if box.height > 26 * self._writer.zoom else ticks[[0, -1]]:
-                y = round(height(tick))
-                pygame.draw.line(picture, FAINT, (box.left, y), (box.right, y))
-                text = write(f"{tick:.6g}", 14, SOFT)
-                place = min(max(y - text.get_height() // 2, box.top), box.bottom - text.get_height())
-                if len(ticks) <= 4 or tick in (ticks[0], ticks[-1]):
-                    picture.blit(text, (gutter - text.get_width() - 4, place))
-            for _, rating in trace.levels:
-                if rating in self.levels:
-                    y = round(height(self.levels[rating]))
-                    for x in range(box.left, box.right, 8):
-                        pygame.draw.line(picture, LEVEL, (x, y), (min(x + 4, box.right), y))
-            for index, history in reversed(list(enumerate(data))):
-                x = box.left + (box.width - 1) * (history[:, 0] - begin) / (end - begin)
-                if len(x) > 1:
-                    line = np.column_stack([x, height(history[:, 1 + number])])
-                    colour = RGB_COLOURS[index % len(RGB_COLOURS)]
-                    pygame.draw.aalines(picture, colour, False, line)
-                    pygame.draw.aalines(picture, colour, False, line + (0, 1))
-            text = write(f"{trace.label} ({trace.unit})", 16, SOFT)
-            picture.blit(text, (10, top + 5))
-            label_end = 10 + text.get_width()
-            right = self.size[0] - 10
-            for index, history in reversed(list(enumerate(data))):
-                colour = RGB_COLOURS[index % len(RGB_COLOURS)]
-                text = write(format(history[-1, 1 + number], trace.form), 18, colour)
-                right -= text.get_width()
-                picture.blit(text, (right, top + 3))
-                right -= 12
-            known = [
-                f"{name} {self.levels[rating]:.4g}" for name, rating in trace.levels if rating in self.levels
-            ]
-            text = write(", ".join(known) or " ", 14, LEVEL)
-            if label_end + 8 + text.get_width() <= right:
-                picture.blit(text, (label_end + 8, top + 6))
-        words = write(f"{begin:.0f} s", 14, SOFT)
-        picture.blit(words, (gutter, self.size[1] - foot))
-        words = write(f"{end:.0f} s", 14, SOFT)
-        picture.blit(words, (self.size[0] - 10 - words.get_width(), self.size[1] - foot))
+            top, width = number * height, self.size[0] - gutter - 10
+            box = self.pygame.Rect(gutter, round(top + head), width, round(height - head - 7))
+            series = [(history[:, 0], history[:, 1 + number]) for history in data]
+            self._strip(picture, box, trace, series, times)
+            self._caption(picture, top, trace, [values[-1] for _, values in series])
+        put, low = self._writer.put, self.size[1] - foot
+        put(picture, f"{times[0]:.0f} s", (gutter, low), 14, SOFT)
+        put(picture, f"{times[1]:.0f} s", (self.size[0] - 10, low), 14, SOFT, right=True)
         return picture
+
+    def _strip(self, picture, box, trace, series, times):
+        """Draw scale, levels and curves of a strip."""
+        draw, zoom = self.pygame.draw, self._writer.zoom
+        low, high, step = self.scale(trace, np.concatenate([values for _, values in series]))
+
+        def height(value):
+            return box.bottom - 1 - (box.height - 2) * (value - low) / (high - low)
+
+        draw.rect(picture, PAGE, box)
+        ticks = np.arange(low, high + 0.5 * step, step)
+        for tick in ticks if box.height > 26 * zoom else ticks[[0, -1]]:
+            y = round(height(tick))
+            draw.line(picture, FAINT, (box.left, y), (box.right, y))
+            text = f"{tick:.6g}"
+            tall = self._writer.render(text, 14, SOFT).get_height()
+            place = box.left - 4, min(max(y - tall // 2, box.top), box.bottom - tall)
+            if len(ticks) <= 4 or tick in (ticks[0], ticks[-1]):
+                self._writer.put(picture, text, place, 14, SOFT, right=True)
+        for _, level in self._levels(trace):
+            y = round(height(level))
+            for x in range(box.left, box.right, 8):
+                draw.line(picture, LEVEL, (x, y), (min(x + 4, box.right), y))
+        begin, end = times
+        for index, (time, values) in reversed(list(enumerate(series))):
+            if len(time) > 1:
+                x = box.left + (box.width - 1) * (time - begin) / (end - begin)
+                line = np.column_stack([x, height(values)])
+                for shift in (0, 1):
+                    draw.aalines(picture, RGB_COLOURS[index % len(RGB_COLOURS)], False, line + (0, shift))
+
+    def _caption(self, picture, top, trace, last):
+        """Write name, levels and last values above a strip."""
+        put, right = self._writer.put, self.size[0] - 10
+        left = put(picture, f"{trace.label} ({trace.unit})", (10, top + 5), 16, SOFT) + 8
+        for index, value in reversed(list(enumerate(last))):
+            colour = RGB_COLOURS[index % len(RGB_COLOURS)]
+            right = put(picture, format(value, trace.form), (right, top + 3), 18, colour, right=True) - 12
+        levels = ", ".join(f"{name} {level:.4g}" for name, level in self._levels(trace))
+        if levels and left + self._writer.render(levels, 14, LEVEL).get_width() <= right:
+            put(picture, levels, (left, top + 6), 14, LEVEL)
 
 
 class AgentPanel:
-    """The last action, each entry a bar about zero, and the reward of the step."""
+    """Draws the last action, each entry as a bar about zero, and the reward of the step."""
 
     NAMES = {2: ("torque", "blade pitch"), 4: ("torque", "blade 1", "blade 2", "blade 3")}
 
@@ -678,36 +631,33 @@ class AgentPanel:
         self._writer = Writer(pygame)
 
     def draw(self, agent):
-        """The picture of an Agent."""
-        pygame, write = self.pygame, self._writer.render
+        """Return the picture of an Agent."""
+        draw, put = self.pygame.draw, self._writer.put
         names = self.NAMES.get(len(agent.action), [f"action {n + 1}" for n in range(len(agent.action))])
-        picture = pygame.Surface((self.width, 18 * (len(names) + 1) + 10), pygame.SRCALPHA)
-        pygame.draw.rect(picture, (*CARD, 225), picture.get_rect(), border_radius=4)
+        picture = self.pygame.Surface((self.width, 18 * (len(names) + 1) + 10), self.pygame.SRCALPHA)
+        draw.rect(picture, (*CARD, 225), picture.get_rect(), border_radius=4)
         left, right = 86, self.width - 46
-        for number, (name, value) in enumerate(zip(names, agent.action, strict=True)):
-            y = 6 + 18 * number
-            picture.blit(write(name, 16, SOFT), (8, y + 2))
-            pygame.draw.rect(picture, PAGE, (left, y + 2, right - left, 11))
-            middle = 0.5 * (left + right)
-            tip = middle + 0.5 * (right - left) * min(max(value, -1.0), 1.0)
-            bar = pygame.Rect(round(min(middle, tip)), y + 2, max(1, round(abs(tip - middle))), 11)
-            pygame.draw.rect(picture, RGB_COLOURS[0], bar)
-            pygame.draw.line(picture, SOFT, (middle, y), (middle, y + 14))
-            text = write(f"{value:+.2f}", 16, INK)
-            picture.blit(text, (self.width - 8 - text.get_width(), y + 2))
-        y = 6 + 18 * len(names)
+        middle = 0.5 * (left + right)
         reward = "-" if agent.reward is None else f"{agent.reward:+.3f}"
-        picture.blit(write("reward", 16, SOFT), (8, y + 2))
-        text = write(reward, 16, INK)
-        picture.blit(text, (self.width - 8 - text.get_width(), y + 2))
+        rows = [(name, value, f"{value:+.2f}") for name, value in zip(names, agent.action, strict=True)]
+        for number, (name, value, text) in enumerate([*rows, ("reward", None, reward)]):
+            y = 6 + 18 * number
+            put(picture, name, (8, y + 2), 16, SOFT)
+            put(picture, text, (self.width - 8, y + 2), 16, INK, right=True)
+            if value is not None:
+                draw.rect(picture, PAGE, (left, y + 2, right - left, 11))
+                tip = middle + 0.5 * (right - left) * min(max(value, -1.0), 1.0)
+                bar = (round(min(middle, tip)), y + 2, max(1, round(abs(tip - middle))), 11)
+                draw.rect(picture, RGB_COLOURS[0], bar)
+                draw.line(picture, SOFT, (middle, y), (middle, y + 14))
         return picture
 
 
 class View:
-    """What a render mode shows: side views of one or several runs beside each other, traces and mooring.
+    """Draws the picture of a render mode: side views of one or several runs, traces and mooring.
 
-    scenes: one per run; labels: their names, or None. speed: how many times faster than real time it is
-    shown; None: not said. span, limits: as for TracePanel. Rows of channels are given to draw().
+    scenes: one per run; labels: their names, or None. speed: factor over real time, written into the
+    picture unless None. span, limits: as for TracePanel.
     """
 
     def __init__(self, scenes, labels=None, size=SIZE, *, speed=None, span=None, limits=None):
@@ -731,20 +681,18 @@ class View:
         self._window = self._clock = None
 
     def enter(self, scene):
-        """Show this scene in the first panel from now on; the traces start anew."""
+        """Change the scene of the first panel and clear the traces."""
         self.panels[0].enter(scene)
         self.traces.clear()
 
     def draw(self, rows, agent=None):
-        """pygame Surface of one row of channels per run, and of the Agent of the first, if there is one."""
+        """Return the pygame Surface of one row of channels per run, and of the Agent of the first run."""
         self.traces.add(rows)
         self.canvas.fill(FAINT)
-        for number, (panel, x, row, label) in enumerate(
-            zip(self.panels, self.places, rows, self.labels, strict=True)
-        ):
-            last = number == len(self.panels) - 1
-            colour = self.colours[number % len(self.colours)]
-            self.canvas.blit(panel.draw(row, label, colour, self.speed if last else None), (x, 0))
+        shown = zip(self.panels, self.places, rows, self.labels, strict=True)
+        for number, (panel, x, row, label) in enumerate(shown):
+            speed = self.speed if number == len(self.panels) - 1 else None
+            self.canvas.blit(panel.draw(row, label, self.colours[number % len(self.colours)], speed), (x, 0))
         self.canvas.blit(self.traces.draw(), (self.right, 0))
         if self.mooring is not None:
             picture = self.mooring.draw(rows[0], self.panels[0].scene, self.panels[0].tension_at_rest)
@@ -754,14 +702,14 @@ class View:
         return self.canvas
 
     def array(self):
-        """(height, width, 3) uint8 copy of what was drawn last."""
+        """Return a (height, width, 3) uint8 copy of the last picture."""
         data = self.pygame.image.tobytes(self.canvas, "RGB")
         return np.frombuffer(data, dtype=np.uint8).reshape(self.size[1], self.size[0], 3).copy()
 
     def show(self, fps):
-        """Put what was drawn last into a window, at no more than fps pictures a second.
+        """Show the last picture in a window, at most fps pictures per second.
 
-        Raises: InputError where there is no display.
+        Raises: InputError without a display.
         """
         pygame = self.pygame
         if self._window is None:
@@ -780,7 +728,7 @@ class View:
         self._clock.tick(fps)
 
     def close(self):
-        """Close the window, if there is one."""
+        """Close the window if one is open."""
         if self._window is not None:
             self.pygame.display.quit()
             self._window = self._clock = None

@@ -1,6 +1,6 @@
-"""Plots of what runs and operating points have in common: box plots, steady schedule, RAOs.
+"""Plots box plots of runs, the steady schedule and response amplitude operators (RAOs).
 
-As in time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
+As in time_series.py every function returns a matplotlib Figure and writes it to `path` unless that is None.
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 
@@ -15,20 +15,20 @@ from fowt_env.visual.style import (
     INK,
     SOFT,
     UNSCORED,
-    head,
+    head_of,
     line_style,
     new_figure,
+    note,
     save_figure,
-    short_names,
     style_axes,
 )
-from fowt_env.visual.time_series import TIME, named_runs
+from fowt_env.visual.time_series import TIME, even_step, named_runs
 
 WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`
 WHISKERS = (1.0, 99.0)  # percentiles
 HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of colours
-ENERGETIC = 0.02  # of the peak of the wave spectrum: an RAO is estimated where the waves have more
+ENERGETIC = 0.02  # of the peak of the wave spectrum: least wave energy for an estimate of an RAO
 COHERENT = 0.5  # above it an RAO is drawn solid
 RAO_RANGE = (0.015, 0.3)  # Hz: from below the resonances of spars and semi-submersibles to the end of waves
 BOXES = (
@@ -56,7 +56,7 @@ MOTION_CHANNELS = (
 
 
 def _grid(panels, columns, width, height):
-    """(figure, panels in reading order) of a grid whose spare places are empty."""
+    """Return (figure, panels in reading order) of a grid; unused places stay empty."""
     rows = -(-len(panels) // columns)
     figure = new_figure(width * columns, 0.7 + height * rows)
     places = list(figure.subplots(rows, columns, squeeze=False).flat)
@@ -68,34 +68,21 @@ def _grid(panels, columns, width, height):
 
 
 def _shown(panels, frames, what):
-    """The panels whose channel some frame has. Raises: InputError where there is none."""
+    """Return the panels with a channel in some frame. Raises: InputError if there is none."""
     shown = [panel for panel in panels if any(panel[1] in frame.columns for frame in frames)]
     if not shown:
         raise InputError(f"nothing to plot: no {what} has {', '.join(channel for _, channel in panels)}")
     return shown
 
 
-def _head(figure, places, names, title):
-    """Title and one legend above all panels, from the handles that any of them has."""
-    texts, handles = short_names(names), {}
-    for axes in places:
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            handles.setdefault(label, handle)
-    shown = [name for name in names if name and name in handles]
-    head(figure, title, [handles[name] for name in shown], [texts[name] for name in shown])
-
-
 def plot_boxes(cases, path=None, title=None, skip=0.0):
-    """Box plots of the samples of runs {case: {label: frame}}: one panel per channel, one box per run.
+    """Plot boxes of the samples of runs {case: {label: frame}}: one panel per channel, one box per run.
 
-    Boxes span the quartiles, whiskers WHISKERS percentiles. The first `skip` seconds are left out.
+    Boxes span the quartiles, whiskers WHISKERS percentiles. The first `skip` seconds are omitted.
     """
     if not cases:
         raise InputError("nothing to plot: no cases were given")
-    kept = {}
-    for case, runs in cases.items():
-        late = {label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in named_runs(runs).items()}
-        kept[case] = named_runs(late)
+    kept = {case: named_runs(runs, skip) for case, runs in cases.items()}
     labels = list(dict.fromkeys(label for runs in kept.values() for label in runs))
     panels = _shown(BOXES, [frame for runs in kept.values() for frame in runs.values()], "run")
     figure, places = _grid(panels, min(3, len(panels)), 4.2, 2.4)
@@ -109,16 +96,9 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
             at = [i + width * (number - 0.5 * (len(labels) - 1)) for i in having]
             colour = COLOURS[number % len(COLOURS)]
             boxes = axes.boxplot(
-                values,
-                positions=at,
-                widths=0.8 * width,
-                whis=WHISKERS,
-                showfliers=False,
-                patch_artist=True,
-                manage_ticks=False,
-                label=label,
-                medianprops={"color": INK},
-            )
+                values, positions=at, widths=0.8 * width, whis=WHISKERS, showfliers=False,
+                patch_artist=True, manage_ticks=False, label=label, medianprops={"color": INK},
+            )  # fmt: skip
             for box in boxes["boxes"]:
                 box.set(facecolor=colour, alpha=0.65, edgecolor=colour)
                 box.set_hatch(HATCHES[number // len(COLOURS) % len(HATCHES)])
@@ -130,12 +110,12 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
         axes.grid(False, axis="x")
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_xlim(-0.6, len(kept) - 0.4)
-    _head(figure, places, labels, title)
+    head_of(figure, places, labels, title)
     return save_figure(figure, path)
 
 
 def plot_schedule(points, path=None, title=None, *, rated_wind=None):
-    """Figure of steady operating points over wind speed, of one table or {label: table} of `fowt trim`.
+    """Plot steady operating points over wind speed, of one table or {label: table} of `fowt trim`.
 
     rated_wind: m/s, marked by a line; None: not marked.
     """
@@ -158,31 +138,27 @@ def plot_schedule(points, path=None, title=None, *, rated_wind=None):
         axes.ticklabel_format(axis="y", useOffset=False)
     if rated_wind is not None:
         for axes in places[: min(3, len(places))]:
-            axes.annotate(
-                f"rated {rated_wind:g} m/s", (rated_wind, 1.0), xycoords=("data", "axes fraction"),
-                xytext=(3, -8), textcoords="offset points", fontsize=7, color=SOFT,
-            )  # fmt: skip
-    _head(figure, places, list(tables), title)
+            note(axes, f"rated {rated_wind:g} m/s", (rated_wind, 1.0), (3, -8))
+    head_of(figure, places, list(tables), title)
     return save_figure(figure, path)
 
 
 class _Estimate(NamedTuple):
-    """Welch's estimates of a response to waves, (n,) each."""
+    """Holds Welch's estimates of a response to waves, (n,) each."""
 
     frequency: np.ndarray  # Hz
     amplitude: np.ndarray  # per metre of wave
     phase: np.ndarray  # rad in (-pi, pi], by which it leads the wave
     coherence: np.ndarray
-    energetic: np.ndarray  # whether the waves have energy there
+    energetic: np.ndarray  # whether the waves have energy at the frequency
 
 
 def response_operator(frame, channel, skip=0.0, segment=None):
-    """(frequency Hz, amplitude per metre of wave, coherence) of a channel, where the waves have energy.
+    """Return (frequency Hz, amplitude per metre of wave, coherence) of a channel where waves have energy.
 
-    The estimate |S_wc| / S_ww from Welch's cross-spectrum (H1): linear response to waves alone.
-    Wind lowers the coherence, which is 1 for a linear system without noise; where it is small the amplitude
-    is uncertain, and too large rather than too small.
-    segment: seconds per window; None: an eighth of the record.
+    The estimate is |S_wc| / S_ww from Welch's cross-spectrum (H1), the linear response to waves. Wind lowers
+    the coherence, which is 1 for a linear system without noise; at low coherence the amplitude is uncertain
+    and rather too large. segment: seconds per window; None: an eighth of the record.
     Raises: InputError for a missing channel, a record without waves, or uneven times.
     """
     found = _estimate(frame, channel, skip, segment)
@@ -191,7 +167,7 @@ def response_operator(frame, channel, skip=0.0, segment=None):
 
 
 def _estimate(frame, channel, skip, segment):
-    """_Estimate at all frequencies above zero; arguments and errors as of response_operator."""
+    """Return the _Estimate at all frequencies above zero; arguments and errors as response_operator."""
     for name in (TIME, WAVE, channel):
         if name not in frame.columns:
             raise InputError(f"response operator: the run has no column {name!r}")
@@ -199,15 +175,13 @@ def _estimate(frame, channel, skip, segment):
     time = kept[TIME].to_numpy()
     if len(time) < 64:
         raise InputError(f"response operator: {len(time)} rows are left; must be at least 64")
-    steps = np.diff(time)
-    if np.abs(steps - steps.mean()).max() > 1e-3 * steps.mean():
-        raise InputError("response operator: the times must be evenly spaced")
+    step = even_step("response operator", time)
     wave, motion = kept[WAVE].to_numpy(), kept[channel].to_numpy()
     if np.ptp(wave) < 1e-9:
         raise InputError("response operator: the run has no waves")
     length = (time[-1] - time[0]) / 8.0 if segment is None else segment
-    samples = int(min(len(time), max(32, round(length / steps.mean()))))
-    settings = {"fs": 1.0 / steps.mean(), "nperseg": samples, "detrend": "linear"}
+    samples = int(min(len(time), max(32, round(length / step))))
+    settings = {"fs": 1.0 / step, "nperseg": samples, "detrend": "linear"}
     frequency, power = welch(wave, **settings)
     _, answer = welch(motion, **settings)
     _, cross = csd(wave, motion, **settings)
@@ -219,23 +193,23 @@ def _estimate(frame, channel, skip, segment):
 
 
 def wrapped(degrees):
-    """The same angles (n,) in [-180, 180) deg."""
+    """Return angles (n,) in [-180, 180) deg."""
     return (np.asarray(degrees) + 180.0) % 360.0 - 180.0
 
 
 def broken_at_wraps(x, degrees):
-    """(x, wrapped angles, deg) of a line that is interrupted wherever the angle passes +-180 deg."""
+    """Return (x, wrapped angles, deg) of a line that is interrupted where the angle passes +-180 deg."""
     x, angle = np.asarray(x, dtype=float), wrapped(degrees)
     jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
     return np.insert(x, jumps, np.nan), np.insert(angle, jumps, np.nan)
 
 
 def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitch_period=None):
-    """Figure of amplitude, phase and coherence of responses to waves over frequency, from {label: frame}.
+    """Plot amplitude, phase and coherence of responses to waves over frequency, of {label: frame} or a frame.
 
-    Solid where the waves have energy and the coherence is above one half, faint elsewhere: there other things
-    than waves move it. Phases are those by which a response leads the wave, in [-180, 180) deg. A line marks
-    the platform-pitch resonance if its period is given (s); one frame may stand for {"": frame}.
+    Lines are solid where the waves have energy and the coherence exceeds 0.5, faint elsewhere. The phase is
+    the lead of the response over the wave, in [-180, 180) deg. A line marks the platform-pitch resonance of
+    a period (s).
     """
     runs = named_runs(runs if isinstance(runs, dict) else {"": runs})
     panels = _shown(MOTION_CHANNELS, list(runs.values()), "run")
@@ -278,16 +252,9 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitc
         axes.set_ylabel(text, fontsize=8.5, color=INK)
     grid[0, 0].set_xlim(*RAO_RANGE)
     if platform_pitch_period is not None:
-        grid[0, 0].annotate(
-            "platform-pitch resonance", (1.0 / platform_pitch_period, 0.02),
-            xycoords=("data", "axes fraction"), xytext=(3, 0), textcoords="offset points",
-            fontsize=7, color=SOFT, rotation=90,
-        )  # fmt: skip
+        place = (1.0 / platform_pitch_period, 0.02)
+        note(grid[0, 0], "platform-pitch resonance", place, (3, 0), rotation=90)
     figure.align_ylabels(grid[:, 0])
-    _head(
-        figure,
-        grid[0],
-        list(runs),
-        title or "Response per metre of wave amplitude (grey: waves without energy)",
-    )
+    title = title or "Response per metre of wave amplitude (grey: waves without energy)"
+    head_of(figure, grid[0], list(runs), title)
     return save_figure(figure, path)

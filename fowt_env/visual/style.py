@@ -1,4 +1,4 @@
-"""The style that all figures share: colours, axes, writing."""
+"""Defines the common style of all figures: colours, axes, text."""
 
 from io import BytesIO
 from pathlib import Path
@@ -17,7 +17,7 @@ SCREEN, SHARP = 96, 2  # dots per inch of a notebook's page, and pixels to each
 
 
 def new_figure(width, height):
-    """An empty Figure in the house style, which a notebook shows as a picture.
+    """Return an empty Figure in the house style, displayed as a picture in notebooks.
 
     Raises: InputError that names the extra to install.
     """
@@ -30,11 +30,11 @@ def new_figure(width, height):
 
 @cached(1)
 def _shown(figure_class):
-    """Matplotlib's Figure that brings its own picture: without pyplot IPython has no way to make one."""
+    """Return a subclass of Figure with its own picture: without pyplot IPython cannot make one."""
 
     class NotebookFigure(figure_class):
         def _repr_png_(self):
-            """(PNG, size on the page), as IPython asks for."""
+            """Return (PNG, size on the page) for IPython."""
             picture = BytesIO()
             self.savefig(picture, format="png", dpi=SCREEN * SHARP)
             width, height = (round(SCREEN * side) for side in self.get_size_inches())
@@ -44,7 +44,7 @@ def _shown(figure_class):
 
 
 def style_axes(axes):
-    """Light grid, no box, quiet ticks."""
+    """Set a light grid, no box and grey ticks."""
     axes.grid(True, color=FAINT, linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -53,7 +53,7 @@ def style_axes(axes):
 
 
 def line_style(number):
-    """Colour and line style of the number-th of several runs; no two of the first 28 have both."""
+    """Return colour and line style of the number-th run; the first 28 combinations differ."""
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": LINES[number // len(COLOURS) % len(LINES)],
@@ -61,9 +61,9 @@ def line_style(number):
 
 
 def short_names(names):
-    """{name: text} for plots: without `policy:`, modules and folders, and at most LONGEST_NAME long.
+    """Return {name: text} for plots: without `policy:`, modules and folders, at most LONGEST_NAME long.
 
-    A text that two names would share is the whole name for both.
+    Names with the same text keep their full form.
     """
     short = {name: _short(str(name)) for name in names}
     texts = list(short.values())
@@ -80,8 +80,18 @@ def _short(name):
     return name
 
 
+def head_of(figure, panels, names, title=None):
+    """Put the title and one legend of all panels above them; a run named "" has no entry."""
+    texts, handles = short_names(names), {}
+    for axes in panels:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            handles.setdefault(label, handle)
+    shown = [name for name in names if name in handles]
+    head(figure, title, [handles[name] for name in shown], [texts[name] for name in shown])
+
+
 def head(figure, title=None, handles=(), names=()):
-    """Put the title and one legend of all panels, where it has names, above them."""
+    """Put the title and a legend of handles, those with a name, above the panels."""
     named = [(handle, name) for handle, name in zip(handles, names, strict=True) if name]
     if not named:
         if title:
@@ -91,19 +101,21 @@ def head(figure, title=None, handles=(), names=()):
     entry = 0.6 * 8.5 * max(len(name) for _, name in named) + 40.0
     figure.legend(
         *zip(*named, strict=True),
-        loc="outside upper center",
-        ncols=max(1, min(len(named), int(width // entry))),
-        fontsize=8.5,
-        labelcolor=INK,
-        frameon=False,
-        handlelength=1.8,
-        title=title,  # as the legend's own: a suptitle would lie upon it
-        title_fontproperties={"size": 11},
-    )
+        loc="outside upper center", ncols=max(1, min(len(named), int(width // entry))), fontsize=8.5,
+        labelcolor=INK, frameon=False, handlelength=1.8,
+        title=title, title_fontproperties={"size": 11},  # of the legend: a suptitle would overlap it
+    )  # fmt: skip
+
+
+def note(axes, text, place, offset, scale="data", **look):
+    """Write a small text into a panel, at (data or axes, axes or data) and an offset in points."""
+    coordinates = ("data", "axes fraction") if scale == "data" else ("axes fraction", "data")
+    look = {"fontsize": 7, "color": SOFT, "textcoords": "offset points"} | look
+    axes.annotate(text, place, xycoords=coordinates, xytext=offset, **look)
 
 
 def save_figure(figure, path):
-    """The figure, written to `path` (format by its ending, default PNG) unless that is None."""
+    """Write the figure to `path` (format by its ending, default PNG) unless that is None; return it."""
     if path is not None:
         path = Path(path)
         if not path.name:

@@ -1,7 +1,7 @@
-"""Plots of runs: time series and spectra. Needs matplotlib: pip install "fowt-env[plot]".
+"""Plots time series and spectra of runs. Needs matplotlib: pip install "fowt-env[plot]".
 
-Every function returns a matplotlib Figure and, if given a path, writes it there. Figures are made
-without pyplot, so nothing global is touched and no display is needed.
+Every function returns a matplotlib Figure and writes it to `path` unless that is None. Figures are made
+without pyplot: no global state, no display.
 """
 
 import numpy as np
@@ -15,17 +15,17 @@ from fowt_env.visual.style import (
     INK,
     SOFT,
     UNSCORED,
-    head,
+    head_of,
     line_style,
     new_figure,
+    note,
     save_figure,
-    short_names,
     style_axes,
 )
 
 TIME = "Time_[s]"
 
-# one panel each: axis label, channel; a run that lacks the channel gets no such panel
+# one panel each: axis label, channel; a run without the channel has no such panel
 PANELS = (
     ("wind\n(m/s)", "Wind1VelX_[m/s]"),
     ("wave\n(m)", "Wave1Elev_[m]"),
@@ -41,7 +41,7 @@ MARKED = {  # channel: lines across its panel, as (text, rating)
     "RotSpeed_[rpm]": (("rated", RATED_SPEED), ("trip", OVERSPEED)),
     "GenPwr_[kW]": (("rated", RATED_POWER),),
 }
-STEADY = 1e-6  # of its mean: what varies less is shown as constant
+STEADY = 1e-6  # of the mean: a signal with a smaller range is shown as constant
 SPECTRA = (
     ("wind", "Wind1VelX_[m/s]", "(m/s)"),
     ("wave elevation", "Wave1Elev_[m]", "m"),
@@ -51,42 +51,42 @@ SPECTRA = (
 )
 
 
-def named_runs(runs):
-    """{label: frame} with at least one non-empty run, each with a time column."""
+def named_runs(runs, skip=0.0):
+    """Return runs {label: frame}, without their first `skip` seconds.
+
+    Raises: InputError without a run, and for a run without time column or with less than two rows.
+    """
     if not runs:
         raise InputError("nothing to plot: no runs were given")
     for label, frame in runs.items():
         if TIME not in frame.columns or len(frame) < 2:
             raise InputError(f"run {label!r}: needs a column {TIME!r} and at least two rows")
-    return runs
+    if skip == 0.0:
+        return runs
+    return named_runs({label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in runs.items()})
 
 
 def _lines(runs, channel):
-    """[(label, style, frame)] of a channel; one without a label where all runs agree (the weather)."""
-    having = [
-        (number, label, frame)
-        for number, (label, frame) in enumerate(runs.items())
-        if channel in frame.columns
-    ]
-    if len(having) > 1:
-        first = having[0][2]
-        if all(f[channel].equals(first[channel]) and f[TIME].equals(first[TIME]) for _, _, f in having[1:]):
+    """Return [(label, style, frame)] of a channel; one entry without label if all runs agree (weather)."""
+    lines = [(label, line_style(i), f) for i, (label, f) in enumerate(runs.items()) if channel in f.columns]
+    if len(lines) > 1:
+        first = lines[0][2]
+        if all(f[channel].equals(first[channel]) and f[TIME].equals(first[TIME]) for _, _, f in lines[1:]):
             return [(None, {"color": INK, "linestyle": "-"}, first)]
-    return [(label, line_style(number), frame) for number, label, frame in having]
+    return lines
 
 
-def _named_head(figure, rows, runs, title):
-    """Title and legend of a column of panels: each run's name once."""
-    texts, handles = short_names(runs), {}
+def _stacked(count, height):
+    """Return (figure, [panels]) with a common time or frequency axis."""
+    figure = new_figure(9.0, 0.9 + height * count)
+    rows = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
     for axes in rows:
-        for line in axes.lines:
-            handles.setdefault(line.get_label(), line)
-    named = {label: handles[label] for label in runs if label in handles}
-    head(figure, title, list(named.values()), [texts[label] for label in named])
+        style_axes(axes)
+    return figure, rows
 
 
 def plot_run(frame, path=None, title=None, *, skip=0.0, ratings=None):
-    """Figure of the stacked time series of one run: wind, wave, rotor, actuators, power, motions, mooring.
+    """Plot stacked time series of one run: wind, wave, rotor, actuators, power, motions, mooring.
 
     skip, ratings: as for plot_runs.
     """
@@ -94,11 +94,11 @@ def plot_run(frame, path=None, title=None, *, skip=0.0, ratings=None):
 
 
 def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None):
-    """Figure of the stacked time series of several runs over each other, {label: frame}.
+    """Plot stacked time series of several runs {label: frame} in common panels.
 
-    skip      s from the start that are not scored: shaded
-    ratings   {name: value} of descriptions.ratings.ratings, drawn as lines across rotor speed and power;
-              None: those that the first frame carries in attrs["ratings"], as simulate leaves them
+    skip      s from the start, shaded as not scored
+    ratings   {name: value} of descriptions.ratings.ratings, drawn as lines in rotor speed and power;
+              None: attrs["ratings"] of the first frame, which simulate sets
     """
     runs = named_runs(runs)
     check_number("skip", skip, 0.0)
@@ -108,10 +108,9 @@ def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None):
         raise InputError(f"nothing to plot: none of {wanted} is in the run")
     first = next(iter(runs.values()))
     ratings = first.attrs.get("ratings", {}) if ratings is None else ratings
-    figure = new_figure(9.0, 0.9 + 1.1 * len(panels))
-    rows = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    start = first[TIME].iloc[0]
+    figure, rows = _stacked(len(panels), 1.1)
     for axes, (label, channel) in zip(rows, panels, strict=True):
-        style_axes(axes)
         lines = _lines(runs, channel)
         for text, style, frame in lines:
             axes.plot(frame[TIME], frame[channel], linewidth=0.9, label=text, **style)
@@ -120,29 +119,19 @@ def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None):
             if rating in ratings:
                 _mark_level(axes, text, ratings[rating])
         if skip > 0.0:
-            axes.axvspan(
-                first[TIME].iloc[0], first[TIME].iloc[0] + skip, color=UNSCORED, zorder=0, linewidth=0
-            )
+            axes.axvspan(start, start + skip, color=UNSCORED, zorder=0, linewidth=0)
         axes.set_ylabel(label, fontsize=8, color=INK)
         axes.margins(x=0.0)
     if skip > 0.0:
-        rows[0].annotate(
-            "not scored",
-            (first[TIME].iloc[0], 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(3, -9),
-            textcoords="offset points",
-            fontsize=7,
-            color=SOFT,
-        )
+        note(rows[0], "not scored", (start, 1.0), (3, -9))
     rows[-1].set_xlabel("time (s)", fontsize=9, color=INK)
     figure.align_ylabels(rows)
-    _named_head(figure, rows, runs, title)
+    head_of(figure, rows, runs, title)
     return save_figure(figure, path)
 
 
 def _fit(axes, series):
-    """Ticks in full, and a range for what is constant up to rounding."""
+    """Set full tick labels, and a range for signals that are constant up to rounding."""
     axes.ticklabel_format(axis="y", useOffset=False)
     low, high = min(values.min() for values in series), max(values.max() for values in series)
     if high - low <= STEADY * max(abs(low), abs(high)):
@@ -151,55 +140,48 @@ def _fit(axes, series):
 
 
 def _mark_level(axes, text, level):
-    """A dashed line at a level of a panel, named at its right end."""
+    """Draw a dashed line at a level of a panel, with its name at the right end."""
     axes.axhline(level, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
-    axes.annotate(
-        f"{text}\n{level:.4g}",
-        (1.0, level),
-        xycoords=("axes fraction", "data"),
-        xytext=(4, 0),
-        textcoords="offset points",
-        fontsize=7,
-        va="center",
-        color=SOFT,
-        annotation_clip=False,
-    )
+    note(axes, f"{text}\n{level:.4g}", (1.0, level), (4, 0), "axes", va="center", annotation_clip=False)
 
 
 def spectrum(time, value, segment=None):
-    """(frequency Hz, one-sided power spectral density): Welch's estimate, Hann windows, mean removed.
+    """Return (frequency Hz, one-sided power spectral density) by Welch's method, Hann windows, mean removed.
 
     time must be evenly spaced. segment: seconds per window; None: a third of the record.
     """
     time, value = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
-    steps = np.diff(time)
-    step = steps.mean()
-    if np.abs(steps - step).max() > 1e-3 * step:
-        raise InputError("spectrum: the times must be evenly spaced")
+    step = even_step("spectrum", time)
     length = (time[-1] - time[0]) / 3.0 if segment is None else segment
     samples = int(min(len(value), max(8, round(length / step))))
     return welch(value, fs=1.0 / step, nperseg=samples, detrend="constant")
 
 
-def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=None):
-    """Figure of the power spectral densities of SPECTRA of {label: frame} or of one frame.
+def even_step(what, time):
+    """Return the step (s) of evenly spaced times. Raises: InputError for other times."""
+    steps = np.diff(time)
+    step = steps.mean()
+    if np.abs(steps - step).max() > 1e-3 * step:
+        raise InputError(f"{what}: the times must be evenly spaced")
+    return step
 
-    A channel that every run lacks or holds constant has no panel. Vertical lines mark the wave peak, 1P (mean
-    rotor speed of the first run) and, if its period is given (s), the platform-pitch natural frequency. The
-    first `skip` seconds are left out.
+
+def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=None):
+    """Plot the power spectral densities of SPECTRA of {label: frame} or of one frame.
+
+    Channels that are missing or constant in every run have no panel. Vertical lines mark the wave peak, 1P
+    (mean rotor speed of the first run) and the natural frequency of a platform-pitch period (s). The first
+    `skip` seconds are omitted.
     """
-    runs = named_runs(runs if isinstance(runs, dict) else {"": runs})
-    runs = named_runs({label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in runs.items()})
+    runs = named_runs(runs if isinstance(runs, dict) else {"": runs}, skip)
     if not any(entry[1] in frame.columns for entry in SPECTRA for frame in runs.values()):
         raise InputError(f"nothing to plot: none of {', '.join(entry[1] for entry in SPECTRA)} is in the run")
     shown = [entry for entry in SPECTRA if any(_varies(frame.get(entry[1])) for frame in runs.values())]
     if not shown:
         raise InputError(f"nothing to plot: {', '.join(entry[1] for entry in SPECTRA)} are constant")
-    figure = new_figure(9.0, 0.9 + 1.7 * len(shown))
-    rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+    figure, rows = _stacked(len(shown), 1.7)
     marks = frequency_marks(next(iter(runs.values())), platform_pitch_period)
     for axes, (label, channel, unit) in zip(rows, shown, strict=True):
-        style_axes(axes)
         top = 0.0
         for text, style, frame in _lines(runs, channel):
             frequency, density = spectrum(frame[TIME], frame[channel])
@@ -214,17 +196,8 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
     near = ""
     for name, at in sorted(marks, key=lambda mark: mark[1]):
         near = "" if near else "\n"  # neighbours at two heights
-        rows[0].annotate(
-            f"{name} {at:.3g} Hz{near}",
-            (at, 1.0),
-            xycoords=("data", "axes fraction"),
-            xytext=(0, 3),
-            textcoords="offset points",
-            fontsize=7.5,
-            ha="center",
-            color=INK,
-            annotation_clip=False,
-        )
+        look = {"fontsize": 7.5, "color": INK, "ha": "center", "annotation_clip": False}
+        note(rows[0], f"{name} {at:.3g} Hz{near}", (at, 1.0), (0, 3), **look)
     rows[-1].set_xscale("log")
     rows[-1].set_xlim(0.005, 0.5)
     ticks = (0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
@@ -232,17 +205,17 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
     rows[-1].set_xticks([], minor=True)
     rows[-1].set_xlabel("frequency (Hz)", fontsize=9, color=INK)
     figure.align_ylabels(rows)
-    _named_head(figure, rows, runs, title)
+    head_of(figure, rows, runs, title)
     return save_figure(figure, path)
 
 
 def _varies(series):
-    """Whether a column is there and is more than constant up to rounding."""
+    """Return whether a column exists and varies by more than rounding."""
     return series is not None and np.ptp(series) > STEADY * np.abs(series).max()
 
 
 def frequency_marks(frame, platform_pitch_period=None):
-    """[(name, Hz)] of the platform-pitch natural frequency, the wave peak and 1P, where there are such."""
+    """Return [(name, Hz)] of the platform-pitch natural frequency, the wave peak and 1P, if known."""
     marks = []
     if platform_pitch_period is not None:
         check_number("platform_pitch_period", platform_pitch_period, 0.0, low_open=True)

@@ -1,7 +1,6 @@
-"""Wave force on a potential-flow body in a sea: from its coefficients to the parts that the plant reads.
+"""Computes the wave force on a potential-flow body in a sea from its coefficients.
 
-The excitation of each component is interpolated linearly in frequency and heading, its real and imaginary
-parts one by one, as HydroDyn does.
+The complex excitation of each component is interpolated linearly in frequency and heading, as in HydroDyn.
 """
 
 import warnings
@@ -25,16 +24,16 @@ from fowt_env.plant.hydro.excitation import (
     FastExcitation,
 )
 from fowt_env.plant.hydro.wave_bands import aligned, padded
-from fowt_env.weather.harmonics import pack_table, table_of
+from fowt_env.weather.harmonics import constant_table, table_of
 from fowt_env.weather.second_order import build_second_order
 
-QUIET, MOST = 1e-3, 0.5  # share of a sea's energy beyond the table that is passed over, and that is refused
-SAME_HEADING = 1e-4  # rad, of headings that the figures of files cannot tell apart
+QUIET, MOST = 1e-3, 0.5  # share of a sea's energy beyond the table that is passed over, and that is rejected
+SAME_HEADING = 1e-4  # rad, of headings that the values of files cannot tell apart
 OUT_OF_PLANE = (1, 3, 5)  # sway, roll, yaw
 
 
 def build_excitation(body, waves, *, duration, fast, planar, position=None, second_order=None, cutoff=None):
-    """Excitation of a PotentialFlow in Waves; None without either.
+    """Return the excitation of a PotentialFlow in Waves; None without either.
 
     duration      s that the table of a sea that does not repeat has to cover
     fast          first order from a table; else by the sum over components
@@ -72,7 +71,7 @@ def build_excitation(body, waves, *, duration, fast, planar, position=None, seco
 
 
 def _first_order_table(waves, force, duration):
-    """TimeTable of the force (n, 6) and the elevation."""
+    """Return the TimeTable of the force (n, 6) and the elevation."""
     coefficient = np.zeros((waves.omega.size, COLUMNS - 1), dtype=complex)
     coefficient[:, :6], coefficient[:, ELEVATION] = force, waves.amplitude
     coefficient *= np.exp(-1j * waves.phase)[:, None]
@@ -80,7 +79,7 @@ def _first_order_table(waves, force, duration):
 
 
 def _fast_sum(exact, amplitude):
-    """FastExcitation of an ExactExcitation. The phase there is k x - omega t + e: the sine changes sign."""
+    """Return the FastExcitation of an ExactExcitation, whose phase has the opposite sign."""
     size = -(-amplitude.size // SUM_LANES) * SUM_LANES
     wave = np.zeros((N_WAVE, size))
     for row, values in ((RATE, exact.omega), (TURN, exact.phase % (2.0 * pi)), (ALONG_X, exact.along_x),
@@ -92,12 +91,12 @@ def _fast_sum(exact, amplitude):
 
 
 def still_excitation(part):
-    """An Excitation of the same types without force: no first order, and no mean drift; None of None."""
+    """Return an Excitation of the same types with zero force; None for None."""
     if part is None:
         return None
     one, none = np.ones(1), np.zeros(1)
     first = ExactExcitation(one, none, none, none, np.zeros((1, 12)), 0.0)
-    flat = pack_table(np.zeros((11, COLUMNS)), 1.0, 8.0, True)
+    flat = constant_table(np.zeros(COLUMNS))
     if isinstance(part.first, ExcitationSeries):
         first = ExcitationSeries(flat, first)
     elif isinstance(part.first, FastExcitation):
@@ -107,11 +106,10 @@ def still_excitation(part):
 
 
 def excitation_at(body, omega, heading):
-    """(n, 6) complex force per metre of amplitude, N/m and N m/m, of waves of omega (n,) and heading, rad.
+    """Return the complex force (n, 6) per metre of amplitude, N/m and N m/m, of waves of omega (n,) rad/s.
 
-    heading: a number or (n,). Below the table's frequencies it goes to the limit of long waves, in which the
-    water rises and falls around the body, above them it is zero.
-    Raises: InputError for a heading between which the table has none.
+    heading: rad, a number or (n,). Below the table's frequencies the force tends to the hydrostatic limit of
+    long waves, above them it is zero. Raises: InputError for a heading outside the table.
     """
     omega = np.asarray(omega, dtype=float)
     known = np.concatenate([[0.0], body.excitation_omega])
@@ -131,7 +129,7 @@ def excitation_at(body, omega, heading):
 
 
 def _headings(body, heading):
-    """(left, right, share): columns of the table beside headings (n,), and the right one's share."""
+    """Return (left, right, share): columns of the table beside headings (n,), and the right one's share."""
     known = body.heading
     turned = known[0] + np.mod(heading - known[0] + SAME_HEADING, 2.0 * pi) - SAME_HEADING
     gap = float(np.diff(known).max()) if known.size > 1 else 0.0
@@ -155,7 +153,7 @@ def _headings(body, heading):
 
 
 def check_frequencies(body, waves):
-    """Refuse a sea that mostly lies outside the frequencies of the table; warn of one that partly does."""
+    """Check the energy outside the table's frequencies. Raises: InputError for most; warns for some of it."""
     energy = waves.amplitude**2
     total = float(energy.sum())
     if total == 0.0:

@@ -1,8 +1,8 @@
-"""Deterministic gusts of IEC 61400-1 (ed. 3), 6.3.2 "Extreme wind conditions", as rows for a WindSeries.
+"""Computes deterministic gusts of IEC 61400-1 (ed. 3), 6.3.2 "Extreme wind conditions".
 
-Each gust takes the hub speed and returns (duration, value): value (n, 5) with the columns of
-WindSeries, evenly spaced over the duration. Before it the first row holds, after it the last.
-The numbers in its docstring are those of the standard; speeds in m/s, lengths in m, times in s.
+Each gust takes the hub speed and returns (duration, value): value (n, 5) with the columns of WindSeries,
+evenly spaced over the duration; the wind is constant before the first and after the last row. Numbers in the
+docstrings are those of the standard; speeds in m/s, lengths in m, times in s.
 """
 
 from math import atan, ceil, pi, radians
@@ -15,20 +15,20 @@ STEP = 0.01  # s; linear interpolation is then within 1e-4 of the gust's amplitu
 
 
 def _rows(duration):
-    """Times from 0 to the duration, and the empty rows that belong to them."""
+    """Return the times from 0 to the duration, and the empty rows that belong to them."""
     time = np.linspace(0.0, duration, ceil(duration / STEP) + 1)
     return time, np.zeros((time.size, 5))
 
 
 def _turned(speed, angle, value):
-    """Rows of a horizontal wind of some speed, turned by an angle (rad) towards +y."""
+    """Return the rows of a horizontal wind of some speed, turned by an angle (rad) towards +y."""
     value[:, 0] = speed * np.cos(angle)
     value[:, 1] = speed * np.sin(angle)
     return value
 
 
 def operating_gust_speed(speed, turbulence_class, turbine_class, height, diameter):
-    """V_gust (m/s) of the extreme operating gust."""
+    """Return V_gust (m/s) of the extreme operating gust."""
     scale = length_scale(height)
     return min(
         1.35 * (extreme_speed(turbine_class, 1) - speed),
@@ -37,7 +37,7 @@ def operating_gust_speed(speed, turbulence_class, turbine_class, height, diamete
 
 
 def operating_gust(speed, *, turbulence_class, turbine_class, height, diameter):
-    """Extreme operating gust (EOG): dip, rise and dip of the speed within 10.5 s."""
+    """Return the extreme operating gust (EOG): dip, rise and dip of the speed within 10.5 s."""
     duration = 10.5
     time, value = _rows(duration)
     gust = operating_gust_speed(speed, turbulence_class, turbine_class, height, diameter)
@@ -48,13 +48,13 @@ def operating_gust(speed, *, turbulence_class, turbine_class, height, diameter):
 
 
 def direction_change_angle(speed, turbulence_class, height, diameter):
-    """theta_e (rad) of the extreme direction change."""
+    """Return theta_e (rad) of the extreme direction change."""
     scale = length_scale(height)
     return 4.0 * atan(ntm_sigma(speed, turbulence_class) / (speed * (1.0 + 0.1 * diameter / scale)))
 
 
 def direction_change(speed, *, turbulence_class, height, diameter, sign):
-    """Extreme direction change (EDC): the wind turns by theta_e within 6 s and stays."""
+    """Return the extreme direction change (EDC): the wind turns by theta_e within 6 s and stays."""
     duration = 6.0
     time, value = _rows(duration)
     angle = sign * direction_change_angle(speed, turbulence_class, height, diameter)
@@ -62,7 +62,7 @@ def direction_change(speed, *, turbulence_class, height, diameter, sign):
 
 
 def coherent_gust(speed, *, sign):
-    """Coherent gust with direction change (ECD): +15 m/s and a turn within 10 s.
+    """Return the coherent gust with direction change (ECD): +15 m/s and a turn within 10 s.
 
     The turn is 180 deg below 4 m/s, else 720 deg m/s over the hub speed.
     """
@@ -74,13 +74,13 @@ def coherent_gust(speed, *, sign):
 
 
 def wind_shear_amplitude(speed, turbulence_class, height, diameter):
-    """Linear shear (m/s over one rotor diameter) that the extreme wind shear adds, times 1 - cos."""
+    """Return linear shear (m/s over one rotor diameter) that the extreme wind shear adds, times 1 - cos."""
     ratio = diameter / length_scale(height)
     return 2.5 + 0.2 * 6.4 * ntm_sigma(speed, turbulence_class) * ratio**0.25
 
 
 def wind_shear(speed, *, turbulence_class, height, diameter, orientation, sign):
-    """Extreme wind shear (EWS): a linear shear over the rotor that comes and goes in 12 s.
+    """Return the extreme wind shear (EWS): a linear shear over the rotor that comes and goes in 12 s.
 
     orientation: "vertical" (sign +1: stronger above) or "horizontal" (+1: stronger at +y). The value
     is per rotor diameter, so the series' reference_length must be the diameter.

@@ -1,4 +1,4 @@
-"""Sums of complex exponentials over evenly spaced times, and the cubic B-splines that stand for them."""
+"""Sums complex exponentials over evenly spaced times, and fits cubic B-splines to the sums."""
 
 from math import ceil, pi
 from typing import NamedTuple
@@ -11,11 +11,11 @@ from fowt_env.plant.hydro.excitation import COLUMNS, TimeTable
 EVEN = 1e-6  # of a spacing: what frequencies may miss a harmonic by, a phase of 6e-6 rad after one period
 SPLINE_ERROR = 1.3e-3  # of an interpolated exponential, times (omega step)^4: rms over times and phases
 TOLERANCE = 5e-6  # rms error of a table over its standard deviation
-ROUNDED = 1e-4  # of a gap: what figures of files may miss a multiple by
+ROUNDED = 1e-4  # of a gap: what values of files may miss a multiple by
 MOST_HARMONICS = 20_000  # from the lowest to the highest frequency, where they are not that many themselves
 LONG_PERIOD = 3600.0  # s, beyond which a table does not cover a period but the duration
 LONGEST = 1.2  # omega times step of the highest frequency
-MARGIN = 5.0  # s of table beyond the time that was asked for
+MARGIN = 5.0  # s of table beyond the time that was requested
 MOST_ROWS = 2_000_000  # 128 MB
 BLOCK_NUMBERS = 4_000_000  # complex numbers of a block of a direct sum at most: 64 MB
 
@@ -29,25 +29,25 @@ class Harmonics(NamedTuple):
 
     @property
     def period(self):
-        """s after which the differences of the frequencies repeat."""
+        """Return the time (s) after which the differences of the frequencies repeat."""
         return 2.0 * pi / self.spacing
 
     @property
     def periodic(self):
-        """Whether the frequencies themselves are multiples of the spacing."""
+        """Return whether the frequencies themselves are multiples of the spacing."""
         ratio = self.start / self.spacing
         return abs(ratio - round(ratio)) < EVEN
 
 
 def harmonics_of(omega):
-    """Harmonics of frequencies (n,) rad/s in any order, or None where they are not evenly spaced."""
+    """Return harmonics of frequencies (n,) rad/s in any order, or None where they are not evenly spaced."""
     start = float(omega.min())
     gaps = np.diff(np.unique(omega))
     spacing = _common_part(gaps[gaps > EVEN * start], start)
     if float(omega.max()) - start > max(MOST_HARMONICS, 2 * omega.size) * spacing:
         return None
     index = np.round((omega - start) / spacing)
-    if index.any():  # one gap carries the rounding of two figures; all of them together carry less
+    if index.any():  # one gap carries the rounding of two values; all of them together carry less
         spacing = float((omega - start) @ index / (index @ index))
     if np.abs((omega - start) / spacing - index).max() > EVEN:
         return None
@@ -55,7 +55,7 @@ def harmonics_of(omega):
 
 
 def _common_part(gaps, without):
-    """What gaps (n,) are multiples of, by Euclid's rule with room for rounded figures; of none `without`."""
+    """Return the common divisor of gaps (n,) by Euclid's rule with tolerance; `without` if there are none."""
     if gaps.size == 0:
         return without
     common = float(gaps.min())
@@ -81,7 +81,7 @@ def step_for(omega, coefficient):
 
 
 def table_of(omega, coefficient, duration):
-    """TimeTable of Re(sum of coefficient (n, m) exp(i omega t)), m up to COLUMNS.
+    """Return the TimeTable of Re(sum of coefficient (n, m) exp(i omega t)), m up to COLUMNS.
 
     It covers a period and repeats where the frequencies are multiples of one; else it covers the duration
     (s) or, of evenly spaced frequencies, the period of their differences if it is somewhat longer.
@@ -107,14 +107,19 @@ def table_of(omega, coefficient, duration):
 
 
 def pack_table(values, step, span, periodic):
-    """TimeTable of B-spline coefficients (rows + 3, m) at times -step, 0, ..."""
+    """Return the TimeTable of B-spline coefficients (rows + 3, m) at times -step, 0, ..."""
     table = np.zeros((values.shape[0], COLUMNS))
     table[:, : values.shape[1]] = values
     return TimeTable(table, float(1.0 / step), float(span), bool(periodic))
 
 
+def constant_table(value):
+    """Return a TimeTable of constant values (m,)."""
+    return pack_table(np.tile(value, (11, 1)), 1.0, 8.0, True)
+
+
 def response_of_spline(omega, step):
-    """What a cubic B-spline makes of exponentials sampled as its coefficients."""
+    """Return the response of a cubic B-spline whose coefficients are samples of exponentials."""
     return (4.0 + 2.0 * np.cos(omega * step)) / 6.0
 
 
@@ -123,7 +128,7 @@ def _prefiltered(omega, coefficient, step):
 
 
 def direct_sum(omega, coefficient, step, rows):
-    """(rows, m) complex sums of coefficient (n, m) exp(i omega t) at t = -step, 0, step, ...
+    """Return (rows, m) complex sums of coefficient (n, m) exp(i omega t) at t = -step, 0, step, ...
 
     exp(i omega (t1 + t2)) is a product, so a block of times takes two short tables of exponentials.
     """

@@ -1,30 +1,25 @@
-"""What a lidar on the nacelle knows of the wind that is on its way to the rotor, with the errors that it has.
+"""Simulates the wind preview of a nacelle lidar with its errors.
 
-The rotor-effective wind is estimated as is usual (Schlipf, "Lidar-Assisted Control Concepts for Wind
+The rotor-effective wind is estimated in the usual way (Schlipf, "Lidar-Assisted Control Concepts for Wind
 Turbines", PhD thesis, Stuttgart 2015; Guo, Schlipf, Cheng, Wind Energ. Sci. 8, 149, 2023): each line-of-sight
-speed is taken for u times the cosine of its beam, the last measurements of all beams and distances are
-averaged, each advanced by the travel of the wind at its mean speed, then filtered, and buffered until the
-wind is due. Errors come from
-- v and w in the line of sight, and from seeing some points of the disc instead of all of it;
-- the average along the beam: Gaussian (pulsed) or Lorentzian (focused continuous wave);
-- wind that evolves on its way: squared coherence exp(-a sqrt((f d/V)^2 + (b d)^2)) of points d apart along
-  the wind, a = 8.4 sigma/V + 0.05 with sigma^2 = sigma_u^2 + sigma_v^2 + sigma_w^2 and b = 0.25 L^-1.24 with
-  L = 8.1 Lambda_1 (m), of large-eddy simulations: Simley and Pao, American Control Conference 2015, Eq. 7.
-  The coherence of two points is the root of this one times the IEC's across the wind (Chen, Guo, Schlipf,
-  Cheng, Wind Energ. Sci. 7, 539, 2022);
-- one beam after another, each held until its next shot, and shots lost to blades that pass in front;
-- the low pass, whose corner is where the transfer function S_RL/S_LL falls below 1 by 3 dB, so that it lets
-  through what rotor and lidar have in common; its delay is that with which it follows the rotor best;
-- the power law, which the points see elsewhere than the rotor.
-The motion of the nacelle along the wind adds to each line of sight at the time of measuring (Motion).
+speed is divided by the cosine of its beam, the last measurements of all beams and distances are averaged,
+each advanced by its travel time at the mean wind, then filtered and buffered. Sources of error:
+- v and w in the line of sight, and the finite number of points in the disc;
+- averaging along the beam: Gaussian (pulsed) or Lorentzian (focused continuous wave);
+- evolution of the wind: squared coherence exp(-a sqrt((f d/V)^2 + (b d)^2)) of points d apart along the
+  wind, a = 8.4 sigma/V + 0.05 with sigma^2 = sigma_u^2 + sigma_v^2 + sigma_w^2, b = 0.25 L^-1.24 and
+  L = 8.1 Lambda_1 (m) (Simley and Pao, American Control Conference 2015, Eq. 7), its root multiplied with the
+  IEC coherence across the wind (Chen, Guo, Schlipf, Cheng, Wind Energ. Sci. 7, 539, 2022);
+- sequential beams, each held until its next shot, and shots blocked by passing blades;
+- the low pass with its corner where the transfer function S_RL/S_LL falls below 1 by 3 dB, and its delay;
+- the power law at the measured points. The motion of the nacelle adds to each line of sight (Motion).
 
-In a rotor-averaged wind the estimate is drawn, given that very wind: with R the rotor's mean and L the
-lidar's, L(f) = (S_RL/S_RR) R(f) + N(f), and N, of spectrum S_LL - |S_RL|^2/S_RR, from a stream of the seed
-of its own. A box of wind is sampled where the beams look, and evolves in addition. Gusts, steps and series of
-the user's are taken to fill the disc and not to evolve.
+In a rotor-averaged wind R the estimate is L(f) = (S_RL/S_RR) R(f) + N(f) with noise N of the spectrum
+S_LL - |S_RL|^2/S_RR from a separate random stream. A box of wind is sampled along the beams and evolves in
+addition. Gusts, steps and user series are uniform over the disc and do not evolve.
 
-Left out: the induction zone, yaw misalignment, tilt of the beams with the platform, its drift and sideways
-motion, noise of the line-of-sight speed (of a shot, which averaging and filtering make small).
+Omitted: induction zone, yaw misalignment, tilt of the beams with the platform, its drift and sideways motion,
+noise of the line-of-sight speed.
 """
 
 from bisect import bisect_left
@@ -53,53 +48,53 @@ from fowt_env.weather.turbulence import (
 from fowt_env.weather.wind import drawn_turbulence
 from fowt_env.weather.wind_field import WindBox
 
-LIDAR_STREAM = 16  # random generator of what rotor and lidar do not share (16), and of held shots (17)
+LIDAR_STREAM = 16  # random generator of the noise N (16), and of held shots (17)
 BEAM_NODES = np.arange(-5.0, 6.0)  # along a beam, in units of z_R or of a quarter of the pulse length
 FREQUENCIES = np.geomspace(1e-4, 5.0, 120)  # Hz
 DISK_NODES = 60  # in each part of a disc seen from a point
-TUNING_CLASS = "B"  # of the normal turbulence model, for which the filter is made whatever the weather
-TUNING_PERIOD = 600.0  # s of wind that the filter is to follow
+TUNING_CLASS = "B"  # turbulence class for which the filter is designed in all weather
+TUNING_PERIOD = 600.0  # s of wind in the design of the filter
 TUNING_HIGHEST = 1.0  # Hz
 MINUS_3_DB = 10.0 ** (-3.0 / 20.0)
-LEADS = np.arange(0.0, 60.0, 0.05)  # s; delays of the filter that are looked through
+LEADS = np.arange(0.0, 60.0, 0.05)  # s; candidate delays of the filter
 SLOWEST = 1.0  # m/s of mean wind
-LEAST_INSIDE = 0.8  # of a lidar's weights that a box of wind must hold
-STEP = 0.1  # s between values, where the wind is no even series
-SETTLING = 300.0  # s beyond the ends of such a wind, after which the filter has forgotten
+LEAST_INSIDE = 0.8  # smallest sum of a lidar's weights inside a box of wind
+STEP = 0.1  # s between values of a wind without even times
+SETTLING = 300.0  # s added at both ends of such a wind for the transients of the filter
 
 
 class Points(NamedTuple):
-    """Where a lidar measures, (n,) each; y and z from the rotor's centre."""
+    """Holds the measured points of a lidar, (n,) each; y and z from the rotor's centre."""
 
     upwind: np.ndarray  # m from the rotor plane
-    late: np.ndarray  # m that the point lies beyond the distance for which it is taken
+    late: np.ndarray  # m behind the nominal distance of the measurement
     y: np.ndarray
     z: np.ndarray
-    weight: np.ndarray  # adding up to 1
-    across: np.ndarray  # v in what the point is taken to be of u
-    up: np.ndarray  # w in it
+    weight: np.ndarray  # sum 1
+    across: np.ndarray  # factor of v in the estimate of u
+    up: np.ndarray  # factor of w in the estimate of u
 
 
 class Shares(NamedTuple):
-    """Shares that the lidar's and the rotor's spectra have in those of a point, at FREQUENCIES."""
+    """Holds spectra of lidar and rotor over those of a point, at FREQUENCIES."""
 
     rotor: np.ndarray  # (m,) S_RR over S_u
-    cross: np.ndarray  # (m,) complex S_RL over S_u, the lidar's wind taken for due at the rotor
+    cross: np.ndarray  # (m,) complex S_RL over S_u, with the lidar's wind advanced to the rotor
     own: np.ndarray  # (3, m) of S_u, S_v, S_w in S_LL
 
 
 class Tuning(NamedTuple):
-    """The filter of a lidar in a mean wind."""
+    """Holds the filter of a lidar in a mean wind."""
 
-    first: int  # index of the nearest distance in use; those beyond are in use too
+    first: int  # index of the nearest used distance; all farther distances are used too
     corner: float  # rad/s; inf: none
-    lead: float  # s by which sampling and low pass are late
-    horizon: float  # s ahead of which it knows at most
-    error: float  # m/s, standard deviation that is expected of the difference to the rotor's wind
+    lead: float  # s, delay of sampling and low pass
+    horizon: float  # s, longest preview time
+    error: float  # m/s, expected standard deviation of the difference from the rotor's wind
 
 
 def directions(lidar):
-    """(slope y, slope z) (n,) of each beam over its distance along the wind."""
+    """Return (slope y, slope z) (n,) of each beam over its distance along the wind."""
     if lidar.beams is not None:
         angle = 2.0 * np.pi * np.arange(lidar.beams) / lidar.beams
         slope = np.tan(np.radians(lidar.half_angle))
@@ -109,7 +104,7 @@ def directions(lidar):
 
 
 def beam_weights(lidar, length):
-    """(offset, weight) (k,) along a beam about its range (m): what a measurement averages."""
+    """Return (offset m, weight) (k,) of the average along a beam about its range (m)."""
     if lidar.pulse_length is not None:
         offset = 0.25 * lidar.pulse_length * BEAM_NODES
         weight = np.exp(-4.0 * np.log(2.0) * (offset / lidar.pulse_length) ** 2)
@@ -124,9 +119,8 @@ def beam_weights(lidar, length):
 
 @cached(64)
 def points(lidar, first=0):
-    """Points of a lidar that uses its distances from an index on."""
-    found = []
-    behind = lidar.behind_rotor or 0.0
+    """Return the Points of a lidar that uses its distances from the index `first` onwards."""
+    parts = []
     distances = lidar.distances[first:]
     slopes = np.stack(directions(lidar), axis=1)
     for slope_y, slope_z in slopes:
@@ -134,43 +128,36 @@ def points(lidar, first=0):
         for distance in distances:
             offset, weight = beam_weights(lidar, distance * stretch)
             along = distance + offset / stretch
-            one = np.ones(along.size)
-            found.append(
-                [
-                    along - behind,
-                    along - distance,
-                    slope_y * along,
-                    slope_z * along + lidar.above_shaft,
-                    weight / (len(slopes) * len(distances)),
-                    -slope_y * one,
-                    -slope_z * one,
-                ]
-            )
-    return Points(*np.concatenate(found, axis=1))
+            place = (slope_y * along, slope_z * along + lidar.above_shaft)
+            weight = weight / (len(slopes) * len(distances))
+            cross = np.outer([-slope_y, -slope_z], np.ones(along.size))
+            upwind = along - (lidar.behind_rotor or 0.0)
+            parts.append([upwind, along - distance, *place, weight, *cross])
+    return Points(*np.concatenate(parts, axis=1))
 
 
 def evolution(speed, sigma, height):
-    """(a, b in 1/m) of the coherence along the wind, Simley and Pao (2015); sigma: of u at a point, m/s."""
+    """Return (a, b in 1/m) of the coherence along the wind (Simley and Pao 2015); sigma of u, m/s."""
     total = sigma * np.sqrt((SIGMA_RATIO**2).sum())
     return 8.4 * total / speed + 0.05, 0.25 * (LENGTH_RATIO[0] * length_scale(height)) ** -1.24
 
 
 def _along(frequency, distance, speed, a, b):
-    """(m, n) root coherence of points some distances (n,) m apart along the wind, at frequencies (m,) Hz."""
+    """Return the root coherence (m, n) at frequencies (m,) Hz of points (n,) m apart along the wind."""
     return np.exp(-0.5 * a * np.hypot(np.multiply.outer(frequency / speed, distance), b * distance))
 
 
 @cached(1)
 def _nodes():
-    """(node, weight) of Gauss's quadrature from 0 to 1."""
+    """Return (node, weight) of Gauss quadrature from 0 to 1."""
     node, weight = np.polynomial.legendre.leggauss(DISK_NODES)
     return 0.5 * (node + 1.0), 0.5 * weight
 
 
 def disk_coherence(k, distance, radius):
-    """(m,) mean over a disc of exp(-k r), r from a point at a distance (m) from its centre; k (m,) 1/m.
+    """Return the mean (m,) of exp(-k r) over a disc, r from a point at a distance from its centre.
 
-    Rings about the point: whole ones, and arcs where they leave the disc; radius 0: the disc is its centre.
+    k (m,) 1/m, lengths in m. The quadrature uses rings about the point; radius 0: the centre alone.
     """
     if radius == 0.0:
         return np.exp(-k * distance)
@@ -184,15 +171,14 @@ def disk_coherence(k, distance, radius):
         span = radius + distance - edge
         r = edge + 0.5 * span * (1.0 - np.cos(np.pi * node))
         arc = np.arccos(np.clip((r**2 + distance**2 - radius**2) / (2.0 * r * distance), -1.0, 1.0))
-        total += np.exp(-np.outer(k, r)) @ (
-            2.0 * arc * r * 0.5 * np.pi * np.sin(np.pi * node) * span * weight
-        )
+        ring = 2.0 * arc * r * 0.5 * np.pi * np.sin(np.pi * node) * span * weight
+        total += np.exp(-np.outer(k, r)) @ ring
     return total / (np.pi * radius**2)
 
 
 @cached(64)
 def _pairs(lidar, first):
-    """(distance across, along, late, weight (3, n)) of pairs of points, those alike to 1 mm together.
+    """Return (distance across, along, late, weight (3, n)) of pairs of points, merged if equal to 1 mm.
 
     late: difference of Points.late, m. weight: of S_u, S_v, S_w in the lidar's spectrum.
     """
@@ -211,9 +197,9 @@ def _pairs(lidar, first):
 
 @cached(64)
 def shares(lidar, first, speed, sigma, height, radius, evolves=True):
-    """Shares of a lidar that uses its distances from an index on; sigma: of u at a point, m/s.
+    """Return the Shares of a lidar that uses its distances from `first` onwards; sigma of u at a point, m/s.
 
-    radius: of the rotor, m; 0: the wind over the rotor is that of its centre.
+    radius: of the rotor, m; 0: the wind of the centre fills the disc.
     """
     f, p = FREQUENCIES, points(lidar, first)
     k, omega = coherence_wave_number(f, speed, height), 2.0 * np.pi * f
@@ -224,16 +210,15 @@ def shares(lidar, first, speed, sigma, height, radius, evolves=True):
     turned = np.exp(1j * np.outer(omega, p.late / speed))
     cross = ((disc[which].T * turned * _along(f, p.upwind, speed, a, b)) * p.weight).sum(axis=1)
     across, along, late, weight = _pairs(lidar, first)
-    pair = (
-        np.exp(-np.outer(k, across)) * _along(f, along, speed, a, b) * np.cos(np.outer(omega, late / speed))
-    )
+    pair = np.exp(-np.outer(k, across)) * _along(f, along, speed, a, b)
+    pair = pair * np.cos(np.outer(omega, late / speed))
     own = np.array([pair @ row for row in weight])
     rotor = disk_average(k * radius) if radius > 0.0 else np.ones(f.size)
     return Shares(rotor, cross, own)
 
 
 def at_frequencies(values, frequency):
-    """Values (..., m) of Shares at frequencies (n,) Hz, linear over their logarithm, the ends held."""
+    """Interpolate values (..., m) of Shares at frequencies (n,) Hz, linearly in their logarithm."""
     place = np.interp(np.log(frequency), np.log(FREQUENCIES), np.arange(FREQUENCIES.size))
     low = np.minimum(place.astype(int), FREQUENCIES.size - 2)
     part = place - low
@@ -241,28 +226,25 @@ def at_frequencies(values, frequency):
 
 
 def lidar_spectra(lidar, frequency, speed, sigma, height, radius, first=0, evolves=True):
-    """(S_RR, complex S_RL, S_LL) in m^2/s^2/Hz at frequencies (n,) Hz of rotor's mean and lidar's estimate.
+    """Return spectra (S_RR, complex S_RL, S_LL), m^2/s^2/Hz, of rotor mean and lidar at frequencies (n,) Hz.
 
-    Before sampling and low pass; the lidar's wind is taken for due at the rotor. Arguments as in shares.
+    The estimate is unfiltered and advanced to the rotor. Arguments as in shares.
     """
-    found = shares(lidar, first, speed, sigma, height, radius, evolves)
+    ratios, scale = zip(SIGMA_RATIO, LENGTH_RATIO, strict=True), length_scale(height)
+    point = np.array([kaimal_spectrum(frequency, speed, r * sigma, length * scale) for r, length in ratios])
+    return _times(shares(lidar, first, speed, sigma, height, radius, evolves), frequency, point)
+
+
+def _times(found, frequency, point):
+    """Return (S_RR, S_RL, S_LL) of Shares at frequencies (n,) with spectra or variances (3, n) of a point."""
     rotor, cross, own = (at_frequencies(values, frequency) for values in found)
-    point = _point_spectra(frequency, speed, sigma, height)
     return rotor * point[0], cross * point[0], (own * point).sum(axis=0)
 
 
-def _point_spectra(frequency, speed, sigma, height):
-    """(3, n) spectra of u, v and w at a point, m^2/s^2/Hz."""
-    ratios = zip(SIGMA_RATIO, LENGTH_RATIO, strict=True)
-    lengths = ((ratio * sigma, scale * length_scale(height)) for ratio, scale in ratios)
-    return np.array([kaimal_spectrum(frequency, speed, deviation, length) for deviation, length in lengths])
-
-
 def blocked_share(lidar, rotor, blade):
-    """Share of shots that passing blades take away, mean over the beams.
+    """Return the fraction of shots that passing blades block, averaged over the beams.
 
-    That of the azimuths at which a blade lies in front of the beam, flat in the rotor plane and as wide as
-    its chord where the beam crosses the plane.
+    A blade blocks the azimuths of its chord at the radius where the beam crosses the rotor plane.
     """
     if lidar.behind_rotor is None:
         return 0.0
@@ -274,9 +256,9 @@ def blocked_share(lidar, rotor, blade):
 
 
 def sampling(lidar, blocked, frequency):
-    """(n,) complex gain of shots that are held for a scan, or for more where the next ones are lost.
+    """Return the complex gain (n,) of shots held for one scan, or longer if the next shots are blocked.
 
-    A beam whose shots are lost with a probability holds a value for a geometric number of scans.
+    A beam with randomly blocked shots holds a value for a geometric number of scans.
     """
     turn = 2.0 * np.pi * frequency * lidar.scan_period
     held = np.sinc(frequency * lidar.scan_period) * np.exp(-0.5j * turn)
@@ -284,24 +266,23 @@ def sampling(lidar, blocked, frequency):
 
 
 def low_pass(frequency, corner):
-    """(n,) complex gain of a first-order low pass of a corner (rad/s)."""
+    """Return the complex gain (n,) of a first-order low pass with a corner (rad/s)."""
     return 1.0 / (1.0 + 2j * np.pi * frequency / corner)
 
 
 @cached(256)
 def tuning(lidar, first, speed, height, radius, blocked):
-    """Tuning of a lidar that uses its distances from an index on, for turbulence of class B.
+    """Return the Tuning of a lidar that uses its distances from `first` onwards, for turbulence of class B.
 
-    blocked: share of shots lost. radius as in shares.
+    blocked: fraction of blocked shots. radius as in shares.
     """
     frequency = np.arange(1, int(TUNING_HIGHEST * TUNING_PERIOD)) / TUNING_PERIOD
     sigma = ntm_sigma(speed, TUNING_CLASS)
-    found = shares(lidar, first, speed, sigma, height, radius)
-    rotor, cross, own = (at_frequencies(values, frequency) for values in found)
     samples = int(round(TUNING_PERIOD / STEP))
     point = amplitudes(speed, sigma, height, 2.0 * radius, samples, STEP, "point")
     variance = 0.5 * point[:3, 1 : frequency.size + 1] ** 2
-    rotor, cross, own = rotor * variance[0], cross * variance[0], (own * variance).sum(axis=0)
+    found = shares(lidar, first, speed, sigma, height, radius)
+    rotor, cross, own = _times(found, frequency, variance)
     gain = np.abs(cross) / own
     below = np.flatnonzero(gain < MINUS_3_DB)
     corner = np.inf
@@ -320,9 +301,9 @@ def tuning(lidar, first, speed, height, radius, blocked):
 
 
 def held_noise(lidar, blocked, frequency, variance):
-    """(n,) variance in bins at frequencies k/period of what sampling folds: as much as it takes away.
+    """Return the aliased variance (n,) in bins at frequencies k/period, as much as sampling removes.
 
-    Spread as that of independent values, each held for a geometric number of scans.
+    Its spectrum is that of independent values, each held for a geometric number of scans.
     """
     if lidar.scan_period == 0.0:
         return np.zeros(frequency.size)
@@ -332,7 +313,7 @@ def held_noise(lidar, blocked, frequency, variance):
 
 
 def lidar_horizon(scene, preset="four_beam_pulsed"):
-    """Longest time (s) ahead that a lidar knows the wind of a scene: that of its farthest distance.
+    """Return the longest preview time (s) of a lidar in a scene, that of its farthest distance.
 
     preset: as in lidar_preview. Raises: InputError for a scene without wind.
     """
@@ -341,11 +322,10 @@ def lidar_horizon(scene, preset="four_beam_pulsed"):
 
 
 def lidar_tuning(scene, preset="four_beam_pulsed", ahead=0.0):
-    """Tuning of a lidar in the mean wind of a scene that knows the wind some time (s) ahead.
+    """Return the Tuning of a lidar in the mean wind of a scene for a preview time `ahead` (s).
 
-    It uses all distances from which the wind is still far enough after the filter. preset: as in
-    lidar_preview.
-    Raises: InputError where it does not know the wind that far ahead, and for a scene without wind.
+    It uses all distances with a sufficient preview time after the filter. preset: as in lidar_preview.
+    Raises: InputError for a longer time than that of the farthest distance, and for a scene without wind.
     """
     lidar, place = _placed(scene, preset)
     last = len(lidar.distances) - 1
@@ -360,7 +340,7 @@ def lidar_tuning(scene, preset="four_beam_pulsed", ahead=0.0):
 
 
 def _placed(scene, preset):
-    """(Lidar, arguments of tuning behind it and first) of a lidar in a scene. Raises: InputError."""
+    """Return (Lidar, further arguments of tuning) of a lidar in a scene. Raises: InputError."""
     lidar = read_lidar(preset)
     if scene.model.aero is None:
         raise InputError(f"lidar {lidar.name!r}: needs a scene with wind to look ahead")
@@ -378,38 +358,34 @@ def _placed(scene, preset):
 
 
 def mean_speed(scene):
-    """Mean wind (m/s) with which gusts travel to the rotor."""
+    """Return the mean wind (m/s) that convects gusts to the rotor."""
     return float(scene.wind.speed if isinstance(scene.wind, WindBox) else scene.wind_speed)
 
 
 def _radius(scene):
-    """Radius (m) over which the wind of the rotor is averaged; 0 where a point's wind fills the disc."""
+    """Return the radius (m) of the rotor average; 0 if the wind of a point fills the disc."""
     drawn = _drawn(scene)
     return 0.0 if drawn is not None and drawn["average"] == "point" else scene.turbine.rotor.tip_radius
 
 
 def _drawn(scene):
-    """Arguments of turbulence() of a scene, None where its wind is not drawn from spectra."""
+    """Return the arguments of turbulence() of a scene, None for a wind that is not drawn from spectra."""
     if isinstance(scene.wind, WindBox):
         return None
-    return drawn_turbulence(
-        scene.wind,
-        reference_height=scene.turbine.rotor.hub_height,
-        rotor_diameter=2.0 * scene.turbine.rotor.tip_radius,
-        seed=scene.seed,
-        duration=scene.options["duration"],
-    )
+    rotor, duration = scene.turbine.rotor, scene.options["duration"]
+    place = {"reference_height": rotor.hub_height, "rotor_diameter": 2.0 * rotor.tip_radius}
+    return drawn_turbulence(scene.wind, **place, seed=scene.seed, duration=duration)
 
 
 def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
-    """Preview of the rotor-averaged wind at times (k,) s ahead, as a lidar on the nacelle estimates it.
+    """Return the Preview of the rotor-averaged wind at times (k,) s ahead, as a nacelle lidar estimates it.
 
     preset  name of a built-in lidar (descriptions.lidar.lidars), a path to a TOML file with its keys, or a
             Lidar
-    seed    of what rotor and lidar do not share; None: that of the scene
-    All times are served by one filter, made for the last of them, and one buffer.
-    Raises: InputError for times that do not increase from 0 to 600 s or go beyond what the lidar knows, with
-    its horizon in this wind and what was asked, and for a scene without wind.
+    seed    of the noise of the lidar; None: that of the scene
+    One filter, designed for the last time, and one buffer serve all times.
+    Raises: InputError for times that do not increase from 0 to 600 s or exceed the lidar's horizon in this
+    wind, and for a scene without wind.
     """
     times = check_times(times)
     lidar, (speed, _, _, blocked) = _placed(scene, preset)
@@ -420,11 +396,11 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
     elif _drawn(scene) is not None:
         start, seen, period = _in_turbulence(scene, lidar, tuned, seed)
     else:
-        start, seen, period = _as_given(scene, lidar, tuned)
+        start, seen, period = _uniform(scene, lidar, tuned)
         seed = None
     value = _filtered(start, seen, period, lidar, blocked, tuned, seed)
     distances = np.array(lidar.distances[tuned.first :])
-    scans = 0.5 + blocked / (1.0 - blocked)  # that a value is old when it is used, on average
+    scans = 0.5 + blocked / (1.0 - blocked)  # mean age of a value
     motion = Motion(
         tuned.corner,
         (distances - distances[0]) / speed + scans * lidar.scan_period,
@@ -435,7 +411,7 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
 
 
 def _profile_factor(scene, lidar, tuned):
-    """Factor on the rotor's series, which is without the power law, for what of this the lidar sees more."""
+    """Return the factor on the rotor's series for the power law at the measured points."""
     series, p = scene.model.aero.wind, points(lidar, tuned.first)
     height = np.maximum(series.reference_height + p.z, LOWEST_HEIGHT)
     seen = p.weight @ (height / series.reference_height) ** series.shear_exponent
@@ -443,17 +419,16 @@ def _profile_factor(scene, lidar, tuned):
 
 
 def _in_turbulence(scene, lidar, tuned, seed):
-    """(time, wind, period) that the lidar sees of a wind drawn from spectra, due at the rotor; unfiltered."""
+    """Return the unfiltered (time, wind, period) of the lidar at the rotor, of a wind drawn from spectra."""
     start, wind, period = rotor_wind_series(scene)
     drawn, count = _drawn(scene), wind.size - 1
-    radius = _radius(scene)
     frequency = np.arange(1, count // 2 + 1) / period
     place = (drawn["speed"], drawn["sigma"], drawn["height"])
-    found = shares(lidar, tuned.first, *place, radius)
+    found = shares(lidar, tuned.first, *place, _radius(scene))
     rotor, cross, own = (at_frequencies(values, frequency) for values in found)
     point = amplitudes(*place, 2.0 * scene.turbine.rotor.tip_radius, count, period / count, "point")[:3, 1:]
     variance = 0.5 * point**2
-    # never below 0 but for rounding: no signal shares more with another than it has
+    # negative only by rounding: the coherence is at most 1
     rest = np.maximum((own * variance).sum(axis=0) - np.abs(cross) ** 2 / rotor * variance[0], 0.0)
     spectrum = np.fft.rfft(wind[:-1])
     spectrum[0] *= _profile_factor(scene, lidar, tuned)
@@ -462,16 +437,16 @@ def _in_turbulence(scene, lidar, tuned, seed):
 
 
 def _noise(variance, count, seed, stream):
-    """(n,) complex Gaussian Fourier sums, of a series of count values, of a variance in each bin."""
+    """Return complex Gaussian Fourier sums (n,) of a series of `count` values with a variance in each bin."""
     drawn = component_generator(seed, stream).normal(size=(2, variance.size))
     return 0.5 * count * np.sqrt(variance) * (drawn[0] + 1j * drawn[1])
 
 
 def _in_box(scene, lidar, tuned, seed):
-    """(time, wind, period) that the lidar sees of a box of wind, due at the rotor; unfiltered.
+    """Return the unfiltered (time, wind, period) of the lidar at the rotor, of a box of wind.
 
-    Beams leave a box of little more than the rotor with their far ends; what lies within the grid counts.
-    Raises: InputError where that is too little.
+    Points outside the grid are omitted, as the far ends of beams in a narrow box.
+    Raises: InputError if too few points remain.
     """
     box, p = scene.wind, points(lidar, tuned.first)
     hub, speed = scene.turbine.rotor.hub_height, box.speed
@@ -491,12 +466,8 @@ def _in_box(scene, lidar, tuned, seed):
     count, radius = seen.size, scene.turbine.rotor.tip_radius
     frequency = np.arange(1, count // 2 + 1) / (count * box.dt)
     sigma = ntm_sigma(speed, TUNING_CLASS)
-    evolved, frozen = (
-        at_frequencies(
-            np.abs(shares(lidar, tuned.first, speed, sigma, hub, radius, evolves).cross), frequency
-        )
-        for evolves in (True, False)
-    )
+    found = (shares(lidar, tuned.first, speed, sigma, hub, radius, evolves) for evolves in (True, False))
+    evolved, frozen = (at_frequencies(np.abs(each.cross), frequency) for each in found)
     kept = np.where(frozen > 1e-12, evolved / np.maximum(frozen, 1e-12), 0.0)
     spectrum = np.fft.rfft(seen)
     variance = 2.0 * np.abs(spectrum[1:] / count) ** 2
@@ -507,7 +478,7 @@ def _in_box(scene, lidar, tuned, seed):
 
 @kernel
 def _look(field, late, y, z, weight, across, up, seen):
-    """Fill seen (n_time,) with what a lidar takes for u at the rotor, from points of a box (see Points)."""
+    """Fill seen (n_time,) with the lidar's estimate of u at the rotor, from points of a box (see Points)."""
     for i in range(seen.shape[0]):
         t = i / field.rate - field.shift
         for n in range(y.shape[0]):
@@ -515,8 +486,8 @@ def _look(field, late, y, z, weight, across, up, seen):
             seen[i] += weight[n] * (u + across[n] * v + up[n] * w)
 
 
-def _as_given(scene, lidar, tuned):
-    """(time, wind, period) that the lidar sees of a wind that fills the disc, at even times; unfiltered."""
+def _uniform(scene, lidar, tuned):
+    """Return the unfiltered (time, wind, period) of the lidar at even times, of a uniform wind."""
     start, wind, period = rotor_wind_series(scene)
     span = max(start[-1] - start[0], STEP) if period is None else period
     count = int(np.ceil(span / STEP - 1e-9))
@@ -525,9 +496,9 @@ def _as_given(scene, lidar, tuned):
 
 
 def _filtered(time, value, period, lidar, blocked, tuned, seed):
-    """(n,) wind at even times (n,) s as the lidar gives it: sampled, held, low-passed, all without delay.
+    """Return the wind (n,) at even times (n,) s after sampling and low pass, with their delay removed.
 
-    seed: of what sampling folds into it; None: nothing. The ends of a wind without a period are held.
+    seed: of the aliased noise; None: no noise. A wind without a period is extended by its end values.
     """
     count, step = value.size, time[1] - time[0] if time.size > 1 else STEP
     folded = np.zeros(count)

@@ -1,8 +1,4 @@
-"""The wind that is still on its way to the rotor, as a controller with a preview may see it.
-
-What a preview holds is the wind alone, as series over the run, so that a controller that declares some
-look-ahead times can be given these and nothing else of the future.
-"""
+"""Prepares the wind preview of a controller: series of the wind some times ahead, over the run."""
 
 from typing import NamedTuple
 
@@ -17,28 +13,28 @@ SAME_INSTANT = 1e-9  # s within which two instants are one
 
 
 class Motion(NamedTuple):
-    """How the fore-aft velocity of the nacelle, positive downwind, gets into the preview of a lidar on it.
+    """Defines the effect of the fore-aft nacelle velocity, positive downwind, on a lidar's preview.
 
-    With y the velocity behind a first-order low pass of the corner, dy/dt = corner (velocity - y),
-    z(t) = sum of weight_k y(t - offset_k), and the value j of the preview is changed by -z(t - delay_j).
+    With y the low-passed velocity, dy/dt = corner (velocity - y), and z(t) = sum of weight_k y(t - offset_k),
+    the value j of the preview changes by -z(t - delay_j).
     """
 
     corner: float  # rad/s; inf: no low pass
     offset: np.ndarray  # (k,) s
-    weight: np.ndarray  # (k,) adding up to 1
+    weight: np.ndarray  # (k,) with sum 1
     delay: np.ndarray  # (len(times),) s
 
 
 class Preview(NamedTuple):
-    """Wind along x over the rotor some times ahead, as it is known: values[j] of t + times[j] at time t."""
+    """Holds the rotor wind along x some times ahead: values[j] at time t is that of t + times[j]."""
 
-    time: np.ndarray  # (n,) s, increasing; the ends are held
+    time: np.ndarray  # (n,) s, increasing; constant beyond the ends
     values: np.ndarray  # (len(times), n) m/s
-    motion: Motion | None = None  # what the nacelle's own motion adds to it; None: nothing
+    motion: Motion | None = None  # effect of the nacelle's motion; None: none
 
 
 def check_times(times):
-    """(k,) look-ahead times (s), increasing, from 0 to LONGEST. Raises: InputError."""
+    """Check look-ahead times (s), increasing from 0 to LONGEST; return them (k,). Raises: InputError."""
     if isinstance(times, (str, bytes)) or not np.iterable(times):
         raise InputError(f"preview_times = {times!r}: must be a list of times in s")
     times = tuple(times)
@@ -51,7 +47,7 @@ def check_times(times):
 
 
 def rotor_wind_series(scene):
-    """(time s, wind m/s, period s or None): wind along x averaged over the rotor, as the scene has it.
+    """Return (time s, wind m/s, period s or None) of a scene's wind along x averaged over the rotor.
 
     Raises: InputError for a scene without wind.
     """
@@ -66,23 +62,23 @@ def rotor_wind_series(scene):
 
 
 def exact_preview(scene, times):
-    """Preview of the rotor-averaged wind at times (k,) s ahead, without error: the most that can be known.
+    """Return the exact Preview of the rotor-averaged wind at times (k,) s ahead.
 
-    Linear between the samples of the scene's wind, whatever the times ahead; random wind repeats with its
-    period, and of other wind the last value holds, as in the plant.
+    Linear between the samples of the scene's wind; random wind repeats with its period, other wind keeps its
+    last value, as in the plant.
     Raises: InputError for times that do not increase from 0 to 600 s, or a scene without wind.
     """
     return series_ahead(scene, *rotor_wind_series(scene), check_times(times))
 
 
 def series_ahead(scene, start, speed, period, times):
-    """Preview of a speed (n,) m/s at times start (n,) s that repeats with a period (s), or holds its ends."""
+    """Return the Preview of a speed (n,) m/s at times start (n,) s, periodic (s) or extended by its ends."""
     end = max(scene.options["duration"], start[-1])
     knots = start
     if period is not None:
         first, last = np.floor(-start[0] / period), np.ceil((end + LONGEST) / period)
         knots = (start + period * np.arange(first, last + 1.0)[:, None]).ravel()
-    # every instant at which one of the values bends
+    # every instant at which the slope of a value changes
     time = np.concatenate([[0.0, end], *(knots - ahead for ahead in times)])
     time = np.sort(time[(time >= 0.0) & (time <= end)])
     time = time[np.concatenate([[True], np.diff(time) > SAME_INSTANT])]
@@ -91,10 +87,10 @@ def series_ahead(scene, start, speed, period, times):
 
 
 def add_motion(preview, time, velocity):
-    """(len(times), n) values of a preview at times (n,) s, with what the nacelle's velocity (n,) m/s changes.
+    """Return the values (len(times), n) of a preview at even times (n,) s with a nacelle velocity (n,).
 
-    The reference of what a run does step by step. The velocity, positive downwind, is linear between the
-    times, which are even; before the first it stood at its first value.
+    Reference for the step-by-step evaluation in a run. The velocity, positive downwind, is linear between the
+    times and constant before the first.
     """
     values = np.array([np.interp(time, preview.time, value) for value in preview.values])
     if preview.motion is None:
@@ -106,7 +102,7 @@ def add_motion(preview, time, velocity):
 
 
 def low_passed(value, step):
-    """(n,) a series, linear between its samples, behind a first-order low pass that starts settled.
+    """Filter a series (n,), linear between its samples, by a first-order low pass that starts settled.
 
     step: time between samples times the corner, rad.
     """

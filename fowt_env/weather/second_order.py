@@ -1,13 +1,13 @@
-"""Difference-frequency wave forces of a sea on a potential-flow body, from its quadratic transfer function.
+"""Computes difference-frequency wave forces on a potential-flow body from its quadratic transfer function.
 
-The force is F(t) = Re sum_i sum_j a_i a_j* Q(w_i, w_j) exp(i (w_i - w_j) t) over all pairs, Q interpolated
-bilinearly between the pairs of the file. With the hat functions u_p of its frequencies that is a
-quadratic form at each time, Re sum_p sum_q Q_pq A_p(t) A_q*(t) with A_p(t) = sum_i a_i u_p(w_i) exp(i w_i t),
-which takes a transform per frequency of the file instead of a loop over pairs of components.
+The double sum (A42) of theory.md, with Q interpolated bilinearly, is evaluated as the quadratic form (A43) of
+sums A_p(t), which needs a transform per frequency of the file instead of a loop over pairs of components.
 """
 
 import warnings
+from collections.abc import Callable
 from math import ceil, pi
+from typing import NamedTuple
 
 import numpy as np
 from scipy.fft import ifft, irfft, next_fast_len, rfft
@@ -18,6 +18,7 @@ from fowt_env.plant.hydro.excitation import SecondOrder
 from fowt_env.weather.harmonics import (
     MARGIN,
     MOST_ROWS,
+    constant_table,
     direct_sum,
     harmonics_of,
     pack_table,
@@ -26,20 +27,20 @@ from fowt_env.weather.harmonics import (
 )
 
 METHODS = ("mean_drift", "newman", "full")
-QUIET = 1e-2  # share of the sea's energy beyond the QTF's frequencies that is passed over
+QUIET = 1e-2  # fraction of the sea's energy beyond the QTF's frequencies that is passed over
 SAME_HEADING = 1e-4  # rad
 EDGE = 24  # rows beyond both ends of a table whose spline is fitted: an end's influence falls by 3.7 per row
 SAMPLES = 12  # per shortest period of a difference, of a sea whose frequencies are not evenly spaced
 
 
 def build_second_order(body, waves, method, *, duration, cutoff=None):
-    """SecondOrder of a PotentialFlow with a QTF, in Waves, by one of METHODS; None for None or "none".
+    """Return SecondOrder of a PotentialFlow with a QTF, in Waves, by one of METHODS; None for None or "none".
 
     mean_drift  the mean force alone
     newman      the diagonal of the QTF alone: |sum a_i sqrt(Q_ii) exp(i w_i t)|^2 of the positive Q_ii, less
                 the same of the negative ones
     full        all pairs
-    cutoff      rad/s: forces of differences above it are left out; None: of none
+    cutoff      rad/s: forces of differences above it are omitted; None: of none
 
     Raises: InputError for a sea whose headings or pairs of frequencies the QTF lacks.
     """
@@ -49,15 +50,13 @@ def build_second_order(body, waves, method, *, duration, cutoff=None):
     ramp = float(waves.ramp)
     used = _inside(qtf, waves)
     if not waves.amplitude[used].any():
-        flat = pack_table(np.zeros((11, 6)), 1.0, 8.0, True)
-        return SecondOrder(flat, np.zeros(6), ramp)
+        return SecondOrder(constant_table(np.zeros(6)), np.zeros(6), ramp)
     wave = waves.amplitude[used] * np.exp(-1j * waves.phase[used])
     omega = waves.omega[used]
     groups = _heading_groups(qtf, np.arctan2(waves.sin_heading, waves.cos_heading)[used])
     mean = _mean(qtf, omega, wave, groups)
     if method == "mean_drift":
-        flat = pack_table(np.tile(mean, (11, 1)), 1.0, 8.0, True)
-        return SecondOrder(flat, mean, ramp)
+        return SecondOrder(constant_table(mean), mean, ramp)
     form = (_full if method == "full" else _newman)(qtf, omega, wave, groups)
     found = harmonics_of(omega)
     if found is None:
@@ -66,7 +65,7 @@ def build_second_order(body, waves, method, *, duration, cutoff=None):
 
 
 def _inside(qtf, waves):
-    """Components (n,) that the QTF covers. Warns: PlantWarning where the others have some energy."""
+    """Return components (n,) that the QTF covers. Warns: PlantWarning where the others have some energy."""
     low, high = qtf.omega[0] * (1.0 - 1e-6), qtf.omega[-1] * (1.0 + 1e-6)
     used = (waves.omega >= low) & (waves.omega <= high)
     energy = waves.amplitude**2
@@ -82,29 +81,24 @@ def _inside(qtf, waves):
 
 
 def _heading_groups(qtf, heading):
-    """[(components, {other group: row of the QTF, whether turned around})] for each heading of the sea."""
+    """Return [(components, {other group: row of the QTF, whether exchanged})] for each heading of the sea."""
     values = []
     for angle in heading:
         if not any(_same(angle, other) for other in values):
             values.append(angle)
     groups = []
     for angle in values:
-        pairs = {}
-        for other, second in enumerate(values):
-            pairs[other] = _pair(qtf, angle, second)
-        own = np.array([_same(angle, one) for one in heading])
-        groups.append((np.flatnonzero(own), pairs))
+        pairs = {other: _pair(qtf, angle, second) for other, second in enumerate(values)}
+        groups.append((np.flatnonzero([_same(angle, one) for one in heading]), pairs))
     return groups
 
 
 def _pair(qtf, first, second):
-    """(row of the QTF, whether its two waves are exchanged) for a pair of headings."""
-    for row, (one, other) in enumerate(qtf.heading):
-        if _same(first, one) and _same(second, other):
-            return row, False
-    for row, (one, other) in enumerate(qtf.heading):
-        if _same(first, other) and _same(second, one):
-            return row, True
+    """Return (row of the QTF, whether its two waves are exchanged) for a pair of headings."""
+    for turned, wanted in ((False, (first, second)), (True, (second, first))):
+        for row, pair in enumerate(qtf.heading):
+            if all(map(_same, wanted, pair)):
+                return row, turned
     known = ", ".join(f"({one:g}, {other:g})" for one, other in np.degrees(qtf.heading)[:12])
     raise InputError(
         f"sea: the difference-frequency QTF has no pair of headings ({np.degrees(first):.4g},"
@@ -117,7 +111,7 @@ def _same(a, b):
 
 
 def _table(qtf, row, turned):
-    """(k, k, 6) of a pair of headings. What the file leaves out is the conjugate of the exchanged pair."""
+    """Return Q (k, k, 6) of a pair of headings; missing values are conjugates of the exchanged pair."""
     value = qtf.value[row]
     if turned:
         return np.conj(value.transpose(1, 0, 2))
@@ -128,7 +122,7 @@ def _table(qtf, row, turned):
 
 
 def _hats(qtf, omega):
-    """(low, share): the file's frequency below each of omega (n,), and the share of the next one."""
+    """Return (low, share): the file's frequency below each of omega (n,), and the share of the next one."""
     if qtf.omega.size == 1:
         return np.zeros(omega.size, dtype=int), np.zeros(omega.size)
     low = np.clip(np.searchsorted(qtf.omega, omega, side="right") - 1, 0, qtf.omega.size - 2)
@@ -137,7 +131,7 @@ def _hats(qtf, omega):
 
 
 def _diagonal(qtf, omega, row):
-    """(n, 6) real Q(w, w) of one heading; linear along the diagonal where the file has nothing beside it."""
+    """Return the real Q(w, w) (n, 6) of a heading; linear along the diagonal without neighbouring values."""
     table = _table(qtf, row, False)
     low, share = _hats(qtf, omega)
     high, share = np.minimum(low + 1, qtf.omega.size - 1), share[:, None]
@@ -151,23 +145,22 @@ def _diagonal(qtf, omega, row):
 
 
 def _mean(qtf, omega, wave, groups):
-    """(6,) mean force: of each component with itself."""
+    """Return (6,) mean force: of each component with itself."""
     total = np.zeros(6)
     for number, (own, pairs) in enumerate(groups):
         total += np.abs(wave[own]) ** 2 @ _diagonal(qtf, omega[own], pairs[number][0])
     return total
 
 
-class _Form:
-    """Forces from sums of components: coefficient (n, m), whose sums at some times make the forces."""
+class _Form(NamedTuple):
+    """Computes forces from sums of components."""
 
-    def __init__(self, coefficient, force):
-        self.coefficient = coefficient
-        self.force = force  # (rows, m) complex sums -> (rows, 6)
+    coefficient: np.ndarray  # (n, m) of the components
+    force: Callable  # (rows, m) complex sums -> (rows, 6)
 
 
 def _newman(qtf, omega, wave, groups):
-    """_Form of Newman's approximation: |positive|^2 - |negative|^2 of each force and heading."""
+    """Return _Form of Newman's approximation: |positive|^2 - |negative|^2 of each force and heading."""
     columns = np.zeros((omega.size, 2, 6, len(groups)), dtype=complex)
     for number, (own, pairs) in enumerate(groups):
         diagonal = _diagonal(qtf, omega[own], pairs[number][0])
@@ -183,7 +176,7 @@ def _newman(qtf, omega, wave, groups):
 
 
 def _full(qtf, omega, wave, groups):
-    """_Form of the full QTF: hat functions of its frequencies for each heading."""
+    """Return _Form of the full QTF: hat functions of its frequencies for each heading."""
     low, share = _hats(qtf, omega)
     high = np.minimum(low + 1, qtf.omega.size - 1)
     nodes = np.unique(np.concatenate([low, high[share > 0.0]]))
@@ -215,7 +208,7 @@ def _full(qtf, omega, wave, groups):
 
 
 def _even_table(found, form, cutoff):
-    """TimeTable of a sea of Harmonics: it repeats with the period of the differences."""
+    """Return the TimeTable of a sea of Harmonics: it repeats with the period of the differences."""
     highest = int(found.index.max())
     size = next_fast_len(2 * highest + 2)
     spectrum = np.zeros((size, form.coefficient.shape[1]), dtype=complex)
@@ -236,7 +229,7 @@ def _even_table(found, form, cutoff):
 
 
 def _uneven_table(omega, form, duration, cutoff):
-    """TimeTable of a sea whose frequencies are not evenly spaced, over the duration."""
+    """Return the TimeTable of a sea whose frequencies are not evenly spaced, over the duration."""
     spread = float(np.ptp(omega))
     if cutoff is not None and cutoff < spread:
         raise InputError(

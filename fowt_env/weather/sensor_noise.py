@@ -1,4 +1,4 @@
-"""Sensors of one run: a chain's figures at its control period, and its noise, drawn beforehand."""
+"""Sensors of one run: a chain's values at its control period, and its noise, drawn beforehand."""
 
 from math import exp
 
@@ -12,7 +12,7 @@ NOISE_STREAM, BLADE_NOISE_STREAM = 3, 4  # of a run's seed: apart from that of i
 
 
 def draw_noise(std: np.ndarray, seed: int, readings: int) -> np.ndarray:
-    """(readings, n) white noise of standard deviations (n,), by the weather's seed.
+    """Return (readings, n) white noise of standard deviations (n,), by the weather's seed.
 
     A longer run goes on from a shorter one's. Fields of BladeMeasurement, which follow those of Measurement,
     have a stream of their own, so that the noise of the others is the same with and without them.
@@ -29,9 +29,9 @@ def draw_noise(std: np.ndarray, seed: int, readings: int) -> np.ndarray:
 def draw_sensors(
     chain: SensorChain | None, control_dt: float, seed: int, readings: int, individual: bool = False
 ) -> Sensors:
-    """Sensors of a run with so many readings, one per control period (s); None: exact ones.
+    """Return the sensors of a run with so many readings, one per control period (s); None: exact ones.
 
-    individual: whether the scene's blades have pitches of their own, with a BladeMeasurement to read. A delay
+    individual: whether the scene's blades have individual pitch, with a BladeMeasurement to read. A delay
     counts as the nearest whole number of control periods. Fields that the chain does not have are left as
     they are measured: it is for the caller to hide them.
     """

@@ -12,7 +12,7 @@ HEAD = struct.Struct("<h4i12fi")  # kind; counts; spacings, hub and scales; leng
 
 
 def read_bts(path):
-    """(velocity, y, z, dt, speed, periodic) of a TurbSim file.
+    """Return (velocity, y, z, dt, speed, periodic) of a TurbSim file.
 
     velocity (n_time, n_z, n_y, 3) float32 m/s; y, z (m); dt (s); speed: mean wind at the hub (m/s); periodic:
     whether the file says so. Memory: at most some ten times the size of the file.
@@ -47,7 +47,7 @@ def read_bts(path):
 
 
 def _check_head(path, where):
-    """Raises: InputError where the head of a TurbSim file is not that of a file of its size.
+    """Raises: InputError if the head of a TurbSim file is not that of a file of its size.
 
     The reader believes the counts that it finds, and takes the memory and the time that they ask for.
     """

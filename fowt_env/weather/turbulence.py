@@ -1,29 +1,22 @@
-"""Turbulent wind of IEC 61400-1 (Kaimal spectrum, exponential coherence) as seen by a whole rotor.
+"""Generates turbulent wind of IEC 61400-1 (Kaimal spectrum, exponential coherence) averaged over the rotor.
 
-A hub-point series blown uniformly over the disk overstates what a rotor feels: gusts smaller than
-the rotor cancel. So each series is averaged over the disk, exactly in the second moments: the point
-spectrum times the average of the coherence over all pairs of points of the disk. The gradients of u
-over the disk (which turn the rotor plane) follow in the same way, from pairs weighted with their
-positions.
+A hub-point series applied to the whole disk overestimates the turbulence of a rotor, because gusts smaller
+than the rotor cancel. The point spectrum is therefore multiplied with the coherence averaged over all pairs
+of points of the disk, (A22) of theory.md; gradients of u follow from pairs weighted with their positions.
+The coherence exp(-k r), k = 12 sqrt((f/V)^2 + (0.12/Lc)^2), Lc = 8.1 Lambda_1 (Annex B), makes the averages
+functions of k R alone: one table serves every rotor, wind speed and frequency.
 
-Coherence depends on distance r and frequency f only through k r, with
-    k = 12 sqrt((f/V)^2 + (0.12/Lc)^2),   coherence = exp(-k r),   Lc = 8.1 Lambda_1   (Annex B)
-so the averages are functions of k R alone: one table serves every rotor, wind speed and frequency.
-
-Assumptions, stated because the standard leaves them open:
-- Area weighting, which needs no blade data. At a given rotor speed thrust and torque respond to u
-  nearly in proportion to chord x radius per radius, i.e. to the chord per area, which favours the
-  inner disk: weighted so, the wind over the NREL 5 MW in a TurbSim box (18 m/s, class B) deviates 2 to
-  3 % more than with area weights.
-- The rotor-averaged wind is the mean over azimuth and radius: the multiples of the blade-passing
-  frequency, which a blade meets by slicing through gusts, are not in it.
-- v and w get the coherence of u (the standard gives none for them), and are independent of u.
-- The amplitudes follow the spectrum exactly and only the phases are random: the point series has the
-  standard deviation sigma_1 over its period. sigma_1 itself is the standard's 90 % quantile in every
-  seed, or drawn from its distribution (drawn_ntm_sigma).
+Assumptions that the standard does not specify:
+- Area weighting. With weights chord x radius, to which thrust and torque respond at constant rotor speed, the
+  wind over the NREL 5 MW in a TurbSim box (18 m/s, class B) deviates 2 to 3 % more.
+- The mean over azimuth and radius has no multiples of the blade-passing frequency.
+- v and w have the coherence of u, and are independent of u.
+- Only the phases are random: the point series has the standard deviation sigma_1 over its period. sigma_1 is
+  the standard's 90 % quantile in every seed, or drawn from its distribution (drawn_ntm_sigma).
 """
 
 import numpy as np
+from scipy.fft import next_fast_len
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.iec import length_scale, ntm_sigma_at
@@ -43,7 +36,7 @@ PAIR_NODES = 200  # quadrature over pair distances, quadratically denser towards
 
 @cached(1)
 def _pair_tables():
-    """Logarithms of k R, of the mean coherence of pairs, and of its gradient moment; (n,) each.
+    """Return the logarithms of k R, of the mean coherence of pairs, and of its gradient moment; (n,) each.
 
     With two points of the disk at distance d = 2 R cos(h), their midpoint lies in the overlap of two
     disks, i.e. two circular segments of half-angle h; area and second moments are elementary. That
@@ -68,22 +61,22 @@ def _pair_tables():
 
 
 def disk_average(kr):
-    """Variance of the disk average of u over the point variance, for k R = kr (any shape)."""
+    """Return the variance of the disk average of u over the point variance, for k R = kr (any shape)."""
     log_kr, mean, _ = _pair_tables()
     return np.exp(np.interp(np.log(kr), log_kr, mean))
 
 
 def disk_gradient(kr):
-    """Variance of R times the fitted gradient of u over the disk over the point variance, for k R = kr.
+    """Return the variance of R times the gradient of u over the point variance, for k R = kr.
 
-    The gradient along one axis of the plane that fits u best over the disk (area weighting).
+    The gradient is that along one axis of the plane fitted to u over the disk (area weighting).
     """
     log_kr, _, gradient = _pair_tables()
     return np.exp(np.interp(np.log(kr), log_kr, gradient))
 
 
 def centre_average(kr):
-    """Mean coherence of the disc's centre with its points, for k R = kr > 0 (any shape)."""
+    """Return the mean coherence of the disc's centre with its points, for k R = kr > 0 (any shape)."""
     kr = np.asarray(kr, dtype=np.float64)
     series = 1.0 - kr * (2.0 / 3.0 - 0.25 * kr)  # where the difference below loses its digits
     exact = -2.0 * (np.expm1(-kr) + kr * np.exp(-kr)) / kr**2
@@ -91,24 +84,24 @@ def centre_average(kr):
 
 
 def coherence_wave_number(frequency, speed, height):
-    """k (1/m) of the coherence exp(-k r) at frequencies (Hz)."""
+    """Return k (1/m) of the coherence exp(-k r) at frequencies (Hz)."""
     coherence_length = LENGTH_RATIO[0] * length_scale(height)
     return COHERENCE_DECAY * np.hypot(frequency / speed, COHERENCE_OFFSET / coherence_length)
 
 
 def kaimal_spectrum(frequency, speed, sigma, length):
-    """One-sided spectrum (m^2/s^2/Hz) with variance sigma^2 and scale L (m), IEC Annex B."""
+    """Return the one-sided spectrum (m^2/s^2/Hz) with variance sigma^2 and scale L (m), IEC Annex B."""
     return sigma**2 * 4.0 * length / speed / (1.0 + 6.0 * frequency * length / speed) ** (5.0 / 3.0)
 
 
 def _kaimal_below(frequency, speed, length):
-    """Share of the Kaimal variance below a frequency (the integral of kaimal_spectrum)."""
+    """Return the fraction of the Kaimal variance below a frequency (the integral of kaimal_spectrum)."""
     return 1.0 - (1.0 + 6.0 * frequency * length / speed) ** (-2.0 / 3.0)
 
 
 @cached(64)
 def amplitudes(speed, sigma, height, diameter, samples, step, average):
-    """Amplitudes (m/s) of u, v, w, vertical_shear, horizontal_shear at k/(samples step); (5, m).
+    """Return the amplitudes (m/s) of u, v, w, vertical_shear, horizontal_shear at k/(samples step); (5, m).
 
     The shears are per rotor diameter. average: "rotor", or "point" for the hub point without shears.
     The frequency bins carry the exact integral of the spectrum, scaled so that the point's standard
@@ -134,20 +127,12 @@ def amplitudes(speed, sigma, height, diameter, samples, step, average):
 
 
 def fft_length(minimum):
-    """Smallest even length with no prime factor above 5 that is at least the minimum."""
-    length = 2 * ((minimum + 1) // 2)
-    while True:
-        rest = length
-        for prime in (2, 3, 5):
-            while rest % prime == 0:
-                rest //= prime
-        if rest == 1:
-            return length
-        length += 2
+    """Return the smallest even length with no prime factor above 5 that is at least the minimum."""
+    return 2 * next_fast_len((minimum + 1) // 2, real=True)
 
 
 def component_generator(seed, component):
-    """Random generator of one wind component, so that leaving one out does not change the others.
+    """Return the random generator of one wind component, so that leaving one out does not change the others.
 
     seed: non-negative int or SeedSequence (which is left as it is).
     """
@@ -158,7 +143,7 @@ def component_generator(seed, component):
 
 
 def drawn_ntm_sigma(speed, turbulence_class, seed):
-    """sigma_1 (m/s) of the normal turbulence model, drawn from its log-normal distribution.
+    """Return sigma_1 (m/s) of the normal turbulence model, drawn from its log-normal distribution.
 
     A seed draws one number, its place in the distribution, from a stream of its own (SIGMA_STREAM), so that
     the phases of a seed are those that it has without. sigma_1 follows from that place and the mean wind:
@@ -170,10 +155,10 @@ def drawn_ntm_sigma(speed, turbulence_class, seed):
 def turbulence(
     speed, sigma, *, height, diameter, period, seed, average="rotor", shear_turbulence=True, step=STEP
 ):
-    """(period, value): one period of turbulence about a mean of zero, (n + 1, 5), last row = first row.
+    """Return (period, value (n + 1, 5)) of one period of turbulence with zero mean; last row = first row.
 
     Columns as in WindSeries, the shears per rotor diameter; sigma is the standard deviation (m/s) of
-    u at a point. The period returned is the one asked for (s), rounded up to a length that transforms
+    u at a point. The returned period is the one requested (s), rounded up to a length that transforms
     quickly. The phases belong to the frequencies k/period, so another period gives another wind.
     """
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
@@ -186,10 +171,10 @@ def turbulence(
 
 
 def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
-    """(period, value): turbulence at the hub, (n + 1, 3), in the wind whose disc average is turbulence(...).
+    """Return (period, value (n + 1, 3)) of turbulence at the hub, with the disc average turbulence(...).
 
-    Arguments as there. u, v and w of a point have the whole Kaimal spectrum. Each is the part that goes with
-    the disc average, by the mean coherence of the centre with the disc, and a rest that is independent of it.
+    u, v and w have the complete Kaimal spectrum: a part correlated with the disc average, by the mean
+    coherence of the centre with the disc, and an independent rest. Arguments as turbulence.
     """
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
     point = amplitudes(speed, sigma, height, diameter, samples, step, "point")[:3]
@@ -205,12 +190,12 @@ def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
 
 
 def _phasor(seed, component, count):
-    """(count,) complex numbers of size 1 and random phase."""
+    """Return (count,) complex numbers of size 1 and random phase."""
     return np.exp(1j * component_generator(seed, component).uniform(0.0, 2.0 * np.pi, count))
 
 
 def _one_period(spectrum, samples, columns):
-    """(samples + 1, columns) series of spectra (rows, m), zero in further columns, last row = first row."""
+    """Return series (samples + 1, columns) of spectra (rows, m), zero in other columns; last row = first."""
     value = np.zeros((samples + 1, columns))
     value[:-1, : len(spectrum)] = np.fft.irfft(spectrum, samples, axis=1).T
     value[-1] = value[0]

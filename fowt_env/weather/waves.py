@@ -1,7 +1,7 @@
-"""The waves of a scene as a sum of components, and the spectra that they are drawn from.
+"""Builds the waves of a scene as a sum of components, from spectra and random phases.
 
-Everything random happens here, before stepping. A component travels towards its heading:
-phase P = k (X cos b + Y sin b) - omega t + e, elevation a cos P (theory.md, 5.4).
+A component propagates towards its heading: phase P = k (X cos b + Y sin b) - omega t + e, elevation a cos P
+(theory.md, 5.4).
 """
 
 from math import pi
@@ -17,7 +17,7 @@ MOST_COMPONENTS = 1_000_000  # of a sea drawn without a number of them: more tak
 
 
 def wave_number(omega, depth, gravity):
-    """k of omega^2 = g k tanh(k depth), (n,), to machine precision."""
+    """Return k of omega^2 = g k tanh(k depth), (n,), to machine precision."""
     omega = np.asarray(omega, dtype=np.float64)
     deep = omega**2 / gravity
     # Guo's explicit start is within 1 %; Newton on the log-free form then converges in 3-4 steps
@@ -33,7 +33,7 @@ def wave_number(omega, depth, gravity):
 
 
 def jonswap(omega, significant_height, peak_period, gamma):
-    """One-sided JONSWAP spectrum S(omega), m2 s/rad (gamma = 1: Pierson-Moskowitz); theory.md, 5.4."""
+    """Return one-sided JONSWAP spectrum S(omega), m2 s/rad (gamma = 1: Pierson-Moskowitz); theory.md, 5.4."""
     omega = np.asarray(omega, dtype=np.float64)
     peak = 2.0 * pi / peak_period
     sigma = np.where(omega <= peak, 0.07, 0.09)
@@ -52,7 +52,7 @@ def jonswap(omega, significant_height, peak_period, gamma):
 
 
 def build_waves(sea, *, depth, density, gravity, seed, duration, components=None):
-    """Waves part of a descriptions.platform.SeaState, or None for still water (exactly no waves).
+    """Return the waves part of a descriptions.platform.SeaState, or None for still water (exactly no waves).
 
     components: number of components of a spectrum; default one per harmonic of 1/duration, so that
     the record does not repeat within it, over the band that holds 99.8 % of the energy (at least 200).
@@ -82,19 +82,19 @@ def build_waves(sea, *, depth, density, gravity, seed, duration, components=None
 
 
 def flat_waves(*, depth, density, gravity):
-    """Waves part of one component without height: still water in a scene whose kernels sum waves."""
+    """Return waves part of one component without height: still water in a scene whose kernels sum waves."""
     omega, none = np.array([2.0 * pi / FLAT_PERIOD]), np.zeros(1)
     k = wave_number(omega, depth, gravity)
     return _pack(omega, k, none, none, none, depth, density, 0.0, False)
 
 
 def is_flat(waves):
-    """Whether a Waves part, or None, is still water."""
+    """Return whether a Waves part, or None, is still water."""
     return waves is None or not waves.amplitude.any()
 
 
 def _pack(omega, k, amplitude, phase, heading, depth, density, ramp, random):
-    """Waves from plain arrays, shortest wave last so that loops may stop early."""
+    """Return the waves from plain arrays, shortest wave last so that loops may stop early."""
     order = np.argsort(k, kind="stable")
     velocity = amplitude * omega / -np.expm1(-2.0 * k * depth)
     arrays = (omega, k, amplitude, phase, np.cos(heading), np.sin(heading), velocity)
@@ -103,7 +103,7 @@ def _pack(omega, k, amplitude, phase, heading, depth, density, ramp, random):
 
 
 def _spectral_components(significant_height, peak_period, gamma, duration, components):
-    """(omega, amplitude) of a spectrum, renormalised so that 4 sqrt(m0) = Hs.
+    """Return (omega, amplitude) of a spectrum, renormalised so that 4 sqrt(m0) = Hs.
 
     Band 0.5 to 5 peak frequencies: outside it 0.1 % (gamma 3.3) to 0.2 % (gamma 1) of the variance lies,
     which the renormalisation returns.

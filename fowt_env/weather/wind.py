@@ -1,9 +1,8 @@
-"""The wind of a scene: a time series at the reference height, built of what a user asks for.
+"""Builds the wind of a scene from a user's specification: a time series at the reference height.
 
-The series is uniform over the rotor apart from the power law and two linear shears; a box of full-field
-wind (wind_field.py) takes its place where a scene has one. Frame: inertial,
-x downwind, y left when looking downwind, z up (state.py). What users may ask for is in
-descriptions/wind.py; plant/aero/wind.py has the wind at any instant and point.
+The series is uniform over the rotor apart from the power law and two linear shears; a box of full-field wind
+(wind_field.py) replaces it. Frame: inertial, x downwind, y left when looking downwind, z up (state.py).
+Specifications are defined in descriptions/wind.py; plant/aero/wind.py evaluates the wind.
 """
 
 import operator
@@ -35,7 +34,7 @@ def rotor_factor(exponent, height, diameter):
 
 
 def make_series(time, value, *, reference_height, reference_length, shear_exponent, period=0.0):
-    """WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
+    """Return the WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
     time, value = _kernel_array(time), _kernel_array(value)
     inverse_step = 0.0
     if time.size > 1:
@@ -43,32 +42,24 @@ def make_series(time, value, *, reference_height, reference_length, shear_expone
         # every sample on its grid line, so that the index cannot be off by more than rounding
         if np.abs(time - time[0] - step * np.arange(time.size)).max() <= 1e-6 * step:
             inverse_step = 1.0 / step
-    return WindSeries(
-        time,
-        value,
-        float(inverse_step),
-        float(period),
-        float(shear_exponent),
-        float(reference_height),
-        float(reference_length),
-        rotor_factor(float(shear_exponent), float(reference_height), float(reference_length)),
-    )
+    place = tuple(map(float, (shear_exponent, reference_height, reference_length)))
+    return WindSeries(time, value, float(inverse_step), float(period), *place, rotor_factor(*place))
 
 
 def _kernel_array(values):
-    """The values as float64 of the one type that kernels are compiled for: C-contiguous and writeable."""
+    """Return values as float64 of the one type that kernels are compiled for: C-contiguous and writeable."""
     return np.require(values, np.float64, "CAW")
 
 
 def _of_kernel_types(series):
-    """A user's WindSeries with the types of every other one; itself where it has them."""
+    """Return a user's WindSeries with the types of every other one; unchanged if it has them."""
     time, value, *numbers = series
     typed = WindSeries(_kernel_array(time), _kernel_array(value), *map(float, numbers))
     return series if all(map(operator.is_, typed, series)) else typed
 
 
 def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, duration):
-    """WindSeries of what a user asked for, None for no aerodynamics at all.
+    """Return the WindSeries of what a user requested, None for no aerodynamics at all.
 
     spec               None; a speed in m/s (0: still air); a dictionary with "kind", or the WindSpec that
                        read_wind made of one (kinds and keys: descriptions.wind.KINDS); a WindSeries, which is
@@ -92,7 +83,9 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
         exponent = EXTREME_SHEAR_EXPONENT if spec.kind == "ewm" else site
     period = 0.0
     if spec.kind in GUSTS:
-        length, value = GUSTS[spec.kind](spec, height, diameter)
+        gust, keys = GUSTS[spec.kind]
+        known = {**spec.values, "height": height, "diameter": diameter}
+        length, value = gust(spec["speed"], **{key: known[SPELT.get(key, key)] for key in keys})
         time = spec["start"] + np.linspace(0.0, length, len(value))
     elif _is_turbulent(spec):
         period, value = _turbulent(spec, height, diameter, seed, duration)
@@ -105,14 +98,8 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
         time, value = np.zeros(1), np.zeros((1, 5))
         _blow(value, nominal_speed(spec), radians(spec["direction"]))
         value[:, 2] = spec.values.get("vertical", 0.0)
-    return make_series(
-        time,
-        value,
-        reference_height=height,
-        reference_length=diameter,
-        shear_exponent=exponent,
-        period=period,
-    )
+    place = {"reference_height": height, "reference_length": diameter, "shear_exponent": exponent}
+    return make_series(time, value, **place, period=period)
 
 
 @cached(8)
@@ -122,7 +109,7 @@ def _even_times(period, samples):
 
 
 def nominal_speed(spec):
-    """Horizontal hub speed (m/s) that the episode starts from, for trim; spec as in build_wind.
+    """Return the horizontal hub speed (m/s) that the episode starts from, for trim; spec as in build_wind.
 
     The nominal speed of steady, turbulent and gusty wind, the first of steps; of a series the mean
     over its first 60 s, since a platform does not follow the single first sample. None gives 0.
@@ -143,7 +130,7 @@ def nominal_speed(spec):
 
 
 def mean_wind(series):
-    """Constant WindSeries that the episode starts from, for trim: the mean of a repeating series over
+    """Return constant WindSeries that the episode starts from, for trim: the mean of a repeating series over
     its period, of another over its first 60 s (before its first sample that one holds). None: None."""
     if series is None:
         return None
@@ -155,7 +142,7 @@ def mean_wind(series):
 
 
 def _opening_mean(time, value, length=OPENING):
-    """Mean of the piecewise linear value over [0, length], its ends held; exact."""
+    """Return the mean of the piecewise linear value over [0, length], constant beyond its ends; exact."""
     inside = time[(time > 0.0) & (time < length)]
     nodes = np.concatenate(([0.0], inside, [length]))
     return float(np.trapezoid(np.interp(nodes, time, value), nodes) / length)
@@ -168,14 +155,14 @@ def _blow(value, speed, direction):
 
 
 def _given(spec):
-    """Samples of the user's own series."""
+    """Return the samples of a user's series."""
     columns = [spec[key] for key in ("speed", "v", "w", "vertical_shear", "horizontal_shear")]
     zero = np.zeros(spec["time"].size)
     return spec["time"], np.stack([zero if column is None else column for column in columns], axis=1)
 
 
 def _stepped(spec):
-    """Samples of a staircase: each speed lasts `every`, then ramps to the next; the last holds."""
+    """Return the samples of a staircase: each speed lasts `every`, then ramps to the next; the last holds."""
     speeds = spec["speeds"]
     edges = spec["every"] * np.arange(1, speeds.size)
     time = np.concatenate(([0.0], np.stack([edges, edges + spec["ramp"]], axis=1).ravel()))
@@ -185,12 +172,12 @@ def _stepped(spec):
 
 
 def _is_turbulent(spec):
-    """True where the spec needs random numbers."""
+    """Return whether the spec needs random numbers."""
     return spec.kind in ("ntm", "etm") or (spec.kind == "ewm" and spec["turbulent"])
 
 
 def _turbulent(spec, height, diameter, seed, duration):
-    """(period, value) of one period of turbulence about its mean speed and direction."""
+    """Return (period, value) of one period of turbulence about its mean speed and direction."""
     drawn = _drawn(spec, height, diameter, seed, duration)
     period, value = turbulence(**drawn, average=spec["average"], shear_turbulence=spec["shear_turbulence"])
     value[:, 0] += drawn["speed"]
@@ -204,7 +191,7 @@ def _turbulent(spec, height, diameter, seed, duration):
 
 
 def _drawn(spec, height, diameter, seed, duration):
-    """Arguments of turbulence(): speed, sigma, height, diameter, period, seed. Raises: InputError."""
+    """Return arguments of turbulence(): speed, sigma, height, diameter, period, seed. Raises: InputError."""
     speed = nominal_speed(spec)
     duration = Number(0.0, 1e5, "s").read("duration", duration)
     period = spec["period"]
@@ -236,7 +223,7 @@ def _turn(value, direction):
 
 
 def drawn_turbulence(spec, *, reference_height, rotor_diameter, seed, duration):
-    """Arguments of turbulence() for a wind that build_wind draws from spectra, with its "average"; else None.
+    """Return the arguments of turbulence() and "average" for a wind drawn from spectra; None for others.
 
     Arguments as in build_wind.
     """
@@ -249,42 +236,26 @@ def drawn_turbulence(spec, *, reference_height, rotor_diameter, seed, duration):
     return drawn | {"average": spec["average"]}
 
 
-def hub_series(spec, *, reference_height, rotor_diameter, seed, duration):
-    """(time, value (n, 3)) of u, v, w at the hub over one period, where build_wind gives a rotor average.
+def hub_series(spec, **arguments):
+    """Return (time, value (n, 3)) of u, v, w at the hub over one period of a rotor-averaged wind.
 
-    Arguments as in build_wind. None for every other wind, which is a point's already.
+    Arguments as in build_wind. None for other winds, which are those of a point.
     """
-    if spec is None or isinstance(spec, WindSeries):
+    drawn = drawn_turbulence(spec, **arguments)
+    if drawn is None or drawn.pop("average") != "rotor":
         return None
-    spec = read_wind(spec)
-    if not _is_turbulent(spec) or spec["average"] != "rotor":
-        return None
-    drawn = _drawn(spec, float(reference_height), float(rotor_diameter), seed, duration)
     period, value = hub_turbulence(**drawn)
     value[:, 0] += drawn["speed"]
-    if spec["direction"] != 0.0:
-        _turn(value, radians(spec["direction"]))
+    if (direction := read_wind(spec)["direction"]) != 0.0:
+        _turn(value, radians(direction))
     return _even_times(period, len(value)), value
 
 
-GUSTS = {
-    "eog": lambda spec, height, diameter: gusts.operating_gust(
-        spec["speed"],
-        turbulence_class=spec["class"],
-        turbine_class=spec["turbine_class"],
-        height=height,
-        diameter=diameter,
-    ),
-    "edc": lambda spec, height, diameter: gusts.direction_change(
-        spec["speed"], turbulence_class=spec["class"], height=height, diameter=diameter, sign=spec["sign"]
-    ),
-    "ecd": lambda spec, height, diameter: gusts.coherent_gust(spec["speed"], sign=spec["sign"]),
-    "ews": lambda spec, height, diameter: gusts.wind_shear(
-        spec["speed"],
-        turbulence_class=spec["class"],
-        height=height,
-        diameter=diameter,
-        orientation=spec["orientation"],
-        sign=spec["sign"],
-    ),
+_CLASS, _PLACE = "turbulence_class", ("height", "diameter")
+SPELT = {_CLASS: "class"}  # key of a specification of an argument
+GUSTS = {  # kind: (function of the speed, its further arguments)
+    "eog": (gusts.operating_gust, (_CLASS, "turbine_class", *_PLACE)),
+    "edc": (gusts.direction_change, (_CLASS, *_PLACE, "sign")),
+    "ecd": (gusts.coherent_gust, ("sign",)),
+    "ews": (gusts.wind_shear, (_CLASS, *_PLACE, "orientation", "sign")),
 }

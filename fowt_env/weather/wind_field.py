@@ -1,12 +1,10 @@
-"""Boxes of full-field wind: read, generated, and checked against the rotor.
+"""Reads and generates boxes of full-field wind, and checks them against the rotor.
 
-u(X, Y, Z, t) = box(t + shift - X/U, Y, Z), trilinear in time and both coordinates, sampled wherever a blade
-station or the tower is. The shift is InflowWind's: half the grid width over the mean wind, so that the
-wind upstream by half a width is known at the start. Outside the grid: below it the wind falls linearly to
-zero at the still-water level, as in InflowWind without tower points; beside and above it the edge's wind
-holds (read_box refuses grids that do not hold the rotor).
-
-Sources of boxes: TurbSim files (turbsim.py), the user's arrays, Mann turbulence (hipersim).
+u(X, Y, Z, t) = box(t + shift - X/U, Y, Z), trilinear in time and both coordinates, sampled at every blade
+station and at the tower. As in InflowWind the shift is half the grid width over the mean wind, so that the
+wind upstream by half a width is known at the start, and below the grid the wind decreases linearly to zero
+at the still-water level; beside and above the grid it is that of the edge (read_box rejects grids smaller
+than the rotor). Sources of boxes: TurbSim files (turbsim.py), user arrays, Mann turbulence (hipersim).
 """
 
 from dataclasses import dataclass
@@ -28,7 +26,7 @@ PROFILE_STEP = 1.0  # m of height between the points of a steady profile
 
 
 def is_field(spec):
-    """Whether a wind specification asks for a box of full-field wind."""
+    """Return whether a wind specification asks for a box of full-field wind."""
     spec = wind_of(spec)
     kind = spec.get("kind") if isinstance(spec, dict) else None
     return isinstance(spec, WindBox) or (isinstance(kind, str) and kind in FIELD_KINDS)
@@ -52,35 +50,27 @@ class WindBox:
 
     @property
     def usable(self):
-        """Seconds of a run that the box covers, drift of MARGIN metres included; inf if it repeats."""
+        """Return seconds of a run that the box covers, drift of MARGIN metres included; inf if it repeats."""
         if self.periodic:
             return float("inf")
         return (self.velocity.shape[0] - 1) * self.dt - self.shift - MARGIN / self.speed
 
     def at(self, time, X, Y, Z):
-        """(n, 3) m/s at times (n,) and points, for tables and tests; one call of field_at each."""
+        """Return (n, 3) m/s at times (n,) and points, for tables and tests; one call of field_at each."""
         field = self.field()
         points = np.broadcast_arrays(*(np.atleast_1d(np.asarray(p, dtype=float)) for p in (time, X, Y, Z)))
         return np.array([field_at(*point, field) for point in zip(*points, strict=True)])
 
     def field(self):
-        """WindField of the box."""
+        """Return the WindField of the box."""
         dy, dz = self.y[1] - self.y[0], self.z[1] - self.z[0]
-        return WindField(
-            np.require(self.velocity, np.float32, "CAW"),  # the one type that kernels are compiled for
-            float(1.0 / self.dt),
-            float(self.shift),
-            float(1.0 / self.speed),
-            float(self.y[0]),
-            float(self.z[0]),
-            float(1.0 / dy),
-            float(1.0 / dz),
-            bool(self.periodic),
-        )
+        numbers = (1.0 / self.dt, self.shift, 1.0 / self.speed, self.y[0], self.z[0], 1.0 / dy, 1.0 / dz)
+        velocity = np.require(self.velocity, np.float32, "CAW")  # the one type that kernels are compiled for
+        return WindField(velocity, *map(float, numbers), bool(self.periodic))
 
 
 def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, duration=600.0):
-    """WindBox of a specification with "kind" bts, box or mann (or of a WindBox: itself).
+    """Return the WindBox of a specification with "kind" bts, box or mann (or of a WindBox: itself).
 
     bts   path; periodic (None: as the file says); shift (s, None: half the grid width over the mean wind)
     box   u (n_time, n_z, n_y) m/s, optionally v and w; y, z (m); dt (s); speed (m/s)
@@ -102,7 +92,7 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
 
 
 def _values(spec):
-    """Checked values of every key of a specification."""
+    """Return the checked values of every key of a specification."""
     kind = spec["kind"]
     keys = FIELD_KINDS[kind]
     for key in spec:
@@ -118,7 +108,7 @@ def _values(spec):
 
 
 def _even(name, line):
-    """A grid line as float64, evenly increasing. Raises: InputError."""
+    """Return a grid line as float64, evenly increasing. Raises: InputError."""
     steps = np.diff(line)
     if line.size < 2 or not steps.min() > 0.0 or np.ptp(steps) > 1e-3 * steps.mean():
         raise InputError(f"wind.{name}: must be at least 2 evenly increasing numbers (m)")
@@ -136,10 +126,13 @@ def _from_arrays(values, hub_height, rotor_diameter, shear_exponent, seed, durat
             if values[key].shape != u.shape:
                 raise InputError(f"wind.{key} has shape {values[key].shape}: must be that of u, {u.shape}")
             velocity[..., index] = values[key]
-    shift = values["shift"]
-    if shift is None:
-        shift = 0.5 * (y[-1] - y[0]) / values["speed"]
-    return WindBox(velocity, y, z, values["dt"], values["speed"], values["periodic"], float(shift))
+    return _box(velocity, y, z, values["dt"], values["speed"], values["periodic"], values["shift"])
+
+
+def _box(velocity, y, z, dt, speed, periodic, shift=None):
+    """Return a WindBox; a shift of None is half the grid width over the mean wind."""
+    shift = 0.5 * (y[-1] - y[0]) / speed if shift is None else float(shift)
+    return WindBox(velocity, y, z, dt, speed, periodic, float(shift))
 
 
 def _from_bts(values, *_):
@@ -147,16 +140,8 @@ def _from_bts(values, *_):
     y, z = _even("y", y), _even("z", z)
     for key, value in (("dt", dt), ("speed", speed)):
         FIELD_KINDS["box"][key][0].read(f"wind.path = {str(values['path'])!r}: {key}", value)
-    shift, periodic = values["shift"], values["periodic"]
-    return WindBox(
-        velocity,
-        y,
-        z,
-        dt,
-        speed,
-        repeats if periodic is None else periodic,
-        0.5 * (y[-1] - y[0]) / speed if shift is None else float(shift),
-    )
+    periodic = repeats if values["periodic"] is None else values["periodic"]
+    return _box(velocity, y, z, dt, speed, periodic, values["shift"])
 
 
 def _from_mann(values, hub_height, rotor_diameter, shear_exponent, seed, duration):
@@ -172,13 +157,8 @@ def _from_mann(values, hub_height, rotor_diameter, shear_exponent, seed, duratio
     n_time = 2 ** ceil(np.log2((duration + 2.0 * rotor_diameter / speed) / dt))
     n_side = 32
     step = 1.2 * rotor_diameter / (n_side - 1)
-    made = MannTurbulenceField.generate(
-        L=0.8 * length_scale(hub_height),
-        Gamma=3.9,
-        Nxyz=(n_time, n_side, n_side),
-        dxyz=(speed * dt, step, step),
-        seed=seed,
-    )
+    grid = {"Nxyz": (n_time, n_side, n_side), "dxyz": (speed * dt, step, step)}
+    made = MannTurbulenceField.generate(L=0.8 * length_scale(hub_height), Gamma=3.9, **grid, seed=seed)
     # x of that box points downwind: the slice that arrives first is the one farthest downstream
     velocity = np.transpose(np.asarray(made.uvw), (1, 3, 2, 0))[::-1].astype(np.float32)
     middle = n_side // 2
@@ -189,7 +169,7 @@ def _from_mann(values, hub_height, rotor_diameter, shear_exponent, seed, duratio
     z = hub_height + line
     exponent = shear_exponent if values["shear_exponent"] is None else values["shear_exponent"]
     velocity[..., 0] += (speed * (np.maximum(z, 1.0) / hub_height) ** exponent)[None, :, None]
-    return WindBox(velocity, line, z, dt, speed, True, 0.5 * (line[-1] - line[0]) / speed)
+    return _box(velocity, line, z, dt, speed, True)
 
 
 _MAKERS = {"bts": _from_bts, "box": _from_arrays, "mann": _from_mann}
@@ -199,13 +179,13 @@ _MAKERS = {"bts": _from_bts, "box": _from_arrays, "mann": _from_mann}
 
 
 def steady_field(field, factor=1.0):
-    """The field's mean over time as a steady wind, times a factor; same type, so nothing is compiled anew."""
+    """The field's mean over time as a steady wind, times a factor; same type, so nothing is recompiled."""
     mean = field.velocity.mean(axis=0, dtype=np.float64, keepdims=True) * factor
     return field._replace(velocity=np.ascontiguousarray(mean, dtype=np.float32))
 
 
 def profile_field(speed, exponent, hub_height, rotor_diameter):
-    """WindField of a steady wind that follows the power law over the height and is alike across.
+    """Return the WindField of a steady wind that follows the power law over the height and is alike across.
 
     speed: m/s at the hub. Of the kernels' types, in place of any box.
     """
@@ -217,14 +197,14 @@ def profile_field(speed, exponent, hub_height, rotor_diameter):
 
 
 def hub_speed(box, hub_height):
-    """Mean horizontal wind (m/s) of the box at the hub."""
+    """Return the mean horizontal wind (m/s) of the box at the hub."""
     field = steady_field(box.field())
     u, v, _ = field_at(0.0, 0.0, 0.0, float(hub_height), field)
     return float(np.hypot(u, v))
 
 
 def hub_wind(box, hub_height):
-    """(time, value (n, 3)): u, v, w of the box at the hub, X = Y = 0."""
+    """Return (time, value (n, 3)): u, v, w of the box at the hub, X = Y = 0."""
     field, count = box.field(), box.velocity.shape[0]
     time = np.arange(count) * box.dt - box.shift
     return time, np.array([field_at(t, 0.0, 0.0, float(hub_height), field) for t in time])
@@ -256,7 +236,7 @@ def _average(field, hub_height, radius, weight, azimuths, value):
 
 
 def rotor_average(box, hub_height, rotor_diameter, weights="area", chord=None):
-    """(time, value): the box averaged over the rotor disk at X = 0, columns as in WindSeries.
+    """Return (time, value): the box averaged over the rotor disk at X = 0, columns as in WindSeries.
 
     value (n, 5): means of u, v, w over the disk, and the gradients of the plane that fits u best, per
     rotor diameter. weights: "area", or "chord" with chord = (radius, chord) of the blade: each ring then

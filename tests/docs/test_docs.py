@@ -143,7 +143,7 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
     },
     "figures of the validation": {
         README: r"\d+ of (\d+) compared values",
-        VALIDATION: r"One figure of (\d+) is missed",
+        VALIDATION: r"One value of (\d+) misses its target",
         PAPER: r"\d+ of (\d+) compared values",
     },
     "periods of decays": {
