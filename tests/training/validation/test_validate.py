@@ -21,6 +21,7 @@ from fowt_env.plant.channels import Out
 from fowt_env.plant.rollout import output_row
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
+from fowt_env.training.validation.comparison import Row, Study
 from fowt_env.training.validation.openfast_cases import (
     DECAYS,
     FOLDER,
@@ -38,7 +39,7 @@ from fowt_env.training.validation.signal_errors import (
     harmonics,
     normalised_rms,
 )
-from fowt_env.training.validation.validate import GROUPS, Row, Study, validate_cases
+from fowt_env.training.validation.validate import GROUPS, validate_cases
 from fowt_env.weather.wind_field import read_box
 
 TIME = "Time_[s]"

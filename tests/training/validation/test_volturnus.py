@@ -10,7 +10,7 @@ import series_figures as figures
 
 from fowt_env.errors import InputError
 from fowt_env.training.validation import linear_cases
-from fowt_env.training.validation.openfast_cases import FOLDER, ReferenceRun
+from fowt_env.training.validation.openfast_cases import FOLDER, ReferenceRun, without_rosco
 from fowt_env.training.validation.validate import PLATFORMS, validate_cases
 from fowt_env.training.validation.volturnus import (
     DECAYS,
@@ -18,7 +18,6 @@ from fowt_env.training.validation.volturnus import (
     PLATFORM,
     RUNS,
     _structural_flap,
-    without_rosco,
 )
 
 REFERENCES, TIME = FOLDER / PLATFORM, "Time_[s]"
