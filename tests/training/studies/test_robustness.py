@@ -28,7 +28,7 @@ def keeps_the_margin(name, integrator, duration):
     base = kind.scene()
     point = kind.point(base)
     fine, _ = step_limits.excursions(base, point, 0.025, duration)
-    scene = long_runs.with_integrator(base, integrator, kind.rotor_samples)
+    scene = random_cases.with_integrator(base, integrator, kind.rotor_samples)
     step = step_limits.MARGIN * INTEGRATORS[integrator].dt
     late = step_limits.excursions(scene, point, step, duration)[1]
     return bool(np.all(late <= step_limits.GROWTH * (fine + step_limits.FLOOR)))

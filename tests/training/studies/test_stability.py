@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -235,16 +236,14 @@ def test_every_extreme_has_the_wind_and_the_fault_of_its_name():
 
 def test_hostile_actions_are_counted_and_no_numbers_are_refused():
     env = FowtEnv()
-    policy = extremes.POLICIES[0]
-    row = extremes.attack(env, policy, 1, steps=40)
+    row = extremes.attack(env, "bang-bang at Nyquist, both", 1, steps=40)
     assert row["finite"] and row["steps"] == 40
     assert extremes.refused_alike(env, 2) == len(extremes.REFUSED)
 
 
 def test_constant_zero_torque_ends_with_the_reason():
     env = FowtEnv(wind=18.0)
-    policy = next(p for p in extremes.POLICIES if p.name == "constant (-1, -1)")
-    row = extremes.attack(env, policy, 1, steps=300)
+    row = extremes.attack(env, "constant (-1, -1)", 1, steps=300)
     assert any("overspeed" in reason for reason in row["ends"])
 
 
@@ -257,7 +256,7 @@ def test_the_report_counts_what_was_missed(tmp_path, monkeypatch):
         found.tables.append(["Many", ["a", "b"], [[f"y{n}", "2"] for n in range(40)]])
         return found
 
-    monkeypatch.setitem(study.PARTS, "plain", part)
+    monkeypatch.setitem(study.PARTS, "plain", replace(study.PARTS["plain"], run=part))
     study.study(tmp_path, ["plain"], study.Sizes(seed=3))
     text = study.write_robustness_report(tmp_path, tmp_path / "report.md").read_text()
     assert "2 checks, 1 of them missed" in text
