@@ -130,7 +130,7 @@ LEVELS = {
 
 
 def level_steps():
-    """Return variants of the levels of build_scene at several steps, and of one part of `standard` at a time."""
+    """Return variants of build_scene's levels at several steps, and of one part of `standard` at a time."""
     axis, alone = "steps of the levels", "parts of standard alone"
     return [
         *(Variant(axis, dt=dt) for dt in (0.0125, 0.025, 0.05, 0.1)),
@@ -330,7 +330,7 @@ def accuracy_summary(table):
 
 
 def pareto(error, speed):
-    """Return (n,) bool: no other point is as fast and more accurate, or as accurate and faster. NaN: never."""
+    """Return (n,) bool: no other point is as fast and more accurate, or as accurate and faster. NaN: no."""
     error, speed = np.asarray(error, dtype=float), np.asarray(speed, dtype=float)
     front = np.isfinite(error) & np.isfinite(speed)
     for i in np.flatnonzero(front):

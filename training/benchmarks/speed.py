@@ -196,6 +196,17 @@ def median_time(call, repeats=REPEATS):
     return float(np.median(times))
 
 
+def paired_times(calls, rounds):
+    """Return CPU times (rounds, n) of this process, s, of n calls that alternate; a first round compiles."""
+    times = np.empty((rounds + 1, len(calls)))
+    for i in range(rounds + 1):
+        for j, call in enumerate(calls):
+            began = time.process_time()
+            call()
+            times[i, j] = time.process_time() - began
+    return times[1:]
+
+
 @kernel
 def _repeat(part, model, data, x, u, dx, m, row, n, dt):
     """n calls of one of LOADS at changing times and places; returns a sum that keeps them from vanishing."""
