@@ -12,6 +12,7 @@ import tempfile
 import time
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from math import inf
 from pathlib import Path
 
@@ -44,6 +45,7 @@ from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, r
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import HeldCommand, reader_of, simulate
+from fowt_env.training.validation.openfast_cases import box_wind
 
 PLATFORM = "oc3_hywind"
 CALIBRATION_STEPS = 10_000_000
@@ -61,8 +63,8 @@ LOADS = (
 class TimedScene:
     """A kind of scene: arguments of build_scene, and what is fixed."""
 
-    wind: object = None
-    sea: object = None
+    wind: object = field(default_factory=lambda: TURBULENCE)
+    sea: object = field(default_factory=lambda: SEA)
     fidelity: str = "standard"
     options: dict = field(default_factory=dict)
     platform_fixed: bool = False
@@ -79,23 +81,14 @@ class TimedScene:
         return self.wind is not None and not self.parked
 
     def scene(self, seed=1, duration=700.0, platform=PLATFORM):
-        """Scene of this kind, with what it holds still."""
+        """Return the scene of this kind, with its platform fixed where the kind says so."""
         wind = self.wind(platform) if callable(self.wind) else self.wind
-        scene = build_scene(
-            platform,
-            wind=wind,
-            sea=self.sea,
-            seed=seed,
-            fidelity=self.fidelity,
-            duration=duration,
-            **self.options,
-        )
-        if not self.platform_fixed:
-            return scene
-        return scene.with_model({"rigid_body.platform_fixed": True})
+        options = {"fidelity": self.fidelity, "seed": seed, "duration": duration} | self.options
+        scene = build_scene(platform, wind=wind, sea=self.sea, **options)
+        return scene.with_model({"rigid_body.platform_fixed": True}) if self.platform_fixed else scene
 
     def start(self, scene):
-        """(state, command) that runs of this kind begin with."""
+        """Return (state, command) at the start of runs of this kind."""
         x, u = initial_state(scene, self.begin)
         if self.parked:
             x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
@@ -104,18 +97,16 @@ class TimedScene:
 
 
 def _box(platform):
-    """Wind specification of a box that the rotor fits into: OC3's stored one, else a sum of plane waves."""
+    """Return the wind of a box that the rotor fits into: OC3's stored one, else a sum of plane waves."""
     if platform == PLATFORM:
-        from fowt_env.training.validation.openfast_cases import box_wind
-
         return box_wind()
     return made_box(read_turbine(read_platform(platform).turbine).rotor)
 
 
 def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed=1):
-    """Wind specification of a box for a Rotor: a sum of plane waves carried by the wind, for timing alone.
+    """Return a box of wind for a Rotor: a sum of plane waves carried by the wind, for timing alone.
 
-    Its deviation is that of class B, its scales those of gusts that the rotor slices; no more is realistic.
+    Only its deviation, that of class B, and its scales, those of gusts that the rotor slices, are realistic.
     """
     draw = np.random.default_rng(seed)
     reach = 1.15 * rotor.tip_radius
@@ -137,42 +128,37 @@ def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed
 
 
 TIMED_SCENES = {
-    "full, reference": TimedScene(TURBULENCE, SEA, "reference"),
-    "full, standard": TimedScene(TURBULENCE, SEA, "standard"),
-    "full, fast": TimedScene(TURBULENCE, SEA, "fast"),
-    "full-field box, standard": TimedScene(_box, SEA, "standard"),
-    "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
-    "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
-    "bending tower": TimedScene(TURBULENCE, SEA, options={"tower": "modes"}),
-    "bending tower, second modes": TimedScene(TURBULENCE, SEA, options={"tower": "modes2"}),
-    "a pitch for each blade": TimedScene(TURBULENCE, SEA, options={"pitch": "individual"}),
-    "still water, wind": TimedScene(TURBULENCE, None, absent="waves"),
-    "no wind, waves": TimedScene(None, SEA, absent="wind, rotor, tower drag"),
+    "full, reference": TimedScene(fidelity="reference"),
+    "full, standard": TimedScene(),
+    "full, fast": TimedScene(fidelity="fast"),
+    "full-field box, standard": TimedScene(_box),
+    "exact waves, look-up rotor": TimedScene(options={"wave_loads": "exact"}),
+    "BEM rotor, fast waves": TimedScene(options={"rotor": "bem"}),
+    "bending tower": TimedScene(options={"tower": "modes"}),
+    "bending tower, second modes": TimedScene(options={"tower": "modes2"}),
+    "a pitch for each blade": TimedScene(options={"pitch": "individual"}),
+    "still water, wind": TimedScene(sea=None, absent="waves"),
+    "no wind, waves": TimedScene(None, absent="wind, rotor, tower drag"),
     "still water, no wind": TimedScene(None, None, absent="waves, wind, rotor, tower drag"),
-    "parked in a storm": TimedScene(40.0, SEA, parked=True),
+    "parked in a storm": TimedScene(40.0, parked=True),
     "planar, fast": TimedScene(
-        TURBULENCE, SEA, "fast", {"planar": True}, absent="sway, roll, yaw: 3x3 instead of 6x6 solve"
+        fidelity="fast", options={"planar": True}, absent="sway, roll, yaw: 3x3 instead of 6x6 solve"
     ),
-    "planar": TimedScene(TURBULENCE, SEA, options={"planar": True}, absent="sway, roll, yaw; 3x3 solve"),
-    "mooring by table": TimedScene(
-        TURBULENCE, SEA, options={"mooring": "table"}, absent="catenary iterations"
-    ),
-    "no mooring": TimedScene(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
-    "platform fixed": TimedScene(TURBULENCE, SEA, platform_fixed=True, absent="6x6 solve (at run time)"),
+    "planar": TimedScene(options={"planar": True}, absent="sway, roll, yaw; 3x3 solve"),
+    "mooring by table": TimedScene(options={"mooring": "table"}, absent="catenary iterations"),
+    "no mooring": TimedScene(options={"mooring": False}, absent="mooring"),
+    "platform fixed": TimedScene(platform_fixed=True, absent="6x6 solve (at run time)"),
     "no water": TimedScene(
-        TURBULENCE,
-        None,
-        options={"hydrodynamics": False, "mooring": False},
-        platform_fixed=True,
+        sea=None, options={"hydrodynamics": False, "mooring": False}, platform_fixed=True,
         absent="strips, waves, buoyancy, mooring; 6x6 solve (at run time)",
-    ),  # fmt: skip
-    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
-}
+    ),
+    "dynamic inflow": TimedScene(options={"dynamic_inflow": True}),
+}  # fmt: skip
 
 
 @kernel
 def multiply_adds(n, a, b):
-    """Result of n multiply-adds that wait for each other: the calibration of a machine's clock."""
+    """Return n dependent multiply-adds: the calibration of a machine's clock."""
     x = 1.0
     for _ in range(n):
         x = x * a + b
@@ -180,13 +166,13 @@ def multiply_adds(n, a, b):
 
 
 def calibration(repeats=3):
-    """Milliseconds of CPU time of CALIBRATION_STEPS dependent multiply-adds."""
+    """Return the CPU time, ms, of CALIBRATION_STEPS dependent multiply-adds."""
     multiply_adds(10, 0.999, 0.1)
     return 1e3 * median_time(lambda: multiply_adds(CALIBRATION_STEPS, 0.999, 0.1), repeats)
 
 
 def median_time(call, repeats=REPEATS):
-    """Median CPU time of this thread in a call, s; the first call is not counted."""
+    """Return the median CPU time of this thread in a call, s; the first call is not counted."""
     call()
     times = []
     for _ in range(repeats):
@@ -209,7 +195,7 @@ def paired_times(calls, rounds):
 
 @kernel
 def _repeat(part, model, data, x, u, dx, m, row, n, dt):
-    """n calls of one of LOADS at changing times and places; returns a sum that keeps them from vanishing."""
+    """Call one of LOADS n times at changing times and places; return a sum, so that no call is left out."""
     total = 0.0
     for i in range(n):
         t = i * dt
@@ -240,7 +226,7 @@ def _repeat(part, model, data, x, u, dx, m, row, n, dt):
 
 @kernel
 def _of_wind(part, t, pose, x, aero, pitches, data, dx):
-    """Something of one of the loads of the wind, if part is one."""
+    """Return a component of one of the loads of the wind, if part is one."""
     if aero is None:
         return 0.0
     now = wind_now(t, aero.wind) if part == 1 else wind_now(0.0, aero.wind)
@@ -254,7 +240,7 @@ def _of_wind(part, t, pose, x, aero, pitches, data, dx):
 
 @kernel
 def _of_water(part, t, pose, hydro, data):
-    """Something of one of the loads of the water, if part is one."""
+    """Return a component of one of the loads of the water, if part is one."""
     if hydro is None:
         return 0.0
     if part == 4:
@@ -270,7 +256,7 @@ def _repeat_in(handle, part, x, u, dx, m, row, n, dt):
 
 
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
-    """{load: microseconds of one call} near a state; the loop and the pose are taken off the others."""
+    """Return {load: microseconds of one call} near a state, without those of the loop and the pose."""
     scene = scene.with_step(0.1)
     handle = scene.handle()
     dx, m = np.zeros_like(x), np.zeros(scene.n_measurements)
@@ -279,11 +265,9 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     output(handle, x, u, 0.0, dx, row)  # fills the cached loads that measure and record read
     micro = {}
     for part, name in enumerate(LOADS):
-        micro[name] = (
-            1e6
-            * median_time(lambda p=part: _repeat_in(handle, p, x.copy(), u, dx, m, row, calls, 0.1), repeats)
-            / calls
-        )
+        call = partial(_repeat_in, handle, part)
+        time = median_time(lambda call=call: call(x.copy(), u, dx, m, row, calls, 0.1), repeats)
+        micro[name] = 1e6 * time / calls
     base = micro[LOADS[0]]
     for name in LOADS[1:7]:
         micro[name] = max(0.0, micro[name] - base)
@@ -291,7 +275,7 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
 
 
 def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
-    """Microseconds of one physics step under a constant command."""
+    """Return the microseconds of one physics step under a constant command."""
     scene = scene.with_step(dt)
     handle = scene.handle()
 
@@ -304,7 +288,7 @@ def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
 
 
 def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
-    """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
+    """Return the CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
     scene = scene.with_step(dt)
     controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
     handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(scene.n_measurements)
@@ -328,7 +312,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
 
 
 def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLATFORM):
-    """Row (dict) of one kind of scene: times per step, real-time factors and microseconds per load."""
+    """Return the row (dict) of a kind of scene: times per step, real-time factors, microseconds per load."""
     if name not in TIMED_SCENES:
         raise unknown("kind of scene", name, TIMED_SCENES)
     kind = TIMED_SCENES[name]
@@ -342,29 +326,22 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLA
         held = scene.with_model({"rigid_body.rotor_fixed": True})
     waves = None if scene.model.hydro is None else scene.model.hydro.waves
     row = {
-        "kind": name,
-        "integrator": scene.options["integrator"],
-        "dt_s": dt,
-        "wave_components": 0 if waves is None else waves.omega.shape[0],
-        "absent": kind.absent,
-        "calibration_ms": calibration(),
-        "step_us": step_time(held, x, u, dt, calls, repeats),
-    }
+        "kind": name, "integrator": scene.options["integrator"], "dt_s": dt,
+        "wave_components": 0 if waves is None else waves.omega.shape[0], "absent": kind.absent,
+        "calibration_ms": calibration(), "step_us": step_time(held, x, u, dt, calls, repeats),
+    }  # fmt: skip
     row["step_x"] = 1e6 * dt / row["step_us"]
     row["loop_x"] = seconds / loop_time(held, kind, x, u, dt, seconds, repeats)
     row["simulate_x"] = float("nan")
     if not kind.parked:  # simulate starts from the running rotor
-        whole = median_time(
-            lambda: simulate(scene, "pi" if kind.controlled else None, duration=seconds, start=kind.begin),
-            repeats,
-        )
-        row["simulate_x"] = seconds / whole
-    row.update({f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()})
-    return row
+        law = "pi" if kind.controlled else None
+        run = partial(simulate, scene, law, duration=seconds, start=kind.begin)
+        row["simulate_x"] = seconds / median_time(run, repeats)
+    return row | {f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()}
 
 
 def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None, platform=PLATFORM):
-    """DataFrame with a row per kind of scene (all by default) of a platform.
+    """Return a DataFrame with a row per kind of scene (all by default) of a platform.
 
     seconds   simulated, for the real-time factors of the closed loop and of simulate
     progress  called with (text, done, total)
@@ -394,7 +371,7 @@ print(imported - start, time.perf_counter() - start, time.process_time() - cpu)
 
 
 def start_times(fidelity="standard"):
-    """{what: seconds}: a first run with an empty cache of kernels and a later one, each in a new process."""
+    """Return {what: seconds}: a first run with an empty cache of kernels, and a later one, in new processes."""
     root = Path(fowt_env.__file__).resolve().parents[1]
     times = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -414,27 +391,29 @@ def start_times(fidelity="standard"):
 
 
 def header():
-    """Lines (list of str) that say where and with what figures were taken."""
+    """Return lines (list of str) on machine, versions, commit and date of a measurement."""
     root = Path(fowt_env.__file__).resolve().parents[1]
-    git = ["git", "-C", str(root)]
-    try:
-        commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
-        changed = subprocess.run([*git, "status", "--porcelain"], capture_output=True, text=True, check=False)
-        state = commit.stdout.strip() + (" with changes" if changed.stdout.strip() else "")
-    except OSError:  # no git on this machine
-        state = ""
+
+    def git(*words):
+        try:
+            words = ["git", "-C", str(root), *words]
+            return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
+        except OSError:  # no git on this machine
+            return ""
+
+    commit = git("rev-parse", "HEAD") + (" with changes" if git("status", "--porcelain") else "")
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     return [
         f"date: {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()}, load {load:.2f}",
         f"versions: Python {platform.python_version()}, numba {numba.__version__}, numpy {np.__version__}",
-        f"commit: {state or 'unknown'}",
+        f"commit: {commit or 'unknown'}",
         f"calibration: {calibration():.2f} ms for {CALIBRATION_STEPS:g} dependent multiply-adds",
     ]
 
 
 def _processor():
-    """Name of the processor."""
+    """Return the name of the processor."""
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text().splitlines():
@@ -444,7 +423,7 @@ def _processor():
 
 
 def write_csv(table, path, remarks=()):
-    """Write a table with the header and remarks as comment lines before it; returns the path."""
+    """Write a table with the header and remarks as comment lines before it; return the path."""
     path = Path(path)
     with replacing(path) as temporary, Path(temporary).open("w", encoding="utf-8", newline="") as file:
         for line in (*header(), *remarks):

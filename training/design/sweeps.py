@@ -42,7 +42,7 @@ def models_over(scene, winds, progress=None):
 
 
 def mode_table(models):
-    """Return a DataFrame: wind, mode, period (s), damping ratio of each oscillation, pitch and torque held."""
+    """Return a DataFrame: wind, mode, period (s), damping ratio of oscillations, pitch and torque held."""
     rows = [
         {"wind_[m/s]": wind, "mode": m.name, "period_[s]": m.period, "damping_[-]": m.damping_ratio}
         for wind, model in models.items()

@@ -7,8 +7,8 @@ through the suite's sensors and behind its trip. Its cost is the mean of the lif
 speed and platform pitch over those of gspi_oc3 on the same runs, plus PENALTY times the excess over the
 suite's limits and over LIMITS, in fractions of them, plus LOST times the fraction of lost runs. The
 present settings come first, then up to half of the budget spread evenly (Sobol), then Nelder and Mead's
-method from the best. A row of OUT/tune_NAME.csv is written for each setting as soon as it is known, so that an
-interrupted search leaves what it tried.
+method from the best. A row of OUT/tune_NAME.csv is written after each setting, so that an interrupted
+search leaves the settings it has tried.
 """
 
 from collections.abc import Callable, Mapping

@@ -19,7 +19,7 @@ from fowt_env.training.validation.comparison import (
     TENSION_CHANNELS,
     THRUST,
 )
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, INK, LINES, new_figure, save_figure, style_axes
 from fowt_env.visual.time_series import TIME, spectrum
 
 LABELS = {
@@ -59,7 +59,6 @@ PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra ar
     "nrel5mw_oc4_semi": {"waves_Hs7.5": (PLANE, LONG, True), "waves_Hs7.5_qtf": (PLANE, LONG, True)},
 }
 HERE, THERE = "fowt_env", "OpenFAST"
-LINES = ("-", "--", ":", "-.")
 COST_PLOTS = {  # file -> (title, {legend: run})
     "costs_rotor": (
         "rotor models, 18 m/s uniform turbulence and Hs 7.5 m",
