@@ -53,7 +53,7 @@ NAMES = (
 
 
 def session(progress=None):
-    """DataFrame (scene, seconds, processor_seconds) of the session in a new process with an empty cache.
+    """Return a DataFrame (scene, seconds, processor_seconds) of the session, new process, empty cache.
 
     progress: called with (text, done, total). Raises: InputError with what a failed process printed.
     """

@@ -371,7 +371,7 @@ print(imported - start, time.perf_counter() - start, time.process_time() - cpu)
 
 
 def start_times(fidelity="standard"):
-    """Return {what: seconds}: a first run with an empty cache of kernels, and a later one, in new processes."""
+    """Return {what: seconds}: a first run, its cache of kernels empty, and a later one, in new processes."""
     root = Path(fowt_env.__file__).resolve().parents[1]
     times = {}
     with tempfile.TemporaryDirectory() as folder:

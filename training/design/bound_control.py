@@ -114,7 +114,7 @@ class Problem:
         self.estimates = {}
 
     def _noise(self, noise):
-        """(k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
+        """Return (k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
         if self.information.sensors is None:
             return np.zeros(0)
         noise = noise_of(turbine=self.plant.turbine) if noise is None else dict(noise)
@@ -124,23 +124,23 @@ class Problem:
         return np.array([noise[name] ** 2 * SAMPLE_TIME for name in self.information.sensors])
 
     def cost(self, fraction, *multipliers):
-        """Q with a fraction of platform pitch and multipliers on travel, power and torque."""
+        """Return Q with a fraction of platform pitch and multipliers on travel, power and torque."""
         weights = np.array([1.0 - fraction, fraction, *multipliers])
         return (self.rows * weights[:, None]).T @ self.rows
 
     def parts(self, deviations):
-        """(5,) Deviations in the units of the cost's rows."""
+        """Return (5,) Deviations in the units of the cost's rows."""
         found = np.array([getattr(deviations, name) / self.scale[name] for name in QUANTITIES])
         found[QUANTITIES.index("travel")] /= GAUSSIAN_MEAN
         return found
 
     def gains(self, q):
-        """(P, K): solution of the Riccati equation and gain on plant and controls."""
+        """Return (P, K): solution of the Riccati equation and gain on plant and controls."""
         p = solve_continuous_are(self.a, self.b, q, self.r)
         return p, np.linalg.solve(self.r, self.b.T @ p)
 
     def deviations(self, q, weather):
-        """Deviations under the best control for the cost q, in a bound_plant.Weather."""
+        """Return Deviations under the best control for the cost q, in a bound_plant.Weather."""
         return self._deviations(*self.gains(q), weather)
 
     def _deviations(self, p, k, weather):
@@ -172,7 +172,7 @@ class Problem:
         return Deviations(*(float(value) for value in found))
 
     def _ahead(self, closed, p, wind):
-        """(n, states) g of the wind per wind speed, with that known for the preview's time ahead."""
+        """Return (n, states) g of the wind per wind speed, with that known for the preview's time ahead."""
         time = self.information.preview or 0.0
         at = self.plant.wind_filter
         states = at.states(OMEGA)
@@ -188,7 +188,7 @@ class Problem:
         return found
 
     def _estimate(self, weather):
-        """Estimates in a weather; kept, since it is the same for all gains."""
+        """Return Estimates in a weather, which are kept as they are the same for all gains."""
         key = id(weather)
         if key not in self.estimates:
             self.estimates[key] = (weather, self._estimated(weather))
@@ -228,7 +228,7 @@ class Problem:
         return found
 
     def estimator(self):
-        """(gain, C): Kalman gain on plant and filters' states, and what the sensors read of these.
+        """Return (gain, C): Kalman gain on plant and filters' states, and what the sensors read of these.
 
         Torque and pitch command are known. A wind that is known acts through them alike: its filter's states
         are not estimated, and have no gain.
@@ -258,7 +258,7 @@ class Problem:
 
 
 def noise_of(chain="standard", turbine=None):
-    """{sensor: standard deviation of a reading} of SENSORS through a sensor chain, its name or a SensorChain.
+    """Return {sensor: standard deviation of a reading} of SENSORS through a chain, a name or SensorChain.
 
     Noise and quantisation together; low pass and delay, small beside the plant's times, are left out.
     Raises: InputError for an unknown name, and for a chain without one of SENSORS or that is exact.
@@ -275,7 +275,7 @@ def noise_of(chain="standard", turbine=None):
 
 
 def front(problem, limits, fractions):
-    """[(fraction, Deviations, cost)] that are best for a fraction of platform pitch; limits: Deviations.
+    """Return [(fraction, Deviations, cost)] best for each fraction of platform pitch; limits: Deviations.
 
     In the plant's true weather. Each multiplier grows while its limit is exceeded and shrinks while it is
     kept. Fractions at which ROUNDS rounds of that end outside the limits are left out.
@@ -308,7 +308,7 @@ def front(problem, limits, fractions):
 
 
 def baseline_deviations(plant, weather):
-    """Deviations under gspi_oc3 in a bound_plant.Weather; constant torque: power goes with speed."""
+    """Return Deviations under gspi_oc3 in a bound_plant.Weather; constant torque: power goes with speed."""
     responses = plant.baseline_response(weather)
 
     def deviation(row):

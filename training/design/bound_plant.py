@@ -65,12 +65,12 @@ class Filter:
     error: float
 
     def states(self, omega):
-        """(n, m) complex response of the states to the noise."""
+        """Return (n, m) complex response of the states to the noise."""
         eye = np.eye(self.b.size)
         return np.linalg.solve(1j * omega[:, None, None] * eye - self.a, self.b[:, None])[:, :, 0]
 
     def density(self, omega):
-        """(n,) one-sided spectrum of the output, per rad/s."""
+        """Return (n,) one-sided spectrum of the output, per rad/s."""
         return np.abs(self.states(omega) @ self.output) ** 2 / pi
 
 
@@ -158,7 +158,7 @@ class BoundPlant:
         self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
 
     def baseline(self):
-        """(10, 10) closed loop of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
+        """Return (10, 10) closed loop of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
 
         The law in continuous time, with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
         Raises: InputError where it is unstable.
@@ -179,7 +179,7 @@ class BoundPlant:
         return a
 
     def baseline_response(self, weather):
-        """(wind (n, 8), waves (n, 8)) of PLANAR under gspi_oc3 per wind speed and elevation."""
+        """Return (wind (n, 8), waves (n, 8)) of PLANAR under gspi_oc3 per wind speed and elevation."""
         drive = np.zeros((OMEGA.size, N + 2, 2), complex)
         drive[:, :N, 0] = self.wind
         drive[:, :N, 1] = weather.force @ self.E.T
@@ -187,7 +187,7 @@ class BoundPlant:
         return found[:, :N, 0], found[:, :N, 1]
 
     def _motion(self):
-        """HullMotion under gspi_oc3 on the true spectra."""
+        """Return the HullMotion under gspi_oc3 on the true spectra."""
         wind, waves = self.baseline_response(self.true)
         velocities = [VX, VZ, WY]
         per_elevation, other = np.zeros((OMEGA.size, 6), complex), np.zeros((6, 6))
@@ -199,7 +199,7 @@ class BoundPlant:
 
 
 def _wind_spectrum(speed, rotor):
-    """One-sided spectrum (n,) over OMEGA, per rad/s, of the rotor-averaged wind of runs of RECORD seconds."""
+    """Return the one-sided spectrum (n,) over OMEGA, per rad/s, of rotor-averaged wind of RECORD seconds."""
     step = 0.1
     samples = fft_length(round(RECORD / step))
     sigma = ntm_sigma(speed, TURBULENCE_CLASS)
@@ -213,7 +213,7 @@ def _wind_spectrum(speed, rotor):
 
 
 def fit_wind(spectrum):
-    """Filter of order 3 with a zero, behind one that stops what is slower than a record.
+    """Return a Filter of order 3 with a zero, behind one that stops frequencies below a record's.
 
     Fitted to the log of a wind's spectrum over OMEGA; the variances agree. Without the second the best
     control would spend its torque on slow changes that no run has.
@@ -243,7 +243,7 @@ def fit_wind(spectrum):
 
 
 def fit_waves(weather, sea):
-    """(Filter of the elevation, force (3, 4) of its states, relative rms errors (3,) of the force).
+    """Return (Filter of the elevation, force (3, 4) of its states, relative rms errors (3,) of the force).
 
     The filter is s^2 through two resonators; its variance is the sea's. The errors are those of the force at
     the sea's frequencies; zero where there is no force.
@@ -285,7 +285,7 @@ def fit_waves(weather, sea):
 
 
 def _companion(below, above):
-    """(a, b, c) of the filter above/below, polynomials in s with the first coefficient of below 1."""
+    """Return (a, b, c) of the filter above/below, polynomials in s with the first coefficient of below 1."""
     n = below.size - 1
     a = np.zeros((n, n))
     a[:-1, 1:] = np.eye(n - 1)
@@ -297,7 +297,7 @@ def _companion(below, above):
 
 
 def _scaled(a, b, c, spectrum):
-    """Filter whose variance is that of a spectrum over OMEGA, both where the spectrum is not zero."""
+    """Return a Filter with the variance of a spectrum over OMEGA, both where the spectrum is not zero."""
     variance, here = np.trapezoid(spectrum, OMEGA), spectrum > 0.0
     density = np.where(here, np.abs(Filter(a, b, c, 0.0).states(OMEGA) @ c) ** 2 / pi, 0.0)
     ratio = variance / np.trapezoid(density, OMEGA) if variance > 0.0 else 0.0

@@ -47,7 +47,7 @@ RATIOS = {  # column of ratio_table: metric
 
 
 def information_sets(previews=PREVIEWS):
-    """{name: Information} of KNOWN, each without and with the wind some seconds ahead, and without torque."""
+    """Return {name: Information} of KNOWN, each without and with previews of the wind, and without torque."""
     found = {}
     for torque in (True, False):
         for time in (None, *previews):
@@ -60,7 +60,7 @@ def information_sets(previews=PREVIEWS):
 
 
 def usual(previews=PREVIEWS):
-    """Names of information_sets of which a table is made by default, {name: text}.
+    """Return {name: text} of the information_sets of a table by default.
 
     Where the wind is known exactly, now and ahead, sensors or all states make less than 1 % of difference:
     of those, all states.
@@ -75,7 +75,7 @@ INFORMATION = usual()  # name: what plots call it
 
 
 def winds_of(turbine):
-    """Winds above rated at which the limit is found by default: even ones up to cut-out, m/s."""
+    """Return the winds above rated at which the limit is found by default: even ones up to cut-out, m/s."""
     first = 2 * ceil(0.5 * (turbine.rated_wind_speed + 0.1))
     return tuple(float(wind) for wind in range(first, int(turbine.cut_out_wind_speed) + 1, 2))
 
@@ -94,7 +94,7 @@ def bound_table(
     fractions=FRACTIONS,
     progress=None,
 ):
-    """DataFrame: per wind and information the Pareto front, beside gspi_oc3; absolute and over gspi_oc3's.
+    """Return a DataFrame: the Pareto front per wind and information, absolute and over gspi_oc3's.
 
     winds        m/s; None: winds_of the scene's turbine
     information  names of information_sets(previews); None: the usual ones
@@ -143,7 +143,7 @@ def bound_table(
 
 
 def _fits(plant):
-    """Errors of a BoundPlant's fits in percent, and the damping of its drag."""
+    """Return the errors of a BoundPlant's fits in percent, and the damping of its drag."""
     surge, heave, lean = (100.0 * float(error) for error in plant.force_errors)
     return {
         "wind_[m/s]": plant.wind_speed,
@@ -158,7 +158,7 @@ def _fits(plant):
 
 
 def _row(wind, information, fraction, found, base, fitted):
-    """One row of bound_table."""
+    """Return one row of bound_table."""
     names = ("rotor_speed", "platform_pitch", "travel")
     difference = max(abs(getattr(fitted, name) / getattr(found, name) - 1.0) for name in names)
     return {
@@ -177,7 +177,7 @@ def _row(wind, information, fraction, found, base, fitted):
 
 
 def rounded(table):
-    """A bound_table with five significant digits, as it is stored."""
+    """Return a bound_table with five significant digits, as it is stored."""
     numbers = table.columns.drop("information")
     short = table.copy()
     short[numbers] = table[numbers].map(lambda value: float(f"{value:.5g}"))
@@ -185,7 +185,7 @@ def rounded(table):
 
 
 def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full"):
-    """Share of what the Pareto front allows that a controller reaches, on the line from gspi_oc3 through it.
+    """Return the position of a controller between gspi_oc3 (0) and the Pareto front (1), on a line.
 
     speed_ratio, pitch_ratio: its deviations over those of gspi_oc3. 1: on the Pareto front; 0: no better than
     gspi_oc3; NaN where the line meets no front (or the controller betters neither).
@@ -208,7 +208,7 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
 
 
 def ratio_table(runs, bound=None):
-    """DataFrame of a sweep's means over seeds (sweeps.sweep) over those of its gspi_oc3.
+    """Return a DataFrame of a sweep's means over seeds (sweeps.sweep) over those of its gspi_oc3.
 
     Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
     fractions of the limit, and of that for measured channels. Cases are named kind_WIND.
@@ -239,7 +239,7 @@ def ratio_table(runs, bound=None):
 
 
 def efficient(points):
-    """The rows of (n, 2) points that no other betters in both columns, by rising first column."""
+    """Return the rows of (n, 2) points that no other betters in both columns, by rising first column."""
     points = np.asarray(points, dtype=float)
     best, kept = np.inf, []
     for x, y in points[np.lexsort((points[:, 1], points[:, 0]))]:

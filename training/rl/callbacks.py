@@ -67,7 +67,7 @@ class CheckpointCallback(BaseCallback):
         self._first = None
 
     def seconds(self):
-        """Wall time of the run so far, s, over all its sessions."""
+        """Return the wall time of the run so far, s, over all its sessions."""
         return self.before + time.monotonic() - self._begin
 
     def _on_training_start(self):
@@ -105,7 +105,7 @@ class CheckpointCallback(BaseCallback):
 
 
 def callbacks(training, validation_env, validation_callback, checkpoint_callback):
-    """[Validation on its episodes, CheckpointCallback] of a training.rl.train.Training."""
+    """Return [Validation on its episodes, CheckpointCallback] of a training.rl.train.Training."""
     every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
     evaluation = Validation(
         validation_env,

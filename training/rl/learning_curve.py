@@ -16,7 +16,7 @@ PANELS = (
 
 
 def plot_learning_curve(runs, path):
-    """Path of a plot of {label: list of validation rows} over decisions, one panel per figure.
+    """Plot {label: list of validation rows} over decisions, one panel per ratio; return the path.
 
     Raises: InputError where matplotlib is missing.
     """
@@ -39,7 +39,7 @@ def plot_learning_curve(runs, path):
 
 
 def plot_front(runs, path):
-    """Path of a plot of what motions cost in blade-pitch travel: every validation of the runs, as ratios.
+    """Plot motions over blade-pitch travel, every validation of the runs, as ratios; return the path.
 
     runs: {label: list of validation rows}. Large marks: the policy that was kept.
     """

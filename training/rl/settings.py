@@ -93,7 +93,7 @@ class TrainingSettings(Record):
 
 
 def check_settings(settings, where="settings"):
-    """The settings, once they are known to be those of a run. Raises: InputError naming each wrong key."""
+    """Return the settings of a run after checking them. Raises: InputError naming each wrong key."""
     if not isinstance(settings, dict):
         raise InputError(f"{where}: must be a table of settings")
     raise_problems(where, validate(TrainingSettings, settings)[1])
@@ -117,13 +117,13 @@ def check_settings(settings, where="settings"):
 
 
 def environment_keys():
-    """Names of all settings of the environment that a training run may change."""
+    """Return the names of all settings of the environment that a training run may change."""
     own = [name for name in SETTINGS if name not in NOT_SET_THERE]
     return list(dict.fromkeys([*OF_TRAINING, *own, *OPTIONS]))
 
 
 def check_algorithm(kind, name, given):
-    """Raises: InputError for settings of algorithm that its class lacks, or declares with another type."""
+    """Raise InputError for settings that an algorithm's class lacks, or declares with another type."""
     arguments = inspect.signature(kind.__init__).parameters
     left_out = (*GIVEN_BY_TRAINING, *OBJECTS)
     known = {key: argument.annotation for key, argument in arguments.items() if key not in left_out}
@@ -139,7 +139,7 @@ def check_algorithm(kind, name, given):
 
 
 def _policy_problems(given):
-    """One line per wrong value of policy_kwargs: its only text is the name of an activation."""
+    """Return a line per wrong value of policy_kwargs, whose only text is the name of an activation."""
     problems = []
     for key, value in given.items():
         if key == "activation" and value not in tuple(ACTIVATIONS):
@@ -153,13 +153,13 @@ def _policy_problems(given):
 
 
 def _holds_text(value):
-    """Whether a value is a text, or has one within it."""
+    """Return whether a value is a text, or has one within it."""
     items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
     return isinstance(value, str) or any(map(_holds_text, items))
 
 
 def _not_allowed(key, value, declared):
-    """What a setting of an algorithm must be, in words, where the value is not; else None."""
+    """Return, for a wrong value of an algorithm's setting, what it must be in words; else None."""
     number = is_number(value)
     if key == "policy_kwargs":
         return None if isinstance(value, dict) else "a table"
@@ -180,7 +180,7 @@ def _not_allowed(key, value, declared):
 
 
 def read_settings(path):
-    """Settings of a run's settings.yml. Raises: InputError."""
+    """Return the settings of a run's settings.yml. Raises: InputError."""
     import yaml
 
     where = f"settings file {str(path)!r}"

@@ -20,7 +20,7 @@ NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 def read_arrays(path):
-    """{name: array} of a coefficients file of the package. Raises: InputError if it does not exist."""
+    """Return {name: array} of a coefficients file of the package. Raises: InputError if it does not exist."""
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: np.asarray(file[name]) for name in file.files}
@@ -29,7 +29,7 @@ def read_arrays(path):
 
 
 def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
-    """6x6 mass matrix about the origin of a body with these moments of inertia about its own centre."""
+    """Return the 6x6 mass matrix about the origin of a body, inertia about its centre."""
     x, y, z = place
     cross = mass * np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     matrix = np.zeros((6, 6))
@@ -41,7 +41,7 @@ def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
 
 
 def tower_mass(stations, densities, base, top, slices=400):
-    """6x6 mass matrix of a tower along z with these densities (kg/m) at fractions of its height."""
+    """Return the 6x6 mass matrix of a tower along z, densities (kg/m) at fractions of its height."""
     fraction = (np.arange(slices) + 0.5) / slices
     length = (top - base) / slices
     matrix = np.zeros((6, 6))
@@ -51,7 +51,7 @@ def tower_mass(stations, densities, base, top, slices=400):
 
 
 def weight_stiffness(mass, gravity=GRAVITY):
-    """6x6 stiffness of the weight of a mass matrix about the displaced origin, in axes that do not turn."""
+    """Return the 6x6 stiffness of the weight of a mass matrix about the displaced origin, fixed axes."""
     x, y, z = mass[1, 5], -mass[0, 5], mass[0, 4]  # moments of mass
     stiffness = np.zeros((6, 6))
     stiffness[3, 3] = stiffness[4, 4] = -gravity * z
@@ -60,7 +60,7 @@ def weight_stiffness(mass, gravity=GRAVITY):
 
 
 def weight(mass, gravity=GRAVITY):
-    """(6,) force and moment of the weight about the undisplaced origin."""
+    """Return (6,) force and moment of the weight about the undisplaced origin."""
     return gravity * np.array([0.0, 0.0, -mass[0, 0], mass[0, 5], mass[1, 5], 0.0])
 
 
@@ -77,7 +77,7 @@ class CatenaryLine:
 
 
 def catenary(span, rise, line):
-    """(horizontal, vertical) tension (N) at the fairlead of a line with this span and rise (m).
+    """Return (horizontal, vertical) tension (N) at the fairlead of a line with this span and rise (m).
 
     Newton's method on the closed form of Jonkman (2007), with and without a part on the seabed.
     """
@@ -120,13 +120,13 @@ def catenary(span, rise, line):
 
 
 def rotation(roll, pitch, yaw):
-    """Rotation matrix of small angles to second order: enough for stiffness by central differences."""
+    """Return the rotation matrix of small angles to second order, for stiffness by central differences."""
     a = np.array([[0.0, -yaw, pitch], [yaw, 0.0, -roll], [-pitch, roll, 0.0]])
     return np.eye(3) + a + 0.5 * a @ a
 
 
 def line_forces(lines, q):
-    """(6,) force and moment of the lines about the displaced origin, in axes that do not turn."""
+    """Return force and moment (6,) of the lines about the displaced origin, in fixed axes."""
     total = np.zeros(6)
     turn = rotation(*q[3:])
     for line in lines:
@@ -141,7 +141,7 @@ def line_forces(lines, q):
 
 
 def line_stiffness(lines, q):
-    """(6, 6) stiffness of the lines at q, by central differences."""
+    """Return (6, 6) stiffness of the lines at q, by central differences."""
     steps = (0.05, 0.05, 0.05, 1e-3, 1e-3, 1e-3)
     columns = []
     for i, step in enumerate(steps):
@@ -153,7 +153,7 @@ def line_stiffness(lines, q):
 
 
 def interpolated(omega, grid, values, low=None, high=None):
-    """Values (n, ...) at omega (rad/s), linear over the grid; low, high: at zero and infinite frequency."""
+    """Return values at omega (rad/s), linear over the grid; low, high: at zero and infinite frequency."""
     if omega < grid[0]:
         first = values[0] if low is None else low
         return first + (values[0] - first) * omega / grid[0]
@@ -184,7 +184,7 @@ class FloatingBody:
         return self.coefficients["stiffness"] + weight_stiffness(self.mass, self.gravity) + extra
 
     def rest(self):
-        """(6,) where the body rests, by Newton's method on lines, weight and buoyancy."""
+        """Return the position of rest (6,), by Newton's method on lines, weight and buoyancy."""
         lift = DENSITY * self.gravity * self.volume
         buoyancy = lift * np.array([0.0, 0.0, 1.0, self.centre[1], -self.centre[0], 0.0])
         q = np.zeros(6)
@@ -199,20 +199,20 @@ class FloatingBody:
         raise InputError("frequency domain: the body finds no place to rest")
 
     def added_mass(self, omega):
-        """(6, 6) at omega (rad/s)."""
+        """Return the added mass (6, 6) at omega (rad/s)."""
         c = self.coefficients
         zero = c.get("added_mass_zero")
         return interpolated(omega, c["omega"], c["added_mass"], zero, c["added_mass_infinite"])
 
     def damping(self, omega):
-        """(6, 6) of radiation, and what is added."""
+        """Return the damping (6, 6) of radiation, and added_damping."""
         c = self.coefficients
         nothing = np.zeros((6, 6))
         extra = nothing if self.added_damping is None else self.added_damping
         return interpolated(omega, c["omega"], c["damping"], nothing, nothing) + extra
 
     def excitation(self, omega, heading=0.0):
-        """(6,) complex per metre of amplitude, at omega (rad/s) and a heading (rad) of the file."""
+        """Return the excitation (6,) per metre at omega (rad/s) and a heading (rad) of the file."""
         c = self.coefficients
         turns = np.abs((c["heading"] - heading + np.pi) % (2.0 * np.pi) - np.pi)
         column = int(np.argmin(turns))
@@ -221,7 +221,7 @@ class FloatingBody:
         return interpolated(omega, c["excitation_omega"], c["excitation"][:, column])
 
     def responses(self, omega, heading=0.0):
-        """(n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
+        """Return (n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
         stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
         found = []
         for w in omega:
@@ -231,7 +231,7 @@ class FloatingBody:
         return np.array(found)
 
     def retardation(self, time, spacing=0.004):
-        """(n, 6, 6) K(t) = 2/pi times the integral of B cos(omega t), by the trapezoid rule over B linear."""
+        """Return (n, 6, 6) K(t) = 2/pi times the integral of B cos(omega t), by the trapezoid rule."""
         grid = np.arange(0.0, self.coefficients["omega"][-1] + spacing, spacing)
         own = FloatingBody(
             self.coefficients, self.mass, self.lines, self.volume
@@ -243,7 +243,7 @@ class FloatingBody:
         return (2.0 / np.pi * waves @ damping).reshape(-1, 6, 6)
 
     def free_decay(self, offset, duration, step=0.05, memory=60.0):
-        """(time (n,), motion (n, 6) from rest) of the body let go at rest at this offset (6,), water at rest.
+        """Return (time (n,), motion (n, 6) from rest) of a free decay from an offset (6,) in still water.
 
         Cummins' equation by the leapfrog rule: places at whole steps, velocities at halves, and the
         convolution by the midpoint rule at those.
@@ -267,7 +267,7 @@ class FloatingBody:
         return step * np.arange(count + 1), motion
 
     def natural_modes(self):
-        """{motion: (rad/s, damping ratio)} of the six modes, each with the coefficients of its frequency."""
+        """Return {motion: (rad/s, damping ratio)} of six modes, each with coefficients at its frequency."""
         stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
         length = self.volume ** (1.0 / 3.0)
         scale = np.array([1.0, 1.0, 1.0, length, length, length])
@@ -304,7 +304,7 @@ BARGE_TOWER = (
 
 
 def nrel5mw(tower, base):
-    """6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk."""
+    """Return the 6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk."""
     tilt, cone = np.radians(5.0), np.radians(2.5)
     apex = np.array([-5.0191 * np.cos(tilt), 0.0, 87.6 + 1.96256 + 5.0191 * np.sin(tilt)])
     shaft = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])  # downwind
@@ -324,7 +324,7 @@ def nrel5mw(tower, base):
 
 
 def _ring(count, first, radius, depth, anchor_radius, anchor_depth, line):
-    """Equal lines around the axis, the first in this direction (deg)."""
+    """Return equal lines around the axis, the first in this direction (deg)."""
     found = []
     for angle in np.radians(first + 360.0 / count * np.arange(count)):
         c, s = np.cos(angle), np.sin(angle)
@@ -339,7 +339,7 @@ def _ring(count, first, radius, depth, anchor_radius, anchor_depth, line):
 
 
 def oc4_semi(coefficients):
-    """FloatingBody of OC4's DeepCwind semi: steel, and the ballast water on the axes of its columns.
+    """Return the FloatingBody of OC4's DeepCwind semi: steel, and ballast water on the columns' axes.
 
     HydroDyn 2, for which the deck was written, lumps the water at the nodes of the members, so that it has no
     inertia across a member. As a solid it would make the periods of pitch and yaw 0.8 and 1.4 % longer.
@@ -361,7 +361,7 @@ def oc4_semi(coefficients):
 
 
 def iti_barge(coefficients):
-    """FloatingBody of the ITI Energy barge."""
+    """Return a FloatingBody of the ITI Energy barge."""
     mass = nrel5mw(BARGE_TOWER, 0.0)
     mass = mass + point_mass(5.452e6, (0.0, 0.0, -0.281768), (7.269e8, 7.269e8, 1.4539e9))
     weight_in_water = (130.403 - DENSITY * 0.25 * np.pi * 0.0809**2) * GRAVITY
