@@ -51,7 +51,7 @@ def evaluation_cost(count=21, suite="above_rated", controller="pi"):
 
 
 def ray_cost(count=200, controller="pi", suite="above_rated"):
-    """Return a DataFrame (what, ms per task) of a local Ray worker: tasks without a result, or with a run's file.
+    """Return a DataFrame (what, ms per task) of a local Ray worker: tasks without a result, or with a file.
 
     Wall time from one result to the next. Raises: InputError without Ray.
     """

@@ -163,9 +163,8 @@ class Problem:
             ahead += wind @ estimate.weather[:, :order]
         drive -= (self.b @ gain) @ ahead
         moved = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(n) - closed, drive)
-        density = np.column_stack(
-            [weather.wind, weather.elevation, np.broadcast_to(self.noise / pi, (OMEGA.size, self.noise.size))]
-        )
+        noise = np.broadcast_to(self.noise / pi, (OMEGA.size, self.noise.size))
+        density = np.column_stack([weather.wind, weather.elevation, noise])
         squares = np.einsum("nqk,nk->nq", np.abs(self.rows @ moved) ** 2, density)
         found = np.sqrt(np.trapezoid(squares, OMEGA, axis=0)) * [self.scale[name] for name in QUANTITIES]
         found[QUANTITIES.index("travel")] *= GAUSSIAN_MEAN
@@ -201,10 +200,8 @@ class Problem:
         found = Estimates(np.zeros((OMEGA.size, N, k), complex), np.zeros((OMEGA.size, orders, k), complex))
         if self.information.sensors is None:
             states = waves.states(OMEGA)
-            elevation = (states @ waves.output)[:, None]
-            found.weather[:, order:, 1] = np.divide(
-                states, elevation, out=np.zeros_like(states), where=elevation != 0.0
-            )
+            elevation, zero = (states @ waves.output)[:, None], np.zeros_like(states)
+            found.weather[:, order:, 1] = np.divide(states, elevation, out=zero, where=elevation != 0.0)
             return found
         gain, c = self.estimator()
         used = [SENSORS.index(name) for name in self.information.sensors]
@@ -269,9 +266,8 @@ def noise_of(chain="standard", turbine=None):
             raise InputError(
                 f"sensors = {chain!r}: must be a chain with noise on each of {', '.join(SENSORS)}"
             )
-    return {
-        name: sqrt(found.sensors[name].noise ** 2 + found.sensors[name].step ** 2 / 12.0) for name in SENSORS
-    }
+    used = {name: found.sensors[name] for name in SENSORS}
+    return {name: sqrt(sensor.noise**2 + sensor.step**2 / 12.0) for name, sensor in used.items()}
 
 
 def front(problem, limits, fractions):
@@ -311,21 +307,12 @@ def baseline_deviations(plant, weather):
     """Return Deviations under gspi_oc3 in a bound_plant.Weather; constant torque: power goes with speed."""
     responses = plant.baseline_response(weather)
 
-    def deviation(row):
-        squares = sum(
-            np.abs(moved @ row) ** 2 * density
-            for moved, density in zip(responses, (weather.wind, weather.elevation), strict=True)
-        )
+    def deviation(row, weight=1.0):
+        parts = zip(responses, (weather.wind, weather.elevation), strict=True)
+        squares = sum(np.abs((moved @ row) * weight) ** 2 * density for moved, density in parts)
         return sqrt(np.trapezoid(squares, OMEGA))
 
     eye = np.eye(N)
-    speed = deviation(eye[SPEED])
-    travel = np.array(responses) @ eye[BLADE] * OMEGA
-    squares = np.abs(travel[0]) ** 2 * weather.wind + np.abs(travel[1]) ** 2 * weather.elevation
-    return Deviations(
-        speed,
-        deviation(eye[LEAN]),
-        GAUSSIAN_MEAN * sqrt(np.trapezoid(squares, OMEGA)),
-        speed / plant.turbine.rated_rotor_speed,
-        0.0,
-    )
+    speed, lean = deviation(eye[SPEED]), deviation(eye[LEAN])
+    travel = GAUSSIAN_MEAN * deviation(eye[BLADE], OMEGA)
+    return Deviations(speed, lean, travel, speed / plant.turbine.rated_rotor_speed, 0.0)

@@ -8,6 +8,7 @@ TrueWeather those that runs are drawn from, with the hull's own force at each fr
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from math import pi, sqrt
 
 import numpy as np
@@ -39,14 +40,10 @@ WIND_BAND = (1.0 / RECORD, 0.25)  # Hz, of its fit
 WAVE_BAND = (0.5, 3.0)  # peak frequencies, of the fit of the elevation
 LOWEST_FORCE = 0.1  # rad/s, from which on the fit of the force weighs it by 1 over frequency
 # rad/s: dense where platform and waves have their resonances, wide enough for the noise of sensors
-OMEGA = np.concatenate(
-    [
-        np.geomspace(1e-4, 0.999 * SLOWEST, 16),
-        SLOWEST * np.arange(1, 510),
-        np.geomspace(510 * SLOWEST, 6.0, 50, endpoint=False),
-        np.geomspace(6.0, 100.0, 60),
-    ]
-)
+OMEGA = np.r_[
+    np.geomspace(1e-4, 0.999 * SLOWEST, 16), SLOWEST * np.arange(1, 510),
+    np.geomspace(510 * SLOWEST, 6.0, 50, endpoint=False), np.geomspace(6.0, 100.0, 60),
+]  # fmt: skip
 ROUNDS, SETTLED = 40, 1e-4  # of the drag and the motion under gspi_oc3
 START = np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # m2/s2: in surge, from which that begins
 
@@ -121,13 +118,9 @@ class BoundPlant:
         self.wave_filter, self.force, self.force_errors = fit_waves(self.true, self.sea)
         states = self.wave_filter.states(OMEGA)
         elevation = (states @ self.wave_filter.output)[:, None]
-        self.fitted = Weather(
-            self.wind_filter.density(OMEGA),
-            self.wave_filter.density(OMEGA),
-            np.divide(
-                states @ self.force.T, elevation, out=np.zeros_like(self.true.force), where=elevation != 0
-            ),
-        )
+        zero, here = np.zeros_like(self.true.force), elevation != 0.0
+        force = np.divide(states @ self.force.T, elevation, out=zero, where=here)
+        self.fitted = Weather(self.wind_filter.density(OMEGA), self.wave_filter.density(OMEGA), force)
 
     def _settle_drag(self, scene, model):
         """Linearise the drag in the sea and in the motion under gspi_oc3, which depends on it."""
@@ -150,11 +143,8 @@ class BoundPlant:
         sensors = [model.output_index(name) for name in SENSORS]
         units = np.array([self.torque, 1.0])  # torque is counted in rated torques
         self.A, self.B, self.wind = model.A[np.ix_(rows, rows)], model.B[rows, :2] * units, model.B[rows, 2]
-        self.C, self.D, self.Dwind = (
-            model.C[np.ix_(sensors, rows)],
-            model.D[sensors, :2] * units,
-            model.D[sensors, 2],
-        )
+        self.C = model.C[np.ix_(sensors, rows)]
+        self.D, self.Dwind = model.D[sensors, :2] * units, model.D[sensors, 2]
         self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
 
     def baseline(self):
@@ -226,17 +216,15 @@ def fit_wind(spectrum):
 
     def miss(p):
         squares = np.log1p((np.exp(p[: ORDER + ZEROS])[:, None] * omega) ** 2)
-        return weight * (
-            p[-1] + squares[ORDER:].sum(axis=0) - squares[:ORDER].sum(axis=0) + slow - np.log(target)
-        )
+        level = p[-1] + squares[ORDER:].sum(axis=0) - squares[:ORDER].sum(axis=0)
+        return weight * (level + slow - np.log(target))
 
     start = np.r_[np.log([60.0, 8.0, 1.0, 20.0]), np.log(target[0])]
     times = np.exp(least_squares(miss, start).x[: ORDER + ZEROS])
-    below, above = np.ones(1), np.ones(1)
-    for time in times[:ORDER]:
-        below = np.polymul(below, [time, 1.0])
-    for time in times[ORDER:]:
-        above = np.polymul(above, [time, 1.0])
+    below, above = (
+        reduce(np.polymul, ([time, 1.0] for time in part), np.ones(1))
+        for part in (times[:ORDER], times[ORDER:])
+    )
     below, above = np.polymul(below / below[0], [1.0, SLOWEST]), np.polymul(above / below[0], [1.0, 0.0])
     a, b, c = _companion(below, above)
     return _scaled(a, b, c, spectrum)

@@ -13,7 +13,7 @@ less than gspi_oc3 has a little less drag than the model: the limit errs to the 
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from math import ceil
 from pathlib import Path
 
@@ -49,13 +49,11 @@ RATIOS = {  # column of ratio_table: metric
 def information_sets(previews=PREVIEWS):
     """Return {name: Information} of KNOWN, each without and with previews of the wind, and without torque."""
     found = {}
-    for torque in (True, False):
-        for time in (None, *previews):
-            for name, (text, sensors) in KNOWN.items():
-                ahead = "" if time is None else f"_preview_{time:g}"
-                words = text + ("" if time is None else f", wind {time:g} s ahead")
-                label = name + ahead + ("" if torque else PITCH_ONLY)
-                found[label] = Information(words + ("" if torque else "; no torque"), sensors, time, torque)
+    for torque, time in product((True, False), (None, *previews)):
+        suffix, ahead = ("", "") if time is None else (f"_preview_{time:g}", f", wind {time:g} s ahead")
+        suffix, ahead = (suffix, ahead) if torque else (suffix + PITCH_ONLY, f"{ahead}; no torque")
+        for name, (text, sensors) in KNOWN.items():
+            found[name + suffix] = Information(text + ahead, sensors, time, torque)
     return found
 
 
@@ -65,10 +63,8 @@ def usual(previews=PREVIEWS):
     Where the wind is known exactly, now and ahead, sensors or all states make less than 1 % of difference:
     of those, all states.
     """
-    found = information_sets(previews)
-    return {
-        name: known.text for name, known in found.items() if known.preview is None or known.sensors is None
-    }
+    found = information_sets(previews).items()
+    return {name: known.text for name, known in found if known.preview is None or known.sensors is None}
 
 
 INFORMATION = usual()  # name: what plots call it
@@ -81,19 +77,9 @@ def winds_of(turbine):
 
 
 def bound_table(
-    scene,
-    winds=None,
-    information=None,
-    *,
-    travel=1.0,
-    power=1.0,
-    torque_std=TORQUE_STD,
-    previews=PREVIEWS,
-    noise=None,
-    sea=None,
-    fractions=FRACTIONS,
-    progress=None,
-):
+    scene, winds=None, information=None, *, travel=1.0, power=1.0, torque_std=TORQUE_STD, previews=PREVIEWS,
+    noise=None, sea=None, fractions=FRACTIONS, progress=None,
+):  # fmt: skip
     """Return a DataFrame: the Pareto front per wind and information, absolute and over gspi_oc3's.
 
     winds        m/s; None: winds_of the scene's turbine
@@ -126,8 +112,7 @@ def bound_table(
     rows, fits, total = [], [], len(winds) * len(chosen)
     for number, wind in enumerate(winds):
         plant = BoundPlant(scene, wind, sea)
-        base = baseline_deviations(plant, plant.true)
-        fitted = baseline_deviations(plant, plant.fitted)
+        base, fitted = (baseline_deviations(plant, weather) for weather in (plant.true, plant.fitted))
         fits.append(_fits(plant))
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base, fitted))
         limits = replace(base, travel=travel * base.travel, power=power * base.power, torque=torque_std)
@@ -144,14 +129,11 @@ def bound_table(
 
 def _fits(plant):
     """Return the errors of a BoundPlant's fits in percent, and the damping of its drag."""
-    surge, heave, lean = (100.0 * float(error) for error in plant.force_errors)
+    errors = plant.wind_filter.error, plant.wave_filter.error, *plant.force_errors
+    names = ("wind", "elevation", "surge_force", "heave_force", "pitch_moment")
     return {
         "wind_[m/s]": plant.wind_speed,
-        "wind_error_[%]": 100.0 * plant.wind_filter.error,
-        "elevation_error_[%]": 100.0 * plant.wave_filter.error,
-        "surge_force_error_[%]": surge,
-        "heave_force_error_[%]": heave,
-        "pitch_moment_error_[%]": lean,
+        **{f"{name}_error_[%]": 100.0 * float(error) for name, error in zip(names, errors, strict=True)},
         "surge_drag_[kN-s/m]": 1e-3 * float(plant.drag.damping[0, 0]),
         "pitch_drag_[MN-m-s/rad]": 1e-6 * float(plant.drag.damping[4, 4]),
     }
@@ -162,18 +144,13 @@ def _row(wind, information, fraction, found, base, fitted):
     names = ("rotor_speed", "platform_pitch", "travel")
     difference = max(abs(getattr(fitted, name) / getattr(found, name) - 1.0) for name in names)
     return {
-        "wind_[m/s]": float(wind),
-        "information": information,
-        "share_[-]": fraction,
-        "RotSpeed_std_[rpm]": found.rotor_speed / RPM,
-        "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
-        "blade_pitch_travel_[deg/s]": found.travel / DEGREE,
-        "power_std_[%]": 100.0 * found.power,
-        "torque_std_[%]": 100.0 * found.torque,
-        "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
+        "wind_[m/s]": float(wind), "information": information, "share_[-]": fraction,
+        "RotSpeed_std_[rpm]": found.rotor_speed / RPM, "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
+        "blade_pitch_travel_[deg/s]": found.travel / DEGREE, "power_std_[%]": 100.0 * found.power,
+        "torque_std_[%]": 100.0 * found.torque, "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
         "pitch_ratio_[-]": found.platform_pitch / base.platform_pitch,
         "fit_difference_[%]": 100.0 * difference,
-    }
+    }  # fmt: skip
 
 
 def rounded(table):

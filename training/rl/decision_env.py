@@ -183,6 +183,6 @@ class ValidationVecEnv(FowtSB3VecEnv):
         }
 
     def _after(self, record, start):
-        """Return the rows of the record from a time (s) of the episode on; one of NaN where there are none."""
+        """Return the rows of the record from a time (s) of the episode on; one of NaN if there are none."""
         rows = record[max(0, round(start / self.env.envs[0].control_dt) - self.skip) :]
         return rows if len(rows) else np.full((1, *record.shape[1:]), np.nan)

@@ -70,6 +70,7 @@ OBSERVATIONS = {  # information sets that agents are compared with
 }
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
 VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "numba", "gymnasium")
+MONITORED = ("episode_returns", "episode_lengths", "episode_count")  # of VecMonitor
 MOTIONS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]")
 RATIOS = (
     *MOTIONS, "blade_pitch_travel_[deg/s]", "torque_travel_[kN-m/s]", "shaft_torque_DEL_[kN-m]",
@@ -388,7 +389,7 @@ class Training:
         """Train the rest of the run; return whether the end was reached."""
         from stable_baselines3.common.logger import configure
 
-        from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, ValidationCallback, callbacks
+        from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, Validation
 
         model = self.model
         say = report or (lambda done, total, text: None)
@@ -397,16 +398,11 @@ class Training:
         self.reference = baseline_figures(self.settings)
         self.kinds = validation_episodes(self.settings)[1]
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
-        checkpoint_callback = CheckpointCallback(self, report)
-        validation_callback = ValidationCallback(self)
-        listeners = callbacks(self, validation, validation_callback, checkpoint_callback)
+        self.evaluation, self.checkpointing = Validation(self, validation), CheckpointCallback(self, report)
+        listeners = [self.evaluation, self.checkpointing]
         if state is not None:
-            listeners[0].n_calls = state["evaluation_calls"]
-            validation_callback.best = state["best"]
-            checkpoint_callback.before = state["seconds"]
-            checkpoint_callback.torch_state = state["torch"]
-        self.evaluation = listeners[0]
-        self.validation_callback, self.checkpoint_callback = validation_callback, checkpoint_callback
+            self.evaluation.n_calls, self.evaluation.best = state["evaluation_calls"], state["best"]
+            self.checkpointing.before, self.checkpointing.torch_state = state["seconds"], state["torch"]
         left = self.settings["steps"] - model.num_timesteps
         finished = True
         with self._signals():
@@ -487,9 +483,7 @@ class Training:
         monitor = env.venv
         state = {
             "environments": decision_env(env).get_state(),
-            "monitor": (
-                monitor.episode_returns.copy(), monitor.episode_lengths.copy(), monitor.episode_count,
-            ),
+            "monitor": [deepcopy(getattr(monitor, name)) for name in MONITORED],
             "returns": env.returns.copy(),
             "original": (deepcopy(env.old_obs), deepcopy(env.old_reward)),
             "random": random.getstate(),
@@ -497,9 +491,9 @@ class Training:
             "torch": torch.get_rng_state(),
             "action_space": model.action_space.np_random.bit_generator.state,
             "evaluation_calls": self.evaluation.n_calls,
-            "best": self.validation_callback.best,
+            "best": self.evaluation.best,
             "rows": self.rows,
-            "seconds": self.checkpoint_callback.seconds(),
+            "seconds": self.checkpointing.seconds(),
             "episodes": list(model.ep_info_buffer),
         }  # fmt: skip
         with (folder / "state.pkl").open("wb") as file:
@@ -519,7 +513,8 @@ class Training:
         env.venv.reset()
         decision_env(env).set_state(state["environments"])
         monitor = env.venv
-        monitor.episode_returns, monitor.episode_lengths, monitor.episode_count = state["monitor"]
+        for name, value in zip(MONITORED, state["monitor"], strict=True):
+            setattr(monitor, name, value)
         env.returns = state["returns"]
         env.old_obs, env.old_reward = state["original"]
         objects = _schedules(self.settings)

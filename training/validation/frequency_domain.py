@@ -9,7 +9,7 @@ rests; drag is left out. With X the excitation per metre and q = surge, sway, he
 C is the hydrostatic stiffness with that of the weight, K that of the lines, D a damping that may be added.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -107,12 +107,9 @@ def catenary(span, rise, line):
         if np.abs(miss).max() < 1e-10 * length:
             return h, v
         dh, dv = 1e-6 * h, 1e-6 * v
-        jacobian = np.column_stack(
-            [
-                (np.array(ends(h + dh, v)) - ends(h - dh, v)) / (2.0 * dh),
-                (np.array(ends(h, v + dv)) - ends(h, v - dv)) / (2.0 * dv),
-            ]
-        )
+        by_h = (np.array(ends(h + dh, v)) - ends(h - dh, v)) / (2.0 * dh)
+        by_v = (np.array(ends(h, v + dv)) - ends(h, v - dv)) / (2.0 * dv)
+        jacobian = np.column_stack([by_h, by_v])
         step = np.linalg.solve(jacobian, miss)
         share = min(1.0, 0.5 * h / max(abs(step[0]), 1e-300), 0.5 * v / max(abs(step[1]), 1e-300))
         h, v = h - share * step[0], v - share * step[1]
@@ -173,15 +170,20 @@ class FloatingBody:
     lines: tuple
     volume: float
     centre: tuple = (0.0, 0.0)  # of buoyancy, x and y
-    added_stiffness: np.ndarray | None = None  # (6, 6)
-    added_damping: np.ndarray | None = None  # (6, 6)
+    added_stiffness: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
+    added_damping: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
     gravity: float = GRAVITY
 
     @property
     def stiffness(self):
         """(6, 6) hydrostatic stiffness with that of the weight and what is added."""
-        extra = 0.0 if self.added_stiffness is None else self.added_stiffness
-        return self.coefficients["stiffness"] + weight_stiffness(self.mass, self.gravity) + extra
+        weight = weight_stiffness(self.mass, self.gravity)
+        return self.coefficients["stiffness"] + weight + self.added_stiffness
+
+    @property
+    def rest_stiffness(self):
+        """(6, 6) stiffness with that of the lines, where the body rests."""
+        return self.stiffness + line_stiffness(self.lines, self.rest())
 
     def rest(self):
         """Return the position of rest (6,), by Newton's method on lines, weight and buoyancy."""
@@ -189,9 +191,8 @@ class FloatingBody:
         buoyancy = lift * np.array([0.0, 0.0, 1.0, self.centre[1], -self.centre[0], 0.0])
         q = np.zeros(6)
         for _ in range(50):
-            left = (
-                buoyancy + weight(self.mass, self.gravity) - self.stiffness @ q + line_forces(self.lines, q)
-            )
+            held = weight(self.mass, self.gravity) + line_forces(self.lines, q)
+            left = buoyancy + held - self.stiffness @ q
             step = np.linalg.solve(self.stiffness + line_stiffness(self.lines, q), left)
             q = q + step
             if np.abs(step).max() < 1e-9:
@@ -208,8 +209,7 @@ class FloatingBody:
         """Return the damping (6, 6) of radiation, and added_damping."""
         c = self.coefficients
         nothing = np.zeros((6, 6))
-        extra = nothing if self.added_damping is None else self.added_damping
-        return interpolated(omega, c["omega"], c["damping"], nothing, nothing) + extra
+        return interpolated(omega, c["omega"], c["damping"], nothing, nothing) + self.added_damping
 
     def excitation(self, omega, heading=0.0):
         """Return the excitation (6,) per metre at omega (rad/s) and a heading (rad) of the file."""
@@ -222,7 +222,7 @@ class FloatingBody:
 
     def responses(self, omega, heading=0.0):
         """Return (n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
-        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
+        stiffness = self.rest_stiffness
         found = []
         for w in omega:
             inertia = self.mass + self.added_mass(w)
@@ -233,10 +233,7 @@ class FloatingBody:
     def retardation(self, time, spacing=0.004):
         """Return (n, 6, 6) K(t) = 2/pi times the integral of B cos(omega t), by the trapezoid rule."""
         grid = np.arange(0.0, self.coefficients["omega"][-1] + spacing, spacing)
-        own = FloatingBody(
-            self.coefficients, self.mass, self.lines, self.volume
-        )  # without damping that is added
-        damping = np.array([own.damping(w) for w in grid]).reshape(len(grid), 36)
+        damping = np.array([self.damping(w) - self.added_damping for w in grid]).reshape(len(grid), 36)
         weight = np.full(len(grid), spacing)
         weight[[0, -1]] *= 0.5
         waves = np.cos(np.outer(time, grid)) * weight
@@ -249,8 +246,7 @@ class FloatingBody:
         convolution by the midpoint rule at those.
         """
         inertia = np.linalg.inv(self.mass + self.coefficients["added_mass_infinite"])
-        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
-        extra = np.zeros((6, 6)) if self.added_damping is None else self.added_damping
+        stiffness = self.rest_stiffness
         kernel = step * self.retardation((np.arange(round(memory / step)) + 0.5) * step)
         flat = np.ascontiguousarray(kernel.transpose(1, 0, 2).reshape(6, -1))  # latest velocity first
         past = np.zeros((len(kernel), 6))
@@ -259,7 +255,7 @@ class FloatingBody:
         motion[0] = offset
         velocity = np.zeros(6)
         for n in range(count):
-            force = -stiffness @ motion[n] - flat @ past.ravel() - extra @ velocity
+            force = -stiffness @ motion[n] - flat @ past.ravel() - self.added_damping @ velocity
             velocity = velocity + (0.5 if n == 0 else 1.0) * step * (inertia @ force)
             past[1:] = past[:-1].copy()
             past[0] = velocity
@@ -268,7 +264,7 @@ class FloatingBody:
 
     def natural_modes(self):
         """Return {motion: (rad/s, damping ratio)} of six modes, each with coefficients at its frequency."""
-        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
+        stiffness = self.rest_stiffness
         length = self.volume ** (1.0 / 3.0)
         scale = np.array([1.0, 1.0, 1.0, length, length, length])
         found = {}
@@ -325,17 +321,10 @@ def nrel5mw(tower, base):
 
 def _ring(count, first, radius, depth, anchor_radius, anchor_depth, line):
     """Return equal lines around the axis, the first in this direction (deg)."""
-    found = []
-    for angle in np.radians(first + 360.0 / count * np.arange(count)):
-        c, s = np.cos(angle), np.sin(angle)
-        found.append(
-            CatenaryLine(
-                (anchor_radius * c, anchor_radius * s, -anchor_depth),
-                (radius * c, radius * s, -depth),
-                **line,
-            )
-        )
-    return tuple(found)
+    turns = [(np.cos(a), np.sin(a)) for a in np.radians(first + 360.0 / count * np.arange(count))]
+    anchors = [(anchor_radius * c, anchor_radius * s, -anchor_depth) for c, s in turns]
+    fairleads = [(radius * c, radius * s, -depth) for c, s in turns]
+    return tuple(CatenaryLine(*ends, **line) for ends in zip(anchors, fairleads, strict=True))
 
 
 def oc4_semi(coefficients):
@@ -373,9 +362,6 @@ def iti_barge(coefficients):
             def turned(x, y, z, c=c, s=s):
                 return (c * x - s * y, s * x + c * y, z)
 
-            lines.append(
-                CatenaryLine(
-                    turned(*anchor, -150.0), turned(20.0, 20.0, -4.0), 473.312, weight_in_water, 5.89e8
-                )
-            )
+            ends = turned(*anchor, -150.0), turned(20.0, 20.0, -4.0)
+            lines.append(CatenaryLine(*ends, 473.312, weight_in_water, 5.89e8))
     return FloatingBody(coefficients, mass, tuple(lines), 6000.0)
