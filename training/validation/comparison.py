@@ -10,14 +10,27 @@ from fowt_env.training.validation.openfast_cases import RUNS
 from fowt_env.training.validation.signal_errors import decay_decrement, decay_period, normalised_rms
 
 TIME = "Time_[s]"
-SURGE, HEAVE, PITCH = "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]"
-MOTION_CHANNELS = (SURGE, "PtfmSway_[m]", HEAVE, "PtfmRoll_[deg]", PITCH, "PtfmYaw_[deg]")
-TENSION_CHANNELS = ("FAIRTEN1_[kN]", "FAIRTEN2_[kN]", "FAIRTEN3_[kN]")
-SPEED, BLADE = "RotSpeed_[rpm]", "BldPitch1_[deg]"
-THRUST, POWER = "RtFldFxh_[N]", "GenPwr_[kW]"
-PLANE = (SURGE, HEAVE, PITCH)
+
+
+class Channel:
+    """Columns of the compared series, as simulate names them."""
+
+    SURGE, HEAVE, PITCH = "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]"
+    SPEED, BLADE = "RotSpeed_[rpm]", "BldPitch1_[deg]"
+    THRUST, TORQUE, POWER = "RtFldFxh_[N]", "RtFldMxh_[N-m]", "GenPwr_[kW]"
+    PLANE = (SURGE, HEAVE, PITCH)
+    MOTIONS = (SURGE, "PtfmSway_[m]", HEAVE, "PtfmRoll_[deg]", PITCH, "PtfmYaw_[deg]")
+    TENSIONS = ("FAIRTEN1_[kN]", "FAIRTEN2_[kN]", "FAIRTEN3_[kN]")
+
+
+COMBINATIONS = (  # position, surface and stretching of wave kinematics; theory.md, section 8
+    ("fixed", "swl", "none"),
+    ("instantaneous", "swl", "none"),
+    ("fixed", "instantaneous", "wheeler"),
+    ("instantaneous", "instantaneous", "wheeler"),
+)
 SETTLED = 100.0  # s left out of statistics
-STD, MEAN, RMS = "standard deviation", "mean", "normalised rms error"
+STATISTICS = {"std": "standard deviation", "mean": "mean", "rms": "normalised rms error"}
 
 
 @dataclass(frozen=True)
@@ -87,22 +100,23 @@ class Study:
         return pair if start is None else since(pair, start, end)
 
     def add_statistics(
-        self, case, channels, kinds=(STD, MEAN, RMS), start=SETTLED, *, pair=None, words="", note="",
+        self, case, channels, kinds=tuple(STATISTICS), start=SETTLED, *, pair=None, words="", note="",
         std=float("nan"), rms=float("nan"),
     ):  # fmt: skip
-        """Add a row for each channel and kind of statistic (STD, MEAN, RMS) of a case from start (s) on.
+        """Add a row for each channel and kind of STATISTICS of a case from start (s) on.
 
         pair: the frames to compare, in place of the case's; words: end of each quantity's name; std, rms:
         allowed errors of these kinds, % (nan: reported). An rms error is shown beside both deviations.
         """
         ours, theirs = self.pair(case, start) if pair is None else pair
-        allowed = {STD: std, RMS: rms, MEAN: float("nan")}
+        allowed = {"std": std, "rms": rms}
         for channel in channels:
             name, unit = name_and_unit(channel)
             for kind in kinds:
-                both = [f[channel].mean() if kind == MEAN else f[channel].std() for f in (theirs, ours)]
-                error = 100.0 * normalised_rms(ours[channel], theirs[channel]) if kind == RMS else None
-                self.add(case, f"{name}, {kind}{words}", unit, *both, error, allowed[kind], note)
+                both = [f[channel].mean() if kind == "mean" else f[channel].std() for f in (theirs, ours)]
+                error = 100.0 * normalised_rms(ours[channel], theirs[channel]) if kind == "rms" else None
+                quantity = f"{name}, {STATISTICS[kind]}{words}"
+                self.add(case, quantity, unit, *both, error, allowed.get(kind, float("nan")), note)
 
     def add_decay(self, case, channel, duration, period, decrement, rms, cycles=4, counted=(1, 3)):
         """Add the rows of a free decay: period of its first cycles, decrements of some, and the rms error.
@@ -122,7 +136,7 @@ class Study:
             self.add(case, f"logarithmic decrement, {words} cycle", "-", *decrements, allowed=decrement)
         name, unit = name_and_unit(channel)
         error = 100.0 * normalised_rms(both[1], both[0])
-        self.add(case, f"{name}, {RMS}", unit, both[0].std(), both[1].std(), error, rms)
+        self.add(case, f"{name}, {STATISTICS['rms']}", unit, both[0].std(), both[1].std(), error, rms)
 
     def table(self):
         """Return a DataFrame of all rows with their verdicts."""

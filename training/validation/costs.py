@@ -6,18 +6,7 @@ import pandas as pd
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.training.validation.comparison import (
-    MEAN,
-    PITCH,
-    RMS,
-    SETTLED,
-    SPEED,
-    STD,
-    SURGE,
-    TENSION_CHANNELS,
-    THRUST,
-    since,
-)
+from fowt_env.training.validation.comparison import SETTLED, Channel, since
 from fowt_env.training.validation.openfast_cases import PLATFORM, RUNS, box_wind
 from fowt_env.weather.turbulence import turbulence
 from fowt_env.weather.wind_field import read_box, rotor_average
@@ -65,10 +54,10 @@ def cheaper_choices(study):
             wind = {"wind": disk["spec"]} if name == "rotor-averaged wind" else {}
             frame = RUNS[case].frame(study.folder, study.bts, dt=STEP, **changes, **wind)
             study.runs[name] = (frame, None)
-    channels = (PITCH, SURGE, SPEED, THRUST, TENSION_CHANNELS[0])
+    channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED, Channel.THRUST, Channel.TENSIONS[0])
     for choice, (dearer, cheaper) in CHOICES.items():
         pair = since((study.runs[cheaper][0], study.runs[dearer][0]), SETTLED)
-        study.add_statistics(choice, channels, (MEAN, STD, RMS), pair=pair)
+        study.add_statistics(choice, channels, ("mean", "std", "rms"), pair=pair)
     _generator(study, disk)
 
 

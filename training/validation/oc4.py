@@ -12,22 +12,16 @@ from dataclasses import replace
 from math import pi
 
 from fowt_env.descriptions.platform import read_platform
-from fowt_env.training.validation.comparison import (
-    HEAVE,
-    PITCH,
-    PLANE,
-    SURGE,
-    TIME,
-)
+from fowt_env.training.validation.comparison import TIME, Channel
 from fowt_env.training.validation.openfast_cases import ReferenceRun, wave_components
 from fowt_env.training.validation.signal_errors import decay_period
 from fowt_env.training.validation.volturnus import DT
 
 PLATFORM = "nrel5mw_oc4_semi"
 DECAYS = {  # case: (channel, start value, seconds, cycles counted)
-    "decay_surge": (SURGE, 8.0, 250.0, 1),
-    "decay_heave": (HEAVE, 3.0, 100.0, 4),
-    "decay_pitch": (PITCH, 6.0, 150.0, 4),
+    "decay_surge": (Channel.SURGE, 8.0, 250.0, 1),
+    "decay_heave": (Channel.HEAVE, 3.0, 100.0, 4),
+    "decay_pitch": (Channel.PITCH, 6.0, 150.0, 4),
 }
 # water of each of three columns, of its upper part and of its base, by the deck's HydroDyn file
 WATER = ((1025.0, 5.94, 7.83), (1025.0, 11.94, 5.05))  # density kg/m3, radius inside m, height m
@@ -87,7 +81,7 @@ def waves(study):
         ("waves_Hs7.5_qtf", 5.0),
         ("waves_Hs7.5_moordyn", float("nan")),
     ):
-        study.add_statistics(case, PLANE, std=allowed)
+        study.add_statistics(case, Channel.PLANE, std=allowed)
 
 
 GROUPS = {"decays": (decays, 4), "waves": (waves, 3)}

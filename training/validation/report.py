@@ -9,30 +9,21 @@ import fowt_env
 from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
-from fowt_env.training.validation.comparison import (
-    BLADE,
-    HEAVE,
-    PITCH,
-    PLANE,
-    SPEED,
-    SURGE,
-    TENSION_CHANNELS,
-    THRUST,
-)
+from fowt_env.training.validation.comparison import Channel
 from fowt_env.visual.style import COLOURS, INK, LINES, new_figure, save_figure, style_axes
 from fowt_env.visual.time_series import TIME, spectrum
 
 LABELS = {
-    SURGE: "surge\n(m)", "PtfmSway_[m]": "sway\n(m)", HEAVE: "heave\n(m)", "PtfmRoll_[deg]": "roll\n(deg)",
-    PITCH: "platform pitch\n(deg)", "PtfmYaw_[deg]": "yaw\n(deg)", SPEED: "rotor speed\n(rpm)",
-    BLADE: "blade pitch\n(deg)", THRUST: "thrust\n(N)", "RtFldMxh_[N-m]": "torque\n(N m)",
-    "FAIRTEN1_[kN]": "tension 1\n(kN)", "TTDspFA_[m]": "tower top\n(m)",
-    "TwrBsMyt_[kN-m]": "tower base\n(kN m)",
+    Channel.SURGE: "surge\n(m)", "PtfmSway_[m]": "sway\n(m)", Channel.HEAVE: "heave\n(m)",
+    "PtfmRoll_[deg]": "roll\n(deg)", Channel.PITCH: "platform pitch\n(deg)", "PtfmYaw_[deg]": "yaw\n(deg)",
+    Channel.SPEED: "rotor speed\n(rpm)", Channel.BLADE: "blade pitch\n(deg)",
+    Channel.THRUST: "thrust\n(N)", Channel.TORQUE: "torque\n(N m)", "FAIRTEN1_[kN]": "tension 1\n(kN)",
+    "TTDspFA_[m]": "tower top\n(m)", "TwrBsMyt_[kN-m]": "tower base\n(kN m)",
 }  # fmt: skip
-TURNING = (*PLANE, SPEED, BLADE)
-OPERATING, WAVE = (*TURNING, TENSION_CHANNELS[0]), (*PLANE, TENSION_CHANNELS[0])
-BENDING = (PITCH, SPEED, "TTDspFA_[m]", "TwrBsMyt_[kN-m]")
-WAKE = (THRUST, "RtFldMxh_[N-m]")
+TURNING = (*Channel.PLANE, Channel.SPEED, Channel.BLADE)
+OPERATING, WAVE = (*TURNING, Channel.TENSIONS[0]), (*Channel.PLANE, Channel.TENSIONS[0])
+BENDING = (Channel.PITCH, Channel.SPEED, "TTDspFA_[m]", "TwrBsMyt_[kN-m]")
+WAKE = (Channel.THRUST, Channel.TORQUE)
 WHOLE, LONG, SHORT = (0.0, 600.0), (100.0, 400.0), (100.0, 200.0)  # s
 PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra are drawn)}
     "oc3_hywind": {
@@ -46,9 +37,9 @@ PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra ar
         "turb_18mps_Hs7.5_box": (OPERATING, LONG, True),
     },
     "iea15_volturnus_s": {
-        "regwave_H4T9": (PLANE, (410.0, 500.0), False),
-        "waves_Hs7.5": (PLANE, LONG, True),
-        "waves_Hs7.5_qtf": (PLANE, LONG, True),
+        "regwave_H4T9": (Channel.PLANE, (410.0, 500.0), False),
+        "waves_Hs7.5": (Channel.PLANE, LONG, True),
+        "waves_Hs7.5_qtf": (Channel.PLANE, LONG, True),
         "float_steady_12mps": (TURNING, WHOLE, False),
         "float_steady_18mps": (TURNING, WHOLE, False),
         "turb_18mps_Hs7.5_uniform": (TURNING, LONG, True),
@@ -56,7 +47,10 @@ PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra ar
         "wake_pitch_step": (WAKE, (10.0, 100.0), False),
         "wake_wind_step_18mps": (WAKE, (10.0, 100.0), False),
     },
-    "nrel5mw_oc4_semi": {"waves_Hs7.5": (PLANE, LONG, True), "waves_Hs7.5_qtf": (PLANE, LONG, True)},
+    "nrel5mw_oc4_semi": {
+        "waves_Hs7.5": (Channel.PLANE, LONG, True),
+        "waves_Hs7.5_qtf": (Channel.PLANE, LONG, True),
+    },
 }
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
@@ -264,7 +258,7 @@ def write_plots(study, folder):
                 start = 400.0 if case.startswith("regwave") else 100.0
                 _spectra(frames, channels, path(f"{case}_spectra"), case, start)
     if "spectra of the wind" in study.runs:
-        channels = (PITCH, SURGE, SPEED)
+        channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED)
         for name, (title, runs) in COST_PLOTS.items():
             frames = {legend: study.runs[run][0] for legend, run in runs.items()}
             _overlay(frames, channels, (100.0, 300.0), path(name), title)

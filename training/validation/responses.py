@@ -17,7 +17,7 @@ from fowt_env.descriptions.units import DEGREE
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import simulate
 from fowt_env.training.validation import frequency_domain
-from fowt_env.training.validation.comparison import HEAVE, PITCH, SURGE, TIME, name_and_unit, phase
+from fowt_env.training.validation.comparison import TIME, Channel, name_and_unit, phase
 
 BODIES = {
     "nrel5mw_iti_barge": frequency_domain.iti_barge,
@@ -27,9 +27,9 @@ OMEGA = np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5]) 
 AMPLITUDE = 0.02  # m, of each component
 RAMP, BEGIN, END = 100.0, 200.0, 900.0  # s, of the waves and of what is fitted
 STEP = 0.05  # s
-CHANNELS = {SURGE: 0, HEAVE: 2, PITCH: 4}
+CHANNELS = {Channel.SURGE: 0, Channel.HEAVE: 2, Channel.PITCH: 4}
 DECAYING = (  # motions that are coupled, and their channels
-    {"surge": SURGE, "heave": HEAVE, "pitch": PITCH},
+    {"surge": Channel.SURGE, "heave": Channel.HEAVE, "pitch": Channel.PITCH},
     {"sway": "PtfmSway_[m]", "roll": "PtfmRoll_[deg]", "yaw": "PtfmYaw_[deg]"},
 )
 OFFSET = 0.1  # m and deg from rest, at which all six motions begin

@@ -6,20 +6,7 @@ blades, drivetrain and second tower modes bend there and not here.
 
 import numpy as np
 
-from fowt_env.training.validation.comparison import (
-    BLADE,
-    PITCH,
-    PLANE,
-    POWER,
-    RMS,
-    SETTLED,
-    SPEED,
-    STD,
-    TENSION_CHANNELS,
-    THRUST,
-    TIME,
-    name_and_unit,
-)
+from fowt_env.training.validation.comparison import SETTLED, TIME, Channel, name_and_unit
 from fowt_env.training.validation.openfast_cases import without_rosco
 from fowt_env.training.validation.signal_errors import band_energy, ringing
 
@@ -29,7 +16,7 @@ FORE_AFT, SIDE_SIDE, NACELLE = "TTDspFA_[m]", "TTDspSS_[m]", "NcIMUTAxs_[m/s^2]"
 BANDS = {"slow": (0.0, 0.05), "waves": (0.05, 0.2), "tower": (0.2, 5.0)}
 RINGING = (0.2, 1.0)  # Hz, in which the tower rings
 RINGING_WINDOW = (2.0, 22.0)  # s of a free decay, after which it has lost half
-MOVING = (*PLANE, SPEED, BLADE, POWER, THRUST)
+MOVING = (*Channel.PLANE, Channel.SPEED, Channel.BLADE, Channel.POWER, Channel.THRUST)
 
 
 def _turbulent(study, case, channels):
@@ -49,7 +36,7 @@ def _turbulent(study, case, channels):
         if channel in theirs:
             allowed = 5.0 if channel in (MOMENT, FORE_AFT) else float("nan")
             study.add_statistics(case, (channel,), std=allowed)
-    study.add_statistics(case, channels, (STD, RMS), std=3.0)
+    study.add_statistics(case, channels, ("std", "rms"), std=3.0)
 
 
 def volturnus(study):
@@ -64,7 +51,7 @@ def volturnus(study):
     )
     study.add(case, "tower, fore-aft frequency", "Hz", theirs[0], ours[0], allowed=1.0)
     study.add(case, "tower, damping ratio", "-", theirs[1], ours[1], allowed=5.0)
-    study.add_decay(case, PITCH, 300.0, period=0.5, decrement=5.0, rms=4.0)
+    study.add_decay(case, Channel.PITCH, 300.0, period=0.5, decrement=5.0, rms=4.0)
     if without_rosco():
         study.say("without ROSCO: its library is not installed")
         return
@@ -73,4 +60,4 @@ def volturnus(study):
 
 def oc3(study):
     """Compare OC3-Hywind with ElastoDyn with all its modes: 18 m/s turbulence with Hs 7.5 m."""
-    _turbulent(study, "turb_18mps_Hs7.5_uniform_flex", (*MOVING, *TENSION_CHANNELS))
+    _turbulent(study, "turb_18mps_Hs7.5_uniform_flex", (*MOVING, *Channel.TENSIONS))

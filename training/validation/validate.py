@@ -14,19 +14,10 @@ from fowt_env.errors import unknown
 from fowt_env.scene.build import build_scene
 from fowt_env.training.validation import costs, oc4, responses, tower_modes, volturnus
 from fowt_env.training.validation.comparison import (
-    BLADE,
-    HEAVE,
-    MOTION_CHANNELS,
-    PITCH,
-    POWER,
-    RMS,
+    COMBINATIONS,
     SETTLED,
-    SPEED,
-    STD,
-    SURGE,
-    TENSION_CHANNELS,
-    THRUST,
     TIME,
+    Channel,
     Study,
     name_and_unit,
     phase,
@@ -37,12 +28,6 @@ from fowt_env.training.validation.signal_errors import band_energy, harmonics, n
 
 WAVE_WINDOW = (400.0, 600.0)  # s, forty periods of 5 s
 BANDS = {"platform pitch": (0.025, 0.042), "wave": (0.08, 0.125), "rotor speed": (0.16, 0.25)}  # Hz
-COMBINATIONS = (  # kinematics position, surface, stretching
-    ("fixed", "swl", "none"),
-    ("instantaneous", "swl", "none"),
-    ("fixed", "instantaneous", "wheeler"),
-    ("instantaneous", "instantaneous", "wheeler"),
-)
 
 
 def decays(study):
@@ -69,10 +54,10 @@ def steady(study):
 
 def floating(study):
     """Compare steady winds, floating, from one start: surge, pitch, tensions, rotor speed within 3 % rms."""
-    channels = (SURGE, PITCH, *TENSION_CHANNELS, SPEED)
+    channels = (Channel.SURGE, Channel.PITCH, *Channel.TENSIONS, Channel.SPEED)
     for case in ("float_steady_8mps", "float_steady_18mps"):
         for start, words in ((0.0, ", whole record"), (SETTLED, f", t >= {SETTLED:g} s")):
-            study.add_statistics(case, channels, (RMS,), start, words=words, rms=3.0)
+            study.add_statistics(case, channels, ("rms",), start, words=words, rms=3.0)
 
 
 def waves(study):
@@ -80,7 +65,7 @@ def waves(study):
     omega = 2.0 * pi / 5.0
     for case in ("regwave_H3T5", "regwave_H3T5_displaced"):
         ours, theirs = study.pair(case, *WAVE_WINDOW)
-        for channel in (SURGE, HEAVE, PITCH, *TENSION_CHANNELS):
+        for channel in (Channel.SURGE, Channel.HEAVE, Channel.PITCH, *Channel.TENSIONS):
             name, unit = name_and_unit(channel)
             there, here = (
                 harmonics(f[TIME].to_numpy(), f[channel].to_numpy(), omega)[0] for f in (theirs, ours)
@@ -96,7 +81,7 @@ def waves(study):
         frames = [RUNS["regwave_H3T5"].frame(study.folder, **options)]
         if surface == "swl":
             frames.append(study.pair(second[position])[1])
-        for channel in (SURGE, PITCH, TENSION_CHANNELS[0]):
+        for channel in (Channel.SURGE, Channel.PITCH, Channel.TENSIONS[0]):
             ratio = []
             for part in since(frames, *WAVE_WINDOW):
                 c = np.abs(harmonics(part[TIME].to_numpy(), part[channel].to_numpy(), omega))
@@ -110,7 +95,7 @@ def waves(study):
 def steps(study):
     """Compare wind steps 12 to 24 m/s: each step with its mean removed, normalised rms error 5 %."""
     case = "float_windsteps_12_24"
-    for channel in (SPEED, BLADE, PITCH):
+    for channel in (Channel.SPEED, Channel.BLADE, Channel.PITCH):
         name, unit = name_and_unit(channel)
         for number in range(13):
             pair = study.pair(case, 100.0 * number, 100.0 * (number + 1) - 0.05)
@@ -127,16 +112,23 @@ def turbulence(study):
     """
     for case in ("turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"):
         ours, theirs = study.pair(case, SETTLED)
-        channels = (*MOTION_CHANNELS, SPEED, BLADE, POWER, THRUST, *TENSION_CHANNELS)
-        study.add_statistics(case, channels, (STD,), std=3.0)
+        channels = (
+            *Channel.MOTIONS,
+            Channel.SPEED,
+            Channel.BLADE,
+            Channel.POWER,
+            Channel.THRUST,
+            *Channel.TENSIONS,
+        )
+        study.add_statistics(case, channels, ("std",), std=3.0)
         time = theirs[TIME].to_numpy()
-        for channel in (PITCH, SPEED):
+        for channel in (Channel.PITCH, Channel.SPEED):
             name, unit = name_and_unit(channel)
             for band, (low, high) in BANDS.items():
                 both = [band_energy(time, f[channel].to_numpy(), low, high) for f in (theirs, ours)]
                 quantity = f"{name}, energy in {low:g} to {high:g} Hz ({band})"
                 study.add(case, quantity, f"({unit})^2", *both, allowed=5.0)
-        study.add_statistics(case, (PITCH, SPEED), (RMS,), rms=10.0)
+        study.add_statistics(case, (Channel.PITCH, Channel.SPEED), ("rms",), rms=10.0)
 
 
 GROUPS = {  # name -> (function, runs that it takes)

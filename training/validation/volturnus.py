@@ -15,20 +15,7 @@ from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import RPM
 from fowt_env.scene.build import build_scene
 from fowt_env.training.validation.blade_loads import blades
-from fowt_env.training.validation.comparison import (
-    BLADE,
-    HEAVE,
-    PITCH,
-    PLANE,
-    POWER,
-    RMS,
-    SPEED,
-    SURGE,
-    THRUST,
-    TIME,
-    name_and_unit,
-    phase,
-)
+from fowt_env.training.validation.comparison import TIME, Channel, name_and_unit, phase
 from fowt_env.training.validation.linear_cases import linear
 from fowt_env.training.validation.openfast_cases import (
     ReferenceRun,
@@ -42,15 +29,15 @@ from fowt_env.training.validation.signal_errors import harmonics, normalised_rms
 from fowt_env.training.validation.tower_modes import volturnus as tower
 
 PLATFORM = "iea15_volturnus_s"
-YAW, TORQUE = "PtfmYaw_[deg]", "RtFldMxh_[N-m]"
+YAW = "PtfmYaw_[deg]"
 DT = 0.025  # s, as OpenFAST's
 # as those runs had it: the wake skewed by the tilt of the shaft, loads of the undisturbed air
 OPTIONS = {"skewed_wake": True, "shear_exponent": 0.0}
 BENDING = {**OPTIONS, "tower": "modes"}
 DECAYS = {  # case: (channel, start value, seconds, step of the reference)
-    "decay_surge": (SURGE, 10.0, 600.0, 0.2),
-    "decay_heave": (HEAVE, 3.0, 200.0, 0.1),
-    "decay_pitch": (PITCH, 5.0, 300.0, 0.1),
+    "decay_surge": (Channel.SURGE, 10.0, 600.0, 0.2),
+    "decay_heave": (Channel.HEAVE, 3.0, 200.0, 0.1),
+    "decay_pitch": (Channel.PITCH, 5.0, 300.0, 0.1),
     "decay_yaw": (YAW, 8.0, 500.0, 0.2),
 }
 WAVE = {"kind": "regular", "H": 4.0, "T": 9.0}
@@ -125,7 +112,7 @@ RUNS = {
         case: _wake(case, (17.0, 19.0), 7.56, (15.4, 15.4))
         for case in ("wake_wind_step_18mps", "wake_wind_step_18mps_mended")
     },
-    "decay_pitch_tower": _run("decay_pitch_tower", 300.0, initial={PITCH: 5.0}, options=BENDING),
+    "decay_pitch_tower": _run("decay_pitch_tower", 300.0, initial={Channel.PITCH: 5.0}, options=BENDING),
 }  # fmt: skip
 
 
@@ -137,7 +124,7 @@ def rest(study):
     case = "static"
     for start, words in ((60.0, "last 540 s"), (550.0, "last 50 s")):
         ours, theirs = study.pair(case, start)
-        for channel in PLANE:
+        for channel in Channel.PLANE:
             name, unit = name_and_unit(channel)
             here, there = ours[channel].mean(), theirs[channel].mean()
             apart = f"{here - there:+.4f} {unit}; allowed 0.02 {unit}"
@@ -239,7 +226,7 @@ def regular(study):
     """Compare a regular wave H 4 m T 9 s: first harmonics of surge, heave and platform pitch within 1 %."""
     case, omega = "regwave_H4T9", 2.0 * pi / WAVE["T"]
     ours, theirs = study.pair(case, *WAVE_WINDOW)
-    for channel in PLANE:
+    for channel in Channel.PLANE:
         name, unit = name_and_unit(channel)
         there, here = (
             harmonics(f[TIME].to_numpy()[:-1], f[channel].to_numpy()[:-1], omega)[0] for f in (theirs, ours)
@@ -251,7 +238,7 @@ def regular(study):
 def waves(study):
     """Compare irregular waves Hs 7.5 m: deviations after 100 s 2 %, with difference-frequency forces 5 %."""
     for case, allowed in (("waves_Hs7.5", 2.0), ("waves_Hs7.5_qtf", 5.0)):
-        study.add_statistics(case, PLANE, std=allowed)
+        study.add_statistics(case, Channel.PLANE, std=allowed)
 
 
 def floating(study):
@@ -259,7 +246,7 @@ def floating(study):
     if without_rosco():  # an extra: the other groups need none of it
         study.say("without ROSCO: its library is not installed")
         return
-    channels = (*PLANE, SPEED, BLADE, POWER, THRUST)
+    channels = (*Channel.PLANE, Channel.SPEED, Channel.BLADE, Channel.POWER, Channel.THRUST)
     for case in CONTROLLED:
         study.add_statistics(case, channels, note="with ROSCO", std=3.0)
 
@@ -276,14 +263,14 @@ def wake(study):
         ours, theirs = study.pair(case)
         time = theirs[TIME].to_numpy()
         limits = (0.5, 0.5, 5.0, 10.0) if judged else (np.nan,) * 4
-        for channel in (THRUST, TORQUE):
+        for channel in (Channel.THRUST, Channel.TORQUE):
             name, unit = name_and_unit(channel)
             there, here = (recovery(time, f[channel].to_numpy(), STEP, 100.0) for f in (theirs, ours))
             words = ("before the step", "long after it", "overshoot", "time of the overshoot")
             rows = zip(words, (unit, unit, unit, "s"), there, here, limits, strict=True)
             for what, its_unit, wanted, found, allowed in rows:
                 study.add(case, f"{name}, {what}", its_unit, wanted, found, allowed=allowed)
-            study.add_statistics(case, (channel,), (RMS,), STEP, words=" after the step")
+            study.add_statistics(case, (channel,), ("rms",), STEP, words=" after the step")
 
 
 def memory(study):
@@ -294,7 +281,7 @@ def memory(study):
             study.say(f"{case}, radiation by {kind}")
             frames.append(RUNS[case].frame(study.folder, radiation=kind))
         dear, cheap = frames
-        for channel in PLANE if case.startswith("waves") else (DECAYS[case][0],):
+        for channel in Channel.PLANE if case.startswith("waves") else (DECAYS[case][0],):
             name, unit = name_and_unit(channel)
             error = 100.0 * normalised_rms(cheap[channel], dear[channel])
             quantity = f"{name}, rms error over the deviation, {case}"

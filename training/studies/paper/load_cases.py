@@ -18,15 +18,13 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.mooring import catenary
+from fowt_env.training.validation.comparison import COMBINATIONS, TIME, Channel
 from fowt_env.training.validation.signal_errors import harmonics
 from fowt_env.visual.time_series import spectrum
 from fowt_env.weather.turbulence import turbulence
 
 PLATFORM = "liu_1_50"
-TIME, SURGE, PITCH = "Time_[s]", "PtfmSurge_[m]", "PtfmPitch_[deg]"
-MOTION_CHANNELS = (
-    SURGE, "PtfmSway_[m]", "PtfmHeave_[m]", "PtfmRoll_[deg]", PITCH, "PtfmYaw_[deg]",
-)  # fmt: skip
+SURGE, PITCH, MOTION_CHANNELS = Channel.SURGE, Channel.PITCH, Channel.MOTIONS
 DURATION = 500.0  # s at model scale, 59 min at full scale
 SKIP = 100.0  # s left out of statistics, ten surge periods
 SEGMENT = 125.0  # s of a spectrum's window: 12 surge periods
@@ -282,12 +280,6 @@ def static_pull(platform, direction, offsets):
 
 # --------------------------------------------------------------------------- full scale
 
-COMBINATIONS = (  # kinematics position, surface, stretching; theory.md, section 8
-    ("fixed", "swl", "none"),
-    ("instantaneous", "swl", "none"),
-    ("fixed", "instantaneous", "wheeler"),
-    ("instantaneous", "instantaneous", "wheeler"),
-)
 EXPECTED_DOUBLE = ((0.02, 0.02), (0.34, 0.34), (0.60, 0.52), (0.92, 0.83))  # %, theory.md, section 8
 DECAYS = {"surge decay": ("PtfmSurge", 10.0, SURGE, 600.0), "pitch decay": ("PtfmPitch", 5.0, PITCH, 300.0)}
 
