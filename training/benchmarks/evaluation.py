@@ -62,14 +62,9 @@ def ray_cost(count=200, controller="pi", suite="above_rated"):
     full = f"a task that returns {len(content) / 1e6:.1f} MB"
     for what, size in (("an empty task", 0), (full, len(content))):
         times = [time.perf_counter()]
-        for _ in outcomes(_returned, [size] * count, jobs=1, engine="ray"):
+        for _ in outcomes(bytes, [size] * count, jobs=1, engine="ray"):
             times.append(time.perf_counter())
         # the first results wait for the cluster to start
         settled = times[len(times) // 4 :]
         rows.append({"what": what, "ms per task": 1e3 * (settled[-1] - settled[0]) / (len(settled) - 1)})
     return pd.DataFrame(rows)
-
-
-def _returned(size):
-    """Return this number of bytes."""
-    return bytes(size)

@@ -193,10 +193,10 @@ def paired_times(calls, rounds):
     return times[1:]
 
 
-@kernel
-def _repeat(part, model, data, x, u, dx, m, row, n, dt):
+@entry
+def _repeat(handle, part, x, u, dx, m, row, n, dt):
     """Call one of LOADS n times at changing times and places; return a sum, so that no call is left out."""
-    total = 0.0
+    model, data, total = model_of(handle), data_of(handle), 0.0
     for i in range(n):
         t = i * dt
         x[State.SURGE] += 1e-7  # nothing is the same as before: no call can be left out
@@ -250,11 +250,6 @@ def _of_water(part, t, pose, hydro, data):
     return 0.0
 
 
-@entry
-def _repeat_in(handle, part, x, u, dx, m, row, n, dt):
-    return _repeat(part, model_of(handle), data_of(handle), x, u, dx, m, row, n, dt)
-
-
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     """Return {load: microseconds of one call} near a state, without those of the loop and the pose."""
     scene = scene.with_step(0.1)
@@ -265,7 +260,7 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     output(handle, x, u, 0.0, dx, row)  # fills the cached loads that measure and record read
     micro = {}
     for part, name in enumerate(LOADS):
-        call = partial(_repeat_in, handle, part)
+        call = partial(_repeat, handle, part)
         time = median_time(lambda call=call: call(x.copy(), u, dx, m, row, calls, 0.1), repeats)
         micro[name] = 1e6 * time / calls
     base = micro[LOADS[0]]

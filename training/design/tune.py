@@ -94,11 +94,6 @@ def _pi(settings, turbine, control_dt):
     return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")
 
 
-def _mpc_lidar(settings, turbine, control_dt):
-    changed = MPCSettings(preview_time=LIDAR_HORIZON, **settings)
-    return MPC(turbine, control_dt, changed, "mpc_lidar", preview=True, exact=False)
-
-
 _LQR = {
     "share": (0.0, 0.9), "share_growth": (-0.04, 0.04), "travel": (0.85, 1.05), "travel_cap": (0.11, 0.18),
     "travel_near_rated": (0.15, 0.35), "shaft": (0.7, 1.5), "shaft_near_rated": (0.03, 0.12),
@@ -129,6 +124,10 @@ def spaces():
     def of(record, ranges):
         return ranges, {key: getattr(record, key) for key in ranges}
 
+    def lidar(settings, turbine, dt):
+        changed = MPCSettings(preview_time=LIDAR_HORIZON, **settings)
+        return MPC(turbine, dt, changed, "mpc_lidar", preview=True, exact=False)
+
     def feedback(settings, turbine, dt):
         return FloatingFeedback(PISettings.published(turbine), FeedbackSettings(**settings), dt)
 
@@ -136,7 +135,7 @@ def spaces():
         "floating_feedback": Space(_FEEDBACK, tuned("floating_feedback"), feedback),
         "lqr": Space(*of(LQGSettings(), _LQR), lambda s, t, dt: LQR(t, dt, LQGSettings(**s))),
         "mpc": Space(*of(MPCSettings(), _MPC), lambda s, t, dt: MPC(t, dt, MPCSettings(**s))),
-        "mpc_lidar": Space(*of(MPCSettings(), _MPC), _mpc_lidar),
+        "mpc_lidar": Space(*of(MPCSettings(), _MPC), lidar),
         "mpc_preview": Space(
             *of(PREVIEW, _MPC),
             lambda s, t, dt: MPC(t, dt, PREVIEW.changed(**s), "mpc_preview", preview=True),

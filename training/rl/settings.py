@@ -97,7 +97,11 @@ def check_settings(settings, where="settings"):
     if not isinstance(settings, dict):
         raise InputError(f"{where}: must be a table of settings")
     raise_problems(where, validate(TrainingSettings, settings)[1])
-    known = {"environment": environment_keys(), "decisions": [f.name for f in fields(DecisionSettings)]}
+    settable = [name for name in SETTINGS if name not in NOT_SET_THERE]
+    known = {
+        "environment": list(dict.fromkeys([*OF_TRAINING, *settable, *OPTIONS])),
+        "decisions": [f.name for f in fields(DecisionSettings)],
+    }
     problems = [
         unknown_key(f"{section}.{key}", key, keys)
         for section, keys in known.items() for key in settings[section] if key not in keys
@@ -114,12 +118,6 @@ def check_settings(settings, where="settings"):
     raise_problems(where, problems)
     DecisionSettings(**settings["decisions"])
     return settings
-
-
-def environment_keys():
-    """Return the names of all settings of the environment that a training run may change."""
-    own = [name for name in SETTINGS if name not in NOT_SET_THERE]
-    return list(dict.fromkeys([*OF_TRAINING, *own, *OPTIONS]))
 
 
 def check_algorithm(kind, name, given):

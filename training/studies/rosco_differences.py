@@ -115,12 +115,6 @@ def variants(turbine):
     }
 
 
-def case_at(wind):
-    """Return the case of normal operation at a wind, m/s."""
-    turbulent = {"kind": "ntm", "speed": wind, "class": "B"}
-    return Case(f"ntm_{wind:g}", turbulent, joint_sea_state(SITE, wind))
-
-
 def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
     """Return a DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases.
 
@@ -129,7 +123,8 @@ def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
     laws = variants(read_turbine("nrel5mw"))
     if names is not None:
         laws = {name: laws[name] for name in (BASELINE, *names)}
-    cases = [case_at(wind) for wind in winds]
+    turbulent = {"kind": "ntm", "class": "B"}
+    cases = [Case(f"ntm_{u:g}", turbulent | {"speed": u}, joint_sea_state(SITE, u)) for u in winds]
     table = evaluate(laws, cases, duration=duration, seeds=seeds, jobs=jobs, control_dt=CONTROL_DT)
     return mean_ratios(table, BASELINE, SHOWN.values()).set_axis(list(SHOWN), axis=1)
 

@@ -47,13 +47,6 @@ GRAVITY = 9.80665
 DRAG_STEPS = np.radians([0.02 * 200.0] * 3 + [2.0] * 3)  # m/s and rad/s, of HydroDyn's differences
 
 
-def with_linearised_drag(scene):
-    """Return the scene with the damping that HydroDyn's differences make of its quadratic drag."""
-    matrices = scene.model.hydro.matrices
-    damping = matrices.linear_damping + matrices.quadratic_damping * DRAG_STEPS
-    return scene.with_model({"hydro.matrices.linear_damping": damping})
-
-
 def old_deck():
     """Return Platform and Turbine with the figures of the older deck."""
     platform = read_platform(PLATFORM)
@@ -160,7 +153,9 @@ def linear(study):
             shear_exponent=SHEAR, radiation="state_space",
             fidelity="reference",
         )  # fmt: skip
-        model = linearize(with_linearised_drag(scene))
+        drag = scene.model.hydro.matrices  # with the damping that HydroDyn's differences make of it
+        damping = drag.linear_damping + drag.quadratic_damping * DRAG_STEPS
+        model = linearize(scene.with_model({"hydro.matrices.linear_damping": damping}))
         theirs = poles[np.isclose(poles["wind_mps"], wind)].iloc[0]
         case = f"linear model at {wind:g} m/s (against OpenFAST)"
         for name, unit, there in (

@@ -15,6 +15,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.analysis.trim import trim_prescribed
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.mooring import catenary
@@ -79,40 +80,30 @@ def wanted_cases(text):
     return list(dict.fromkeys(chosen))
 
 
-def model_wind(speed, hub_height, diameter, duration, seed):
-    """Return a wind specification: rotor-averaged Kaimal turbulence of low intensity about a speed (m/s)."""
-    period, value = turbulence(
-        speed, INTENSITY * speed, height=hub_height, diameter=diameter, period=duration, seed=seed,
-        shear_turbulence=False,
-    )  # fmt: skip
-    time = np.linspace(0.0, period, len(value))
-    return {"kind": "series", "time": time, "speed": speed + value[:, 0]}
-
-
 def load_case_scene(name, duration=DURATION, seed=1, **options):
-    """Return the scene of a model-scale load case; options as in build_scene."""
-    case = CASES[name]
-    platform = read_platform(PLATFORM)
-    wind = None
+    """Return the scene of a model-scale load case; options as in build_scene.
+
+    The wind is rotor-averaged Kaimal turbulence of low intensity.
+    """
+    case, platform, wind = CASES[name], read_platform(PLATFORM), None
     if case.wind is not None:
-        rotor = fowt_env.descriptions.turbine.read_turbine(platform.turbine).rotor
-        wind = model_wind(case.wind, rotor.hub_height, 2.0 * rotor.tip_radius, duration, seed)
+        rotor = read_turbine(platform.turbine).rotor
+        period, value = turbulence(
+            case.wind, INTENSITY * case.wind, height=rotor.hub_height, diameter=2.0 * rotor.tip_radius,
+            period=duration, seed=seed, shear_turbulence=False,
+        )  # fmt: skip
+        time = np.linspace(0.0, period, len(value))
+        wind = {"kind": "series", "time": time, "speed": case.wind + value[:, 0]}
     options = {"fidelity": "standard", "integrator": "rk4", "duration": duration} | options
     return fowt_env.build_scene(platform, wind=wind, sea=case.sea, seed=seed, **options)
 
 
-def case_point(scene, name):
-    """Return the OperatingPoint of a load case with its prescribed rotor speed and blade pitch."""
-    case = CASES[name]
-    return trim_prescribed(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
-
-
 def run_load_case(name, duration=DURATION, seed=1, progress=False, **options):
     """Return the DataFrame of a model-scale load case, started from its steady state."""
-    scene = load_case_scene(name, duration, seed, **options)
-    case, point = CASES[name], case_point(scene, name)
-    names = [column.split("_[")[0] for column in MOTION_CHANNELS]
-    initial = {name: point[name] for name in names}
+    scene, case = load_case_scene(name, duration, seed, **options), CASES[name]
+    point = trim_prescribed(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
+    motions = [column.split("_[")[0] for column in MOTION_CHANNELS]
+    initial = {motion: point[motion] for motion in motions}
     initial |= {"RotSpeed": case.rotor_rpm, "BldPitch1": case.blade_pitch_deg}
     return fowt_env.simulate(
         scene, controller=None, duration=duration, dt=STEP, control_dt=0.1, output_dt=OUTPUT, start="zero",

@@ -153,12 +153,6 @@ def regular_waves(full, path=None, window=(420.0, 450.0)):
     return save_figure(figure, path)
 
 
-def claims_table(study):
-    """Return a Markdown table of the claims with their verdicts."""
-    rows = [(c.figure, c.text, c.found, "holds" if c.holds else "FAILS") for c in study.claims]
-    return markdown_table(("figure", "claim of the paper", "found here", "verdict"), rows)
-
-
 def double_frequency_table(full):
     """Return a Markdown table of second over first harmonics for the four combinations."""
     ratios = ("surge, 2nd/1st", "pitch, 2nd/1st")
@@ -210,7 +204,9 @@ def write_paper_report(study, folder, plot=True):
             paths.append(Path(write_table(frame, folder / "runs" / f"{case}.parquet")))
         paths.append(Path(write_table(load_cases.statistics(study.runs), folder / "statistics.csv")))
         text += ["## Natural periods of the 1:50 model", "", periods_table(), "", "## Claims", ""]
-        text += [claims_table(study), "", "## Statistics, model scale", "", statistics_table(study.runs), ""]
+        rows = [(c.figure, c.text, c.found, "holds" if c.holds else "FAILS") for c in study.claims]
+        text += [markdown_table(("figure", "claim of the paper", "found here", "verdict"), rows), ""]
+        text += ["## Statistics, model scale", "", statistics_table(study.runs), ""]
     if study.full:
         text += ["## Double frequency, H 3 m, T 5 s, full scale", "", double_frequency_table(study.full), ""]
     with replacing(folder / "paper.md") as temporary:

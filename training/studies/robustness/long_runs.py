@@ -57,14 +57,6 @@ def free_start():
     return x
 
 
-def floating_start():
-    """Return the state (N_RIGID,) of a platform set free at an offset, with its rotor turning."""
-    x = np.zeros(N_RIGID)
-    x[:6] = 5.0, 2.0, 0.5, 0.02, 0.06, 0.03
-    x[State.ROTOR_SPEED] = 1.2671
-    return x
-
-
 def kinetic_energy(scene, x):
     """Return the kinetic energy of platform and rotor, J."""
     body, speed = scene.model.rigid_body, x[State.ROTOR_SPEED]
@@ -114,7 +106,8 @@ def floating_drift(integrator, steps, dt=None, progress=None):
 
     The energy of the motion is kinetic (without the rotor's spin) and potential energy above rest.
     """
-    scene, x = floating_scene(), floating_start()
+    scene, x = floating_scene(), np.zeros(N_RIGID)
+    x[:6], x[State.ROTOR_SPEED] = (5.0, 2.0, 0.5, 0.02, 0.06, 0.03), 1.2671  # set free at an offset
     handle = with_integrator(scene, integrator).handle()
     start = kinetic_energy(scene, x) + potential_energy(handle, x)
     moving = potential_energy(handle, x) - potential_energy(handle, np.zeros(N_RIGID))

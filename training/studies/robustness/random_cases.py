@@ -337,14 +337,6 @@ def _case(scene, wind, sea, seed, state, commands, duration):
     }  # fmt: skip
 
 
-def random_case_scene(case):
-    """Return the scene of a case."""
-    return build_scene(
-        wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
-        integrator=case["integrator"], tower=case.get("tower", "rigid"), duration=WEATHER,
-    )  # fmt: skip
-
-
 def replay(case):
     """Return the Outcome of a case dict or of its JSON file. Raises: InputError if keys are missing."""
     if not isinstance(case, dict):
@@ -360,7 +352,11 @@ def replay(case):
     missing = [key for key in KEYS if key not in case]
     if missing:
         raise InputError(f"case: {', '.join(missing)} missing; needs {', '.join(KEYS)}")
-    return Runner(random_case_scene(case), case["dt"]).run(case["state"], case["commands"], case["duration"])
+    scene = build_scene(
+        wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
+        integrator=case["integrator"], tower=case.get("tower", "rigid"), duration=WEATHER,
+    )  # fmt: skip
+    return Runner(scene, case["dt"]).run(case["state"], case["commands"], case["duration"])
 
 
 def with_integrator(scene, name, rotor_samples=1):

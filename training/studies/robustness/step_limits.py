@@ -6,6 +6,7 @@ velocities.
 """
 
 from dataclasses import dataclass, field
+from functools import partial
 from math import exp, log
 
 import numpy as np
@@ -215,13 +216,9 @@ def excursions(scene, point, dt, duration=DURATION):
     return peaks, late
 
 
-def measured_limit(scene, point, fine, duration=DURATION):
-    """Return the largest step (s) without blow-up of a scene's integrator; fine: peaks of the fine run."""
-
-    def holds(dt):
-        return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
-
-    return first_unstable(holds, INTEGRATORS[scene.options["integrator"]].dt)
+def stays(scene, point, fine, dt, duration=DURATION):
+    """Return whether a run with steps dt does not blow up; fine: peaks of the fine run."""
+    return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
 
 
 def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progress=None):
@@ -248,9 +245,9 @@ def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progre
                 continue
             scene = with_integrator(base, integrator, kind.rotor_samples)
             default = INTEGRATORS[integrator].dt
-            found = measured_limit(scene, point, fine, duration)
+            found = first_unstable(partial(stays, scene, point, fine, duration=duration), default)
             scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
-            theory = first_unstable(lambda h, m=model, i=scheme: stable(m.A, h, i, duration), default)
+            theory = first_unstable(partial(stable, model.A, integrator=scheme, duration=duration), default)
             mode = limiting_state(model.A, theory * SCAN, scheme) if theory < np.inf else ""
             rows.append({
                 "kind": name, "integrator": integrator, "default_s": default, "measured_s": found,
