@@ -7,7 +7,6 @@ measured in the same minute: figures of two machines compare through it.
 import os
 import platform
 import subprocess
-import sys
 import tempfile
 import time
 from dataclasses import dataclass, field
@@ -25,7 +24,7 @@ from fowt_env.control import EXACT
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.initial_conditions import initial_state
 from fowt_env.plant.aero.load import rotor_part
@@ -45,6 +44,7 @@ from fowt_env.plant.rollout import Schedule, advance, forget, observe, output, r
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import HeldCommand, reader_of, simulate
+from fowt_env.training.benchmarks.compile_time import session
 from fowt_env.training.validation.openfast_cases import box_wind
 
 PLATFORM = "oc3_hywind"
@@ -355,33 +355,23 @@ def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None
 
 
 START_CODE = """
-import time
-start, cpu = time.perf_counter(), time.process_time()
 import fowt_env
-imported = time.perf_counter()
+report("import")
 scene = fowt_env.build_scene(wind=18.0, sea={"kind": "jonswap", "Hs": 7.5, "Tp": 10.0}, fidelity="FIDELITY")
 fowt_env.simulate(scene, "pi", duration=10.0)
-print(imported - start, time.perf_counter() - start, time.process_time() - cpu)
+report("scene and run")
 """
 
 
 def start_times(fidelity="standard"):
     """Return {what: seconds}: a first run, its cache of kernels empty, and a later one, in new processes."""
-    root = Path(fowt_env.__file__).resolve().parents[1]
     times = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in ("first", "later"):
-            done = subprocess.run(
-                [sys.executable, "-c", START_CODE.replace("FIDELITY", fidelity)],
-                env={**os.environ, "FOWT_CACHE_DIR": folder}, cwd=root, capture_output=True, text=True,
-                check=False,
-            )  # fmt: skip
-            if done.returncode != 0:
-                raise InputError(f"start times: the run in a new process failed: {done.stderr[-400:]}")
-            imported, whole, processor = map(float, done.stdout.split())
-            times[f"{name} start, import (s)"] = imported
-            times[f"{name} start, import, scene and 10 s run (s)"] = whole
-            times[f"{name} start, processor time of that (s)"] = processor
+            table = session(START_CODE.replace("FIDELITY", fidelity), folder)
+            times[f"{name} start, import (s)"] = table["seconds"][0]
+            times[f"{name} start, import, scene and 10 s run (s)"] = table["seconds"].sum()
+            times[f"{name} start, processor time of that (s)"] = table["processor_seconds"].sum()
     return times
 
 
