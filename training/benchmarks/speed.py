@@ -45,7 +45,6 @@ from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.simulation import HeldCommand, reader_of, simulate
 from fowt_env.training.benchmarks.compile_time import session
-from fowt_env.training.validation.openfast_cases import box_wind
 
 PLATFORM = "oc3_hywind"
 CALIBRATION_STEPS = 10_000_000
@@ -99,6 +98,8 @@ class TimedScene:
 def _box(platform):
     """Return the wind of a box that the rotor fits into: OC3's stored one, else a sum of plane waves."""
     if platform == PLATFORM:
+        from fowt_env.training.validation.openfast_cases import box_wind
+
         return box_wind()
     return made_box(read_turbine(read_platform(platform).turbine).rotor)
 
