@@ -43,23 +43,13 @@ def export_policy(model, normalisation, single, decisions, path, about):
     task = single.task
     statistics = normalisation.obs_rms
     settings = {
-        "format": FORMAT,
-        "activation": activation,
-        "squash": squash,
-        "layers": len(linear),
-        "clip_observation": float(normalisation.clip_obs),
-        "control_dt": single.control_dt,
-        "decisions": asdict(decisions),
-        "action_mode": single.action_mode,
-        "baseline": single.baseline,
-        "observation": list(task.observation),
-        "wind_preview": list(task.wind_preview),
-        "blade_pitch": list(task.blade_pitch),
-        "setpoint": list(task.setpoint),
-        "residual_torque": task.residual_torque,
-        "residual_pitch": task.residual_pitch,
-        "about": about,
-    }
+        "format": FORMAT, "activation": activation, "squash": squash, "layers": len(linear),
+        "clip_observation": float(normalisation.clip_obs), "control_dt": single.control_dt,
+        "decisions": asdict(decisions), "action_mode": single.action_mode, "baseline": single.baseline,
+        "observation": list(task.observation), "wind_preview": list(task.wind_preview),
+        "blade_pitch": list(task.blade_pitch), "setpoint": list(task.setpoint),
+        "residual_torque": task.residual_torque, "residual_pitch": task.residual_pitch, "about": about,
+    }  # fmt: skip
     arrays = {
         "settings": np.array(json.dumps(settings)),
         "mean": statistics.mean,

@@ -495,7 +495,7 @@ class Training:
             "rows": self.rows,
             "seconds": self.checkpointing.seconds(),
             "episodes": list(model.ep_info_buffer),
-        }  # fmt: skip
+        }
         with (folder / "state.pkl").open("wb") as file:
             pickle.dump(state, file)
         seal(folder)
