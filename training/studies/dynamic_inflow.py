@@ -73,7 +73,7 @@ def speeds(platform="oc3_hywind", wind=18.0):
 
 
 def main(speed: Annotated[bool, typer.Option("--speed", help="Time of a run with and without it.")] = False):
-    """Print a table."""
+    """Print the errors of the look-up rotor with and without dynamic inflow."""
     if speed:
         print(markdown_table(["rotor", "times real time", "of the quasi-steady one's"], speeds()))
     else:

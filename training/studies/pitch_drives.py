@@ -88,7 +88,7 @@ def main(
     timed: Annotated[bool, typer.Option("--speed", help="Time of a run instead.")] = False,
     rounds: Annotated[int, typer.Option(help="Pairs of runs to time.")] = 15,
 ):
-    """Print a table."""
+    """Print the effect of the pitch drive on runs: none, of first order, of second order."""
     if timed:
         heading = ["platform", "x real time without a drive", "with that of second order", "speed ratio"]
         print(markdown_table(heading, speed(rounds)))

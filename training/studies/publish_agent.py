@@ -92,7 +92,7 @@ def publish(folder, name, machine):
 
 
 def main(folder: str, name: str, machine: Annotated[str, typer.Option(help="Kind of machine of the run.")]):
-    """Publish one run."""
+    """Ship the best policy of a training run: its .npz and its card."""
     for path in publish(folder, name, machine):
         print(path)
 

@@ -130,7 +130,7 @@ def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
 
 
 def main(jobs: Annotated[int, typer.Option(help="Processes.")] = 1):
-    """Print the table."""
+    """Print the changes from the published law to ROSCO with its gains, one at a time."""
     print(differences(jobs=jobs).round(3).to_string())
 
 

@@ -126,7 +126,7 @@ def main(
     agents: Annotated[str, typer.Option(help="Names or paths of policies, comma-separated.")] = "",
     out: Annotated[str, typer.Option(help="CSV to write.")] = "results/safety.csv",
 ):
-    """Run the study, print and write it."""
+    """Run agents with and without the safety layer on validation episodes; print and write the table."""
     table = safety_study([name for name in agents.split(",") if name])
     print(table.round(2).to_string(index=False))
     write_table(table, out)
