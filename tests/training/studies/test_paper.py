@@ -134,27 +134,9 @@ def test_every_load_case_runs_and_stays_finite(runs):
         assert np.isfinite(frame.to_numpy()).all()
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "LC1: surge is nearly steady",
-        "LC2: surge spectrum peaks at the pitch frequency",
-        "mean pitch is largest at rated wind (LC2)",
-        "mean pitch falls above rated (LC2 > LC3 > LC4)",
-        "LC5: surge spectrum peaks at the surge frequency",
-        "LC5: surge spectrum peaks at the pitch frequency",
-        "LC5: surge spectrum peaks at the wave frequency",
-        "LC5: surge spectrum peaks at twice the wave frequency",
-        "LC5 to LC8: the range grows with the waves",
-        "LC5 to LC8: waves leave the mean alone",
-        "LC11: pitch spectrum peaks at the pitch frequency",
-        "LC11: pitch spectrum peaks at the wave frequency",
-        "LC9 to LC12: wind sets the mean",
-        "LC10 to LC12: waves set the range",
-    ],
-)
-def test_a_claim_of_figures_6_to_12_holds(text, runs, natural):
-    assert verdicts(runs, natural)[text]
+def test_every_claim_of_figures_6_to_12_holds(runs, natural):
+    found = verdicts(runs, natural)
+    assert len(found) == 14 and all(found.values()), found
 
 
 def test_the_judge_sees_no_double_frequency_where_waves_act_at_rest(natural):
