@@ -154,7 +154,7 @@ def bending_steps():
 def select(names):
     """Return the variants of the axes named. Raises: InputError for an unknown axis.
 
-    "levels" stands for those that are levels of build_scene; "steps of the levels" are these at several
+    "levels" selects the variants that are levels of build_scene; "steps of the levels" are these at several
     steps, "parts of standard alone" what one of them replaces and "bending tower" a plant of its own, none
     of them part of the sweep of all;
     "reference" adds none to those of every study.

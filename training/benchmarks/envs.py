@@ -76,7 +76,7 @@ def single_costs(env, seconds):
     """Return {step_us, physics_us, overhead_us, get_state_us, set_state_us, reset_ms} of one environment.
 
     The physics are those of the compiled call for a batch of 16 such environments, over 16; the overhead is
-    what a step takes beyond them. The resets draw new wind, sea and offsets, with all trims known.
+    the rest of a step. The resets draw new wind, sea and offsets, with all trims known.
     """
     few = 16
     batch = FowtVectorEnv(few, threads=1, **env)

@@ -172,7 +172,7 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
     way = 1.0 - np.array([speed_ratio, pitch_ratio])
     if not len(line) or not np.any(way > 0.0):
         return float("nan")
-    # the front goes on straight up and to the right from its ends
+    # the front continues straight up and to the right from its ends
     line = np.vstack([[line[0, 0], 10.0], line, [10.0, line[-1, 1]]])
     for start, end in pairwise(1.0 - line):
         try:

@@ -25,7 +25,7 @@ from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.seeds import VALIDATION
 
-INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
+INFINITE = 1e3  # rad/s: larger generalised eigenvalues are zeros at infinity
 MODEL_SUFFIXES = (".json", ".npz")
 SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
 KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")

@@ -2,8 +2,8 @@
 
 A checkpoint that a run of this user wrote carries a seal, a keyed hash (HMAC-SHA256) of all its files. The
 key is in the user's configuration folder (FOWT_CONFIG_DIR, else XDG_CONFIG_HOME/fowt_env or
-~/.config/fowt_env), for nobody else to read. A checkpoint without a right seal is loaded only where the user
-says so.
+~/.config/fowt_env), readable for this user alone. A checkpoint without a right seal is loaded only where
+the user says so.
 """
 
 import hashlib

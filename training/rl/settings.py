@@ -42,12 +42,12 @@ SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may
 GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
     "self", "policy", "env", "seed", "device", "tensorboard_log", "verbose", "_init_setup_model",
 )  # fmt: skip
-OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that no text stands for
+OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that are no text or number
 NOT_SET_THERE = ("task", "render_mode")  # of FowtEnv: what training gives, or lacks
 
 
 class Normalise(Record):
-    """Arguments of stable-baselines3's VecNormalize; what is left out has its default."""
+    """Arguments of stable-baselines3's VecNormalize; missing ones have their defaults."""
 
     norm_obs: Switch = True
     norm_reward: Switch = True

@@ -78,8 +78,8 @@ RATIOS = (
 )  # fmt: skip
 # what the validation score adds to the mean ratio of the motions
 FAILURE_COST = 10.0  # per fraction of episodes that failed
-TRAVEL_COST = 2.0  # per unit of blade-pitch travel beyond the reference's
-TORQUE_COST = 1.0  # per unit of torque travel, and of shaft-torque DEL, beyond the reference's
+TRAVEL_COST = 2.0  # per unit of blade-pitch travel above the reference's
+TORQUE_COST = 1.0  # per unit of torque travel, and of shaft-torque DEL, above the reference's
 POWER_COST = 20.0  # per unit of mean power, counted up to rated, short of LEAST_POWER
 LEAST_POWER = 0.999  # of the reference's
 UNREST_COST = 0.5  # per fraction of episodes of steady wind that did not come to rest

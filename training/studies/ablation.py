@@ -142,7 +142,7 @@ def markdown(rows):
 
 
 def main(arguments=None):
-    """Train what is left of the chosen variants, or report what there is."""
+    """Train the rest of the chosen variants, or report the validated ones."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", default="runs/ablation", help="folder of the runs")
     parser.add_argument("--table", default=str(TABLE), help="file of variants")

@@ -1,4 +1,4 @@
-"""What the cheaper modelling choices cost: the same run with the dearer and the cheaper one, compared."""
+"""Errors of cheaper modelling choices: the same run with the costlier and the cheaper one, compared."""
 
 import numpy as np
 import pandas as pd
@@ -28,7 +28,7 @@ RUN_CHANGES = {  # name of a run: (case, changes)
     "rotor-averaged wind": (BOX, {}),  # with the wind of _disk
     "rotor-averaged wind, rotor table": (BOX, {"rotor": "table", "skewed_wake": False}),
 }
-CHOICES = {  # cheaper choice: (run with the dearer one, run with the cheaper one)
+CHOICES = {  # cheaper choice: (run with the costlier one, run with the cheaper one)
     "skewed wake off (against on)": ("uniform wind", "uniform wind, no skewed wake"),
     "tabulated rotor (against BEM, both without skewed wake)": (
         "uniform wind, no skewed wake", "uniform wind, rotor table",
@@ -46,7 +46,7 @@ CHOICES = {  # cheaper choice: (run with the dearer one, run with the cheaper on
 
 
 def cheaper_choices(study):
-    """Compare each cheaper choice with the dearer one on the same run; keep the runs for the plots."""
+    """Compare each cheaper choice with the costlier one on the same run; keep the runs for the plots."""
     disk = _disk(study)
     for name, (case, changes) in RUN_CHANGES.items():
         if name not in study.runs:
@@ -55,8 +55,8 @@ def cheaper_choices(study):
             frame = RUNS[case].frame(study.folder, study.bts, dt=STEP, **changes, **wind)
             study.runs[name] = (frame, None)
     channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED, Channel.THRUST, Channel.TENSIONS[0])
-    for choice, (dearer, cheaper) in CHOICES.items():
-        pair = since((study.runs[cheaper][0], study.runs[dearer][0]), SETTLED)
+    for choice, (costlier, cheaper) in CHOICES.items():
+        pair = since((study.runs[cheaper][0], study.runs[costlier][0]), SETTLED)
         study.add_statistics(choice, channels, ("mean", "std", "rms"), pair=pair)
     _generator(study, disk)
 

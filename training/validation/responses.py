@@ -136,7 +136,7 @@ def rao(name, study):
     study.say("responses to small waves")
     body = body_of(name)
     known = body.coefficients["excitation_omega"]
-    omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # the plant has no force beyond its table
+    omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # the plant has no force outside its table
     waves = sea(omega)
     scene = without_drag(build_scene(name, sea=waves, duration=END, fidelity="reference"))
     frame = simulate(scene, None, duration=END, dt=STEP, output_dt=0.1)

@@ -68,7 +68,7 @@ def ringing(time, value, low, high):
 def recovery(time, value, step, settled):
     """Return (level before, level after, overshoot, its time) of a series with a step at `step` s.
 
-    The level after is the mean from `settled` on. The overshoot is how far the series goes beyond it, with
+    The level after is the mean from `settled` on. The overshoot is how far the series passes it, with
     its sign, and its time (s) the integral of the deviation from there on over the overshoot: the time
     constant of an exponential.
     """

@@ -4,7 +4,7 @@ Lengths by the scale L, speeds and times by sqrt(L), masses and forces by L^3 (w
 are), power by L^3.5: 10 MW from 5 MW is L = 2^(1/3.5) = 1.219. Blade twist, polars and all coefficients stay.
 
 The result is similar to its original, not a design: masses of real turbines grow less than L^3, rated wind
-speed does not grow with size, and nobody has built it. It shows that the description carries another size,
+speed does not grow with size, and it has not been built. It shows that the description carries another size,
 and serves where a control law is to be tried on one.
 
 `python -m fowt_env.training.studies.froude_model.scale --help` has the settings; without any it writes the

@@ -151,7 +151,7 @@ def amplification(a, h, integrator):
 
 
 def stable(a, h, integrator, duration=DURATION):
-    """Return whether errors grow no more than GROWTH times beyond the plant itself over the duration."""
+    """Return whether errors grow no more than GROWTH times as much as the plant itself over the duration."""
     radius = np.abs(np.linalg.eigvals(amplification(a, h, integrator))).max()
     own = max(0.0, np.linalg.eigvals(a).real.max())
     return duration / h * log(radius) <= own * duration + log(GROWTH)
@@ -224,7 +224,7 @@ def stays(scene, point, fine, dt, duration=DURATION):
 def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progress=None):
     """Return a DataFrame with a row per kind of scene and integrator.
 
-    Columns: kind, integrator, default_s, measured_s, theory_s (largest steps; inf beyond LARGEST_STEP),
+    Columns: kind, integrator, default_s, measured_s, theory_s (largest steps; inf above LARGEST_STEP),
     margin (measured over default), mode (state that grows first), fastest_1_per_s (largest eigenvalue
     of the plant but for the blade-pitch actuator).
     """

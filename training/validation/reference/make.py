@@ -135,7 +135,7 @@ def inputs(source):
 
 # region of the box: columns within this of the axis, rows up to this height, seconds
 SIDE, TOP, LENGTH = 68.0, 162.0, 612.0
-REACH = 78.0  # m from the hub: beyond it no blade station has a corner of its cell
+REACH = 78.0  # m from the hub: farther out no blade station has a corner of its cell
 ROUNDING = np.array([0.04, 0.08, 0.08])  # m/s, rounding of u, v, w
 
 
