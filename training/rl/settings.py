@@ -42,7 +42,7 @@ SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may
 GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
     "self", "policy", "env", "seed", "device", "tensorboard_log", "verbose", "_init_setup_model",
 )  # fmt: skip
-OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that are no text or number
+OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that are objects
 NOT_SET_THERE = ("task", "render_mode")  # of FowtEnv: what training gives, or lacks
 
 
