@@ -99,23 +99,6 @@ def test_integrals_over_the_spectra_are_the_covariances_of_lyapunov_equations(pl
         assert found[QUANTITIES.index("torque")] == 0.0
 
 
-def test_no_other_gain_has_a_lower_cost_with_full_information(plant):
-    problem = Problem(plant, FULL)
-    a, b, g = whole(problem)
-    q = np.zeros_like(a)
-    small = problem.cost(*WEIGHTS)
-    q[: len(small), : len(small)] = small
-    k = np.linalg.solve(problem.r, b.T @ solve_continuous_are(a, b, q, problem.r))
-
-    def total(gain):
-        return np.trace((q + gain.T @ problem.r @ gain) @ solve_continuous_lyapunov(a - b @ gain, -g @ g.T))
-
-    random = np.random.default_rng(1)
-    tried = [k * (1.0 + 0.02 * random.standard_normal(k.shape)) for _ in range(40)]
-    stable = [gain for gain in tried if np.linalg.eigvals(a - b @ gain).real.max() < 0.0]
-    assert len(stable) >= 10 and min(total(gain) for gain in stable) > total(k)
-
-
 def delay_line(problem, q, time, step):
     """(A, B, noise, K) of plant and weather sampled at step, the wind of the next time s as states of a line.
 
