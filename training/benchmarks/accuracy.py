@@ -22,18 +22,14 @@ from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
 from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, TimedScene, calibration, header, loop_time
 from fowt_env.training.validation.signal_errors import normalised_rms
+from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 from fowt_env.weather.wind_field import is_field
 
 CHANNELS = {
-    "surge": "PtfmSurge_[m]",
-    "sway": "PtfmSway_[m]",
-    "heave": "PtfmHeave_[m]",
-    "roll": "PtfmRoll_[deg]",
-    "platform_pitch": "PtfmPitch_[deg]",
-    "yaw": "PtfmYaw_[deg]",
-    "rotor_speed": "RotSpeed_[rpm]",
+    "surge": "PtfmSurge_[m]", "sway": "PtfmSway_[m]", "heave": "PtfmHeave_[m]", "roll": "PtfmRoll_[deg]",
+    "platform_pitch": "PtfmPitch_[deg]", "yaw": "PtfmYaw_[deg]", "rotor_speed": "RotSpeed_[rpm]",
     "fairlead_tension": "FAIRTEN1_[kN]",
-}
+}  # fmt: skip
 PLATFORM = "oc3_hywind"
 UNITS = {"strongest": "strongest components", "blade_stations": "stations", "strip_length": "m strips",
          "rotor_samples": "rotor loads a step"}  # fmt: skip
@@ -57,13 +53,13 @@ OPENFAST_STD = (2.005, 1.308, 1.617)
 
 @dataclass(frozen=True)
 class Variant:
-    """One choice of parts and step, with the axis that it is a point of."""
+    """One choice of parts and step, with the axis that it is a point of; the defaults are exact."""
 
     axis: str
-    integrator: str
-    dt: float
-    rotor: str
-    wave_loads: str
+    integrator: str = "rk4"
+    dt: float = 0.025
+    rotor: str = "bem"
+    wave_loads: str = "exact"
     # further options of build_scene, as (name, value); "strongest": that many of the sea's components
     options: tuple = ()
 
@@ -74,6 +70,7 @@ class Variant:
 
     @property
     def name(self):
+        """Name in tables, which tells step and parts."""
         parts = [f"{self.integrator} {self.dt:g} s", self.rotor, f"{self.wave_loads} waves"]
         for name, value in self.options:
             parts.append(f"{value:g} {UNITS[name]}" if name in UNITS else f"{name} by {value}")
@@ -87,48 +84,41 @@ BENDING = (("tower", "modes"),)  # another plant, with a reference of its own
 
 
 def step_sizes(integrator):
-    """Three steps of an integrator, s, each twice the one before."""
+    """Return three steps of an integrator, s, each twice the one before."""
     largest = LARGER_STEPS.get(integrator, INTEGRATORS[integrator].dt)
     return (0.25 * largest, 0.5 * largest, largest)
 
 
 def _axis(integrator):
-    """Axis of the rows that compare integrators with the BEM rotor."""
+    """Return the axis of the rows that compare integrators with the BEM rotor."""
     return "BEM once per step" if INTEGRATORS[integrator].evaluations == 1 else "integrator and step"
 
 
 def variants():
-    """Every variant of the sweep: one part changed at a time, then all together, cheapest parts last.
+    """Return every variant of the sweep: one part changed at a time, then all together, cheapest parts last.
 
     ab4 evaluates the loads once per step, so that its rows with the BEM rotor show the BEM solved once per
     step against at every stage (rk4 of the same step).
     """
-    found = [
-        Variant(_axis(name), name, dt, "bem", "exact") for name in INTEGRATORS for dt in step_sizes(name)
-    ]
-    found += [Variant("rotor", "rk4", 0.025, rotor, "exact") for rotor in ("lookup", "table")]
-    found += [Variant("waves", "rk4", 0.025, "bem", "fast")]
-    found += [Variant("mooring", "rk4", 0.025, "bem", "exact", TABLED)]
-    found += [
-        Variant(axis, "rk4", 0.025, "bem", waves, ((option, value),))
-        for axis, option, waves, values in (
-            ("wave components", "strongest", "fast", (200, 100, 50)),
-            ("stations per blade", "blade_stations", "exact", (13, 9, 6)),
-            ("strips", "strip_length", "exact", (1.5, 6.0, 12.0)),
-        )
-        for value in values
-    ]
+    found = [Variant(_axis(name), name, dt) for name in INTEGRATORS for dt in step_sizes(name)]
+    found += [Variant("rotor", rotor=rotor) for rotor in ("lookup", "table")]
+    found += [Variant("waves", wave_loads="fast"), Variant("mooring", options=TABLED)]
+    for axis, option, waves, values in (
+        ("wave components", "strongest", "fast", (200, 100, 50)),
+        ("stations per blade", "blade_stations", "exact", (13, 9, 6)),
+        ("strips", "strip_length", "exact", (1.5, 6.0, 12.0)),
+    ):
+        found += [Variant(axis, wave_loads=waves, options=((option, value),)) for value in values]
     found += [
         Variant("rotor loads per step", "ab4", 0.1, "lookup", "fast", (("rotor_samples", n),))
         for n in (1, 2, 3, 4)
     ]
-    found += [
+    return found + [
         Variant("all together", name, dt, rotor, "fast", options)
         for rotor, options in (("lookup", ()), ("table", TABLED))
         for name in INTEGRATORS
         for dt in step_sizes(name)[-2:]
     ]
-    return found
 
 
 # which variants are the levels of build_scene
@@ -139,29 +129,77 @@ LEVELS = {
 }
 
 
+def level_steps():
+    """Return variants of build_scene's levels at several steps, and of one part of `standard` at a time."""
+    axis, alone = "steps of the levels", "parts of standard alone"
+    return [
+        *(Variant(axis, dt=dt) for dt in (0.0125, 0.025, 0.05, 0.1)),
+        *(Variant(axis, "ab4", dt, "lookup", "fast") for dt in (0.025, 0.05, 0.1)),
+        *(Variant(axis, "ab4", dt, "table", "fast", TABLED) for dt in (0.025, 0.05, 0.1)),
+        Variant(alone, rotor="lookup"),
+        Variant(alone, options=(("radiation", "state_space"),)),
+    ]
+
+
 def bending_steps():
-    """Variants with a tower that bends in its first modes, at several steps."""
+    """Return variants with a tower that bends in its first modes, at several steps."""
     axis = "bending tower"
-    found = [Variant(axis, "rk4", dt, "bem", "exact", BENDING) for dt in (0.0125, 0.025, 0.05, 0.1)]
-    found += [Variant(axis, "rk4", dt, "lookup", "fast", BENDING) for dt in (0.0125, 0.05, 0.1)]
-    return found + [Variant(axis, "ab4", dt, "lookup", "fast", BENDING) for dt in (0.025, 0.05, 0.1)]
+    return [
+        *(Variant(axis, dt=dt, options=BENDING) for dt in (0.0125, 0.025, 0.05, 0.1)),
+        *(Variant(axis, "rk4", dt, "lookup", "fast", BENDING) for dt in (0.0125, 0.05, 0.1)),
+        *(Variant(axis, "ab4", dt, "lookup", "fast", BENDING) for dt in (0.025, 0.05, 0.1)),
+    ]
 
 
-def _scene(variant, seed, duration, wind, sea, platform):
-    options = dict(variant.options)
-    strongest = options.pop("strongest", None)
+def select(names):
+    """Return the variants of the axes named. Raises: InputError for an unknown axis.
 
-    def build(sea):
-        return build_scene(
-            platform, wind=wind, sea=sea, seed=seed, duration=max(100.0, duration), fidelity=variant.fidelity,
-            rotor=variant.rotor, wave_loads=variant.wave_loads, integrator=variant.integrator, **options,
-        )  # fmt: skip
+    "levels" selects the variants that are levels of build_scene; "steps of the levels" are these at several
+    steps, "parts of standard alone" what one of them replaces and "bending tower" a plant of its own, none
+    of them part of the sweep of all;
+    "reference" adds none to those of every study.
+    """
+    apart = [*level_steps(), *bending_steps()]
+    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in (*variants(), *apart))]
+    for name in names:
+        if name not in known:
+            raise unknown("axis", name, known)
+    chosen = [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
+    return chosen + [v for v in apart if v.axis in names]
 
-    return build(sea if strongest is None else _thinned(build(sea).model.hydro.waves, strongest))
+
+@dataclass(frozen=True)
+class Setting:
+    """Platform, weather and length (s) of all runs of a study."""
+
+    platform: str
+    wind: object
+    sea: object
+    duration: float
+
+    def scene(self, variant, seed):
+        """Return the scene of a variant."""
+        options = dict(variant.options)
+        strongest = options.pop("strongest", None)
+
+        def build(sea):
+            return build_scene(
+                self.platform, wind=self.wind, sea=sea, seed=seed, duration=max(100.0, self.duration),
+                fidelity=variant.fidelity, rotor=variant.rotor, wave_loads=variant.wave_loads,
+                integrator=variant.integrator, **options,
+            )  # fmt: skip
+
+        return build(
+            self.sea if strongest is None else _thinned(build(self.sea).model.hydro.waves, strongest)
+        )
+
+    def run(self, scene, variant):
+        """Return the DataFrame of a run of a variant's scene."""
+        return simulate(scene, "pi", duration=self.duration, dt=variant.dt)
 
 
 def _thinned(waves, count):
-    """Sea (dict) of the strongest components of Waves: the same sea, which another number would not be."""
+    """Return the sea (dict) of the strongest components of Waves, phases kept."""
     kept = np.sort(np.argsort(waves.amplitude)[-count:])
     heading = np.degrees(np.arctan2(waves.sin_heading, waves.cos_heading))
     return {
@@ -170,31 +208,16 @@ def _thinned(waves, count):
     }  # fmt: skip
 
 
-def _run(variant, seed, duration, wind, sea, platform):
-    """DataFrame of a run of this variant."""
-    return simulate(
-        _scene(variant, seed, duration, wind, sea, platform), "pi", duration=duration, dt=variant.dt
-    )
-
-
 def errors(frame, reference):
-    """{quantity: rms difference over standard deviation} of a run."""
+    """Return {quantity: rms difference over standard deviation} of a run."""
     return {name: normalised_rms(frame[channel], reference[channel]) for name, channel in CHANNELS.items()}
 
 
 def accuracy(
-    seeds=(1, 2, 3),
-    duration=600.0,
-    finest=0.00625,
-    chosen=None,
-    out=None,
-    wind=None,
-    sea=None,
-    repeats=5,
-    progress=None,
-    platform=PLATFORM,
-):
-    """DataFrame with a row per seed and variant; the first of a seed is the reference at twice its step.
+    seeds=(1, 2, 3), duration=600.0, finest=0.00625, chosen=None, out=None, wind=None, sea=None, repeats=5,
+    progress=None, platform=PLATFORM,
+):  # fmt: skip
+    """Return a DataFrame with a row per seed and variant, beginning with the reference at twice its step.
 
     finest    step of the reference, s
     repeats   of the timing of runs shorter than TIMED; the median counts
@@ -203,10 +226,9 @@ def accuracy(
     progress  called with (text, done, total)
     platform  name of a platform: each needs a CSV of its own
     """
-    wind, sea = wind or TURBULENCE, SEA if sea is None else sea
-    check = Variant(REFERENCE, "rk4", 2.0 * finest, "bem", "exact")
-    plan = [check, *(variants() if chosen is None else chosen)]
-    if not is_field(wind):
+    setting = Setting(platform, wind or TURBULENCE, SEA if sea is None else sea, duration)
+    plan = [Variant(REFERENCE, dt=2.0 * finest), *(variants() if chosen is None else chosen)]
+    if not is_field(setting.wind):
         plan = [v for v in plan if ("rotor_samples", 1) not in v.options]  # what it is anyway
     rows = _finished(out)
     known = {(row["seed"], row["axis"], row["variant"], row["seconds"], row["finest_s"]) for row in rows}
@@ -214,33 +236,29 @@ def accuracy(
     for seed in seeds:
         missing = [v for v in plan if (seed, v.axis, v.name, float(duration), float(finest)) not in known]
         done += len(plan) - len(missing)
-        if not missing:
-            continue
         references = {}
         for variant in missing:
             plant = tuple(option for option in variant.options if option in BENDING)
             if plant not in references:
                 if progress is not None:
                     progress(f"seed {seed}: reference", done, total)
-                exact = Variant(REFERENCE, "rk4", finest, "bem", "exact", plant)
-                references[plant] = _run(exact, seed, duration, wind, sea, platform)
-            reference = references[plant]
+                exact = Variant(REFERENCE, dt=finest, options=plant)
+                references[plant] = setting.run(setting.scene(exact, seed), exact)
             if progress is not None:
                 progress(f"seed {seed}: {variant.name}", done, total)
-            rows.append(_row(variant, seed, duration, finest, reference, wind, sea, repeats, platform))
+            rows.append(_row(variant, seed, setting, finest, references[plant], repeats))
             _append(out, rows[-1])
             done += 1
     return pd.DataFrame(rows, columns=COLUMNS)
 
 
-def _row(variant, seed, duration, finest, reference, wind, sea, repeats, platform):
-    scene = _scene(variant, seed, duration, wind, sea, platform)
+def _row(variant, seed, setting, finest, reference, repeats):
+    scene, duration = setting.scene(variant, seed), setting.duration
     simulate(scene, "pi", duration=1.0, dt=variant.dt)  # compiles
-    frame, cost = _timed(lambda: simulate(scene, "pi", duration=duration, dt=variant.dt), repeats)
+    frame, cost = _timed(lambda: setting.run(scene, variant), repeats)
     kernel_seconds = min(duration, max(1.0, float(round(0.2 * TIMED * duration / cost))))
-    kernel = loop_time(
-        scene, TimedScene(wind=wind), *initial_state(scene), variant.dt, kernel_seconds, repeats
-    )  # fmt: skip
+    kind = TimedScene(wind=setting.wind)
+    kernel = loop_time(scene, kind, *initial_state(scene), variant.dt, kernel_seconds, repeats)
     found = errors(frame, reference)
     worst = max(found, key=found.get)
     waves = scene.model.hydro.waves
@@ -255,7 +273,7 @@ def _row(variant, seed, duration, finest, reference, wind, sea, repeats, platfor
 
 
 def _timed(call, repeats):
-    """(result, CPU time of this thread) of a call: the median of repeats, or of the first beyond TIMED s."""
+    """Return (result, CPU time of this thread) of a call: the median of repeats, or of those in TIMED s."""
     times = []
     while len(times) < repeats and sum(times) < TIMED:
         start = time.thread_time()
@@ -265,7 +283,7 @@ def _timed(call, repeats):
 
 
 def _finished(out):
-    """Rows (list of dict) of an earlier, perhaps interrupted study."""
+    """Return the rows (list of dict) of an earlier, perhaps interrupted study."""
     if out is None:
         return []
     out = Path(out)
@@ -280,7 +298,7 @@ def _finished(out):
 
 
 def read_accuracy(path):
-    """DataFrame of a CSV of accuracy(). Raises: InputError for none, and for another file."""
+    """Return a CSV of accuracy() as a DataFrame. Raises: InputError for none, and for another file."""
     if not Path(path).is_file():
         raise InputError(f"accuracy table {str(path)!r} does not exist")
     return pd.DataFrame(_finished(path), columns=COLUMNS)
@@ -301,7 +319,7 @@ def _append(out, row):
 
 
 def accuracy_summary(table):
-    """DataFrame by variant: seeds' means of error and real-time factor; whether it is on the Pareto front."""
+    """Return a DataFrame by variant: means of error and real-time factor over seeds; whether on the front."""
     if table.empty:
         raise InputError("nothing to summarise: the table has no rows")
     groups = table.groupby(["variant", "axis"], sort=False)
@@ -312,7 +330,7 @@ def accuracy_summary(table):
 
 
 def pareto(error, speed):
-    """(n,) bool: no other point is as fast and more accurate, or as accurate and faster. NaN: never."""
+    """Return (n,) bool: no other point is as fast and more accurate, or as accurate and faster. NaN: no."""
     error, speed = np.asarray(error, dtype=float), np.asarray(speed, dtype=float)
     front = np.isfinite(error) & np.isfinite(speed)
     for i in np.flatnonzero(front):
@@ -322,7 +340,7 @@ def pareto(error, speed):
 
 
 def openfast_points():
-    """[(setting, error, real-time factor)] of OpenFAST.
+    """Return [(setting, error, real-time factor)] of OpenFAST.
 
     Its differences are the largest in 40 s, in surge, platform pitch and rotor speed: divided by the standard
     deviations of the case they are upper bounds of the rms measure used here, over fewer quantities.
@@ -334,13 +352,11 @@ def openfast_points():
 
 
 def plot_accuracy(table, path=None, openfast=True, beside=None):
-    """Figure: error over real-time factor, both logarithmic, with the Pareto front and OpenFAST's points.
+    """Return a Figure of error over real-time factor, logarithmic, with Pareto front and OpenFAST's points.
 
     openfast: whether those points, which are of OC3-Hywind, are drawn; beside: (name, table) of another
     platform, whose points of the same variants are hollow.
     """
-    from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
-
     points = accuracy_summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
     figure = new_figure(8.5, 5.5)
@@ -373,9 +389,7 @@ def plot_accuracy(table, path=None, openfast=True, beside=None):
 
 
 def _draw_openfast(axes):
-    """OpenFAST's points; its reference, which differs by nothing from itself, on the lower edge."""
-    from fowt_env.visual.style import INK
-
+    """Draw OpenFAST's points; its reference, whose difference is zero, on the lower edge."""
     theirs = openfast_points()
     style = {"color": "black", "markersize": 6, "markerfacecolor": "none", "linestyle": "none"}
     differing = [p for p in theirs if p[1] > 0.0]
@@ -394,9 +408,7 @@ def _draw_openfast(axes):
 
 
 def _name_front(axes, front):
-    """Numbers at the points of the Pareto front, the levels' with their names; all names beside it."""
-    from fowt_env.visual.style import INK
-
+    """Write numbers at the points of the Pareto front, names at those of levels; all names beside it."""
     lines = []
     for number, row in enumerate(front.to_dict("records"), 1):
         level = LEVELS.get(row["variant"])
@@ -408,34 +420,3 @@ def _name_front(axes, front):
             fontweight="normal" if level is None else "bold", textcoords="offset points",
         )  # fmt: skip
     axes.text(1.02, 0.02, "\n".join(lines), transform=axes.transAxes, fontsize=7, color=INK, va="bottom")
-
-
-def level_steps():
-    """Variants of the levels of build_scene at several steps, and of one part of `standard` at a time."""
-    axis, alone = "steps of the levels", "parts of standard alone"
-    exact = [Variant(axis, "rk4", dt, "bem", "exact") for dt in (0.0125, 0.025, 0.05, 0.1)]
-    steps = (0.025, 0.05, 0.1)
-    standard = [Variant(axis, "ab4", dt, "lookup", "fast") for dt in steps]
-    tables = [Variant(axis, "ab4", dt, "table", "fast", TABLED) for dt in steps]
-    parts = [
-        Variant(alone, "rk4", 0.025, "lookup", "exact"),
-        Variant(alone, "rk4", 0.025, "bem", "exact", (("radiation", "state_space"),)),
-    ]
-    return [*exact, *standard, *tables, *parts]
-
-
-def select(names):
-    """Variants of the axes named. Raises: InputError for an unknown axis.
-
-    "levels" stands for those that are levels of build_scene; "steps of the levels" are these at several
-    steps, "parts of standard alone" what one of them replaces and "bending tower" a plant of its own, none
-    of them part of the sweep of all;
-    "reference" adds none to those of every study.
-    """
-    every = [*variants(), *level_steps(), *bending_steps()]
-    known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in every)]
-    for name in names:
-        if name not in known:
-            raise unknown("axis", name, known)
-    chosen = [v for v in variants() if v.axis in names or ("levels" in names and v.name in LEVELS)]
-    return chosen + [v for v in (*level_steps(), *bending_steps()) if v.axis in names]

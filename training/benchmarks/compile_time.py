@@ -13,17 +13,19 @@ import pandas as pd
 
 from fowt_env import InputError
 
-SESSION = """
+REPORT = """
 import time
 start, cpu = time.perf_counter(), time.process_time()
-import numpy as np
-import fowt_env
 
 def report(name):
     global start, cpu
     now, used = time.perf_counter(), time.process_time()
     print(f"{name}|{now - start}|{used - cpu}", flush=True)
     start, cpu = now, used
+"""
+SESSION = """
+import numpy as np
+import fowt_env
 
 report("import")
 def run(name, law="pi", initial=None, **what):
@@ -52,27 +54,26 @@ NAMES = (
 )  # fmt: skip
 
 
-def session(progress=None):
-    """DataFrame (scene, seconds, processor_seconds) of the session in a new process with an empty cache.
+def session(code=SESSION, folder=None, progress=None):
+    """Return a DataFrame (scene, seconds, processor_seconds) of what code reports in a new process.
 
-    progress: called with (text, done, total). Raises: InputError with what a failed process printed.
+    folder: cache of kernels; None: an empty one. progress: called with (text, done, total).
+    Raises: InputError with what a failed process printed.
     """
+    if folder is None:
+        with tempfile.TemporaryDirectory() as empty:
+            return session(code, empty, progress)
     rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        process = subprocess.Popen(
-            [sys.executable, "-W", "ignore", "-c", SESSION],
-            env={**os.environ, "FOWT_CACHE_DIR": folder},
-            cwd=folder,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for line in process.stdout:
-            name, seconds, processor = line.split("|")
-            rows.append((name, float(seconds), float(processor)))
-            if progress is not None:
-                progress(name, len(rows), len(NAMES))
-        errors = process.communicate()[1]
+    process = subprocess.Popen(
+        [sys.executable, "-W", "ignore", "-c", REPORT + code], env={**os.environ, "FOWT_CACHE_DIR": folder},
+        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    for line in process.stdout:
+        name, seconds, processor = line.split("|")
+        rows.append((name, float(seconds), float(processor)))
+        if progress is not None:
+            progress(name, len(rows), len(NAMES))
+    errors = process.communicate()[1]
     if process.returncode != 0:
         raise InputError(f"the session in a new process failed: {errors[-600:]}")
     return pd.DataFrame(rows, columns=["scene", "seconds", "processor_seconds"])

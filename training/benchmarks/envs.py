@@ -21,7 +21,7 @@ ROUND = 1e-3  # s
 
 
 def timed(action, seconds):
-    """Time of a call (s) in the fastest of many rounds of ROUND seconds, in about the given seconds.
+    """Return the time of a call (s) in the fastest of many rounds of ROUND seconds, within some seconds.
 
     Rounds as short as that fall between the turns of other programs even on a busy machine.
     """
@@ -47,7 +47,7 @@ def multiply_adds_side_by_side(parts, n, results):
 
 
 def ceiling(threads, seconds):
-    """How many times one thread's work so many threads do in the same time, where nothing is shared."""
+    """Return the work of so many threads over that of one in the same time, where nothing is shared."""
     n, results = 300_000, np.zeros(threads)
     with thread_limit(1):
         one = timed(lambda: multiply_adds_side_by_side(1, n, results), seconds)
@@ -57,7 +57,7 @@ def ceiling(threads, seconds):
 
 
 def arrays_of(part):
-    """Arrays of a NamedTuple and of the parts in it."""
+    """Yield the arrays of a NamedTuple and of its parts."""
     for value in part:
         if isinstance(value, np.ndarray):
             yield value
@@ -66,17 +66,17 @@ def arrays_of(part):
 
 
 def own_bytes(envs):
-    """Mean bytes of the arrays that each environment has for itself: those no other one holds."""
+    """Return the mean size, bytes, of the arrays that each environment shares with no other."""
     held = [{id(a): a.nbytes for a in (*arrays_of(env._config), *arrays_of(env._episode))} for env in envs]
     holders = Counter(key for own in held for key in own)
     return sum(n for own in held for key, n in own.items() if holders[key] == 1) / len(envs)
 
 
 def single_costs(env, seconds):
-    """{step_us, physics_us, overhead_us, get_state_us, set_state_us, reset_ms} of one environment.
+    """Return {step_us, physics_us, overhead_us, get_state_us, set_state_us, reset_ms} of one environment.
 
     The physics are those of the compiled call for a batch of 16 such environments, over 16; the overhead is
-    what a step takes beyond them. The resets draw new wind, sea and offsets, with all trims known.
+    the rest of a step. The resets draw new wind, sea and offsets, with all trims known.
     """
     few = 16
     batch = FowtVectorEnv(few, threads=1, **env)
@@ -104,35 +104,25 @@ def single_costs(env, seconds):
         single.reset(seed=seed)
     reset = timed(lambda: single.reset(seed=next(seeds) % 60), seconds)
     return {
-        "step_us": step * 1e6,
-        "physics_us": physics * 1e6,
-        "overhead_us": (step - physics) * 1e6,
-        "get_state_us": get * 1e6,
-        "set_state_us": put * 1e6,
-        "reset_ms": reset * 1e3,
-    }
+        "step_us": step * 1e6, "physics_us": physics * 1e6, "overhead_us": (step - physics) * 1e6,
+        "get_state_us": get * 1e6, "set_state_us": put * 1e6, "reset_ms": reset * 1e3,
+    }  # fmt: skip
 
 
 def row_of(kind, n, threads, per_step, memory=np.nan, reset=np.nan, one=np.nan, most=np.nan):
-    """One row of the table from the time of a step of all n environments (s).
+    """Return one row of the table from the time of a step of all n environments (s).
 
     one: that time on one thread; most: ceiling of so many threads.
     """
     return {
-        "kind": kind,
-        "envs": n,
-        "threads": threads,
-        "env_steps_per_s": n / per_step,
-        "us_per_env_step": per_step / n * 1e6,
-        "times_one_thread": one / per_step,
-        "ceiling": most,
-        "reset_ms_per_env": reset * 1e3,
-        "memory_kB_per_env": memory,
-    }
+        "kind": kind, "envs": n, "threads": threads, "env_steps_per_s": n / per_step,
+        "us_per_env_step": per_step / n * 1e6, "times_one_thread": one / per_step, "ceiling": most,
+        "reset_ms_per_env": reset * 1e3, "memory_kB_per_env": memory,
+    }  # fmt: skip
 
 
 def native_rows(settings, sizes, threads, seconds):
-    """Rows of FowtVectorEnv, each size on each number of threads."""
+    """Return rows of FowtVectorEnv, each size on each number of threads."""
     rows = []
     for n in sizes:
         batch = FowtVectorEnv(n, threads=1, **settings)
@@ -152,7 +142,7 @@ def native_rows(settings, sizes, threads, seconds):
 
 
 def gymnasium_rows(settings, n, seconds):
-    """Rows of Gymnasium's vector environments of n single ones."""
+    """Return rows of Gymnasium's vector environments of n single ones."""
     model = FowtEnv(**settings)
     model.reset(seed=0)
     model.step(HOLD)  # compiled before processes fork
@@ -170,7 +160,7 @@ def gymnasium_rows(settings, n, seconds):
 def benchmark_envs(
     fidelity="standard", sizes=SIZES, threads=THREADS, seconds=1.0, gymnasium_envs=16, **settings
 ):
-    """(table, single): a pandas table of env steps per second, and the costs of a single environment.
+    """Return (table, single): a pandas table of env steps per second, and the costs of a single environment.
 
     An env step is one control period (0.1 s) of the task above_rated in residual mode without residual:
     turbulent wind, irregular sea, the PI, observation, reward and info included. seconds: per measurement.

@@ -1,4 +1,4 @@
-"""What an evaluation costs: processor time of a ten-minute case, stage by stage, and of handing it to Ray."""
+"""Cost of an evaluation: processor time of a ten-minute case, stage by stage, and of handing it to Ray."""
 
 import tempfile
 import time
@@ -17,7 +17,7 @@ STAGES = ("whole run", "without its file", "reading its row")
 
 
 def evaluation_cost(count=21, suite="above_rated", controller="pi"):
-    """DataFrame (stage, ms per run, core seconds per 1,000 runs, MB per run) of one process.
+    """Return a DataFrame (stage, ms per run, core seconds per 1,000 runs, MB per run) of one process.
 
     count: runs that are timed, after one per case that compiles or loads the kernels. The times are CPU
     times of this process, which other processes lengthen only by sharing caches and memory.
@@ -26,38 +26,32 @@ def evaluation_cost(count=21, suite="above_rated", controller="pi"):
     check_whole_number("count", count, 1)
     chosen = read_suite(suite)
     seeds = range(1, 2 + count // len(chosen.cases))
+    spent = dict.fromkeys(STAGES, 0.0)
+
+    def timed(stage, call, argument):
+        start = time.process_time()
+        call(argument)
+        spent[stage] += time.process_time() - start
+
     with tempfile.TemporaryDirectory() as folder:
         runs = planned(controller, chosen, seeds=seeds, runs_folder=folder)
         for run in runs[:: len(seeds)]:
             score(run)
         runs = runs[:count]
-        spent = dict.fromkeys(STAGES, 0.0)
         for run in runs:
-            start = time.process_time()
-            score(run)
-            spent["whole run"] += time.process_time() - start
-            start = time.process_time()
-            read_row(run.frame_path)
-            spent["reading its row"] += time.process_time() - start
+            timed("whole run", score, run)
+            timed("reading its row", read_row, run.frame_path)
         size = np.mean([Path(run.frame_path).stat().st_size for run in runs]) / 1e6
         for run in planned(controller, chosen, seeds=seeds)[:count]:
-            start = time.process_time()
-            score(run)
-            spent["without its file"] += time.process_time() - start
-    rows = [
-        {
-            "stage": stage,
-            "ms per run": 1e3 * spent[stage] / len(runs),
-            "core seconds per 1,000 runs": 1e3 * spent[stage] / len(runs),
-            "MB per run": 0.0 if stage == "without its file" else size,
-        }
-        for stage in STAGES
-    ]
-    return pd.DataFrame(rows)
+            timed("without its file", score, run)
+    cost = [1e3 * spent[stage] / len(runs) for stage in STAGES]
+    sizes = [0.0 if stage == "without its file" else size for stage in STAGES]
+    columns = {"stage": STAGES, "ms per run": cost, "core seconds per 1,000 runs": cost, "MB per run": sizes}
+    return pd.DataFrame(columns)
 
 
 def ray_cost(count=200, controller="pi", suite="above_rated"):
-    """DataFrame (what, ms per task) of a local Ray worker: tasks that only return nothing, or a run's file.
+    """Return a DataFrame (what, ms per task) of a local Ray worker: tasks without a result, or with a file.
 
     Wall time from one result to the next. Raises: InputError without Ray.
     """
@@ -65,19 +59,12 @@ def ray_cost(count=200, controller="pi", suite="above_rated"):
     with tempfile.TemporaryDirectory() as folder:
         _, content = score_and_send(planned(controller, chosen, seeds=(1,), runs_folder=folder)[0])
     rows = []
-    for what, size in (
-        ("an empty task", 0),
-        (f"a task that returns {len(content) / 1e6:.1f} MB", len(content)),
-    ):
+    full = f"a task that returns {len(content) / 1e6:.1f} MB"
+    for what, size in (("an empty task", 0), (full, len(content))):
         times = [time.perf_counter()]
-        for _ in outcomes(_returned, [size] * count, jobs=1, engine="ray"):
+        for _ in outcomes(bytes, [size] * count, jobs=1, engine="ray"):
             times.append(time.perf_counter())
         # the first results wait for the cluster to start
         settled = times[len(times) // 4 :]
         rows.append({"what": what, "ms per task": 1e3 * (settled[-1] - settled[0]) / (len(settled) - 1)})
     return pd.DataFrame(rows)
-
-
-def _returned(size):
-    """Bytes of this number."""
-    return bytes(size)

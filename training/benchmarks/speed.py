@@ -7,11 +7,11 @@ measured in the same minute: figures of two machines compare through it.
 import os
 import platform
 import subprocess
-import sys
 import tempfile
 import time
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numba
@@ -23,7 +23,7 @@ from fowt_env.control import EXACT
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.loop.interface import interface_data
 from fowt_env.loop.protection import build_guard
@@ -46,6 +46,7 @@ from fowt_env.run.initial_conditions import initial_state
 from fowt_env.run.interface import build_interface
 from fowt_env.run.simulation import HeldCommand, simulate
 from fowt_env.scene.build import build_scene
+from fowt_env.training.benchmarks.compile_time import session
 
 PLATFORM = "oc3_hywind"
 CALIBRATION_STEPS = 10_000_000
@@ -63,8 +64,8 @@ LOADS = (
 class TimedScene:
     """A kind of scene: arguments of build_scene, and what is fixed."""
 
-    wind: object = None
-    sea: object = None
+    wind: object = field(default_factory=lambda: TURBULENCE)
+    sea: object = field(default_factory=lambda: SEA)
     fidelity: str = "standard"
     options: dict = field(default_factory=dict)
     platform_fixed: bool = False
@@ -81,23 +82,14 @@ class TimedScene:
         return self.wind is not None and not self.parked
 
     def scene(self, seed=1, duration=700.0, platform=PLATFORM):
-        """Scene of this kind, with what it holds still."""
+        """Return the scene of this kind, with its platform fixed where the kind says so."""
         wind = self.wind(platform) if callable(self.wind) else self.wind
-        scene = build_scene(
-            platform,
-            wind=wind,
-            sea=self.sea,
-            seed=seed,
-            fidelity=self.fidelity,
-            duration=duration,
-            **self.options,
-        )
-        if not self.platform_fixed:
-            return scene
-        return scene.with_model({"rigid_body.platform_fixed": True})
+        options = {"fidelity": self.fidelity, "seed": seed, "duration": duration} | self.options
+        scene = build_scene(platform, wind=wind, sea=self.sea, **options)
+        return scene.with_model({"rigid_body.platform_fixed": True}) if self.platform_fixed else scene
 
     def start(self, scene):
-        """(state, command) that runs of this kind begin with."""
+        """Return (state, command) at the start of runs of this kind."""
         x, u = initial_state(scene, self.begin)
         if self.parked:
             x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
@@ -106,7 +98,7 @@ class TimedScene:
 
 
 def _box(platform):
-    """Wind specification of a box that the rotor fits into: OC3's stored one, else a sum of plane waves."""
+    """Return the wind of a box that the rotor fits into: OC3's stored one, else a sum of plane waves."""
     if platform == PLATFORM:
         from fowt_env.training.validation.openfast_cases import box_wind
 
@@ -115,9 +107,9 @@ def _box(platform):
 
 
 def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed=1):
-    """Wind specification of a box for a Rotor: a sum of plane waves carried by the wind, for timing alone.
+    """Return a box of wind for a Rotor: a sum of plane waves carried by the wind, for timing alone.
 
-    Its deviation is that of class B, its scales those of gusts that the rotor slices; no more is realistic.
+    Only its deviation, that of class B, and its scales, those of gusts that the rotor slices, are realistic.
     """
     draw = np.random.default_rng(seed)
     reach = 1.15 * rotor.tip_radius
@@ -139,42 +131,37 @@ def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed
 
 
 TIMED_SCENES = {
-    "full, reference": TimedScene(TURBULENCE, SEA, "reference"),
-    "full, standard": TimedScene(TURBULENCE, SEA, "standard"),
-    "full, fast": TimedScene(TURBULENCE, SEA, "fast"),
-    "full-field box, standard": TimedScene(_box, SEA, "standard"),
-    "exact waves, look-up rotor": TimedScene(TURBULENCE, SEA, "standard", {"wave_loads": "exact"}),
-    "BEM rotor, fast waves": TimedScene(TURBULENCE, SEA, "standard", {"rotor": "bem"}),
-    "bending tower": TimedScene(TURBULENCE, SEA, options={"tower": "modes"}),
-    "bending tower, second modes": TimedScene(TURBULENCE, SEA, options={"tower": "modes2"}),
-    "a pitch for each blade": TimedScene(TURBULENCE, SEA, options={"pitch": "individual"}),
-    "still water, wind": TimedScene(TURBULENCE, None, absent="waves"),
-    "no wind, waves": TimedScene(None, SEA, absent="wind, rotor, tower drag"),
+    "full, reference": TimedScene(fidelity="reference"),
+    "full, standard": TimedScene(),
+    "full, fast": TimedScene(fidelity="fast"),
+    "full-field box, standard": TimedScene(_box),
+    "exact waves, look-up rotor": TimedScene(options={"wave_loads": "exact"}),
+    "BEM rotor, fast waves": TimedScene(options={"rotor": "bem"}),
+    "bending tower": TimedScene(options={"tower": "modes"}),
+    "bending tower, second modes": TimedScene(options={"tower": "modes2"}),
+    "a pitch for each blade": TimedScene(options={"pitch": "individual"}),
+    "still water, wind": TimedScene(sea=None, absent="waves"),
+    "no wind, waves": TimedScene(None, absent="wind, rotor, tower drag"),
     "still water, no wind": TimedScene(None, None, absent="waves, wind, rotor, tower drag"),
-    "parked in a storm": TimedScene(40.0, SEA, parked=True),
+    "parked in a storm": TimedScene(40.0, parked=True),
     "planar, fast": TimedScene(
-        TURBULENCE, SEA, "fast", {"planar": True}, absent="sway, roll, yaw: 3x3 instead of 6x6 solve"
+        fidelity="fast", options={"planar": True}, absent="sway, roll, yaw: 3x3 instead of 6x6 solve"
     ),
-    "planar": TimedScene(TURBULENCE, SEA, options={"planar": True}, absent="sway, roll, yaw; 3x3 solve"),
-    "mooring by table": TimedScene(
-        TURBULENCE, SEA, options={"mooring": "table"}, absent="catenary iterations"
-    ),
-    "no mooring": TimedScene(TURBULENCE, SEA, options={"mooring": False}, absent="mooring"),
-    "platform fixed": TimedScene(TURBULENCE, SEA, platform_fixed=True, absent="6x6 solve (at run time)"),
+    "planar": TimedScene(options={"planar": True}, absent="sway, roll, yaw; 3x3 solve"),
+    "mooring by table": TimedScene(options={"mooring": "table"}, absent="catenary iterations"),
+    "no mooring": TimedScene(options={"mooring": False}, absent="mooring"),
+    "platform fixed": TimedScene(platform_fixed=True, absent="6x6 solve (at run time)"),
     "no water": TimedScene(
-        TURBULENCE,
-        None,
-        options={"hydrodynamics": False, "mooring": False},
-        platform_fixed=True,
+        sea=None, options={"hydrodynamics": False, "mooring": False}, platform_fixed=True,
         absent="strips, waves, buoyancy, mooring; 6x6 solve (at run time)",
-    ),  # fmt: skip
-    "dynamic inflow": TimedScene(TURBULENCE, SEA, options={"dynamic_inflow": True}),
-}
+    ),
+    "dynamic inflow": TimedScene(options={"dynamic_inflow": True}),
+}  # fmt: skip
 
 
 @kernel
 def multiply_adds(n, a, b):
-    """Result of n multiply-adds that wait for each other: the calibration of a machine's clock."""
+    """Return n dependent multiply-adds: the calibration of a machine's clock."""
     x = 1.0
     for _ in range(n):
         x = x * a + b
@@ -182,13 +169,13 @@ def multiply_adds(n, a, b):
 
 
 def calibration(repeats=3):
-    """Milliseconds of CPU time of CALIBRATION_STEPS dependent multiply-adds."""
+    """Return the CPU time, ms, of CALIBRATION_STEPS dependent multiply-adds."""
     multiply_adds(10, 0.999, 0.1)
     return 1e3 * median_time(lambda: multiply_adds(CALIBRATION_STEPS, 0.999, 0.1), repeats)
 
 
 def median_time(call, repeats=REPEATS):
-    """Median CPU time of this thread in a call, s; the first call is not counted."""
+    """Return the median CPU time of this thread in a call, s; the first call is not counted."""
     call()
     times = []
     for _ in range(repeats):
@@ -198,10 +185,21 @@ def median_time(call, repeats=REPEATS):
     return float(np.median(times))
 
 
-@kernel
-def _repeat(part, model, data, x, u, dx, m, row, n, dt):
-    """n calls of one of LOADS at changing times and places; returns a sum that keeps them from vanishing."""
-    total = 0.0
+def paired_times(calls, rounds):
+    """Return CPU times (rounds, n) of this process, s, of n calls that alternate; a first round compiles."""
+    times = np.empty((rounds + 1, len(calls)))
+    for i in range(rounds + 1):
+        for j, call in enumerate(calls):
+            began = time.process_time()
+            call()
+            times[i, j] = time.process_time() - began
+    return times[1:]
+
+
+@entry
+def _repeat(handle, part, x, u, dx, m, row, n, dt):
+    """Call one of LOADS n times at changing times and places; return a sum, so that no call is left out."""
+    model, data, total = model_of(handle), data_of(handle), 0.0
     for i in range(n):
         t = i * dt
         x[State.SURGE] += 1e-7  # nothing is the same as before: no call can be left out
@@ -231,7 +229,7 @@ def _repeat(part, model, data, x, u, dx, m, row, n, dt):
 
 @kernel
 def _of_wind(part, t, pose, x, aero, pitches, data, dx):
-    """Something of one of the loads of the wind, if part is one."""
+    """Return a component of one of the loads of the wind, if part is one."""
     if aero is None:
         return 0.0
     now = wind_now(t, aero.wind) if part == 1 else wind_now(0.0, aero.wind)
@@ -245,7 +243,7 @@ def _of_wind(part, t, pose, x, aero, pitches, data, dx):
 
 @kernel
 def _of_water(part, t, pose, hydro, data):
-    """Something of one of the loads of the water, if part is one."""
+    """Return a component of one of the loads of the water, if part is one."""
     if hydro is None:
         return 0.0
     if part == 4:
@@ -255,13 +253,8 @@ def _of_water(part, t, pose, hydro, data):
     return 0.0
 
 
-@entry
-def _repeat_in(handle, part, x, u, dx, m, row, n, dt):
-    return _repeat(part, model_of(handle), data_of(handle), x, u, dx, m, row, n, dt)
-
-
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
-    """{load: microseconds of one call} near a state; the loop and the pose are taken off the others."""
+    """Return {load: microseconds of one call} near a state, without those of the loop and the pose."""
     scene = scene.with_step(0.1)
     handle = scene.handle()
     dx, m = np.zeros_like(x), np.zeros(scene.n_measurements)
@@ -270,11 +263,9 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     output(handle, x, u, 0.0, dx, row)  # fills the cached loads that measure and record read
     micro = {}
     for part, name in enumerate(LOADS):
-        micro[name] = (
-            1e6
-            * median_time(lambda p=part: _repeat_in(handle, p, x.copy(), u, dx, m, row, calls, 0.1), repeats)
-            / calls
-        )
+        call = partial(_repeat, handle, part)
+        time = median_time(lambda call=call: call(x.copy(), u, dx, m, row, calls, 0.1), repeats)
+        micro[name] = 1e6 * time / calls
     base = micro[LOADS[0]]
     for name in LOADS[1:7]:
         micro[name] = max(0.0, micro[name] - base)
@@ -282,7 +273,7 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
 
 
 def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
-    """Microseconds of one physics step under a constant command."""
+    """Return the microseconds of one physics step under a constant command."""
     scene = scene.with_step(dt)
     handle = scene.handle()
 
@@ -295,7 +286,7 @@ def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
 
 
 def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
-    """CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
+    """Return the CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
     scene = scene.with_step(dt)
     controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
     handle = scene.handle()
@@ -321,7 +312,7 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
 
 
 def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLATFORM):
-    """Row (dict) of one kind of scene: times per step, real-time factors and microseconds per load."""
+    """Return the row (dict) of a kind of scene: times per step, real-time factors, microseconds per load."""
     if name not in TIMED_SCENES:
         raise unknown("kind of scene", name, TIMED_SCENES)
     kind = TIMED_SCENES[name]
@@ -335,29 +326,22 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLA
         held = scene.with_model({"rigid_body.rotor_fixed": True})
     waves = None if scene.model.hydro is None else scene.model.hydro.waves
     row = {
-        "kind": name,
-        "integrator": scene.options["integrator"],
-        "dt_s": dt,
-        "wave_components": 0 if waves is None else waves.omega.shape[0],
-        "absent": kind.absent,
-        "calibration_ms": calibration(),
-        "step_us": step_time(held, x, u, dt, calls, repeats),
-    }
+        "kind": name, "integrator": scene.options["integrator"], "dt_s": dt,
+        "wave_components": 0 if waves is None else waves.omega.shape[0], "absent": kind.absent,
+        "calibration_ms": calibration(), "step_us": step_time(held, x, u, dt, calls, repeats),
+    }  # fmt: skip
     row["step_x"] = 1e6 * dt / row["step_us"]
     row["loop_x"] = seconds / loop_time(held, kind, x, u, dt, seconds, repeats)
     row["simulate_x"] = float("nan")
     if not kind.parked:  # simulate starts from the running rotor
-        whole = median_time(
-            lambda: simulate(scene, "pi" if kind.controlled else None, duration=seconds, initial=kind.begin),
-            repeats,
-        )
-        row["simulate_x"] = seconds / whole
-    row.update({f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()})
-    return row
+        law = "pi" if kind.controlled else None
+        run = partial(simulate, scene, law, duration=seconds, start=kind.begin)
+        row["simulate_x"] = seconds / median_time(run, repeats)
+    return row | {f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()}
 
 
 def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None, platform=PLATFORM):
-    """DataFrame with a row per kind of scene (all by default) of a platform.
+    """Return a DataFrame with a row per kind of scene (all by default) of a platform.
 
     seconds   simulated, for the real-time factors of the closed loop and of simulate
     progress  called with (text, done, total)
@@ -376,58 +360,50 @@ def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None
 
 
 START_CODE = """
-import time
-start, cpu = time.perf_counter(), time.process_time()
 import fowt_env
-imported = time.perf_counter()
+report("import")
 scene = fowt_env.build_scene(wind=18.0, sea={"kind": "jonswap", "Hs": 7.5, "Tp": 10.0}, fidelity="FIDELITY")
 fowt_env.simulate(scene, "pi", duration=10.0)
-print(imported - start, time.perf_counter() - start, time.process_time() - cpu)
+report("scene and run")
 """
 
 
 def start_times(fidelity="standard"):
-    """{what: seconds}: a first run with an empty cache of kernels and a later one, each in a new process."""
-    root = Path(fowt_env.__file__).resolve().parents[1]
+    """Return {what: seconds}: a first run, its cache of kernels empty, and a later one, in new processes."""
     times = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in ("first", "later"):
-            done = subprocess.run(
-                [sys.executable, "-c", START_CODE.replace("FIDELITY", fidelity)],
-                env={**os.environ, "FOWT_CACHE_DIR": folder}, cwd=root, capture_output=True, text=True,
-                check=False,
-            )  # fmt: skip
-            if done.returncode != 0:
-                raise InputError(f"start times: the run in a new process failed: {done.stderr[-400:]}")
-            imported, whole, processor = map(float, done.stdout.split())
-            times[f"{name} start, import (s)"] = imported
-            times[f"{name} start, import, scene and 10 s run (s)"] = whole
-            times[f"{name} start, processor time of that (s)"] = processor
+            table = session(START_CODE.replace("FIDELITY", fidelity), folder)
+            times[f"{name} start, import (s)"] = table["seconds"][0]
+            times[f"{name} start, import, scene and 10 s run (s)"] = table["seconds"].sum()
+            times[f"{name} start, processor time of that (s)"] = table["processor_seconds"].sum()
     return times
 
 
 def header():
-    """Lines (list of str) that say where and with what figures were taken."""
+    """Return lines (list of str) on machine, versions, commit and date of a measurement."""
     root = Path(fowt_env.__file__).resolve().parents[1]
-    git = ["git", "-C", str(root)]
-    try:
-        commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=False)
-        changed = subprocess.run([*git, "status", "--porcelain"], capture_output=True, text=True, check=False)
-        state = commit.stdout.strip() + (" with changes" if changed.stdout.strip() else "")
-    except OSError:  # no git on this machine
-        state = ""
+
+    def git(*words):
+        try:
+            words = ["git", "-C", str(root), *words]
+            return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
+        except OSError:  # no git on this machine
+            return ""
+
+    commit = git("rev-parse", "HEAD") + (" with changes" if git("status", "--porcelain") else "")
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     return [
         f"date: {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()}, load {load:.2f}",
         f"versions: Python {platform.python_version()}, numba {numba.__version__}, numpy {np.__version__}",
-        f"commit: {state or 'unknown'}",
+        f"commit: {commit or 'unknown'}",
         f"calibration: {calibration():.2f} ms for {CALIBRATION_STEPS:g} dependent multiply-adds",
     ]
 
 
 def _processor():
-    """Name of the processor."""
+    """Return the name of the processor."""
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text().splitlines():
@@ -437,7 +413,7 @@ def _processor():
 
 
 def write_csv(table, path, remarks=()):
-    """Write a table with the header and remarks as comment lines before it; returns the path."""
+    """Write a table with the header and remarks as comment lines before it; return the path."""
     path = Path(path)
     with replacing(path) as temporary, Path(temporary).open("w", encoding="utf-8", newline="") as file:
         for line in (*header(), *remarks):

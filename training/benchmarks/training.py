@@ -39,7 +39,7 @@ class Clock:
 
 
 def nothing_env(env):
-    """A VecEnv of env's spaces that returns the same numbers at no cost: what is left is PPO itself."""
+    """Return a VecEnv of env's spaces that costs nothing: it returns the same numbers, and PPO remains."""
     from stable_baselines3.common.vec_env import VecEnvWrapper
 
     rng = np.random.default_rng(0)
@@ -61,7 +61,7 @@ def nothing_env(env):
 
 
 def sync_env(n, settings):
-    """FowtSB3VecEnv whose batch is Gymnasium's SyncVectorEnv of n single environments."""
+    """Return a FowtSB3VecEnv whose batch is Gymnasium's SyncVectorEnv of n single environments."""
     from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     class SyncSB3VecEnv(FowtSB3VecEnv):
@@ -74,23 +74,18 @@ def sync_env(n, settings):
     return env
 
 
-def _plain(n, settings, kind):
-    """stable-baselines3's own vector environment of single ones."""
-    first = FowtEnv(**settings)
-    first.reset(seed=0)
-    first.step(np.zeros(2))  # compiled before processes start
-    return kind([first.twin] * n)
-
-
 def subject(kind, n, settings, decisions):
-    """(VecEnv, control periods per step, its FowtVectorEnv or None) of a named kind."""
+    """Return (VecEnv, control periods per step, its FowtVectorEnv or None) of a named kind."""
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
     from fowt_env.training.rl.decision_env import DecisionVecEnv
     from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     if kind == "SubprocVecEnv":
-        return _plain(n, settings, lambda makers: SubprocVecEnv(makers, start_method="fork")), 1, None
+        first = FowtEnv(**settings)
+        first.reset(seed=0)
+        first.step(np.zeros(2))  # compiled before processes start
+        return SubprocVecEnv([first.twin] * n, start_method="fork"), 1, None
     if kind == "SyncVectorEnv":
         return sync_env(n, settings), 1, None
     native = FowtSB3VecEnv(n, threads=1, **settings)
@@ -109,7 +104,7 @@ VECTOR_ENVS = (
 
 
 def measured(kind, n, steps, settings, decisions, algorithm):
-    """Row of the table: PPO on one kind of vector environment."""
+    """Return a row of the table: PPO on one kind of vector environment."""
     from stable_baselines3 import PPO
 
     env, hold, native = subject(kind, n, settings, decisions)
@@ -129,19 +124,15 @@ def measured(kind, n, steps, settings, decisions, algorithm):
     fractions = {label: seconds / wall for label, seconds in clock.seconds.items()}
     physics, torch = fractions.get("physics", np.nan), fractions.get("torch", np.nan)
     return {
-        "kind": kind,
-        "envs": n,
-        "steps_per_s": rounds * rollout / wall,
-        "env_steps_per_s": rounds * rollout * hold / wall,
-        "physics_share": physics,
-        "torch_share": torch,
+        "kind": kind, "envs": n, "steps_per_s": rounds * rollout / wall,
+        "env_steps_per_s": rounds * rollout * hold / wall, "physics_share": physics, "torch_share": torch,
         "python_share": 1.0 - physics - torch,
         "minutes_for_10M_env_steps": 1e7 / (rounds * rollout * hold / wall) / 60.0,
-    }
+    }  # fmt: skip
 
 
 def benchmark_training(n=64, steps=50_000, kinds=VECTOR_ENVS, progress=None):
-    """DataFrame with a row per kind of vector environment, PPO as shipped on one torch thread.
+    """Return a DataFrame with a row per kind of vector environment, PPO as shipped on one torch thread.
 
     An env step is one control period (0.1 s) of the task above_rated at fidelity "standard", residual mode;
     a step is what PPO learns from: the same, or a decision. physics: the compiled call; torch: PPO's update

@@ -114,7 +114,7 @@ class Problem:
         self.estimates = {}
 
     def _noise(self, noise):
-        """(k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
+        """Return (k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
         if self.information.sensors is None:
             return np.zeros(0)
         noise = noise_of(turbine=self.plant.turbine) if noise is None else dict(noise)
@@ -124,23 +124,23 @@ class Problem:
         return np.array([noise[name] ** 2 * SAMPLE_TIME for name in self.information.sensors])
 
     def cost(self, fraction, *multipliers):
-        """Q with a fraction of platform pitch and multipliers on travel, power and torque."""
+        """Return Q with a fraction of platform pitch and multipliers on travel, power and torque."""
         weights = np.array([1.0 - fraction, fraction, *multipliers])
         return (self.rows * weights[:, None]).T @ self.rows
 
     def parts(self, deviations):
-        """(5,) Deviations in the units of the cost's rows."""
+        """Return (5,) Deviations in the units of the cost's rows."""
         found = np.array([getattr(deviations, name) / self.scale[name] for name in QUANTITIES])
         found[QUANTITIES.index("travel")] /= GAUSSIAN_MEAN
         return found
 
     def gains(self, q):
-        """(P, K): solution of the Riccati equation and gain on plant and controls."""
+        """Return (P, K): solution of the Riccati equation and gain on plant and controls."""
         p = solve_continuous_are(self.a, self.b, q, self.r)
         return p, np.linalg.solve(self.r, self.b.T @ p)
 
     def deviations(self, q, weather):
-        """Deviations under the best control for the cost q, in a bound_plant.Weather."""
+        """Return Deviations under the best control for the cost q, in a bound_plant.Weather."""
         return self._deviations(*self.gains(q), weather)
 
     def _deviations(self, p, k, weather):
@@ -163,16 +163,15 @@ class Problem:
             ahead += wind @ estimate.weather[:, :order]
         drive -= (self.b @ gain) @ ahead
         moved = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(n) - closed, drive)
-        density = np.column_stack(
-            [weather.wind, weather.elevation, np.broadcast_to(self.noise / pi, (OMEGA.size, self.noise.size))]
-        )
+        noise = np.broadcast_to(self.noise / pi, (OMEGA.size, self.noise.size))
+        density = np.column_stack([weather.wind, weather.elevation, noise])
         squares = np.einsum("nqk,nk->nq", np.abs(self.rows @ moved) ** 2, density)
         found = np.sqrt(np.trapezoid(squares, OMEGA, axis=0)) * [self.scale[name] for name in QUANTITIES]
         found[QUANTITIES.index("travel")] *= GAUSSIAN_MEAN
         return Deviations(*(float(value) for value in found))
 
     def _ahead(self, closed, p, wind):
-        """(n, states) g of the wind per wind speed, with that known for the preview's time ahead."""
+        """Return (n, states) g of the wind per wind speed, with that known for the preview's time ahead."""
         time = self.information.preview or 0.0
         at = self.plant.wind_filter
         states = at.states(OMEGA)
@@ -188,7 +187,7 @@ class Problem:
         return found
 
     def _estimate(self, weather):
-        """Estimates in a weather; kept, since it is the same for all gains."""
+        """Return Estimates in a weather, which are kept as they are the same for all gains."""
         key = id(weather)
         if key not in self.estimates:
             self.estimates[key] = (weather, self._estimated(weather))
@@ -201,10 +200,8 @@ class Problem:
         found = Estimates(np.zeros((OMEGA.size, N, k), complex), np.zeros((OMEGA.size, orders, k), complex))
         if self.information.sensors is None:
             states = waves.states(OMEGA)
-            elevation = (states @ waves.output)[:, None]
-            found.weather[:, order:, 1] = np.divide(
-                states, elevation, out=np.zeros_like(states), where=elevation != 0.0
-            )
+            elevation, zero = (states @ waves.output)[:, None], np.zeros_like(states)
+            found.weather[:, order:, 1] = np.divide(states, elevation, out=zero, where=elevation != 0.0)
             return found
         gain, c = self.estimator()
         used = [SENSORS.index(name) for name in self.information.sensors]
@@ -228,7 +225,7 @@ class Problem:
         return found
 
     def estimator(self):
-        """(gain, C): Kalman gain on plant and filters' states, and what the sensors read of these.
+        """Return (gain, C): Kalman gain on plant and filters' states, and what the sensors read of these.
 
         Torque and pitch command are known. A wind that is known acts through them alike: its filter's states
         are not estimated, and have no gain.
@@ -258,7 +255,7 @@ class Problem:
 
 
 def noise_of(chain="standard", turbine=None):
-    """{sensor: standard deviation of a reading} of SENSORS through a sensor chain, its name or a SensorChain.
+    """Return {sensor: standard deviation of a reading} of SENSORS through a chain, a name or SensorChain.
 
     Noise and quantisation together; low pass and delay, small beside the plant's times, are left out.
     Raises: InputError for an unknown name, and for a chain without one of SENSORS or that is exact.
@@ -269,13 +266,12 @@ def noise_of(chain="standard", turbine=None):
             raise InputError(
                 f"sensors = {chain!r}: must be a chain with noise on each of {', '.join(SENSORS)}"
             )
-    return {
-        name: sqrt(found.sensors[name].noise ** 2 + found.sensors[name].step ** 2 / 12.0) for name in SENSORS
-    }
+    used = {name: found.sensors[name] for name in SENSORS}
+    return {name: sqrt(sensor.noise**2 + sensor.step**2 / 12.0) for name, sensor in used.items()}
 
 
 def front(problem, limits, fractions):
-    """[(fraction, Deviations, cost)] that are best for a fraction of platform pitch; limits: Deviations.
+    """Return [(fraction, Deviations, cost)] best for each fraction of platform pitch; limits: Deviations.
 
     In the plant's true weather. Each multiplier grows while its limit is exceeded and shrinks while it is
     kept. Fractions at which ROUNDS rounds of that end outside the limits are left out.
@@ -308,24 +304,15 @@ def front(problem, limits, fractions):
 
 
 def baseline_deviations(plant, weather):
-    """Deviations under gspi_oc3 in a bound_plant.Weather; constant torque: power goes with speed."""
+    """Return Deviations under gspi_oc3 in a bound_plant.Weather; constant torque: power goes with speed."""
     responses = plant.baseline_response(weather)
 
-    def deviation(row):
-        squares = sum(
-            np.abs(moved @ row) ** 2 * density
-            for moved, density in zip(responses, (weather.wind, weather.elevation), strict=True)
-        )
+    def deviation(row, weight=1.0):
+        parts = zip(responses, (weather.wind, weather.elevation), strict=True)
+        squares = sum(np.abs((moved @ row) * weight) ** 2 * density for moved, density in parts)
         return sqrt(np.trapezoid(squares, OMEGA))
 
     eye = np.eye(N)
-    speed = deviation(eye[SPEED])
-    travel = np.array(responses) @ eye[BLADE] * OMEGA
-    squares = np.abs(travel[0]) ** 2 * weather.wind + np.abs(travel[1]) ** 2 * weather.elevation
-    return Deviations(
-        speed,
-        deviation(eye[LEAN]),
-        GAUSSIAN_MEAN * sqrt(np.trapezoid(squares, OMEGA)),
-        speed / plant.turbine.rated_rotor_speed,
-        0.0,
-    )
+    speed, lean = deviation(eye[SPEED]), deviation(eye[LEAN])
+    travel = GAUSSIAN_MEAN * deviation(eye[BLADE], OMEGA)
+    return Deviations(speed, lean, travel, speed / plant.turbine.rated_rotor_speed, 0.0)

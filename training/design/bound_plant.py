@@ -8,6 +8,7 @@ TrueWeather those that runs are drawn from, with the hull's own force at each fr
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from math import pi, sqrt
 
 import numpy as np
@@ -39,14 +40,10 @@ WIND_BAND = (1.0 / RECORD, 0.25)  # Hz, of its fit
 WAVE_BAND = (0.5, 3.0)  # peak frequencies, of the fit of the elevation
 LOWEST_FORCE = 0.1  # rad/s, from which on the fit of the force weighs it by 1 over frequency
 # rad/s: dense where platform and waves have their resonances, wide enough for the noise of sensors
-OMEGA = np.concatenate(
-    [
-        np.geomspace(1e-4, 0.999 * SLOWEST, 16),
-        SLOWEST * np.arange(1, 510),
-        np.geomspace(510 * SLOWEST, 6.0, 50, endpoint=False),
-        np.geomspace(6.0, 100.0, 60),
-    ]
-)
+OMEGA = np.r_[
+    np.geomspace(1e-4, 0.999 * SLOWEST, 16), SLOWEST * np.arange(1, 510),
+    np.geomspace(510 * SLOWEST, 6.0, 50, endpoint=False), np.geomspace(6.0, 100.0, 60),
+]  # fmt: skip
 ROUNDS, SETTLED = 40, 1e-4  # of the drag and the motion under gspi_oc3
 START = np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # m2/s2: in surge, from which that begins
 
@@ -65,12 +62,12 @@ class Filter:
     error: float
 
     def states(self, omega):
-        """(n, m) complex response of the states to the noise."""
+        """Return (n, m) complex response of the states to the noise."""
         eye = np.eye(self.b.size)
         return np.linalg.solve(1j * omega[:, None, None] * eye - self.a, self.b[:, None])[:, :, 0]
 
     def density(self, omega):
-        """(n,) one-sided spectrum of the output, per rad/s."""
+        """Return (n,) one-sided spectrum of the output, per rad/s."""
         return np.abs(self.states(omega) @ self.output) ** 2 / pi
 
 
@@ -121,13 +118,9 @@ class BoundPlant:
         self.wave_filter, self.force, self.force_errors = fit_waves(self.true, self.sea)
         states = self.wave_filter.states(OMEGA)
         elevation = (states @ self.wave_filter.output)[:, None]
-        self.fitted = Weather(
-            self.wind_filter.density(OMEGA),
-            self.wave_filter.density(OMEGA),
-            np.divide(
-                states @ self.force.T, elevation, out=np.zeros_like(self.true.force), where=elevation != 0
-            ),
-        )
+        zero, here = np.zeros_like(self.true.force), elevation != 0.0
+        force = np.divide(states @ self.force.T, elevation, out=zero, where=here)
+        self.fitted = Weather(self.wind_filter.density(OMEGA), self.wave_filter.density(OMEGA), force)
 
     def _settle_drag(self, scene, model):
         """Linearise the drag in the sea and in the motion under gspi_oc3, which depends on it."""
@@ -150,15 +143,12 @@ class BoundPlant:
         sensors = [model.output_index(name) for name in SENSORS]
         units = np.array([self.torque, 1.0])  # torque is counted in rated torques
         self.A, self.B, self.wind = model.A[np.ix_(rows, rows)], model.B[rows, :2] * units, model.B[rows, 2]
-        self.C, self.D, self.Dwind = (
-            model.C[np.ix_(sensors, rows)],
-            model.D[sensors, :2] * units,
-            model.D[sensors, 2],
-        )
+        self.C = model.C[np.ix_(sensors, rows)]
+        self.D, self.Dwind = model.D[sensors, :2] * units, model.D[sensors, 2]
         self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
 
     def baseline(self):
-        """(10, 10) closed loop of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
+        """Return (10, 10) closed loop of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
 
         The law in continuous time, with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
         Raises: InputError where it is unstable.
@@ -179,7 +169,7 @@ class BoundPlant:
         return a
 
     def baseline_response(self, weather):
-        """(wind (n, 8), waves (n, 8)) of PLANAR under gspi_oc3 per wind speed and elevation."""
+        """Return (wind (n, 8), waves (n, 8)) of PLANAR under gspi_oc3 per wind speed and elevation."""
         drive = np.zeros((OMEGA.size, N + 2, 2), complex)
         drive[:, :N, 0] = self.wind
         drive[:, :N, 1] = weather.force @ self.E.T
@@ -187,7 +177,7 @@ class BoundPlant:
         return found[:, :N, 0], found[:, :N, 1]
 
     def _motion(self):
-        """HullMotion under gspi_oc3 on the true spectra."""
+        """Return the HullMotion under gspi_oc3 on the true spectra."""
         wind, waves = self.baseline_response(self.true)
         velocities = [VX, VZ, WY]
         per_elevation, other = np.zeros((OMEGA.size, 6), complex), np.zeros((6, 6))
@@ -199,7 +189,7 @@ class BoundPlant:
 
 
 def _wind_spectrum(speed, rotor):
-    """One-sided spectrum (n,) over OMEGA, per rad/s, of the rotor-averaged wind of runs of RECORD seconds."""
+    """Return the one-sided spectrum (n,) over OMEGA, per rad/s, of rotor-averaged wind of RECORD seconds."""
     step = 0.1
     samples = fft_length(round(RECORD / step))
     sigma = ntm_sigma(speed, TURBULENCE_CLASS)
@@ -213,7 +203,7 @@ def _wind_spectrum(speed, rotor):
 
 
 def fit_wind(spectrum):
-    """Filter of order 3 with a zero, behind one that stops what is slower than a record.
+    """Return a Filter of order 3 with a zero, behind one that stops frequencies below a record's.
 
     Fitted to the log of a wind's spectrum over OMEGA; the variances agree. Without the second the best
     control would spend its torque on slow changes that no run has.
@@ -226,24 +216,22 @@ def fit_wind(spectrum):
 
     def miss(p):
         squares = np.log1p((np.exp(p[: ORDER + ZEROS])[:, None] * omega) ** 2)
-        return weight * (
-            p[-1] + squares[ORDER:].sum(axis=0) - squares[:ORDER].sum(axis=0) + slow - np.log(target)
-        )
+        level = p[-1] + squares[ORDER:].sum(axis=0) - squares[:ORDER].sum(axis=0)
+        return weight * (level + slow - np.log(target))
 
     start = np.r_[np.log([60.0, 8.0, 1.0, 20.0]), np.log(target[0])]
     times = np.exp(least_squares(miss, start).x[: ORDER + ZEROS])
-    below, above = np.ones(1), np.ones(1)
-    for time in times[:ORDER]:
-        below = np.polymul(below, [time, 1.0])
-    for time in times[ORDER:]:
-        above = np.polymul(above, [time, 1.0])
+    below, above = (
+        reduce(np.polymul, ([time, 1.0] for time in part), np.ones(1))
+        for part in (times[:ORDER], times[ORDER:])
+    )
     below, above = np.polymul(below / below[0], [1.0, SLOWEST]), np.polymul(above / below[0], [1.0, 0.0])
     a, b, c = _companion(below, above)
     return _scaled(a, b, c, spectrum)
 
 
 def fit_waves(weather, sea):
-    """(Filter of the elevation, force (3, 4) of its states, relative rms errors (3,) of the force).
+    """Return (Filter of the elevation, force (3, 4) of its states, relative rms errors (3,) of the force).
 
     The filter is s^2 through two resonators; its variance is the sea's. The errors are those of the force at
     the sea's frequencies; zero where there is no force.
@@ -285,7 +273,7 @@ def fit_waves(weather, sea):
 
 
 def _companion(below, above):
-    """(a, b, c) of the filter above/below, polynomials in s with the first coefficient of below 1."""
+    """Return (a, b, c) of the filter above/below, polynomials in s with the first coefficient of below 1."""
     n = below.size - 1
     a = np.zeros((n, n))
     a[:-1, 1:] = np.eye(n - 1)
@@ -297,7 +285,7 @@ def _companion(below, above):
 
 
 def _scaled(a, b, c, spectrum):
-    """Filter whose variance is that of a spectrum over OMEGA, both where the spectrum is not zero."""
+    """Return a Filter with the variance of a spectrum over OMEGA, both where the spectrum is not zero."""
     variance, here = np.trapezoid(spectrum, OMEGA), spectrum > 0.0
     density = np.where(here, np.abs(Filter(a, b, c, 0.0).states(OMEGA) @ c) ** 2 / pi, 0.0)
     ratio = variance / np.trapezoid(density, OMEGA) if variance > 0.0 else 0.0

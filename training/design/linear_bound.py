@@ -13,7 +13,7 @@ less than gspi_oc3 has a little less drag than the model: the limit errs to the 
 """
 
 from dataclasses import replace
-from itertools import pairwise
+from itertools import pairwise, product
 from math import ceil
 from pathlib import Path
 
@@ -47,54 +47,40 @@ RATIOS = {  # column of ratio_table: metric
 
 
 def information_sets(previews=PREVIEWS):
-    """{name: Information} of KNOWN, each without and with the wind some seconds ahead, and without torque."""
+    """Return {name: Information} of KNOWN, each without and with previews of the wind, and without torque."""
     found = {}
-    for torque in (True, False):
-        for time in (None, *previews):
-            for name, (text, sensors) in KNOWN.items():
-                ahead = "" if time is None else f"_preview_{time:g}"
-                words = text + ("" if time is None else f", wind {time:g} s ahead")
-                label = name + ahead + ("" if torque else PITCH_ONLY)
-                found[label] = Information(words + ("" if torque else "; no torque"), sensors, time, torque)
+    for torque, time in product((True, False), (None, *previews)):
+        suffix, ahead = ("", "") if time is None else (f"_preview_{time:g}", f", wind {time:g} s ahead")
+        suffix, ahead = (suffix, ahead) if torque else (suffix + PITCH_ONLY, f"{ahead}; no torque")
+        for name, (text, sensors) in KNOWN.items():
+            found[name + suffix] = Information(text + ahead, sensors, time, torque)
     return found
 
 
 def usual(previews=PREVIEWS):
-    """Names of information_sets of which a table is made by default, {name: text}.
+    """Return {name: text} of the information_sets of a table by default.
 
     Where the wind is known exactly, now and ahead, sensors or all states make less than 1 % of difference:
     of those, all states.
     """
-    found = information_sets(previews)
-    return {
-        name: known.text for name, known in found.items() if known.preview is None or known.sensors is None
-    }
+    found = information_sets(previews).items()
+    return {name: known.text for name, known in found if known.preview is None or known.sensors is None}
 
 
 INFORMATION = usual()  # name: what plots call it
 
 
 def winds_of(turbine):
-    """Winds above rated at which the limit is found by default: even ones up to cut-out, m/s."""
+    """Return the winds above rated at which the limit is found by default: even ones up to cut-out, m/s."""
     first = 2 * ceil(0.5 * (turbine.rated_wind_speed + 0.1))
     return tuple(float(wind) for wind in range(first, int(turbine.cut_out_wind_speed) + 1, 2))
 
 
 def bound_table(
-    scene,
-    winds=None,
-    information=None,
-    *,
-    travel=1.0,
-    power=1.0,
-    torque_std=TORQUE_STD,
-    previews=PREVIEWS,
-    noise=None,
-    sea=None,
-    fractions=FRACTIONS,
-    progress=None,
-):
-    """DataFrame: per wind and information the Pareto front, beside gspi_oc3; absolute and over gspi_oc3's.
+    scene, winds=None, information=None, *, travel=1.0, power=1.0, torque_std=TORQUE_STD, previews=PREVIEWS,
+    noise=None, sea=None, fractions=FRACTIONS, progress=None,
+):  # fmt: skip
+    """Return a DataFrame: the Pareto front per wind and information, absolute and over gspi_oc3's.
 
     winds        m/s; None: winds_of the scene's turbine
     information  names of information_sets(previews); None: the usual ones
@@ -126,8 +112,7 @@ def bound_table(
     rows, fits, total = [], [], len(winds) * len(chosen)
     for number, wind in enumerate(winds):
         plant = BoundPlant(scene, wind, sea)
-        base = baseline_deviations(plant, plant.true)
-        fitted = baseline_deviations(plant, plant.fitted)
+        base, fitted = (baseline_deviations(plant, weather) for weather in (plant.true, plant.fitted))
         fits.append(_fits(plant))
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base, fitted))
         limits = replace(base, travel=travel * base.travel, power=power * base.power, torque=torque_std)
@@ -143,41 +128,33 @@ def bound_table(
 
 
 def _fits(plant):
-    """Errors of a BoundPlant's fits in percent, and the damping of its drag."""
-    surge, heave, lean = (100.0 * float(error) for error in plant.force_errors)
+    """Return the errors of a BoundPlant's fits in percent, and the damping of its drag."""
+    errors = plant.wind_filter.error, plant.wave_filter.error, *plant.force_errors
+    names = ("wind", "elevation", "surge_force", "heave_force", "pitch_moment")
     return {
         "wind_[m/s]": plant.wind_speed,
-        "wind_error_[%]": 100.0 * plant.wind_filter.error,
-        "elevation_error_[%]": 100.0 * plant.wave_filter.error,
-        "surge_force_error_[%]": surge,
-        "heave_force_error_[%]": heave,
-        "pitch_moment_error_[%]": lean,
+        **{f"{name}_error_[%]": 100.0 * float(error) for name, error in zip(names, errors, strict=True)},
         "surge_drag_[kN-s/m]": 1e-3 * float(plant.drag.damping[0, 0]),
         "pitch_drag_[MN-m-s/rad]": 1e-6 * float(plant.drag.damping[4, 4]),
     }
 
 
 def _row(wind, information, fraction, found, base, fitted):
-    """One row of bound_table."""
+    """Return one row of bound_table."""
     names = ("rotor_speed", "platform_pitch", "travel")
     difference = max(abs(getattr(fitted, name) / getattr(found, name) - 1.0) for name in names)
     return {
-        "wind_[m/s]": float(wind),
-        "information": information,
-        "share_[-]": fraction,
-        "RotSpeed_std_[rpm]": found.rotor_speed / RPM,
-        "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
-        "blade_pitch_travel_[deg/s]": found.travel / DEGREE,
-        "power_std_[%]": 100.0 * found.power,
-        "torque_std_[%]": 100.0 * found.torque,
-        "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
+        "wind_[m/s]": float(wind), "information": information, "share_[-]": fraction,
+        "RotSpeed_std_[rpm]": found.rotor_speed / RPM, "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
+        "blade_pitch_travel_[deg/s]": found.travel / DEGREE, "power_std_[%]": 100.0 * found.power,
+        "torque_std_[%]": 100.0 * found.torque, "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
         "pitch_ratio_[-]": found.platform_pitch / base.platform_pitch,
         "fit_difference_[%]": 100.0 * difference,
-    }
+    }  # fmt: skip
 
 
 def rounded(table):
-    """A bound_table with five significant digits, as it is stored."""
+    """Return a bound_table with five significant digits, as it is stored."""
     numbers = table.columns.drop("information")
     short = table.copy()
     short[numbers] = table[numbers].map(lambda value: float(f"{value:.5g}"))
@@ -185,7 +162,7 @@ def rounded(table):
 
 
 def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full"):
-    """Share of what the Pareto front allows that a controller reaches, on the line from gspi_oc3 through it.
+    """Return the position of a controller between gspi_oc3 (0) and the Pareto front (1), on a line.
 
     speed_ratio, pitch_ratio: its deviations over those of gspi_oc3. 1: on the Pareto front; 0: no better than
     gspi_oc3; NaN where the line meets no front (or the controller betters neither).
@@ -195,7 +172,7 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
     way = 1.0 - np.array([speed_ratio, pitch_ratio])
     if not len(line) or not np.any(way > 0.0):
         return float("nan")
-    # the front goes on straight up and to the right from its ends
+    # the front continues straight up and to the right from its ends
     line = np.vstack([[line[0, 0], 10.0], line, [10.0, line[-1, 1]]])
     for start, end in pairwise(1.0 - line):
         try:
@@ -208,7 +185,7 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
 
 
 def ratio_table(runs, bound=None):
-    """DataFrame of a sweep's means over seeds (sweeps.sweep) over those of its gspi_oc3.
+    """Return a DataFrame of a sweep's means over seeds (sweeps.sweep) over those of its gspi_oc3.
 
     Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
     fractions of the limit, and of that for measured channels. Cases are named kind_WIND.
@@ -239,7 +216,7 @@ def ratio_table(runs, bound=None):
 
 
 def efficient(points):
-    """The rows of (n, 2) points that no other betters in both columns, by rising first column."""
+    """Return the rows of (n, 2) points that no other betters in both columns, by rising first column."""
     points = np.asarray(points, dtype=float)
     best, kept = np.inf, []
     for x, y in points[np.lexsort((points[:, 1], points[:, 0]))]:

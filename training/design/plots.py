@@ -8,20 +8,13 @@ import numpy as np
 
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
+from fowt_env.training.design.linear_bound import efficient
 from fowt_env.visual.response import broken_at_wraps
 from fowt_env.visual.style import COLOURS, FAINT, INK, SOFT, new_figure, save_figure, style_axes
 
 MODE_NAMES = (
-    "surge",
-    "sway",
-    "heave",
-    "roll",
-    "platform_pitch",
-    "yaw",
-    "rotor_speed",
-    "blade_pitch",
-    "other",
-)
+    "surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed", "blade_pitch", "other",
+)  # fmt: skip
 MODE_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
 OF_REAL_POLES = ("rotor_speed", "blade_pitch", "surge", "sway", "heave", "roll", "platform_pitch", "yaw")
 REAL = 1e-6  # rad/s: a pole of less imaginary part is real
@@ -39,24 +32,27 @@ TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel
 
 
 def _wind_colours(winds):
-    """{wind: colour} from dark (low) to light along one scale, and the scale for a colour bar."""
+    """Return {wind: colour} from dark (low) to light, and the scale for a colour bar.
+
+    Raises: InputError without winds.
+    """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
+    if not winds:
+        raise InputError("nothing to plot: no linear models were given")
     low, high = min(winds), max(winds)
     scale = ScalarMappable(Normalize(low, high if high > low else low + 1.0), colormaps["viridis"])
     return {wind: scale.to_rgba(wind) for wind in winds}, scale
 
 
 def plot_poles(models, path=None, title=None):
-    """Figure of the poles over the wind of {wind: LinearModel}, whole and near the origin; colour by wind.
+    """Return a Figure of the poles over the wind of {wind: LinearModel}, whole and near the origin.
 
     Poles of oscillations have the mark of their mode; real ones, of the rotor speed and of actuators, lie on
-    the real axis. What decays faster than FASTEST lies outside and is named with its value.
+    the real axis. Poles that decay faster than FASTEST lie outside and are named with their value.
     """
-    if not models:
-        raise InputError("nothing to plot: no linear models were given")
     colours, scale = _wind_colours(list(models))
     found = [(wind, *pole) for wind, model in models.items() for pole in _poles(model)]
     figure = new_figure(11.5, 5.2)
@@ -81,15 +77,9 @@ def plot_poles(models, path=None, title=None):
     panels[1].set_title("near the origin", fontsize=9, color=INK, loc="left", pad=16)
     if beyond:
         texts = sorted({f"{name.replace('_', ' ')} at {pole.real:.3g} 1/s" for name, pole in beyond})
-        panels[0].annotate(
-            f"further left: {', '.join(texts[:3])}",
-            (0.01, 0.06),
-            xycoords="axes fraction",
-            fontsize=8,
-            color=SOFT,
-        )
-    bar = figure.colorbar(scale, ax=panels, pad=0.01)
-    _quiet_bar(bar, "wind (m/s)")
+        text = f"further left: {', '.join(texts[:3])}"
+        panels[0].annotate(text, (0.01, 0.06), xycoords="axes fraction", fontsize=8, color=SOFT)
+    _colour_bar(figure, scale, panels, "wind (m/s)")
     figure.legend(
         handles, labels, loc="outside upper center", ncols=len(labels), fontsize=8.5, frameon=False,
         labelcolor=INK, title=title or "Poles with torque and blade pitch held; grey lines: damping ratio",
@@ -99,7 +89,7 @@ def plot_poles(models, path=None, title=None):
 
 
 def _poles(model):
-    """[(name, pole rad/s)] of all poles of a LinearModel with an imaginary part of at least 0.
+    """Return [(name, pole rad/s)] of all poles of a LinearModel with an imaginary part of at least 0.
 
     Oscillations have the names of model.modes(); a real pole that of the state of OF_REAL_POLES that
     participates most in it.
@@ -119,7 +109,9 @@ def _poles(model):
     return entries
 
 
-def _quiet_bar(bar, label):
+def _colour_bar(figure, scale, axes, label):
+    """Draw a colour bar beside axes."""
+    bar = figure.colorbar(scale, ax=axes, pad=0.01)
     bar.set_label(label, fontsize=9, color=INK)
     bar.ax.tick_params(labelsize=8, colors=INK)
     bar.outline.set_visible(False)
@@ -148,7 +140,7 @@ def _damping_lines(axes, left, top):
 
 
 def plot_damping(models, path=None, title=None):
-    """Period and damping ratio of every mode over the wind of {wind: LinearModel}."""
+    """Return a Figure of period and damping ratio of every mode over the wind of {wind: LinearModel}."""
     if not models:
         raise InputError("nothing to plot: no linear models were given")
     figure = new_figure(9.0, 5.6)
@@ -177,13 +169,11 @@ def plot_damping(models, path=None, title=None):
 
 
 def plot_bode(models, path=None, title=None):
-    """Figure of gain and phase of BODE for {wind: LinearModel}: from pitch, torque and wind to the motions.
+    """Return a Figure of gain and phase of BODE for {wind: LinearModel}.
 
     Phases are in [-180, 180) deg. Blade pitch is shown where it is free to move: not at winds where it
     rests on its limit.
     """
-    if not models:
-        raise InputError("nothing to plot: no linear models were given")
     colours, scale = _wind_colours(list(models))
     figure = new_figure(12.0, 5.8)
     panels = figure.subplots(2, len(BODE), sharex=True)
@@ -210,21 +200,19 @@ def plot_bode(models, path=None, title=None):
             gain.set_ylim(top * 10.0**-DECADES, 1.6 * top)
     panels[1, 0].set_ylabel("phase (deg)", fontsize=8.5, color=INK)
     figure.align_ylabels(panels[:, 0])
-    _quiet_bar(figure.colorbar(scale, ax=panels, pad=0.01), "wind (m/s)")
+    _colour_bar(figure, scale, panels, "wind (m/s)")
     if title:
         figure.suptitle(title, fontsize=11, color=INK)
     return save_figure(figure, path)
 
 
 def plot_bound(table, names, points=None, path=None, title=None):
-    """Pareto fronts of linear_bound.bound_table over gspi_oc3's, a panel per wind, and simulated points.
+    """Return a Figure of the fronts of linear_bound.bound_table over gspi_oc3's, a panel per wind.
 
     names: {information: legend text}, in order. points: training.design.linear_bound.ratio_table of simulated
     controllers, coloured by their blade-pitch travel over that of gspi_oc3. Winds without points are left
     out where there are points at all.
     """
-    from fowt_env.training.design.linear_bound import efficient
-
     winds = sorted(table[WIND].unique())
     if points is not None:
         winds = [wind for wind in winds if wind in set(points[WIND])]
@@ -247,27 +235,19 @@ def plot_bound(table, names, points=None, path=None, title=None):
         if points is not None:
             shown = points[points[WIND] == wind]
             drawn = axes.scatter(
-                shown["speed_ratio_[-]"],
-                shown["pitch_ratio_[-]"],
-                c=shown["travel_ratio_[-]"],
-                **TRAVEL,
-                s=30,
-                edgecolor=INK,
-                linewidth=0.5,
-                label="lqr, simulated",
-                zorder=5,
-            )
+                shown["speed_ratio_[-]"], shown["pitch_ratio_[-]"], c=shown["travel_ratio_[-]"], **TRAVEL,
+                s=30, edgecolor=INK, linewidth=0.5, label="lqr, simulated", zorder=5,
+            )  # fmt: skip
         axes.set_xlim(0.0, 1.25)
         axes.set_ylim(0.0, 1.15)
         axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
     if points is not None:
-        bar = figure.colorbar(drawn, ax=places, pad=0.01)
-        _quiet_bar(bar, "mean blade-pitch rate over that of gspi_oc3")
+        _colour_bar(figure, drawn, places, "mean blade-pitch rate over that of gspi_oc3")
     return finish_bound(figure, places, len(winds), path, title)
 
 
 def finish_bound(figure, places, used, path, title):
-    """The Figure of a grid of deviations over those of gspi_oc3, completed and written to path.
+    """Return a Figure of a grid of deviations over those of gspi_oc3, completed and written to path.
 
     Labels, title and a legend in the first spare place, or above the grid; other spare places are emptied.
     """

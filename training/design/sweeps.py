@@ -1,4 +1,4 @@
-"""What linear models say over the wind: modes, zeros of blade pitch to rotor speed; and sweeps of lqr.
+"""Linear models over the wind: modes, zeros of blade pitch to rotor speed; and sweeps of lqr.
 
 Run as fowt linearize and fowt design; every function returns a table that can be written as it is.
 """
@@ -25,14 +25,14 @@ from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.seeds import VALIDATION
 
-INFINITE = 1e3  # rad/s: generalised eigenvalues beyond are zeros at infinity
+INFINITE = 1e3  # rad/s: larger generalised eigenvalues are zeros at infinity
 MODEL_SUFFIXES = (".json", ".npz")
 SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
 KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")
 
 
 def models_over(scene, winds, progress=None):
-    """{wind m/s: LinearModel} of a scene in steady winds; blades that follow at once lag by LEAST_LAG."""
+    """Return {wind m/s: LinearModel} of a scene in steady winds; blades lag by LEAST_LAG at least."""
     models = {}
     for number, wind in enumerate(winds, 1):
         models[float(wind)] = with_pitch_lag(linearize(scene_at(scene, wind)))
@@ -42,7 +42,7 @@ def models_over(scene, winds, progress=None):
 
 
 def mode_table(models):
-    """DataFrame: wind, mode, period (s), damping ratio of every oscillating mode, pitch and torque held."""
+    """Return a DataFrame: wind, mode, period (s), damping ratio of oscillations, pitch and torque held."""
     rows = [
         {"wind_[m/s]": wind, "mode": m.name, "period_[s]": m.period, "damping_[-]": m.damping_ratio}
         for wind, model in models.items()
@@ -52,7 +52,7 @@ def mode_table(models):
 
 
 def transmission_zeros(model, source="blade_pitch_command", output="rotor_speed"):
-    """Finite zeros (rad/s, complex) from an input of LinearModel.inputs to one of its outputs."""
+    """Return the finite zeros (rad/s, complex) from an input of LinearModel.inputs to one of its outputs."""
     b = model.B[:, [model.inputs.index(source)]]
     row = model.output_index(output)
     c, d = model.C[[row]], model.D[[row]][:, [model.inputs.index(source)]]
@@ -64,22 +64,26 @@ def transmission_zeros(model, source="blade_pitch_command", output="rotor_speed"
     return values[np.isfinite(values) & (np.abs(values) < INFINITE)]
 
 
+def _right_half(model):
+    """Return the zeros of blade pitch to rotor speed in the right half plane, one of each pair."""
+    return [z for z in transmission_zeros(model) if z.real > 1e-6 and z.imag >= 0.0]
+
+
 def zero_table(models):
-    """DataFrame: wind, real and imaginary part (rad/s) of the right-half-plane zeros of pitch to speed.
+    """Return a DataFrame: wind, real and imaginary part (rad/s) of the right-half-plane zeros.
 
     Winds at which the blade pitch rests on its minimum are left out: there is no pitch control.
     """
     rows = [
         {"wind_[m/s]": wind, "real_[rad/s]": z.real, "imag_[rad/s]": z.imag}
         for wind, model in models.items()
-        for z in (() if model.pitch_rests else transmission_zeros(model))
-        if z.real > 1e-6 and z.imag >= 0.0
+        for z in (() if model.pitch_rests else _right_half(model))
     ]
     return pd.DataFrame(rows, columns=["wind_[m/s]", "real_[rad/s]", "imag_[rad/s]"])
 
 
 def zeros_over(scene, winds=None, progress=None):
-    """DataFrame: wind, right-half-plane zero of blade pitch to rotor speed, and what it makes of the loop.
+    """Return a DataFrame: wind, right-half-plane zero of blade pitch to rotor speed, and modes of the loop.
 
     winds      m/s; None: whole ones above rated up to cut-out
     Columns: real and imaginary part of the zero (0 where there is none) and its period; period and damping of
@@ -94,38 +98,33 @@ def zeros_over(scene, winds=None, progress=None):
     for wind, model in models_over(scene, winds, progress).items():
         if model.pitch_rests:
             raise InputError(f"wind = {wind:g}: the blade pitch rests on its limit there")
-        zeros = [z for z in transmission_zeros(model) if z.real > 1e-6 and z.imag >= 0.0]
-        zero = max(zeros, key=lambda z: z.real, default=0.0j)
+        zero = max(_right_half(model), key=lambda z: z.real, default=0.0j)
         own, frequency = platform_mode(model), platform_frequency(model)
         a, names = closed_loop_matrix(model, settings)
-        # what oscillates as platform and rotor do: sway, roll and yaw are not the loop's
+        # modes of platform and rotor: sway, roll and yaw are not the loop's
         moving = [
-            mode
-            for mode in modes(a, names, model.cm_height, model.arm)
+            mode for mode in modes(a, names, model.cm_height, model.arm)
             if mode.name in ("platform_pitch", "rotor_speed", "surge")
-        ]
+        ]  # fmt: skip
         fast, slow = (
             min((m.damping_ratio for m in moving if (m.frequency > 0.5 * frequency) is part), default=np.nan)
             for part in (True, False)
         )
-        size = abs(zero)
-        rows.append(
-            {
-                "wind_[m/s]": wind,
-                "zero_real_[rad/s]": float(zero.real),
-                "zero_imag_[rad/s]": float(zero.imag),
-                "zero_period_[s]": float(2.0 * np.pi / size) if size else np.nan,
-                "platform_period_[s]": np.nan if own is None else own.period,
-                "platform_damping_[-]": np.nan if own is None else own.damping_ratio,
-                "pi_pitch_damping_[-]": float(fast),
-                "pi_surge_damping_[-]": float(slow),
-            }
-        )
+        rows.append({
+            "wind_[m/s]": wind,
+            "zero_real_[rad/s]": float(zero.real),
+            "zero_imag_[rad/s]": float(zero.imag),
+            "zero_period_[s]": float(2.0 * np.pi / abs(zero)) if zero else np.nan,
+            "platform_period_[s]": np.nan if own is None else own.period,
+            "platform_damping_[-]": np.nan if own is None else own.damping_ratio,
+            "pi_pitch_damping_[-]": float(fast),
+            "pi_surge_damping_[-]": float(slow),
+        })  # fmt: skip
     return pd.DataFrame(rows)
 
 
 def save_models(models, path):
-    """The path written: {wind: LinearModel} as .json or .npz, SI.
+    """Write {wind: LinearModel} and return the path: .json or .npz, SI.
 
     winds (n,), states, inputs, outputs, forces (names), A (n, m, m), B, C, D, E, F as in LinearModel, and
     the operating points: x (n, m) in the order of states, u (n, 2) torque and blade pitch.
@@ -152,7 +151,7 @@ def save_models(models, path):
 
 
 def save_study(models, folder):
-    """The paths written into a folder: modes.csv, zeros.csv, models.json, models.npz and three plots."""
+    """Write modes.csv, zeros.csv, models.json, models.npz and three plots into a folder; return the paths."""
     from fowt_env.training.design.plots import plot_bode, plot_damping, plot_poles
 
     folder = Path(folder)
@@ -166,11 +165,11 @@ def save_study(models, folder):
 
 
 def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0, platform="oc3_hywind"):
-    """DataFrame of lqr with each variant of its settings ({name: value} each) and of gspi_oc3, seed by seed.
+    """Return a DataFrame of lqr with each variant of its settings and of gspi_oc3, seed by seed.
 
-    cases: names of cases and suites, scaled to the platform's turbine.
-    Of the metrics it has those of KEPT, NaN where a run failed. seeds must be training seeds,
-    seeds.VALIDATION.start and above: the others are for scoring. out: CSV.
+    variants: {setting: value} each; cases: names of cases and suites, scaled to the platform's turbine.
+    Metrics are those of KEPT, NaN where a run failed. seeds: seeds.VALIDATION.start and above, as the others
+    are for scoring. out: CSV.
     Raises: InputError for other seeds or unknown settings.
     """
     if min(seeds) < VALIDATION.start:

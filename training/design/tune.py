@@ -4,11 +4,11 @@
 
 Every setting runs on the cases of a suite, on validation seeds (1000 and above, on which no suite is scored),
 through the suite's sensors and behind its trip. Its cost is the mean of the lifetime deviations of rotor
-speed and platform pitch over those of gspi_oc3 on the same runs, plus PENALTY times what it lies beyond the
-suite's limits and beyond LIMITS, in fractions of them, plus LOST times the fraction of lost runs. The
-settings of now come first, then up to half of the budget spread evenly (Sobol), then Nelder and Mead's method
-from the best. A row of OUT/tune_NAME.csv is written for each setting as soon as it is known, so that an
-interrupted search leaves what it tried.
+speed and platform pitch over those of gspi_oc3 on the same runs, plus PENALTY times the excess over the
+suite's limits and over LIMITS, in fractions of them, plus LOST times the fraction of lost runs. The
+present settings come first, then up to half of the budget spread evenly (Sobol), then Nelder and Mead's
+method from the best. A row of OUT/tune_NAME.csv is written after each setting, so that an interrupted
+search leaves the settings it has tried.
 """
 
 from collections.abc import Callable, Mapping
@@ -52,18 +52,18 @@ FIGURES = {
     "travel_ratio": "blade_pitch_travel_[deg/s]", "shaft_ratio": "RotTorq_DEL_[kN-m]",
     "energy_ratio": "GenPwr_capped_mean_[kW]", "power_std_ratio": "GenPwr_std_[kW]",
 }  # fmt: skip
-# Over the baseline, beside the suite's: a search goes as far as it may, and other seeds then go beyond
+# over the baseline's, stricter than the suite's: a search ends at a limit, and other seeds then exceed it
 LIMITS = {"blade_pitch_travel_[deg/s]": 0.98, "RotTorq_DEL_[kN-m]": 1.05, "GenPwr_capped_mean_[kW]": 0.995}
-PENALTY = 10.0  # 1 % beyond a limit has to be worth 10 % of the deviations
+PENALTY = 10.0  # 1 % above a limit has to be worth 10 % of the deviations
 LOST = 5.0
 FIRST_STEP = 0.12  # of the simplex, in the unit cube
 
 
 @dataclass(frozen=True)
 class Space:
-    """What is searched of a controller: {setting: (low, high)}, by logarithm where low is positive.
+    """Settings of a controller that are searched: {setting: (low, high)}, by logarithm where low is positive.
 
-    start: the settings of now. make(settings, turbine, control_dt): the controller.
+    start: the present settings. make(settings, turbine, control_dt): the controller.
     """
 
     ranges: Mapping[str, tuple[float, float]]
@@ -71,7 +71,7 @@ class Space:
     make: Callable[..., Any]
 
     def settings(self, place):
-        """{setting: value} of a place (n,) in the unit cube."""
+        """Return {setting: value} of a place (n,) in the unit cube."""
         found = {}
         for (key, (low, high)), x in zip(self.ranges.items(), np.clip(place, 0.0, 1.0), strict=True):
             value = low * (high / low) ** x if low > 0.0 else low + (high - low) * x
@@ -79,7 +79,7 @@ class Space:
         return found
 
     def place(self, settings):
-        """(n,) place in the unit cube of settings, at its walls where they lie outside."""
+        """Return the place (n,) of settings in the unit cube, at its walls where they lie outside."""
         place = []
         for key, (low, high) in self.ranges.items():
             value = min(max(settings[key], low), high)
@@ -92,36 +92,6 @@ def _pi(settings, turbine, control_dt):
     published = PISettings.published(turbine)
     changes = {name: getattr(published, name) * factor for name, factor in settings.items()}
     return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")
-
-
-def _feedback(settings, turbine, control_dt):
-    return FloatingFeedback(PISettings.published(turbine), FeedbackSettings(**settings), control_dt)
-
-
-def _rosco(settings, turbine, control_dt):
-    return Rosco(RoscoSettings(mode=1, **settings), control_dt, "rosco_float")
-
-
-def _lqr(settings, turbine, control_dt):
-    return LQR(turbine, control_dt, LQGSettings(**settings))
-
-
-def _mpc(settings, turbine, control_dt):
-    return MPC(turbine, control_dt, MPCSettings(**settings))
-
-
-def _mpc_preview(settings, turbine, control_dt):
-    return MPC(turbine, control_dt, PREVIEW.changed(**settings), "mpc_preview", preview=True)
-
-
-def _mpc_lidar(settings, turbine, control_dt):
-    changed = MPCSettings(preview_time=LIDAR_HORIZON, **settings)
-    return MPC(turbine, control_dt, changed, "mpc_lidar", preview=True, exact=False)
-
-
-def _of(record, ranges):
-    """Start of a Space: the fields of a settings record."""
-    return {key: getattr(record, key) for key in ranges}
 
 
 _LQR = {
@@ -137,31 +107,45 @@ _MPC = {
 }  # fmt: skip
 
 
+_FEEDBACK = {
+    "pitch_gain": (0.01, 0.3), "low_pass": (0.05, 0.6), "high_pass": (0.005, 0.04),
+    "torque_gain": (-400.0, 400.0),
+}  # fmt: skip
+_ROSCO = {
+    "kp": (0.3, 3.0), "ki": (0.1, 2.0), "gain": (-0.3, 0.0), "low_pass": (0.05, 0.6),
+    "high_pass": (0.003, 0.04),
+}  # fmt: skip
+_FACTORS = {"KP": (0.3, 4.0), "KI": (0.05, 3.0), "gain_schedule_pitch": (0.3, 4.0)}
+
+
 def spaces():
-    """{name of a baseline: its Space}."""
-    feedback = {
-        "pitch_gain": (0.01, 0.3),
-        "low_pass": (0.05, 0.6),
-        "high_pass": (0.005, 0.04),
-        "torque_gain": (-400.0, 400.0),
-    }
-    rosco = {
-        "kp": (0.3, 3.0),
-        "ki": (0.1, 2.0),
-        "gain": (-0.3, 0.0),
-        "low_pass": (0.05, 0.6),
-        "high_pass": (0.003, 0.04),
-    }
-    factors = {"KP": (0.3, 4.0), "KI": (0.05, 3.0), "gain_schedule_pitch": (0.3, 4.0)}
+    """Return {name of a baseline: its Space}."""
+
+    def of(record, ranges):
+        return ranges, {key: getattr(record, key) for key in ranges}
+
+    def lidar(settings, turbine, dt):
+        changed = MPCSettings(preview_time=LIDAR_HORIZON, **settings)
+        return MPC(turbine, dt, changed, "mpc_lidar", preview=True, exact=False)
+
+    def feedback(settings, turbine, dt):
+        return FloatingFeedback(PISettings.published(turbine), FeedbackSettings(**settings), dt)
+
     return {
-        "floating_feedback": Space(feedback, tuned("floating_feedback"), _feedback),
-        "lqr": Space(_LQR, _of(LQGSettings(), _LQR), _lqr),
-        "mpc": Space(_MPC, _of(MPCSettings(), _MPC), _mpc),
-        "mpc_lidar": Space(_MPC, _of(MPCSettings(), _MPC), _mpc_lidar),
-        "mpc_preview": Space(_MPC, _of(PREVIEW, _MPC), _mpc_preview),
-        "pi_tuned": Space(factors, tuned("pi_tuned"), _pi),
-        "rosco_float": Space(rosco, tuned("rosco_float"), _rosco),
-    }
+        "floating_feedback": Space(_FEEDBACK, tuned("floating_feedback"), feedback),
+        "lqr": Space(*of(LQGSettings(), _LQR), lambda s, t, dt: LQR(t, dt, LQGSettings(**s))),
+        "mpc": Space(*of(MPCSettings(), _MPC), lambda s, t, dt: MPC(t, dt, MPCSettings(**s))),
+        "mpc_lidar": Space(*of(MPCSettings(), _MPC), lidar),
+        "mpc_preview": Space(
+            *of(PREVIEW, _MPC),
+            lambda s, t, dt: MPC(t, dt, PREVIEW.changed(**s), "mpc_preview", preview=True),
+        ),
+        "pi_tuned": Space(_FACTORS, tuned("pi_tuned"), _pi),
+        "rosco_float": Space(
+            _ROSCO, tuned("rosco_float"),
+            lambda s, t, dt: Rosco(RoscoSettings(mode=1, **s), dt, "rosco_float"),
+        ),
+    }  # fmt: skip
 
 
 class Objective:
@@ -177,7 +161,7 @@ class Objective:
         self.base = evaluate(BASELINE, self.suite, seeds=self.seeds, reference=BASELINE, **engine)
 
     def __call__(self, controller):
-        """{"cost", FIGURES over the baseline's, "lost", "beyond"} of a controller."""
+        """Return {"cost", FIGURES over the baseline's, "lost", "beyond"} of a controller."""
         made = evaluate(
             {"candidate": controller}, self.suite, seeds=self.seeds, reference=False, **self.engine
         )
@@ -200,7 +184,7 @@ class Objective:
         return found | {"lost": lost, "beyond": float(excess)}
 
     def _means(self, runs):
-        """Series of the lifetime means of METRICS over the runs of one controller."""
+        """Return a Series of the lifetime means of METRICS over the runs of one controller."""
         cases = [case.name for case in self.suite.cases]
         index = pd.MultiIndex.from_product([cases, self.seeds], names=["case", "seed"])
         values = runs.set_index(["case", "seed"])[list(METRICS)].reindex(index).to_numpy(dtype=np.float64)
@@ -211,7 +195,7 @@ class Objective:
 
 
 def tune(name, budget=BUDGET, out=None, report=None, **objective):
-    """(best settings, its figures, DataFrame of all that were tried, in order) of a baseline.
+    """Return (best settings, their figures, DataFrame of all that were tried, in order) of a baseline.
 
     budget     settings that are tried
     out        folder of tune_NAME.csv; None: none is written
@@ -228,7 +212,7 @@ def tune(name, budget=BUDGET, out=None, report=None, **objective):
     def cost(place):
         settings = space.settings(place)
         row = settings | judge(space.make(settings, judge.turbine, CONTROL_DT))
-        # beyond the walls of the search the nearest setting inside counts, and a little more
+        # outside the walls of the search the nearest setting inside counts, and the distance to it
         row["cost"] += float(np.sum(np.abs(place - np.clip(place, 0.0, 1.0))))
         rows.append(row)
         if out is not None:
@@ -253,7 +237,7 @@ def tune(name, budget=BUDGET, out=None, report=None, **objective):
 
 
 def write_tuned(name, settings, figures, budget, objective, path=TUNED):
-    """Put settings into tuned.toml, in place of those of the same controller."""
+    """Write settings into tuned.toml, in place of those of the same controller."""
     import tomllib
 
     held = tomllib.loads(Path(path).read_text(encoding="utf-8"))

@@ -14,24 +14,35 @@ REPORT_EVERY = 1.0  # s
 
 
 class Stopped(Exception):
-    """The run was asked to end, and its checkpoint is written."""
+    """The run has been stopped, and its checkpoint is written."""
 
 
-class ValidationCallback(BaseCallback):
-    """After each validation: physical figures against the baseline's, a row of the table, the best policy."""
+class Validation(EvalCallback):
+    """Validations of a train.Training: ratios to the reference, a row of the table, the best policy."""
 
-    def __init__(self, training):
-        super().__init__()
+    def __init__(self, training, env):
+        every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
+        super().__init__(env, n_eval_episodes=env.num_envs, eval_freq=every, deterministic=True, verbose=0)
         self.training = training
         self.best = float("inf")
 
+    def now(self):
+        """Validate the present policy; the interval of the validations stays as it is."""
+        calls, self.n_calls = self.n_calls, 0
+        try:
+            self._on_step()
+        finally:
+            self.n_calls = calls
+
     def _on_step(self):
-        training, evaluation = self.training, self.parent
-        figures = decision_env(evaluation.eval_env).base.figures()
-        row = {"decisions": self.num_timesteps, "seconds": training.checkpoint_callback.seconds()}
-        row |= {"reward": evaluation.last_mean_reward} | validation_score(
-            figures, training.reference, training.kinds
-        )
+        training, due = self.training, self.n_calls % self.eval_freq == 0
+        going = super()._on_step()
+        if not due:
+            return going
+        figures = decision_env(self.eval_env).base.figures()
+        row = {"decisions": self.num_timesteps, "seconds": training.checkpointing.seconds()}
+        row |= {"reward": self.last_mean_reward}
+        row |= validation_score(figures, training.reference, training.kinds)
         training.rows.append(row)
         for name, value in row.items():
             self.logger.record(f"validation/{name}", value)
@@ -39,35 +50,23 @@ class ValidationCallback(BaseCallback):
         if row["score"] < self.best:
             self.best = row["score"]
             training.export("best.npz")
-        return True
-
-
-class Validation(EvalCallback):
-    """EvalCallback that can also validate the policy as it stands, whatever its count of calls."""
-
-    def now(self):
-        """Validate the present policy; the rhythm of the validations stays as it is."""
-        calls, self.n_calls = self.n_calls, 0
-        try:
-            self._on_step()
-        finally:
-            self.n_calls = calls
+        return going
 
 
 class CheckpointCallback(BaseCallback):
-    """Checkpoints between an update and the next rollout, progress, and the stop that was asked for."""
+    """Checkpoints between an update and the next rollout, progress, and the stop of a run."""
 
     def __init__(self, training, report):
         super().__init__()
         self.training = training
         self.report = report
         self.before = 0.0  # s, of the sessions before this one
-        self.torch_state = None  # to go on from in the first rollout
+        self.torch_state = None  # of the first rollout of a resumed run
         self._begin = self._saved = self._reported = time.monotonic()
         self._first = None
 
     def seconds(self):
-        """Wall time of the run so far, s, over all its sessions."""
+        """Return the wall time of the run so far, s, over all its sessions."""
         return self.before + time.monotonic() - self._begin
 
     def _on_training_start(self):
@@ -102,17 +101,3 @@ class CheckpointCallback(BaseCallback):
                 parts.append(f"best score {best['score']:.3f}")
             self.report(self.num_timesteps, total, ", ".join([*parts, f"{left} left"]))
         return True
-
-
-def callbacks(training, validation_env, validation_callback, checkpoint_callback):
-    """[Validation on its episodes, CheckpointCallback] of a training.rl.train.Training."""
-    every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
-    evaluation = Validation(
-        validation_env,
-        callback_after_eval=validation_callback,
-        n_eval_episodes=validation_env.num_envs,
-        eval_freq=every,
-        deterministic=True,
-        verbose=0,
-    )
-    return [evaluation, checkpoint_callback]

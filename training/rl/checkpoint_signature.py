@@ -2,8 +2,8 @@
 
 A checkpoint that a run of this user wrote carries a seal, a keyed hash (HMAC-SHA256) of all its files. The
 key is in the user's configuration folder (FOWT_CONFIG_DIR, else XDG_CONFIG_HOME/fowt_env or
-~/.config/fowt_env), for nobody else to read. A checkpoint without a right seal is loaded only where the user
-says so.
+~/.config/fowt_env), readable for this user alone. A checkpoint without a right seal is loaded only where
+the user says so.
 """
 
 import hashlib
@@ -20,12 +20,12 @@ KEY_BYTES = 32
 
 
 def config_folder():
-    """Folder of what belongs to the user and not to a run; None for a user without a home."""
+    """Return the folder of the user's configuration; None for a user without a home."""
     return user_folder("FOWT_CONFIG_DIR", "XDG_CONFIG_HOME", ".config")
 
 
 def _key():
-    """The user's key, made where there is none; None where that cannot be, or others may know the key."""
+    """Return the user's key, made if missing; None where that fails, or others may know the key."""
     folder = config_folder()
     if folder is None:
         return None
@@ -52,7 +52,7 @@ def _key():
 
 
 def _hash(folder, key):
-    """Keyed hash of the names and contents of a folder's files."""
+    """Return the keyed hash of the names and contents of a folder's files."""
     total = hmac.new(key, digestmod=hashlib.sha256)
     for path in sorted(folder.iterdir()):
         if path.name != SEAL:
@@ -70,7 +70,7 @@ def seal(folder):
 
 
 def is_own(folder):
-    """Whether a checkpoint is as a run of this user wrote it."""
+    """Return whether a checkpoint is as a run of this user wrote it."""
     key = _key()
     try:
         given = (folder / SEAL).read_text(encoding="ascii").strip()

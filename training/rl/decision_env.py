@@ -54,7 +54,7 @@ class DecisionVecEnv(VecEnvWrapper):
         return np.array([env.last_action for env in self.base.env.envs])
 
     def reset(self):
-        """Features (n, size) at the start of new episodes."""
+        """Return the features (n, size) at the start of new episodes."""
         observations = self.venv.reset()
         self.decisions.restart(slice(None), observations, self._actions_in_force())
         return self.decisions.features()
@@ -64,7 +64,7 @@ class DecisionVecEnv(VecEnvWrapper):
         self._decision = np.array(actions, dtype=np.float64)
 
     def step_wait(self):
-        """(features, rewards, dones, infos) after one decision."""
+        """Return (features, rewards, dones, infos) after one decision."""
         n, decisions = self.num_envs, self.decisions
         total = np.zeros(n)
         ended = np.zeros(n, dtype=bool)
@@ -89,12 +89,12 @@ class DecisionVecEnv(VecEnvWrapper):
         return decisions.features(), (total / self.settings.hold).astype(np.float32), ended, infos
 
     def get_state(self):
-        """Everything that decides how the episodes go on, to be pickled: plants, histories, actions."""
+        """Return the state of the episodes, to be pickled: plants, histories, actions."""
         kept = (getattr(self.decisions, name).copy() for name in ("observations", "action", "memory"))
         return self.base.env.get_state(), *kept
 
     def set_state(self, state):
-        """Go on from what get_state returned; returns the features there."""
+        """Continue from a state of get_state; return its features."""
         plants, observations, action, memory = state
         self.base.env.set_state(list(plants))
         self.decisions.observations[:] = observations
@@ -125,7 +125,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
         self._failed = np.zeros(len(episodes), dtype=bool)
 
     def reset(self):
-        """Observations at the start of the fixed episodes; their randomness is the same each time."""
+        """Return observations at the start of the fixed episodes, whose randomness is the same each time."""
         self._seeds = list(range(self.num_envs))
         self._options = [dict(episode) for episode in self.episodes]
         self._record[:] = np.nan
@@ -135,7 +135,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
         return super().reset()
 
     def step_wait(self):
-        """As FowtSB3VecEnv; keeps the measurements of each environment's first episode."""
+        """Step as FowtSB3VecEnv and record the measurements of each environment's first episode."""
         result = super().step_wait()
         _, _, dones, infos = result
         for i in np.flatnonzero(dones & ~self._over):
@@ -148,7 +148,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
         return result
 
     def figures(self):
-        """{metric: (n,)} of the recorded episodes by the formulas of evaluation.metrics; NaN for failed ones.
+        """Return {metric: (n,)} of the recorded episodes by evaluation.metrics; NaN for failed ones.
 
         They are of what the sensors could measure, control period by control period, and so of the shaft's
         power, which is the generator's before its losses. Offset of the mean rotor speed from rated is of the
@@ -183,6 +183,6 @@ class ValidationVecEnv(FowtSB3VecEnv):
         }
 
     def _after(self, record, start):
-        """Rows of the record from a time (s) of the episode on; one of NaN where there are none."""
+        """Return the rows of the record from a time (s) of the episode on; one of NaN if there are none."""
         rows = record[max(0, round(start / self.env.envs[0].control_dt) - self.skip) :]
         return rows if len(rows) else np.full((1, *record.shape[1:]), np.nan)

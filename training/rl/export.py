@@ -14,7 +14,7 @@ ACTIVATION_NAMES = {"Tanh": "tanh", "ReLU": "relu"}
 
 
 def layers_of(model):
-    """(list of torch Linear layers, activation name, squash name) of the deterministic policy of a model.
+    """Return (torch Linear layers, activation name, squash name) of a model's deterministic policy.
 
     Raises: InputError for policies that are not multilayer perceptrons with one known activation.
     """
@@ -34,7 +34,7 @@ def layers_of(model):
 
 
 def export_policy(model, normalisation, single, decisions, path, about):
-    """Path written: the deterministic policy of a model as a .npz without pickled objects.
+    """Write the deterministic policy of a model as a .npz without pickled objects; return the path.
 
     normalisation: the VecNormalize it was trained through; single: one of its FowtEnvs; decisions: its
     DecisionSettings; about: dict of text and numbers on where it comes from.
@@ -43,23 +43,13 @@ def export_policy(model, normalisation, single, decisions, path, about):
     task = single.task
     statistics = normalisation.obs_rms
     settings = {
-        "format": FORMAT,
-        "activation": activation,
-        "squash": squash,
-        "layers": len(linear),
-        "clip_observation": float(normalisation.clip_obs),
-        "control_dt": single.control_dt,
-        "decisions": asdict(decisions),
-        "action_mode": single.action_mode,
-        "baseline": single.baseline,
-        "observation": list(task.observation),
-        "wind_preview": list(task.wind_preview),
-        "blade_pitch": list(task.blade_pitch),
-        "setpoint": list(task.setpoint),
-        "residual_torque": task.residual_torque,
-        "residual_pitch": task.residual_pitch,
-        "about": about,
-    }
+        "format": FORMAT, "activation": activation, "squash": squash, "layers": len(linear),
+        "clip_observation": float(normalisation.clip_obs), "control_dt": single.control_dt,
+        "decisions": asdict(decisions), "action_mode": single.action_mode, "baseline": single.baseline,
+        "observation": list(task.observation), "wind_preview": list(task.wind_preview),
+        "blade_pitch": list(task.blade_pitch), "setpoint": list(task.setpoint),
+        "residual_torque": task.residual_torque, "residual_pitch": task.residual_pitch, "about": about,
+    }  # fmt: skip
     arrays = {
         "settings": np.array(json.dumps(settings)),
         "mean": statistics.mean,
@@ -74,7 +64,7 @@ def export_policy(model, normalisation, single, decisions, path, about):
 
 
 def export_run(folder, path):
-    """Path written: the policy of a run's newest checkpoint. Loading it executes code from the checkpoint.
+    """Write the policy of a run's newest checkpoint, whose loading executes code; return the path.
 
     Raises: InputError where the folder holds no checkpoint.
     """

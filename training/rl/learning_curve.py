@@ -16,7 +16,7 @@ PANELS = (
 
 
 def plot_learning_curve(runs, path):
-    """Path of a plot of {label: list of validation rows} over decisions, one panel per figure.
+    """Plot {label: list of validation rows} over decisions, one panel per ratio; return the path.
 
     Raises: InputError where matplotlib is missing.
     """
@@ -30,16 +30,22 @@ def plot_learning_curve(runs, path):
         if name.endswith("ratio"):
             axis.axhline(1.0, color="0.6", linewidth=0.8)
         axis.set_ylabel(label, fontsize=8)
+    axes[-1].set_xlabel("decisions (millions)")
+    return _finished(figure, axes, path)
+
+
+def _finished(figure, axes, path):
+    """Style the axes, add the legend, write the figure; return the path."""
+    for axis in axes:
         style_axes(axis)
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=3)
-    axes[-1].set_xlabel("decisions (millions)")
     save_figure(figure, path)
     return path
 
 
 def plot_front(runs, path):
-    """Path of a plot of what motions cost in blade-pitch travel: every validation of the runs, as ratios.
+    """Plot motions over blade-pitch travel, every validation of the runs, as ratios; return the path.
 
     runs: {label: list of validation rows}. Large marks: the policy that was kept.
     """
@@ -57,11 +63,7 @@ def plot_front(runs, path):
         axis.axvline(1.0, color="0.6", linewidth=0.8)
         axis.set_xlabel("blade-pitch travel / baseline")
         axis.set_ylabel(label, fontsize=8)
-        style_axes(axis)
-    handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, fontsize=8, loc="outside lower center", ncols=3)
-    save_figure(figure, path)
-    return path
+    return _finished(figure, axes, path)
 
 
 def main(arguments=None):

@@ -27,7 +27,7 @@ DISTRIBUTIONS = {
 
 
 def check_distribution(where, spec):
-    """(kind, a, b) of a distribution. Raises: InputError naming what is wrong with it."""
+    """Return (kind, a, b) of a distribution. Raises: InputError naming what is wrong with it."""
     if not isinstance(spec, list | tuple) or len(spec) != 3:
         raise InputError(f"{where} = {spec!r}: must be [kind, a, b], kind one of {', '.join(DISTRIBUTIONS)}")
     kind, a, b = spec
@@ -40,7 +40,7 @@ def check_distribution(where, spec):
 
 
 def distributions(spec):
-    """{name: (kind, a, b)} of all that is randomised, the given ones in place of the defaults.
+    """Return {name: (kind, a, b)} of all randomised quantities: defaults, and the changes of spec.
 
     spec: {name: [kind, a, b] or None (not randomised)}; "plants" is left out. Raises: InputError.
     """
@@ -58,13 +58,13 @@ def distributions(spec):
 
 
 def draw(chosen, rng):
-    """{name: value} of one draw of distributions, in a fixed order."""
+    """Return {name: value} of one draw of distributions, in a fixed order."""
     order = [name for name in (*PLANT, *SENSORS) if name in chosen]
     return {name: float(DISTRIBUTIONS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
 
 
 def randomised(spec, n, seed):
-    """List of n dicts of FowtEnv settings drawn with a seed: plant, sensors, and the plant that is known.
+    """Return n dicts of FowtEnv settings drawn with a seed: plant, sensors, and the nominal plant.
 
     spec: {"plants": size of the pool, name: distribution or None, ...}. Raises: InputError.
     """

@@ -34,7 +34,7 @@ class FowtSB3VecEnv(VecEnv):
         super().__init__(num_envs, self.env.single_observation_space, self.env.single_action_space)
 
     def reset(self):
-        """Observations (num_envs, n) at the start of new episodes; seeds and options are used once."""
+        """Return observations (num_envs, n) of new episodes; seeds and options are used once."""
         observations, infos = self.env.reset(seed=self._seeds, options=list(self._options))
         self.reset_infos = [of_one(infos, i) for i in range(self.num_envs)]
         self._reset_seeds()
@@ -46,7 +46,7 @@ class FowtSB3VecEnv(VecEnv):
         self._actions = actions
 
     def step_wait(self):
-        """(observations, rewards, dones, infos) after one control period."""
+        """Return (observations, rewards, dones, infos) after one control period."""
         observations, rewards, terminations, truncations, vector_infos = self.env.step(self._actions)
         dones = terminations | truncations
         if self.step_info:
@@ -63,11 +63,11 @@ class FowtSB3VecEnv(VecEnv):
         return observations, rewards.astype(np.float32), dones, infos
 
     def close(self):
-        """Nothing is held that needs closing."""
+        """Close the batch."""
         self.env.close()
 
     def get_attr(self, attr_name, indices=None):
-        """List of an attribute of the chosen environments."""
+        """Return a list of an attribute of the chosen environments."""
         return [self.env.envs[i].get_wrapper_attr(attr_name) for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name, value, indices=None):
@@ -76,10 +76,10 @@ class FowtSB3VecEnv(VecEnv):
             setattr(self.env.envs[i], attr_name, value)
 
     def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
-        """List of what a method of the chosen environments returns."""
+        """Return a list of what a method of the chosen environments returns."""
         chosen = self._get_indices(indices)
         return list(self.env.call(method_name, *method_args, indices=chosen, **method_kwargs))
 
     def env_is_wrapped(self, wrapper_class, indices=None):
-        """No environment of the batch is wrapped."""
+        """Return that no environment of the batch is wrapped."""
         return [False for _ in self._get_indices(indices)]

@@ -42,12 +42,12 @@ SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may
 GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
     "self", "policy", "env", "seed", "device", "tensorboard_log", "verbose", "_init_setup_model",
 )  # fmt: skip
-OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that no text stands for
+OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that are objects
 NOT_SET_THERE = ("task", "render_mode")  # of FowtEnv: what training gives, or lacks
 
 
 class Normalise(Record):
-    """Arguments of stable-baselines3's VecNormalize; what is left out has its default."""
+    """Arguments of stable-baselines3's VecNormalize; missing ones have their defaults."""
 
     norm_obs: Switch = True
     norm_reward: Switch = True
@@ -93,11 +93,15 @@ class TrainingSettings(Record):
 
 
 def check_settings(settings, where="settings"):
-    """The settings, once they are known to be those of a run. Raises: InputError naming each wrong key."""
+    """Return the settings of a run after checking them. Raises: InputError naming each wrong key."""
     if not isinstance(settings, dict):
         raise InputError(f"{where}: must be a table of settings")
     raise_problems(where, validate(TrainingSettings, settings)[1])
-    known = {"environment": environment_keys(), "decisions": [f.name for f in fields(DecisionSettings)]}
+    settable = [name for name in ("task", "platform", *KEYWORDS) if name not in NOT_SET_THERE]
+    known = {
+        "environment": list(dict.fromkeys([*OF_TRAINING, *settable, *OPTIONS])),
+        "decisions": [f.name for f in fields(DecisionSettings)],
+    }
     problems = [
         unknown_key(f"{section}.{key}", key, keys)
         for section, keys in known.items() for key in settings[section] if key not in keys
@@ -116,14 +120,8 @@ def check_settings(settings, where="settings"):
     return settings
 
 
-def environment_keys():
-    """Names of all settings of the environment that a training run may change."""
-    own = [name for name in ("task", "platform", *KEYWORDS) if name not in NOT_SET_THERE]
-    return list(dict.fromkeys([*OF_TRAINING, *own, *OPTIONS]))
-
-
 def check_algorithm(kind, name, given):
-    """Raises: InputError for settings of algorithm that its class lacks, or declares with another type."""
+    """Raise InputError for settings that an algorithm's class lacks, or declares with another type."""
     arguments = inspect.signature(kind.__init__).parameters
     left_out = (*GIVEN_BY_TRAINING, *OBJECTS)
     known = {key: argument.annotation for key, argument in arguments.items() if key not in left_out}
@@ -139,7 +137,7 @@ def check_algorithm(kind, name, given):
 
 
 def _policy_problems(given):
-    """One line per wrong value of policy_kwargs: its only text is the name of an activation."""
+    """Return a line per wrong value of policy_kwargs, whose only text is the name of an activation."""
     problems = []
     for key, value in given.items():
         if key == "activation" and value not in tuple(ACTIVATIONS):
@@ -153,13 +151,13 @@ def _policy_problems(given):
 
 
 def _holds_text(value):
-    """Whether a value is a text, or has one within it."""
+    """Return whether a value is a text, or has one within it."""
     items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
     return isinstance(value, str) or any(map(_holds_text, items))
 
 
 def _not_allowed(key, value, declared):
-    """What a setting of an algorithm must be, in words, where the value is not; else None."""
+    """Return, for a wrong value of an algorithm's setting, what it must be in words; else None."""
     number = is_number(value)
     if key == "policy_kwargs":
         return None if isinstance(value, dict) else "a table"
@@ -180,7 +178,7 @@ def _not_allowed(key, value, declared):
 
 
 def read_settings(path):
-    """Settings of a run's settings.yml. Raises: InputError."""
+    """Return the settings of a run's settings.yml. Raises: InputError."""
     import yaml
 
     where = f"settings file {str(path)!r}"

@@ -1,4 +1,4 @@
-"""Training of agents: settings from one YAML per algorithm, checkpoints that can be gone on from, validation.
+"""Training of agents: settings from one YAML per algorithm, resumable checkpoints, validation.
 
     from fowt_env.training.rl.train import Training, resolve
     Training(resolve("ppo", "above_rated", seed=0, steps=2_000_000), "runs/ppo_0").run()
@@ -7,11 +7,10 @@ A run folder holds settings.yml and versions.json; checkpoints/step_N (model, no
 replay buffer, random states); validation.csv with a row per validation; best.npz, the policy that scored
 best there, and last.npz; learning_curve.png; and TensorBoard's files.
 
-What a resumed run repeats exactly: PPO's checkpoints lie between an update and the next rollout and hold all
-that decides how the run goes on (parameters, optimiser, environments in mid-episode, normalisation, the
-states of every random generator), so a run that was stopped and resumed gives the bits of one that was not,
-on the same machine with the same number of torch threads. SAC and TQC are saved between two calls of their
-update, with the replay buffer. What is not repeated: wall times, and with them the rates that are shown.
+A resumed run has the bits of one that was never stopped, on the same machine with the same number of torch
+threads: PPO's checkpoints lie between an update and the next rollout, those of SAC and TQC between two calls
+of their update with the replay buffer, and hold parameters, optimiser, environments in mid-episode,
+normalisation and the states of every random generator. Wall times and the rates shown differ.
 """
 
 import errno
@@ -33,6 +32,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.descriptions.checks import check_whole_number
+from fowt_env.descriptions.sea_state import joint_sea_state
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
@@ -52,31 +52,25 @@ from fowt_env.training.rl.settings import (
 
 SETTINGS_FOLDER = Path(__file__).parent  # of the YAML file of each algorithm
 ALGORITHMS = ("ppo", "sac", "tqc")
+# what a turbine of today measures: drive train, blade pitch, motion of nacelle and hull
+MEASURED = (
+    "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
+    "nacelle_acceleration", "previous_action",
+)  # fmt: skip
+# what the estimator of lqr makes of that: wind, surge and waves
+ESTIMATED = ("estimated_wind", "estimated_platform", "estimated_waves")
+AHEAD = ("wind_speed", "wind_preview")
 OBSERVATIONS = {  # information sets that agents are compared with
-    # what a turbine of today measures: drive train, blade pitch, motion of nacelle and hull
-    "measured": (
-        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
-        "nacelle_acceleration", "previous_action",
-    ),
+    "measured": MEASURED,
     "state": ("default", "nacelle_acceleration", "previous_action"),  # all motions and rates of the platform
-    "preview": (
-        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
-        "nacelle_acceleration", "previous_action", "wind_speed", "wind_preview",
-    ),
+    "preview": (*MEASURED, *AHEAD),
     "blade": ("rotor_speed", "blade_pitch", "previous_action"),
-    # as measured, and what the estimator of lqr makes of it: wind, surge and waves
-    "estimate": (
-        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
-        "nacelle_acceleration", "previous_action", "estimated_wind", "estimated_platform", "estimated_waves",
-    ),
-    "estimate_preview": (
-        "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
-        "nacelle_acceleration", "previous_action", "estimated_wind", "estimated_platform", "estimated_waves",
-        "wind_speed", "wind_preview",
-    ),
-}  # fmt: skip
+    "estimate": (*MEASURED, *ESTIMATED),
+    "estimate_preview": (*MEASURED, *ESTIMATED, *AHEAD),
+}
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
 VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "numba", "gymnasium")
+MONITORED = ("episode_returns", "episode_lengths", "episode_count")  # of VecMonitor
 MOTIONS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]")
 RATIOS = (
     *MOTIONS, "blade_pitch_travel_[deg/s]", "torque_travel_[kN-m/s]", "shaft_torque_DEL_[kN-m]",
@@ -84,8 +78,8 @@ RATIOS = (
 )  # fmt: skip
 # what the validation score adds to the mean ratio of the motions
 FAILURE_COST = 10.0  # per fraction of episodes that failed
-TRAVEL_COST = 2.0  # per unit of blade-pitch travel beyond the reference's
-TORQUE_COST = 1.0  # per unit of torque travel, and of shaft-torque DEL, beyond the reference's
+TRAVEL_COST = 2.0  # per unit of blade-pitch travel above the reference's
+TORQUE_COST = 1.0  # per unit of torque travel, and of shaft-torque DEL, above the reference's
 POWER_COST = 20.0  # per unit of mean power, counted up to rated, short of LEAST_POWER
 LEAST_POWER = 0.999  # of the reference's
 UNREST_COST = 0.5  # per fraction of episodes of steady wind that did not come to rest
@@ -97,7 +91,7 @@ GUST_START = 120.0  # s
 
 
 def resolve(algo, task, seed, steps, changes=None):
-    """Dict of all settings of a run: those of training/rl/ALGO.yml for the task, changed.
+    """Return all settings of a run (dict): those of training/rl/ALGO.yml for the task, changed.
 
     changes: {dotted key: value}, such as {"environment.action_mode": "direct"}.
     Raises: InputError for unknown names, keys, and numbers outside their range.
@@ -133,7 +127,7 @@ def _change(settings, key, value):
 
 
 def environment_settings(settings):
-    """Settings of FowtEnv for training: the task with its own reach, information set and weather seeds."""
+    """Return the settings of FowtEnv for training: task with its reach and weather seeds, information set."""
     given = dict(settings["environment"])
     given.pop("num_envs", None)
     given.pop("randomise", None)
@@ -151,7 +145,7 @@ def environment_settings(settings):
 
 
 def make_algorithm(name):
-    """Algorithm class. Raises: InputError where its library is missing."""
+    """Return the class of an algorithm. Raises: InputError where its library is missing."""
     try:
         if name == "tqc":
             from sb3_contrib import TQC
@@ -165,7 +159,7 @@ def make_algorithm(name):
 
 
 def versions():
-    """{package: version} of what shapes a result, and the platform."""
+    """Return {package: version} of the packages that shape a result, and the number of processors."""
     found = {"python": sys.version.split()[0], "processors": os.cpu_count()}
     for name in VERSIONS:
         try:
@@ -176,46 +170,36 @@ def versions():
 
 
 def validation_episodes(settings):
-    """(list of reset options, list of their kinds) of the episodes that resolved settings validate on.
+    """Return (reset options, kinds) of the episodes that resolved settings validate on, two lists.
 
     turbulent: each wind with each of its validation seeds; steady: still water, from STEADY_KICK; gust: one
     EOG and one EDC for each wind.
     """
     chosen = settings["validation"]
     seeds = seeds_for("validation", int(chosen["first"]), int(chosen["seeds"]))
-    sigma = chosen.get("sigma", "90%")
-    episodes = [
-        {
-            "wind": {"kind": "ntm", "speed": float(speed), "class": "B", "sigma": sigma},
-            "sea": _sea_at(float(speed)),
-            "weather_seed": seed,
-        }
-        for speed in chosen["winds"]
-        for seed in seeds
-    ]
-    kinds = ["turbulent"] * len(episodes)
-    for speed in chosen.get("steady", ()):
-        wind = {"kind": "steady", "speed": float(speed)}
-        episodes.append({"wind": wind, "sea": None, "weather_seed": seeds[0], "offsets": STEADY_KICK})
-        kinds.append("steady")
-    for speed in chosen.get("gusts", ()):
+    found = []  # (kind of episode, wind, sea, seed, more)
+    for speed in map(float, chosen["winds"]):
+        wind = {"kind": "ntm", "speed": speed, "class": "B", "sigma": chosen.get("sigma", "90%")}
+        found += [("turbulent", wind, _sea_at(speed), seed, {}) for seed in seeds]
+    for speed in map(float, chosen.get("steady", ())):
+        wind = {"kind": "steady", "speed": speed}
+        found.append(("steady", wind, None, seeds[0], {"offsets": STEADY_KICK}))
+    for speed in map(float, chosen.get("gusts", ())):
         for kind in ("eog", "edc"):
-            wind = {"kind": kind, "speed": float(speed), "start": GUST_START}
-            episodes.append({"wind": wind, "sea": _sea_at(float(speed)), "weather_seed": seeds[0]})
-            kinds.append("gust")
-    return episodes, kinds
+            wind = {"kind": kind, "speed": speed, "start": GUST_START}
+            found.append(("gust", wind, _sea_at(speed), seeds[0], {}))
+    episodes = [{"wind": wind, "sea": sea, "weather_seed": seed} | more for _, wind, sea, seed, more in found]
+    return episodes, [kind for kind, *_ in found]
 
 
 def _sea_at(speed):
-    """JONSWAP sea of the site's normal sea state at a wind speed (m/s)."""
-    from fowt_env.descriptions.sea_state import joint_sea_state
-
+    """Return the JONSWAP sea of the site's normal sea state at a wind speed (m/s)."""
     state = joint_sea_state(SITE, speed)
     return {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
 
 
 def make_envs(settings):
-    """(training VecNormalize, validation VecNormalize) of settings; plants are drawn for training alone."""
+    """Return (training VecNormalize, validation VecNormalize); plants are drawn for training alone."""
     from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
     from fowt_env.training.rl.decision_env import DecisionVecEnv
@@ -229,17 +213,18 @@ def make_envs(settings):
     plants = settings["environment"].get("randomise")
     per_env = None if not plants else randomised(plants, n, settings["seed"])
     base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
-    env = VecNormalize(VecMonitor(DecisionVecEnv(base, decisions)), **normalise)
-    fixed = validation_env(settings, chosen)
-    validation = VecNormalize(VecMonitor(DecisionVecEnv(fixed, decisions)), training=False, **normalise)
-    validation.norm_reward = False
+    env, validation = (
+        VecNormalize(VecMonitor(DecisionVecEnv(inner, decisions)), **normalise)
+        for inner in (base, validation_env(settings, chosen))
+    )
+    validation.training = validation.norm_reward = False
     return env, validation
 
 
 def validation_env(settings, chosen):
-    """ValidationVecEnv of resolved settings: FowtEnvs with the settings `chosen` on the nominal plant.
+    """Return the ValidationVecEnv of resolved settings: FowtEnvs with the settings `chosen`, nominal plant.
 
-    The sensors of the settings' validation go round the episodes of each wind.
+    The sensors of the settings' validation alternate over the episodes of each wind.
     """
     from fowt_env.training.rl.decision_env import ValidationVecEnv
 
@@ -258,19 +243,17 @@ def validation_env(settings, chosen):
 
 
 def decision_env(env):
-    """The DecisionVecEnv inside wrappers."""
+    """Return the DecisionVecEnv inside wrappers."""
     while type(env).__name__ != "DecisionVecEnv":
         env = env.venv
     return env
 
 
 def baseline_figures(settings, reference=None):
-    """{metric: (n,)} of a compiled controller on the validation episodes of resolved settings.
+    """Return {metric: (n,)} of a compiled controller on the validation episodes of resolved settings.
 
-    reference: its name; None: that of the settings.
-
-    It is run in the agent's own environment and not by evaluation.evaluate, so that a ratio is of the same
-    weather, start, sensors and control periods.
+    reference: its name; None: that of the settings. It runs in the agent's environment and not by
+    evaluation.evaluate, so that a ratio is of the same weather, start, sensors and control periods.
     """
     reference = reference or settings["validation"].get("reference", REFERENCE)
     chosen = environment_settings(settings) | {"action_mode": "residual", "baseline": reference}
@@ -283,13 +266,13 @@ def baseline_figures(settings, reference=None):
 
 
 def validation_score(figures, reference, kinds=None):
-    """{ratio, check or score: number} of figures over those of the reference; lower is better.
+    """Return {ratio, check or score: number} of figures over those of the reference; lower is better.
 
     kinds: of the episodes, as validation_episodes has them; None: all turbulent. Ratios are means over the
     turbulent ones, that of torque travel one of sums, since a reference may keep its torque in some. score:
-    mean of the ratios of rotor-speed and platform-pitch standard deviation, and what more travel, torque
-    travel and shaft load or less power than the reference's, failures, unrest in steady wind and larger
-    motions in gusts cost.
+    mean of the ratios of rotor-speed and platform-pitch standard deviation, plus costs of more travel, torque
+    travel and shaft load or less power than the reference's, of failures, of unrest in steady wind and of
+    larger motions in gusts.
     """
     kinds = np.array(["turbulent"] * len(figures["failed"]) if kinds is None else kinds)
     turbulent, steady, gust = (kinds == kind for kind in ("turbulent", "steady", "gust"))
@@ -312,14 +295,14 @@ def validation_score(figures, reference, kinds=None):
 
 
 def _mean(values):
-    """Mean of what is not NaN, the figures of episodes that did not fail; NaN of none."""
+    """Return the mean of the values of episodes that did not fail, which are not NaN; NaN of none."""
     values = np.asarray(values, dtype=np.float64)
     kept = values[np.isfinite(values)]
     return float(kept.mean()) if len(kept) else float("nan")
 
 
 class Training:
-    """One run in one folder. resume: go on from its newest checkpoint, or start anew where it has none yet.
+    """One run in one folder. resume: continue from its newest checkpoint, or anew where it has none.
 
     Loading a checkpoint executes code from it: one that no run of this user wrote (checkpoint_signature.py)
     is refused unless trusted.
@@ -329,30 +312,25 @@ class Training:
 
     def __init__(self, settings, folder, resume=False, trusted=False):
         self.folder = Path(folder)
-        self.checkpoints = self.folder / "checkpoints"
-        self.settings_path = self.folder / "settings.yml"
+        self.checkpoints, self.settings_path = self.folder / "checkpoints", self.folder / "settings.yml"
         self.resume, self.trusted = resume, trusted
         self._check_folder()
+        self.settings = settings
         if resume:
             stored = read_settings(self.settings_path)
-            if settings is not None:
-                stored["steps"] = settings["steps"]
-            settings = stored
-        self.settings = settings
-        self.stop = False
-        self.rows = []
+            self.settings = stored if settings is None else stored | {"steps": settings["steps"]}
+        self.stop, self.rows = False, []
 
     def _check_folder(self):
-        """Raises: InputError unless the run can begin in its folder, or go on there."""
-        if not self.resume:
-            if self.settings_path.exists():
-                raise InputError(
-                    f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
-                )
-            return
-        if not self.settings_path.exists():
+        """Raise InputError unless the run can begin in its folder, or continue there."""
+        begun = self.settings_path.exists()
+        if not self.resume and begun:
+            raise InputError(
+                f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
+            )
+        if self.resume and not begun:
             raise InputError(f"--resume: {self.folder} holds no run")
-        newest = self.newest()
+        newest = self.newest() if self.resume else None
         if newest is not None and not self.trusted and not is_own(newest):
             raise InputError(
                 f"--resume: loading {newest} executes code from it, and no run of yours wrote it so;"
@@ -360,12 +338,12 @@ class Training:
             )
 
     def newest(self):
-        """Folder of the newest checkpoint, or None."""
+        """Return the folder of the newest checkpoint, or None."""
         found = [p for p in self.checkpoints.glob("step_*") if p.name.removeprefix("step_").isdigit()]
         return max(found, key=lambda p: int(p.name.removeprefix("step_")), default=None)
 
     def run(self, report=None):
-        """Train to the end, or to an interrupt; returns whether the end was reached.
+        """Train to the end, or to an interrupt; return whether the end was reached.
 
         report(done, total, text): called about once a second.
         Raises: InputError where another training is in the folder, or its settings cannot be used.
@@ -388,7 +366,7 @@ class Training:
             return self._learn(validation, state, report)
 
     def _build(self):
-        """(validation environment, what a resumed run goes on from or None); sets model and env."""
+        """Set model and env; return (validation environment, stored state of a resumed run or None)."""
         import torch
         from stable_baselines3.common.utils import set_random_seed
 
@@ -408,10 +386,10 @@ class Training:
         return validation, state
 
     def _learn(self, validation, state, report):
-        """Whether the end was reached, once what is left of the run has been trained."""
+        """Train the rest of the run; return whether the end was reached."""
         from stable_baselines3.common.logger import configure
 
-        from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, ValidationCallback, callbacks
+        from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, Validation
 
         model = self.model
         say = report or (lambda done, total, text: None)
@@ -420,16 +398,11 @@ class Training:
         self.reference = baseline_figures(self.settings)
         self.kinds = validation_episodes(self.settings)[1]
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
-        checkpoint_callback = CheckpointCallback(self, report)
-        validation_callback = ValidationCallback(self)
-        listeners = callbacks(self, validation, validation_callback, checkpoint_callback)
+        self.evaluation, self.checkpointing = Validation(self, validation), CheckpointCallback(self, report)
+        listeners = [self.evaluation, self.checkpointing]
         if state is not None:
-            listeners[0].n_calls = state["evaluation_calls"]
-            validation_callback.best = state["best"]
-            checkpoint_callback.before = state["seconds"]
-            checkpoint_callback.torch_state = state["torch"]
-        self.evaluation = listeners[0]
-        self.validation_callback, self.checkpoint_callback = validation_callback, checkpoint_callback
+            self.evaluation.n_calls, self.evaluation.best = state["evaluation_calls"], state["best"]
+            self.checkpointing.before, self.checkpointing.torch_state = state["seconds"], state["torch"]
         left = self.settings["steps"] - model.num_timesteps
         finished = True
         with self._signals():
@@ -448,16 +421,14 @@ class Training:
 
     @contextmanager
     def _signals(self):
-        """Within the block the first interrupt or termination asks for a checkpoint and an orderly end."""
+        """Let the first interrupt or termination within the block set stop: a checkpoint, then the end."""
 
         def ask(number, frame):
             if self.stop:
                 raise KeyboardInterrupt
             self.stop = True
 
-        before = {}
-        for number in (signal.SIGINT, signal.SIGTERM):
-            before[number] = signal.signal(number, ask)
+        before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
         try:
             yield
         finally:
@@ -465,7 +436,7 @@ class Training:
                 signal.signal(number, handler)
 
     def _remove_leftovers(self):
-        """Remove what processes that were killed left half written."""
+        """Remove files that killed processes left half written."""
         remove_leftovers(self.folder)
         for path in self.checkpoints.glob(".writing_*"):
             number = path.name.removeprefix(".writing_")
@@ -479,9 +450,9 @@ class Training:
             path.write_text(yaml.safe_dump(self.settings, sort_keys=False), encoding="utf-8")
 
     def save(self):
-        """Write a checkpoint of the present instant, whole or not at all; the one before it goes.
+        """Write a checkpoint of the present instant, whole or not at all, in place of the one before.
 
-        Raises: OSError naming it where there is no space; the one before it stays.
+        Raises: OSError naming it where there is no space; then the one before remains.
         """
         target = self.checkpoints / f"step_{self.model.num_timesteps}"
         if target.exists():
@@ -512,11 +483,7 @@ class Training:
         monitor = env.venv
         state = {
             "environments": decision_env(env).get_state(),
-            "monitor": (
-                monitor.episode_returns.copy(),
-                monitor.episode_lengths.copy(),
-                monitor.episode_count,
-            ),
+            "monitor": [deepcopy(getattr(monitor, name)) for name in MONITORED],
             "returns": env.returns.copy(),
             "original": (deepcopy(env.old_obs), deepcopy(env.old_reward)),
             "random": random.getstate(),
@@ -524,9 +491,9 @@ class Training:
             "torch": torch.get_rng_state(),
             "action_space": model.action_space.np_random.bit_generator.state,
             "evaluation_calls": self.evaluation.n_calls,
-            "best": self.validation_callback.best,
+            "best": self.evaluation.best,
             "rows": self.rows,
-            "seconds": self.checkpoint_callback.seconds(),
+            "seconds": self.checkpointing.seconds(),
             "episodes": list(model.ep_info_buffer),
         }
         with (folder / "state.pkl").open("wb") as file:
@@ -534,7 +501,7 @@ class Training:
         seal(folder)
 
     def _load(self, kind, env):
-        """(model, state) of the newest checkpoint, everything put back in its place."""
+        """Return (model, state) of the newest checkpoint, with environments and generators as they were."""
         from stable_baselines3.common.vec_env import VecNormalize
 
         folder = self.newest()
@@ -546,15 +513,13 @@ class Training:
         env.venv.reset()
         decision_env(env).set_state(state["environments"])
         monitor = env.venv
-        monitor.episode_returns, monitor.episode_lengths, monitor.episode_count = state["monitor"]
+        for name, value in zip(MONITORED, state["monitor"], strict=True):
+            setattr(monitor, name, value)
         env.returns = state["returns"]
         env.old_obs, env.old_reward = state["original"]
+        objects = _schedules(self.settings)
         model = kind.load(
-            folder / "model.zip",
-            env=env,
-            device="cpu",
-            force_reset=False,
-            custom_objects=_schedules(self.settings),
+            folder / "model.zip", env=env, device="cpu", force_reset=False, custom_objects=objects
         )
         if hasattr(model, "replay_buffer"):
             model.load_replay_buffer(folder / "replay_buffer.pkl")
@@ -566,11 +531,11 @@ class Training:
         return model, state
 
     def best(self):
-        """Row of the validation with the least score; None before the first one."""
+        """Return the row of the validation with the least score; None before the first one."""
         return min(self.rows, key=lambda row: row["score"], default=None)
 
     def export(self, name):
-        """Path of the present policy written as a plain array file in the run folder."""
+        """Write the present policy as a plain array file in the run folder; return its path."""
         from fowt_env.training.rl.export import export_policy
 
         about = {key: self.settings[key] for key in ("algo", "name", "seed")}
@@ -580,7 +545,7 @@ class Training:
         return export_policy(self.model, self.env, single, inner.settings, self.folder / name, about)
 
     def plot(self):
-        """Path of the plot of the learning curve, or None before the first validation."""
+        """Plot the learning curve; return the path, or None before the first validation."""
         from fowt_env.training.rl.learning_curve import plot_learning_curve
 
         if not self.rows:
@@ -589,19 +554,18 @@ class Training:
 
 
 def _schedules(settings):
-    """Learning rate and clipping of a run as stable-baselines3 wants them: numbers, or falling linearly."""
+    """Return those of SCHEDULES that fall linearly over a run, as stable-baselines3 takes them."""
     from stable_baselines3.common.utils import LinearSchedule
 
-    chosen = {}
-    for key in SCHEDULES:
-        value = settings["algorithm"].get(key)
-        if isinstance(value, list):
-            chosen[key] = LinearSchedule(float(value[0]), float(value[1]), 1.0)
-    return chosen
+    pairs = {key: settings["algorithm"].get(key) for key in SCHEDULES}
+    return {
+        key: LinearSchedule(float(pair[0]), float(pair[1]), 1.0)
+        for key, pair in pairs.items() if isinstance(pair, list)
+    }  # fmt: skip
 
 
 def _new_model(kind, settings, env):
-    """Untrained model of resolved settings. Raises: InputError for a keyword that the algorithm lacks."""
+    """Return an untrained model. Raises: InputError for a keyword that the algorithm lacks."""
     import torch
 
     given = dict(settings["algorithm"]) | _schedules(settings)
@@ -615,5 +579,5 @@ def _new_model(kind, settings, env):
 
 
 def seconds_text(seconds):
-    """A duration as h:mm:ss."""
+    """Return a duration as h:mm:ss."""
     return time.strftime("%H:%M:%S", time.gmtime(max(0.0, seconds)))

@@ -1,12 +1,12 @@
-"""What information, action mode and algorithm are worth: equal runs that differ in one thing each.
+"""Effect of information, action mode and algorithm on agents: equal runs that differ in one thing each.
 
     python -m fowt_env.training.studies.ablation --out runs/ablation         # all of ablation.yml
     python -m fowt_env.training.studies.ablation --out runs/ablation --only direct,estimate
     python -m fowt_env.training.studies.ablation --out runs/ablation --report docs/figures/rl_ablation.png
 
-Each variant and seed is a run of training/rl/train.py in a folder of its own; one that was stopped goes on
-where it was when the command is given again, and one that has ended is left alone. The runs are far shorter
-than those of the shipped agents, so that they say which lever moves more, not where it ends.
+Each variant and seed is a run of training/rl/train.py in a folder of its own. The same command continues a
+stopped run and leaves a finished one as it is. The runs are far shorter than those of the shipped agents:
+they compare the variants and do not show the best that each can reach.
 """
 
 import argparse
@@ -36,7 +36,7 @@ COLUMNS = FIGURES | {"capped_power_mean_ratio": "power up to rated"}  # of the t
 
 
 def read_table(path=TABLE):
-    """{"steps", "seeds", "common", "variants"} of an ablation file. Raises: InputError for unknown keys."""
+    """Return {"steps", "seeds", "common", "variants"} of a file. Raises: InputError for unknown keys."""
     with Path(path).open(encoding="utf-8") as file:
         table = yaml.safe_load(file)
     for key in table:
@@ -50,14 +50,14 @@ def read_table(path=TABLE):
 
 
 def variant_of(table, name):
-    """What the table says of a variant. Raises: InputError for an unknown name."""
+    """Return the entry of a variant in the table. Raises: InputError for an unknown name."""
     if name not in table["variants"]:
         raise unknown("variant", name, table["variants"])
     return table["variants"][name]
 
 
 def settings_of(table, name, seed, steps=None):
-    """Resolved settings of a variant and seed. Raises: InputError."""
+    """Return the resolved settings of a variant and seed. Raises: InputError."""
     variant = variant_of(table, name)
     changes = table["common"] | variant.get("set", {})
     steps = steps or variant.get("steps", table["steps"])
@@ -65,23 +65,23 @@ def settings_of(table, name, seed, steps=None):
 
 
 def seeds_of(table, name):
-    """Training seeds of a variant: its own, or those of all. Raises: InputError for an unknown name."""
+    """Return the training seeds of a variant, or those of all. Raises: InputError for an unknown name."""
     return variant_of(table, name).get("seeds", table["seeds"])
 
 
 def folder_of(out, name, seed):
-    """Folder of the run of a variant and seed."""
+    """Return the folder of the run of a variant and seed."""
     return Path(out) / f"{name}_{seed}"
 
 
 def decisions_done(folder):
-    """Decisions in the newest checkpoint of a run's folder; 0 without one."""
+    """Return the number of decisions in the newest checkpoint of a run's folder; 0 without one."""
     steps = [int(p.name.removeprefix("step_")) for p in Path(folder).glob("checkpoints/step_*")]
     return max(steps, default=0)
 
 
 def run_variant(table, name, seed, out, steps=None, report=None):
-    """Whether the run of a variant and seed has reached its end, after training what is left of it."""
+    """Train the rest of the run of a variant and seed; return whether it has reached its end."""
     settings, folder = settings_of(table, name, seed, steps), folder_of(out, name, seed)
     done = decisions_done(folder)
     if done >= settings["steps"]:
@@ -90,7 +90,7 @@ def run_variant(table, name, seed, out, steps=None, report=None):
 
 
 def ablation_rows(table, out):
-    """DataFrame: a row per variant and seed that has been validated, with the figures of its best policy."""
+    """Return a DataFrame: a row per validated variant and seed, with the figures of its best policy."""
     rows = []
     for name, variant in table["variants"].items():
         for seed in seeds_of(table, name):
@@ -99,17 +99,16 @@ def ablation_rows(table, out):
                 continue
             validated = pd.read_csv(path)
             best = validated.loc[validated["score"].idxmin()]
-            about = {"variant": name, "label": variant["label"], "seed": seed}
-            last = validated.iloc[-1]
-            trained = {"decisions_trained": int(last["decisions"]), "seconds_trained": float(last["seconds"])}
-            rows.append(about | best.to_dict() | trained)
+            row = {"variant": name, "label": variant["label"], "seed": seed} | best.to_dict()
+            decisions, seconds = validated.iloc[-1][["decisions", "seconds"]]
+            rows.append(row | {"decisions_trained": int(decisions), "seconds_trained": float(seconds)})
     if not rows:
         raise InputError(f"{out}: no variant has been validated yet")
     return pd.DataFrame(rows)
 
 
 def plot_ablation(rows, path):
-    """Path of a plot of the figures of ablation_rows: a line per variant, a dot per seed."""
+    """Plot the figures of ablation_rows, a line per variant, a dot per seed; return the path."""
     labels = list(dict.fromkeys(rows["label"]))
     figure = new_figure(10.0, 1.2 + 0.33 * len(labels))
     axes = figure.subplots(1, len(FIGURES), sharey=True)
@@ -127,7 +126,7 @@ def plot_ablation(rows, path):
 
 
 def markdown(rows):
-    """The figures of ablation_rows as a markdown table: means over seeds, 95 % interval of the score's."""
+    """Return ablation_rows as a markdown table: means over seeds, 95 % interval of the mean score."""
     groups = rows.groupby("label", sort=False)
     mean = groups[[*COLUMNS, "failed", "score", "decisions_trained", "seconds_trained"]].mean()
     rows = []
@@ -143,11 +142,11 @@ def markdown(rows):
 
 
 def main(arguments=None):
-    """Train what is left of the chosen variants, or report what there is."""
+    """Train the rest of the chosen variants, or report the validated ones."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", default="runs/ablation", help="folder of the runs")
     parser.add_argument("--table", default=str(TABLE), help="file of variants")
-    parser.add_argument("--only", help="variants, separated comma-separated")
+    parser.add_argument("--only", help="variants, comma-separated")
     parser.add_argument("--steps", type=int, help="decisions of each run, in place of the file's")
     parser.add_argument("--report", metavar="PICTURE", help="train nothing: plot and print what there is")
     given = parser.parse_args(arguments)

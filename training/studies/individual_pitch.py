@@ -1,4 +1,4 @@
-"""What individual pitch control takes off the blades, what it costs in travel, and what the platform does.
+"""Relief of the blades by individual pitch control, its cost in travel, and the motion of the platform.
 
     python -m fowt_env.training.studies.individual_pitch --platform oc3_hywind
 
@@ -24,40 +24,29 @@ from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 SUITE, PLATFORM = "ipc", "oc3_hywind"
 NAMES = {  # controller -> the one with the same law and one pitch for all blades
-    "pi": "pi",
-    "ipc": "pi",
-    "ipc_constrained": "pi",
-    "ipc_floating": "pi",
-    "rosco": "rosco",
-    "rosco_ipc": "rosco",
-}
+    "pi": "pi", "ipc": "pi", "ipc_constrained": "pi", "ipc_floating": "pi",
+    "rosco": "rosco", "rosco_ipc": "rosco",
+}  # fmt: skip
 BOUNDS = (0.05, 0.1, 0.15, 0.2, 0.3)  # of IPCSettings
 TRAVEL, ROOT = "each_blade_travel_[deg/s]", "RootMyc_DEL_[kN-m]"
 SHOWN = {
-    "root out of plane": ROOT,
-    "root in plane": "RootMxc_DEL_[kN-m]",
-    "hub tilt": "LSSTipMys_DEL_[kN-m]",
-    "hub yaw": "LSSTipMzs_DEL_[kN-m]",
-    "bearing tilt": "YawBrMyp_DEL_[kN-m]",
-    "bearing yaw": "YawBrMzp_DEL_[kN-m]",
-    "tower base": "TwrBsMyt_DEL_[kN-m]",
-    "platform pitch": "PtfmPitch_std_[deg]",
-    "platform yaw": "PtfmYaw_std_[deg]",
-    "platform roll": "PtfmRoll_std_[deg]",
-    "platform sway": "PtfmSway_std_[m]",
-    "rotor speed": "RotSpeed_std_[rpm]",
-    "power": "GenPwr_mean_[kW]",
-}
+    "root out of plane": ROOT, "root in plane": "RootMxc_DEL_[kN-m]",
+    "hub tilt": "LSSTipMys_DEL_[kN-m]", "hub yaw": "LSSTipMzs_DEL_[kN-m]",
+    "bearing tilt": "YawBrMyp_DEL_[kN-m]", "bearing yaw": "YawBrMzp_DEL_[kN-m]",
+    "tower base": "TwrBsMyt_DEL_[kN-m]", "platform pitch": "PtfmPitch_std_[deg]",
+    "platform yaw": "PtfmYaw_std_[deg]", "platform roll": "PtfmRoll_std_[deg]",
+    "platform sway": "PtfmSway_std_[m]", "rotor speed": "RotSpeed_std_[rpm]", "power": "GenPwr_mean_[kW]",
+}  # fmt: skip
 
 
 def bounded(turbine):
-    """{name: controller} of ipc behind each of BOUNDS."""
+    """Return {name: controller} of ipc behind each of BOUNDS."""
     published = PISettings.published(turbine)
     return {f"bound {b:g}": IPC(published, IPCSettings(bound=b), CONTROL_DT) for b in BOUNDS}
 
 
 def means(table):
-    """DataFrame of the means of SHOWN and the travel of each controller over its runs.
+    """Return a DataFrame of the means of SHOWN and the travel of each controller over its runs.
 
     Raises: ValueError where a run failed or tripped.
     """
@@ -75,7 +64,7 @@ def means(table):
 
 
 def ratios(figures):
-    """DataFrame of SHOWN over the collective law's, with the travel itself (deg/s), of means."""
+    """Return a DataFrame of SHOWN over the collective law's, with the travel itself (deg/s), of means."""
     rows = {}
     for name, baseline in NAMES.items():
         row = figures.loc[name] / figures.loc[baseline]
@@ -84,7 +73,7 @@ def ratios(figures):
 
 
 def trade_off(figures):
-    """DataFrame of the shares of relief and added travel that each bound leaves of ipc's, of means."""
+    """Return a DataFrame of the shares of ipc's relief and added travel that each bound leaves."""
     relief, travel = figures.loc["pi", ROOT] - figures[ROOT], figures[TRAVEL] - figures.loc["pi", TRAVEL]
     rows = [name for name in figures.index if name == "ipc" or name.startswith("bound")]
     shares = {"share of relief": relief / relief["ipc"], "share of travel": travel / travel["ipc"]}
@@ -92,7 +81,7 @@ def trade_off(figures):
 
 
 def study(platform=PLATFORM, seeds=None, jobs=1, folder=None):
-    """Means of every controller; seeds None: those of the suite."""
+    """Return the means of every controller; seeds None: those of the suite."""
     turbine = read_turbine(read_platform(platform).turbine)
     laws = {name: name for name in NAMES} | bounded(turbine)
     options = {} if seeds is None else {"seeds": seeds}
@@ -105,7 +94,7 @@ def main(arguments=None):
     parser.add_argument("--platform", default=PLATFORM)
     parser.add_argument("--seeds", type=int, nargs="+", help="weather seeds; those of the suite by default")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", help="results folder, which a later run goes on with")
+    parser.add_argument("--out", help="results folder, which a later run continues")
     given = parser.parse_args(arguments)
     figures = study(given.platform, given.seeds, given.jobs, given.out)
     print(ratios(figures).round(3).to_string())

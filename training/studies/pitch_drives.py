@@ -4,15 +4,14 @@
     python -m fowt_env.training.studies.pitch_drives --speed      # time of a run with and without inertia
 
 18 m/s, class B turbulence, the sea of that wind at the site of the suites, three seeds, 600 s after 100 s, at
-fidelity standard. The drive of second order is that of the turbine file, the one of first order lags as long;
-where the file has a lag of its own it is that one.
+fidelity standard. The drive of second order is that of the turbine file, the one of first order lags as long,
+or by the lag of the file where it has one.
 """
 
-import argparse
-import sys
-from time import process_time
+from typing import Annotated
 
 import numpy as np
+import typer
 
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.sea_state import joint_sea_state
@@ -20,6 +19,7 @@ from fowt_env.descriptions.turbine import read_turbine, with_second_order_drive
 from fowt_env.files.markdown import markdown_table
 from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
+from fowt_env.training.benchmarks.speed import paired_times
 
 PLATFORMS = ("oc3_hywind", "iea15_volturnus_s")
 CONTROLLERS = ("pi", "gspi_oc3")
@@ -33,41 +33,36 @@ FIGURES = {
 }
 
 
-def drives(turbine):
-    """{name: Turbine} with each of the drives."""
+def drives(platform):
+    """Return {name: Turbine} of a platform's turbine with each of the drives."""
+    turbine = read_turbine(read_platform(platform).turbine)
     second = with_second_order_drive(turbine)
-    own, lag = turbine.pitch_drive, turbine.pitch_drive.lag or second.pitch_drive.lag
+    drive, lag = second.pitch_drive, turbine.pitch_drive.lag or second.pitch_drive.lag
 
     def first(time_constant):
-        drive = own.model_copy(update={"time_constant": time_constant})
-        return turbine.model_copy(update={"pitch_drive": drive})
+        changed = turbine.pitch_drive.model_copy(update={"time_constant": time_constant})
+        return turbine.model_copy(update={"pitch_drive": changed})
 
-    figures = second.pitch_drive
     return {
         "none": first(0.0),
         f"first order, {lag:.2g} s": first(lag),
-        f"second order, {figures.natural_frequency:g} rad/s, {figures.damping:g}": second,
+        f"second order, {drive.natural_frequency:g} rad/s, {drive.damping:g}": second,
     }
 
 
 def scene_of(platform, turbine, seed):
-    """Scene of the study."""
+    """Return the scene of the study."""
     return build_scene(
-        platform,
-        wind={"kind": "ntm", "speed": WIND, "class": "B"},
-        sea=joint_sea_state("gulf_of_maine_normal", WIND),
-        seed=seed,
-        duration=END,
-        fidelity="standard",
-        turbine=turbine,
-    )
+        platform, wind={"kind": "ntm", "speed": WIND, "class": "B"}, turbine=turbine, fidelity="standard",
+        sea=joint_sea_state("gulf_of_maine_normal", WIND), seed=seed, duration=END,
+    )  # fmt: skip
 
 
 def table():
-    """Rows of the study: platform, drive, controller and the means of FIGURES over the seeds."""
+    """Return the rows of the study: platform, drive, controller and the means of FIGURES over the seeds."""
     rows = []
     for platform in PLATFORMS:
-        for drive, turbine in drives(read_turbine(read_platform(platform).turbine)).items():
+        for drive, turbine in drives(platform).items():
             scenes = [scene_of(platform, turbine, seed) for seed in SEEDS]
             for controller in CONTROLLERS:
                 runs = [simulate(scene, controller, duration=END) for scene in scenes]
@@ -78,37 +73,28 @@ def table():
 
 
 def speed(rounds):
-    """Rows: platform, median time with the second-order drive over that without a drive, of paired runs."""
+    """Return rows: platform, real-time factors without and with the second-order drive, their ratio."""
     rows = []
     for platform in PLATFORMS:
-        made = list(drives(read_turbine(read_platform(platform).turbine)).values())
-        pair = [scene_of(platform, turbine, 1) for turbine in (made[0], made[-1])]
-        times = np.empty((rounds + 1, 2))
-        for i in range(rounds + 1):  # the first compiles
-            for j, scene in enumerate(pair):
-                began = process_time()
-                simulate(scene, "gspi_oc3", duration=END)
-                times[i, j] = process_time() - began
-        ratio = np.median(times[1:, 1] / times[1:, 0])
-        rows.append(
-            [platform, *(f"{END / t:,.0f}" for t in np.median(times[1:], axis=0)), f"{1.0 / ratio:.3f}"]
-        )
+        plain, *_, second = drives(platform).values()
+        scenes = [scene_of(platform, turbine, 1) for turbine in (plain, second)]
+        times = paired_times([lambda s=s: simulate(s, "gspi_oc3", duration=END) for s in scenes], rounds)
+        ratio = np.median(times[:, 1] / times[:, 0])
+        rows.append([platform, *(f"{END / t:,.0f}" for t in np.median(times, axis=0)), f"{1.0 / ratio:.3f}"])
     return rows
 
 
-def main(arguments=None):
-    """Print a table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--speed", action="store_true", help="time of a run instead")
-    parser.add_argument("--rounds", type=int, default=15, help="pairs of runs to time")
-    chosen = parser.parse_args(arguments)
-    if chosen.speed:
+def main(
+    timed: Annotated[bool, typer.Option("--speed", help="Time of a run instead.")] = False,
+    rounds: Annotated[int, typer.Option(help="Pairs of runs to time.")] = 15,
+):
+    """Print the effect of the pitch drive on runs: none, of first order, of second order."""
+    if timed:
         heading = ["platform", "x real time without a drive", "with that of second order", "speed ratio"]
-        print(markdown_table(heading, speed(chosen.rounds)))
+        print(markdown_table(heading, speed(rounds)))
     else:
         print(markdown_table(["platform", "pitch drive", "controller", *FIGURES], table()))
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    typer.run(main)

@@ -7,12 +7,13 @@ The card has the command that makes the run again, its seed, wall time and machi
 its figures on the validation episodes, and the versions that the run was made with.
 """
 
-import argparse
 import json
 import shutil
 from pathlib import Path
+from typing import Annotated
 
 import pandas as pd
+import typer
 import yaml
 
 from fowt_env.controllers import information
@@ -26,7 +27,7 @@ LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
 
 
 def changes_of(settings):
-    """{dotted key: value} by which the settings of a run differ from those of its algorithm's YAML now."""
+    """Return {dotted key: value} by which settings of a run differ from its algorithm's YAML now."""
     now = resolve(settings["algo"], settings["name"], settings["seed"], settings["steps"])
     changes = {}
 
@@ -42,7 +43,7 @@ def changes_of(settings):
 
 
 def training_command(settings):
-    """Command line that makes the run again."""
+    """Return the command line that makes the run again."""
     given = "".join(f" --set '{key}={json.dumps(value)}'" for key, value in changes_of(settings).items())
     return (
         f"fowt train --algo {settings['algo']} --task {settings['name']} --seed {settings['seed']}"
@@ -51,7 +52,7 @@ def training_command(settings):
 
 
 def publish(folder, name, machine):
-    """(policy path, card path) written from the best validation of a run. Raises: InputError."""
+    """Write policy and card of the best validation of a run; return their paths. Raises: InputError."""
     folder = Path(folder)
     policy, table = folder / "best.npz", folder / "validation.csv"
     if not policy.is_file() or not table.is_file():
@@ -90,16 +91,11 @@ def publish(folder, name, machine):
     return target, card
 
 
-def main(arguments=None):
-    """Publish one run."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder")
-    parser.add_argument("name")
-    parser.add_argument("--machine", required=True, help="the kind of machine that made it, in words")
-    given = parser.parse_args(arguments)
-    for path in publish(given.folder, given.name, given.machine):
+def main(folder: str, name: str, machine: Annotated[str, typer.Option(help="Kind of machine of the run.")]):
+    """Ship the best policy of a training run: its .npz and its card."""
+    for path in publish(folder, name, machine):
         print(path)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

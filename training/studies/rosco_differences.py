@@ -7,10 +7,11 @@ From ROSCO towards the published law: the set-point smoother, the torque law, an
 the schedule. Cases of normal turbulence at WINDS on validation seeds; controllers.md has the outcome.
 """
 
-import argparse
 from math import exp
+from typing import Annotated
 
 import numpy as np
+import typer
 
 from fowt_env.controllers.gspi import gspi_oc3
 from fowt_env.controllers.pi import (
@@ -64,7 +65,7 @@ class InsideIntegral:
         memory[Memory.INTEGRAL] *= gain * p[Parameter.INTEGRAL]
 
     def act(self, measurement):
-        """(generator torque N m, blade pitch rad) of one period."""
+        """Return (generator torque N m, blade pitch rad) of one period."""
         p, memory = self.law.parameters, self.law.memory
         if self.filtered:
             self.pitch += (1.0 - self.decay) * (measurement.blade_pitch - self.pitch)
@@ -82,7 +83,7 @@ class InsideIntegral:
 
 
 def outside_factor(blade_pitch, schedule_pitch):
-    """Share of its scheduled gains that a law has for small changes if the schedule multiplies its integral.
+    """Return the share of its gains that a law has for small changes if the schedule multiplies its integral.
 
     beta = GK(beta) (KP e + KI I): a change of beta moves GK too, and with the steady GK KI I = beta,
     d beta (1 + beta/(beta_K + beta)) = GK (KP de + KI e dt): theory.md (A7) over GK.
@@ -91,7 +92,7 @@ def outside_factor(blade_pitch, schedule_pitch):
 
 
 def variants(turbine):
-    """{what is switched: controller}, from the published law to ROSCO."""
+    """Return {change: controller}, from the published law to ROSCO."""
     published = PISettings.published(turbine)
     kept = outside_factor(SCHEDULE, turbine.gains["oc3"].gain_schedule_pitch)
     proportional, integral = pitch_gains(turbine)
@@ -114,31 +115,24 @@ def variants(turbine):
     }
 
 
-def case_at(wind):
-    """Case of normal operation at a wind, m/s."""
-    turbulent = {"kind": "ntm", "speed": wind, "class": "B"}
-    return Case(f"ntm_{wind:g}", turbulent, joint_sea_state(SITE, wind))
-
-
 def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
-    """DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases.
+    """Return a DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases.
 
     names: of variants, gspi_oc3 aside; None: all.
     """
     laws = variants(read_turbine("nrel5mw"))
     if names is not None:
         laws = {name: laws[name] for name in (BASELINE, *names)}
-    cases = [case_at(wind) for wind in winds]
+    turbulent = {"kind": "ntm", "class": "B"}
+    cases = [Case(f"ntm_{u:g}", turbulent | {"speed": u}, joint_sea_state(SITE, u)) for u in winds]
     table = evaluate(laws, cases, duration=duration, seeds=seeds, jobs=jobs, control_dt=CONTROL_DT)
     return mean_ratios(table, BASELINE, SHOWN.values()).set_axis(list(SHOWN), axis=1)
 
 
-def main(arguments=None):
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--jobs", type=int, default=1)
-    print(differences(jobs=parser.parse_args(arguments).jobs).round(3).to_string())
+def main(jobs: Annotated[int, typer.Option(help="Processes.")] = 1):
+    """Print the changes from the published law to ROSCO with its gains, one at a time."""
+    print(differences(jobs=jobs).round(3).to_string())
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

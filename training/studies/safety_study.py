@@ -2,15 +2,16 @@
 
     python -m fowt_env.training.studies.safety_study --agents ppo_lqr --out results/safety.csv
 
-Beside the trained agents two careless ones with direct commands are run: one that asks for new random
-torque and blade pitch every 5 s, and one that asks for no torque and flat blades.
+Beside the trained agents two careless ones with direct commands are run: one that commands new random
+torque and blade pitch every 5 s, and one that commands no torque and flat blades.
 """
 
-import argparse
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 import pandas as pd
+import typer
 
 from fowt_env.controllers.policy.controller import policy_path, read_policy
 from fowt_env.descriptions.units import RPM
@@ -32,16 +33,13 @@ class Trained:
         self.decisions = None
 
     def env(self):
-        """Environment of the agent's training."""
+        """Return the environment of the agent's training."""
         s = self.settings
         reach = {name: tuple(s[name]) if isinstance(s[name], list) else s[name] for name in TASK_FIELDS}
         return FowtEnv(
-            replace(TASKS["above_rated"], **reach),
-            action_mode=s["action_mode"],
-            baseline=s["baseline"],
-            observation=tuple(s["observation"]),
-            wind_preview=tuple(s["wind_preview"]) or None,
-        )
+            replace(TASKS["above_rated"], **reach), action_mode=s["action_mode"], baseline=s["baseline"],
+            observation=tuple(s["observation"]), wind_preview=tuple(s["wind_preview"]) or None,
+        )  # fmt: skip
 
     def reset(self, env, observation):
         """Start an episode."""
@@ -53,7 +51,7 @@ class Trained:
         self.periods = 0
 
     def act(self, observation):
-        """Action of the coming control period."""
+        """Return the action of the coming control period."""
         if self.periods % self.decisions.settings.hold == 0:
             if self.periods:
                 self.decisions.append(observation[None])
@@ -69,7 +67,7 @@ class Careless:
         self.kind = kind
 
     def env(self):
-        """An environment of direct commands."""
+        """Return an environment of direct commands."""
         return FowtEnv("above_rated", action_mode="direct")
 
     def reset(self, env, observation):
@@ -79,7 +77,7 @@ class Careless:
         self.action = np.array([-1.0, -1.0])
 
     def act(self, observation):
-        """Action of the coming control period."""
+        """Return the action of the coming control period."""
         if self.kind == CARELESS[0] and self.periods % 50 == 0:
             self.action = self.rng.uniform(-1.0, 1.0, 2)
         self.periods += 1
@@ -87,7 +85,7 @@ class Careless:
 
 
 def episode_figures(agent, env, options):
-    """{figure: number} of one episode."""
+    """Return {figure: number} of one episode."""
     observation, _ = env.reset(seed=0, options=options | {"offsets": {}})
     agent.reset(env, observation)
     scene = env.unwrapped.scene
@@ -108,12 +106,11 @@ def episode_figures(agent, env, options):
 
 
 def safety_study(agents, progress=print):
-    """DataFrame: a row per agent, without and with the layer; means over episodes, largest overspeed."""
+    """Return a DataFrame: a row per agent and layer; means over episodes, largest overspeed."""
     episodes = validation_episodes(resolve("ppo", "above_rated", 0, 1))[0][::2]
     rows = []
-    for label, agent in [(name, Trained(name)) for name in agents] + [
-        (kind, Careless(kind)) for kind in CARELESS
-    ]:
+    judged = {name: Trained(name) for name in agents} | {kind: Careless(kind) for kind in CARELESS}
+    for label, agent in judged.items():
         for layer in (False, True):
             env = SafetyLayer(agent.env()) if layer else agent.env()
             table = pd.DataFrame([episode_figures(agent, env, options) for options in episodes])
@@ -125,16 +122,15 @@ def safety_study(agents, progress=print):
     return pd.DataFrame(rows)
 
 
-def main(arguments=None):
-    """Run the study, print and write it."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--agents", default="", help="names or paths of policies, comma-separated")
-    parser.add_argument("--out", default="results/safety.csv")
-    given = parser.parse_args(arguments)
-    table = safety_study([name for name in given.agents.split(",") if name])
+def main(
+    agents: Annotated[str, typer.Option(help="Names or paths of policies, comma-separated.")] = "",
+    out: Annotated[str, typer.Option(help="CSV to write.")] = "results/safety.csv",
+):
+    """Run agents with and without the safety layer on validation episodes; print and write the table."""
+    table = safety_study([name for name in agents.split(",") if name])
     print(table.round(2).to_string(index=False))
-    write_table(table, given.out)
+    write_table(table, out)
 
 
 if __name__ == "__main__":
-    main()
+    typer.run(main)

@@ -8,6 +8,10 @@ also with `bem` without it. Blades as masses are those of the turbine file.
 import numpy as np
 
 from fowt_env.descriptions.units import DEGREE, RPM
+from fowt_env.plant.advance import output_row
+from fowt_env.plant.state import Command, State
+from fowt_env.scene.build import build_scene
+from fowt_env.training.validation.comparison import phase
 from fowt_env.training.validation.openfast_cases import table
 
 PLATFORM = "iea15_volturnus_s"
@@ -21,23 +25,18 @@ OWN = 1.0  # %, of the look-up against what it tabulates
 
 
 def harmonics_of(values, azimuth):
-    """(mean, first, third harmonic) of values over evenly spread azimuths (rad) of blade 1; complex."""
+    """Return (mean, first, third harmonic) of values over evenly spread azimuths (rad); complex."""
     waves = [2.0 * np.exp(-1j * k * azimuth) for k in (1, 3)]
     return values.mean(), *(np.mean(values * wave) for wave in waves)
 
 
 def turn(rotor, wind, shear, rotor_speed, pitches, **options):
-    """{channel: harmonics_of} of a rotor held at a speed (rad/s) and three pitches (rad), in kN m."""
-    from fowt_env.plant.advance import output_row
-    from fowt_env.plant.state import Command, State
-    from fowt_env.scene.build import build_scene
-
+    """Return {channel: harmonics_of} of a rotor held at a speed (rad/s) and three pitches (rad), in kN m."""
     scene = build_scene(
         PLATFORM, wind={"kind": "steady", "speed": wind}, rotor=rotor, shear_exponent=shear,
         pitch="individual", hydrodynamics=False, mooring=False, **{"fidelity": "reference"} | options,
     )  # fmt: skip
-    body = scene.model.rigid_body._replace(platform_fixed=True, rotor_fixed=True)
-    scene = scene.with_model(rigid_body=body)
+    scene = scene.with_model({"rigid_body.platform_fixed": True, "rigid_body.rotor_fixed": True})
     handle, names = scene.handle(), [channel.name for channel in scene.channels]
     x, u = np.zeros(scene.n_state), np.zeros(scene.n_commands)
     x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = rotor_speed, pitches[0]
@@ -52,7 +51,7 @@ def turn(rotor, wind, shear, rotor_speed, pitches, **options):
 
 
 def blades(study):
-    """Steady wind, platform held: means of the moments 2 %, first (tower: also third) harmonics 5 %."""
+    """Compare steady wind, platform held: means of the moments 2 %, first (tower: third) harmonics 5 %."""
     for case, rows in table(REFERENCE, study.folder).groupby("case", sort=False):
         first = rows.iloc[0]
         state = (
@@ -75,7 +74,7 @@ def blades(study):
 
 
 def _add_rows(study, case, row, found):
-    """Rows of a channel: its mean, and the harmonics that its axes make large."""
+    """Add the rows of a channel: its mean, and the harmonics that its axes make large."""
     name = row["channel"]
     study.add(case, f"{name}, mean", "kN-m", row["mean_kNm"], found[0], allowed=MEAN)
     alike = row["blade_pitch1_deg"] == row["blade_pitch3_deg"]
@@ -85,6 +84,5 @@ def _add_rows(study, case, row, found):
     for order in orders:
         there = complex(row[f"cos{order}_kNm"], -row[f"sin{order}_kNm"])
         here = found[1 if order == 1 else 2]
-        turned = f"phase {np.degrees(np.angle(here / there)):+.2f} deg"
         quantity = f"{name}, {'first' if order == 1 else 'third'} harmonic over the azimuth"
-        study.add(case, quantity, "kN-m", abs(there), abs(here), allowed=HARMONIC, note=turned)
+        study.add(case, quantity, "kN-m", abs(there), abs(here), allowed=HARMONIC, note=phase(here, there))

@@ -1,4 +1,4 @@
-"""What the cheaper modelling choices cost: the same run with the dearer and the cheaper one, compared."""
+"""Errors of cheaper modelling choices: the same run with the costlier and the cheaper one, compared."""
 
 import numpy as np
 import pandas as pd
@@ -6,8 +6,8 @@ import pandas as pd
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.training.validation.comparison import SETTLED, Channel, since
 from fowt_env.training.validation.openfast_cases import PLATFORM, RUNS, box_wind
-from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.weather.turbulence import turbulence
 from fowt_env.weather.wind_field import read_box, rotor_average
 
@@ -15,81 +15,67 @@ STEP = 0.025  # s; half of it changes deviations by less than 0.1 % here
 GENERATOR_SEEDS = 8
 BANDS = (0.005, 0.02, 0.05, 0.1, 0.2, 0.5)  # Hz
 INSTANTANEOUS = {
-    "kinematics_position": "instantaneous",
-    "surface": "instantaneous",
-    "stretching": "wheeler",
+    "kinematics_position": "instantaneous", "surface": "instantaneous", "stretching": "wheeler",
+}  # fmt: skip
+UNIFORM, BOX = "turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"
+RUN_CHANGES = {  # name of a run: (case, changes)
+    "uniform wind": (UNIFORM, {}),
+    "uniform wind, no skewed wake": (UNIFORM, {"skewed_wake": False}),
+    "uniform wind, rotor table": (UNIFORM, {"skewed_wake": False, "rotor": "table"}),
+    "uniform wind, instantaneous wave kinematics": (UNIFORM, INSTANTANEOUS),
+    "uniform wind, dynamic inflow": (UNIFORM, {"dynamic_inflow": True}),
+    "full-field wind": (BOX, {}),
+    "rotor-averaged wind": (BOX, {}),  # with the wind of _disk
+    "rotor-averaged wind, rotor table": (BOX, {"rotor": "table", "skewed_wake": False}),
 }
+CHOICES = {  # cheaper choice: (run with the costlier one, run with the cheaper one)
+    "skewed wake off (against on)": ("uniform wind", "uniform wind, no skewed wake"),
+    "tabulated rotor (against BEM, both without skewed wake)": (
+        "uniform wind, no skewed wake", "uniform wind, rotor table",
+    ),
+    "fixed wave kinematics up to still water (against instantaneous, Wheeler)": (
+        "uniform wind, instantaneous wave kinematics", "uniform wind",
+    ),
+    "quasi-steady wake (against dynamic inflow)": ("uniform wind, dynamic inflow", "uniform wind"),
+    "rotor-averaged wind with gradients (against full field)": ("full-field wind", "rotor-averaged wind"),
+    "rotor-averaged wind and tabulated rotor (against full field and BEM)": (
+        "full-field wind", "rotor-averaged wind, rotor table",
+    ),
+    "hub wind blown uniformly (against full field)": ("full-field wind", "uniform wind"),
+}  # fmt: skip
 
 
 def cheaper_choices(study):
-    """Add the rows of every choice to the study, and their runs for the plots."""
-    from fowt_env.training.validation.validate import (
-        PITCH,
-        SETTLED,
-        SPEED,
-        SURGE,
-        TENSION_CHANNELS,
-        THRUST,
-        _name,
-        _since,
-    )
-
-    def frame(key, case, **changes):
-        if key not in study.runs:
-            study.say(f"costs: {key}")
-            study.runs[key] = (RUNS[case].frame(study.folder, study.bts, dt=STEP, **changes), None)
-        return study.runs[key][0]
-
-    def compare(choice, dearer, cheaper):
-        dear, cheap = _since((dearer, cheaper), SETTLED)
-        for channel in (PITCH, SURGE, SPEED, THRUST, TENSION_CHANNELS[0]):
-            name, unit = _name(channel)
-            study.add(choice, f"{name}, mean", unit, dear[channel].mean(), cheap[channel].mean())
-            study.add(choice, f"{name}, standard deviation", unit, dear[channel].std(), cheap[channel].std())
-            error = 100.0 * normalised_rms(cheap[channel], dear[channel])
-            quantity = f"{name}, normalised rms error"
-            study.add(choice, quantity, unit, dear[channel].std(), cheap[channel].std(), error)
-
-    uniform, box = "turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"
-    full = frame("uniform wind", uniform)
-    straight = frame("uniform wind, no skewed wake", uniform, skewed_wake=False)
-    compare("skewed wake off (against on)", full, straight)
-    table = frame("uniform wind, rotor table", uniform, skewed_wake=False, rotor="table")
-    compare("tabulated rotor (against BEM, both without skewed wake)", straight, table)
-    moved = frame("uniform wind, instantaneous wave kinematics", uniform, **INSTANTANEOUS)
-    compare("fixed wave kinematics up to still water (against instantaneous, Wheeler)", moved, full)
-    inflow = frame("uniform wind, dynamic inflow", uniform, dynamic_inflow=True)
-    compare("quasi-steady wake (against dynamic inflow)", inflow, full)
-    field = frame("full-field wind", box)
+    """Compare each cheaper choice with the costlier one on the same run; keep the runs for the plots."""
     disk = _disk(study)
-    mean = frame("rotor-averaged wind", box, wind=disk["spec"])
-    compare("rotor-averaged wind with gradients (against full field)", field, mean)
-    both = frame("rotor-averaged wind, rotor table", box, rotor="table", skewed_wake=False)
-    compare("rotor-averaged wind and tabulated rotor (against full field and BEM)", field, both)
-    compare("hub wind blown uniformly (against full field)", field, full)
+    for name, (case, changes) in RUN_CHANGES.items():
+        if name not in study.runs:
+            study.say(f"costs: {name}")
+            wind = {"wind": disk["spec"]} if name == "rotor-averaged wind" else {}
+            frame = RUNS[case].frame(study.folder, study.bts, dt=STEP, **changes, **wind)
+            study.runs[name] = (frame, None)
+    channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED, Channel.THRUST, Channel.TENSIONS[0])
+    for choice, (costlier, cheaper) in CHOICES.items():
+        pair = since((study.runs[cheaper][0], study.runs[costlier][0]), SETTLED)
+        study.add_statistics(choice, channels, ("mean", "std", "rms"), pair=pair)
     _generator(study, disk)
 
 
-def _rotor():
-    """(hub height, diameter, (radius, chord)) of the validation turbine."""
-    turbine = read_turbine(read_platform(PLATFORM).turbine)
-    blade = (np.asarray(turbine.blade.radius), np.asarray(turbine.blade.chord))
-    return turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius, blade
-
-
 def _disk(study):
-    """Rotor averages of the box, and the wind specification that blows them."""
-    hub, diameter, blade = _rotor()
+    """Return the rotor averages of the box, and the wind specification that has them."""
+    turbine = read_turbine(read_platform(PLATFORM).turbine)
+    hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
+    blade = (np.asarray(turbine.blade.radius), np.asarray(turbine.blade.chord))
     box = read_box(box_wind(study.folder, study.bts), hub_height=hub, rotor_diameter=diameter)
     time, value = rotor_average(box, hub, diameter)
     _, chord = rotor_average(box, hub, diameter, "chord", blade)
     keys = ("speed", "v", "w", "vertical_shear", "horizontal_shear")
     spec = {"kind": "series", "time": time, **dict(zip(keys, value.T, strict=True)), "shear_exponent": 0.0}
-    return {"box": box, "time": time, "value": value, "chord": chord, "spec": spec}
+    return {"hub": hub, "diameter": diameter, "box": box, "value": value, "chord": chord, "spec": spec}
 
 
 def _densities(step, values):
-    """(frequency, mean density) of the columns of (n, m) values, mean removed, Hann window."""
+    """Return (frequency, mean density) of the columns of (n, m) values, mean removed, Hann window."""
     window = np.hanning(len(values))[:, None]
     transform = np.fft.rfft((values - values.mean(axis=0)) * window, axis=0)
     density = 2.0 * step * np.abs(transform) ** 2 / np.sum(window**2)
@@ -97,13 +83,11 @@ def _densities(step, values):
 
 
 def _generator(study, disk):
-    """The generator of normal turbulence against the rotor average of the box: deviation and spectrum.
+    """Compare the generator of normal turbulence with the rotor average of the box: deviation, spectrum.
 
-    One box of one seed: its own point deviation differs from sigma_1 of the standard: fractions of the point
-    variance are compared.
+    Fractions of the point variance are compared: that of one box of one seed differs from sigma_1.
     """
-    hub, diameter, _ = _rotor()
-    box, step = disk["box"], disk["box"].dt
+    hub, diameter, box, step = disk["hub"], disk["diameter"], disk["box"], disk["box"].dt
     y, z = np.meshgrid(box.y, box.z)
     inside = np.hypot(y, z - hub) <= 0.5 * diameter
     points = box.velocity[:, inside, 0].astype(float)
@@ -111,26 +95,23 @@ def _generator(study, disk):
     _, mean = _densities(step, disk["value"][:, :1])
     _, chord = _densities(step, disk["chord"][:, :1])
     sigma = ntm_sigma(18.0, "B")
-    series = {"rotor": [], "point": []}
-    for average in series:
-        for seed in range(GENERATOR_SEEDS):
-            period = len(points) * step
-            _, value = turbulence(
-                18.0, sigma, height=hub, diameter=diameter, period=period, seed=seed, average=average
-            )
-            series[average].append(value[:-1])
+    period, series = len(points) * step, {}
+    for average in ("rotor", "point"):
+        settings = {"height": hub, "diameter": diameter, "period": period, "average": average}
+        values = [turbulence(18.0, sigma, seed=seed, **settings)[1] for seed in range(GENERATOR_SEEDS)]
+        series[average] = [value[:-1] for value in values]
     made_frequency, made_rotor = _densities(step, np.stack([v[:, 0] for v in series["rotor"]], axis=1))
     _, made_point = _densities(step, np.stack([v[:, 0] for v in series["point"]], axis=1))
     case = "generator of normal turbulence (against the rotor average of the TurbSim box)"
-    theirs = disk["value"][:, 0].std() / np.sqrt(points.var(axis=0).mean())
+    deviation = np.sqrt(points.var(axis=0).mean())
+    theirs = disk["value"][:, 0].std() / deviation
     ours = np.mean([r[:, 0].std() / p[:, 0].std() for r, p in zip(*series.values(), strict=True)])
     study.add(case, "u: std of the rotor average over that of a point", "-", theirs, ours)
-    theirs = disk["chord"][:, 0].std() / np.sqrt(points.var(axis=0).mean())
+    theirs = disk["chord"][:, 0].std() / deviation
     study.add(case, "the same, box averaged with chord weights", "-", theirs, ours)
-    deviation = np.sqrt(points.var(axis=0).mean())
     study.add(case, "u at a point, std (the box: one seed; here sigma_1)", "m/s", deviation, sigma)
     for column, name in ((3, "vertical"), (4, "horizontal")):
-        theirs = disk["value"][:, column].std() / np.sqrt(points.var(axis=0).mean())
+        theirs = disk["value"][:, column].std() / deviation
         ours = np.mean([r[:, column].std() for r in series["rotor"]]) / sigma
         study.add(case, f"u: std of the {name} gradient per diameter over that of a point", "-", theirs, ours)
     for low, high in zip(BANDS[:-1], BANDS[1:], strict=True):

@@ -9,7 +9,7 @@ rests; drag is left out. With X the excitation per metre and q = surge, sway, he
 C is the hydrostatic stiffness with that of the weight, K that of the lines, D a damping that may be added.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,7 +20,7 @@ NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 def read_arrays(path):
-    """{name: array} of a coefficients file of the package. Raises: InputError if it does not exist."""
+    """Return {name: array} of a coefficients file of the package. Raises: InputError if it does not exist."""
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: np.asarray(file[name]) for name in file.files}
@@ -29,7 +29,7 @@ def read_arrays(path):
 
 
 def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
-    """6x6 mass matrix about the origin of a body with these moments of inertia about its own centre."""
+    """Return the 6x6 mass matrix about the origin of a body, inertia about its centre."""
     x, y, z = place
     cross = mass * np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     matrix = np.zeros((6, 6))
@@ -41,7 +41,7 @@ def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
 
 
 def tower_mass(stations, densities, base, top, slices=400):
-    """6x6 mass matrix of a tower along z with these densities (kg/m) at fractions of its height."""
+    """Return the 6x6 mass matrix of a tower along z, densities (kg/m) at fractions of its height."""
     fraction = (np.arange(slices) + 0.5) / slices
     length = (top - base) / slices
     matrix = np.zeros((6, 6))
@@ -51,7 +51,7 @@ def tower_mass(stations, densities, base, top, slices=400):
 
 
 def weight_stiffness(mass, gravity=GRAVITY):
-    """6x6 stiffness of the weight of a mass matrix about the displaced origin, in axes that do not turn."""
+    """Return the 6x6 stiffness of the weight of a mass matrix about the displaced origin, fixed axes."""
     x, y, z = mass[1, 5], -mass[0, 5], mass[0, 4]  # moments of mass
     stiffness = np.zeros((6, 6))
     stiffness[3, 3] = stiffness[4, 4] = -gravity * z
@@ -60,7 +60,7 @@ def weight_stiffness(mass, gravity=GRAVITY):
 
 
 def weight(mass, gravity=GRAVITY):
-    """(6,) force and moment of the weight about the undisplaced origin."""
+    """Return (6,) force and moment of the weight about the undisplaced origin."""
     return gravity * np.array([0.0, 0.0, -mass[0, 0], mass[0, 5], mass[1, 5], 0.0])
 
 
@@ -77,7 +77,7 @@ class CatenaryLine:
 
 
 def catenary(span, rise, line):
-    """(horizontal, vertical) tension (N) at the fairlead of a line with this span and rise (m).
+    """Return (horizontal, vertical) tension (N) at the fairlead of a line with this span and rise (m).
 
     Newton's method on the closed form of Jonkman (2007), with and without a part on the seabed.
     """
@@ -107,12 +107,9 @@ def catenary(span, rise, line):
         if np.abs(miss).max() < 1e-10 * length:
             return h, v
         dh, dv = 1e-6 * h, 1e-6 * v
-        jacobian = np.column_stack(
-            [
-                (np.array(ends(h + dh, v)) - ends(h - dh, v)) / (2.0 * dh),
-                (np.array(ends(h, v + dv)) - ends(h, v - dv)) / (2.0 * dv),
-            ]
-        )
+        by_h = (np.array(ends(h + dh, v)) - ends(h - dh, v)) / (2.0 * dh)
+        by_v = (np.array(ends(h, v + dv)) - ends(h, v - dv)) / (2.0 * dv)
+        jacobian = np.column_stack([by_h, by_v])
         step = np.linalg.solve(jacobian, miss)
         share = min(1.0, 0.5 * h / max(abs(step[0]), 1e-300), 0.5 * v / max(abs(step[1]), 1e-300))
         h, v = h - share * step[0], v - share * step[1]
@@ -120,13 +117,13 @@ def catenary(span, rise, line):
 
 
 def rotation(roll, pitch, yaw):
-    """Rotation matrix of small angles to second order: enough for stiffness by central differences."""
+    """Return the rotation matrix of small angles to second order, for stiffness by central differences."""
     a = np.array([[0.0, -yaw, pitch], [yaw, 0.0, -roll], [-pitch, roll, 0.0]])
     return np.eye(3) + a + 0.5 * a @ a
 
 
 def line_forces(lines, q):
-    """(6,) force and moment of the lines about the displaced origin, in axes that do not turn."""
+    """Return force and moment (6,) of the lines about the displaced origin, in fixed axes."""
     total = np.zeros(6)
     turn = rotation(*q[3:])
     for line in lines:
@@ -141,7 +138,7 @@ def line_forces(lines, q):
 
 
 def line_stiffness(lines, q):
-    """(6, 6) stiffness of the lines at q, by central differences."""
+    """Return (6, 6) stiffness of the lines at q, by central differences."""
     steps = (0.05, 0.05, 0.05, 1e-3, 1e-3, 1e-3)
     columns = []
     for i, step in enumerate(steps):
@@ -153,7 +150,7 @@ def line_stiffness(lines, q):
 
 
 def interpolated(omega, grid, values, low=None, high=None):
-    """Values (n, ...) at omega (rad/s), linear over the grid; low, high: at zero and infinite frequency."""
+    """Return values at omega (rad/s), linear over the grid; low, high: at zero and infinite frequency."""
     if omega < grid[0]:
         first = values[0] if low is None else low
         return first + (values[0] - first) * omega / grid[0]
@@ -173,25 +170,29 @@ class FloatingBody:
     lines: tuple
     volume: float
     centre: tuple = (0.0, 0.0)  # of buoyancy, x and y
-    added_stiffness: np.ndarray | None = None  # (6, 6)
-    added_damping: np.ndarray | None = None  # (6, 6)
+    added_stiffness: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
+    added_damping: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
     gravity: float = GRAVITY
 
     @property
     def stiffness(self):
         """(6, 6) hydrostatic stiffness with that of the weight and what is added."""
-        extra = 0.0 if self.added_stiffness is None else self.added_stiffness
-        return self.coefficients["stiffness"] + weight_stiffness(self.mass, self.gravity) + extra
+        weight = weight_stiffness(self.mass, self.gravity)
+        return self.coefficients["stiffness"] + weight + self.added_stiffness
+
+    @property
+    def rest_stiffness(self):
+        """(6, 6) stiffness with that of the lines, where the body rests."""
+        return self.stiffness + line_stiffness(self.lines, self.rest())
 
     def rest(self):
-        """(6,) where the body rests, by Newton's method on lines, weight and buoyancy."""
+        """Return the position of rest (6,), by Newton's method on lines, weight and buoyancy."""
         lift = DENSITY * self.gravity * self.volume
         buoyancy = lift * np.array([0.0, 0.0, 1.0, self.centre[1], -self.centre[0], 0.0])
         q = np.zeros(6)
         for _ in range(50):
-            left = (
-                buoyancy + weight(self.mass, self.gravity) - self.stiffness @ q + line_forces(self.lines, q)
-            )
+            held = weight(self.mass, self.gravity) + line_forces(self.lines, q)
+            left = buoyancy + held - self.stiffness @ q
             step = np.linalg.solve(self.stiffness + line_stiffness(self.lines, q), left)
             q = q + step
             if np.abs(step).max() < 1e-9:
@@ -199,20 +200,19 @@ class FloatingBody:
         raise InputError("frequency domain: the body finds no place to rest")
 
     def added_mass(self, omega):
-        """(6, 6) at omega (rad/s)."""
+        """Return the added mass (6, 6) at omega (rad/s)."""
         c = self.coefficients
         zero = c.get("added_mass_zero")
         return interpolated(omega, c["omega"], c["added_mass"], zero, c["added_mass_infinite"])
 
     def damping(self, omega):
-        """(6, 6) of radiation, and what is added."""
+        """Return the damping (6, 6) of radiation, and added_damping."""
         c = self.coefficients
         nothing = np.zeros((6, 6))
-        extra = nothing if self.added_damping is None else self.added_damping
-        return interpolated(omega, c["omega"], c["damping"], nothing, nothing) + extra
+        return interpolated(omega, c["omega"], c["damping"], nothing, nothing) + self.added_damping
 
     def excitation(self, omega, heading=0.0):
-        """(6,) complex per metre of amplitude, at omega (rad/s) and a heading (rad) of the file."""
+        """Return the excitation (6,) per metre at omega (rad/s) and a heading (rad) of the file."""
         c = self.coefficients
         turns = np.abs((c["heading"] - heading + np.pi) % (2.0 * np.pi) - np.pi)
         column = int(np.argmin(turns))
@@ -221,8 +221,8 @@ class FloatingBody:
         return interpolated(omega, c["excitation_omega"], c["excitation"][:, column])
 
     def responses(self, omega, heading=0.0):
-        """(n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
-        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
+        """Return (n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
+        stiffness = self.rest_stiffness
         found = []
         for w in omega:
             inertia = self.mass + self.added_mass(w)
@@ -231,26 +231,22 @@ class FloatingBody:
         return np.array(found)
 
     def retardation(self, time, spacing=0.004):
-        """(n, 6, 6) K(t) = 2/pi times the integral of B cos(omega t), by the trapezoid rule over B linear."""
+        """Return (n, 6, 6) K(t) = 2/pi times the integral of B cos(omega t), by the trapezoid rule."""
         grid = np.arange(0.0, self.coefficients["omega"][-1] + spacing, spacing)
-        own = FloatingBody(
-            self.coefficients, self.mass, self.lines, self.volume
-        )  # without damping that is added
-        damping = np.array([own.damping(w) for w in grid]).reshape(len(grid), 36)
+        damping = np.array([self.damping(w) - self.added_damping for w in grid]).reshape(len(grid), 36)
         weight = np.full(len(grid), spacing)
         weight[[0, -1]] *= 0.5
         waves = np.cos(np.outer(time, grid)) * weight
         return (2.0 / np.pi * waves @ damping).reshape(-1, 6, 6)
 
     def free_decay(self, offset, duration, step=0.05, memory=60.0):
-        """(time (n,), motion (n, 6) from rest) of the body let go at rest at this offset (6,), water at rest.
+        """Return (time (n,), motion (n, 6) from rest) of a free decay from an offset (6,) in still water.
 
         Cummins' equation by the leapfrog rule: places at whole steps, velocities at halves, and the
         convolution by the midpoint rule at those.
         """
         inertia = np.linalg.inv(self.mass + self.coefficients["added_mass_infinite"])
-        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
-        extra = np.zeros((6, 6)) if self.added_damping is None else self.added_damping
+        stiffness = self.rest_stiffness
         kernel = step * self.retardation((np.arange(round(memory / step)) + 0.5) * step)
         flat = np.ascontiguousarray(kernel.transpose(1, 0, 2).reshape(6, -1))  # latest velocity first
         past = np.zeros((len(kernel), 6))
@@ -259,7 +255,7 @@ class FloatingBody:
         motion[0] = offset
         velocity = np.zeros(6)
         for n in range(count):
-            force = -stiffness @ motion[n] - flat @ past.ravel() - extra @ velocity
+            force = -stiffness @ motion[n] - flat @ past.ravel() - self.added_damping @ velocity
             velocity = velocity + (0.5 if n == 0 else 1.0) * step * (inertia @ force)
             past[1:] = past[:-1].copy()
             past[0] = velocity
@@ -267,8 +263,8 @@ class FloatingBody:
         return step * np.arange(count + 1), motion
 
     def natural_modes(self):
-        """{motion: (rad/s, damping ratio)} of the six modes, each with the coefficients of its frequency."""
-        stiffness = self.stiffness + line_stiffness(self.lines, self.rest())
+        """Return {motion: (rad/s, damping ratio)} of six modes, each with coefficients at its frequency."""
+        stiffness = self.rest_stiffness
         length = self.volume ** (1.0 / 3.0)
         scale = np.array([1.0, 1.0, 1.0, length, length, length])
         found = {}
@@ -304,7 +300,7 @@ BARGE_TOWER = (
 
 
 def nrel5mw(tower, base):
-    """6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk."""
+    """Return the 6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk."""
     tilt, cone = np.radians(5.0), np.radians(2.5)
     apex = np.array([-5.0191 * np.cos(tilt), 0.0, 87.6 + 1.96256 + 5.0191 * np.sin(tilt)])
     shaft = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])  # downwind
@@ -324,22 +320,15 @@ def nrel5mw(tower, base):
 
 
 def _ring(count, first, radius, depth, anchor_radius, anchor_depth, line):
-    """Equal lines around the axis, the first in this direction (deg)."""
-    found = []
-    for angle in np.radians(first + 360.0 / count * np.arange(count)):
-        c, s = np.cos(angle), np.sin(angle)
-        found.append(
-            CatenaryLine(
-                (anchor_radius * c, anchor_radius * s, -anchor_depth),
-                (radius * c, radius * s, -depth),
-                **line,
-            )
-        )
-    return tuple(found)
+    """Return equal lines around the axis, the first in this direction (deg)."""
+    turns = [(np.cos(a), np.sin(a)) for a in np.radians(first + 360.0 / count * np.arange(count))]
+    anchors = [(anchor_radius * c, anchor_radius * s, -anchor_depth) for c, s in turns]
+    fairleads = [(radius * c, radius * s, -depth) for c, s in turns]
+    return tuple(CatenaryLine(*ends, **line) for ends in zip(anchors, fairleads, strict=True))
 
 
 def oc4_semi(coefficients):
-    """FloatingBody of OC4's DeepCwind semi: steel, and the ballast water on the axes of its columns.
+    """Return the FloatingBody of OC4's DeepCwind semi: steel, and ballast water on the columns' axes.
 
     HydroDyn 2, for which the deck was written, lumps the water at the nodes of the members, so that it has no
     inertia across a member. As a solid it would make the periods of pitch and yaw 0.8 and 1.4 % longer.
@@ -361,7 +350,7 @@ def oc4_semi(coefficients):
 
 
 def iti_barge(coefficients):
-    """FloatingBody of the ITI Energy barge."""
+    """Return a FloatingBody of the ITI Energy barge."""
     mass = nrel5mw(BARGE_TOWER, 0.0)
     mass = mass + point_mass(5.452e6, (0.0, 0.0, -0.281768), (7.269e8, 7.269e8, 1.4539e9))
     weight_in_water = (130.403 - DENSITY * 0.25 * np.pi * 0.0809**2) * GRAVITY
@@ -373,9 +362,6 @@ def iti_barge(coefficients):
             def turned(x, y, z, c=c, s=s):
                 return (c * x - s * y, s * x + c * y, z)
 
-            lines.append(
-                CatenaryLine(
-                    turned(*anchor, -150.0), turned(20.0, 20.0, -4.0), 473.312, weight_in_water, 5.89e8
-                )
-            )
+            ends = turned(*anchor, -150.0), turned(20.0, 20.0, -4.0)
+            lines.append(CatenaryLine(*ends, 473.312, weight_in_water, 5.89e8))
     return FloatingBody(coefficients, mass, tuple(lines), 6000.0)

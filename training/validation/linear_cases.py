@@ -9,9 +9,16 @@ is the deck's state-space fit, their blades turn in the potential flow around th
 and yaw are held.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from fowt_env.analysis.linear_model import linearize
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE
+from fowt_env.scene.build import build_scene
+from fowt_env.training.validation.comparison import phase
 from fowt_env.training.validation.openfast_cases import table
 
 PLATFORM = "iea15_volturnus_s"
@@ -40,57 +47,42 @@ GRAVITY = 9.80665
 DRAG_STEPS = np.radians([0.02 * 200.0] * 3 + [2.0] * 3)  # m/s and rad/s, of HydroDyn's differences
 
 
-def with_linearised_drag(scene):
-    """The scene with the damping that HydroDyn's differences make of its quadratic drag."""
-    matrices = scene.model.hydro.matrices
-    damping = matrices.linear_damping + matrices.quadratic_damping * DRAG_STEPS
-    return scene.with_model({"hydro.matrices.linear_damping": damping})
-
-
 def old_deck():
-    """Platform and Turbine with the older deck's figures in place of today's."""
-    from fowt_env.descriptions.platform import read_platform
-    from fowt_env.descriptions.turbine import read_turbine
-
+    """Return Platform and Turbine with the figures of the older deck."""
     platform = read_platform(PLATFORM)
     turbine = read_turbine(platform.turbine)
     flow = platform.potential_flow
-    stiffness = flow.stiffness.copy()
-    stiffness *= GRAVITY / platform.environment.gravity
+    gravity = platform.environment.gravity
+    stiffness = flow.stiffness * (GRAVITY / gravity)
     stiffness[2, 2] = HEAVE_STIFFNESS
-    platform = platform.model_copy(
-        update={
-            "environment": platform.environment.model_copy(update={"gravity": GRAVITY}),
-            "ballast": platform.ballast.model_copy(update={"cm_depth": PLATFORM_DEPTH}),
-            "tower": platform.tower.model_copy(update={**TOWER, "top_height": TOWER_TOP, "modes": None}),
-            "potential_flow": _with(flow, stiffness=stiffness),
-            "lines": tuple(
-                line.model_copy(
-                    update={"wet_weight": line.wet_weight * GRAVITY / platform.environment.gravity}
-                )
-                for line in platform.lines
-            ),
-        }
+    changes = {
+        "environment": {"gravity": GRAVITY},
+        "ballast": {"cm_depth": PLATFORM_DEPTH},
+        "tower": {**TOWER, "top_height": TOWER_TOP, "modes": None},
+    }
+    parts = {name: getattr(platform, name).model_copy(update=update) for name, update in changes.items()}
+    parts["potential_flow"] = replace(flow, stiffness=stiffness)
+    parts["lines"] = tuple(
+        line.model_copy(update={"wet_weight": line.wet_weight * GRAVITY / gravity}) for line in platform.lines
     )
-    return platform, _turbine(turbine)
-
-
-def _with(record, **changes):
-    from dataclasses import replace
-
-    return replace(record, **changes)
+    return platform.model_copy(update=parts), _turbine(turbine)
 
 
 def _turbine(turbine):
-    """The Turbine with the masses and radii of the older deck."""
+    """Return the Turbine with the masses and radii of the older deck."""
     mass = 3.0 * BLADE_MASS + HUB_MASS
     along = BLADE_MASS * (HUB_RADIUS + BLADE_CENTRE)  # first moment about the apex
     square = BLADE_SQUARE + 2.0 * HUB_RADIUS * BLADE_MASS * BLADE_CENTRE + HUB_RADIUS**2 * BLADE_MASS
     about_shaft = 3.0 * square * np.cos(CONE) ** 2
     offset = -3.0 * along * np.sin(CONE) / mass  # upwind
     about_apex = 0.5 * about_shaft + 3.0 * square * np.sin(CONE) ** 2
-    rotor = turbine.rotor.model_copy(
-        update={
+    top = YAW_BEARING + NACELLE
+    reduced = NACELLE * YAW_BEARING / top
+    gap_x, gap_z = NACELLE_PLACE[0], NACELLE_PLACE[1] - TOWER_TOP
+    own = NACELLE_YAW_INERTIA - NACELLE * NACELLE_PLACE[0] ** 2
+    law, ratio = turbine.torque_law, turbine.drivetrain.gear_ratio
+    changes = {
+        "rotor": {
             "mass": mass,
             "overhang": OVERHANG * np.cos(TILT),
             "hub_height": TOWER_TOP + TWR2SHFT + OVERHANG * np.sin(TILT),
@@ -99,47 +91,29 @@ def _turbine(turbine):
             "inertia": about_shaft + HUB_INERTIA,
             "inertia_diameter": about_apex - mass * offset**2,
             "cm_offset": offset,
-        }
-    )
-    top = YAW_BEARING + NACELLE
-    x = NACELLE * NACELLE_PLACE[0] / top
-    z = (NACELLE * NACELLE_PLACE[1] + YAW_BEARING * TOWER_TOP) / top
-    reduced = NACELLE * YAW_BEARING / top
-    gap_x, gap_z = NACELLE_PLACE[0], NACELLE_PLACE[1] - TOWER_TOP
-    own = NACELLE_YAW_INERTIA - NACELLE * NACELLE_PLACE[0] ** 2
-    nacelle = turbine.nacelle.model_copy(
-        update={
+        },
+        "nacelle": {
             "mass": top,
-            "cm_downwind": x,
-            "cm_height": z,
+            "cm_downwind": NACELLE * NACELLE_PLACE[0] / top,
+            "cm_height": (NACELLE * NACELLE_PLACE[1] + YAW_BEARING * TOWER_TOP) / top,
             "inertia": (reduced * gap_z**2, reduced * (gap_x**2 + gap_z**2), own + reduced * gap_x**2),
-        }
-    )
-    law = turbine.torque_law
-    speed = turbine.rated_rotor_speed * turbine.drivetrain.gear_ratio
-    law = law.model_copy(
-        update={
-            "rated_torque": TORQUE, "rated_power": TORQUE * speed, "max_torque": max(TORQUE, law.max_torque),
+        },
+        "torque_law": {
+            "rated_torque": TORQUE,
+            "rated_power": TORQUE * (turbine.rated_rotor_speed * ratio),
+            "max_torque": max(TORQUE, law.max_torque),
             # below rated nothing is compared: the curve only has to meet the other rated torque
             "region2_constant": law.region2_constant * TORQUE / law.rated_torque,
-        }
-    )  # fmt: skip
-    radius = turbine.blade.radius - (turbine.rotor.hub_radius - HUB_RADIUS)
-    return turbine.model_copy(
-        update={
-            "rotor": rotor,
-            "nacelle": nacelle,
-            "torque_law": law,
-            "drivetrain": turbine.drivetrain.model_copy(
-                update={"generator_inertia": GENERATOR_INERTIA / turbine.drivetrain.gear_ratio**2}
-            ),
-            "blade": turbine.blade.model_copy(update={"radius": radius}),
-        }
-    )
+        },
+        "drivetrain": {"generator_inertia": GENERATOR_INERTIA / ratio**2},
+        "blade": {"radius": turbine.blade.radius - (turbine.rotor.hub_radius - HUB_RADIUS)},
+    }
+    parts = {name: getattr(turbine, name).model_copy(update=update) for name, update in changes.items()}
+    return turbine.model_copy(update=parts)
 
 
 def named_poles(matrix, states):
-    """{motion: pole with positive imaginary part, rotor: real pole} by participation factors."""
+    """Return {motion: pole with positive imaginary part, rotor: real pole} by participation factors."""
     value, right = np.linalg.eig(matrix)
     share = np.abs(right.T * np.linalg.inv(right))
     found, used = {}, set()
@@ -156,7 +130,7 @@ def named_poles(matrix, states):
 
 
 def open_loop(model):
-    """(A, {input: column}, states) of a LinearModel with the blade pitch as an input, without azimuth."""
+    """Return (A, {input: column}, states) of a LinearModel with the blade pitch as input, no azimuth."""
     states = list(model.states)
     pitch = states.index("blade_pitch")
     kept = [i for i, name in enumerate(states) if name not in ("blade_pitch", "azimuth")]
@@ -168,10 +142,7 @@ def open_loop(model):
 
 
 def linear(study):
-    """Linear models above rated wind: frequencies of platform modes 3 %, damping and rotor pole 10 %."""
-    from fowt_env.analysis.linear_model import linearize
-    from fowt_env.scene.build import build_scene
-
+    """Compare linear models above rated wind: frequencies 3 %, damping and rotor pole 10 %."""
     poles = table(f"{PLATFORM}/linear_poles.csv.gz", study.folder)
     gains = table(f"{PLATFORM}/linear_responses.csv.gz", study.folder)
     platform, turbine = old_deck()
@@ -182,36 +153,27 @@ def linear(study):
             shear_exponent=SHEAR, radiation="state_space",
             fidelity="reference",
         )  # fmt: skip
-        model = linearize(with_linearised_drag(scene))
+        drag = scene.model.hydro.matrices  # with the damping that HydroDyn's differences make of it
+        damping = drag.linear_damping + drag.quadratic_damping * DRAG_STEPS
+        model = linearize(scene.with_model({"hydro.matrices.linear_damping": damping}))
         theirs = poles[np.isclose(poles["wind_mps"], wind)].iloc[0]
-        _operating_point(study, model, theirs, wind)
+        case = f"linear model at {wind:g} m/s (against OpenFAST)"
+        for name, unit, there in (
+            ("BldPitch1", "deg", theirs["blade_pitch_rad"] * (1.0 / DEGREE)),
+            ("PtfmSurge", "m", theirs["surge_m"]),
+            ("PtfmHeave", "m", theirs["heave_m"]),
+            ("PtfmPitch", "deg", theirs["pitch_rad"] * (1.0 / DEGREE)),
+        ):
+            study.add(case, f"operating point, {name}", unit, there, model.point[name])
         matrix, columns, states = open_loop(model)
-        _poles(study, named_poles(matrix, states), theirs, wind)
+        ours = named_poles(matrix, states)
+        for name in MOTIONS:
+            there, here = complex(theirs[f"{name}_real"], theirs[f"{name}_imag"]), ours[name]
+            study.add(case, f"{name} mode, frequency", "rad/s", there.imag, here.imag, allowed=3.0)
+            ratios = [-pole.real / abs(pole) for pole in (there, here)]
+            study.add(case, f"{name} mode, damping ratio", "-", *ratios, allowed=10.0)
+        study.add(case, "rotor pole", "1/s", theirs["rotor_real"], ours["rotor"].real, allowed=10.0)
         _responses(study, matrix, columns, states, gains[np.isclose(gains["wind_mps"], wind)], wind)
-
-
-def _operating_point(study, model, theirs, wind):
-    case = f"linear model at {wind:g} m/s (against OpenFAST)"
-    point = model.point
-    degrees = 1.0 / DEGREE
-    for name, unit, there in (
-        ("BldPitch1", "deg", theirs["blade_pitch_rad"] * degrees),
-        ("PtfmSurge", "m", theirs["surge_m"]),
-        ("PtfmHeave", "m", theirs["heave_m"]),
-        ("PtfmPitch", "deg", theirs["pitch_rad"] * degrees),
-    ):
-        study.add(case, f"operating point, {name}", unit, there, point[name])
-
-
-def _poles(study, ours, theirs, wind):
-    case = f"linear model at {wind:g} m/s (against OpenFAST)"
-    for name in MOTIONS:
-        there = complex(theirs[f"{name}_real"], theirs[f"{name}_imag"])
-        here = ours[name]
-        study.add(case, f"{name} mode, frequency", "rad/s", there.imag, here.imag, allowed=3.0)
-        ratios = [-pole.real / abs(pole) for pole in (there, here)]
-        study.add(case, f"{name} mode, damping ratio", "-", *ratios, allowed=10.0)
-    study.add(case, "rotor pole", "1/s", theirs["rotor_real"], ours["rotor"].real, allowed=10.0)
 
 
 def _responses(study, matrix, columns, states, gains, wind):
@@ -226,6 +188,5 @@ def _responses(study, matrix, columns, states, gains, wind):
         (state, unit), (source, per) = outputs[row["output"]], inputs[row["input"]]
         solved = np.linalg.solve(1j * omega * np.eye(len(matrix)) - matrix, columns[row["input"]])
         here = solved[states.index(state)]
-        turned = np.degrees(np.angle(here / there))
         quantity = f"{state.replace('_', ' ')} per {source} at {omega:g} rad/s"
-        study.add(case, quantity, f"{unit} per {per}", abs(there), abs(here), note=f"phase {turned:+.1f} deg")
+        study.add(case, quantity, f"{unit} per {per}", abs(there), abs(here), note=phase(here, there, 1))

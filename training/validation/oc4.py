@@ -12,25 +12,23 @@ from dataclasses import replace
 from math import pi
 
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.training.validation.comparison import TIME, Channel
 from fowt_env.training.validation.openfast_cases import ReferenceRun, wave_components
 from fowt_env.training.validation.signal_errors import decay_period
-from fowt_env.training.validation.validate import PITCH, SURGE, TIME, add_decay
-from fowt_env.training.validation.volturnus import DT, PLANE, add_deviations
+from fowt_env.training.validation.volturnus import DT
 
 PLATFORM = "nrel5mw_oc4_semi"
 DECAYS = {  # case: (channel, start value, seconds, cycles counted)
-    "decay_surge": (SURGE, 8.0, 250.0, 1),
-    "decay_heave": (PLANE[1], 3.0, 100.0, 4),
-    "decay_pitch": (PITCH, 6.0, 150.0, 4),
+    "decay_surge": (Channel.SURGE, 8.0, 250.0, 1),
+    "decay_heave": (Channel.HEAVE, 3.0, 100.0, 4),
+    "decay_pitch": (Channel.PITCH, 6.0, 150.0, 4),
 }
-
-
 # water of each of three columns, of its upper part and of its base, by the deck's HydroDyn file
 WATER = ((1025.0, 5.94, 7.83), (1025.0, 11.94, 5.05))  # density kg/m3, radius inside m, height m
 
 
 def with_solid_water():
-    """The platform, the water in its columns turning with them."""
+    """Return the platform with the water in its columns turning as a solid."""
     found = read_platform(PLATFORM)
     square = sum(3.0 * density * pi * radius**4 * height for density, radius, height in WATER)
     added = (0.25 * square, 0.25 * square, 0.5 * square)
@@ -39,7 +37,7 @@ def with_solid_water():
 
 
 def _run(case, duration, **settings):
-    """ReferenceRun of this platform."""
+    """Return a ReferenceRun of this platform."""
     return ReferenceRun(case, duration, DT, platform=with_solid_water, place=PLATFORM, **settings)
 
 
@@ -49,23 +47,20 @@ RUNS = {
         for case, (channel, start, seconds, _) in DECAYS.items()
     },
     "waves_Hs7.5": _run("waves_Hs7.5", 400.0, sea=wave_components),
-    "waves_Hs7.5_qtf": _run(
-        "waves_Hs7.5_qtf", 400.0, sea=wave_components, options={"second_order": "full"}
-    ),
+    "waves_Hs7.5_qtf": _run("waves_Hs7.5_qtf", 400.0, sea=wave_components, options={"second_order": "full"}),
     "waves_Hs7.5_moordyn": _run("waves_Hs7.5_moordyn", 400.0, sea=wave_components),
 }
 
 
 def decays(study):
-    """Free decays with members' drag: period 0.2 %, logarithmic decrement 2 %, rms of the record 1 %.
+    """Compare free decays with members' drag: period 0.2 %, decrement 2 %, rms of the record 1 %.
 
     HydroDyn's members keep their upright direction: 1 - cos(6 deg) is 0.5 %. Its strips of 2 to 6 m make
     less than 1 % of the drag of a velocity that is linear along a column.
     """
     for case, (channel, _, seconds, cycles) in DECAYS.items():
-        add_decay(
-            study, case, channel, seconds, period=0.2, decrement=2.0, rms=1.0, cycles=cycles, counted=(1,)
-        )
+        allowed = {"period": 0.2, "decrement": 2.0, "rms": 1.0}
+        study.add_decay(case, channel, seconds, **allowed, cycles=cycles, counted=(1,))
     case, (channel, _, seconds, cycles) = "decay_pitch", DECAYS["decay_pitch"]
     study.say(f"{case}, published inertia")
     theirs = study.pair(case)[1]
@@ -77,13 +72,16 @@ def decays(study):
 
 
 def waves(study):
-    """Irregular waves Hs 7.5 m: deviations after 100 s within 2 %, with difference frequencies 5 %.
+    """Compare irregular waves Hs 7.5 m: deviations after 100 s 2 %, with difference frequencies 5 %.
 
-    The run with MoorDyn says what lines with drag and inertia do: reported alone.
+    The run with MoorDyn, whose lines have drag and inertia, is reported alone.
     """
-    add_deviations(study, "waves_Hs7.5", PLANE, 2.0)
-    add_deviations(study, "waves_Hs7.5_qtf", PLANE, 5.0)
-    add_deviations(study, "waves_Hs7.5_moordyn", PLANE, float("nan"))
+    for case, allowed in (
+        ("waves_Hs7.5", 2.0),
+        ("waves_Hs7.5_qtf", 5.0),
+        ("waves_Hs7.5_moordyn", float("nan")),
+    ):
+        study.add_statistics(case, Channel.PLANE, std=allowed)
 
 
 GROUPS = {"decays": (decays, 4), "waves": (waves, 3)}

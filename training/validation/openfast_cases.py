@@ -1,4 +1,4 @@
-"""The OpenFAST reference runs: where they are, and how this project's plant is run on the same case."""
+"""The OpenFAST reference runs: where they are, and how this plant is run on the same case."""
 
 import lzma
 from dataclasses import dataclass, field
@@ -7,38 +7,31 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from fowt_env.controllers.rosco import find_library
 from fowt_env.errors import InputError
+from fowt_env.run.simulation import simulate
+from fowt_env.scene.build import build_scene
 
 PLATFORM = "oc3_hywind_openfast"
 FOLDER = Path(__file__).parent / "reference"
-COLUMNS = {  # column of a reference file: (OpenFAST channel as simulate names it, factor)
-    "time_s": ("Time_[s]", 1.0),
-    "wave_elev_m": ("Wave1Elev_[m]", 1.0),
-    "surge_m": ("PtfmSurge_[m]", 1.0),
-    "sway_m": ("PtfmSway_[m]", 1.0),
-    "heave_m": ("PtfmHeave_[m]", 1.0),
-    "roll_deg": ("PtfmRoll_[deg]", 1.0),
-    "pitch_deg": ("PtfmPitch_[deg]", 1.0),
-    "yaw_deg": ("PtfmYaw_[deg]", 1.0),
-    "rotor_speed_rpm": ("RotSpeed_[rpm]", 1.0),
-    "blade_pitch_deg": ("BldPitch1_[deg]", 1.0),
-    "gen_power_elec_kW": ("GenPwr_[kW]", 1.0),
-    "gen_torque_kNm": ("GenTq_[kN-m]", 1.0),
-    "aero_thrust_N": ("RtFldFxh_[N]", 1.0),
-    "aero_thrust_kN": ("RtFldFxh_[N]", 1e3),
-    "aero_torque_kNm": ("RtFldMxh_[N-m]", 1e3),
-    "aero_torque_Nm": ("RtFldMxh_[N-m]", 1.0),
-    "fair_tension1_kN": ("FAIRTEN1_[kN]", 1.0),
-    "fair_tension2_kN": ("FAIRTEN2_[kN]", 1.0),
-    "fair_tension3_kN": ("FAIRTEN3_[kN]", 1.0),
-    "tower_top_fa_m": ("TTDspFA_[m]", 1.0),
-    "tower_top_ss_m": ("TTDspSS_[m]", 1.0),
-    "twr_base_My_kNm": ("TwrBsMyt_[kN-m]", 1.0),
-    "twr_base_Mx_kNm": ("TwrBsMxt_[kN-m]", 1.0),
-    "nacelle_acc_x_mps2": ("NcIMUTAxs_[m/s^2]", 1.0),
-    "hydro_Fx_kN": ("HydroFxi_[N]", 1e3),
-    "hydro_Fz_kN": ("HydroFzi_[N]", 1e3),
-    "hydro_My_kNm": ("HydroMyi_[N-m]", 1e3),
+NAMED = {  # channel as simulate names it: column of a reference file, in the same unit
+    "Time_[s]": "time_s", "Wave1Elev_[m]": "wave_elev_m", "PtfmSurge_[m]": "surge_m",
+    "PtfmSway_[m]": "sway_m", "PtfmHeave_[m]": "heave_m", "PtfmRoll_[deg]": "roll_deg",
+    "PtfmPitch_[deg]": "pitch_deg", "PtfmYaw_[deg]": "yaw_deg", "RotSpeed_[rpm]": "rotor_speed_rpm",
+    "BldPitch1_[deg]": "blade_pitch_deg", "GenPwr_[kW]": "gen_power_elec_kW",
+    "GenTq_[kN-m]": "gen_torque_kNm",
+    "RtFldFxh_[N]": "aero_thrust_N", "RtFldMxh_[N-m]": "aero_torque_Nm", "FAIRTEN1_[kN]": "fair_tension1_kN",
+    "FAIRTEN2_[kN]": "fair_tension2_kN", "FAIRTEN3_[kN]": "fair_tension3_kN", "TTDspFA_[m]": "tower_top_fa_m",
+    "TTDspSS_[m]": "tower_top_ss_m", "TwrBsMyt_[kN-m]": "twr_base_My_kNm",
+    "TwrBsMxt_[kN-m]": "twr_base_Mx_kNm", "NcIMUTAxs_[m/s^2]": "nacelle_acc_x_mps2",
+}  # fmt: skip
+THOUSANDS = {  # column in kN or kN m: channel in N or N m
+    "aero_thrust_kN": "RtFldFxh_[N]", "aero_torque_kNm": "RtFldMxh_[N-m]", "hydro_Fx_kN": "HydroFxi_[N]",
+    "hydro_Fz_kN": "HydroFzi_[N]", "hydro_My_kNm": "HydroMyi_[N-m]",
+}  # fmt: skip
+COLUMNS = {  # column of a reference file: (channel, factor)
+    **{column: (channel, 1.0) for channel, column in NAMED.items()},
+    **{column: (channel, 1e3) for column, channel in THOUSANDS.items()},
 }
 REGULAR = {"kind": "regular", "H": 3.0, "T": 5.0}
 DECAYS = {  # case: (channel, start value, seconds)
@@ -62,36 +55,33 @@ def _path(folder, name):
 
 
 def table(name, folder=None):
-    """DataFrame of a file of the references, as it is. Raises: InputError if absent."""
+    """Return a file of the references as a DataFrame. Raises: InputError if absent."""
     return pd.read_csv(_path(folder, name), comment="#")
 
 
 def reference(case, folder=None, place=""):
-    """DataFrame of a reference run, columns named as simulate names them. Raises: InputError if absent.
+    """Return a reference run as a DataFrame, columns named as simulate names them.
 
-    place: folder of the run in the folder of all references.
+    place: folder of the run in the folder of all references. Raises: InputError if absent.
     """
     frame = table(f"{place}/{case}.csv.gz" if place else f"{case}.csv.gz", folder)
-    values = {}
-    for name in frame.columns:
-        channel, factor = COLUMNS[name]
-        values[channel] = frame[name] * factor
-    return pd.DataFrame(values)
+    named = ((*COLUMNS[name], name) for name in frame.columns)
+    return pd.DataFrame({channel: frame[name] * factor for channel, factor, name in named})
 
 
 def steady_reference(folder=None):
-    """DataFrame of the steady curve, one row per wind speed (columns as in the file)."""
+    """Return a DataFrame of the steady curve, one row per wind speed (columns as in the file)."""
     return table("steady.csv.gz", folder)
 
 
 def hub_wind(folder=None):
-    """Wind specification of the recorded hub wind, blown uniformly."""
+    """Return the wind specification of the recorded hub wind, uniform over the rotor."""
     frame = table("wind_hub_18mps.csv.gz", folder)
     return {"kind": "series", "time": frame["time_s"].to_numpy(), "speed": frame["u_mps"].to_numpy()}
 
 
 def wave_components(folder=None):
-    """Sea specification of the recorded wave components (there omega t + phase, here minus both)."""
+    """Return the sea specification of the recorded wave components (there omega t + phase, here minus)."""
     frame = table("waves_hs7.5_tp10.csv.gz", folder)
     return {
         "kind": "components",
@@ -102,7 +92,7 @@ def wave_components(folder=None):
 
 
 def box_wind(folder=None, bts=None):
-    """Wind specification of the TurbSim box: the file itself if its path is given, else the stored region.
+    """Return the wind specification of the TurbSim box: the file bts, or without one the stored region.
 
     The region is rounded to 0.04 m/s (u) and 0.08 m/s (v, w); training/validation/reference/make.py wrote it.
     """
@@ -139,100 +129,82 @@ class ReferenceRun:
     before: float = 0.0  # s that this plant runs before the reference begins, its wake settling
 
     def theirs(self, folder=None):
-        """DataFrame of OpenFAST's run. Raises: InputError if absent."""
+        """Return OpenFAST's run as a DataFrame. Raises: InputError if absent."""
         return reference(self.case, folder, self.place)
 
     def frame(self, folder=None, bts=None, dt=None, wind=None, rotor="bem", progress=False, **options):
-        """DataFrame of this project's run at the reference's times.
+        """Return this plant's run at the reference's times as a DataFrame.
 
         wind None: the run's own, dt None: the deck's. controller and other arguments of build_scene may be
         among the options.
         """
-        from fowt_env.run.simulation import simulate
-        from fowt_env.scene.build import build_scene
-
         if wind is None:
             wind = self.wind(folder, bts) if callable(self.wind) else self.wind
-        sea = self.sea(folder) if callable(self.sea) else self.sea
         controller = options.pop("controller", self.controller)
+        if callable(controller):
+            controller = controller(folder)
         scene = build_scene(
-            self.platform() if callable(self.platform) else self.platform,
-            wind=wind,
-            sea=sea,
-            rotor=rotor,
+            self.platform() if callable(self.platform) else self.platform, wind=wind,
+            sea=self.sea(folder) if callable(self.sea) else self.sea, rotor=rotor,
             **{"fidelity": "reference", "duration": max(700.0, self.duration), **self.options, **options},
-        )
+        )  # fmt: skip
         if self.held:
-            body = scene.model.rigid_body._replace(platform_fixed=True, rotor_fixed=True)
-            scene = scene.with_model(rigid_body=body)
+            scene = scene.with_model({"rigid_body.platform_fixed": True, "rigid_body.rotor_fixed": True})
         dt = self.dt if dt is None else dt
         frame = simulate(
-            scene,
-            controller=(controller(folder) if callable(controller) else controller)
-            if self.controlled
-            else None,
-            duration=self.before + self.duration,
-            dt=dt,
-            control_dt=dt,
-            output_dt=self.output_dt,
-            initial={"start": "zero"} | (self.initial or {}),
+            scene, controller=controller if self.controlled else None, duration=self.before + self.duration,
+            dt=dt, control_dt=dt, output_dt=self.output_dt, initial={"start": "zero"} | (self.initial or {}),
             progress=progress,
-        )
+        )  # fmt: skip
         if self.before:
             frame = frame[frame["Time_[s]"] >= self.before - 1e-6].reset_index(drop=True)
             frame["Time_[s]"] -= self.before
         return frame
 
 
-def _start(rotor_speed, blade_pitch):
+def without_rosco():
+    """Return why ROSCO's library is not installed, or None where it is."""
+    try:
+        find_library()
+    except InputError as error:
+        return str(error)
+    return None
+
+
+def rotor_start(rotor_speed, blade_pitch):
+    """Return the initial conditions of a rotor speed (rpm) and blade pitch (deg)."""
     return {"RotSpeed": rotor_speed, "BldPitch1": blade_pitch}
 
 
+def _run(case, duration, dt, start, **settings):
+    """Return a ReferenceRun under control that starts at (rotor speed rpm, blade pitch deg)."""
+    return ReferenceRun(case, duration, dt, controlled=True, initial=rotor_start(*start), **settings)
+
+
 WIND_STEPS = {"kind": "steps", "speeds": [float(v) for v in range(12, 25)], "every": 100.0, "ramp": 0.1}
+UNIFORM = {"wind": lambda folder, bts: hub_wind(folder)}
 RUNS = {
-    **{
-        case: ReferenceRun(case, seconds, 0.025, initial={channel: start})
-        for case, (channel, start, seconds) in DECAYS.items()
-    },
-    "float_steady_8mps": ReferenceRun(
-        "float_steady_8mps", 600.0, 0.0125, wind=8.0, controlled=True, initial=_start(9.16, 0.0)
-    ),
-    "float_steady_18mps": ReferenceRun(
-        "float_steady_18mps", 600.0, 0.0125, wind=18.0, controlled=True, initial=_start(12.1, 14.92)
-    ),
-    "float_windsteps_12_24": ReferenceRun(
-        "float_windsteps_12_24", 1300.0, 0.025, wind=WIND_STEPS, controlled=True, initial=_start(12.1, 3.83)
-    ),
-    "regwave_H3T5": ReferenceRun("regwave_H3T5", 600.0, 0.025, sea=REGULAR),
-    "regwave_H3T5_displaced": ReferenceRun(
-        "regwave_H3T5_displaced", 600.0, 0.025, sea=REGULAR, options={"kinematics_position": "instantaneous"}
-    ),
-    "turb_18mps_Hs7.5_uniform": ReferenceRun(
-        "turb_18mps_Hs7.5_uniform",
-        600.0,
-        0.0125,
-        wind=lambda folder, bts: hub_wind(folder),
-        sea=wave_components,
-        controlled=True,
-        initial=_start(12.1, 14.92),
-    ),
-    "turb_18mps_Hs7.5_uniform_flex": ReferenceRun(
-        "turb_18mps_Hs7.5_uniform_flex",
-        600.0,
-        0.0125,
-        wind=lambda folder, bts: hub_wind(folder),
-        sea=wave_components,
-        controlled=True,
-        initial=_start(12.1, 14.92),
-        options={"tower": "modes"},
-    ),
-    "turb_18mps_Hs7.5_box": ReferenceRun(
-        "turb_18mps_Hs7.5_box",
-        600.0,
-        0.0125,
-        wind=box_wind,
-        sea=wave_components,
-        controlled=True,
-        initial=_start(12.1, 14.92),
-    ),
-}
+    run.case: run
+    for run in (
+        *(
+            ReferenceRun(case, seconds, 0.025, initial={channel: start})
+            for case, (channel, start, seconds) in DECAYS.items()
+        ),
+        _run("float_steady_8mps", 600.0, 0.0125, (9.16, 0.0), wind=8.0),
+        _run("float_steady_18mps", 600.0, 0.0125, (12.1, 14.92), wind=18.0),
+        _run("float_windsteps_12_24", 1300.0, 0.025, (12.1, 3.83), wind=WIND_STEPS),
+        ReferenceRun("regwave_H3T5", 600.0, 0.025, sea=REGULAR),
+        ReferenceRun(
+            "regwave_H3T5_displaced", 600.0, 0.025, sea=REGULAR,
+            options={"kinematics_position": "instantaneous"},
+        ),
+        *(
+            _run(f"turb_18mps_Hs7.5_{name}", 600.0, 0.0125, (12.1, 14.92), sea=wave_components, **settings)
+            for name, settings in (
+                ("uniform", UNIFORM),
+                ("uniform_flex", {**UNIFORM, "options": {"tower": "modes"}}),
+                ("box", {"wind": box_wind}),
+            )
+        ),
+    )
+}  # fmt: skip

@@ -1,4 +1,4 @@
-"""What a validation leaves behind: the table (CSV and Markdown) and the overlay plots per case."""
+"""Reports of a validation: the table (CSV and Markdown) and plots of the compared series."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -9,60 +9,49 @@ import fowt_env
 from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
+from fowt_env.training.validation.comparison import Channel
+from fowt_env.visual.style import COLOURS, INK, LINES, new_figure, save_figure, style_axes
 from fowt_env.visual.time_series import TIME, spectrum
 
 LABELS = {
-    "PtfmSurge_[m]": "surge\n(m)",
-    "PtfmSway_[m]": "sway\n(m)",
-    "PtfmHeave_[m]": "heave\n(m)",
-    "PtfmRoll_[deg]": "roll\n(deg)",
-    "PtfmPitch_[deg]": "platform pitch\n(deg)",
-    "PtfmYaw_[deg]": "yaw\n(deg)",
-    "RotSpeed_[rpm]": "rotor speed\n(rpm)",
-    "BldPitch1_[deg]": "blade pitch\n(deg)",
-    "GenPwr_[kW]": "power\n(kW)",
-    "RtFldFxh_[N]": "thrust\n(N)",
-    "RtFldMxh_[N-m]": "torque\n(N m)",
-    "FAIRTEN1_[kN]": "tension 1\n(kN)",
-    "FAIRTEN2_[kN]": "tension 2\n(kN)",
-    "Wave1Elev_[m]": "wave\n(m)",
-    "TTDspFA_[m]": "tower top\n(m)",
-    "TwrBsMyt_[kN-m]": "tower base\n(kN m)",
+    Channel.SURGE: "surge\n(m)", "PtfmSway_[m]": "sway\n(m)", Channel.HEAVE: "heave\n(m)",
+    "PtfmRoll_[deg]": "roll\n(deg)", Channel.PITCH: "platform pitch\n(deg)", "PtfmYaw_[deg]": "yaw\n(deg)",
+    Channel.SPEED: "rotor speed\n(rpm)", Channel.BLADE: "blade pitch\n(deg)",
+    Channel.THRUST: "thrust\n(N)", Channel.TORQUE: "torque\n(N m)", "FAIRTEN1_[kN]": "tension 1\n(kN)",
+    "TTDspFA_[m]": "tower top\n(m)", "TwrBsMyt_[kN-m]": "tower base\n(kN m)",
+}  # fmt: skip
+TURNING = (*Channel.PLANE, Channel.SPEED, Channel.BLADE)
+OPERATING, WAVE = (*TURNING, Channel.TENSIONS[0]), (*Channel.PLANE, Channel.TENSIONS[0])
+BENDING = (Channel.PITCH, Channel.SPEED, "TTDspFA_[m]", "TwrBsMyt_[kN-m]")
+WAKE = (Channel.THRUST, Channel.TORQUE)
+WHOLE, LONG, SHORT = (0.0, 600.0), (100.0, 400.0), (100.0, 200.0)  # s
+PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra are drawn)}
+    "oc3_hywind": {
+        "float_steady_8mps": (OPERATING, WHOLE, False),
+        "float_steady_18mps": (OPERATING, WHOLE, False),
+        "float_windsteps_12_24": (OPERATING, (0.0, 1300.0), False),
+        "regwave_H3T5": (WAVE, (560.0, 600.0), True),
+        "regwave_H3T5_displaced": (WAVE, (560.0, 600.0), True),
+        "turb_18mps_Hs7.5_uniform": (OPERATING, LONG, True),
+        "turb_18mps_Hs7.5_uniform_flex": (BENDING, SHORT, True),
+        "turb_18mps_Hs7.5_box": (OPERATING, LONG, True),
+    },
+    "iea15_volturnus_s": {
+        "regwave_H4T9": (Channel.PLANE, (410.0, 500.0), False),
+        "waves_Hs7.5": (Channel.PLANE, LONG, True),
+        "waves_Hs7.5_qtf": (Channel.PLANE, LONG, True),
+        "float_steady_12mps": (TURNING, WHOLE, False),
+        "float_steady_18mps": (TURNING, WHOLE, False),
+        "turb_18mps_Hs7.5_uniform": (TURNING, LONG, True),
+        "turb_18mps_Hs7.5_uniform_tower": (BENDING, SHORT, True),
+        "wake_pitch_step": (WAKE, (10.0, 100.0), False),
+        "wake_wind_step_18mps": (WAKE, (10.0, 100.0), False),
+    },
+    "nrel5mw_oc4_semi": {
+        "waves_Hs7.5": (Channel.PLANE, LONG, True),
+        "waves_Hs7.5_qtf": (Channel.PLANE, LONG, True),
+    },
 }
-OPERATING = (
-    "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "RotSpeed_[rpm]", "BldPitch1_[deg]", "FAIRTEN1_[kN]",
-)  # fmt: skip
-WAVE = ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "FAIRTEN1_[kN]")
-TURNING = ("PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]", "RotSpeed_[rpm]", "BldPitch1_[deg]")
-PLANE = TURNING[:3]
-BENDING = ("PtfmPitch_[deg]", "RotSpeed_[rpm]", "TTDspFA_[m]", "TwrBsMyt_[kN-m]")
-VOLTURNUS_PLOTS = {
-    "regwave_H4T9": (PLANE, (410.0, 500.0), False),
-    "waves_Hs7.5": (PLANE, (100.0, 400.0), True),
-    "waves_Hs7.5_qtf": (PLANE, (100.0, 400.0), True),
-    "float_steady_12mps": (TURNING, (0.0, 600.0), False),
-    "float_steady_18mps": (TURNING, (0.0, 600.0), False),
-    "turb_18mps_Hs7.5_uniform": (TURNING, (100.0, 400.0), True),
-    "turb_18mps_Hs7.5_uniform_tower": (BENDING, (100.0, 200.0), True),
-    "wake_pitch_step": (("RtFldFxh_[N]", "RtFldMxh_[N-m]"), (10.0, 100.0), False),
-    "wake_wind_step_18mps": (("RtFldFxh_[N]", "RtFldMxh_[N-m]"), (10.0, 100.0), False),
-}
-OC4_PLOTS = {
-    "waves_Hs7.5": (PLANE, (100.0, 400.0), True),
-    "waves_Hs7.5_qtf": (PLANE, (100.0, 400.0), True),
-}
-OC3_PLOTS = {  # case -> (channels, seconds shown); spectra of the same channels where asked for
-    "float_steady_8mps": (OPERATING, (0.0, 600.0), False),
-    "float_steady_18mps": (OPERATING, (0.0, 600.0), False),
-    "float_windsteps_12_24": (OPERATING, (0.0, 1300.0), False),
-    "regwave_H3T5": (WAVE, (560.0, 600.0), True),
-    "regwave_H3T5_displaced": (WAVE, (560.0, 600.0), True),
-    "turb_18mps_Hs7.5_uniform": (OPERATING, (100.0, 400.0), True),
-    "turb_18mps_Hs7.5_uniform_flex": (BENDING, (100.0, 200.0), True),
-    "turb_18mps_Hs7.5_box": (OPERATING, (100.0, 400.0), True),
-}
-PLOTS = {"oc3_hywind": OC3_PLOTS, "iea15_volturnus_s": VOLTURNUS_PLOTS, "nrel5mw_oc4_semi": OC4_PLOTS}
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
     "costs_rotor": (
@@ -91,70 +80,72 @@ COST_PLOTS = {  # file -> (title, {legend: run})
 }
 
 
+def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=False):
+    """Return a figure of a panel for each (channel, {legend: frame}) below each other, written to a path.
+
+    draw(axes, frame, channel, **style): draws one line. squared: labels are those of power densities.
+    """
+    figure = new_figure(9.0, 0.8 + height * len(panels))
+    shared = all(frames is panels[0][1] for _, frames in panels)
+    rows = figure.subplots(len(panels), 1, sharex=shared, squeeze=False)[:, 0]
+    for axes, (channel, frames) in zip(rows, panels, strict=True):
+        style_axes(axes)
+        for number, (legend, frame) in enumerate(frames.items()):
+            style = {"color": COLOURS[number], "linewidth": 1.0, "label": legend}
+            draw(axes, frame, channel, linestyle=LINES[number and (number - 1) % 3 + 1], **style)
+        label = LABELS[channel]
+        axes.set_ylabel(label.replace(")", "²/Hz)") if squared else label, fontsize=8, color=INK)
+    ncols = len(panels[0][1])
+    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=ncols, fontsize=8, frameon=False)
+    rows[-1].set_xlabel(xlabel, fontsize=9, color=INK)
+    figure.align_ylabels(rows)
+    figure.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
+    return save_figure(figure, path)
+
+
 def _overlay(frames, channels, window, path, title):
-    """Stacked time series of {legend: frame} over each other."""
-    figure = new_figure(9.0, 0.8 + 1.2 * len(channels))
-    rows = figure.subplots(len(channels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, channel in zip(rows, channels, strict=True):
-        style_axes(axes)
-        for number, (legend, frame) in enumerate(frames.items()):
-            part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
-            line = "-" if number == 0 else ("--", ":", "-.")[(number - 1) % 3]
-            axes.plot(part[TIME], part[channel], line, color=COLOURS[number], linewidth=1.0, label=legend)
-        axes.set_ylabel(LABELS[channel], fontsize=8, color=INK)
+    """Draw stacked time series of {legend: frame} over each other."""
+
+    def draw(axes, frame, channel, **style):
+        part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
+        axes.plot(part[TIME], part[channel], **style)
         axes.margins(x=0.0)
-    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(frames), fontsize=8, frameon=False)
-    rows[-1].set_xlabel("time (s)", fontsize=9, color=INK)
-    figure.align_ylabels(rows)
-    figure.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
-    return save_figure(figure, path)
+
+    return _stack([(channel, frames) for channel in channels], draw, path, title)
 
 
-def _spectra(frames, channels, path, title, start=100.0, highest=0.7):
-    """Power spectra of {legend: frame} over each other, on logarithmic axes."""
-    figure = new_figure(9.0, 0.8 + 1.5 * len(channels))
-    rows = figure.subplots(len(channels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, channel in zip(rows, channels, strict=True):
-        style_axes(axes)
-        top = 0.0
-        for number, (legend, frame) in enumerate(frames.items()):
-            part = frame[frame[TIME] >= start]
-            frequency, density = spectrum(part[TIME], part[channel])
-            line = "-" if number == 0 else ("--", ":", "-.")[(number - 1) % 3]
-            axes.loglog(frequency[1:], density[1:], line, color=COLOURS[number], linewidth=1.0, label=legend)
-            top = max(top, density[1:].max())
+def _spectra(frames, channels, path, title, start=100.0):
+    """Draw power spectra of {legend: frame} over each other, on logarithmic axes."""
+    tops = {}
+
+    def draw(axes, frame, channel, **style):
+        part = frame[frame[TIME] >= start]
+        frequency, density = spectrum(part[TIME], part[channel])
+        axes.loglog(frequency[1:], density[1:], **style)
+        top = tops[channel] = max(tops.get(channel, 0.0), density[1:].max())
         axes.set_ylim(1e-8 * top, 4.0 * top)
-        axes.set_ylabel(LABELS[channel].replace(")", "²/Hz)"), fontsize=8, color=INK)
-    rows[0].set_xlim(0.004, highest)
-    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(frames), fontsize=8, frameon=False)
-    rows[-1].set_xlabel("frequency (Hz)", fontsize=9, color=INK)
-    figure.align_ylabels(rows)
-    figure.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
-    return save_figure(figure, path)
+        axes.set_xlim(0.004, 0.7)
+
+    return _stack([(c, frames) for c in channels], draw, path, title, "frequency (Hz)", 1.5, squared=True)
 
 
 def _decays(study, path):
-    """The decays, each in its own motion."""
+    """Draw the decays, each in its own motion."""
     cases = [case for case in study.cases if case in study.runs and case.startswith("decay_")]
-    figure = new_figure(9.0, 1.4 * len(cases) + 0.8)
-    rows = figure.subplots(len(cases), 1, squeeze=False)[:, 0]
-    for axes, case in zip(rows, cases, strict=True):
-        style_axes(axes)
+    panels = []
+    for case in cases:
         (channel,) = study.cases[case].initial
-        for number, (legend, frame) in enumerate(zip((THERE, HERE), reversed(study.runs[case]), strict=True)):
-            line = ("-", "--")[number]
-            axes.plot(frame[TIME], frame[channel], line, color=COLOURS[number], linewidth=1.0, label=legend)
-        axes.set_ylabel(LABELS[channel], fontsize=8, color=INK)
+        panels.append((channel, dict(zip((THERE, HERE), reversed(study.runs[case]), strict=True))))
+
+    def draw(axes, frame, channel, **style):
+        axes.plot(frame[TIME], frame[channel], **style)
         axes.margins(x=0.0)
-    rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, fontsize=8, frameon=False)
-    rows[-1].set_xlabel("time (s)", fontsize=9, color=INK)
-    figure.align_ylabels(rows)
-    figure.suptitle("free decays", fontsize=10, color=INK, x=0.01, ha="left")
-    return save_figure(figure, path)
+
+    return _stack(panels, draw, path, "free decays", height=1.4)
 
 
 def _steady(study, path):
-    """Errors of the steady curve over wind speed."""
+    """Draw errors of the steady curve over wind speed."""
     rows = [row for row in study.rows if row.case.startswith("steady_")]
     figure = new_figure(9.0, 3.2)
     axes = figure.subplots()
@@ -163,8 +154,7 @@ def _steady(study, path):
         chosen = [row for row in rows if row.quantity == quantity]
         wind = [float(row.case.removeprefix("steady_").removesuffix("mps")) for row in chosen]
         error = [row.error for row in chosen]
-        colour = COLOURS[number % len(COLOURS)]
-        axes.plot(wind, error, "o-", color=colour, markersize=4, label=quantity)
+        axes.plot(wind, error, "o-", color=COLOURS[number % len(COLOURS)], markersize=4, label=quantity)
     axes.set_xlabel("wind (m/s)", fontsize=9, color=INK)
     axes.set_ylabel("difference to OpenFAST (%)", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False)
@@ -172,7 +162,7 @@ def _steady(study, path):
 
 
 def _responses(study, path):
-    """Responses to small waves over frequency: this plant and the frequency domain."""
+    """Draw responses to small waves over frequency: this plant and the frequency domain."""
     from matplotlib.ticker import NullFormatter
 
     ours, smooth = study.runs["responses"]
@@ -192,7 +182,7 @@ def _responses(study, path):
 
 
 def _poles(study, path):
-    """Frequencies and damping ratios of the linear models over wind speed."""
+    """Draw frequencies and damping ratios of the linear models over wind speed."""
     rows = [row for row in study.rows if "linear model" in row.case]
     figure = new_figure(9.0, 3.6)
     panels = figure.subplots(1, 3)
@@ -213,7 +203,7 @@ def _poles(study, path):
 
 
 def _generator(study, path):
-    """Spectra of the wind at a point and averaged over the rotor: box and generator."""
+    """Draw spectra of the wind at a point and averaged over the rotor: box and generator."""
     box, made = study.runs["spectra of the wind"]
     figure = new_figure(9.0, 3.6)
     axes = figure.subplots()
@@ -235,7 +225,7 @@ def _generator(study, path):
 
 
 def _smooth(frequency, density, per_decade=12):
-    """Means over bins of equal width in the logarithm of the frequency."""
+    """Return means over bins of equal width in the logarithm of the frequency."""
     edges = np.logspace(-3, 1, 4 * per_decade + 1)
     which = np.digitize(frequency, edges)
     bins = [which == k for k in range(1, len(edges)) if (which == k).any()]
@@ -243,7 +233,7 @@ def _smooth(frequency, density, per_decade=12):
 
 
 def write_plots(study, folder):
-    """Paths of the plots of whatever the study has run."""
+    """Write the plots of the runs of the study; return their paths."""
     folder = Path(folder)
     paths = []
 
@@ -268,7 +258,7 @@ def write_plots(study, folder):
                 start = 400.0 if case.startswith("regwave") else 100.0
                 _spectra(frames, channels, path(f"{case}_spectra"), case, start)
     if "spectra of the wind" in study.runs:
-        channels = ("PtfmPitch_[deg]", "PtfmSurge_[m]", "RotSpeed_[rpm]")
+        channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED)
         for name, (title, runs) in COST_PLOTS.items():
             frames = {legend: study.runs[run][0] for legend, run in runs.items()}
             _overlay(frames, channels, (100.0, 300.0), path(name), title)
@@ -278,12 +268,12 @@ def write_plots(study, folder):
 
 
 def _shown(value):
-    """A figure as text; empty where there is none."""
+    """Return a number as text, empty for NaN."""
     return "" if not np.isfinite(value) else f"{value:.5g}"
 
 
 def markdown(study, plots=(), date=None):
-    """Markdown of the tables, one per case, each with the plots of its name; other plots come first.
+    """Return Markdown of the tables, one per case, each with the plots of its name; other plots come first.
 
     plots: names of files beside the text; date: as YYYY-MM-DD, default today
     """
@@ -315,13 +305,13 @@ def markdown(study, plots=(), date=None):
 
 
 def _images(names):
-    """Lines of Markdown that show images."""
+    """Return lines of Markdown that show images."""
     lines = [f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names]
     return [*lines, ""] if lines else []
 
 
 def write_validation_report(study, folder, plots=True):
-    """Paths written: validation.csv, validation.md and, with plots, one or two images per case."""
+    """Write validation.csv, validation.md and, with plots, one or two images per case; return the paths."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     remove_leftovers(folder)

@@ -11,10 +11,13 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import least_squares
 
+from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.files import DATA
 from fowt_env.descriptions.units import DEGREE
+from fowt_env.run.simulation import simulate
+from fowt_env.scene.build import build_scene
 from fowt_env.training.validation import frequency_domain
-from fowt_env.training.validation.validate import TIME, _name
+from fowt_env.training.validation.comparison import TIME, Channel, name_and_unit, phase
 
 BODIES = {
     "nrel5mw_iti_barge": frequency_domain.iti_barge,
@@ -24,9 +27,9 @@ OMEGA = np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5]) 
 AMPLITUDE = 0.02  # m, of each component
 RAMP, BEGIN, END = 100.0, 200.0, 900.0  # s, of the waves and of what is fitted
 STEP = 0.05  # s
-CHANNELS = {"PtfmSurge_[m]": 0, "PtfmHeave_[m]": 2, "PtfmPitch_[deg]": 4}
+CHANNELS = {Channel.SURGE: 0, Channel.HEAVE: 2, Channel.PITCH: 4}
 DECAYING = (  # motions that are coupled, and their channels
-    {"surge": "PtfmSurge_[m]", "heave": "PtfmHeave_[m]", "pitch": "PtfmPitch_[deg]"},
+    {"surge": Channel.SURGE, "heave": Channel.HEAVE, "pitch": Channel.PITCH},
     {"sway": "PtfmSway_[m]", "roll": "PtfmRoll_[deg]", "yaw": "PtfmYaw_[deg]"},
 )
 OFFSET = 0.1  # m and deg from rest, at which all six motions begin
@@ -35,42 +38,45 @@ SMALL = 0.02  # of the largest response: smaller ones are judged by their share 
 
 
 def body_of(name):
-    """FloatingBody of a built-in platform from the arrays that its file names."""
+    """Return the FloatingBody of a built-in platform from the arrays that its file names."""
     path = DATA / "platforms" / f"{name}.toml"
     table = tomllib.loads(path.read_text())["potential_flow"]
     return BODIES[name](frequency_domain.read_arrays(path.parent / table["coefficients"]))
 
 
 def without_drag(scene):
-    """The scene with no quadratic drag: neither that of the matrices nor that of members."""
-    hydro = scene.model.hydro
-    parts = {}
+    """Return the scene without quadratic drag, neither that of the matrices nor that of members."""
+    hydro, parts = scene.model.hydro, {}
     if hydro.matrices is not None:
-        parts["hydro.matrices"] = hydro.matrices._replace(
-            quadratic_damping=np.zeros_like(hydro.matrices.quadratic_damping)
-        )
+        zero = np.zeros_like(hydro.matrices.quadratic_damping)
+        parts["hydro.matrices"] = hydro.matrices._replace(quadratic_damping=zero)
     if getattr(hydro, "members", None) is not None:
         parts["hydro.members"] = None
     return scene.with_model(parts)
 
 
+def _decaying(time, rates):
+    """Return a list of series: one, and cosine and sine of each decaying mode of a complex rate (1/s)."""
+    columns = [np.ones_like(time)]
+    for rate in rates:
+        envelope = np.exp(-rate.real * (time - time[0]))
+        columns += [envelope * np.cos(rate.imag * time), envelope * np.sin(rate.imag * time)]
+    return columns
+
+
 def fitted(time, value, omega, slow):
-    """Complex amplitudes (n,) of value ~ Re(sum c exp(i omega t)), with slow decaying modes beside them.
+    """Return complex amplitudes (n,) of value ~ Re(sum c exp(i omega t)) beside decaying modes.
 
     slow: complex rates (1/s) of the modes that the start has left, whose amplitudes are fitted too.
     """
-    columns = [np.ones_like(time)]
-    for w in omega:
-        columns += [np.cos(w * time), -np.sin(w * time)]
-    for rate in slow:
-        envelope = np.exp(-rate.real * (time - time[0]))
-        columns += [envelope * np.cos(rate.imag * time), envelope * np.sin(rate.imag * time)]
-    solution = np.linalg.lstsq(np.column_stack(columns), value, rcond=None)[0]
+    waves = [wave for w in omega for wave in (np.cos(w * time), -np.sin(w * time))]
+    one, *modes = _decaying(time, slow)
+    solution = np.linalg.lstsq(np.column_stack([one, *waves, *modes]), value, rcond=None)[0]
     return solution[1 : 2 * len(omega) : 2] + 1j * solution[2 : 2 * len(omega) + 1 : 2]
 
 
 def sea(omega):
-    """Sea specification of the small components, phases spread so that they do not add up."""
+    """Return the sea specification of the small components, phases spread so that they do not add up."""
     phase = 2.0 * np.pi * np.arange(len(omega)) ** 2 / (2.0 * len(omega))
     return {
         "kind": "components", "omega": omega, "amplitude": np.full(len(omega), AMPLITUDE), "phase": phase,
@@ -79,22 +85,15 @@ def sea(omega):
 
 
 def modal_rates(time, values, guess):
-    """Complex rates (n,), 1/s and rad/s, of the decaying modes that (m, k) values consist of.
+    """Return complex rates (n,), 1/s and rad/s, of the decaying modes that (m, k) values consist of.
 
     values ~ c + sum Re(a_j exp(s_j t)) with the same s_j = -rate.real + i rate.imag in all columns: nonlinear
     least squares in the rates, linear in the rest.
     """
     scale = values.std(axis=0)
 
-    def basis(rates):
-        columns = [np.ones_like(time)]
-        for real, imag in rates.reshape(-1, 2):
-            envelope = np.exp(-real * (time - time[0]))
-            columns += [envelope * np.cos(imag * time), envelope * np.sin(imag * time)]
-        return np.column_stack(columns)
-
     def misfit(rates):
-        columns = basis(rates)
+        columns = np.column_stack(_decaying(time, [complex(*pair) for pair in rates.reshape(-1, 2)]))
         solution = np.linalg.lstsq(columns, values, rcond=None)[0]
         return ((columns @ solution - values) / scale).ravel()
 
@@ -104,11 +103,7 @@ def modal_rates(time, values, guess):
 
 
 def periods(name, study):
-    """Damped natural periods of small free decays against those of Cummins' equation in numpy: 1 %."""
-    from fowt_env.analysis.trim import trim
-    from fowt_env.run.simulation import simulate
-    from fowt_env.scene.build import build_scene
-
+    """Compare damped natural periods of small free decays with those of Cummins' equation in numpy: 1 %."""
     study.say("natural periods")
     scene = without_drag(build_scene(name, fidelity="reference"))
     point = trim(scene)
@@ -137,14 +132,11 @@ def periods(name, study):
 
 
 def rao(name, study):
-    """Responses to small waves, 0.2 to 1.5 rad/s, against the frequency domain: amplitude 1 %."""
-    from fowt_env.run.simulation import simulate
-    from fowt_env.scene.build import build_scene
-
+    """Compare responses to small waves, 0.2 to 1.5 rad/s, with the frequency domain: amplitude 1 %."""
     study.say("responses to small waves")
     body = body_of(name)
     known = body.coefficients["excitation_omega"]
-    omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # the plant has no force beyond its table
+    omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # the plant has no force outside its table
     waves = sea(omega)
     scene = without_drag(build_scene(name, sea=waves, duration=END, fidelity="reference"))
     frame = simulate(scene, None, duration=END, dt=STEP, output_dt=0.1)
@@ -157,25 +149,23 @@ def rao(name, study):
     curves = np.abs(body.responses(fine))
     ours, smooth = {"omega": omega}, {"omega": fine}
     for channel, motion in CHANNELS.items():
-        label, unit = _name(channel)
+        label, unit = name_and_unit(channel)
         factor = 1.0 / DEGREE if unit == "deg" else 1.0
         # the elevation is a cos(omega t - e) at the origin: the same phase is taken off
         here = fitted(time, kept[channel].to_numpy(), omega, slow) / AMPLITUDE * np.exp(1j * waves["phase"])
         there = theirs[:, motion] * factor
         largest = np.abs(there).max()
         for w, mine, wanted in zip(omega, here, there, strict=True):
-            turned = np.degrees(np.angle(mine / wanted))
-            note = f"phase {turned:+.2f} deg"
             error = 100.0 * (abs(mine) - abs(wanted)) / max(abs(wanted), SMALL * largest)
             quantity = f"{label} per metre of wave at {w:g} rad/s"
             study.add(
                 "responses to small waves (against the frequency domain)", quantity, f"{unit}/m", abs(wanted),
-                abs(mine), error, 1.0, note,
+                abs(mine), error, 1.0, phase(mine, wanted),
             )  # fmt: skip
         ours[label], smooth[label] = np.abs(here), factor * curves[:, motion]
     study.runs["responses"] = (pd.DataFrame(ours), pd.DataFrame(smooth))
 
 
 def groups(name):
-    """{group: (function, runs)} of a platform."""
+    """Return {group: (function, runs)} of a platform."""
     return {"periods": (partial(periods, name), 1), "responses": (partial(rao, name), 1)}

@@ -7,13 +7,13 @@ from fowt_env.errors import InputError
 
 
 def crossings(time, value):
-    """Times (n,) at which a series passes zero, linear between samples."""
+    """Return the times (n,) at which a series passes zero, linear between samples."""
     at = np.flatnonzero((value[:-1] > 0.0) != (value[1:] > 0.0))
     return time[at] - value[at] * (time[at + 1] - time[at]) / (value[at + 1] - value[at])
 
 
 def extrema(time, value):
-    """Values (n,) of the extrema between successive zero crossings, parabolas through the largest samples."""
+    """Return the extrema (n,) between successive zero crossings, by parabolas through the largest samples."""
     edges = np.flatnonzero((value[:-1] > 0.0) != (value[1:] > 0.0)) + 1
     result = []
     for low, high in zip(np.concatenate(([0], edges[:-1])), edges, strict=True):
@@ -28,7 +28,7 @@ def extrema(time, value):
 
 
 def decay_period(time, value, centre, cycles=4):
-    """Mean period (s) of the first cycles of a decay, between zero crossings about a centre."""
+    """Return the mean period (s) of the first cycles of a decay, between zero crossings about a centre."""
     at = crossings(time, value - centre)
     if len(at) < 2 * cycles + 1:
         raise InputError(f"decay: {len(at)} zero crossings, {2 * cycles + 1} are needed for {cycles} cycles")
@@ -36,14 +36,14 @@ def decay_period(time, value, centre, cycles=4):
 
 
 def decay_decrement(time, value, centre, cycle=1):
-    """Logarithmic decrement of a cycle (1 is the first): peak-to-peak against that of a cycle later."""
+    """Return the logarithmic decrement of a cycle (1: the first) from peak-to-peak values a cycle apart."""
     peaks = extrema(time, value - centre)
     height = np.abs(np.diff(peaks))
     return float(np.log(height[2 * cycle - 2] / height[2 * cycle]))
 
 
 def ringing(time, value, low, high):
-    """(Hz, damping ratio) of the damped oscillation between two frequencies (Hz) that a series has.
+    """Return (Hz, damping ratio) of a damped oscillation of a series between two frequencies (Hz).
 
     A least-squares fit beside a polynomial of eighth order, which takes slower motion.
     """
@@ -66,9 +66,9 @@ def ringing(time, value, low, high):
 
 
 def recovery(time, value, step, settled):
-    """(level before, level after, overshoot, its time) of a series that a step at `step` s upsets.
+    """Return (level before, level after, overshoot, its time) of a series with a step at `step` s.
 
-    The level after is the mean from `settled` on. The overshoot is how far the series goes beyond it, with
+    The level after is the mean from `settled` on. The overshoot is how far the series passes it, with
     its sign, and its time (s) the integral of the deviation from there on over the overshoot: the time
     constant of an exponential.
     """
@@ -81,13 +81,13 @@ def recovery(time, value, step, settled):
 
 
 def normalised_rms(value, reference):
-    """Rms of the difference over the standard deviation of the reference."""
+    """Return the rms of the difference over the standard deviation of the reference."""
     value, reference = np.asarray(value), np.asarray(reference)
     return float(np.sqrt(np.mean((value - reference) ** 2)) / np.std(reference))
 
 
 def harmonics(time, value, omega, count=2):
-    """Complex amplitudes (count,) of the harmonics of omega (rad/s): value ~ Re(sum c_k exp(i k omega t)).
+    """Return complex amplitudes (count,) of harmonics: value ~ Re(sum c_k exp(i k omega t)), omega rad/s.
 
     Projections under a Hann window, whose sidelobes fall so fast that a slow transient in the record
     (surge, 124 s) does not leak into the second harmonic. time: whole periods, evenly spaced.
@@ -103,7 +103,7 @@ def harmonics(time, value, omega, count=2):
 
 
 def band_energy(time, value, low, high):
-    """Variance of a series between two frequencies (Hz): periodogram with a Hann window, mean removed."""
+    """Return the variance of a series between two frequencies (Hz): periodogram, Hann window, no mean."""
     step = (time[-1] - time[0]) / (len(time) - 1)
     window = np.hanning(len(time))
     transform = np.fft.rfft((value - np.mean(value)) * window)

@@ -1,4 +1,4 @@
-"""The IEA 15 MW on VolturnUS-S against OpenFAST: cases, and groups of figures with what is allowed.
+"""The IEA 15 MW on VolturnUS-S against OpenFAST: cases, and groups of rows with the allowed errors.
 
 Rigid OpenFAST v5 runs of the public deck (their settings are in the heads of the series), and the linear
 models that ROSCO's repository holds of the same turbine. Nothing here is adjusted to fit.
@@ -8,44 +8,40 @@ from math import pi
 
 import numpy as np
 
+from fowt_env.analysis.rotor_loads import rotor_loads
 from fowt_env.controllers import make
-from fowt_env.controllers.rosco import find_library
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import RPM
-from fowt_env.errors import InputError
-from fowt_env.training.validation.openfast_cases import ReferenceRun, hub_wind, table, wave_components
-from fowt_env.training.validation.signal_errors import harmonics, normalised_rms, recovery
-from fowt_env.training.validation.validate import (
-    BLADE,
-    PITCH,
-    POWER,
-    SETTLED,
-    SPEED,
-    SURGE,
-    THRUST,
-    TIME,
-    _name,
-    _since,
-    add_decay,
+from fowt_env.scene.build import build_scene
+from fowt_env.training.validation.blade_loads import blades
+from fowt_env.training.validation.comparison import TIME, Channel, name_and_unit, phase
+from fowt_env.training.validation.linear_cases import linear
+from fowt_env.training.validation.openfast_cases import (
+    ReferenceRun,
+    hub_wind,
+    rotor_start,
+    table,
+    wave_components,
+    without_rosco,
 )
+from fowt_env.training.validation.signal_errors import harmonics, normalised_rms, recovery
+from fowt_env.training.validation.tower_modes import volturnus as tower
 
 PLATFORM = "iea15_volturnus_s"
-HEAVE, YAW, TORQUE = "PtfmHeave_[m]", "PtfmYaw_[deg]", "RtFldMxh_[N-m]"
-PLANE = (SURGE, HEAVE, PITCH)
+YAW = "PtfmYaw_[deg]"
 DT = 0.025  # s, as OpenFAST's
 # as those runs had it: the wake skewed by the tilt of the shaft, loads of the undisturbed air
 OPTIONS = {"skewed_wake": True, "shear_exponent": 0.0}
 BENDING = {**OPTIONS, "tower": "modes"}
 DECAYS = {  # case: (channel, start value, seconds, step of the reference)
-    "decay_surge": (SURGE, 10.0, 600.0, 0.2),
-    "decay_heave": (HEAVE, 3.0, 200.0, 0.1),
-    "decay_pitch": (PITCH, 5.0, 300.0, 0.1),
+    "decay_surge": (Channel.SURGE, 10.0, 600.0, 0.2),
+    "decay_heave": (Channel.HEAVE, 3.0, 200.0, 0.1),
+    "decay_pitch": (Channel.PITCH, 5.0, 300.0, 0.1),
     "decay_yaw": (YAW, 8.0, 500.0, 0.2),
 }
 WAVE = {"kind": "regular", "H": 4.0, "T": 9.0}
 WAVE_WINDOW = (302.0, 500.0)  # s, twenty-two periods
-HARMONICS = (SURGE, HEAVE, PITCH)
 STEP, WAKE_SETTLED = 20.0, 100.0  # s, of wind or blade pitch with dynamic inflow, and before the record
 WAKES = {  # case: are its figures judged
     "wake_pitch_step": True,
@@ -57,22 +53,18 @@ CONTROLLED = ("float_steady_12mps", "float_steady_18mps", "turb_18mps_Hs7.5_unif
 
 
 def _run(case, duration, **settings):
-    """ReferenceRun of this platform."""
+    """Return a ReferenceRun of this platform."""
     settings = {"platform": PLATFORM, "place": PLATFORM, "options": OPTIONS, **settings}
     return ReferenceRun(case, duration, DT, **settings)
 
 
-def _start(blade_pitch):
-    return {"RotSpeed": 7.56, "BldPitch1": blade_pitch}
-
-
 def rosco(folder):
-    """Controller: ROSCO's library with the DISCON.IN and rotor table of the deck, as OpenFAST ran it."""
+    """Return ROSCO's library as a controller with the deck's DISCON.IN and rotor table."""
     return make("rosco", read_turbine(read_platform(PLATFORM).turbine), DT)
 
 
 def _wake(case, wind, rotor_speed, pitches):
-    """ReferenceRun of a held rotor with dynamic inflow: wind rises, or blade pitch changes at 2 deg/s."""
+    """Return a ReferenceRun of a held rotor: wind rises, or blade pitch changes at 2 deg/s."""
     begin = WAKE_SETTLED + STEP
     if not isinstance(wind, float):
         times = [0.0, begin, begin + 1.0, begin + 200.0]
@@ -90,15 +82,8 @@ def _wake(case, wind, rotor_speed, pitches):
     )  # fmt: skip
 
 
-def without_rosco():
-    """Why there is no ROSCO here, or None."""
-    try:
-        find_library()
-    except InputError as error:
-        return str(error)
-    return None
-
-
+UNDER_ROSCO = {"controlled": True, "controller": rosco}
+TURBULENT = {"wind": lambda folder, bts: hub_wind(folder), "sea": wave_components, **UNDER_ROSCO}
 RUNS = {
     "static": _run("static", 600.0, output_dt=0.2),
     **{
@@ -111,40 +96,36 @@ RUNS = {
         "waves_Hs7.5_qtf", 600.0, sea=wave_components, output_dt=0.2,
         options={**OPTIONS, "second_order": "full"},
     ),
-    "float_steady_12mps": _run(
-        "float_steady_12mps", 600.0, wind=12.0, controlled=True, initial=_start(6.3), controller=rosco
-    ),
-    "float_steady_18mps": _run(
-        "float_steady_18mps", 600.0, wind=18.0, controlled=True, initial=_start(15.4), controller=rosco
-    ),
-    "turb_18mps_Hs7.5_uniform": _run(
-        "turb_18mps_Hs7.5_uniform", 600.0, wind=lambda folder, bts: hub_wind(folder), sea=wave_components,
-        controlled=True, initial=_start(15.4), controller=rosco,
-    ),
+    **{
+        case: _run(case, 600.0, wind=wind, initial=rotor_start(7.56, pitch), **UNDER_ROSCO)
+        for case, wind, pitch in (("float_steady_12mps", 12.0, 6.3), ("float_steady_18mps", 18.0, 15.4))
+    },
+    **{
+        case: _run(case, 600.0, initial=rotor_start(7.56, 15.4), options=options, **TURBULENT)
+        for case, options in (
+            ("turb_18mps_Hs7.5_uniform", OPTIONS), ("turb_18mps_Hs7.5_uniform_tower", BENDING),
+        )
+    },
     "wake_pitch_step": _wake("wake_pitch_step", 10.0, 7.05, (0.0, 3.0)),
     "wake_pitch_step_18mps": _wake("wake_pitch_step_18mps", 18.0, 7.56, (15.4, 13.4)),
     **{
         case: _wake(case, (17.0, 19.0), 7.56, (15.4, 15.4))
         for case in ("wake_wind_step_18mps", "wake_wind_step_18mps_mended")
     },
-    "decay_pitch_tower": _run("decay_pitch_tower", 300.0, initial={PITCH: 5.0}, options=BENDING),
-    "turb_18mps_Hs7.5_uniform_tower": _run(
-        "turb_18mps_Hs7.5_uniform_tower", 600.0, wind=lambda folder, bts: hub_wind(folder),
-        sea=wave_components, controlled=True, initial=_start(15.4), controller=rosco, options=BENDING,
-    ),
+    "decay_pitch_tower": _run("decay_pitch_tower", 300.0, initial={Channel.PITCH: 5.0}, options=BENDING),
 }  # fmt: skip
 
 
 def rest(study):
-    """Where the platform settles in still water: surge and heave within 0.02 m, platform pitch 0.02 deg.
+    """Compare where the platform settles in still water: surge and heave 0.02 m, platform pitch 0.02 deg.
 
     Means of the last 540 s, four periods of surge, and of the last 50 s, in which it still moves.
     """
     case = "static"
     for start, words in ((60.0, "last 540 s"), (550.0, "last 50 s")):
-        ours, theirs = _since(study.pair(case), start)
-        for channel in PLANE:
-            name, unit = _name(channel)
+        ours, theirs = study.pair(case, start)
+        for channel in Channel.PLANE:
+            name, unit = name_and_unit(channel)
             here, there = ours[channel].mean(), theirs[channel].mean()
             apart = f"{here - there:+.4f} {unit}; allowed 0.02 {unit}"
             allowed = 100.0 * 0.02 / abs(there)
@@ -152,9 +133,9 @@ def rest(study):
 
 
 def decays(study):
-    """Free decays: period 0.5 %, logarithmic decrement 5 %, rms error of the whole record 4 %."""
+    """Compare free decays: period 0.5 %, logarithmic decrement 5 %, rms error of the whole record 4 %."""
     for case, (channel, _, seconds, _) in DECAYS.items():
-        add_decay(study, case, channel, seconds, period=0.5, decrement=5.0, rms=4.0)
+        study.add_decay(case, channel, seconds, period=0.5, decrement=5.0, rms=4.0)
 
 
 # of a straight blade as ElastoDyn has it (its summary): kg, m from the root, kg m2 about the root
@@ -164,9 +145,7 @@ AZIMUTHS = 24
 
 
 def _rotor_means(scene, rotor_speed, pitch):
-    """(force, moment, out-of-plane root moment of blade 1: mean, cos, sin part) over a turn, N and N m."""
-    from fowt_env.analysis.rotor_loads import rotor_loads
-
+    """Return means over a turn: force, moment, root moment of blade 1 (mean, cos, sin part), N and N m."""
     angles = 2.0 * pi * np.arange(AZIMUTHS) / AZIMUTHS
     loads = [rotor_loads(scene, rotor_speed, pitch, azimuth) for azimuth in angles]
     flap = np.array([load.root_out_of_plane[0] for load in loads])
@@ -179,7 +158,7 @@ def _rotor_means(scene, rotor_speed, pitch):
 
 
 def _structural_flap(rotor, rotor_speed):
-    """(mean, cos part) of the out-of-plane root moment by a straight blade's weight and rotation, N m."""
+    """Return (mean, cos part) of the root moment by a straight blade's weight and rotation, N m."""
     tilt, cone = rotor.shaft_tilt, rotor.cone
     first = BLADE_MASS * BLADE_CENTRE
     # weight: down-shaft part g sin(tilt), and g cos(tilt) cos(azimuth) along the blade's radius
@@ -190,9 +169,7 @@ def _structural_flap(rotor, rotor_speed):
 
 
 def rotor(study):
-    """Steady wind, platform held: rotor loads and root moments 0.5 %, in sheared wind 2 %."""
-    from fowt_env.scene.build import build_scene
-
+    """Compare steady wind, platform held: rotor loads and root moments 0.5 %, in sheared wind 2 %."""
     for row in table(f"{PLATFORM}/steady.csv.gz", study.folder).to_dict("records"):
         study.say(f"rotor, {row['case']}")
         scene = build_scene(
@@ -203,98 +180,79 @@ def rotor(study):
         pitches = [np.radians(row[f"blade_pitch{k}_deg"]) for k in (1, 2, 3)]
         means = {pitch: _rotor_means(scene, speed, pitch) for pitch in dict.fromkeys(pitches)}
         force, moment = (np.mean([means[pitch][k] for pitch in pitches], axis=0) for k in (0, 1))
-        _hub_rows(study, row, force, moment)
+        plain = row["shear_exponent"] == 0.0 and row["blade_pitch1_deg"] == row["blade_pitch3_deg"]
+        case = f"steady_{row['wind_mps']:g}mps" if plain else f"rotor, {row['case']}"
+        allowed = 2.0 if row["shear_exponent"] else 0.5
+        _hub_rows(study, case, allowed, row, force, moment)
         if np.isfinite(row["root1_My_kNm"]):
-            _root_rows(study, row, [means[pitch][2] for pitch in pitches], scene.turbine.rotor, speed)
+            flaps = [means[pitch][2] for pitch in pitches]
+            structural = _structural_flap(scene.turbine.rotor, speed)
+            _root_rows(study, case, allowed, row, flaps, structural)
 
 
-def _case(row):
-    plain = row["shear_exponent"] == 0.0 and row["blade_pitch1_deg"] == row["blade_pitch3_deg"]
-    return f"steady_{row['wind_mps']:g}mps" if plain else f"rotor, {row['case']}"
-
-
-def _hub_rows(study, row, force, moment):
-    """Rows of thrust, torque and the moments about the rotor centre, judged by their size together."""
-    case, allowed = _case(row), 2.0 if row["shear_exponent"] else 0.5
-    study.add(case, "aerodynamic thrust", "kN", 1e-3 * row["aero_thrust_N"], 1e-3 * force[0], allowed=allowed)
-    study.add(
-        case, "aerodynamic torque", "kN-m", 1e-3 * row["aero_torque_Nm"], 1e-3 * moment[0], allowed=allowed
-    )
+def _hub_rows(study, case, allowed, row, force, moment):
+    """Add rows of thrust, torque, and of moments and forces at the hub, judged by a size that is not zero."""
+    thrust, torque = row["aero_thrust_N"], row["aero_torque_Nm"]
     size = np.hypot(row["aero_My_Nm"], row["aero_Mz_Nm"])
-    lever = row["aero_torque_Nm"]  # moments may pass zero: one percent of the torque is the other yardstick
-    for name, here, there in (
-        ("tilting moment at the hub", moment[1], row["aero_My_Nm"]),
-        ("yawing moment at the hub", moment[2], row["aero_Mz_Nm"]),
+    for quantity, unit, there, here, scale, of_torque in (
+        ("aerodynamic thrust", "kN", thrust, force[0], None, False),
+        ("aerodynamic torque", "kN-m", torque, moment[0], None, False),
+        # moments may pass zero: one percent of the torque is the other yardstick
+        ("tilting moment at the hub, of both moments", "kN-m", row["aero_My_Nm"], moment[1], size, True),
+        ("yawing moment at the hub, of both moments", "kN-m", row["aero_Mz_Nm"], moment[2], size, True),
+        ("side force at the hub, of the thrust", "kN", row["aero_Fy_N"], force[1], thrust, False),
+        ("upward force at the hub, of the thrust", "kN", row["aero_Fz_N"], force[2], thrust, False),
     ):
-        error = 100.0 * (here - there) / size
-        note = f"{100.0 * (here - there) / lever:+.3f} % of the torque"
-        study.add(case, f"{name}, of both moments", "kN-m", 1e-3 * there, 1e-3 * here, error, allowed, note)
-    for name, here, there in (
-        ("side force at the hub", force[1], row["aero_Fy_N"]),
-        ("upward force at the hub", force[2], row["aero_Fz_N"]),
-    ):
-        error = 100.0 * (here - there) / row["aero_thrust_N"]
-        study.add(case, f"{name}, of the thrust", "kN", 1e-3 * there, 1e-3 * here, error, allowed)
+        error = None if scale is None else 100.0 * (here - there) / scale
+        note = f"{100.0 * (here - there) / torque:+.3f} % of the torque" if of_torque else ""
+        study.add(case, quantity, unit, 1e-3 * there, 1e-3 * here, error, allowed, note)
 
 
-def _root_rows(study, row, flaps, rotor, speed):
-    """Rows of the out-of-plane root moments, with weight and rotation of a rigid blade added to the air's."""
-    case, allowed = _case(row), 2.0 if row["shear_exponent"] else 0.5
-    mean, cosine = _structural_flap(rotor, speed)
+def _root_rows(study, case, allowed, row, flaps, structural):
+    """Add rows of the out-of-plane root moments: the air's, and a rigid blade's weight and rotation."""
+    mean, cosine = structural
     for number, flap in enumerate(flaps, 1):
         there, here = row[f"root{number}_My_kNm"], 1e-3 * (flap[0] + mean)
         study.add(case, f"RootMyc{number}, mean over a turn", "kN-m", there, here, allowed=allowed)
-    whole = row["root1_My_kNm"]
     for part, here in (("cos", 1e-3 * (flaps[0][1] + cosine)), ("sin", 1e-3 * flaps[0][2])):
         there = row[f"root1_My_kNm_{part}"]
-        error = 100.0 * (here - there) / whole
-        quantity = f"RootMyc1, {part} over the azimuth, of the mean"
-        study.add(case, quantity, "kN-m", there, here, error, allowed)
+        error = 100.0 * (here - there) / row["root1_My_kNm"]
+        study.add(
+            case, f"RootMyc1, {part} over the azimuth, of the mean", "kN-m", there, here, error, allowed
+        )
 
 
 def regular(study):
-    """Regular wave H 4 m T 9 s: first harmonics of surge, heave and platform pitch within 1 %."""
+    """Compare a regular wave H 4 m T 9 s: first harmonics of surge, heave and platform pitch within 1 %."""
     case, omega = "regwave_H4T9", 2.0 * pi / WAVE["T"]
-    ours, theirs = _since(study.pair(case), *WAVE_WINDOW)
-    for channel in HARMONICS:
-        name, unit = _name(channel)
+    ours, theirs = study.pair(case, *WAVE_WINDOW)
+    for channel in Channel.PLANE:
+        name, unit = name_and_unit(channel)
         there, here = (
             harmonics(f[TIME].to_numpy()[:-1], f[channel].to_numpy()[:-1], omega)[0] for f in (theirs, ours)
         )
-        turned = f"phase {np.degrees(np.angle(here / there)):+.2f} deg"
-        study.add(case, f"{name}, first harmonic", unit, abs(there), abs(here), allowed=1.0, note=turned)
+        sizes = abs(there), abs(here)
+        study.add(case, f"{name}, first harmonic", unit, *sizes, allowed=1.0, note=phase(here, there))
 
 
 def waves(study):
-    """Irregular waves Hs 7.5 m: deviations after 100 s within 2 %, with difference-frequency forces 5 %."""
-    add_deviations(study, "waves_Hs7.5", PLANE, 2.0)
-    add_deviations(study, "waves_Hs7.5_qtf", PLANE, 5.0)
-
-
-def add_deviations(study, case, channels, allowed, note=""):
-    """Rows of a case after the start: standard deviations (allowed, %), means, and rms errors."""
-    ours, theirs = _since(study.pair(case), SETTLED)
-    for channel in channels:
-        name, unit = _name(channel)
-        both = [frame[channel].std() for frame in (theirs, ours)]
-        study.add(case, f"{name}, standard deviation", unit, *both, allowed=allowed, note=note)
-        means = [frame[channel].mean() for frame in (theirs, ours)]
-        study.add(case, f"{name}, mean", unit, *means, note=note)
-        error = 100.0 * normalised_rms(ours[channel], theirs[channel])
-        study.add(case, f"{name}, normalised rms error", unit, *both, error, note=note)
+    """Compare irregular waves Hs 7.5 m: deviations after 100 s 2 %, with difference-frequency forces 5 %."""
+    for case, allowed in (("waves_Hs7.5", 2.0), ("waves_Hs7.5_qtf", 5.0)):
+        study.add_statistics(case, Channel.PLANE, std=allowed)
 
 
 def floating(study):
-    """Floating with ROSCO, 12 and 18 m/s and turbulence with Hs 7.5 m: deviations after 100 s within 3 %."""
+    """Compare floating with ROSCO, 12 and 18 m/s and turbulence with Hs 7.5 m: deviations 3 %."""
     if without_rosco():  # an extra: the other groups need none of it
         study.say("without ROSCO: its library is not installed")
         return
+    channels = (*Channel.PLANE, Channel.SPEED, Channel.BLADE, Channel.POWER, Channel.THRUST)
     for case in CONTROLLED:
-        add_deviations(study, case, (*PLANE, SPEED, BLADE, POWER, THRUST), 3.0, "with ROSCO")
+        study.add_statistics(case, channels, note="with ROSCO", std=3.0)
 
 
 def wake(study):
-    """Dynamic inflow, steps of pitch and wind: loads at rest 0.5 %, overshoot 5 %, its time 10 %.
+    """Compare dynamic inflow, steps of pitch and wind: loads at rest 0.5 %, overshoot 5 %, its time 10 %.
 
     AeroDyn's time constants are those of the mean induction of the disk, here each element has its own: at
     0.3, 0.05 more is 11 % more of them. OpenFAST v5.0.0 updates the wake with one wind at both ends of a time
@@ -305,56 +263,30 @@ def wake(study):
         ours, theirs = study.pair(case)
         time = theirs[TIME].to_numpy()
         limits = (0.5, 0.5, 5.0, 10.0) if judged else (np.nan,) * 4
-        for channel in (THRUST, TORQUE):
-            name, unit = _name(channel)
+        for channel in (Channel.THRUST, Channel.TORQUE):
+            name, unit = name_and_unit(channel)
             there, here = (recovery(time, f[channel].to_numpy(), STEP, 100.0) for f in (theirs, ours))
             words = ("before the step", "long after it", "overshoot", "time of the overshoot")
             rows = zip(words, (unit, unit, unit, "s"), there, here, limits, strict=True)
             for what, its_unit, wanted, found, allowed in rows:
                 study.add(case, f"{name}, {what}", its_unit, wanted, found, allowed=allowed)
-            after = time >= STEP
-            error = 100.0 * normalised_rms(ours[channel][after], theirs[channel][after])
-            both = theirs[channel][after].std(), ours[channel][after].std()
-            study.add(case, f"{name}, normalised rms error after the step", unit, *both, error)
+            study.add_statistics(case, (channel,), ("rms",), STEP, words=" after the step")
 
 
 def memory(study):
-    """States of the radiation memory against convolution, decays and an irregular sea: 1 % of deviations."""
+    """Compare states of the radiation memory with convolution, decays and an irregular sea: 1 % rms."""
     for case in ("decay_surge", "decay_heave", "decay_pitch", "waves_Hs7.5"):
-        run = RUNS[case]
         frames = []
         for kind in ("convolution", "state_space"):
             study.say(f"{case}, radiation by {kind}")
-            frames.append(run.frame(study.folder, radiation=kind))
+            frames.append(RUNS[case].frame(study.folder, radiation=kind))
         dear, cheap = frames
-        channels = PLANE if case.startswith("waves") else (DECAYS[case][0],)
-        for channel in channels:
-            name, unit = _name(channel)
+        for channel in Channel.PLANE if case.startswith("waves") else (DECAYS[case][0],):
+            name, unit = name_and_unit(channel)
             error = 100.0 * normalised_rms(cheap[channel], dear[channel])
             quantity = f"{name}, rms error over the deviation, {case}"
             both = dear[channel].std(), cheap[channel].std()
             study.add("radiation memory as states (against convolution)", quantity, unit, *both, error, 1.0)
-
-
-def tower(study):
-    """A tower that bends in its first modes: frequency, tower-base moment by bands, motions."""
-    from fowt_env.training.validation.tower_modes import volturnus
-
-    volturnus(study)
-
-
-def linear(study):
-    """Linear models against OpenFAST's."""
-    from fowt_env.training.validation.linear_cases import linear as compared
-
-    compared(study)
-
-
-def blades(study):
-    """Moments of single blades, hub and tower against OpenFAST's."""
-    from fowt_env.training.validation.blade_loads import blades as compared
-
-    compared(study)
 
 
 GROUPS = {  # name -> (function, runs that it takes)

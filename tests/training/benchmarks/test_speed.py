@@ -30,9 +30,6 @@ def test_a_kind_of_scene_has_a_time_for_every_load_and_none_for_absent_ones():
         assert row[figure] > 0.0
     scene = benchmark.TIMED_SCENES[STILL].scene()
     assert scene.model.aero is None and scene.model.hydro.waves is None
-
-
-def test_an_unknown_kind_is_refused_by_name():
     with pytest.raises(InputError, match="full, standart"):
         benchmark.speed(["full, standart"], **TINY)
 
@@ -93,17 +90,18 @@ def test_the_variant_named_a_level_has_the_parts_and_the_step_of_that_level(leve
     assert dict(found.options).get("mooring", "catenary") == scene.options["mooring"]
 
 
+def summarised(variants, axes):
+    """Table of made-up rows of an accuracy study."""
+    rows = {"variant": variants, "axis": axes, "worst_of": "yaw", "kernel_factor": 110.0, "worst": 0.1}
+    return pd.DataFrame(rows | {"real_time_factor": 100.0} | dict.fromkeys(benchmark_accuracy.CHANNELS, 0.1))
+
+
 def test_every_axis_of_the_sweep_has_a_mark_of_its_own_in_the_plot(tmp_path):
     axes = list(dict.fromkeys(v.axis for v in benchmark_accuracy.variants()))
-    count = len(axes)
-    columns = {name: [0.1] * count for name in benchmark_accuracy.CHANNELS}
-    table = pd.DataFrame(
-        {"variant": axes, "axis": axes, "worst": [0.1] * count, "worst_of": ["yaw"] * count,
-         "real_time_factor": [100.0] * count, "kernel_factor": [110.0] * count, **columns}
-    )  # fmt: skip
-    figure = benchmark_accuracy.plot_accuracy(table)
+    figure = benchmark_accuracy.plot_accuracy(summarised(axes, axes), tmp_path / "accuracy.png")
     lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
-    assert len({(lines[axis].get_marker(), lines[axis].get_color()) for axis in axes}) == count
+    assert len({(lines[axis].get_marker(), lines[axis].get_color()) for axis in axes}) == len(axes)
+    assert (tmp_path / "accuracy.png").stat().st_size > 1000
 
 
 def test_a_thinned_sea_keeps_the_strongest_components_with_their_phases():
@@ -123,16 +121,6 @@ def test_memory_of_an_environment_is_what_no_other_one_holds():
     own = benchmark_envs.own_bytes(envs)
     shared = max(a.nbytes for a in benchmark_envs.arrays_of(envs[0]._config))
     assert 100.0 < own < shared
-
-
-def test_the_plot_of_a_study_is_written(tmp_path):
-    columns = {name: [0.1, 0.01] for name in benchmark_accuracy.CHANNELS}
-    table = pd.DataFrame(
-        {"variant": ["a", "b"], "axis": ["rotor", "waves"], "worst": [0.1, 0.01], "worst_of": ["yaw", "sway"],
-         "real_time_factor": [1000.0, 100.0], "kernel_factor": [1100.0, 110.0], **columns}
-    )  # fmt: skip
-    benchmark_accuracy.plot_accuracy(table, tmp_path / "accuracy.png")
-    assert (tmp_path / "accuracy.png").stat().st_size > 1000
 
 
 def test_the_cost_of_an_evaluation_has_a_row_per_stage_and_the_size_of_a_run(tmp_path):
@@ -161,11 +149,7 @@ def test_levels_over_steps_include_the_levels_themselves_and_stay_out_of_the_swe
 
 
 def test_points_of_another_platform_are_those_of_the_same_variants(tmp_path):
-    columns = {name: [0.1, 0.1] for name in benchmark_accuracy.CHANNELS}
-    table = pd.DataFrame(
-        {"variant": ["a", "b"], "axis": ["x", "x"], "worst": [0.1, 0.2], "worst_of": ["yaw", "yaw"],
-         "real_time_factor": [100.0, 200.0], "kernel_factor": [110.0, 210.0], **columns}
-    )  # fmt: skip
+    table = summarised(["a", "b"], "x")
     figure = benchmark_accuracy.plot_accuracy(table.iloc[:1], openfast=False, beside=("other", table))
     lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
     assert len(lines["other, the same variants"].get_xdata()) == 1

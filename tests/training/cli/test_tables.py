@@ -128,10 +128,10 @@ def design_lqr_command(monkeypatch, tmp_path):
 
 
 def validate_command(monkeypatch, tmp_path):
+    from fowt_env.training.validation import comparison, validate
     from fowt_env.training.validation import report as validation_report
-    from fowt_env.training.validation import validate
 
-    study = validate.Study()
+    study = comparison.Study()
     for number in range(123):
         study.add(
             "second harmonic, position instantaneous, surface instantaneous" * 2, str(number), "m", 1, 1

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, simulate
-from fowt_env.analysis.linear_drag import with_drag
+from fowt_env.analysis.linear_drag import linear_drag, with_drag
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.lqr.design import scene_at
 from fowt_env.controllers.pi import PISettings
+from fowt_env.descriptions.sea_state import joint_sea_state
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.training.design.bound_control import baseline_deviations
@@ -74,8 +75,6 @@ def test_the_closed_loop_of_the_baseline_has_the_eigenvalues_of_the_whole_plant(
 
 def test_the_drag_is_that_of_the_motion_that_it_allows(windy, plant):
     """Linearised again in the motion under the baseline it is the same."""
-    from fowt_env.analysis.linear_drag import linear_drag
-
     again = linear_drag(
         windy, linearize(scene_at(windy, 18.0)).point.state, OMEGA, plant.sea, plant._motion()
     )
@@ -117,19 +116,14 @@ def test_what_has_no_limit_is_named(windy, plant):
 @pytest.mark.parametrize("wind", [16, 20, 24])
 def test_the_linear_baseline_is_the_simulated_one(windy, wind):
     """Means over six seeds of the headline suite's weather: pitch within 6 %, rotor 5 %, travel 7 %."""
-    from fowt_env.descriptions.sea_state import joint_sea_state
-
     plant = BoundPlant(windy, float(wind))
     expected = baseline_deviations(plant, plant.true)
     found = []
     for seed in range(1001, 1007):
+        weather = {"kind": "ntm", "speed": float(wind), "class": "B"}
+        sea = joint_sea_state("gulf_of_maine_normal", float(wind))
         scene = build_scene(
-            "oc3_hywind",
-            wind={"kind": "ntm", "speed": float(wind), "class": "B"},
-            sea=joint_sea_state("gulf_of_maine_normal", float(wind)),
-            seed=seed,
-            fidelity="standard",
-            duration=800.0,
+            "oc3_hywind", wind=weather, sea=sea, seed=seed, fidelity="standard", duration=800.0
         )
         run = simulate(scene, "gspi_oc3", duration=800.0)
         kept = run[run["Time_[s]"] >= 200.0]

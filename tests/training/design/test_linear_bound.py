@@ -26,6 +26,12 @@ def windy():
     return build_scene("oc3_hywind", wind=18.0, fidelity="reference")
 
 
+def fronts(information, speed, pitch):
+    """A bound_table of these ratios at 18 m/s."""
+    ratios = {"speed_ratio_[-]": speed, "pitch_ratio_[-]": pitch}
+    return pd.DataFrame({"wind_[m/s]": 18.0, "information": information} | ratios)
+
+
 def test_bad_wishes_are_named(windy):
     with pytest.raises(InputError, match="wind = 10.0: must be above 11.4"):
         bound_table(windy, (10.0,))
@@ -89,14 +95,7 @@ def test_efficient_points_are_those_that_no_other_betters():
 
 
 def test_the_fraction_of_the_bound_is_one_on_the_front_and_none_at_the_baseline():
-    table = pd.DataFrame(
-        {
-            "wind_[m/s]": 18.0,
-            "information": "full",
-            "speed_ratio_[-]": [0.5, 0.6, 0.9],
-            "pitch_ratio_[-]": [0.9, 0.6, 0.5],
-        }
-    )
+    table = fronts("full", [0.5, 0.6, 0.9], [0.9, 0.6, 0.5])
     assert fraction_of_bound(table, 18.0, 0.6, 0.6) == pytest.approx(1.0)
     assert fraction_of_bound(table, 18.0, 0.8, 0.8) == pytest.approx(0.5)
     assert fraction_of_bound(table, 18.0, 0.75, 1.0) == pytest.approx(0.5)  # straight to the left
@@ -114,14 +113,7 @@ def runs_table():
 
 
 def small_front():
-    return pd.DataFrame(
-        {
-            "wind_[m/s]": 18.0,
-            "information": ["full", "full", "measured", "measured"],
-            "speed_ratio_[-]": [0.5, 0.9, 0.7, 0.9],
-            "pitch_ratio_[-]": [0.9, 0.5, 0.9, 0.6],
-        }
-    )
+    return fronts(["full", "full", "measured", "measured"], [0.5, 0.9, 0.7, 0.9], [0.9, 0.5, 0.9, 0.6])
 
 
 def test_ratios_are_of_means_over_seeds():
@@ -142,8 +134,8 @@ def test_runs_that_cannot_be_compared_are_named():
 
 def test_the_plot_shows_fronts_and_points_of_the_winds_that_have_both(tmp_path):
     pytest.importorskip("matplotlib")
-    fronts = small_front()
-    both = pd.concat([fronts, fronts.assign(**{"wind_[m/s]": 20.0})])
+    at_18, at_20 = small_front(), small_front().assign(**{"wind_[m/s]": 20.0})
+    both = pd.concat([at_18, at_20])
     figure = plot_bound(both, INFORMATION, path=tmp_path / "b.png")
     assert [axes.get_title() for axes in figure.axes][:2] == ["18 m/s", "20 m/s"]
     assert [len(axes.lines) for axes in figure.axes[:2]] == [2, 2]
@@ -151,7 +143,7 @@ def test_the_plot_shows_fronts_and_points_of_the_winds_that_have_both(tmp_path):
     assert [axes.get_title() for axes in with_points.axes if axes.get_title()] == ["18 m/s"]
     assert (tmp_path / "b.png").stat().st_size > 1000
     with pytest.raises(InputError, match="nothing to plot"):
-        plot_bound(fronts.assign(**{"wind_[m/s]": 20.0}), INFORMATION, ratio_table(runs_table()))
+        plot_bound(at_20, INFORMATION, ratio_table(runs_table()))
 
 
 def test_the_published_fronts_are_those_of_today(windy):

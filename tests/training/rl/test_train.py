@@ -1,14 +1,9 @@
 """Training: what a run leaves behind, how it stops and goes on, and what it refuses."""
 
 import json
-import os
 import random
 import shlex
-import signal
-import subprocess
-import sys
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -134,30 +129,15 @@ def test_a_run_that_came_into_the_folder_meanwhile_is_not_written_over(tmp_path)
     assert Training(None, late.folder, resume=True).settings == first.settings
 
 
-def test_a_run_cannot_be_gone_on_with_while_it_goes_on_and_can_once_it_was_killed(tmp_path, monkeypatch):
-    folder, root = tmp_path / "run", Path(__file__).resolve().parents[3]
-    code = (
-        "import sys, time\n"
-        "from fowt_env.training.rl import train\n"
-        "train.make_envs = lambda settings: print('building', flush=True) or time.sleep(600)\n"
-        "train.Training(train.resolve('ppo', 'above_rated', 0, 100), sys.argv[1]).run()\n"
-    )
-    words = [sys.executable, "-c", code, folder]
-
-    def went_on(settings):
+def test_a_resumed_run_that_cannot_be_built_keeps_its_settings(tmp_path, monkeypatch):
+    def broken(settings):
         raise ZeroDivisionError
 
-    monkeypatch.setattr(train, "make_envs", went_on)
-    with subprocess.Popen(words, stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(root)}) as other:
-        try:
-            assert other.stdout.readline() == b"building\n"
-            with pytest.raises(InputError, match="another training is writing to it"):
-                Training(None, folder, resume=True).run()
-        finally:
-            other.send_signal(signal.SIGKILL)
+    Training(small("ppo"), tmp_path)._write_settings()
+    monkeypatch.setattr(train, "make_envs", broken)
     with pytest.raises(ZeroDivisionError):
-        Training(None, folder, resume=True).run()
-    assert (folder / "settings.yml").exists()  # its own, which a run that cannot go on leaves alone
+        Training(None, tmp_path, resume=True).run()
+    assert (tmp_path / "settings.yml").exists()
 
 
 def test_a_run_has_its_folder_to_itself_as_long_as_it_learns_and_no_longer(tmp_path):
@@ -236,18 +216,6 @@ def test_without_a_place_for_its_key_a_run_goes_on_but_its_checkpoint_has_no_sea
         Training(None, run.folder, resume=True)
 
 
-def test_wrong_values_of_settings_are_named(tmp_path):
-    with pytest.raises(InputError, match="validation.winds.*-3"):
-        small("ppo", **{"validation.winds": [-3]})
-    with pytest.raises(InputError, match="checkpoint_minutes = 'often'"):
-        small("ppo", checkpoint_minutes="often")
-    folder = tmp_path / "run"
-    folder.mkdir()
-    (folder / "settings.yml").write_text("algo: [ppo\n")
-    with pytest.raises(InputError, match="settings.yml.*not valid YAML"):
-        Training(None, folder, resume=True)
-
-
 def test_validation_repeats_the_same_episodes_bit_for_bit():
     _, validation = make_envs(small("ppo"))
     rng = np.random.default_rng(0)
@@ -319,19 +287,26 @@ def test_an_agent_that_always_fails_scores_infinity(reference):
     assert validation_score(nothing | {"failed": np.ones(5)}, figures, kinds)["score"] == np.inf
 
 
-def test_wrong_settings_are_named(tmp_path):
-    with pytest.raises(InputError, match="unknown algorithm 'pop'. Did you mean 'ppo'"):
-        resolve("pop", "above_rated", 0, 10)
-    with pytest.raises(InputError, match="unknown task of training/rl/ppo.yml"):
-        resolve("ppo", "above_ratted", 0, 10)
-    with pytest.raises(InputError, match="steps = 0"):
-        resolve("ppo", "above_rated", 0, 0)
-    with pytest.raises(InputError, match="unknown setting 'algoritm.gamma'"):
-        resolve("ppo", "above_rated", 0, 10, {"algoritm.gamma": 1.0})
-    with pytest.raises(InputError, match="unknown observation set 'mesured'. Did you mean 'measured'"):
-        Training(small("ppo", **{"environment.observation": "mesured"}), tmp_path / "a").run()
+@pytest.mark.parametrize(
+    ("words", "changes", "message"),
+    [
+        (("pop", "above_rated", 0, 10), {}, "unknown algorithm 'pop'. Did you mean 'ppo'"),
+        (("ppo", "above_ratted", 0, 10), {}, "unknown task of training/rl/ppo.yml"),
+        (("ppo", "above_rated", 0, 0), {}, "steps = 0"),
+        (("ppo", "above_rated", 0, 10), {"algoritm.gamma": 1.0}, "unknown setting 'algoritm.gamma'"),
+    ],
+)
+def test_what_no_file_of_settings_has_is_named(words, changes, message):
+    with pytest.raises(InputError, match=message):
+        resolve(*words, changes)
+
+
+def test_a_folder_without_usable_settings_is_not_resumed(tmp_path):
     with pytest.raises(InputError, match="holds no run"):
-        Training(None, tmp_path / "c", resume=True)
+        Training(None, tmp_path, resume=True)
+    (tmp_path / "settings.yml").write_text("algo: [ppo\n")
+    with pytest.raises(InputError, match="settings.yml.*not valid YAML"):
+        Training(None, tmp_path, resume=True)
 
 
 @pytest.mark.parametrize(
@@ -351,6 +326,8 @@ def test_wrong_settings_are_named(tmp_path):
         ({"environment.randomise": 3}, "environment.randomise = 3: must be a table"),
         ({"normalise.training": True}, "normalise.training: unknown key"),
         ({"normalise.clip_obs": "x"}, "normalise.clip_obs = 'x': must be a number > 0"),
+        ({"validation.winds": [-3]}, "validation.winds.*-3"),
+        ({"checkpoint_minutes": "often"}, "checkpoint_minutes = 'often'"),
         ({"validation.winds": "[a]"}, r"validation.winds = '\[a\]': must be a list of numbers"),
     ],
 )
@@ -377,6 +354,10 @@ def test_a_setting_that_no_run_can_have_is_named_before_anything_is_built(change
         ({"algorithm.target_kl": "os:abort"}, "algorithm.target_kl = 'os:abort': must be a number"),
         ({"algorithm.policy_kwargs.net": 3}, "ppo does not take these settings.*'net'"),
         ({"algorithm.n_steps": -1}, "ppo does not take these settings.*n_steps=-1"),
+        (
+            {"environment.observation": "mesured"},
+            "set 'mesured'. Did you mean 'measured'",
+        ),
         ({"validation.skip": 12.0}, "validation.skip = 12.0: must be less than the 12 s of an episode"),
     ],
 )

@@ -22,28 +22,23 @@ from fowt_env.training.studies.robustness import (
 FOUND = Path(__file__).parents[2] / "reference" / "stability"
 
 
-def keeps_the_margin(name, integrator, duration):
-    """Whether a run of twice the default step stays with the fine run."""
+@pytest.mark.parametrize(
+    ("name", "integrator"),
+    [
+        (name, integrator)
+        for name in ("full, look-up rotor", "idling feathered, 70 m/s, Hs 15 m", "platform fixed")
+        for integrator in INTEGRATORS
+    ]
+    + [("full, rotor sampled thrice a step", "ab4")],
+)
+def test_default_step_keeps_a_factor_of_two_from_blow_up(name, integrator):
     kind = step_limits.LIMIT_SCENES[name]
     base = kind.scene()
     point = kind.point(base)
-    fine, _ = step_limits.excursions(base, point, 0.025, duration)
-    scene = long_runs.with_integrator(base, integrator, kind.rotor_samples)
+    fine, _ = step_limits.excursions(base, point, 0.025, 100.0)
+    scene = random_cases.with_integrator(base, integrator, kind.rotor_samples)
     step = step_limits.MARGIN * INTEGRATORS[integrator].dt
-    late = step_limits.excursions(scene, point, step, duration)[1]
-    return bool(np.all(late <= step_limits.GROWTH * (fine + step_limits.FLOOR)))
-
-
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize(
-    "name", ["full, look-up rotor", "idling feathered, 70 m/s, Hs 15 m", "platform fixed"]
-)
-def test_default_step_keeps_a_factor_of_two_from_blow_up(name, integrator):
-    assert keeps_the_margin(name, integrator, 100.0)
-
-
-def test_default_step_keeps_a_factor_of_two_where_the_rotor_is_sampled_within_a_step():
-    assert keeps_the_margin("full, rotor sampled thrice a step", "ab4", 100.0)
+    assert step_limits.stays(scene, point, fine, step, 100.0)
 
 
 EACH_PUSH = ("full, look-up rotor",)  # of the map's scenes, which take half a minute each
@@ -64,27 +59,28 @@ def test_default_step_keeps_a_factor_of_two_on_the_whole_map(name):
     assert (both["measured_s"] > 0.8 * both["theory_s"]).all()
 
 
-def no_failure(tally):
-    return tally.failures == [] and tally.unconverged == 0
+NIGHTLY = [pytest.mark.slow, pytest.mark.nightly]
 
 
-def test_random_scenes_and_states_stay_finite_and_bounded():
-    assert no_failure(random_cases.random_cases(100, seed=11, per_weather=10, plants=("standard",)))
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-def test_random_scenes_and_states_with_a_bending_tower_stay_finite_and_bounded():
-    plants = (f"standard{random_cases.BENDS}",)
-    assert no_failure(random_cases.random_cases(200, seed=13, per_weather=10, plants=plants))
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-def test_many_random_scenes_and_states_of_every_fidelity_stay_finite_and_bounded():
-    plants = ("standard", "fast", "standard", "standard", "reference")
-    # `fowt benchmark stability --cases N` runs more
-    assert no_failure(random_cases.random_cases(500, seed=12, plants=plants))
+@pytest.mark.parametrize(
+    ("count", "settings"),
+    [
+        (100, {"seed": 11, "per_weather": 10, "plants": ("standard",)}),
+        pytest.param(
+            200, {"seed": 13, "per_weather": 10, "plants": (f"standard{random_cases.BENDS}",)}, marks=NIGHTLY
+        ),
+        # `fowt benchmark stability --cases N` runs more
+        pytest.param(
+            500,
+            {"seed": 12, "plants": ("standard", "fast", "standard", "standard", "reference")},
+            marks=NIGHTLY,
+        ),
+    ],
+    ids=["standard", "bending tower", "every fidelity"],
+)
+def test_random_scenes_and_states_stay_finite_and_bounded(count, settings):
+    tally = random_cases.random_cases(count, **settings)
+    assert tally.failures == [] and tally.unconverged == 0
 
 
 @pytest.mark.parametrize("case", sorted(FOUND.glob("*.json")), ids=lambda path: path.stem)
@@ -115,19 +111,12 @@ def test_hostile_actions_leave_everything_finite_or_end_with_the_reason(mode):
     assert table["finite"].all()
 
 
+@pytest.mark.parametrize(
+    "steps", [10_000, pytest.param(10_000_000, marks=(pytest.mark.slow, pytest.mark.nightly))]
+)
 @pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_free_body_keeps_energy_and_momenta_at_the_default_step(integrator):
-    drift = long_runs.free_drift(integrator, 10_000)
-    assert drift["status"] == RUNNING
-    for key, most in study.DRIFT[integrator].items():
-        assert drift[key] <= most
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-def test_free_body_keeps_energy_and_momenta_over_ten_million_steps(integrator):
-    drift = long_runs.free_drift(integrator, 10_000_000)
+def test_free_body_keeps_energy_and_momenta_at_the_default_step(integrator, steps):
+    drift = long_runs.free_drift(integrator, steps)
     assert drift["status"] == RUNNING
     for key, most in study.DRIFT[integrator].items():
         assert drift[key] <= most

@@ -1,5 +1,7 @@
 """The frequency domain against closed forms, MoorPy and published periods; nothing of the plant is used."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,16 +44,10 @@ def box(damping=0.0, added=0.0, **changes):
 
 def test_catenary_matches_moorpy_on_the_seabed_and_hanging_free():
     moorpy = pytest.importorskip("moorpy.Catenary")
-    for span, rise, friction in (
-        (796.7, 186.0, 1.0),
-        (780.0, 186.0, 1.0),
-        (812.0, 186.0, 0.0),
-        (814.0, 180.0, 1.0),
-    ):
-        line = CatenaryLine((0, 0, 0), (0, 0, 0), LINE.length, LINE.weight, LINE.stiffness, friction)
-        _, _, h, v, _ = moorpy.catenary(
-            span, rise, line.length, line.stiffness, line.weight, CB=friction, Tol=1e-10
-        )
+    for span, rise, friction in ((796.7, 186, 1.0), (780.0, 186, 1.0), (812.0, 186, 0.0), (814.0, 180, 1.0)):
+        line = replace(LINE, friction=friction)
+        known = line.length, line.stiffness, line.weight
+        _, _, h, v, _ = moorpy.catenary(span, rise, *known, CB=friction, Tol=1e-10)
         assert catenary(span, rise, line) == pytest.approx((abs(h), abs(v)), rel=1e-5)
 
 

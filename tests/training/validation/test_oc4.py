@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from fowt_env.training.validation import oc4, volturnus
+from fowt_env.training.validation.comparison import Study
 from fowt_env.training.validation.openfast_cases import table
 from fowt_env.training.validation.signal_errors import normalised_rms
-from fowt_env.training.validation.validate import Study, validate_cases
+from fowt_env.training.validation.validate import validate_cases
 
 TIME = "Time_[s]"
 

@@ -21,17 +21,15 @@ def test_amplitudes_are_exact_beside_modes_that_the_start_has_left():
 def test_rates_of_two_decaying_modes_are_found_from_three_signals():
     rates = np.array([0.002 + 0.06j, 0.08 + 0.8j])
     draw = np.random.default_rng(1)
-    values = np.column_stack(
-        [
-            sum(
-                draw.normal()
-                * np.exp(-rate.real * (TIME - TIME[0]))
-                * np.cos(rate.imag * TIME + draw.normal())
-                for rate in rates
-            )
-            for _ in range(3)
-        ]
-    )
+
+    def signal():
+        parts = ((draw.normal(), draw.normal()) for _ in rates)
+        return sum(
+            size * np.exp(-rate.real * (TIME - TIME[0])) * np.cos(rate.imag * TIME + angle)
+            for rate, (size, angle) in zip(rates, parts, strict=True)
+        )
+
+    values = np.column_stack([signal() for _ in range(3)])
     found = modal_rates(TIME, values, [0.0 + 0.058j, 0.05 + 0.75j])
     assert found == pytest.approx(rates, rel=1e-6)
 

@@ -21,6 +21,7 @@ from fowt_env.plant.aero.blade_elements import build_blade_elements, lift_drag
 from fowt_env.plant.channels import Out
 from fowt_env.plant.state import State
 from fowt_env.scene.build import build_scene
+from fowt_env.training.validation.comparison import Row, Study
 from fowt_env.training.validation.openfast_cases import (
     DECAYS,
     FOLDER,
@@ -38,7 +39,7 @@ from fowt_env.training.validation.signal_errors import (
     harmonics,
     normalised_rms,
 )
-from fowt_env.training.validation.validate import GROUPS, Row, Study, validate_cases
+from fowt_env.training.validation.validate import GROUPS, validate_cases
 from fowt_env.weather.wind_field import read_box
 
 TIME = "Time_[s]"
@@ -141,20 +142,18 @@ def test_pitch_decay_is_openfasts_within_02_percent_of_period_and_3_percent_of_d
     assert normalised_rms(mine, wanted) < 0.03
 
 
-@pytest.mark.parametrize(
-    ("error", "verdict"),
-    [
-        (3.0, "met"),
-        (-3.0, "met"),
-        (3.01, "MISSED"),
-        (-3.01, "MISSED"),
-        (np.nan, "MISSED"),
-        (np.inf, "MISSED"),
-    ],
-)
-def test_an_error_of_either_sign_beyond_what_is_allowed_is_missed(error, verdict):
-    assert Row("case", "quantity", "m", 1.0, 1.0, error, 3.0).verdict == verdict
-    assert Row("case", "quantity", "m", 1.0, 1.0, error).verdict == "reported"
+def test_an_error_of_either_sign_beyond_what_is_allowed_is_missed():
+    for error, met in (
+        (3.0, True),
+        (-3.0, True),
+        (3.01, False),
+        (-3.01, False),
+        (np.nan, False),
+        (np.inf, False),
+    ):
+        row = Row("case", "quantity", "m", 1.0, 1.0, error, 3.0)
+        assert row.verdict == ("met" if met else "MISSED")
+        assert replace(row, allowed=np.nan).verdict == "reported"
 
 
 def test_a_study_has_errors_in_percent_of_the_reference():
@@ -263,30 +262,16 @@ def test_the_report_has_every_figure_and_its_plots(tmp_path):
 # --------------------------------------------------------------------------- slow
 
 
-@pytest.fixture(scope="module")
-def floating():
-    return validate_cases(["floating"])
-
-
 @pytest.mark.slow
-def test_floating_steady_winds_from_the_same_start_are_within_3_percent(floating):
-    assert not failed(floating, "float_steady_18mps: PtfmPitch, normalised rms error, t >= 100 s")
-
-
-@pytest.mark.slow
-def test_platform_pitch_at_18_mps_after_100_s_misses_3_percent_by_the_tip_node_and_the_undisplaced_strips(
-    floating,
-):
-    """3.9 %: 0.003 deg of a record whose deviation is 0.08 deg.
+def test_floating_steady_winds_are_within_3_percent_but_for_pitch_at_18_mps_after_100_s():
+    """Missed with 3.9 %: 0.003 deg of a record whose deviation is 0.08 deg.
 
     With AeroDyn's tip node (0.1 % of thrust, see the quick test) and strip forces along the undisplaced
     axis, as HydroDyn has them, the same figure is 0.4 % (docs/results/validation.md).
     """
-    (row,) = [
-        r
-        for r in floating.rows
-        if r.case == "float_steady_18mps" and r.quantity.startswith("PtfmPitch") and "100 s" in r.quantity
-    ]
+    study, known = validate_cases(["floating"]), "PtfmPitch, normalised rms error, t >= 100 s"
+    assert not failed(study, f"float_steady_18mps: {known}")
+    (row,) = [r for r in study.rows if r.case == "float_steady_18mps" and r.quantity == known]
     assert row.error == pytest.approx(3.88, abs=0.2)
 
 
@@ -295,11 +280,12 @@ def test_platform_pitch_at_18_mps_after_100_s_misses_3_percent_by_the_tip_node_a
 def test_regular_wave_second_harmonics_come_from_position_and_surface_as_in_openfast():
     study = validate_cases(["waves"])
     assert not failed(study)
-    second = {(r.case, r.quantity.split(",")[0]): r for r in study.rows if r.case.startswith("second")}
-    fixed = second["second harmonic, position fixed, surface swl", "PtfmSurge"]
-    moved = second["second harmonic, position instantaneous, surface swl", "PtfmSurge"]
-    surface = second["second harmonic, position fixed, surface instantaneous", "PtfmSurge"]
-    both = second["second harmonic, position instantaneous, surface instantaneous", "PtfmSurge"]
+    second = {r.case: r for r in study.rows if r.case.startswith("second") and "PtfmSurge" in r.quantity}
+    fixed, moved, surface, both = (
+        second[f"second harmonic, position {position}, surface {surface}"]
+        for surface in ("swl", "instantaneous")
+        for position in ("fixed", "instantaneous")
+    )
     assert fixed.here < 0.05 and fixed.openfast < 0.05
     assert moved.here == pytest.approx(moved.openfast, rel=0.05)
     assert both.here == pytest.approx(moved.here + surface.here, rel=0.05)

@@ -10,7 +10,7 @@ import series_figures as figures
 
 from fowt_env.errors import InputError
 from fowt_env.training.validation import linear_cases
-from fowt_env.training.validation.openfast_cases import FOLDER, ReferenceRun
+from fowt_env.training.validation.openfast_cases import FOLDER, ReferenceRun, without_rosco
 from fowt_env.training.validation.validate import PLATFORMS, validate_cases
 from fowt_env.training.validation.volturnus import (
     DECAYS,
@@ -18,7 +18,6 @@ from fowt_env.training.validation.volturnus import (
     PLATFORM,
     RUNS,
     _structural_flap,
-    without_rosco,
 )
 
 REFERENCES, TIME = FOLDER / PLATFORM, "Time_[s]"
@@ -204,10 +203,8 @@ def test_root_moment_of_a_hanging_blade_is_its_weight_at_its_arm():
     assert cosine == 0.0
     Rotor.shaft_tilt, Rotor.cone = 0.0, np.radians(4.0)
     mean, cosine = _structural_flap(Rotor, 0.0)
-    for up in (
-        1.0,
-        -1.0,
-    ):  # azimuth 0 and 180 deg; x downwind, z up: a moment around y bends the tip downwind
+    # azimuth 0 and 180 deg; x downwind, z up: a moment around y bends the tip downwind
+    for up in (1.0, -1.0):
         centre = 27.601 * np.array([-np.sin(Rotor.cone), 0.0, up * np.cos(Rotor.cone)])
         moment = np.cross(centre, [0.0, 0.0, -68507.6 * 9.81])[1]
         assert mean + up * cosine == pytest.approx(up * moment)
@@ -290,9 +287,7 @@ def test_rotor_loads_in_steady_wind_miss_small_hub_moments_alone():
         if "thrust" in row.quantity or "torque" in row.quantity or "RootMyc" in row.quantity:
             assert abs(row.error) < 0.1, f"{row.case}: {row.quantity}"
         if "moment at the hub" in row.quantity:
-            (torque,) = [
-                r.openfast for r in rows if r.case == row.case and r.quantity == "aerodynamic torque"
-            ]
+            torque = {r.case: r.openfast for r in rows if r.quantity == "aerodynamic torque"}[row.case]
             assert abs(row.here - row.openfast) < 1e-3 * torque, f"{row.case}: {row.quantity}"
 
 

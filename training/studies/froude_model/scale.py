@@ -4,7 +4,7 @@ Lengths by the scale L, speeds and times by sqrt(L), masses and forces by L^3 (w
 are), power by L^3.5: 10 MW from 5 MW is L = 2^(1/3.5) = 1.219. Blade twist, polars and all coefficients stay.
 
 The result is similar to its original, not a design: masses of real turbines grow less than L^3, rated wind
-speed does not grow with size, and nobody has built it. It shows that the description carries another size,
+speed does not grow with size, and it has not been built. It shows that the description carries another size,
 and serves where a control law is to be tried on one.
 
 `python -m fowt_env.training.studies.froude_model.scale --help` has the settings; without any it writes the
@@ -24,12 +24,12 @@ from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
-from fowt_env.training.studies.froude_model.identify import toml_value
 
 PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"
 POWER_EXPONENT = 3.5
 SAME, TIME, SPEED, RATE = 0.0, 0.5, 0.5, -0.5  # exponents of the scale; RATE: per time
 LENGTH, MASS, FORCE, INERTIA, MOMENT = 1.0, 3.0, 3.0, 5.0, 4.0
+MASSIVE = 2.0  # least exponent of a quantity that is proportional to a mass
 SECOND_ORDER = {  # of a pitch drive
     "natural_frequency": RATE, "damping": SAME, "acceleration_limit": 2.0 * RATE, "deadband": SAME,
     "friction": SAME,
@@ -103,123 +103,142 @@ LABEL = """\
 # less wind. SI units (kg, m, s, N, rad). Written by training/studies/froude_model/scale.py."""
 
 
-def scaled(record, name, scale):
-    """{field: value} of what a record was given, times its powers of the scale. name: key of EXPONENTS."""
+def toml_value(value):
+    """Return a TOML value as text, numbers to 10 digits."""
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(toml_value(item) for item in value) + "]"
+    return repr(value) if isinstance(value, int) else f"{float(value):.10g}"
+
+
+def entries(values):
+    """Return the lines of a TOML table without its heading."""
+    return [f"{key} = {toml_value(value)}" for key, value in values.items()]
+
+
+def toml_table(heading, values):
+    """Return the lines of a TOML table, after an empty one."""
+    return ["", f"[{heading}]", *entries(values)]
+
+
+def write_files(texts):
+    """Write {path: text}, each file whole or not at all."""
+    for file, text in texts.items():
+        with replacing(file) as temporary:
+            temporary.write_text(text)
+
+
+def scaled(record, name, scale, density=1.0):
+    """Return {field: value} of the fields that a record sets, times their powers of the scale.
+
+    name: key of EXPONENTS; density: ratio of the densities of water, by which all that holds a mass changes
+    too. That is what grows with the second power of the scale or more. A field with a table of its own is
+    left out.
+    """
     result = {}
-    for field, value in record.model_dump().items():
-        if field not in EXPONENTS[name] or field not in record.model_fields_set or value is None:
+    for field, value in record.model_dump(exclude_unset=True, exclude_none=True).items():
+        if field not in EXPONENTS[name] or isinstance(value, dict):
             continue
         exponent = EXPONENTS[name][field]
-        if isinstance(value, dict):  # has a table of its own
-            continue
         if isinstance(value, int | str):
             result[field] = value
         elif isinstance(value, float):
-            result[field] = value * scale**exponent
+            result[field] = value * scale**exponent * (density if exponent >= MASSIVE else 1.0)
         else:
-            result[field] = (np.asarray(value) * scale ** np.asarray(exponent)).tolist()
+            factor = scale ** np.asarray(exponent) * np.where(np.asarray(exponent) >= MASSIVE, density, 1.0)
+            result[field] = (np.asarray(value) * factor).tolist()
     return result
 
 
-def _table(heading, values):
-    """Lines of a TOML table."""
-    return ["", f"[{heading}]", *(f"{key} = {toml_value(value)}" for key, value in values.items())]
-
-
 def turbine_text(turbine, name, scale, polars="polars"):
-    """Text of the turbine file of a descriptions.turbine.Turbine times the scale. polars: their folder."""
+    """Return the text of the turbine file of a Turbine times the scale. polars: their folder."""
     lines = [LABEL.format(origin=turbine.name, what="TURBINE", scale=scale), "", f'name = "{name}"']
     lines.append(f'source = "{turbine.name} by Froude\'s law, scale {scale:.6g}; not a real turbine"')
-    lines += [f"{key} = {toml_value(value)}" for key, value in scaled(turbine, "turbine", scale).items()]
+    lines += entries(scaled(turbine, "turbine", scale))
     for part in ("rotor", "nacelle", "drivetrain", "pitch_drive", "protection", "torque_law"):
-        lines += _table(part, scaled(getattr(turbine, part), part, scale))
-    if turbine.pitch_drive.second_order is not None:
-        lines += _table(
-            "pitch_drive.second_order", scaled(turbine.pitch_drive.second_order, "second_order", scale)
-        )
+        lines += toml_table(part, scaled(getattr(turbine, part), part, scale))
+    if (drive := turbine.pitch_drive.second_order) is not None:
+        lines += toml_table("pitch_drive.second_order", scaled(drive, "second_order", scale))
     for which, trip in turbine.protection:
         if isinstance(trip, TripLimit) and which in turbine.protection.model_fields_set:
-            lines += _table(f"protection.{which}", scaled(trip, "trip", scale))
+            lines += toml_table(f"protection.{which}", scaled(trip, "trip", scale))
     for gain_set, gains in turbine.gains.items():
-        lines += _table(f"gains.{gain_set}", scaled(gains, "gains", scale))
-    lines += _table("blade", {"stations": "blade.csv", "polars": polars})
+        lines += toml_table(f"gains.{gain_set}", scaled(gains, "gains", scale))
+    lines += toml_table("blade", {"stations": "blade.csv", "polars": polars})
     return "\n".join(lines) + "\n"
 
 
 def platform_text(platform, name, turbine_name, scale):
-    """Text of the platform file of a descriptions.platform.Platform times the scale."""
+    """Return the text of the platform file of a Platform times the scale."""
     lines = [LABEL.format(origin=platform.name, what="PLATFORM", scale=scale), ""]
     lines += [f'name = "{name}"', f'turbine = "{turbine_name}"']
     lines.append(f'source = "{platform.name} by Froude\'s law, scale {scale:.6g}; not a real platform"')
     for part in ("environment", "ballast", "hull", "hydro", "tower"):
-        lines += _table(part, scaled(getattr(platform, part), part, scale))
+        lines += toml_table(part, scaled(getattr(platform, part), part, scale))
     for line in platform.lines:
-        values = scaled(line, "lines", scale)
-        lines += ["", "[[lines]]", *(f"{key} = {toml_value(value)}" for key, value in values.items())]
+        lines += ["", "[[lines]]", *entries(scaled(line, "lines", scale))]
     if platform.options:
-        lines += _table("options", platform.options)
+        lines += toml_table("options", platform.options)
     figures = {k: platform.published[k] * scale**e for k, e in PUBLISHED.items() if k in platform.published}
     if figures:
-        lines += _table("published", figures)
+        lines += toml_table("published", figures)
     periods = platform.published.get("natural_periods", {})
     if periods:
-        lines += _table("published.natural_periods", {k: v * scale**TIME for k, v in periods.items()})
+        lines += toml_table("published.natural_periods", {k: v * scale**TIME for k, v in periods.items()})
     return "\n".join(lines) + "\n"
 
 
-def stations_text(turbine, scale):
-    """Text of the blade file of a descriptions.turbine.Turbine, lengths times the scale."""
-    blade = turbine.blade
-    rows = [
-        f"# Blade of {turbine.name}, lengths times {scale:.6g}, twist as it is (froude_model/scale.py).",
-        "radius_m,chord_m,twist_deg,airfoil",
-    ]
-    for radius, chord, twist, airfoil in zip(
-        blade.radius * scale, blade.chord * scale, blade.twist / DEGREE, blade.airfoil, strict=True
-    ):
-        rows.append(f"{radius:.10g},{chord:.10g},{twist:.10g},{airfoil}")
+def stations_text(blade, scale, words, digits=10):
+    """Return the text of the file of a blade, lengths times the scale; words: its first line."""
+    rows = [words, "radius_m,chord_m,twist_deg,airfoil"]
+    columns = (blade.radius * scale, blade.chord * scale, blade.twist / DEGREE, blade.airfoil)
+    for *values, airfoil in zip(*columns, strict=True):
+        rows.append(",".join([*(f"{value:.{digits}g}" for value in values), airfoil]))
     return "\n".join(rows) + "\n"
 
 
-def _polar_files(turbine):
-    """{file name: text} of its polars."""
+def polar_files(turbine, words, angle_digits=10, digits=10):
+    """Return {file name: text} of a turbine's polars; words: behind each name in its first line."""
     files = {}
     for name, polar in turbine.blade.polars.items():
-        rows = [f"# {name} of {turbine.name}, unchanged (froude_model/scale.py).", "alpha_deg,cl,cd,cm"]
+        rows = [f"# {name} {words}", "alpha_deg,cl,cd,cm"]
         for alpha, *values in polar:
-            rows.append(",".join(f"{value:.10g}" for value in (alpha / DEGREE, *values)))
+            texts = (f"{alpha / DEGREE:.{angle_digits}g}", *(f"{value:.{digits}g}" for value in values))
+            rows.append(",".join(texts))
         files[f"{name}.csv"] = "\n".join(rows) + "\n"
     return files
 
 
 def write(scale, folder, name, platform=PLATFORM, turbine=TURBINE):
-    """Path of the platform file, written with its turbine into folder/platforms and folder/turbines/<name>.
+    """Write a platform and its turbine into folder/platforms and folder/turbines/<name>; return the path.
 
-    scale: of lengths, > 0. platform, turbine: the originals, as read_platform and read_turbine take them.
+    The path is that of the platform file. scale: of lengths, > 0.
+    platform, turbine: the originals, as read_platform and read_turbine take them.
     Raises: InputError for a scale or descriptions that cannot be used.
     """
     check_number("scale", scale, 0.001, 100.0)
     folder = Path(folder)
     machine = read_turbine(turbine)
     home = folder / "turbines" / name
-    texts = {home / "blade.csv": stations_text(machine, scale)}
+    words = f"# Blade of {machine.name}, lengths times {scale:.6g}, twist as it is (froude_model/scale.py)."
+    texts = {home / "blade.csv": stations_text(machine.blade, scale, words)}
     polars = "polars"
     if (DATA / "turbines" / str(turbine) / polars).is_dir():
         polars = f"{turbine}/polars"  # those of a built-in turbine are found from anywhere
     else:
-        texts |= {home / polars / file: text for file, text in _polar_files(machine).items()}
+        files = polar_files(machine, f"of {machine.name}, unchanged (froude_model/scale.py).")
+        texts |= {home / polars / file: text for file, text in files.items()}
     texts[home / "turbine.toml"] = turbine_text(machine, name, scale, polars)
     path = folder / "platforms" / f"{name}.toml"
     where = name if folder == DATA else f"../turbines/{name}/turbine.toml"
     texts[path] = platform_text(read_platform(platform), name, where, scale)
-    for file, text in texts.items():
-        with replacing(file) as temporary:
-            temporary.write_text(text)
+    write_files(texts)
     return path
 
 
 def scale_of_power(power, turbine=TURBINE):
-    """Scale of lengths at which the turbine's rated electrical power becomes `power` (W)."""
+    """Return the scale of lengths at which the turbine's rated electrical power becomes `power` (W)."""
     machine = read_turbine(turbine)
     own = machine.torque_law.rated_power * machine.drivetrain.generator_efficiency
     check_number("power", power, 0.0, low_open=True, allowed="a positive number of watts")

@@ -15,18 +15,17 @@ import pandas as pd
 import fowt_env
 from fowt_env.analysis.trim import trim_prescribed
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.mooring import catenary
+from fowt_env.training.validation.comparison import COMBINATIONS, TIME, Channel
 from fowt_env.training.validation.signal_errors import harmonics
 from fowt_env.visual.time_series import spectrum
 from fowt_env.weather.turbulence import turbulence
 
 PLATFORM = "liu_1_50"
-TIME, SURGE, PITCH = "Time_[s]", "PtfmSurge_[m]", "PtfmPitch_[deg]"
-MOTION_CHANNELS = (
-    SURGE, "PtfmSway_[m]", "PtfmHeave_[m]", "PtfmRoll_[deg]", PITCH, "PtfmYaw_[deg]",
-)  # fmt: skip
+SURGE, PITCH, MOTION_CHANNELS = Channel.SURGE, Channel.PITCH, Channel.MOTIONS
 DURATION = 500.0  # s at model scale, 59 min at full scale
 SKIP = 100.0  # s left out of statistics, ten surge periods
 SEGMENT = 125.0  # s of a spectrum's window: 12 surge periods
@@ -65,7 +64,7 @@ GROUPS = {
 
 
 def wanted_cases(text):
-    """Case names of "LC5", "LC1,LC2", "all" or "full_scale". Raises: InputError for an unknown one."""
+    """Return the case names of "LC5", "LC1,LC2", "all" or "full_scale". Raises: InputError."""
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
         raise InputError(f"case = {text!r}: must name at least one case, e.g. LC5, all or {FULL_SCALE}")
@@ -81,58 +80,44 @@ def wanted_cases(text):
     return list(dict.fromkeys(chosen))
 
 
-def model_wind(speed, hub_height, diameter, duration, seed):
-    """Wind specification: rotor-averaged Kaimal turbulence of low intensity about a mean speed (m/s)."""
-    period, value = turbulence(
-        speed, INTENSITY * speed, height=hub_height, diameter=diameter, period=duration, seed=seed,
-        shear_turbulence=False,
-    )  # fmt: skip
-    time = np.linspace(0.0, period, len(value))
-    return {"kind": "series", "time": time, "speed": speed + value[:, 0]}
-
-
 def load_case_scene(name, duration=DURATION, seed=1, **options):
-    """Scene of a model-scale load case; options as in build_scene."""
-    case = CASES[name]
-    platform = read_platform(PLATFORM)
-    wind = None
+    """Return the scene of a model-scale load case; options as in build_scene.
+
+    The wind is rotor-averaged Kaimal turbulence of low intensity.
+    """
+    case, platform, wind = CASES[name], read_platform(PLATFORM), None
     if case.wind is not None:
-        rotor = fowt_env.descriptions.turbine.read_turbine(platform.turbine).rotor
-        wind = model_wind(case.wind, rotor.hub_height, 2.0 * rotor.tip_radius, duration, seed)
+        rotor = read_turbine(platform.turbine).rotor
+        period, value = turbulence(
+            case.wind, INTENSITY * case.wind, height=rotor.hub_height, diameter=2.0 * rotor.tip_radius,
+            period=duration, seed=seed, shear_turbulence=False,
+        )  # fmt: skip
+        time = np.linspace(0.0, period, len(value))
+        wind = {"kind": "series", "time": time, "speed": case.wind + value[:, 0]}
     options = {"fidelity": "standard", "integrator": "rk4", "duration": duration} | options
     return fowt_env.build_scene(platform, wind=wind, sea=case.sea, seed=seed, **options)
 
 
-def case_point(scene, name):
-    """OperatingPoint of a load case's scene with its prescribed rotor speed and blade pitch."""
-    case = CASES[name]
-    return trim_prescribed(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
-
-
 def run_load_case(name, duration=DURATION, seed=1, progress=False, **options):
-    """DataFrame of a model-scale load case, started from its steady state."""
-    scene = load_case_scene(name, duration, seed, **options)
-    case, point = CASES[name], case_point(scene, name)
-    initial = {column.split("_[")[0]: point[column.split("_[")[0]] for column in MOTION_CHANNELS}
+    """Return the DataFrame of a model-scale load case, started from its steady state."""
+    scene, case = load_case_scene(name, duration, seed, **options), CASES[name]
+    point = trim_prescribed(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
+    motions = [column.split("_[")[0] for column in MOTION_CHANNELS]
+    initial = {"start": "zero"} | {motion: point[motion] for motion in motions}
+    initial |= {"RotSpeed": case.rotor_rpm, "BldPitch1": case.blade_pitch_deg}
     return fowt_env.simulate(
-        scene,
-        controller=None,
-        duration=duration,
-        dt=STEP,
-        control_dt=0.1,
-        output_dt=OUTPUT,
-        initial=initial | {"start": "zero", "RotSpeed": case.rotor_rpm, "BldPitch1": case.blade_pitch_deg},
-        progress=progress,
-    )
+        scene, controller=None, duration=duration, dt=STEP, control_dt=0.1, output_dt=OUTPUT,
+        initial=initial, progress=progress,
+    )  # fmt: skip
 
 
 def settled(frame, skip=SKIP):
-    """Rows from skip seconds on."""
+    """Return the rows from skip seconds on."""
     return frame[frame[TIME] >= skip - 1e-6]
 
 
 def statistics(runs):
-    """DataFrame: mean, standard deviation, extremes and quartiles of the channels of {case: frame}."""
+    """Return a DataFrame: mean, deviation, extremes and quartiles of the channels of {case: frame}."""
     rows = []
     for case, frame in runs.items():
         part = settled(frame)
@@ -146,13 +131,13 @@ def statistics(runs):
 
 
 def case_spectrum(frame, channel, skip=0.0):
-    """(frequency Hz, density) of a channel from skip seconds on."""
+    """Return (frequency Hz, density) of a channel from skip seconds on."""
     part = settled(frame, skip)
     return spectrum(part[TIME], part[channel], segment=SEGMENT)
 
 
 def prominence(frame, channel, frequency, skip=0.0, width=0.1, reach=0.35):
-    """Height of a spectral peak near a frequency (Hz) over its surroundings; above 1 where there is one.
+    """Return the height of a spectral peak near a frequency (Hz) over its surroundings, above 1 for a peak.
 
     The largest density within width (relative) of the frequency, over the larger of the medians of the
     density on its two sides, up to reach away. 0 if the largest is at the edge, i.e. a slope and no peak.
@@ -175,7 +160,7 @@ VISIBLE = 1e-5  # ... and to this fraction of the highest one, five decades of a
 
 @dataclass(frozen=True)
 class PaperClaim:
-    """One qualitative claim of the paper, what was found here, and whether it holds."""
+    """One qualitative claim of the paper, the result here, and whether it holds."""
 
     figure: str
     text: str
@@ -185,135 +170,86 @@ class PaperClaim:
 
 @dataclass
 class PaperStudy:
-    """Runs and findings of `fowt paper`."""
+    """Runs and claims of `fowt paper`."""
 
     runs: dict = field(default_factory=dict)  # model-scale case -> frame
     claims: list = field(default_factory=list)
-    full: dict = field(default_factory=dict)  # name -> frame or table
+    full: dict = field(default_factory=dict)  # name, or combination of wave kinematics -> frame
 
 
 def natural_frequencies():
-    """{motion: Hz} of the 1:50 model."""
+    """Return {motion: Hz} of the 1:50 model."""
     scene = fowt_env.build_scene(PLATFORM, fidelity="reference")
     return {motion: 1.0 / period for motion, period in fowt_env.natural_periods(scene).items()}
 
 
 def claims(runs, natural):
-    """[PaperClaim] of section 8 that the given model-scale runs can judge."""
-    having = set(runs)
-    found = []
-    for needs, judge in (
-        ({"LC1"}, _steady_surge),
-        ({"LC2"}, _rated_surge_peak),
-        (set(GROUPS["wind"]), _pitch_over_wind),
-        ({"LC5"}, _regular_wave_peaks),
-        (set(GROUPS["waves"]), _waves_have_no_mean),
-        ({"LC11"}, _combined_peaks),
-        ({*GROUPS["wind"], *GROUPS["waves"], *GROUPS["wind and waves"]}, _mean_and_range),
-    ):
-        if needs <= having:
-            found += judge(runs, natural)
-    return found
+    """Return [PaperClaim] of section 8 that the given model-scale runs can judge.
 
+    natural: natural_frequencies().
+    """
+    having, found = set(runs), []
+    wind, waves, both = GROUPS.values()
+    pitch = {name: settled(frame)[PITCH].to_numpy() for name, frame in runs.items()}
+    mean, std = ({name: getattr(x, of)() for name, x in pitch.items()} for of in ("mean", "std"))
 
-def _pitch(runs, name):
-    return settled(runs[name])[PITCH].to_numpy()
+    def claim(figure, text, shown, holds):
+        found.append(PaperClaim(figure, text, shown, bool(holds)))
 
+    def peaks(figure, case, channel, places):
+        """Claim that the spectrum of a channel peaks at each of {name of a frequency: Hz}."""
+        for where, frequency in places.items() if case in having else ():
+            height = prominence(runs[case], channel, frequency)
+            f, density = case_spectrum(runs[case], channel)
+            fraction = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
+            shown = (
+                f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {fraction:.2g} of the highest"
+            )
+            words = {SURGE: "surge", PITCH: "pitch"}[channel]
+            text = f"{case}: {words} spectrum peaks at {where}"
+            claim(figure, text, shown, height >= PEAK and fraction >= VISIBLE)
 
-def _peak(figure, text, runs, case, channel, frequency):
-    height = prominence(runs[case], channel, frequency)
-    f, density = case_spectrum(runs[case], channel)
-    fraction = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
-    found = f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {fraction:.2g} of the highest"
-    return PaperClaim(figure, text, found, bool(height >= PEAK and fraction >= VISIBLE))
-
-
-def _steady_surge(runs, natural):
-    surge = settled(runs["LC1"])[SURGE]
-    text = f"mean {surge.mean():.4f} m, std {surge.std():.4f} m"
-    return [PaperClaim("6", "LC1: surge is nearly steady", text, bool(surge.std() < 0.1 * surge.mean()))]
-
-
-def _rated_surge_peak(runs, natural):
-    f = natural["platform_pitch"]
-    return [_peak("7", "LC2: surge spectrum peaks at the pitch frequency", runs, "LC2", SURGE, f)]
-
-
-def _pitch_over_wind(runs, natural):
-    mean = {name: _pitch(runs, name).mean() for name in GROUPS["wind"]}
-    text = ", ".join(f"{name} {value:.2f}" for name, value in mean.items()) + " deg"
-    return [
-        PaperClaim("8", "mean pitch is largest at rated wind (LC2)", text, max(mean, key=mean.get) == "LC2"),
-        PaperClaim(
-            "8",
-            "mean pitch falls above rated (LC2 > LC3 > LC4)",
-            text,
-            bool(mean["LC2"] > mean["LC3"] > mean["LC4"]),
-        ),
-    ]
-
-
-def _regular_wave_peaks(runs, natural):
+    if "LC1" in having:
+        surge = settled(runs["LC1"])[SURGE]
+        shown = f"mean {surge.mean():.4f} m, std {surge.std():.4f} m"
+        claim("6", "LC1: surge is nearly steady", shown, surge.std() < 0.1 * surge.mean())
+    of_pitch = {"the pitch frequency": natural["platform_pitch"]}
+    peaks("7", "LC2", SURGE, of_pitch)
+    if set(wind) <= having:
+        shown = ", ".join(f"{name} {mean[name]:.2f}" for name in wind) + " deg"
+        largest = max(wind, key=mean.get) == "LC2"
+        claim("8", "mean pitch is largest at rated wind (LC2)", shown, largest)
+        falls = mean["LC2"] > mean["LC3"] > mean["LC4"]
+        claim("8", "mean pitch falls above rated (LC2 > LC3 > LC4)", shown, falls)
     wave = 1.0 / SEAS[0]["T"]
-    places = {
-        "the surge frequency": natural["surge"],
-        "the pitch frequency": natural["platform_pitch"],
-        "the wave frequency": wave,
-        "twice the wave frequency": 2.0 * wave,
-    }
-    return [
-        _peak("9", f"LC5: surge spectrum peaks at {where}", runs, "LC5", SURGE, frequency)
-        for where, frequency in places.items()
-    ]
-
-
-def _waves_have_no_mean(runs, natural):
-    spread = {name: _pitch(runs, name).std() for name in GROUPS["waves"]}
-    still = _pitch(runs, "LC5").mean()
-    shift = max(abs(_pitch(runs, name).mean() - still) for name in GROUPS["waves"])
-    text = ", ".join(f"{name} {value:.2f}" for name, value in spread.items())
-    return [
-        PaperClaim("10", "LC5 to LC8: the range grows with the waves", f"std {text} deg",
-              list(spread.values()) == sorted(spread.values())),
-        PaperClaim("10", "LC5 to LC8: waves leave the mean alone", f"means within {shift:.3f} deg",
-              bool(shift < 0.1 * spread["LC8"])),
-    ]  # fmt: skip
-
-
-def _combined_peaks(runs, natural):
-    wave = 1.0 / SEAS[2]["Tp"]
-    return [
-        _peak("11", "LC11: pitch spectrum peaks at the pitch frequency", runs, "LC11", PITCH,
-              natural["platform_pitch"]),
-        _peak("11", "LC11: pitch spectrum peaks at the wave frequency", runs, "LC11", PITCH, wave),
-    ]  # fmt: skip
-
-
-def _mean_and_range(runs, natural):
-    means, spreads = [], []
-    for wind, wave, both in zip(*GROUPS.values(), strict=True):
-        means.append((_pitch(runs, both).mean(), _pitch(runs, wind).mean(), _pitch(runs, wave).mean()))
-        spreads.append((_pitch(runs, both).std(), _pitch(runs, wind).std(), _pitch(runs, wave).std()))
-    shift = max(abs(both - wind) for both, wind, _ in means)
-    largest = max(wind for _, wind, _ in means)
-    ratios = [both / wave for both, _, wave in spreads]
-    nearer = all(abs(both - wave) < abs(both - wind) for both, wind, wave in spreads[1:])
-    text = ", ".join(
-        f"{name} {ratio:.2f}" for name, ratio in zip(GROUPS["wind and waves"], ratios, strict=True)
-    )
-    return [
-        PaperClaim("12", "LC9 to LC12: wind sets the mean",
-              f"within {shift:.2f} deg of the mean in wind alone", bool(shift < 0.1 * largest)),
-        PaperClaim("12", "LC10 to LC12: waves set the range", f"std over that in waves alone: {text}",
-              nearer),
-    ]  # fmt: skip
+    of_waves = {"the wave frequency": wave, "twice the wave frequency": 2.0 * wave}
+    peaks("9", "LC5", SURGE, {"the surge frequency": natural["surge"], **of_pitch, **of_waves})
+    if set(waves) <= having:
+        spread = [std[name] for name in waves]
+        shown = "std " + ", ".join(f"{name} {std[name]:.2f}" for name in waves) + " deg"
+        claim("10", "LC5 to LC8: the range grows with the waves", shown, spread == sorted(spread))
+        shift = max(abs(mean[name] - mean["LC5"]) for name in waves)
+        text, shown = "LC5 to LC8: waves leave the mean alone", f"means within {shift:.3f} deg"
+        claim("10", text, shown, shift < 0.1 * std["LC8"])
+    peaks("11", "LC11", PITCH, {**of_pitch, "the wave frequency": 1.0 / SEAS[2]["Tp"]})
+    if {*wind, *waves, *both} <= having:
+        shift = max(abs(mean[name] - mean[alone]) for name, alone in zip(both, wind, strict=True))
+        shown = f"within {shift:.2f} deg of the mean in wind alone"
+        holds = shift < 0.1 * max(mean[name] for name in wind)
+        claim("12", "LC9 to LC12: wind sets the mean", shown, holds)
+        triples = list(zip(both, wind, waves, strict=True))
+        text = ", ".join(f"{name} {std[name] / std[sea]:.2f}" for name, _, sea in triples)
+        nearer = all(abs(std[name] - std[sea]) < abs(std[name] - std[air]) for name, air, sea in triples[1:])
+        shown = f"std over that in waves alone: {text}"
+        claim("12", "LC10 to LC12: waves set the range", shown, nearer)
+    return found
 
 
 # --------------------------------------------------------------------------- mooring
 
 
 def static_pull(platform, direction, offsets):
-    """DataFrame: restoring force (N) and line tensions (N) of the moorings at offsets (m) along a direction.
+    """Return a DataFrame: restoring force and line tensions (N) at offsets (m) along a direction.
 
     direction: "surge" or "sway". The hull is moved without turning, as in the paper's Fig. 5.
     """
@@ -335,18 +271,12 @@ def static_pull(platform, direction, offsets):
 
 # --------------------------------------------------------------------------- full scale
 
-COMBINATIONS = (  # kinematics position, surface, stretching; theory.md, section 8
-    ("fixed", "swl", "none"),
-    ("instantaneous", "swl", "none"),
-    ("fixed", "instantaneous", "wheeler"),
-    ("instantaneous", "instantaneous", "wheeler"),
-)
 EXPECTED_DOUBLE = ((0.02, 0.02), (0.34, 0.34), (0.60, 0.52), (0.92, 0.83))  # %, theory.md, section 8
 DECAYS = {"surge decay": ("PtfmSurge", 10.0, SURGE, 600.0), "pitch decay": ("PtfmPitch", 5.0, PITCH, 300.0)}
 
 
 def decay(channel, start, duration):
-    """Frame of a free decay of OC3-Hywind in still water."""
+    """Return the frame of a free decay of OC3-Hywind in still water."""
     scene = fowt_env.build_scene("oc3_hywind", fidelity="reference")
     return fowt_env.simulate(
         scene, controller=None, duration=duration, dt=0.05, initial={channel: start}
@@ -354,7 +284,7 @@ def decay(channel, start, duration):
 
 
 def regular_wave(position, surface, stretching, duration=460.0):
-    """Frame of OC3-Hywind in the regular wave H 3 m, T 5 s of Fig. 15 with given wave kinematics."""
+    """Return the frame of OC3-Hywind in the regular wave H 3 m, T 5 s of Fig. 15."""
     scene = fowt_env.build_scene(
         "oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0, "ramp": 50.0}, kinematics_position=position,
         surface=surface, stretching=stretching,
@@ -364,7 +294,7 @@ def regular_wave(position, surface, stretching, duration=460.0):
 
 
 def double_frequency(frame, start=260.0, period=5.0):
-    """{channel: (first harmonic, second over first in %)} of surge and pitch in a regular wave."""
+    """Return {channel: (first harmonic, second over first in %)} of surge and pitch in a regular wave."""
     part = frame[(frame[TIME] >= start) & (frame[TIME] < frame[TIME].iloc[-1] - 1e-6)]
     time = part[TIME].to_numpy()
     found = {}
@@ -375,7 +305,7 @@ def double_frequency(frame, start=260.0, period=5.0):
 
 
 def wind_and_waves(duration=1000.0, seed=1):
-    """Frame of Fig. 16: 18 m/s (turbulence class B, a choice), JONSWAP Hs 7.5 m, Tp 10 s, under control."""
+    """Return the frame of Fig. 16: 18 m/s (class B, a choice), JONSWAP Hs 7.5 m, Tp 10 s, under control."""
     scene = fowt_env.build_scene(
         "oc3_hywind", wind={"kind": "ntm", "speed": 18.0, "class": "B"}, sea="paper_wind_wave", seed=seed,
         fidelity="standard", duration=duration,
@@ -383,39 +313,22 @@ def wind_and_waves(duration=1000.0, seed=1):
     return fowt_env.simulate(scene, controller="pi", duration=duration)
 
 
-def full_scale(say=None):
-    """{name: frame or table} of the full-scale studies."""
-    say = say or (lambda text: None)
-    found = {}
-    for name, (channel, start, _, duration) in DECAYS.items():
-        say(name)
-        found[name] = decay(channel, start, duration)
-    for combination in COMBINATIONS:
-        say("regular wave: " + ", ".join(combination[:2]))
-        found[combination] = regular_wave(*combination)
-    say("wind and waves")
-    found["wind and waves"] = wind_and_waves()
-    return found
-
-
 def run_paper(names, report=None):
-    """PaperStudy of the named cases; report(text, done, total) is called before each run."""
+    """Return the PaperStudy of the named cases; report(text, done, total) is called before each run."""
+    runs = {name: lambda name=name: run_load_case(name) for name in names if name in CASES}
+    models = list(runs)
+    if FULL_SCALE in names:
+        for name, (channel, start, _, duration) in DECAYS.items():
+            runs[name] = lambda args=(channel, start, duration): decay(*args)
+        for combination in COMBINATIONS:
+            runs[combination] = lambda combination=combination: regular_wave(*combination)
+        runs["wind and waves"] = wind_and_waves
     study = PaperStudy()
-    models = [name for name in names if name in CASES]
-    total = len(models) + (len(DECAYS) + len(COMBINATIONS) + 1 if FULL_SCALE in names else 0)
-    done = 0
-
-    def say(text):
-        nonlocal done
+    for done, (name, run) in enumerate(runs.items()):
         if report is not None:
-            report(text, done, total)
-        done += 1
-
-    for name in models:
-        say(name)
-        study.runs[name] = run_load_case(name)
+            text = name if isinstance(name, str) else "regular wave: " + ", ".join(name[:2])
+            report(text, done, len(runs))
+        (study.runs if name in models else study.full)[name] = run()
     if models:
         study.claims = claims(study.runs, natural_frequencies())
-    if FULL_SCALE in names:
-        study.full = full_scale(say)
     return study

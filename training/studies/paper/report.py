@@ -1,4 +1,4 @@
-"""What `fowt paper` leaves behind: time series, statistics, claims, and plots like the paper's."""
+"""Files of `fowt paper`: time series, statistics, claims, and plots like the paper's."""
 
 from datetime import UTC, datetime
 from pathlib import Path
@@ -26,53 +26,62 @@ PULLS = {"model": (load_cases.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0
 
 
 def _axes(figure, rows, columns=1, **options):
+    """Return styled axes (rows, columns) of a figure."""
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for one in axes.ravel():
         style_axes(one)
     return axes
 
 
+def _label(axis, text):
+    """Write the label of an axis: axis is a method such as axes.set_xlabel."""
+    axis(text, fontsize=9, color=INK)
+
+
+def _within(frame, window):
+    """Return the rows of a frame in a window (s)."""
+    return frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
+
+
 def _groups(runs):
-    """{group: [case]} of the groups with at least one run."""
+    """Return {group: [case]} of the groups with at least one run."""
     having = {name: [case for case in cases if case in runs] for name, cases in load_cases.GROUPS.items()}
     return {name: cases for name, cases in having.items() if cases}
 
 
 def box_plots(runs, channel, path=None):
-    """Box plots of a channel per case, like Figs 8, 10 and 12: quartiles, median and extremes."""
+    """Draw box plots of a channel per case, like Figs 8, 10 and 12: quartiles, median and extremes."""
     groups = _groups(runs)
     figure = new_figure(9.0, 3.2)
-    for axes, (name, cases) in zip(
-        _axes(figure, 1, len(groups), sharey=True)[0], groups.items(), strict=True
-    ):
+    panels = _axes(figure, 1, len(groups), sharey=True)[0]
+    for axes, (name, cases) in zip(panels, groups.items(), strict=True):
         values = [load_cases.settled(runs[case])[channel].to_numpy() for case in cases]
         axes.boxplot(values, tick_labels=cases, whis=(0, 100), medianprops={"color": COLOURS[1]})
         axes.set_title(name, fontsize=9, color=INK)
-    figure.axes[0].set_ylabel(LABELS[channel], fontsize=9, color=INK)
+    _label(panels[0].set_ylabel, LABELS[channel])
     return save_figure(figure, path)
 
 
 def time_series(runs, channel, path=None, window=(0.0, 200.0)):
-    """A channel of every case over time, a panel per case."""
+    """Draw a channel of every case over time, a panel per case."""
     figure = new_figure(9.0, 0.6 + 0.9 * len(runs))
     rows = _axes(figure, len(runs), sharex=True)[:, 0]
     for axes, (case, frame) in zip(rows, runs.items(), strict=True):
-        part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
+        part = _within(frame, window)
         axes.plot(part[TIME], part[channel], color=COLOURS[0], linewidth=0.8)
         axes.set_ylabel(case, fontsize=8, color=INK)
         axes.margins(x=0.0)
-    rows[-1].set_xlabel("time (s, model scale)", fontsize=9, color=INK)
+    _label(rows[-1].set_xlabel, "time (s, model scale)")
     figure.suptitle(LABELS[channel], fontsize=10, color=INK, x=0.01, ha="left")
     return save_figure(figure, path)
 
 
 def spectra(runs, channel, natural, path=None):
-    """Power spectra of a channel, a panel per group, with the natural and wave frequencies marked."""
+    """Draw power spectra of a channel, a panel per group, with the natural frequencies marked."""
     groups = _groups(runs)
     figure = new_figure(9.0, 0.6 + 2.2 * len(groups))
-    for axes, (name, cases) in zip(
-        _axes(figure, len(groups), sharex=True)[:, 0], groups.items(), strict=True
-    ):
+    panels = _axes(figure, len(groups), sharex=True)[:, 0]
+    for axes, (name, cases) in zip(panels, groups.items(), strict=True):
         top = 0.0
         for number, case in enumerate(cases):
             frequency, density = load_cases.case_spectrum(runs[case], channel)
@@ -80,90 +89,72 @@ def spectra(runs, channel, natural, path=None):
             top = max(top, density[1:].max())
         for motion in ("surge", "heave", "platform_pitch"):
             axes.axvline(natural[motion], color=INK, linestyle=":", linewidth=0.8)
-        axes.set_ylim(1e-10 * top, 4.0 * top)
-        axes.set_xlim(0.03, 3.0)
+        axes.set(xlim=(0.03, 3.0), ylim=(1e-10 * top, 4.0 * top))
         axes.set_title(f"{name}  (dotted: surge, pitch, heave)", fontsize=9, color=INK, loc="left")
         axes.legend(fontsize=8, frameon=False, loc="upper right", ncols=4)
-    figure.axes[-1].set_xlabel("frequency (Hz, model scale)", fontsize=9, color=INK)
-    figure.supylabel(f"power density of {LABELS[channel]}, squared per Hz", fontsize=9, color=INK)
+    _label(panels[-1].set_xlabel, "frequency (Hz, model scale)")
+    _label(figure.supylabel, f"power density of {LABELS[channel]}, squared per Hz")
     return save_figure(figure, path)
 
 
 def static_pulls(path=None):
-    """Pull and line tensions over offset, like Fig. 5, of the model and of OC3-Hywind."""
+    """Draw pull and line tensions over offset, like Fig. 5, of the model and of OC3-Hywind."""
     figure = new_figure(9.0, 6.4)
     for row, (name, (platform, reach)) in zip(_axes(figure, 2, 2), PULLS.items(), strict=True):
+        unit, factor = ("N", 1.0) if platform == load_cases.PLATFORM else ("kN", 1e-3)
         for axes, direction in zip(row, ("surge", "sway"), strict=True):
             table = load_cases.static_pull(read_platform(platform), direction, np.linspace(-reach, reach, 81))
-            unit, factor = ("N", 1.0) if platform == load_cases.PLATFORM else ("kN", 1e-3)
             offset = table["offset_[m]"]
             axes.plot(offset, factor * table["force_[N]"], color=INK, label="restoring force")
-            tensions = [column for column in table if column.startswith("tension")]
-            for number, column in enumerate(tensions):
-                line = ("-", "--")[number // 3]
+            for number, column in enumerate(c for c in table if c.startswith("tension")):
+                style = {"color": COLOURS[number % 3], "linewidth": 0.9}
+                style["linestyle"] = ("-", "--")[number // 3]
                 label = column.removesuffix("_[N]").replace("_", " ")
-                axes.plot(
-                    offset,
-                    factor * table[column],
-                    line,
-                    color=COLOURS[number % 3],
-                    linewidth=0.9,
-                    label=label,
-                )
-            axes.set_xlabel(f"{direction} (m)", fontsize=9, color=INK)
-            axes.set_ylabel(unit, fontsize=9, color=INK)
+                axes.plot(offset, factor * table[column], label=label, **style)
+            _label(axes.set_xlabel, f"{direction} (m)")
+            _label(axes.set_ylabel, unit)
             axes.set_title(f"{name}: {direction}", fontsize=9, color=INK, loc="left")
             axes.legend(fontsize=7, frameon=False)
     return save_figure(figure, path)
 
 
 def decays(full, path=None):
-    """The surge and pitch decays of Figs 13 and 14."""
+    """Draw the surge and pitch decays of Figs 13 and 14."""
     figure = new_figure(9.0, 4.4)
     rows = _axes(figure, 2)[:, 0]
     for axes, (name, (_, _, channel, _)) in zip(rows, load_cases.DECAYS.items(), strict=True):
         axes.plot(full[name][TIME], full[name][channel], color=COLOURS[0], linewidth=1.0)
-        axes.set_ylabel(LABELS[channel], fontsize=9, color=INK)
+        _label(axes.set_ylabel, LABELS[channel])
         axes.margins(x=0.0)
-    figure.axes[-1].set_xlabel("time (s)", fontsize=9, color=INK)
+    _label(rows[-1].set_xlabel, "time (s)")
     return save_figure(figure, path)
 
 
 def regular_waves(full, path=None, window=(420.0, 450.0)):
-    """Fig. 15: surge, pitch and tension in the regular wave, and spectra for the four combinations."""
+    """Draw Fig. 15: surge, pitch and tension in the regular wave, and spectra, for the four combinations."""
     channels = (load_cases.SURGE, load_cases.PITCH, "FAIRTEN1_[kN]")
     figure = new_figure(9.0, 6.4)
-    for row, channel in zip(_axes(figure, len(channels), 2), channels, strict=True):
+    panels = _axes(figure, len(channels), 2)
+    for row, channel in zip(panels, channels, strict=True):
         for number, combination in enumerate(load_cases.COMBINATIONS):
-            frame = full[combination]
             label = f"{combination[0]} position, {combination[1]} surface"
-            part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
+            part = _within(full[combination], window)
             row[0].plot(part[TIME], part[channel], color=COLOURS[number], linewidth=0.9, label=label)
-            part = frame[frame[TIME] >= 260.0]
+            part = _within(full[combination], (260.0, np.inf))
             frequency, density = spectrum(part[TIME], part[channel], segment=100.0)
             row[1].semilogy(frequency[1:], density[1:], color=COLOURS[number], linewidth=0.9)
         row[1].set_xlim(0.0, 0.7)
-        row[0].set_ylabel(LABELS[channel], fontsize=9, color=INK)
+        _label(row[0].set_ylabel, LABELS[channel])
         row[0].margins(x=0.0)
-    lines, labels = figure.axes[0].get_legend_handles_labels()
+    lines, labels = panels[0, 0].get_legend_handles_labels()
     figure.legend(lines, labels, fontsize=8, frameon=False, loc="outside upper center", ncols=2)
-    figure.axes[-2].set_xlabel("time (s)", fontsize=9, color=INK)
-    figure.axes[-1].set_xlabel("frequency (Hz), power density per Hz", fontsize=9, color=INK)
+    _label(panels[-1, 0].set_xlabel, "time (s)")
+    _label(panels[-1, 1].set_xlabel, "frequency (Hz), power density per Hz")
     return save_figure(figure, path)
 
 
-def claims_table(study):
-    """Markdown table of the claims with their verdicts."""
-    rows = [(claim.figure, claim.text, claim.found, _verdict(claim)) for claim in study.claims]
-    return markdown_table(("figure", "claim of the paper", "found here", "verdict"), rows)
-
-
-def _verdict(claim):
-    return "holds" if claim.holds else "FAILS"
-
-
 def double_frequency_table(full):
-    """Markdown table of second over first harmonics for the four combinations."""
+    """Return a Markdown table of second over first harmonics for the four combinations."""
     ratios = ("surge, 2nd/1st", "pitch, 2nd/1st")
     header = ("position", "surface", "surge (m)", "pitch (deg)", *ratios, "theory.md")
     rows = []
@@ -177,7 +168,7 @@ def double_frequency_table(full):
 
 
 def statistics_table(runs):
-    """Markdown table of pitch and surge per case."""
+    """Return a Markdown table of pitch and surge per case."""
     table = load_cases.statistics(runs)
     surge = ("surge mean", "std", "min", "max (m)")
     header = ("case", "pitch mean", "std", "min", "max (deg)", *surge, "thrust mean (N)")
@@ -192,19 +183,19 @@ def statistics_table(runs):
 
 
 def periods_table():
-    """Markdown table of the natural periods of the 1:50 model against Table 1."""
+    """Return a Markdown table of the natural periods of the 1:50 model against Table 1."""
     published = read_platform(load_cases.PLATFORM).published["natural_periods"]
     rows = []
     scene = fowt_env.build_scene(load_cases.PLATFORM, fidelity="reference")
     for motion, period in fowt_env.natural_periods(scene).items():
-        wanted = published[motion.removeprefix("platform_")]
-        difference = f"{100.0 * (period / wanted - 1.0):+.2f} %"
-        rows.append((motion, f"{wanted:.2f}", f"{period:.3f}", difference))
+        printed = published[motion.removeprefix("platform_")]
+        difference = f"{100.0 * (period / printed - 1.0):+.2f} %"
+        rows.append((motion, f"{printed:.2f}", f"{period:.3f}", difference))
     return markdown_table(("motion", "paper, computed (s)", "here (s)", "difference"), rows)
 
 
 def write_paper_report(study, folder, plot=True):
-    """Write everything that a study holds into a folder; returns the paths."""
+    """Write everything of a study into a folder; return the paths."""
     folder = Path(folder)
     written = f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}"
     paths, text = [], ["# Every claim of the paper", "", f"{written}: `fowt paper all,full_scale`.", ""]
@@ -213,7 +204,9 @@ def write_paper_report(study, folder, plot=True):
             paths.append(Path(write_table(frame, folder / "runs" / f"{case}.parquet")))
         paths.append(Path(write_table(load_cases.statistics(study.runs), folder / "statistics.csv")))
         text += ["## Natural periods of the 1:50 model", "", periods_table(), "", "## Claims", ""]
-        text += [claims_table(study), "", "## Statistics, model scale", "", statistics_table(study.runs), ""]
+        rows = [(c.figure, c.text, c.found, "holds" if c.holds else "FAILS") for c in study.claims]
+        text += [markdown_table(("figure", "claim of the paper", "found here", "verdict"), rows), ""]
+        text += ["## Statistics, model scale", "", statistics_table(study.runs), ""]
     if study.full:
         text += ["## Double frequency, H 3 m, T 5 s, full scale", "", double_frequency_table(study.full), ""]
     with replacing(folder / "paper.md") as temporary:
@@ -223,7 +216,7 @@ def write_paper_report(study, folder, plot=True):
 
 
 def _plots(study, folder):
-    """Paths of all plots."""
+    """Write all plots; return their paths."""
     made = {}
     if study.runs:
         natural = load_cases.natural_frequencies()

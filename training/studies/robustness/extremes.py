@@ -1,6 +1,8 @@
 """Extreme events on the running or parked turbine, and hostile actions on the environment."""
 
+from collections import Counter
 from dataclasses import dataclass, field
+from itertools import product
 from math import isfinite, pi
 
 import numpy as np
@@ -31,7 +33,7 @@ HOSTILE_STEPS = 3000  # control periods of each hostile policy: five minutes
 
 @dataclass(frozen=True)
 class Extreme:
-    """One extreme run. What happens from `at` on: a fault's name in FAULTS, or nothing but the weather."""
+    """One extreme run: its weather, and the fault (a name of FAULTS or "line loss") that happens at EVENT."""
 
     group: str
     wind: object
@@ -42,55 +44,39 @@ class Extreme:
     duration: float = DURATION
 
 
-def feather(command, turbine, held):
-    """Emergency stop: no torque, blades to feather as fast as the actuator goes."""
-    return 0.0, turbine.pitch_drive.maximum
-
-
-def no_torque(command, turbine, held):
-    """Grid loss: no torque, the pitch controller goes on."""
-    return 0.0, command[1]
-
-
-def no_torque_no_pitch(command, turbine, held):
-    """Grid loss with the blades left where they are."""
-    return 0.0, held
-
-
-def stuck(command, turbine, held):
-    """Stuck blades: torque goes on, the blade pitch stays."""
-    return command[0], held
-
-
-FAULTS = {
-    "emergency stop": feather,
-    "grid loss": no_torque,
-    "grid loss, no pitch action": no_torque_no_pitch,
-    "stuck pitch": stuck,
+FAULTS = {  # name: command (torque, pitch) from the controller's, the drive's maximum and the pitch at EVENT
+    "emergency stop": lambda command, feathered, held: (0.0, feathered),  # as fast as the actuator goes
+    "grid loss": lambda command, feathered, held: (0.0, command[1]),
+    "grid loss, no pitch action": lambda command, feathered, held: (0.0, held),
+    "stuck pitch": lambda command, feathered, held: (command[0], held),
 }
 
 
+def _etm(speed):
+    return {"kind": "etm", "speed": speed, "class": "A"}
+
+
+def _gust(kind, speed, **settings):
+    return {"kind": kind, "speed": speed, "start": EVENT, **settings}
+
+
 def _gusts():
-    """Gust runs: every kind at the speeds where it hurts."""
-    found = {}
-    for speed in (10.0, 11.4, 13.0, 25.0):
-        found[f"EOG {speed:g} m/s"] = Extreme("EOG", {"kind": "eog", "speed": speed, "start": EVENT})
+    """Return gust runs: every kind at the speeds where it hurts."""
+    found = {f"EOG {u:g} m/s": Extreme("EOG", _gust("eog", u)) for u in (10.0, 11.4, 13.0, 25.0)}
     for speed in (6.0, 12.0, 25.0):
         for sign in (1, -1):
-            wind = {"kind": "ecd", "speed": speed, "start": EVENT, "sign": sign}
-            found[f"ECD {speed:g} m/s, sign {sign:+d}"] = Extreme("ECD", wind)
+            name = f"ECD {speed:g} m/s, sign {sign:+d}"
+            found[name] = Extreme("ECD", _gust("ecd", speed, sign=sign))
     for way in ("vertical", "horizontal"):
         for sign in (1, -1):
             for speed in (12.0, 25.0):
-                wind = {"kind": "ews", "speed": speed, "start": EVENT, "sign": sign, "orientation": way}
+                wind = _gust("ews", speed, sign=sign, orientation=way)
                 found[f"EWS {speed:g} m/s, {way} {sign:+d}"] = Extreme("EWS", wind)
-    for speed in (12.0, 18.0, 25.0):
-        found[f"ETM {speed:g} m/s"] = Extreme("ETM", {"kind": "etm", "speed": speed, "class": "A"})
-    return found
+    return found | {f"ETM {u:g} m/s": Extreme("ETM", _etm(u)) for u in (12.0, 18.0, 25.0)}
 
 
 def _storms():
-    """Parked and idling in the 50-year storm from several sides, and in waves about to break."""
+    """Return runs parked and idling in the 50-year storm from several sides, and in waves about to break."""
     found = {}
     for direction in (0.0, 45.0, 90.0, 180.0):
         wind = STORM_WIND | {"direction": direction}
@@ -107,32 +93,28 @@ def _storms():
 
 
 def _faults():
-    """Faults in mid-run."""
+    """Return runs with a fault at EVENT."""
     found = {}
-    etm = {"kind": "etm", "speed": 18.0, "class": "A"}
     for line in range(3):
-        storm = Extreme("line loss", STORM_WIND, STORM_SEA, parked=True, fault="line loss", line=line)
+        lost = {"fault": "line loss", "line": line}
+        storm = Extreme("line loss", STORM_WIND, STORM_SEA, parked=True, **lost)
         found[f"line {line + 1} lost in the 50-year storm, parked"] = storm
-        found[f"line {line + 1} lost at 18 m/s ETM, operating"] = Extreme(
-            "line loss", etm, fault="line loss", line=line
-        )
+        found[f"line {line + 1} lost at 18 m/s ETM, operating"] = Extreme("line loss", _etm(18.0), **lost)
     for fault in FAULTS:
         group = "grid loss" if fault.startswith("grid") else fault
         for speed in (11.4, 18.0, 25.0):
-            wind = {"kind": "etm", "speed": speed, "class": "A"}
-            found[f"{fault} at {speed:g} m/s ETM"] = Extreme(group, wind, fault=fault)
-    gust = {"kind": "eog", "speed": 13.0, "start": EVENT}
-    found["grid loss in EOG 13 m/s"] = Extreme("grid loss", gust, fault="grid loss")
-    found["emergency stop in EOG 13 m/s"] = Extreme("emergency stop", gust, fault="emergency stop")
-    found["stuck pitch in EOG 13 m/s"] = Extreme("stuck pitch", gust, fault="stuck pitch")
+            found[f"{fault} at {speed:g} m/s ETM"] = Extreme(group, _etm(speed), fault=fault)
+    for fault in ("grid loss", "emergency stop", "stuck pitch"):
+        found[f"{fault} in EOG 13 m/s"] = Extreme(fault, _gust("eog", 13.0), fault=fault)
     return found
 
 
 EXTREMES = {**_gusts(), **_storms(), **_faults()}
+PEAKS = ("rotor_rpm", "tilt_deg", "yaw_deg", "offset_m", "heave_m", "tension_MN")
 
 
 def without_line(scene, line):
-    """The scene with one mooring line (0, 1, ..) gone, the others solved as catenaries.
+    """Return the scene with one mooring line (0, 1, ..) gone, the others solved as catenaries.
 
     Raises: InputError if there is no such line.
     """
@@ -154,66 +136,61 @@ class _ExtremeRun:
             self.x[State.ROTOR_SPEED] = self.u[Command.GENERATOR_TORQUE] = 0.0
             self.x[State.BLADE_PITCH] = self.u[Command.BLADE_PITCH] = scene.turbine.pitch_drive.maximum
             self.scene = scene.with_model({"rigid_body.rotor_fixed": True})
-        elif self.x[State.ROTOR_SPEED] > 0.0:  # beyond cut-out the trim idles feathered without control
+        elif self.x[State.ROTOR_SPEED] > 0.0:  # above cut-out the trim idles feathered without control
             self.controller = make("pi", scene.turbine, CONTROL_DT)
-        self.dx, self.measurement = np.zeros_like(self.x), np.zeros(N_MEASUREMENTS)
         self.peak = dict.fromkeys(PEAKS, 0.0)
-        self.held = None  # blade pitch at the fault
 
     def go(self):
-        """(status, time reached) of the whole run."""
-        dt, data = self.dt, self.scene.data()
+        """Run to the end or to a stop; return (status, time reached)."""
+        x, u, dt, case, controller = self.x, self.u, self.dt, self.case, self.controller
+        dx, row = np.zeros_like(x), np.zeros(N_MEASUREMENTS)
+        data = self.scene.data()
         handle = self.scene.handle(data)
-        per_control = round(CONTROL_DT / dt)
-        fault = FAULTS.get(self.case.fault)
+        per_control, feathered = round(CONTROL_DT / dt), self.scene.turbine.pitch_drive.maximum
+        held = None  # blade pitch at the fault
         forget(handle)
-        observe(handle, self.x, self.u, 0.0, self.dx, self.measurement)
-        if self.controller is not None:
-            self.controller.reset(Measurement(*self.measurement.tolist()))
-        for period in range(round(self.case.duration / CONTROL_DT)):
+        observe(handle, x, u, 0.0, dx, row)
+        if controller is not None:
+            controller.reset(Measurement(*row.tolist()))
+        for period in range(round(case.duration / CONTROL_DT)):
             step = period * per_control
-            happened = step * dt >= EVENT - 1e-9
-            if happened and self.case.fault == "line loss" and self.held is None:
-                self.held = 0.0
-                self.scene = without_line(self.scene, self.case.line)
-                data = self.scene.data()
-                handle = self.scene.handle(data)
-            observe(handle, self.x, self.u, step * dt, self.dx, self.measurement)
+            begins = case.fault and held is None and step * dt >= EVENT - 1e-9
+            if begins:
+                held = float(x[State.BLADE_PITCH])
+                if case.fault == "line loss":
+                    self.scene = without_line(self.scene, case.line)
+                    data = self.scene.data()
+                    handle = self.scene.handle(data)
+            observe(handle, x, u, step * dt, dx, row)
             self.note(data.lines)
-            if self.controller is not None:
-                self.u[:] = self.controller.act(Measurement(*self.measurement.tolist()))
-            if happened and fault is not None:
-                if self.held is None:
-                    self.held = float(self.x[State.BLADE_PITCH])
-                self.u[:] = fault(self.u, self.scene.turbine, self.held)
-            status = advance(handle, self.x, self.u, step, per_control, dt)
+            if controller is not None:
+                u[:] = controller.act(Measurement(*row.tolist()))
+            if held is not None and case.fault in FAULTS:
+                u[:] = FAULTS[case.fault](u, feathered, held)
+            status = advance(handle, x, u, step, per_control, dt)
             if status != RUNNING:
                 return status, (step + per_control) * dt
-        return RUNNING, self.case.duration
+        return RUNNING, case.duration
 
     def note(self, lines):
         """Add the present instant to the peaks."""
         x = self.x
-        values = {
-            "rotor_rpm": abs(x[State.ROTOR_SPEED]) / RPM,
-            "tilt_deg": max(abs(x[State.ROLL]), abs(x[State.PLATFORM_PITCH])) / DEGREE,
-            "yaw_deg": abs(x[State.YAW]) / DEGREE,
-            "offset_m": float(np.hypot(x[State.SURGE], x[State.SWAY])),
-            "heave_m": abs(x[State.HEAVE]),
-            "tension_MN": float(lines[:, 2].max()) * 1e-6,
-        }
-        for name, value in values.items():
-            self.peak[name] = max(self.peak[name], value)
-
-
-PEAKS = ("rotor_rpm", "tilt_deg", "yaw_deg", "offset_m", "heave_m", "tension_MN")
+        values = (
+            abs(x[State.ROTOR_SPEED]) / RPM,
+            max(abs(x[State.ROLL]), abs(x[State.PLATFORM_PITCH])) / DEGREE,
+            abs(x[State.YAW]) / DEGREE,
+            float(np.hypot(x[State.SURGE], x[State.SWAY])),
+            abs(x[State.HEAVE]),
+            float(lines[:, 2].max()) * 1e-6,
+        )
+        self.peak = {name: max(self.peak[name], value) for name, value in zip(PEAKS, values, strict=True)}
 
 
 def run_extreme(name, fidelity="standard", seed=1, finer=1, scene=None):
-    """Row (dict) of one of EXTREMES: peaks, verdict, and the scene it ran in.
+    """Return the row (dict) of one of EXTREMES: its peaks and its verdict.
 
     finer: the physics step is the default's finer-th. The verdict names the reason of a stop, and
-    an overspeed beyond the turbine's limit, which an environment would end the episode for.
+    an overspeed above the turbine's limit, for which an environment would end the episode.
     """
     case = EXTREMES[name]
     if scene is None:
@@ -230,21 +207,20 @@ def run_extreme(name, fidelity="standard", seed=1, finer=1, scene=None):
 
 
 def extremes(names=None, fidelity="standard", seed=1, compare=True, progress=None):
-    """DataFrame with a row per extreme; step_change: worst relative change of a peak with half the step.
+    """Return a DataFrame with a row per extreme.
 
-    compare: whether to run each again with half the step.
+    step_change: worst relative change of a peak with half the step, with which each runs again if compare.
     """
     names = list(names or EXTREMES)
-    rows, bases = [], {}
+    rows, base = [], None
     for done, name in enumerate(names):
         if progress is not None:
             progress(f"extremes: {name}", done, len(names))
         case = EXTREMES[name]
-        if "scene" not in bases:
-            bases["scene"] = build_scene(
-                wind=case.wind, sea=case.sea, seed=seed, fidelity=fidelity, duration=DURATION
-            )
-        scene = bases["scene"].with_weather(case.wind, case.sea, seed)
+        weather = {"wind": case.wind, "sea": case.sea, "seed": seed}
+        if base is None:
+            base = build_scene(**weather, fidelity=fidelity, duration=DURATION)
+        scene = base.with_weather(**weather)
         row = run_extreme(name, seed=seed, scene=scene)
         row["step_change"] = float("nan")
         if compare and row["verdict"].startswith("finite"):
@@ -254,15 +230,8 @@ def extremes(names=None, fidelity="standard", seed=1, compare=True, progress=Non
     return pd.DataFrame(rows)
 
 
-class Hostile:
-    """A policy that means harm: its name, and actions (2,) from the step and a generator."""
-
-    def __init__(self, name, act):
-        self.name, self.act = name, act
-
-
 def _bang(first, second):
-    """Full swings every control period of the chosen channels, the others at rest."""
+    """Return full swings every control period of the chosen channels, the others at rest."""
     swing = np.array([first, second], dtype=float)
     return lambda step, rng: swing * (1.0 if step % 2 == 0 else -1.0)
 
@@ -272,47 +241,47 @@ def _constant(first, second):
     return lambda step, rng: action
 
 
-POLICIES = (
-    Hostile("bang-bang at Nyquist, both", _bang(1, 1)),
-    Hostile("bang-bang at Nyquist, opposed", _bang(1, -1)),
-    Hostile("bang-bang at Nyquist, torque", _bang(1, 0)),
-    Hostile("bang-bang at Nyquist, pitch", _bang(0, 1)),
-    *(Hostile(f"constant ({a:+d}, {b:+d})", _constant(a, b)) for a in (-1, 1) for b in (-1, 1)),
-    Hostile("uniform random", lambda step, rng: rng.uniform(-1.0, 1.0, 2)),
-    Hostile("random corners", lambda step, rng: rng.choice([-1.0, 1.0], 2)),
-    Hostile("platform-pitch resonance", lambda step, rng: np.full(2, np.sign(np.sin(step * 0.1 * 0.21)))),
-    Hostile("far beyond the range", lambda step, rng: rng.choice([-1e300, 1e300, 1e9], 2)),
-)
+POLICIES = {  # name: action (2,) from the step and a generator
+    "bang-bang at Nyquist, both": _bang(1, 1),
+    "bang-bang at Nyquist, opposed": _bang(1, -1),
+    "bang-bang at Nyquist, torque": _bang(1, 0),
+    "bang-bang at Nyquist, pitch": _bang(0, 1),
+    **{f"constant ({a:+d}, {b:+d})": _constant(a, b) for a in (-1, 1) for b in (-1, 1)},
+    "uniform random": lambda step, rng: rng.uniform(-1.0, 1.0, 2),
+    "random corners": lambda step, rng: rng.choice([-1.0, 1.0], 2),
+    "platform-pitch resonance": lambda step, rng: np.full(2, np.sign(np.sin(step * 0.1 * 0.21))),
+    "far beyond the range": lambda step, rng: rng.choice([-1e300, 1e300, 1e9], 2),
+}
 REFUSED = ((np.nan, 0.0), (0.0, np.nan), (np.inf, 0.0), (0.0, -np.inf), (np.nan, np.inf))
 
 
 def attack(env, policy, seed, steps=HOSTILE_STEPS):
-    """Row (dict) of a hostile policy on an environment: periods, ends by reason, whether all was finite."""
+    """Return the row (dict) of a policy: periods, ends by reason, whether all was finite."""
     rng = np.random.default_rng(seed)
     observation, _ = env.reset(seed=seed)
     finite = bool(np.all(np.isfinite(observation)))
-    reasons, resets = {}, 0
+    reasons, resets = Counter(), 0
     for step in range(steps):
-        observation, reward, terminated, truncated, info = env.step(policy.act(step, rng))
+        observation, reward, terminated, truncated, info = env.step(POLICIES[policy](step, rng))
         finite = finite and bool(np.all(np.isfinite(observation))) and isfinite(reward)
         if terminated:
-            reasons[info["termination"]] = reasons.get(info["termination"], 0) + 1
+            reasons[info["termination"]] += 1
         elif not np.all(np.isfinite(env.view().state)):
             finite = False
         if terminated or truncated:
             resets += 1
             env.reset(seed=seed + resets)
-    return {"policy": policy.name, "steps": steps, "ends": reasons, "finite": finite}
+    return {"policy": policy, "steps": steps, "ends": dict(reasons), "finite": finite}
 
 
 def _alike(a, b):
-    """Whether two arrays of snapshots, or None, are equal; NaN, which a baseline is not given, equals NaN."""
+    """Return whether two arrays of snapshots, or None, are equal; NaN, as of hidden readings, equals NaN."""
     floats = a is not None and a.dtype.kind == "f"
     return np.array_equal(a, b, equal_nan=floats)
 
 
 def refused_alike(env, seed):
-    """Number of unusable actions that were refused with the state left as it was, of len(REFUSED)."""
+    """Return how many of the unusable actions REFUSED were refused with the state left as it was."""
     env.reset(seed=seed)
     env.step(np.zeros(2))
     count = 0
@@ -327,25 +296,19 @@ def refused_alike(env, seed):
 
 
 def hostile(
-    modes=("direct", "setpoint", "residual"),
-    tasks=("above_rated", "full_range"),
-    steps=HOSTILE_STEPS,
-    policies=POLICIES,
+    modes=("direct", "setpoint", "residual"), tasks=("above_rated", "full_range"), steps=HOSTILE_STEPS,
     progress=None,
-):
-    """DataFrame with a row per task, action mode and policy, and one for actions that are no numbers."""
+):  # fmt: skip
+    """Return a DataFrame: a row per task, action mode and policy, and one for actions that are no numbers."""
     rows = []
-    total = len(modes) * len(tasks)
-    for task in tasks:
-        for mode in modes:
-            if progress is not None:
-                progress(f"hostile actions: {task}, {mode}", len(rows) // (len(policies) + 1), total)
-            env = FowtEnv(task=task, action_mode=mode)
-            for number, policy in enumerate(policies):
-                rows.append({"task": task, "mode": mode} | attack(env, policy, 1000 * number, steps))
-            count = refused_alike(env, 7)
-            rows.append({
-                "task": task, "mode": mode, "policy": "NaN and infinity", "steps": len(REFUSED),
-                "ends": {"refused, state untouched": count}, "finite": count == len(REFUSED),
-            })  # fmt: skip
+    for done, (task, mode) in enumerate(product(tasks, modes)):
+        if progress is not None:
+            progress(f"hostile actions: {task}, {mode}", done, len(modes) * len(tasks))
+        env = FowtEnv(task=task, action_mode=mode)
+        found = [attack(env, policy, 1000 * number, steps) for number, policy in enumerate(POLICIES)]
+        count = refused_alike(env, 7)
+        ends = {"refused, state untouched": count}
+        found.append({"policy": "NaN and infinity", "steps": len(REFUSED), "ends": ends,
+                      "finite": count == len(REFUSED)})  # fmt: skip
+        rows += [{"task": task, "mode": mode} | row for row in found]
     return pd.DataFrame(rows)

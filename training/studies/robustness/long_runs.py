@@ -2,7 +2,6 @@
 
 import resource
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,28 +10,25 @@ from scipy.spatial.transform import Rotation
 
 from fowt_env.envs import FowtEnv
 from fowt_env.plant.advance import RUNNING, advance, forget, observe
-from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, Adams, build_integrator
+from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, Adams
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import N_COMMANDS, N_RIGID, State
 from fowt_env.run.initial_conditions import initial_state
 from fowt_env.scene.build import build_scene
-from fowt_env.training.studies.robustness.random_cases import Runner, platform_energy, potential_energy
+from fowt_env.training.studies.robustness.random_cases import (
+    Runner,
+    platform_energy,
+    potential_energy,
+    with_integrator,
+)
 
 CHUNK = 100_000  # steps between looks at the invariants
 WEATHER_SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 
 
-def with_integrator(scene, name, rotor_samples=1):
-    """The scene with another integrator, ab4 with that many rotor loads per step."""
-    return replace(
-        scene.with_model(integrator=build_integrator(name, rotor_samples)),
-        options=scene.options | {"integrator": name},
-    )
-
-
 def free_scene():
-    """The turbine in empty space without weight and without losses in the shaft."""
+    """Return the turbine in empty space without weight and without losses in the shaft."""
     scene = build_scene(hydrodynamics=False, mooring=False, fidelity="reference")
     model = scene.model
     shaft = model.drivetrain._replace(bearing_loss_coefficient=0.0, mesh_loss=0.0)
@@ -40,7 +36,7 @@ def free_scene():
 
 
 def floating_scene():
-    """The turbine afloat on its lines in still water without drag, damping and fluid inertia."""
+    """Return the turbine afloat on its lines in still water without drag, damping and fluid inertia."""
     scene = build_scene(fidelity="reference")
     model = scene.model
     shape = model.hydro.strips.shape._replace(
@@ -52,7 +48,7 @@ def floating_scene():
 
 
 def free_start():
-    """State (N_RIGID,) of a body that drifts, nutates and keeps its pitch off the singular 90 deg."""
+    """Return the state (N_RIGID,) of a body that drifts and nutates, its pitch off the singular 90 deg."""
     x = np.zeros(N_RIGID)
     x[3:6] = 0.2, -0.15, 0.4
     x[7:10] = 0.1, 0.05, -0.08
@@ -61,28 +57,20 @@ def free_start():
     return x
 
 
-def floating_start():
-    """State (N_RIGID,) of a platform set free at an offset, with its rotor turning."""
-    x = np.zeros(N_RIGID)
-    x[:6] = 5.0, 2.0, 0.5, 0.02, 0.06, 0.03
-    x[State.ROTOR_SPEED] = 1.2671
-    return x
-
-
 def kinetic_energy(scene, x):
-    """Kinetic energy of platform and rotor, J."""
+    """Return the kinetic energy of platform and rotor, J."""
     body, speed = scene.model.rigid_body, x[State.ROTOR_SPEED]
     spin = 0.5 * body.rotor_row * speed**2 + body.coupling * speed * x[State.WX]
     return platform_energy(x, body.mass_matrix) + spin
 
 
 def rotation(x):
-    """Rotation of the platform, body to inertial axes."""
+    """Return the rotation of the platform, body to inertial axes."""
     return Rotation.from_euler("ZYX", [x[State.YAW], x[State.PLATFORM_PITCH], x[State.ROLL]])
 
 
 def momenta(scene, x):
-    """(linear, angular about the inertial origin) momentum of the whole turbine, inertial axes, (3,) each."""
+    """Return (linear, angular about the origin) momentum of the turbine, inertial axes, (3,) each."""
     body, turn = scene.model.rigid_body, rotation(x)
     body_momentum = body.mass_matrix @ x[7:13]
     body_momentum[3] += body.coupling * x[State.ROTOR_SPEED]
@@ -91,7 +79,7 @@ def momenta(scene, x):
 
 
 def own_momenta(scene, x):
-    """(linear, angular about the centre of mass) momentum, inertial axes: both constant in free flight."""
+    """Return (linear, angular about the centre of mass) momentum, inertial axes: constant in free flight."""
     linear, angular = momenta(scene, x)
     body = scene.model.rigid_body
     centre = x[:3] + rotation(x).apply([body.s_x / body.mass, 0.0, body.s_z / body.mass])
@@ -99,56 +87,56 @@ def own_momenta(scene, x):
 
 
 def free_drift(integrator, steps, dt=None, progress=None):
-    """{energy, linear, angular: largest relative change; status} of the free body over so many steps."""
-    scene = with_integrator(free_scene(), integrator)
-    dt = INTEGRATORS[integrator].dt if dt is None else dt
-    x, u, handle = free_start(), np.zeros(N_COMMANDS), scene.handle()
-    energy0, (linear0, angular0) = kinetic_energy(scene, x), own_momenta(scene, x)
-    drift = {"energy": 0.0, "linear": 0.0, "angular": 0.0}
-    forget(handle)
-    status, done = RUNNING, 0
-    while done < steps and status == RUNNING:
-        n = min(CHUNK, steps - done)
-        status = advance(handle, x, u, done, n, dt)
-        done += n
-        linear, angular = own_momenta(scene, x)
-        drift["energy"] = max(drift["energy"], abs(kinetic_energy(scene, x) / energy0 - 1.0))
-        drift["linear"] = max(drift["linear"], _relative(linear, linear0))
-        drift["angular"] = max(drift["angular"], _relative(angular, angular0))
-        if progress is not None:
-            progress(f"free body, {integrator}", done, steps)
-    return drift | {"status": int(status), "steps": done}
+    """Return {energy, linear, angular: largest relative change; status, steps} of the free body."""
+    scene, x = free_scene(), free_start()
+    energy0, momenta0 = kinetic_energy(scene, x), own_momenta(scene, x)
 
+    def changes(handle, x):
+        found = [abs(kinetic_energy(scene, x) / energy0 - 1.0)]
+        for vector, first in zip(own_momenta(scene, x), momenta0, strict=True):
+            found.append(float(np.linalg.norm(vector - first) / np.linalg.norm(first)))
+        return dict(zip(("energy", "linear", "angular"), found, strict=True))
 
-def _relative(vector, first):
-    return float(np.linalg.norm(vector - first) / np.linalg.norm(first))
+    handle = with_integrator(scene, integrator).handle()
+    return _drift(changes, handle, x, integrator, steps, dt, "free body", progress)
 
 
 def floating_drift(integrator, steps, dt=None, progress=None):
-    """{energy: largest change over that of the motion; status} of the undamped floating body.
+    """Return {energy: largest change over that of the motion; status, steps} of the undamped floating body.
 
     The energy of the motion is kinetic (without the rotor's spin) and potential energy above rest.
     """
-    scene = with_integrator(floating_scene(), integrator)
-    dt = INTEGRATORS[integrator].dt if dt is None else dt
-    x, u, handle = floating_start(), np.zeros(N_COMMANDS), scene.handle()
+    scene, x = floating_scene(), np.zeros(N_RIGID)
+    x[:6], x[State.ROTOR_SPEED] = (5.0, 2.0, 0.5, 0.02, 0.06, 0.03), 1.2671  # set free at an offset
+    handle = with_integrator(scene, integrator).handle()
     start = kinetic_energy(scene, x) + potential_energy(handle, x)
     moving = potential_energy(handle, x) - potential_energy(handle, np.zeros(N_RIGID))
+
+    def changes(handle, x):
+        now = kinetic_energy(scene, x) + potential_energy(handle, x)
+        return {"energy": abs(now - start) / moving}
+
+    return _drift(changes, handle, x, integrator, steps, dt, "floating body", progress)
+
+
+def _drift(changes, handle, x, integrator, steps, dt, words, progress):
+    """Advance a body by so many steps; return {name: largest of changes(handle, x); status, steps}."""
+    dt = INTEGRATORS[integrator].dt if dt is None else dt
+    u, largest, status, done = np.zeros(N_COMMANDS), {}, RUNNING, 0
     forget(handle)
-    worst, status, done = 0.0, RUNNING, 0
     while done < steps and status == RUNNING:
         n = min(CHUNK, steps - done)
         status = advance(handle, x, u, done, n, dt)
         done += n
-        now = kinetic_energy(scene, x) + potential_energy(handle, x)
-        worst = max(worst, abs(now - start) / moving)
+        for name, change in changes(handle, x).items():
+            largest[name] = max(largest.get(name, 0.0), change)
         if progress is not None:
-            progress(f"floating body, {integrator}", done, steps)
-    return {"energy": worst, "status": int(status), "steps": done}
+            progress(f"{words}, {integrator}", done, steps)
+    return largest | {"status": int(status), "steps": done}
 
 
 def resident():
-    """Resident memory of this process, MB; its largest so far where the system does not tell the present."""
+    """Return the resident memory of this process, MB, or its largest so far where that is all there is."""
     statm = Path("/proc/self/statm")
     if statm.is_file():
         return int(statm.read_text().split()[1]) * resource.getpagesize() / 1e6
@@ -157,7 +145,7 @@ def resident():
 
 
 def plant_memory(steps, progress=None):
-    """{growth_MB, status, steps}: memory after a tenth of the steps of the full plant and after all."""
+    """Return {growth_MB, status, steps}: memory of the full plant after all steps less after a tenth."""
     scene = build_scene(
         wind={"kind": "ntm", "speed": 18.0, "class": "B"}, sea=WEATHER_SEA, fidelity="standard", seed=1
     )
@@ -177,7 +165,7 @@ def plant_memory(steps, progress=None):
 
 
 def environment_memory(steps, progress=None):
-    """{growth_MB, steps, resets} of an environment with episodes of 20 s, after a tenth and after all."""
+    """Return {growth_MB, steps, resets} of an environment with episodes of 20 s, likewise."""
     env = FowtEnv(duration=20.0)
     env.reset(seed=0)
     first, resets = None, 0
@@ -194,7 +182,7 @@ def environment_memory(steps, progress=None):
 
 
 def measured_orders(duration=20.0, steps=(0.1, 0.05, 0.025), finest=0.003125):
-    """{integrator: order of convergence} in a regular wave, from the error at the two smallest steps.
+    """Return {integrator: order of convergence} in a regular wave, from the error at the two smallest steps.
 
     Without drag, whose |u| u is not smooth where the flow turns. The Adams methods get the derivatives of
     their first three steps from the fine run: their own starting steps are of lower order, which leaves
@@ -206,26 +194,24 @@ def measured_orders(duration=20.0, steps=(0.1, 0.05, 0.025), finest=0.003125):
     rows = np.r_[0:6, 7:13]
     exact_scene = with_integrator(base, "rk4")
 
-    def exact(time):
-        x, handle = x0.copy(), exact_scene.handle()
+    def advanced(scene, steps, dt):
+        x, handle = x0.copy(), scene.handle()
         forget(handle)
-        advance(handle, x, u, 0, round(time / finest), finest)
+        advance(handle, x, u, 0, steps, dt)
         return x
+
+    def exact(time):
+        return advanced(exact_scene, round(time / finest), finest)
 
     def end(name, dt):
         scene = with_integrator(base, name)
         if not isinstance(scene.model.integrator, Adams):
-            x, handle = x0.copy(), scene.handle()
-            forget(handle)
-            advance(handle, x, u, 0, round(duration / dt), dt)
-            return x[rows]
+            return advanced(scene, round(duration / dt), dt)[rows]
         data = scene.data()
-        handle = scene.handle(data)
+        handle, unread = scene.handle(data), np.zeros(N_MEASUREMENTS)
         for k in range(START_STEPS):
             forget(handle)
-            observe(
-                handle, exact(k * dt), u, k * dt, data.history[START_STEPS - 1 - k], np.zeros(N_MEASUREMENTS)
-            )
+            observe(handle, exact(k * dt), u, k * dt, data.history[START_STEPS - 1 - k], unread)
         forget(handle)
         data.cache[LoadCache.STEPS] = START_STEPS
         x = exact(START_STEPS * dt)
@@ -241,7 +227,7 @@ def measured_orders(duration=20.0, steps=(0.1, 0.05, 0.025), finest=0.003125):
 
 
 def quaternion_difference(duration=60.0, integrator="rk4", dt=None):
-    """(largest entry by which the rotation matrices differ, rad turned): Euler angles against a quaternion.
+    """Return (largest difference of rotation matrices, rad turned): Euler angles against a quaternion.
 
     A body tumbling in free space by the plant's own step, and its twin whose attitude is a quaternion
     integrated by an eighth-order method; body rates come from the plant's equation of motion in both.

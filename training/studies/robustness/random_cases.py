@@ -49,7 +49,7 @@ AGREE = 0.1  # relative difference of peak energies up to which they are the pla
 
 @kernel
 def platform_energy(x, mass_matrix):
-    """Kinetic energy of the platform's six motions (rotor turning with it), J."""
+    """Return the kinetic energy of the platform's six motions (rotor turning with it), J."""
     total = 0.0
     for i in range(6):
         for j in range(6):
@@ -57,19 +57,22 @@ def platform_energy(x, mass_matrix):
     return total
 
 
-@kernel
-def _run_case(
-    model, data, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt,
-    peak,
-):  # fmt: skip
-    for i in range(peak.shape[0]):
-        peak[i] = 0.0
+@entry
+def run_random_case(
+    handle, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
+):
+    """Advance x by last steps of dt; return (status, steps done).
+
+    Open loop where commands (k, 2) has rows, each held for per_segment steps; else the law act, called
+    every per_control steps. peak (4,) becomes the largest platform kinetic energy (J), roll or pitch (rad),
+    distance from the origin (m) and rotor speed (rad/s).
+    """
+    model, data = model_of(handle), data_of(handle)
     for step in range(last):
         if commands.shape[0] > 0:
             if step % per_segment == 0:
                 row = min(step // per_segment, commands.shape[0] - 1)
-                u[Command.GENERATOR_TORQUE] = commands[row, 0]
-                u[Command.BLADE_PITCH] = commands[row, 1]
+                u[Command.GENERATOR_TORQUE], u[Command.BLADE_PITCH] = commands[row, 0], commands[row, 1]
         elif step % per_control == 0:
             rates(step * dt, x, u, model, data, dx)
             measure(model, data, x, dx, u, step * dt, measurement)
@@ -85,37 +88,33 @@ def _run_case(
     return RUNNING, last
 
 
-@entry
-def run_random_case(
-    handle, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
-):
-    """Advance x by last steps of dt; returns (status, steps done).
-
-    Open loop where commands (k, 2) has rows, each held for per_segment steps; else the law act, called
-    every per_control steps. peak (4,): largest platform kinetic energy (J), roll or pitch (rad), distance
-    from the origin (m) and rotor speed (rad/s).
-    """
-    return _run_case(
-        model_of(handle), data_of(handle), x, u, act, parameters, memory, measurement, dx, commands,
-        per_control, per_segment, last, dt, peak,
-    )  # fmt: skip
-
-
 @dataclass
 class Outcome:
-    """What a case did."""
+    """Result of a case."""
 
     status: int
     time: float  # s reached
-    peak: np.ndarray  # (4,) as run_case has it
+    peak: np.ndarray  # (4,) as run_random_case has it
     energy_bound: float  # J, of the platform's kinetic energy
     speed_bound: float  # rad/s, of the rotor
     unconverged: int  # mooring lines that missed their tolerance
-    failure: str = ""  # empty: none
 
     @property
     def capsized(self):
+        """Whether the run stopped for another reason than a state that is no number."""
         return self.status not in (RUNNING, NON_FINITE)
+
+    @property
+    def failure(self):
+        """Reason for which the outcome is a failure, or an empty text. A finer run judges a capsize."""
+        if self.status == NON_FINITE:
+            return STOP_REASONS[NON_FINITE]
+        energy, speed = self.peak[0], self.peak[3]
+        if not energy <= self.energy_bound:
+            return f"kinetic energy {energy:.3g} J above the bound {self.energy_bound:.3g} J"
+        if not speed <= self.speed_bound:
+            return f"rotor speed {speed:.3g} rad/s above the bound {self.speed_bound:.3g} rad/s"
+        return ""
 
     @property
     def text(self):
@@ -129,7 +128,7 @@ class Outcome:
 
 @kernel
 def line_energy(H, V, length, weight, EA, node, quadrature):
-    """Elastic and gravity energy (J) of a frictionless line under fairlead tensions H and V.
+    """Return the elastic and gravity energy (J) of a frictionless line under fairlead tensions H and V.
 
     node, quadrature: points and weights of Gauss-Legendre quadrature over [-1, 1].
     """
@@ -163,7 +162,7 @@ def _potential_energy(handle, x, node, quadrature):
 
 @kernel
 def buoyant_energy(pose, hydro, data):
-    """Work (J) that the still water has done on the hull, up to a constant."""
+    """Return the work (J) that the still water has done on the hull, up to a constant."""
     if hydro is None:
         return 0.0
     volume, qx, qy, qz = submerged(pose, hydro.hull, data.counters)
@@ -172,12 +171,12 @@ def buoyant_energy(pose, hydro, data):
 
 
 def potential_energy(handle, x):
-    """Energy (J) of gravity, still-water buoyancy and moorings of a state, up to a constant."""
+    """Return the energy (J) of gravity, still-water buoyancy and moorings of a state, up to a constant."""
     return _potential_energy(handle, x, *QUADRATURE)
 
 
 def weather_speeds(scene):
-    """(fastest wind at the rotor, fastest water at the surface) of a scene, m/s, generous."""
+    """Return (fastest wind at the rotor, fastest water at the surface) of a scene, m/s, generous."""
     wind = water = 0.0
     aero, hydro = scene.model.aero, scene.model.hydro
     if aero is not None:
@@ -193,7 +192,7 @@ def weather_speeds(scene):
 
 
 class Runner:
-    """Runs cases in one scene; what they share is built once."""
+    """Run cases in one scene, of which the shared parts are built once."""
 
     def __init__(self, scene, dt):
         self.scene, self.dt = scene, float(dt)
@@ -206,7 +205,7 @@ class Runner:
         self.measurement = np.zeros(N_MEASUREMENTS)
 
     def bounds(self, x):
-        """(J, rad/s) that the platform's kinetic energy and the rotor speed must stay below from x on.
+        """Return (J, rad/s) that the platform's kinetic energy and the rotor speed must stay below from x on.
 
         FACTOR times the sum of: the state's kinetic energy and its potential energy above that of the
         upright platform; the platform with its added mass at the speed of the water; and the work of the
@@ -222,79 +221,65 @@ class Runner:
         return FACTOR * energy, max(1.05 * abs(x[State.ROTOR_SPEED]), FASTEST_TIP * wind / rotor.tip_radius)
 
     def run(self, state, commands, duration):
-        """Outcome of a state (n,) under commands (k, 2), or under the PI where commands is empty."""
+        """Return the Outcome of a state (n,) under commands (k, 2), or under the PI where there are none."""
         dt, handle, data = self.dt, self.handle, self.data
         x = np.array(state, dtype=float)
         commands = np.array(commands, dtype=float).reshape(-1, 2)
-        u = np.array([0.0, x[State.BLADE_PITCH]])
-        energy, speed = self.bounds(x)
+        u, peak = np.array([0.0, x[State.BLADE_PITCH]]), np.zeros(4)
+        bounds = self.bounds(x)
         for carried in (data.lines, data.counters, data.cache, data.history, data.elastic):
             carried[:] = 0.0  # as in a scene of its own: a case runs alike alone and among others
-        law, parameters, memory = hold.compiled, np.zeros(1), np.zeros(1)
+        law = hold.compiled, np.zeros(1), np.zeros(1)
         if len(commands) == 0:
             observe(handle, x, u, 0.0, self.dx, self.measurement)
             self.controller.reset(Measurement(*self.measurement.tolist()))
-            law, parameters, memory = (
-                self.controller.law,
-                self.controller.parameters,
-                self.controller.memory,
-            )
-        peak = np.zeros(4)
+            law = self.controller.law, self.controller.parameters, self.controller.memory
         status, steps = run_random_case(
-            handle, x, u, law, parameters, memory, self.measurement, self.dx, commands,
-            round(CONTROL_DT / dt), round(SEGMENT / dt), round(duration / dt), dt, peak,
+            handle, x, u, *law, self.measurement, self.dx, commands, round(CONTROL_DT / dt),
+            round(SEGMENT / dt), round(duration / dt), dt, peak,
         )  # fmt: skip
         unconverged = int(data.counters[Counter.MOORING_UNCONVERGED])
-        outcome = Outcome(int(status), steps * dt, peak, energy, speed, unconverged)
-        outcome.failure = failure_of(outcome)
-        return outcome
+        return Outcome(int(status), steps * dt, peak, *bounds, unconverged)
 
 
-def failure_of(outcome):
-    """Why an outcome is a failure, or an empty text. A capsize is the plant's to judge by a finer run."""
-    if outcome.status == NON_FINITE:
-        return STOP_REASONS[NON_FINITE]
-    if not outcome.peak[0] <= outcome.energy_bound:
-        return f"kinetic energy {outcome.peak[0]:.3g} J above the bound {outcome.energy_bound:.3g} J"
-    if not outcome.peak[3] <= outcome.speed_bound:
-        return f"rotor speed {outcome.peak[3]:.3g} rad/s above the bound {outcome.speed_bound:.3g} rad/s"
-    return ""
+def _uniform(low, high):
+    return lambda rng: float(rng.uniform(low, high))
+
+
+def _one_of(*options):
+    return lambda rng: rng.choice(options).item()
+
+
+GUST = {"speed": _uniform(1.0, 50.0), "start": _uniform(0.0, 15.0)}
+SIGNED_GUST = GUST | {"sign": _one_of(1, -1)}
+TURBULENCE_CLASS = _one_of("A", "B", "C")
+WINDS = {  # kind: (probability, {key of its specification: draw}), in the order of the draws
+    "steady": (0.3, {"speed": _uniform(0.0, 70.0), "vertical": _uniform(-5.0, 5.0)}),
+    "ntm": (0.2, {"speed": _uniform(1.0, 60.0), "class": TURBULENCE_CLASS}),
+    "etm": (0.15, {"speed": _uniform(1.0, 50.0), "class": TURBULENCE_CLASS}),
+    "ewm": (0.1, {"turbine_class": _one_of("I", "II", "III"), "recurrence": _one_of(1, 50)}),
+    "eog": (0.05, GUST),
+    "ecd": (0.05, SIGNED_GUST),
+    "edc": (0.05, SIGNED_GUST),
+    "ews": (0.05, SIGNED_GUST | {"orientation": _one_of("vertical", "horizontal")}),
+    "still": (0.05, {}),
+}
 
 
 def draw_wind(rng):
-    """A wind specification from still air to 70 m/s, from any direction."""
-    kind = rng.choice(
-        ["steady", "ntm", "etm", "ewm", "eog", "ecd", "edc", "ews", "still"],
-        p=[0.3, 0.2, 0.15, 0.1, 0.05, 0.05, 0.05, 0.05, 0.05],
-    )
+    """Return a wind specification from still air to 70 m/s, from any direction."""
+    kind = str(rng.choice(list(WINDS), p=[probability for probability, _ in WINDS.values()]))
     direction = float(rng.uniform(-180.0, 180.0))
     if kind == "still":
         return {"kind": "steady", "speed": 0.0}
-    if kind == "steady":
-        return {
-            "kind": "steady", "speed": float(rng.uniform(0.0, 70.0)), "direction": direction,
-            "vertical": float(rng.uniform(-5.0, 5.0)),
-        }  # fmt: skip
-    if kind == "ewm":
-        return {
-            "kind": "ewm", "turbine_class": str(rng.choice(["I", "II", "III"])), "turbulent": True,
-            "recurrence": int(rng.choice([1, 50])), "direction": direction,
-        }  # fmt: skip
-    if kind in ("ntm", "etm"):
-        return {
-            "kind": str(kind), "speed": float(rng.uniform(1.0, 60.0 if kind == "ntm" else 50.0)),
-            "class": str(rng.choice(["A", "B", "C"])), "direction": direction,
-        }  # fmt: skip
-    gust = {"kind": str(kind), "speed": float(rng.uniform(1.0, 50.0)), "start": float(rng.uniform(0.0, 15.0))}
-    if kind != "eog":
-        gust["sign"] = int(rng.choice([1, -1]))
-    if kind == "ews":
-        gust["orientation"] = str(rng.choice(["vertical", "horizontal"]))
-    return gust
+    wind = {"kind": kind} | {key: draw(rng) for key, draw in WINDS[kind][1].items()}
+    if "start" not in wind:  # gusts come from ahead
+        wind["direction"] = direction
+    return wind | {"turbulent": True} if kind == "ewm" else wind
 
 
 def draw_sea(rng):
-    """A sea specification from flat water to Hs 17 m or a regular wave about to break, from any direction."""
+    """Return a sea specification from flat water to Hs 17 m or a regular wave about to break, any heading."""
     heading = float(rng.uniform(-180.0, 180.0))
     kind = str(rng.choice(["jonswap", "pierson_moskowitz", "regular"], p=[0.6, 0.15, 0.25]))
     if kind == "regular":
@@ -311,7 +296,7 @@ def draw_sea(rng):
 
 
 def draw_state(rng, turbine, tower=None):
-    """State anywhere in the valid range: lines taut to slack, 30 deg of tilt, rotor to 150 %.
+    """Return a state anywhere in the valid range: lines taut to slack, 30 deg of tilt, rotor to 150 %.
 
     (15,), and those of a tower that bends (TowerModes): to 1 m and 2 m/s in each mode.
     """
@@ -334,7 +319,7 @@ def draw_state(rng, turbine, tower=None):
 
 
 def draw_commands(rng, turbine, duration):
-    """Commands (k, 2): none (the PI), one constant, or a new one anywhere in the range every SEGMENT."""
+    """Return commands (k, 2): none (the PI), one constant, or a new one every SEGMENT."""
     drive = turbine.pitch_drive
     count = (0, 1, round(duration / SEGMENT))[rng.integers(3)]
     torque = rng.uniform(0.0, turbine.torque_law.max_torque, count)
@@ -342,7 +327,7 @@ def draw_commands(rng, turbine, duration):
 
 
 def _case(scene, wind, sea, seed, state, commands, duration):
-    """The replayable dict of a case."""
+    """Return the dict by which a case can be run again."""
     return {
         "fidelity": scene.options["fidelity"], "tower": scene.options["tower"],
         "integrator": scene.options["integrator"], "dt": scene.dt,
@@ -352,16 +337,8 @@ def _case(scene, wind, sea, seed, state, commands, duration):
     }  # fmt: skip
 
 
-def random_case_scene(case):
-    """Scene of a case."""
-    return build_scene(
-        wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
-        integrator=case["integrator"], tower=case.get("tower", "rigid"), duration=WEATHER,
-    )  # fmt: skip
-
-
 def replay(case):
-    """Outcome of a case dict, or of the JSON file that holds one. Raises: InputError if keys are missing."""
+    """Return the Outcome of a case dict or of its JSON file. Raises: InputError if keys are missing."""
     if not isinstance(case, dict):
         path = Path(case)
         if not path.is_file():
@@ -375,20 +352,30 @@ def replay(case):
     missing = [key for key in KEYS if key not in case]
     if missing:
         raise InputError(f"case: {', '.join(missing)} missing; needs {', '.join(KEYS)}")
-    return Runner(random_case_scene(case), case["dt"]).run(case["state"], case["commands"], case["duration"])
+    scene = build_scene(
+        wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
+        integrator=case["integrator"], tower=case.get("tower", "rigid"), duration=WEATHER,
+    )  # fmt: skip
+    return Runner(scene, case["dt"]).run(case["state"], case["commands"], case["duration"])
+
+
+def with_integrator(scene, name, rotor_samples=1):
+    """Return the scene with another integrator, ab4 with that many rotor loads per step."""
+    return replace(
+        scene.with_model(integrator=build_integrator(name, rotor_samples)),
+        options=scene.options | {"integrator": name},
+    )
 
 
 def finer(scene, case):
-    """Outcome of a case by Runge-Kutta 4 at a FINER-th of its step, in its own scene."""
-    other = replace(
-        scene.with_model(integrator=build_integrator("rk4")), options=scene.options | {"integrator": "rk4"}
-    )
-    return Runner(other, case["dt"] / FINER).run(case["state"], case["commands"], case["duration"])
+    """Return the Outcome of a case by Runge-Kutta 4 at a FINER-th of its step, in its own scene."""
+    runner = Runner(with_integrator(scene, "rk4"), case["dt"] / FINER)
+    return runner.run(case["state"], case["commands"], case["duration"])
 
 
 @dataclass
 class Tally:
-    """What a batch of random cases came to."""
+    """Result of a batch of random cases."""
 
     cases: int = 0
     weathers: int = 0
@@ -403,7 +390,7 @@ class Tally:
 
 
 def random_cases(count, seed=0, per_weather=PER_WEATHER, duration=DURATION, plants=PLANTS, progress=None):
-    """Tally of count random cases, per_weather states in each weather; the same seed gives the same cases.
+    """Return the Tally of count random cases, per_weather states in each weather, repeatable by the seed.
 
     Every capsize, and the most energetic case of each weather in twenty, runs again by Runge-Kutta 4 at
     a quarter of the step: a capsize that the finer run does not have, or a peak energy that differs by
@@ -487,7 +474,7 @@ def _count(tally, scene, case, outcome):
 
 
 def store_case(failures, folder):
-    """Write each (case, reason) as a JSON file for replay; returns the paths."""
+    """Write each (case, reason) as a JSON file for replay; return the paths."""
     paths = []
     for number, (case, reason) in enumerate(failures):
         path = Path(folder) / f"case_{number:04d}.json"

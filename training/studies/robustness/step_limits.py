@@ -6,6 +6,7 @@ velocities.
 """
 
 from dataclasses import dataclass, field
+from functools import partial
 from math import exp, log
 
 import numpy as np
@@ -17,7 +18,7 @@ from fowt_env.plant.advance import RUNNING, advance, forget
 from fowt_env.plant.integrators import INTEGRATORS, feathering
 from fowt_env.plant.state import STATE_INDEX, STATES, State
 from fowt_env.scene.build import build_scene
-from fowt_env.training.studies.robustness.long_runs import with_integrator
+from fowt_env.training.studies.robustness.random_cases import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest
 FINE_STEP = 0.0125  # s, of the run that others are judged by
@@ -51,18 +52,14 @@ class LimitScene:
     rotor_samples: int = 1  # of ab4
 
     def scene(self, integrator="rk4"):
-        """Scene of this kind with one of INTEGRATORS."""
-        scene = build_scene(
-            wind=self.wind, sea=self.sea, seed=1, fidelity=self.fidelity, integrator=integrator,
-            **self.options,
-        )  # fmt: skip
-        body = scene.model.rigid_body._replace(
-            platform_fixed=self.platform_fixed, rotor_fixed=self.rotor_fixed
-        )
-        return scene.with_model(rigid_body=body)
+        """Return a scene of this kind with one of INTEGRATORS."""
+        options = {"fidelity": self.fidelity, "integrator": integrator, **self.options}
+        scene = build_scene(wind=self.wind, sea=self.sea, seed=1, **options)
+        fixed = {"platform_fixed": self.platform_fixed, "rotor_fixed": self.rotor_fixed}
+        return scene.with_model({f"rigid_body.{name}": value for name, value in fixed.items()})
 
     def point(self, scene):
-        """OperatingPoint about which runs start and theory is linear.
+        """Return the OperatingPoint about which runs start and theory is linear.
 
         Without moorings nothing balances the thrust: then the upright platform, which drifts from there.
         """
@@ -93,19 +90,19 @@ LIMIT_SCENES = {
 
 
 def exact_pitch(a, h):
-    """Factor that the blade pitch's own law leaves of it after a step h."""
+    """Return the factor by which the blade pitch decays in a step h."""
     return exp(a[PITCH, PITCH] * h)
 
 
 def with_pitch(matrix, factor):
-    """The matrix (N, N) with that factor of the present blade pitch as its row of the blade pitch."""
+    """Return the matrix (N, N) with this factor as its row of the blade pitch."""
     matrix[PITCH] = 0.0
     matrix[PITCH, PITCH] = factor
     return matrix
 
 
 def runge_kutta(a, h):
-    """(N, N) matrix of one classical Runge-Kutta step of x' = a x, blade pitch exact at every stage."""
+    """Return the (N, N) matrix of a Runge-Kutta 4 step of x' = a x, blade pitch exact at every stage."""
     half, whole = exact_pitch(a, 0.5 * h), exact_pitch(a, h)
     k1 = a
     k2 = a @ with_pitch(np.eye(N) + 0.5 * h * k1, half)
@@ -115,25 +112,20 @@ def runge_kutta(a, h):
 
 
 def trapezoid(a, h):
-    """(N, N) matrix of one step of heun: explicit trapezoidal rule, blade pitch exact."""
+    """Return the (N, N) matrix of one step of heun: explicit trapezoidal rule, blade pitch exact."""
     pitch = exact_pitch(a, h)
     predicted = with_pitch(np.eye(N) + h * a, pitch)
     return with_pitch(np.eye(N) + 0.5 * h * (a + a @ predicted), pitch)
 
 
 def adams(a, h, corrector):
-    """(4 N, 4 N) matrix of one Adams step of the state and its three latest derivatives.
+    """Return the (4 N, 4 N) matrix of one Adams step of the state and its three latest derivatives.
 
-    Of each the derivative now is a x; what is carried are x and the derivatives one, two and three
-    steps ago.
+    The present derivative is a x; carried are x and the derivatives one, two and three steps ago.
     """
     now = np.zeros((N, 4 * N))
     now[:, :N] = np.eye(N)
-    past = [a @ now]
-    for k in range(1, 4):
-        block = np.zeros((N, 4 * N))
-        block[:, k * N : (k + 1) * N] = np.eye(N)
-        past.append(block)
+    past = [a @ now, *(np.roll(now, k * N, axis=1) for k in range(1, 4))]
     pitch = np.zeros(4 * N)
     pitch[PITCH] = exact_pitch(a, h)
     moved = now + h * sum(c * f for c, f in zip(BASHFORTH, past, strict=True))
@@ -150,7 +142,7 @@ def adams(a, h, corrector):
 
 
 def amplification(a, h, integrator):
-    """Matrix of one step h of an integrator on x' = a x, a (N, N) in the order of linear_model.STATES."""
+    """Return the matrix of one step h of an integrator on x' = a x, a (N, N) of linear_model.STATES."""
     if integrator == "rk4":
         return runge_kutta(a, h)
     if integrator == "heun":
@@ -159,23 +151,23 @@ def amplification(a, h, integrator):
 
 
 def stable(a, h, integrator, duration=DURATION):
-    """Whether errors grow no more than GROWTH times beyond the plant itself over the duration."""
+    """Return whether errors grow no more than GROWTH times as much as the plant itself over the duration."""
     radius = np.abs(np.linalg.eigvals(amplification(a, h, integrator))).max()
     own = max(0.0, np.linalg.eigvals(a).real.max())
     return duration / h * log(radius) <= own * duration + log(GROWTH)
 
 
 def limiting_state(a, h, integrator):
-    """Name of the state with the largest participation, EXCITATION as unit, of the fastest-growing vector."""
+    """Return the name of the state that participates most, in EXCITATION, in the fastest-growing vector."""
     values, vectors = np.linalg.eig(amplification(a, h, integrator))
     participation = np.abs(vectors[:N, np.argmax(np.abs(values))]) / EXCITATION
     return STATES[int(np.argmax(participation))]
 
 
 def first_unstable(holds, start):
-    """Largest step (s) up to the first that does not hold: scan by SCAN, then bisection. inf: all do.
+    """Return the largest step (s) below the first that does not hold: scan by SCAN, then bisection.
 
-    0.0 where the start itself does not hold.
+    inf: all hold; 0.0: the start itself does not.
     """
     low, high = 0.0, start
     while holds(high):
@@ -194,7 +186,7 @@ def first_unstable(holds, start):
 
 
 def excursions(scene, point, dt, duration=DURATION):
-    """(peaks over the run, peaks over its second half): largest |state - operating point|, (N,) each.
+    """Return (peaks over the run, peaks over its second half): largest |state - operating point|, (N,).
 
     The run starts off the operating point by EXCITATION and keeps its command. inf once it has stopped.
     """
@@ -224,19 +216,15 @@ def excursions(scene, point, dt, duration=DURATION):
     return peaks, late
 
 
-def measured_limit(scene, point, fine, duration=DURATION):
-    """Largest step (s) without blow-up of a scene's integrator; fine: peaks of the fine run."""
-
-    def holds(dt):
-        return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
-
-    return first_unstable(holds, INTEGRATORS[scene.options["integrator"]].dt)
+def stays(scene, point, fine, dt, duration=DURATION):
+    """Return whether a run with steps dt does not blow up; fine: peaks of the fine run."""
+    return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
 
 
 def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progress=None):
-    """DataFrame with a row per kind of scene and integrator.
+    """Return a DataFrame with a row per kind of scene and integrator.
 
-    Columns: kind, integrator, default_s, measured_s, theory_s (largest steps; inf beyond LARGEST_STEP),
+    Columns: kind, integrator, default_s, measured_s, theory_s (largest steps; inf above LARGEST_STEP),
     margin (measured over default), mode (state that grows first), fastest_1_per_s (largest eigenvalue
     of the plant but for the blade-pitch actuator).
     """
@@ -257,15 +245,12 @@ def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progre
                 continue
             scene = with_integrator(base, integrator, kind.rotor_samples)
             default = INTEGRATORS[integrator].dt
-            found = measured_limit(scene, point, fine, duration)
+            found = first_unstable(partial(stays, scene, point, fine, duration=duration), default)
             scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
-            theory = first_unstable(lambda h, m=model, i=scheme: stable(m.A, h, i, duration), default)
+            theory = first_unstable(partial(stable, model.A, integrator=scheme, duration=duration), default)
             mode = limiting_state(model.A, theory * SCAN, scheme) if theory < np.inf else ""
-            rows.append(
-                {
-                    "kind": name, "integrator": integrator, "default_s": default, "measured_s": found,
-                    "theory_s": theory, "margin": found / default, "mode": mode,
-                    "fastest_1_per_s": fastest,
-                }
-            )  # fmt: skip
+            rows.append({
+                "kind": name, "integrator": integrator, "default_s": default, "measured_s": found,
+                "theory_s": theory, "margin": found / default, "mode": mode, "fastest_1_per_s": fastest,
+            })  # fmt: skip
     return pd.DataFrame(rows)

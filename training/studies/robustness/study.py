@@ -1,10 +1,11 @@
-"""Stability under stress: the parts of the study, what each claims, and the report.
+"""Stability under stress: the parts of the study, the claims of each, and the report.
 
-Each part stores what it found as JSON beside the others, so that a report can join runs of several days.
+Each part stores its results as JSON beside the others, so that a report can join runs of several days.
 """
 
 import json
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -56,7 +57,7 @@ class RobustnessClaim:
 
 @dataclass
 class Found:
-    """What a part came to: claims, and tables as (title, columns, rows of texts)."""
+    """Result of a part: claims, and tables as [title, columns, rows of texts]."""
 
     claims: list = field(default_factory=list)
     tables: list = field(default_factory=list)
@@ -65,10 +66,14 @@ class Found:
         """Add a RobustnessClaim."""
         self.claims.append(RobustnessClaim(what, str(count), found, target, bool(holds)))
 
+    def none(self, what, count, number, words, target="none"):
+        """Add a claim that a number of misses, shown with these words behind it, is zero."""
+        self.claim(what, count, f"{number} {words}".rstrip(), target, number == 0)
+
 
 @dataclass(frozen=True)
 class Sizes:
-    """How much is run; the documented run has 100000 cases and 10000000 steps."""
+    """Sizes of the parts; the documented run has 100000 cases and 10000000 steps."""
 
     cases: int = 2000
     per_weather: int = random_cases.PER_WEATHER
@@ -81,32 +86,31 @@ class Sizes:
 
 
 def map_part(sizes, folder, progress):
-    """Found of the stability map."""
+    """Return Found of the stability map."""
     table = step_limits.stability_map(sizes.kinds, duration=sizes.map_duration, progress=progress)
     found = Found()
     for integrator in INTEGRATORS:
         rows = table[table["integrator"] == integrator]
         least = rows.loc[rows["margin"].idxmin()]
-        found.claim(
-            f"{integrator}: default step of {INTEGRATORS[integrator].dt:g} s",
-            f"{len(rows)} kinds of scene",
-            f"least margin {least['margin']:.1f} ({least['kind']})",
-            f"factor {step_limits.MARGIN:g}",
-            least["margin"] >= step_limits.MARGIN,
-        )
+        what = f"{integrator}: default step of {INTEGRATORS[integrator].dt:g} s"
+        text = f"least margin {least['margin']:.1f} ({least['kind']})"
+        target = f"factor {step_limits.MARGIN:g}"
+        holds = least["margin"] >= step_limits.MARGIN
+        found.claim(what, f"{len(rows)} kinds of scene", text, target, holds)
     both = table[np.isfinite(table["theory_s"]) & np.isfinite(table["measured_s"])]
     ratio = both["measured_s"] / both["theory_s"]
-    found.claim(
-        "measured limit over linear theory's",
-        f"{len(table)} limits, {len(both)} below {step_limits.LARGEST_STEP:g} s in both",
-        f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}" if len(both) else "none",
-        "none below 0.8",
-        len(both) == 0 or ratio.min() > 0.8,
-    )
+    count = f"{len(table)} limits, {len(both)} below {step_limits.LARGEST_STEP:g} s in both"
+    text = f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}" if len(both) else "none"
+    holds = len(both) == 0 or ratio.min() > 0.8
+    found.claim("measured limit over linear theory's", count, text, "none below 0.8", holds)
+
+    def limit(value):
+        return f"{value:.3f}" if np.isfinite(value) else f"> {step_limits.LARGEST_STEP:g}"
+
     rows = [
-        [row["kind"], row["integrator"], f"{row['default_s']:g}", _limit(row["measured_s"]),
-         _limit(row["theory_s"]), _factor(row["margin"]), row["mode"].replace("_", " "),
-         f"{row['fastest_1_per_s']:.2f}"]
+        [row["kind"], row["integrator"], f"{row['default_s']:g}", limit(row["measured_s"]),
+         limit(row["theory_s"]), f"{row['margin']:.1f}" if np.isfinite(row["margin"]) else "-",
+         row["mode"].replace("_", " "), f"{row['fastest_1_per_s']:.2f}"]
         for row in table.to_dict("records")
     ]  # fmt: skip
     columns = ["scene", "integrator", "default, s", "largest stable step, s", "theory, s", "margin",
@@ -115,56 +119,36 @@ def map_part(sizes, folder, progress):
     return found
 
 
-def _limit(value):
-    return f"{value:.3f}" if np.isfinite(value) else f"> {step_limits.LARGEST_STEP:g}"
-
-
-def _factor(value):
-    return f"{value:.1f}" if np.isfinite(value) else "-"
-
-
 def cases_part(sizes, folder, progress):
-    """Found of the random scenes and states; failures are stored as replayable files in folder/failures."""
+    """Return Found of the random scenes and states; failures are stored for replay in folder/failures."""
     tally = random_cases.random_cases(sizes.cases, sizes.seed, sizes.per_weather, progress=progress)
     return _found_of(tally, Path(folder) / "failures")
 
 
 def tower_part(sizes, folder, progress):
-    """Found of a twentieth as many random scenes and states with a tower that bends, as cases_part."""
-    plants = (f"standard{random_cases.BENDS}",)
-    tally = random_cases.random_cases(
-        max(1, sizes.cases // 20), sizes.seed, sizes.per_weather, plants=plants, progress=progress
-    )
+    """Return Found of a twentieth as many random scenes and states with a tower that bends, as cases_part."""
+    count, plants = max(1, sizes.cases // 20), (f"standard{random_cases.BENDS}",)
+    tally = random_cases.random_cases(count, sizes.seed, sizes.per_weather, plants=plants, progress=progress)
     return _found_of(tally, Path(folder) / "tower_failures")
 
 
 def _found_of(tally, failures):
-    """Found of a Tally, whose failures go into a folder."""
+    """Return Found of a Tally, whose failures go into a folder."""
     paths = random_cases.store_case(tally.failures, failures)
     reasons = [reason for _, reason in tally.failures]
     broken = sum("exception" in reason or "non-finite" in reason for reason in reasons)
     found = Found()
     spread = ", ".join(f"{count} {plant}" for plant, count in tally.per_plant.items())
     what = f"{tally.cases} states in {tally.weathers} weathers ({spread})"
-    found.claim("NaN or exception", what, f"{broken}", "none", broken == 0)
-    found.claim(
-        "kinetic energy and rotor speed bounded",
-        f"{tally.cases}",
-        f"{len(reasons) - broken} above; largest ratio to the energy bound {tally.worst_ratio:.2f}",
-        "none, nor a stop that a finer step lacks",
-        len(reasons) == broken,
-    )
-    found.claim(
-        "peak energy with a quarter of the step, every twentieth weather",
-        f"{tally.checked}",
-        f"largest change {tally.difference:.2%}",
-        f"{random_cases.AGREE:.0%}",
-        tally.difference <= random_cases.AGREE,
-    )
-    found.claim(
-        "mooring lines that missed their tolerance", f"{tally.cases}", f"{tally.unconverged}", "none",
-        tally.unconverged == 0,
-    )  # fmt: skip
+    found.none("NaN or exception", what, broken, "")
+    words = f"above; largest ratio to the energy bound {tally.worst_ratio:.2f}"
+    target = "none, nor a stop that a finer step lacks"
+    above = len(reasons) - broken
+    found.none("kinetic energy and rotor speed bounded", tally.cases, above, words, target)
+    what, most = "peak energy with a quarter of the step, every twentieth weather", random_cases.AGREE
+    text, holds = f"largest change {tally.difference:.2%}", tally.difference <= most
+    found.claim(what, tally.checked, text, f"{most:.0%}", holds)
+    found.none("mooring lines that missed their tolerance", tally.cases, tally.unconverged, "")
     peak = tally.peak
     rows = [
         ["kinetic energy of the platform", f"{peak[0] * 1e-6:.0f} MJ"],
@@ -181,25 +165,16 @@ def _found_of(tally, failures):
 
 
 def hostile_part(sizes, folder, progress):
-    """Found of hostile actions on the environment."""
+    """Return Found of hostile actions on the environment."""
     table = stability_extremes.hostile(steps=sizes.hostile_steps, progress=progress)
     found = Found()
-    refused = table["policy"] == "NaN and infinity"
-    attacks = table[~refused]
-    found.claim(
-        "state, observation and reward finite, or an end with its reason",
-        f"{int(attacks['steps'].sum())} control periods, {len(attacks)} policies, modes and tasks",
-        f"{int((~attacks['finite']).sum())} not finite",
-        "none",
-        attacks["finite"].all(),
-    )
-    found.claim(
-        "NaN or infinity refused, state untouched",
-        f"{int(table[refused]['steps'].sum())}",
-        f"{int((~table[refused]['finite']).sum())} accepted",
-        "all refused",
-        table[refused]["finite"].all(),
-    )
+    refused = table[table["policy"] == "NaN and infinity"]
+    attacks = table.drop(refused.index)
+    what = "state, observation and reward finite, or an end with its reason"
+    count = f"{int(attacks['steps'].sum())} control periods, {len(attacks)} policies, modes and tasks"
+    found.none(what, count, int((~attacks["finite"]).sum()), "not finite")
+    accepted, count = int((~refused["finite"]).sum()), int(refused["steps"].sum())
+    found.none("NaN or infinity refused, state untouched", count, accepted, "accepted", "all refused")
     rows = [
         [row["task"], row["mode"], row["policy"], str(row["steps"]),
          "; ".join(f"{reason}: {count}" for reason, count in row["ends"].items()) or "none",
@@ -212,26 +187,17 @@ def hostile_part(sizes, folder, progress):
 
 
 def extremes_part(sizes, folder, progress):
-    """Found of the extreme events."""
+    """Return Found of the extreme events."""
     table = stability_extremes.extremes(sizes.extremes, seed=sizes.seed + 1, progress=progress)
     found = Found()
-    groups = ", ".join(
-        f"{count} {group}" for group, count in table.groupby("group", sort=False).size().items()
-    )
+    sizes_of_groups = table.groupby("group", sort=False).size().items()
+    groups = ", ".join(f"{count} {group}" for group, count in sizes_of_groups)
     stops = (~table["verdict"].str.startswith("finite")).sum()
-    found.claim(
-        "state finite to the end", f"{len(table)} runs: {groups}",
-        f"{(~table['finite']).sum()} not finite, {stops} stopped with their reason", "all finite",
-        table["finite"].all(),
-    )  # fmt: skip
+    words, broken = f"not finite, {stops} stopped with their reason", (~table["finite"]).sum()
+    found.none("state finite to the end", f"{len(table)} runs: {groups}", broken, words, "all finite")
     changes = table["step_change"].dropna()
-    found.claim(
-        "peaks with half the step",
-        f"{len(changes)} runs",
-        f"largest change {changes.max():.2%}" if len(changes) else "none",
-        f"{STEP_CHANGE:.0%}",
-        (changes <= STEP_CHANGE).all(),
-    )
+    text, holds = f"largest change {changes.max():.2%}" if len(changes) else "none", changes <= STEP_CHANGE
+    found.claim("peaks with half the step", f"{len(changes)} runs", text, f"{STEP_CHANGE:.0%}", holds.all())
     columns = ["run", "rotor, rpm", "tilt, deg", "yaw, deg", "offset, m", "heave, m", "tension, MN",
                "change with half the step", "verdict"]  # fmt: skip
     rows = [
@@ -244,92 +210,129 @@ def extremes_part(sizes, folder, progress):
 
 
 def long_part(sizes, folder, progress):
-    """Found of the long runs, the orders and the quaternion."""
+    """Return Found of the long runs, the orders and the quaternion."""
     long, found = long_runs, Found()
-    for integrator in INTEGRATORS:
-        for steps in (min(SECULAR_STEPS, sizes.steps), sizes.steps):
-            drift = long.free_drift(integrator, steps, progress=progress)
-            limits = DRIFT[integrator]
-            text = ", ".join(f"{drift[key]:.1e}" for key in limits)
-            good = drift["status"] == RUNNING and all(drift[key] <= limits[key] for key in limits)
-            target = ", ".join(f"{most:.0e}" for most in limits.values())
-            found.claim(
-                f"free body, {integrator}",
-                f"{steps} steps of {INTEGRATORS[integrator].dt:g} s", text, target, good,
-            )  # fmt: skip
-    for integrator, most in FLOATING_DRIFT.items():
-        drift = long.floating_drift(integrator, sizes.steps, progress=progress)
-        found.claim(
-            f"floating body, {integrator}",
-            f"{sizes.steps} steps of {INTEGRATORS[integrator].dt:g} s", f"{drift['energy']:.1e}",
-            f"{most:.0e}", drift["status"] == RUNNING and drift["energy"] <= most,
-        )  # fmt: skip
+    runs = [(i, n, long.free_drift, "free", DRIFT[i])
+            for i in INTEGRATORS for n in (min(SECULAR_STEPS, sizes.steps), sizes.steps)]  # fmt: skip
+    runs += [(i, sizes.steps, long.floating_drift, "floating", {"energy": most})
+             for i, most in FLOATING_DRIFT.items()]  # fmt: skip
+    for integrator, steps, measure, body, limits in runs:
+        drift = measure(integrator, steps, progress=progress)
+        holds = drift["status"] == RUNNING and all(drift[key] <= limits[key] for key in limits)
+        what, count = f"{body} body, {integrator}", f"{steps} steps of {INTEGRATORS[integrator].dt:g} s"
+        text = ", ".join(f"{drift[key]:.1e}" for key in limits)
+        found.claim(what, count, text, ", ".join(f"{most:.0e}" for most in limits.values()), holds)
     memory = long.plant_memory(sizes.steps, progress)
-    found.claim(
-        "memory, full plant in turbulence and waves", f"{memory['steps']} steps",
-        f"{memory['growth_MB']:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB",
-        memory["status"] == RUNNING and memory["growth_MB"] <= MEMORY_MB,
-    )  # fmt: skip
+    what, count = "memory, full plant in turbulence and waves", f"{memory['steps']} steps"
+    text, target = "{growth_MB:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB"
+    holds = memory["status"] == RUNNING and memory["growth_MB"] <= MEMORY_MB
+    found.claim(what, count, text.format(**memory), target, holds)
     memory = long.environment_memory(max(2000, sizes.steps // 50), progress)
-    found.claim(
-        "memory, environment", f"{memory['steps']} control periods, {memory['resets']} resets",
-        f"{memory['growth_MB']:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB",
-        memory["growth_MB"] <= MEMORY_MB,
-    )  # fmt: skip
+    count = f"{memory['steps']} control periods, {memory['resets']} resets"
+    holds = memory["growth_MB"] <= MEMORY_MB
+    found.claim("memory, environment", count, text.format(**memory), target, holds)
     for integrator, order in long.measured_orders().items():
         least = INTEGRATORS[integrator].order - ORDER_SLACK
-        found.claim(
-            f"order of {integrator}", "steps of 0.05 and 0.025 s", f"{order:.2f}", f"{least:.2f} or more",
-            order >= least,
-        )  # fmt: skip
+        what, count = f"order of {integrator}", "steps of 0.05 and 0.025 s"
+        found.claim(what, count, f"{order:.2f}", f"{least:.2f} or more", order >= least)
     difference, turned = long.quaternion_difference()
-    found.claim(
-        "tumbling body: Euler angles against a quaternion", "60 s, 61 instants",
-        f"rotation matrices differ by {difference:.1e}, turned by {turned / DEGREE:.0f} deg",
-        f"{TURNED:.0e}", difference <= TURNED,
-    )  # fmt: skip
+    what = "tumbling body: Euler angles against a quaternion"
+    text = f"rotation matrices differ by {difference:.1e}, turned by {turned / DEGREE:.0f} deg"
+    found.claim(what, "60 s, 61 instants", text, f"{TURNED:.0e}", difference <= TURNED)
     return found
 
 
 def plain_part(sizes, folder, progress):
-    """Found of the runs without the compiler."""
+    """Return Found of the runs without the compiler."""
     found = Found()
     if progress is not None:
         progress("runs without the compiler", 0, 1)
     differences = without_compiler.differences()
     worst = max(differences, key=differences.get)
-    found.claim(
-        "NUMBA_DISABLE_JIT=1 against compiled",
-        f"{len(differences)} runs", f"largest difference {differences[worst]:.1e} ({worst})",
-        f"{PLAIN:.0e} of 1 or the number", differences[worst] <= PLAIN,
-    )  # fmt: skip
+    text = f"largest difference {differences[worst]:.1e} ({worst})"
+    count, target = f"{len(differences)} runs", f"{PLAIN:.0e} of 1 or the number"
+    found.claim("NUMBA_DISABLE_JIT=1 against compiled", count, text, target, differences[worst] <= PLAIN)
     rows = [[name, f"{value:.1e}"] for name, value in differences.items()]
     found.tables.append(["Without the compiler: largest difference", ["run", "difference"], rows])
     return found
 
 
+@dataclass(frozen=True)
+class Part:
+    """A part of the study: its function, its title and method in the report, and the size that it takes.
+
+    size: (field of Sizes, option of the command), or None.
+    """
+
+    run: Callable
+    title: str
+    method: str
+    size: tuple | None = None
+
+
 PARTS = {
-    "map": map_part,
-    "cases": cases_part,
-    "tower": tower_part,
-    "hostile": hostile_part,
-    "extremes": extremes_part,
-    "long": long_part,
-    "plain": plain_part,
-}
-TITLES = {
-    "map": "Stability map",
-    "cases": "Random scenes and initial states",
-    "tower": "The same with a tower that bends",
-    "hostile": "Hostile actions",
-    "extremes": "Extremes",
-    "long": "Long runs, order and attitude",
-    "plain": "Without the compiler",
+    "map": Part(
+        map_part,
+        "Stability map",
+        f"Each run starts off its operating point in every state, keeps its command and lasts"
+        f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a peak of its second half is"
+        f" more than {step_limits.GROWTH:g} times that with steps of {step_limits.FINE_STEP:g} s. Theory is"
+        " the amplification matrix of the integrator on the linear model, which has no drag: some limits"
+        " are therefore higher than its own. Yaw and rotor speed limit. Where the blades of an"
+        " idling rotor damp its speed, ab4 corrects its step as abm4 does (`integrators.FEATHERING`).",
+    ),
+    "cases": Part(
+        cases_part,
+        "Random scenes and initial states",
+        "Wind from still air to 70 m/s (steady, NTM, ETM, EWM, gusts; any direction), seas to Hs 17 m or a"
+        " regular wave to 30 m as steep as it may be; at the start offsets to 30 m, tilt and yaw to 30 deg,"
+        " speeds to 3 m/s and 0.1 rad/s, rotor to 150 %, any blade pitch. A third under the PI, a"
+        f" third under a constant command, a third under a random one every second; {random_cases.DURATION:g}"
+        " s each. The bound on the kinetic energy of the platform is"
+        f" {random_cases.FACTOR:g} times the sum of its energy at the start, its own at the speed of"
+        " the water, and the work that thrust can do; that on the rotor speed a tip-speed ratio of"
+        f" {random_cases.FASTEST_TIP:g}.",
+        ("cases", "--cases"),
+    ),
+    "tower": Part(
+        tower_part,
+        "The same with a tower that bends",
+        'A twentieth as many with `tower="modes"`, deflections to 1 m and rates to 2 m/s at the start.',
+        ("cases", "--cases"),
+    ),
+    "hostile": Part(
+        hostile_part,
+        "Hostile actions",
+        "Environment at its defaults; episodes that end early restart. Policies: bang-bang at"
+        " Nyquist, constant corners, random, platform-pitch resonance, far outside the range.",
+        ("hostile_steps", "--hostile"),
+    ),
+    "extremes": Part(
+        extremes_part,
+        "Extremes",
+        f"Standard fidelity, {stability_extremes.DURATION:g} s, the event at {stability_extremes.EVENT:g} s,"
+        " PI control where the rotor runs. Lines have no breaking strength and the rotor no"
+        " aerodynamic brake: a finite state does not say that a turbine survives.",
+    ),
+    "long": Part(
+        long_part,
+        "Long runs, order and attitude",
+        "The free body drifts and nutates in empty space with its rotor turning: relative drifts of its"
+        " energy, linear and angular momentum. The floating body has hull, weight and lines, but no drag,"
+        " damping or added mass: drift of its energy over the energy of motion.",
+        ("steps", "--steps"),
+    ),
+    "plain": Part(
+        plain_part,
+        "Without the compiler",
+        f"{without_compiler.STEPS_PER_SCENE} steps of each scene by each integrator, and"
+        f" {without_compiler.ENV_STEPS} control periods of environments.",
+    ),
 }
 
 
 def study(folder, parts=None, sizes=None, progress=None):
-    """{part: Found} of the chosen parts (default: all); each is written to folder/<part>.json as it ends.
+    """Return {part: Found} of the chosen parts (default: all); each is written to folder/<part>.json.
 
     progress: called with (text, done, total). Raises: InputError for an unknown part.
     """
@@ -341,34 +344,27 @@ def study(folder, parts=None, sizes=None, progress=None):
     results = {}
     for part in chosen:
         began = time.perf_counter()
-        found = PARTS[part](sizes, folder, progress)
-        results[part] = found
+        found = results[part] = PARTS[part].run(sizes, folder, progress)
         stored = {
             "about": header(),
             "minutes": (time.perf_counter() - began) / 60.0,
             "date": f"{datetime.now(UTC):%Y-%m-%d}",
             "sizes": asdict(sizes),
-            "claims": [asdict(claim) for claim in found.claims],
-            "tables": found.tables,
+            **asdict(found),
         }
         with replacing(Path(folder) / f"{part}.json") as temporary:
             Path(temporary).write_text(json.dumps(stored, indent=1) + "\n")
     return results
 
 
-def stored_parts(folder):
-    """{part: what study stored of it} of a folder, in the order of PARTS."""
-    paths = {part: Path(folder) / f"{part}.json" for part in PARTS}
-    return {part: json.loads(path.read_text()) for part, path in paths.items() if path.is_file()}
-
-
 def write_robustness_report(folder, path):
-    """Write the Markdown report of every part that the folder holds; returns the path.
+    """Write the Markdown report of every part that the folder holds; return the path.
 
     Tables of more than ROWS_SHOWN rows become CSV files in a folder beside the report, of its name.
     """
     path = Path(path)
-    parts = stored_parts(folder)
+    paths = {part: Path(folder) / f"{part}.json" for part in PARTS}
+    parts = {part: json.loads(file.read_text()) for part, file in paths.items() if file.is_file()}
     verdicts = [claim["holds"] for stored in parts.values() for claim in stored["claims"]]
     lines = [
         "# Numerical robustness", "",
@@ -376,7 +372,8 @@ def write_robustness_report(folder, path):
         " each part names the date and commit of its runs and the command that repeats them.",
     ]  # fmt: skip
     for part, stored in parts.items():
-        lines += ["", f"## {TITLES[part]}", "", f"{_origin(part, stored)} {METHODS[part]}", ""]
+        words = f"{_origin(part, stored)} {PARTS[part].method}"
+        lines += ["", f"## {PARTS[part].title}", "", words, ""]
         rows = [
             [c["what"], c["count"], c["found"] if c["holds"] else f"**MISSED**: {c['found']}", c["target"]]
             for c in stored["claims"]
@@ -395,64 +392,12 @@ def write_robustness_report(folder, path):
 
 
 def _origin(part, stored):
-    """When a part was run, on what source, and the command that repeats it."""
+    """Return date and commit of a part's run, and the command that repeats it."""
     about = dict(line.partition(": ")[::2] for line in stored["about"])
-    sizes = Sizes(**stored["sizes"])
-    words = [f"{option} {getattr(sizes, name)}" for name, option in REPEATED[part]]
-    words += [f"--seed {sizes.seed}"] if sizes.seed else []
-    commit = about["commit"][:7]
-    command = " ".join(["fowt benchmark stability --parts", part, *words])
-    return f"{stored['date']}, {commit}, `{command}`."
-
-
-CASES = (("cases", "--cases"),)
-REPEATED = {  # sizes that the command of a part takes: (field of Sizes, option)
-    "map": (),
-    "cases": CASES,
-    "tower": CASES,
-    "hostile": (("hostile_steps", "--hostile"),),
-    "extremes": (),
-    "long": (("steps", "--steps"),),
-    "plain": (),
-}
-METHODS = {
-    "map": (
-        f"Each run starts off its operating point in every state, keeps its command and lasts"
-        f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a peak of its second half is"
-        f" more than {step_limits.GROWTH:g} times that with steps of {step_limits.FINE_STEP:g} s. Theory is"
-        " the amplification matrix of the integrator on the linear model, which has no drag: some limits"
-        " are therefore higher than its own. Yaw and rotor speed limit. Where the blades of an"
-        " idling rotor damp its speed, ab4 corrects its step as abm4 does (`integrators.FEATHERING`)."
-    ),
-    "cases": (
-        "Wind from still air to 70 m/s (steady, NTM, ETM, EWM, gusts; any direction), seas to Hs 17 m or a"
-        " regular wave to 30 m as steep as it may be; at the start offsets to 30 m, tilt and yaw to 30 deg,"
-        " speeds to 3 m/s and 0.1 rad/s, rotor to 150 %, any blade pitch. A third under the PI, a"
-        f" third under a constant command, a third under a random one every second; {random_cases.DURATION:g}"
-        " s each. The bound on the kinetic energy of the platform is"
-        f" {random_cases.FACTOR:g} times the sum of its energy at the start, its own at the speed of"
-        " the water, and the work that thrust can do; that on the rotor speed a tip-speed ratio of"
-        f" {random_cases.FASTEST_TIP:g}."
-    ),
-    "tower": (
-        'A twentieth as many with `tower="modes"`, deflections to 1 m and rates to 2 m/s at the start.'
-    ),
-    "hostile": (
-        "Environment at its defaults; episodes that end early restart. Policies: bang-bang at"
-        " Nyquist, constant corners, random, platform-pitch resonance, far outside the range."
-    ),
-    "extremes": (
-        f"Standard fidelity, {stability_extremes.DURATION:g} s, the event at {stability_extremes.EVENT:g} s,"
-        " PI control where the rotor runs. Lines have no breaking strength and the rotor no"
-        " aerodynamic brake: a finite state does not say that a turbine survives."
-    ),
-    "long": (
-        "The free body drifts and nutates in empty space with its rotor turning: relative drifts of its"
-        " energy, linear and angular momentum. The floating body has hull, weight and lines, but no drag,"
-        " damping or added mass: drift of its energy over the energy of motion."
-    ),
-    "plain": (
-        f"{without_compiler.STEPS_PER_SCENE} steps of each scene by each integrator, and"
-        f" {without_compiler.ENV_STEPS} control periods of environments."
-    ),
-}
+    words = ["fowt benchmark stability --parts", part]
+    if PARTS[part].size is not None:
+        name, option = PARTS[part].size
+        words.append(f"{option} {stored['sizes'][name]}")
+    if stored["sizes"]["seed"]:
+        words.append(f"--seed {stored['sizes']['seed']}")
+    return f"{stored['date']}, {about['commit'][:7]}, `{' '.join(words)}`."

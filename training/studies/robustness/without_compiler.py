@@ -1,7 +1,7 @@
 """The same small runs with and without the compiler: numbers must agree to rounding.
 
-As a program (`python -m fowt_env.training.studies.robustness.without_compiler IN OUT`) it runs what IN, a
-pickle of jobs, asks for; with NUMBA_DISABLE_JIT=1 in its environment every kernel is then plain Python.
+As a program (`python -m fowt_env.training.studies.robustness.without_compiler IN OUT`) it runs the jobs of
+IN, a pickle; with NUMBA_DISABLE_JIT=1 in its environment every kernel is then plain Python.
 """
 
 import os
@@ -42,7 +42,7 @@ SCENES = {
 
 
 def start(scene):
-    """State in rough motion."""
+    """Return a state in rough motion."""
     x = np.zeros(scene.n_state)
     x[:6] = 4.0, -3.0, 0.5, 0.05, 0.08, -0.1
     x[7:13] = 0.5, -0.3, 0.2, 0.01, 0.02, -0.02
@@ -52,9 +52,9 @@ def start(scene):
 
 
 def jobs(scenes=SCENES, environments=True):
-    """{name: job} of pickled runs: scenes by every integrator, one environment and a vector of them.
+    """Return {name: job} of pickled runs: scenes by every integrator, one environment and a vector of them.
 
-    Scenes and snapshots are made here and handed over: trims and tables would take long without the compiler.
+    Scenes and snapshots are made here, with the compiler: trims and tables would take long without it.
     """
     found = {}
     for name, options in scenes.items():
@@ -74,7 +74,7 @@ def jobs(scenes=SCENES, environments=True):
 
 
 def result(job):
-    """(n,) numbers that a job comes to."""
+    """Return the numbers (n,) of a job."""
     kind, *given = job
     if kind == "scene":
         scene = given[0]
@@ -84,26 +84,20 @@ def result(job):
         row = output_row(scene.handle(), x, u, 5.0 + STEPS_PER_SCENE * 0.05, len(scene.channels))
         return np.r_[status, x, row]
     mode, snapshot = given
-    rng = np.random.default_rng(3)
+    rng, found = np.random.default_rng(3), []
     if kind == "env":
-        env = FowtEnv(action_mode=mode, **ENV)
+        env, shape = FowtEnv(action_mode=mode, **ENV), (2,)
         env.set_state(snapshot)
-        found = []
-        for _ in range(ENV_STEPS):
-            observation, reward, terminated, _, _ = env.step(rng.uniform(-1.0, 1.0, 2))
-            found += [observation.astype(float), [reward, float(terminated)]]
-        return np.concatenate(found)
-    batch = FowtVectorEnv(2, threads=1, action_mode=mode, **ENV)
-    batch.set_state(list(snapshot))
-    found = []
+    else:
+        env, shape = FowtVectorEnv(2, threads=1, action_mode=mode, **ENV), (2, 2)
+        env.set_state(list(snapshot))
     for _ in range(ENV_STEPS):
-        observations, rewards, terminated, _, _ = batch.step(rng.uniform(-1.0, 1.0, (2, 2)))
-        found += [observations.astype(float).ravel(), rewards, terminated.astype(float)]
+        found += [np.ravel(part).astype(float) for part in env.step(rng.uniform(-1.0, 1.0, shape))[:3]]
     return np.concatenate(found)
 
 
 def differences(given=None):
-    """{job: largest difference over max(1, largest number)} between compiled and plain Python runs.
+    """Return {job: largest difference over max(1, largest number)} between compiled and plain Python runs.
 
     The measure is entry by entry, |a - b| / max(1, |a|). Raises: InputError if the plain process fails.
     """

@@ -36,13 +36,10 @@ SEA = (
 CASES = {  # case -> (columns, settings)
     **{
         f"decay_{name}": (MOTION_COLUMNS, f"dt 0.025 s; free decay from {start}; {STILL}")
-        for name, start in (
-            ("surge", "10 m"),
-            ("sway", "10 m"),
-            ("heave", "3 m"),
-            ("roll", "5 deg"),
-            ("pitch", "5 deg"),
-            ("yaw", "8 deg"),
+        for name, start in zip(
+            ("surge", "sway", "heave", "roll", "pitch", "yaw"),
+            ("10 m", "10 m", "3 m", "5 deg", "5 deg", "8 deg"),
+            strict=True,
         )
     },
     "float_steady_8mps": (
@@ -82,7 +79,7 @@ CASES = {  # case -> (columns, settings)
 
 
 def sha256(path):
-    """SHA-256 of a file, or of the list of names and SHA-256 of a folder's files."""
+    """Return the SHA-256 of a file, or of the list of names and SHA-256 of a folder's files."""
     path = Path(path)
     if path.is_dir():
         lines = [f"{sha256(part)} {part.name}\n" for part in sorted(path.iterdir())]
@@ -91,18 +88,23 @@ def sha256(path):
 
 
 def sources(*paths):
-    """Lines of a head: SHA-256 and name of each file that figures are from."""
+    """Return the lines of a head: SHA-256 and name of each file that figures are from."""
     return [f"sha256 {sha256(path)} {Path(path).name}" for path in paths]
 
 
 def write(path, comment, frame):
-    """Gzipped CSV with comment lines, the same bytes whenever it is made."""
+    """Write a gzipped CSV with comment lines, the same bytes whenever it is made."""
     text = "".join(f"# {line}\n" for line in comment) + frame.to_csv(index=False)
     path.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
 
 
+def six_digits(rows):
+    """Return a DataFrame with six digits of each float."""
+    return pd.DataFrame(rows).map(lambda v: float(f"{v:.6g}") if isinstance(v, float) else v)
+
+
 def series(source):
-    """The time series of every case."""
+    """Write the time series of every case."""
     for case, (columns, settings) in CASES.items():
         full = pd.read_csv(source / f"{case}.csv.gz", usecols=["time_s", *columns])[["time_s", *columns]]
         every = round(0.1 / (full["time_s"][1] - full["time_s"][0]))
@@ -115,7 +117,7 @@ def series(source):
 
 
 def inputs(source):
-    """The steady curve, the wind and the wave components."""
+    """Write the steady curve, the wind and the wave components."""
     path = source / "steady_operating_points.csv"
     steady = pd.read_csv(path)
     columns = ["wind_mps", "rotor_speed_rpm", "blade_pitch_deg", "aero_thrust_kN", "aero_torque_kNm"]
@@ -133,12 +135,12 @@ def inputs(source):
 
 # region of the box: columns within this of the axis, rows up to this height, seconds
 SIDE, TOP, LENGTH = 68.0, 162.0, 612.0
-REACH = 78.0  # m from the hub: beyond it no blade station has a corner of its cell
+REACH = 78.0  # m from the hub: farther out no blade station has a corner of its cell
 ROUNDING = np.array([0.04, 0.08, 0.08])  # m/s, rounding of u, v, w
 
 
 def box(source):
-    """The region of the TurbSim box that rotor and tower meet, rounded, differences in time, lzma.
+    """Write the region of the TurbSim box that rotor and tower meet, rounded, differences in time, lzma.
 
     Points that neither meets are zero.
     """

@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from make import sources, write
+from make import six_digits, sources, write
 from openfast_decks import OPENFAST, Oc4, Volturnus
 
 HERE = Path(__file__).resolve().parent
@@ -63,7 +63,7 @@ TAU = "DBEMT_Mod 2 (time constants from the means over the disk)"
 
 
 def _up(first, last, start=20.0, ramp=1.0, end=400.0):
-    """[(time, wind)] of a wind that rises within a ramp."""
+    """Return [(time, wind)] of a wind that rises within a ramp."""
     return [(0.0, first), (start, first), (start + ramp, last), (end, last)]
 
 
@@ -107,9 +107,10 @@ CASES = {  # case: (deck, arguments of its writer, columns, words)
 }  # fmt: skip
 PLACES = {Oc4: "nrel5mw_oc4_semi", Volturnus: "iea15_volturnus_s"}
 _TURBULENT = dict(t=600, wind="hub_wind", waves=True, control=True, rpm=7.56, pitch=15.4)
-_STEADY = {u: dict(t=40, wind=u, fixed=True, rpm=r, pitch=p, dtout=0.5) for u, r, p in (
-    (6, 5.0, 0.0), (10, 7.05, 0.0), (12, 7.56, 6.3), (14, 7.56, 10.0), (18, 7.56, 15.4), (24, 7.56, 21.8),
-)}  # fmt: skip
+STEADY = {  # wind, m/s: (rotor speed rpm, blade pitch deg), held
+    6: (5.0, 0.0), 10: (7.05, 0.0), 12: (7.56, 6.3), 14: (7.56, 10.0), 18: (7.56, 15.4), 24: (7.56, 21.8),
+}  # fmt: skip
+_STEADY = {u: dict(t=40, wind=u, fixed=True, rpm=r, pitch=p, dtout=0.5) for u, (r, p) in STEADY.items()}
 VOLTURNUS = {  # full outputs that make_volturnus.py reduces
     "static": dict(t=600),
     "decay_surge": dict(t=600, PtfmSurge=10),
@@ -131,12 +132,12 @@ VOLTURNUS = {  # full outputs that make_volturnus.py reduces
 
 
 def stored(name):
-    """DataFrame of a file of this folder."""
+    """Return a DataFrame of a file of this folder."""
     return pd.read_csv(HERE / name, comment="#")
 
 
 def run(deck, case, folder, program):
-    """DataFrame of OpenFAST's output of a case, run in a folder that is made. Raises: RuntimeError."""
+    """Return a DataFrame of OpenFAST's output of a case, run in a new folder. Raises: RuntimeError."""
     if not (folder / "model.out").exists():
         deck.write(
             folder, case, components=stored(WAVES), hub_wind=stored(WIND),
@@ -157,17 +158,12 @@ def run(deck, case, folder, program):
     return pd.DataFrame(np.array(rows), columns=names)
 
 
-def rounded(frame):
-    """The same with six digits of each figure."""
-    return frame.map(lambda value: float(f"{value:.6g}"))
-
-
 def reduce(name, decks, program, runs):
-    """Writes the series of a case of CASES."""
+    """Write the series of a case of CASES."""
     kind, case, columns, words = CASES[name]
     deck, place = kind(decks), PLACES[kind]
     full = run(deck, case, runs / place / name, program).rename(columns=COLUMNS)
-    frame = rounded(full[["time_s", *columns]])
+    frame = six_digits(full[["time_s", *columns]])
     inputs = [*deck.inputs(case), *([HERE / WAVES] if case.get("waves") else [])]
     (HERE / place).mkdir(exist_ok=True)
     model = MODEL + (OC4 if kind is Oc4 else IEA15)
@@ -175,10 +171,10 @@ def reduce(name, decks, program, runs):
 
 
 def keep_whole(case, decks, program, runs):
-    """Writes the full output of a case of VOLTURNUS, as make_volturnus.py reads it."""
+    """Write the full output of a case of VOLTURNUS, as make_volturnus.py reads it."""
     full = run(Volturnus(decks), VOLTURNUS[case], runs / "volturnus" / case, program)
     frame = full[[name for name in full if name in COLUMNS]].rename(columns=COLUMNS)
-    write(runs / f"{case}.csv.gz", (), rounded(frame))
+    write(runs / f"{case}.csv.gz", (), six_digits(frame))
 
 
 if __name__ == "__main__":

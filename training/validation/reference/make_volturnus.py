@@ -16,7 +16,8 @@ import pandas as pd
 from fowt_env.descriptions.units import RPM
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from make import sources, write
+from make import six_digits, sources, write
+from make_openfast import STEADY as HELD
 
 HERE = Path(__file__).resolve().parent / "iea15_volturnus_s"
 PLANE = ["surge_m", "heave_m", "pitch_deg"]
@@ -69,13 +70,7 @@ BENDING_CASES = {  # the same, with a tower that bends
     ),
 }  # fmt: skip
 STEADY = {  # case -> (wind, rotor speed, blade pitches, shear exponent)
-    **{
-        f"{wind}mps": (float(wind), rpm, (pitch,) * 3, 0.0)
-        for wind, rpm, pitch in (
-            (6, 5.0, 0.0), (10, 7.05, 0.0), (12, 7.56, 6.3), (14, 7.56, 10.0), (18, 7.56, 15.4),
-            (24, 7.56, 21.8),
-        )
-    },
+    **{f"{wind}mps": (float(wind), rpm, (pitch,) * 3, 0.0) for wind, (rpm, pitch) in HELD.items()},
     "12mps_shear": (12.0, 7.56, (6.3,) * 3, 0.14),
     "12mps_pitches": (12.0, 7.56, (8.3, 5.3, 6.3), 0.0),
 }  # fmt: skip
@@ -85,7 +80,7 @@ ROOTS = [("root1_Mx_kNm", "root1_My_kNm"), ("root2_My_kNm",), ("root3_My_kNm",)]
 
 
 def rounded(values, digits=5):
-    """Series rounded to a step that leaves `digits` digits of its largest value."""
+    """Return a series rounded to a step that leaves `digits` digits of its largest value."""
     largest = np.abs(values).max()
     if largest < 1e-7:
         return 0.0 * values
@@ -93,7 +88,7 @@ def rounded(values, digits=5):
 
 
 def series(source):
-    """The time series of every case."""
+    """Write the time series of every case."""
     for case, (columns, step, settings) in {**CASES, **BENDING_CASES}.items():
         full = pd.read_csv(source / f"{case}.csv.gz", usecols=["time_s", *columns])[["time_s", *columns]]
         every = round(step / (full["time_s"][1] - full["time_s"][0]))
@@ -105,7 +100,7 @@ def series(source):
 
 
 def wave_forces(source):
-    """What a sea pushes with: first order, and difference frequencies of the full QTF, every 2 s."""
+    """Write the forces of a sea: first order, and difference frequencies of the full QTF, every 2 s."""
     path = source / "waves_Hs7.5_qtf.csv.gz"
     columns = ["wave_elev_m", "excitation_Fx_N", "excitation_Fz_N", "excitation_My_Nm", "second_order_Fx_N",
                "second_order_My_Nm"]  # fmt: skip
@@ -119,34 +114,46 @@ def wave_forces(source):
 
 
 def whole_turns(time, rpm):
-    """Mask of the samples after SETTLED that make up whole turns."""
+    """Return a mask of the samples after SETTLED that make up whole turns."""
     period, step = 60.0 / rpm, time[1] - time[0]
     turns = np.floor((time[-1] - SETTLED) / period + 1e-9)
     return (time >= SETTLED - 1e-9) & (time < SETTLED + turns * period - 0.5 * step)
 
 
+def held(source, case):
+    """Return (arrays of a steady case over whole turns, azimuth of blade 1, row of the case's settings)."""
+    wind, rpm, pitches, shear = STEADY[case]
+    frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
+    time = frame["time_s"].to_numpy()
+    kept = whole_turns(time, rpm)
+    row = {"case": case, "wind_mps": wind, "shear_exponent": shear, "rotor_speed_rpm": rpm}
+    row |= {f"blade_pitch{k}_deg": value for k, value in enumerate(pitches, 1)}
+    columns = {name: frame[name].to_numpy()[kept] for name in frame}
+    return columns, rpm * RPM * time[kept], row  # blade 1 up at t = 0
+
+
+def write_steady(name, settings, source, cases, rows):
+    """Write the reduced rows of steady cases."""
+    paths = [source / f"steady_{case}_fixed.csv.gz" for case in cases]
+    write(HERE / f"{name}.csv.gz", (MODEL, settings, *sources(*paths)), six_digits(rows))
+
+
 def steady(source):
-    """Rotor loads in steady wind with the platform held: means over whole turns, in axes that do not turn."""
+    """Write rotor loads in steady wind, platform held: means over whole turns, in axes that do not turn."""
     rows = []
-    for case, (wind, rpm, pitches, shear) in STEADY.items():
-        frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
-        time = frame["time_s"].to_numpy()
-        angle = rpm * RPM * time  # blade 1 up at t = 0
-        kept = whole_turns(time, rpm)
-        row = {"case": case, "wind_mps": wind, "shear_exponent": shear, "rotor_speed_rpm": rpm}
-        row |= {f"blade_pitch{k}_deg": value for k, value in enumerate(pitches, 1)}
+    for case in STEADY:
+        values, angle, row = held(source, case)
         for name in ("aero_thrust_N", "aero_torque_Nm"):
-            row[name] = frame[name].to_numpy()[kept].mean()
+            row[name] = values[name].mean()
         for y, z in TURNING:
-            a, b = frame[y].to_numpy(), frame[z].to_numpy()
-            row[y] = (a * np.cos(angle) - b * np.sin(angle))[kept].mean()
-            row[z] = (a * np.sin(angle) + b * np.cos(angle))[kept].mean()
+            a, b = values[y], values[z]
+            row[y] = (a * np.cos(angle) - b * np.sin(angle)).mean()
+            row[z] = (a * np.sin(angle) + b * np.cos(angle)).mean()
         for name in [name for names in ROOTS for name in names]:
-            row[name] = frame[name].to_numpy()[kept].mean() if name in frame else np.nan
+            row[name] = values[name].mean() if name in values else np.nan
         for name in ("root1_Mx_kNm", "root1_My_kNm"):
             for part, wave in (("cos", np.cos(angle)), ("sin", np.sin(angle))):
-                value = 2.0 * (frame[name].to_numpy() * wave)[kept].mean() if name in frame else np.nan
-                row[f"{name}_{part}"] = value
+                row[f"{name}_{part}"] = 2.0 * (values[name] * wave).mean() if name in values else np.nan
         rows.append(row)
     settings = (
         "platform and tower held, steady wind at 150 m, rotor speed and blade pitch held; means over whole"
@@ -154,14 +161,11 @@ def steady(source):
         " the rotor (z up when blade 1 is); root moments of the structure (with weight and inertia): means,"
         " and cos and sin parts over the azimuth of blade 1 (0: up)"
     )
-    paths = [source / f"steady_{case}_fixed.csv.gz" for case in STEADY]
-    write(HERE / "steady.csv.gz", (MODEL, settings, *sources(*paths)), pd.DataFrame(rows).map(
-        lambda v: float(f"{v:.6g}") if isinstance(v, float) else v
-    ))  # fmt: skip
+    write_steady("steady", settings, source, STEADY, rows)
 
 
 def sheared(source):
-    """Rotor loads in sheared wind at azimuths of one turn."""
+    """Write rotor loads in sheared wind at azimuths of one turn."""
     path = source / "steady_12mps_shear_fixed.csv.gz"
     columns = ["time_s", "azimuth_deg", "aero_thrust_N", "aero_torque_Nm", "aero_My_Nm", "aero_Mz_Nm"]
     frame = pd.read_csv(path, usecols=columns)[columns]
@@ -182,18 +186,12 @@ BLADE_CHANNELS = {
 
 
 def blade_loads(source):
-    """Moments of single blades, yaw bearing and tower base: means and harmonics over the azimuth."""
+    """Write moments of single blades, yaw bearing and tower base: means and harmonics over the azimuth."""
     rows = []
     for case in BLADE_CASES:
-        wind, rpm, pitches, shear = STEADY[case]
-        frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
-        time = frame["time_s"].to_numpy()
-        kept = whole_turns(time, rpm)
-        angle = rpm * RPM * time[kept]  # blade 1 up at t = 0
-        settings = {"case": case, "wind_mps": wind, "shear_exponent": shear, "rotor_speed_rpm": rpm}
-        settings |= {f"blade_pitch{k}_deg": value for k, value in enumerate(pitches, 1)}
+        columns, angle, settings = held(source, case)
         for channel, column in BLADE_CHANNELS.items():
-            values = frame[column].to_numpy()[kept]
+            values = columns[column]
             row = settings | {"channel": channel, "mean_kNm": values.mean()}
             for order in (1, 3):
                 row[f"cos{order}_kNm"] = 2.0 * (values * np.cos(order * angle)).mean()
@@ -204,10 +202,7 @@ def blade_loads(source):
         " moments over whole turns after 15 s: mean, cos and sin parts of the first and third harmonic over"
         " the azimuth of blade 1 (0: up)"
     )
-    paths = [source / f"steady_{case}_fixed.csv.gz" for case in BLADE_CASES]
-    write(HERE / "blade_loads.csv.gz", (MODEL, settings, *sources(*paths)), pd.DataFrame(rows).map(
-        lambda v: float(f"{v:.6g}") if isinstance(v, float) else v
-    ))  # fmt: skip
+    write_steady("blade_loads", settings, source, BLADE_CASES, rows)
 
 
 if __name__ == "__main__":

@@ -115,14 +115,14 @@ AERO_CHANNELS = ("RtFldFxh", "RtFldMxh", "RtFldFyh", "RtFldFzh", "RtFldMyh", "Rt
 
 
 def value_of(text, key):
-    """Text of the value before a key of a deck, None where the deck has no such key."""
+    """Return the text of the value before a key of a deck, None where the deck has no such key."""
     bare = re.escape(key).replace(r"\(", r"\(?").replace(r"\)", r"\)?")
     found = re.search(rf"^[ \t]*(\"[^\"\n]*\"|[^\s\"]+)[ \t]+{bare}(?=\s|$)", text, re.M)
     return None if found is None else found[1]
 
 
 def filled(layout, deck="", **settings):
-    """Text of an input file: of each key of the layout the setting, else the default, else the deck's value.
+    """Return the text of an input file: each key of the layout with its setting, default or deck's value.
 
     Raises: KeyError for a setting that the layout lacks, and for a key without any value.
     """
@@ -145,7 +145,7 @@ def filled(layout, deck="", **settings):
 
 
 def put(text, **values):
-    """Deck text with the value before each key replaced, where the key comes first."""
+    """Return deck text with the value before each key replaced, where the key comes first."""
     for name, value in values.items():
         key = re.escape(name.replace("__", "(") + (")" if "__" in name else ""))
         text, count = re.subn(
@@ -158,24 +158,24 @@ def put(text, **values):
 
 
 def with_channels(text, channels):
-    """Deck text with its first list of channels replaced, and cut after it."""
+    """Return deck text with its first list of channels replaced, and cut after it."""
     head = text[: text.index("\n", text.index("OutList")) + 1]
     return head + "".join(f'"{name}"\n' for name in channels) + "END\n"
 
 
 def matrix(name, entries):
-    """Six rows of a 6x6 matrix of HydroDyn; entries {(i, j) from 1: value}."""
+    """Return six rows of a 6x6 matrix of HydroDyn; entries {(i, j) from 1: value}."""
     rows = [" ".join(repr(float(entries.get((i, j), 0.0))) for j in range(1, 7)) for i in range(1, 7)]
     return "\n".join([f"{rows[0]} {name}", *rows[1:]]) + "\n"
 
 
 def table(key, rows):
-    """Text of a table of HydroDyn: the number of rows, two headlines, the rows."""
+    """Return the text of a table of HydroDyn: the number of rows, two headlines, the rows."""
     return f"- table\n{len(rows)} {key}\n-\n-\n" + "".join(f"{row}\n" for row in rows)
 
 
 def members_text(axial=(), joints=(), sections=(), coefficients=(), members=(), fills=()):
-    """Text of HydroDyn's strip theory, all tables of it in v5's order."""
+    """Return the text of HydroDyn's strip theory, all tables of it in v5's order."""
     return "".join([
         table("NAxCoef", axial or ["1 0 0 1 0 0 1"]),
         table("NJoints", joints),
@@ -196,7 +196,7 @@ def members_text(axial=(), joints=(), sections=(), coefficients=(), members=(), 
 
 
 def write_elastodyn(folder, deck, case, **files):
-    """Writes ED.dat of a run: rigid but for what the case switches on; blade and tower files beside it."""
+    """Write ED.dat of a run: rigid but for what the case switches on; blade and tower files beside it."""
     tower, blades = case.get("tower", 0), bool(case.get("blades"))
     pitches = case.get("pitches", (case.get("pitch", 0),) * 3)
     held = {f"Ptfm{k}DOF": False for k in ("Sg", "Sw", "Hv", "R", "P", "Y")} if case.get("fixed") else {}
@@ -213,7 +213,7 @@ def write_elastodyn(folder, deck, case, **files):
 
 
 def write_sea(folder, case, components, **grid):
-    """Writes SS.dat, and the file of wave components where the case has them."""
+    """Write SS.dat, and the file of wave components where the case has them."""
     settings = {"WvHiCOffD": 0.737863, **grid}
     if kind := case.get("sea"):
         settings |= {"WaveMod": "1P0.0", "WaveHs": kind[0], "WaveTp": kind[1]}
@@ -226,7 +226,7 @@ def write_sea(folder, case, components, **grid):
 
 
 def write_glue(folder, case, **settings):
-    """Writes model.fst of a run."""
+    """Write model.fst of a run."""
     aero = 2 if case.get("wind") is not None else 0
     text = filled(
         GLUE, TMax=case["t"], DT=case.get("dt", 0.025), DT_Out=case.get("dtout", 0.1),
@@ -237,7 +237,7 @@ def write_glue(folder, case, **settings):
 
 
 def end_nodes(text, inside=0.05):
-    """AeroDyn blade with a node more just inside root and tip, where AeroDyn has loads without induction."""
+    """Return an AeroDyn blade with nodes just inside root and tip, where loads have no induction."""
     lines = text.rstrip("\n").split("\n")
     first = next(k for k, line in enumerate(lines) if "NumBlNds" in line)
     count = int(lines[first].split()[0])
@@ -257,23 +257,43 @@ def end_nodes(text, inside=0.05):
     return "\n".join(lines[: first + 3] + body) + "\n"
 
 
-class Volturnus:
+class Deck:
+    """A public deck: its own folder and name, tower and blade files, and the files of its floating body."""
+
+    ends = (".1", ".3", ".hst", ".12d")
+
+    def read(self, part):
+        """Return the text of a file of the deck."""
+        return (self.own / f"{self.name}_{part}.dat").read_text()
+
+    def begin(self, folder, case):
+        """Make the folder of a run with the files of structure and floating body."""
+        folder.mkdir(parents=True)
+        tower = self.own / f"{self.name}_{self.tower}.dat"
+        write_elastodyn(folder, self.read("ElastoDyn"), case, blade_ed=self.blade, tower=tower)
+        (folder / "HydroData").mkdir()
+        for end in self.ends:
+            shutil.copy(self.own / "HydroData" / f"{self.body}{end}", folder / "HydroData" / f"body{end}")
+
+
+class Volturnus(Deck):
     """IEA 15 MW on VolturnUS-S: potential flow, a matrix of quadratic drag, MAP++, quasi-steady polars."""
+
+    name = body = "IEA-15-240-RWT-UMaineSemi"
+    tower = "ElastoDyn_tower"
 
     def __init__(self, decks):
         root = Path(decks) / "iea15_volturnus_s"
-        self.own = root / "OpenFAST" / "IEA-15-240-RWT-UMaineSemi"
-        self.rotor = root / "OpenFAST" / "IEA-15-240-RWT"
-        self.name = "IEA-15-240-RWT-UMaineSemi"
+        self.own, self.rotor = root / "OpenFAST" / self.name, root / "OpenFAST" / "IEA-15-240-RWT"
+        self.blade = self.rotor / "IEA-15-240-RWT_ElastoDyn_blade.dat"
         tests = root / "rosco_v2.10_deck" / "Examples" / "Test_Cases" / "IEA-15-240-RWT"
         self.discon = tests / self.name / f"{self.name}_DISCON.IN"
 
     def inputs(self, case):
-        """Paths of the files of the deck that a run takes figures from."""
-        paths = [self.own / f"{self.name}_{part}.dat" for part in ("ElastoDyn", "ElastoDyn_tower")]
-        paths.append(self.rotor / "IEA-15-240-RWT_ElastoDyn_blade.dat")
+        """Return the paths of the files of the deck that a run takes figures from."""
+        paths = [self.own / f"{self.name}_{part}.dat" for part in ("ElastoDyn", self.tower)] + [self.blade]
         if not case.get("fixed"):
-            body = [self.own / "HydroData" / f"{self.name}{end}" for end in (".1", ".3", ".hst", ".12d")]
+            body = [self.own / "HydroData" / f"{self.body}{end}" for end in self.ends]
             paths += [self.own / f"{self.name}_MAP.dat", *(body if case.get("qtf") else body[:3])]
         if case.get("wind") is not None:
             paths += [self.own / f"{self.name}_AeroDyn15.dat", self.rotor / "Airfoils",
@@ -284,19 +304,9 @@ class Volturnus:
             paths.append(self.own / f"{self.name}_ServoDyn.dat")
         return paths
 
-    def read(self, part):
-        return (self.own / f"{self.name}_{part}.dat").read_text()
-
     def write(self, folder, case, components=None, hub_wind=None, rosco="libdiscon.so"):
-        """Writes all inputs of a run; rosco: path of its library."""
-        folder.mkdir(parents=True)
-        write_elastodyn(
-            folder, self.read("ElastoDyn"), case, tower=self.own / f"{self.name}_ElastoDyn_tower.dat",
-            blade_ed=self.rotor / "IEA-15-240-RWT_ElastoDyn_blade.dat",
-        )  # fmt: skip
-        (folder / "HydroData").mkdir()
-        for end in (".1", ".3", ".hst", ".12d"):
-            shutil.copy(self.own / "HydroData" / f"{self.name}{end}", folder / "HydroData" / f"body{end}")
+        """Write all inputs of a run; rosco: path of its library."""
+        self.begin(folder, case)
         drag = {
             (1, 1): 9.23e5, (2, 2): 9.23e5, (3, 3): 2.30e6, (4, 4): 1.68e10, (5, 5): 1.68e10,
             (6, 6): 4.80e10, (1, 5): -8.92e6, (5, 1): -8.92e6, (2, 4): 8.92e6, (4, 2): 8.92e6,
@@ -316,7 +326,7 @@ class Volturnus:
         write_glue(folder, case, **held)
 
     def _write_wind(self, folder, case, hub_wind):
-        """Writes AD.dat with its blade and airfoils, IW.dat and the uniform wind of a file."""
+        """Write AD.dat with its blade and airfoils, IW.dat and the uniform wind of a file."""
         text = self.read("AeroDyn15").replace("../IEA-15-240-RWT/Airfoils", "Airfoils")
         text = text.replace("../IEA-15-240-RWT/IEA-15-240-RWT_AeroDyn15_blade.dat", "blade_ad.dat")
         text = put(text, TwrPotent=0, TwrShadow=0, DBEMT_Mod=case.get("dbemt", 0), UA_Mod=0, AoA34=False)
@@ -343,7 +353,7 @@ class Volturnus:
         (folder / "IW.dat").write_text(f"v5\n-\n{text}")
 
     def _write_servodyn(self, folder, case, rosco):
-        """Writes SV.dat: ROSCO's library, or a pitch manoeuvre of all blades ("pitch_to" degrees at 20 s)."""
+        """Write SV.dat: ROSCO's library, or a pitch manoeuvre of all blades ("pitch_to" degrees at 20 s)."""
         control, target = 5 if case.get("control") else 0, case.get("pitch_to")
         text = put(self.read("ServoDyn"), PCMode=control, VSContrl=control, DLL_FileName=f'"{rosco}"',
                    DLL_InFile='"DISCON.IN"', DLL_DT="0.025" if control else '"default"')  # fmt: skip
@@ -363,7 +373,7 @@ class Volturnus:
 
 
 def section(text, key):
-    """Rows (lists of words) of a table of HydroDyn's old format, below the line with its number of rows."""
+    """Return the rows (lists of words) of a table of HydroDyn's old format, below their number."""
     lines = text.split("\n")
     at = next(k for k, line in enumerate(lines) if re.match(rf"\s*\d+\s+{key}(\s|$)", line))
     count = int(lines[at].split()[0])
@@ -373,39 +383,32 @@ def section(text, key):
     return [row.split("!")[0].split() for row in rows[1 : count + 1]]
 
 
-class Oc4:
+class Oc4(Deck):
     """NREL 5 MW on the OC4 semi-submersible: potential flow, drag of 25 members, water in six of them."""
 
+    name, body, tower = "NRELOffshrBsline5MW_OC4DeepCwindSemi", "marin_semi", "ElastoDyn_Tower"
+    ends = (".1", ".hst", ".12d")
     gravity, density = 9.80665, 1025.0
     division = {"1": "2.5", "2": "2.0", "3": "3.0", "4": "6.0"}  # m, of the strips by the set of sections
 
     def __init__(self, decks):
         self.own = Path(decks) / "nrel5mw_oc4_semi" / "CertTest" / "5MW_Baseline"
-        self.name = "NRELOffshrBsline5MW_OC4DeepCwindSemi"
         turbine = Path(decks) / "nrel5mw_turbine" / "Examples" / "Test_Cases" / "NREL-5MW"
         self.blade = turbine / "NRELOffshrBsline5MW_Blade.dat"
         data = Path(__file__).resolve().parents[3] / "fowt_env" / "data" / "platforms"
         self.excitation = data / "nrel5mw_oc4_semi.npz"
 
     def inputs(self, case):
-        """Paths of the files that a run takes figures from; the deck has no .3: excitation of the package."""
-        parts = ["ElastoDyn", "ElastoDyn_Tower", "HydroDyn", "MoorDyn" if case.get("moordyn") else "MAP"]
+        """Return the paths of the inputs of a run; the deck has no .3: excitation of the package."""
+        parts = ["ElastoDyn", self.tower, "HydroDyn", "MoorDyn" if case.get("moordyn") else "MAP"]
         paths = [self.own / f"{self.name}_{part}.dat" for part in parts]
-        ends = (".1", ".hst", ".12d") if case.get("qtf") else (".1", ".hst")
-        paths += [self.own / "HydroData" / f"marin_semi{end}" for end in ends]
+        ends = self.ends if case.get("qtf") else self.ends[:2]
+        paths += [self.own / "HydroData" / f"{self.body}{end}" for end in ends]
         return [*paths, self.blade, self.excitation]
 
-    def read(self, part):
-        return (self.own / f"{self.name}_{part}.dat").read_text()
-
     def write(self, folder, case, components=None, **_):
-        """Writes all inputs of a run."""
-        folder.mkdir(parents=True)
-        write_elastodyn(folder, self.read("ElastoDyn"), case, blade_ed=self.blade,
-                        tower=self.own / f"{self.name}_ElastoDyn_Tower.dat")  # fmt: skip
-        (folder / "HydroData").mkdir()
-        for end in (".1", ".hst", ".12d"):
-            shutil.copy(self.own / "HydroData" / f"marin_semi{end}", folder / "HydroData" / f"body{end}")
+        """Write all inputs of a run."""
+        self.begin(folder, case)
         (folder / "HydroData" / "body.3").write_text(self._excitation_text())
         (folder / "HD.dat").write_text(self._hydrodyn(case))
         # 2 m along the waves, which no component is shorter than 9 m in; all members are within 29 m and 20 m
@@ -416,7 +419,7 @@ class Oc4:
         write_glue(folder, case, Gravity=self.gravity, CompMooring=3 if case.get("moordyn") else 1)
 
     def _excitation_text(self):
-        """WAMIT's .3 of the arrays of the package, about heading 0: at the periods of the .1, linear between.
+        """Return WAMIT's .3 of the package's arrays, about heading 0: at the periods of the .1, interpolated.
 
         Period, heading, mode, size, phase, real and imaginary part.
         """
@@ -438,7 +441,7 @@ class Oc4:
         return "\n".join(rows) + "\n"
 
     def ballast(self, text):
-        """[(mass, height of its centre)] of the water in members: kg, m."""
+        """Return [(mass, height of its centre)] of the water in members: kg, m."""
         joints = {row[0]: float(row[3]) for row in section(text, "NJoints")}
         sizes = {row[0]: float(row[1]) - 2.0 * float(row[2]) for row in section(text, "NPropSets")}
         members = {row[0]: row for row in section(text, "NMembers")}
@@ -453,7 +456,7 @@ class Oc4:
         return found
 
     def _hydrodyn(self, case):
-        """Text of HD.dat: the members of the deck with their drag, and its water, which moves with them."""
+        """Return the text of HD.dat: the deck's members with their drag, and the water in them."""
         text = self.read("HydroDyn")
         wet = bool(case.get("sea") or case.get("waves"))
         platform = filled(FLOATING, text, DiffQTF=case.get("qtf", 0), ExctnMod=int(wet))
@@ -487,7 +490,7 @@ class Oc4:
         return f"v5\n-\n{platform}{added}" + filled(SIMPLE) + strips + filled(HYDRO_OUTPUT)
 
     def _moordyn(self):
-        """MoorDyn v2 text of the deck's MoorDyn file."""
+        """Return MoorDyn v2 text of the deck's MoorDyn file."""
         text = self.read("MoorDyn")
 
         def rows(name, count):

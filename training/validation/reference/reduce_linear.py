@@ -17,8 +17,7 @@ infinite frequency instead; the poles by it are stored beside the others.
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
-from make import sources, write
+from make import six_digits, sources, write
 
 RAD_PER_S = np.array([0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8])  # of the responses
 PLATFORM = ("surge", "heave", "pitch")
@@ -26,7 +25,7 @@ FREE, TOWER = [0, 1, 2, 4], 3  # positions that stay, and the tower's
 
 
 def read(path):
-    """(A, B, (states, inputs) operating points) of a linearisation file."""
+    """Return (A, B, (states, inputs) operating points) of a linearisation file."""
     lines = Path(path).read_text().split("\n")
     found = {}
     for number, line in enumerate(lines):
@@ -45,13 +44,13 @@ def read(path):
 
 
 def mean_over_azimuths(folder, point):
-    """(A, B, states, inputs) of an operating point, averaged over its azimuths."""
+    """Return (A, B, states, inputs) of an operating point, averaged over its azimuths."""
     models = [read(path) for path in sorted(Path(folder).glob(f"lin_{point:02d}.*.lin"))]
     return [np.mean([model[k] for model in models], axis=0) for k in range(4)], len(models)
 
 
 def hold_tower(A, B, direction=None):
-    """(A, B) with the tower held; states: surge, heave, pitch, their rates, rotor speed, HydroDyn's.
+    """Return (A, B) with the tower held; states: surge, heave, pitch, their rates, rotor speed, HydroDyn's.
 
     direction (5,): M^-1 e_t up to a factor; None: the column of the tower's deflection.
     """
@@ -84,7 +83,7 @@ ADDED_MASS = ((0, 0, 9.64e6), (1, 1, 2.48e7), (2, 2, 1.164e10), (0, 2, -1.01e8),
 
 
 def direction_from_masses():
-    """M^-1 e_t (5,) of the plane model from the figures above; the rotor does not couple."""
+    """Return M^-1 e_t (5,) of the plane model from the figures above; the rotor does not couple."""
     mass = np.zeros((4, 4))  # surge, heave, pitch, tower
 
     def add(m, x, z, bend, slope):
@@ -110,7 +109,7 @@ def direction_from_masses():
 
 
 def named_poles(A):
-    """{motion: complex pole with positive imaginary part, rotor: real pole} of a model with the tower held.
+    """Return {motion: complex pole with positive imaginary part, rotor: real pole}, the tower held.
 
     A mode is found by its participation in the two states of a motion: right times left eigenvector.
     """
@@ -129,7 +128,7 @@ def named_poles(A):
 
 
 def response(A, B, column, state, omega):
-    """Complex response of a state (index) to an input (column) at omega (rad/s)."""
+    """Return the complex response of a state (index) to an input (column) at omega (rad/s)."""
     unit = np.eye(len(A))
     return np.array([np.linalg.solve(1j * w * unit - A, B[:, column])[state] for w in omega])
 
@@ -138,7 +137,7 @@ WIND, COLLECTIVE = 0, 8  # columns of B
 
 
 def responses(source, folder):
-    """Writes linear_poles.csv.gz and linear_responses.csv.gz of the operating points 5 to 24 m/s."""
+    """Write linear_poles.csv.gz and linear_responses.csv.gz of the operating points 5 to 24 m/s."""
     poles, gains = [], []
     for point in range(20):
         (A, B, states, inputs), count = mean_over_azimuths(source, point)
@@ -163,12 +162,10 @@ def responses(source, folder):
         for source_name, column in (("wind", WIND), ("blade_pitch", COLLECTIVE)):
             for target, state in (("rotor_speed", 6), ("pitch", 2)):
                 for w, value in zip(RAD_PER_S, response(held, by, column, state, RAD_PER_S), strict=True):
-                    gains.append(
-                        {
-                            "wind_mps": inputs[0], "input": source_name, "output": target, "omega_rad_s": w,
-                            "real": value.real, "imag": value.imag,
-                        }
-                    )  # fmt: skip
+                    gains.append({
+                        "wind_mps": inputs[0], "input": source_name, "output": target, "omega_rad_s": w,
+                        "real": value.real, "imag": value.imag,
+                    })  # fmt: skip
     model = (
         "OpenFAST (2021-02), IEA 15 MW on VolturnUS-S of NREL/ROSCO fc11f43 (Examples/Test_Cases, 240"
         " linearisation files): surge, heave, platform pitch,"
@@ -181,11 +178,8 @@ def responses(source, folder):
         " _flexible: tower free"
     )
 
-    def shown(rows):
-        return pd.DataFrame(rows).map(lambda v: float(f"{v:.6g}") if isinstance(v, float) else v)
-
-    write(folder / "linear_poles.csv.gz", (model, settings, *sources(source)), shown(poles))
+    write(folder / "linear_poles.csv.gz", (model, settings, *sources(source)), six_digits(poles))
     settings = (
         "responses of rotor speed (rad/s) and platform pitch (rad) to hub wind (m/s) and blade pitch (rad)"
     )
-    write(folder / "linear_responses.csv.gz", (model, settings, *sources(source)), shown(gains))
+    write(folder / "linear_responses.csv.gz", (model, settings, *sources(source)), six_digits(gains))
