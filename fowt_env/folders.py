@@ -2,6 +2,8 @@
 
 import os
 import stat
+import tempfile
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 PRIVATE = 0o700
@@ -40,6 +42,21 @@ def make_private(folder):
     if not folder.is_dir():
         make_private(folder.parent)
         folder.mkdir(mode=PRIVATE, exist_ok=True)
+
+
+@contextmanager
+def replaced_privately(path):
+    """Context with a binary file that takes the path's place at its end, private whatever the umask."""
+    folder, name = os.path.split(path)
+    handle, temporary = tempfile.mkstemp(dir=folder, prefix=f"{name}.tmp.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(temporary)
+        raise
 
 
 def distrust(path, kind=stat.S_ISDIR):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import fowt_env
 from fowt_env.layout import FOLDERS, PACKAGE, installed_path, module_path
-from fowt_env.training.evaluation.sources import imported_files, in_order
+from fowt_env.plant.compile.sources import imported_files, in_order, read_source
 
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
 NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
@@ -21,10 +21,10 @@ INSTALLED = {"site-packages", "dist-packages"}
 
 
 def _digest(paths, key=""):
-    """Hash of files, by their order and contents, and of a key."""
+    """Hash of files, by their order and contents, of a key, and of Python's files by their code."""
     digest = hashlib.sha256(key.encode())
-    for path in paths:
-        digest.update(Path(path).read_bytes())
+    for path in map(Path, paths):
+        digest.update(read_source(path).code.encode() if path.suffix == ".py" else path.read_bytes())
     return digest.hexdigest()[:16]
 
 

@@ -2,8 +2,9 @@
 
 Numba's own cache watches only the file of the function itself: after an edit of a callee in
 another file a cached caller would go on returning the old result. So the cache lives in a folder
-named by a hash of every source of the plant. A kernel of another package (an environment's, a controller's)
-carries the hash of what its module imports besides. A user's function is compiled anew in each process.
+named by a hash of the code of every source of the plant, without its texts (sources.py). A kernel of another
+package (an environment's, a controller's) carries the hash of what its module imports besides. A user's
+function is compiled anew in each process.
 """
 
 import hashlib
@@ -31,7 +32,7 @@ from fowt_env.layout import PACKAGE, installed_path  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
 from fowt_env.plant.compile.linked import LinkedDispatcher  # noqa: E402
 from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # listens from here on
-from fowt_env.plant.compile.sources import imported_at_top  # noqa: E402
+from fowt_env.plant.compile.sources import imported_at_top, keep_sources, read_source  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
 DAY = 86400.0  # s; what was used within it may be in use still
@@ -42,11 +43,12 @@ PLANT = Path(__file__).absolute().parents[1]
 
 
 def _hash(paths):
-    """Hash (16 hexadecimal digits) of sources and of the versions that shape machine code."""
+    """Hash (16 hexadecimal digits) of sources' code and of the versions that shape machine code."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
     for place, path in sorted((installed_path(path), path) for path in paths):
         digest.update(place.relative_to(PACKAGE).as_posix().encode())
-        digest.update(path.read_bytes())
+        digest.update(read_source(path).code.encode())
+    keep_sources()
     return digest.hexdigest()[:16]
 
 
