@@ -10,11 +10,16 @@ from math import isfinite
 
 import numpy as np
 
-from fowt_env.descriptions.measurements import BLADES_MEASURED, MEASURED
 from fowt_env.descriptions.sensors import SensorChain, sensor_chain, sensors_of
 from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measurement
+from fowt_env.plant.measurement import (
+    BLADES_MEASURED,
+    MEASURED,
+    N_MEASUREMENTS,
+    BladeMeasurement,
+    Measurement,
+)
 from fowt_env.plant.sensing import Sensors, Setting, open_chain
 from fowt_env.weather.sensor_noise import draw_noise
 from fowt_env.weather.sensor_noise import draw_sensors as draw_chain

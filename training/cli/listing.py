@@ -212,7 +212,7 @@ def _tasks():
 
 
 def _metrics():
-    from fowt_env.training.evaluation.metric_meanings import metric_table
+    from fowt_env.training.evaluation.metrics import metric_table
 
     return metric_table()
 

@@ -13,8 +13,7 @@ from fowt_env.scene import options
 from fowt_env.training.cli import listing
 from fowt_env.training.cli.app import app
 from fowt_env.training.evaluation.cases import read_suite
-from fowt_env.training.evaluation.metric_meanings import metric_meaning
-from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.metrics import METRICS, TABLE
 from fowt_env.weather.wind_field import FIELD_KINDS
 
 
@@ -27,7 +26,7 @@ def test_what_is_described_here_is_what_there_is():
     assert set(listing.FAULTS) == set(faults.KINDS)
     assert set(listing.OPTIONS) == set(options.OPTIONS)
     assert set(listing.TASKS) == set(tasks.TASKS)
-    assert len(rows("metrics")) == len(METRICS) and all(metric_meaning(metric) for metric in METRICS)
+    assert len(rows("metrics")) == len(METRICS) and all(metric.meaning for metric in TABLE.values())
 
 
 def test_every_channel_has_a_meaning():
