@@ -69,6 +69,7 @@ class Task:
     # None: nothing is to be stopped, and the agent has it from the start
     shutdown: tuple | None = None
     weather_seeds: tuple = (0, LARGEST_SEED)  # range (low, below) from which an episode's weather is drawn
+    summary: str = field(default="", compare=False)  # what is to be done, for lists
 
     def _repr_html_(self):
         """What a notebook shows: weather, observation, and the weights of the reward."""
@@ -371,18 +372,25 @@ TASKS = {
     for task in (
         Task(
             name="above_rated",
+            summary="hold rotor speed and platform in turbulence and waves",
             wind={"kind": "ntm", "speed": (12.0, 24.0), "class": "B"},
             sea={"kind": "joint", "table": SITE},
             setpoint=(0.85, 1.15),
         ),
         Task(
             name="full_range",
+            summary="produce power from cut-in to cut-out",
             wind={"kind": "ntm", "speed": (4.0, 25.0), "class": "B"},
             sea={"kind": "joint", "table": SITE},
         ),
-        Task(name="steady", wind={"kind": "steady", "speed": (4.0, 25.0)}, sea=None),
+        Task(
+            name="steady",
+            summary="steady wind over still water: the simplest to learn",
+            wind={"kind": "steady", "speed": (4.0, 25.0)},
+        ),
         Task(
             name="shutdown",
+            summary="stop the rotor gently after a signal",
             wind={"kind": "ntm", "speed": (12.0, 24.0), "class": "B"},
             sea={"kind": "joint", "table": SITE},
             duration=240.0,
@@ -391,7 +399,12 @@ TASKS = {
             blade_pitch=(0.0, 90.0),
             shutdown=(20.0, 60.0),
         ),
-        Task(name="above_rated_mixture", wind=_mixture(12.0, 24.0), setpoint=(0.85, 1.15)),
+        Task(
+            name="above_rated_mixture",
+            summary="above_rated with gusts, steady wind and direction changes mixed in",
+            wind=_mixture(12.0, 24.0),
+            setpoint=(0.85, 1.15),
+        ),
     )
 }
 

@@ -287,7 +287,7 @@ def check_scene(scene: Any) -> None:
 
 def _default(name):
     """Default of an option, None where its fidelity decides it."""
-    return OPTIONS[name][0] if name in OPTIONS else None
+    return OPTIONS[name].default if name in OPTIONS else None
 
 
 def _replaced(part, path, value):
