@@ -30,7 +30,6 @@ The built-in controllers are built on the simulator, and so it imports none of t
 package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
 """
 
-import difflib
 import importlib
 import inspect
 import operator
@@ -58,6 +57,7 @@ from fowt_env.errors import (
     InputError,
     PlantWarning,
     SimulationStopped,
+    did_you_mean,
     level_outside,
     unknown,
 )
@@ -350,9 +350,8 @@ def _lacking(error):
     what = "measurement.blades has" if of_blades else "a measurement has"
     if not of_blades and error.name in BladeMeasurement._fields:
         return f"{what} no {error.name!r}: it is measurement.blades.{error.name}"
-    near = difflib.get_close_matches(str(error.name), known, n=3)
-    hint = f". Did you mean {' or '.join(map(repr, near))}?" if near else f": it has {', '.join(known)}"
-    return f"{what} no {error.name!r}{hint}"
+    hint = did_you_mean(error.name, known, 3)
+    return f"{what} no {error.name!r}" + (f".{hint}" if hint else f": it has {', '.join(known)}")
 
 
 class MeasurementView(Measurement):

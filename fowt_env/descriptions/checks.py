@@ -4,15 +4,16 @@ A message is `key = value: must be ...`, with the allowed range in words.
 """
 
 import math
+from pathlib import Path
 
 import numpy as np
 
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, did_you_mean
 
 
 def plain_number(value):
-    """A numpy scalar as a Python number, which the strict float type takes (and no string or bool)."""
-    return value.item() if isinstance(value, (np.floating, np.integer)) else value
+    """A scalar of numpy or the like as Python's own, which the strict float type takes."""
+    return value.item() if getattr(value, "ndim", None) == 0 else value
 
 
 def is_number(value):
@@ -76,6 +77,72 @@ def check_whole_number(key, value, low=None, high=None):
         allowed = "a whole number" if low is None else f"a whole number >= {low}"
         raise refusal(key, value, allowed if high is None else f"a whole number from {low} to {high}")
     return int(value)
+
+
+def check_pair(key, value, low, high):
+    """The (low, high) of a pair of numbers in order. Raises: InputError unless both are within the range."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise refusal(key, value, "a pair (low, high)")
+    first, last = (check_number(key, number, low, high) for number in value)
+    if first > last:
+        raise InputError(f"{key} = {short(value)}: the low end must not exceed the high end")
+    return first, last
+
+
+def check_in_range(key, value, low, high, unit=""):
+    """The value as a float. Raises: InputError unless it is a number in [low, high], with its unit."""
+    return check_number(key, value, low, high, allowed=f"a number in [{low:g}, {high:g}] {unit}".rstrip())
+
+
+def check_choice(key, value, choices):
+    """The one of a few names or numbers that a value is, letters of either case. Raises: InputError."""
+    wanted = value.upper() if isinstance(value, str) else value
+    for choice in choices:
+        same = choice.upper() if isinstance(choice, str) else choice
+        if type(wanted) is not bool and wanted == same:
+            return choice
+    hint = did_you_mean(value, choices) if isinstance(value, str) else ""
+    raise refusal(key, value, f"one of {', '.join(map(str, choices))}{'.' * bool(hint)}{hint}")
+
+
+def check_flag(key, value):
+    """The value as a bool. Raises: InputError unless it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise refusal(key, value, "True or False")
+    return bool(value)
+
+
+def check_path(key, value):
+    """The value as a Path, with ~ expanded. Raises: InputError."""
+    if not isinstance(value, str | Path):
+        raise refusal(key, value, "a path")
+    return Path(value).expanduser()
+
+
+def check_samples(key, value, low, high, unit):
+    """A (n,) float64 copy of a list or array of numbers in [low, high], n > 0. Raises: InputError."""
+    try:
+        values = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise refusal(key, value, "a list of numbers") from None
+    if values.ndim != 1 or values.size == 0:
+        raise InputError(f"{key} has shape {values.shape}: must be a list of at least one number, shape (n,)")
+    wrong = np.flatnonzero(~((values >= low) & (values <= high)))
+    if wrong.size:
+        where = f"{key}[{wrong[0]}] = {values[wrong[0]]}"
+        raise InputError(f"{where}: must be in [{low:g}, {high:g}] {unit}")
+    return values
+
+
+def check_array(key, value, axes):
+    """An array of finite numbers, float32 where it has several axes. Raises: InputError."""
+    try:
+        values = np.asarray(value, dtype=np.float32 if axes > 1 else np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{key}: must be an array of numbers with {axes} axes") from None
+    if values.ndim != axes or values.size == 0 or not np.isfinite(values).all():
+        raise InputError(f"{key} has shape {values.shape}: must be finite numbers with {axes} axes")
+    return values
 
 
 def check_one_of(key, value, choices):

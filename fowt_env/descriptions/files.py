@@ -1,7 +1,6 @@
 """Checked reading of TOML, JSON and CSV; whatever is wrong becomes an InputError that names the file."""
 
 import csv
-import difflib
 import io
 import json
 import math
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.descriptions.checks import interval, short
-from fowt_env.errors import NEAREST, InputError
+from fowt_env.errors import NEAREST, InputError, did_you_mean, nearest
 
 DATA = Path(__file__).parents[1] / "data"
 MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file
@@ -159,12 +158,11 @@ def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, 
 
 
 def _unknown_name(kind, name, known, command, also):
-    nearest = difflib.get_close_matches(name.lower(), known, n=3)
-    hint = f" Did you mean {' or '.join(map(repr, nearest))}?" if nearest else ""
+    hint = did_you_mean(name, known, 3)
     if len(known) <= MOST_NAMED:
         listed = ", ".join(known)
     else:
-        near = difflib.get_close_matches(name.lower(), known, n=NEAREST, cutoff=0.0)
+        near = nearest(name, known, NEAREST, cutoff=0.0)
         printed = "" if command is None else f", all by `{command}`"
         listed = f"one of {len(known)} names (nearest: {', '.join(near)}{printed})"
     others = f", {also}" if also else ""

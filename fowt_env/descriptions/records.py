@@ -3,7 +3,6 @@
 A problem is one line of text: key, value and allowed range. Keys are dotted paths as they stand in the file.
 """
 
-import difflib
 import math
 import types
 import typing
@@ -13,8 +12,21 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from fowt_env.descriptions.checks import interval, is_number, plain_number, short
+from fowt_env.descriptions.checks import (
+    check_array,
+    check_choice,
+    check_flag,
+    check_in_range,
+    check_path,
+    check_samples,
+    check_whole_number,
+    interval,
+    is_number,
+    plain_number,
+    short,
+)
 from fowt_env.descriptions.units import FILE_UNITS
+from fowt_env.errors import did_you_mean
 
 # Keys that had another name: the old one -> the one of now.
 RENAMED = {"designed_on": "nominal_plant"}
@@ -45,6 +57,45 @@ def _number_or_array(value):
     return _float_array(value)
 
 
+KEY = "\0"  # where a message of a check has the key
+
+
+class Allowed(typing.NamedTuple):
+    """What a checked field may be, in words."""
+
+    text: str
+
+
+def checked(check, allowed, *arguments):
+    """Annotated type of what check(key, value, *arguments) of checks.py returns, which raises InputErrors."""
+    return Annotated[
+        typing.Any, BeforeValidator(lambda value: check(KEY, value, *arguments)), Allowed(allowed)
+    ]
+
+
+def in_range(low, high, unit=""):
+    """Annotated type of a number within [low, high]."""
+    return checked(check_in_range, f"a number in [{low:g}, {high:g}] {unit}".rstrip(), low, high, unit)
+
+
+def one_of(choices):
+    """Annotated type of one of a few names or numbers; letters of either case."""
+    return checked(check_choice, f"one of {', '.join(map(str, choices))}", choices)
+
+
+def samples(low, high, unit):
+    """Annotated type of a (n,) float64 array of at least one number within [low, high]."""
+    return checked(check_samples, f"a list of numbers in [{low:g}, {high:g}] {unit}", low, high, unit)
+
+
+def array(axes):
+    """Annotated type of an array of finite numbers with this many axes."""
+    return checked(check_array, f"an array of numbers with {axes} axes", axes)
+
+
+Flag = checked(check_flag, "True or False")
+Seed = checked(check_whole_number, "a whole number >= 0", 0)
+FilePath = checked(check_path, "a path")
 Positive = bounded(gt=0)
 NonNegative = bounded(ge=0)
 Finite = bounded()
@@ -126,13 +177,14 @@ def _problem(model, item, origin):
     if kind == "extra_forbidden":
         return [unknown_key(key, shown[-1], _fields_at(model, loc[:-1]))]
     if kind == "value_error":
+        if KEY in (text := str(item["ctx"]["error"])):
+            return [text.replace(KEY, key)]
         prefix = f"{key}: " if key else ""
         return [prefix + line for line in str(item["ctx"]["error"]).splitlines()]
     close = ""
     if isinstance(value, str) and kind == "literal_error":
         options = [option.strip("'") for option in allowed(model, loc).removeprefix("one of ").split(", ")]
-        nearest = difflib.get_close_matches(value, options, n=1)
-        close = f" Did you mean {nearest[0]!r}?" if nearest else ""
+        close = did_you_mean(value, options)
     return [f"{key} = {short(value)}: must be {allowed(model, loc)}.{close}".rstrip(".")]
 
 
@@ -141,10 +193,7 @@ def unknown_key(key, name, known):
     if name in RENAMED:
         elsewhere = "" if RENAMED[name] in known else f", which is no key here. Allowed: {', '.join(known)}"
         return f"{key}: is called {RENAMED[name]} now{elsewhere}"
-    lowered = {option.lower(): option for option in known}
-    nearest = difflib.get_close_matches(str(name).lower(), lowered, n=1)
-    hint = f" Did you mean {lowered[nearest[0]]!r}?" if nearest else ""
-    return f"{key}: unknown key.{hint} Allowed: {', '.join(known)}"
+    return f"{key}: unknown key.{did_you_mean(name, known)} Allowed: {', '.join(known)}"
 
 
 def _fields_at(model, loc):
@@ -198,6 +247,9 @@ def _type_at(model, loc):
 def allowed(model, loc):
     """What the field at loc of a pydantic model may be, in words: "a number > 0", "a table" ..."""
     kind, metadata = _type_at(model, loc)
+    for entry in metadata:
+        if isinstance(entry, Allowed):
+            return entry.text
     if kind in (float, int):
         low, high, low_open, high_open = -math.inf, math.inf, True, True
         for entry in metadata:

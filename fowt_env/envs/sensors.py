@@ -6,10 +6,10 @@ are, by fowt_env/plant/sensing.py.
 """
 
 from collections.abc import Mapping
-from math import isfinite
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_number, check_whole_number
 from fowt_env.descriptions.sensors import SensorChain, sensor_chain, sensors_of
 from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
@@ -59,14 +59,8 @@ def check_sensors(given, turbine=None):
     for key in given:
         if key not in ("noise", "delay"):
             raise unknown("key of sensors", key, ("noise", "delay"))
-    noise, delay = settings["noise"], settings["delay"]
-    number = isinstance(noise, int | float | np.number) and not isinstance(noise, bool)
-    if not number or not (isfinite(noise) and noise >= 0.0):
-        raise InputError(f"sensors.noise = {noise!r}: must be a finite number >= 0")
-    whole = isinstance(delay, int | np.integer) and not isinstance(delay, bool)
-    if not whole or not 0 <= delay <= LONGEST_DELAY:
-        raise InputError(f"sensors.delay = {delay!r}: must be a whole number from 0 to {LONGEST_DELAY}")
-    return {"noise": float(noise), "delay": int(delay)}
+    noise = check_number("sensors.noise", settings["noise"], 0.0, allowed="a finite number >= 0")
+    return {"noise": noise, "delay": check_whole_number("sensors.delay", settings["delay"], 0, LONGEST_DELAY)}
 
 
 def draw_sensors(settings, scales, control_dt, seed, readings):

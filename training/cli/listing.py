@@ -10,25 +10,6 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli.console import app, out, reported
 from fowt_env.training.cli.tables import figure, print_table
 
-WINDS = {  # kind -> (form on the command line, what it is); a test holds the kinds to those of build_scene
-    "steady": ("18", "constant wind, with the site's shear"),
-    "ntm": ("ntm:18:B", "normal turbulence model, IEC 61400-1; speed and class A+, A, B or C"),
-    "etm": ("etm:18:B", "extreme turbulence model, IEC 61400-1"),
-    "eog": ("eog:18:B", "extreme operating gust, from 60 s on (JSON: start)"),
-    "edc": ("edc:18:B", "extreme direction change"),
-    "ecd": ("ecd:18", "extreme coherent gust with direction change"),
-    "ews": ("ews:18:B", "extreme wind shear, vertical or (JSON: orientation) horizontal"),
-    "ewm": ('{"kind": "ewm"}', "extreme wind of 50 years or one, steady or turbulent: a parked turbine"),
-    "steps": (
-        '{"kind": "steps", "speeds": [12, 14], "every": 60}',
-        "wind speeds one after the other, each held for a time, s",
-    ),
-    "series": ("wind.csv, wind.parquet", "a table with columns time (s) and speed (m/s)"),
-    "uniform": ("wind.wnd, wind.hh", "OpenFAST's uniform wind file: speed, direction, shear over time"),
-    "bts": ("wind.bts", "TurbSim's full-field box, met by the blades point by point"),
-    "mann": ("mann:18:B", "full-field Mann turbulence (needs the extra mann)"),
-    "box": ("in Python alone", "a full-field box of your own arrays"),
-}
 LAST = ("DEMONSTRATION", "comparison only")  # in the summaries of controllers that nobody should choose
 
 
@@ -74,6 +55,13 @@ def _turbines():
         values = (turbine.rated_wind_speed, turbine.rated_rotor_speed / RPM)
         rows.append((name, f"{1e-3 * power:.5g}", *map(figure, values), _one_line(turbine.source)))
     return rows
+
+
+def _winds():
+    from fowt_env.descriptions.wind import ALL_KINDS
+
+    file = ("uniform", "wind.wnd, wind.hh", "OpenFAST's uniform wind file: speed, direction, shear over time")
+    return [*((name, kind.form, kind.summary) for name, kind in ALL_KINDS.items()), file]
 
 
 def _seas():
@@ -228,7 +216,7 @@ KINDS = {
     ),
     "winds": Kind(
         "--wind", "kinds of wind, and how each is written",
-        ("kind", "--wind", "what it is"), lambda: [(kind, *row) for kind, row in WINDS.items()],
+        ("kind", "--wind", "what it is"), _winds,
         prose=(1, 2), remark="Any of them as JSON, with further keys. Speeds in m/s at hub height.",
     ),
     "seas": Kind(

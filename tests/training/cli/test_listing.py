@@ -14,7 +14,6 @@ from fowt_env.training.cli import listing
 from fowt_env.training.cli.app import app
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.metrics import METRICS, TABLE
-from fowt_env.weather.wind_field import FIELD_KINDS
 
 
 def rows(*words):
@@ -22,7 +21,7 @@ def rows(*words):
 
 
 def test_what_is_described_here_is_what_there_is():
-    assert set(listing.WINDS) - {"uniform"} == {*wind.KINDS, *FIELD_KINDS}  # uniform: a form of series
+    assert {row["kind"] for row in rows("winds")} - {"uniform"} == set(wind.ALL_KINDS)
     assert all(option.summary for option in options.OPTIONS.values())
     assert all(task.summary for task in tasks.TASKS.values())
     assert len(rows("metrics")) == len(METRICS) and all(metric.meaning for metric in TABLE.values())
