@@ -5,8 +5,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
-from fowt_env.descriptions.files import raise_problems
-from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, validate
+from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, checked_record
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
 
@@ -120,7 +119,5 @@ def read_faults(value: Any) -> tuple[Fault, ...]:
         raise InputError(f"faults = {value!r}: must be a Fault, a mapping of its keys, or a list of them")
     found = []
     for number, item in enumerate(value, 1):
-        record, problems = (item, []) if isinstance(item, Fault) else validate(Fault, item)
-        raise_problems(f"faults.{number}", problems)
-        found.append(record)
+        found.append(item if isinstance(item, Fault) else checked_record(Fault, item, f"faults.{number}"))
     return tuple(found)

@@ -112,10 +112,10 @@ def read_table(path, kind, columns, optional=()):
     return rows
 
 
-def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_ends=True):
+def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_ends=True, increasing=False):
     """(n,) float64 values of one CSV column; appends one problem per value that is no number in the range.
 
-    open_ends: the limits themselves are not allowed.
+    open_ends: the limits themselves are not allowed. increasing: each value must be above the one before.
     """
     values = np.full(len(rows), np.nan)
     allowed = interval(minimum, maximum, open_ends, open_ends)
@@ -127,6 +127,8 @@ def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_en
         inside = minimum < value < maximum if open_ends else minimum <= value <= maximum
         if not (math.isfinite(value) and inside):
             problems.append(f"line {number}: {name} = {row[name][:40]}: must be {allowed}")
+        elif increasing and i > 0 and value <= values[i - 1]:
+            problems.append(f"line {number}: {name} = {row[name][:40]}: must increase")
         values[i] = value
     return values
 

@@ -120,15 +120,26 @@ class AdditionalLoads(Record):
         return self
 
 
-class Member(Record):
+class Straight(Record):
+    """Base of what lies between two points of the body."""
+
+    start: Vector3  # m
+    end: Vector3
+
+    @model_validator(mode="after")
+    def _length(self):
+        if math.dist(self.start, self.end) < 1e-6:
+            raise ValueError(f"start = {list(self.start)}: must not be end")
+        return self
+
+
+class Member(Straight):
     """A straight cylinder of the hull, of any direction and taper, for strip (Morison) loads.
 
     start, end in body axes; end 1 is the start. The coefficients multiply 1/2 rho D |v| v, rho A a and, on
     an end that is an outer face of the hull, 1/2 rho A |v| v and the added mass of a half sphere.
     """
 
-    start: Vector3  # m
-    end: Vector3
     diameter: tuple[Positive, Positive]  # m, at start and end
     drag_coefficient: tuple[NonNegative, NonNegative]
     added_mass_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)
@@ -138,28 +149,18 @@ class Member(Record):
     axial_pressure_coefficient: tuple[NonNegative, NonNegative] = (1.0, 1.0)
     potential_flow: bool = False  # in the potential-flow body: drag alone, no inertia and no buoyancy
 
-    @model_validator(mode="after")
-    def _length(self):
-        if math.dist(self.start, self.end) < 1e-6:
-            raise ValueError(f"start = {list(self.start)}: must not be end")
-        return self
 
-
-class Shape(Record):
+class Shape(Straight):
     """A straight part of the hull for pictures alone: round, or a box of a horizontal axis. It has no loads.
 
     For hulls whose loads come from elsewhere, as a radiation database or a cylinder of the same drag.
     """
 
-    start: Vector3  # m, body axes
-    end: Vector3
     diameter: Positive | None = None  # m
     section: tuple[Positive, Positive] | None = None  # m, width and height of a box
 
     @model_validator(mode="after")
     def _one_section(self):
-        if math.dist(self.start, self.end) < 1e-6:
-            raise ValueError(f"start = {list(self.start)}: must not be end")
         if (self.diameter is None) == (self.section is None):
             raise ValueError("diameter: must be given where section is not, and only there")
         return self
@@ -188,15 +189,20 @@ class Tower(Record):
         return self
 
 
-class Line(Record):
-    """One mooring line. anchor in inertial, fairlead in body coordinates, m."""
+class LineProperties(Record):
+    """What a mooring line is made of."""
 
-    anchor: Vector3
-    fairlead: Vector3
     length: Positive  # unstretched, m
     wet_weight: Positive  # per length, N/m
     EA: Positive  # N
     seabed_friction: NonNegative = 0.0  # C_B
+
+
+class Line(LineProperties):
+    """One mooring line. anchor in inertial, fairlead in body coordinates, m."""
+
+    anchor: Vector3
+    fairlead: Vector3
 
 
 class Platform(Record):
@@ -263,7 +269,7 @@ def _missing_half(name):
     return f"{name} is missing: must be a table; a platform has hull and hydro, or neither"
 
 
-class MooringSpread(Record):
+class MooringSpread(LineProperties):
     """Equal lines around the tower axis, as platform files may give them."""
 
     azimuth: tuple[Finite, ...]  # of the anchors, rad from +x towards +y
@@ -271,10 +277,6 @@ class MooringSpread(Record):
     anchor_z: Finite
     fairlead_radius: NonNegative
     fairlead_z: Finite
-    length: Positive
-    wet_weight: Positive
-    EA: Positive
-    seabed_friction: NonNegative = 0.0
 
     def lines(self):
         """One Line per azimuth; directions are rounded to 14 decimals to keep symmetric spreads symmetric."""
@@ -283,10 +285,7 @@ class MooringSpread(Record):
             Line(
                 anchor=(self.anchor_radius * x, self.anchor_radius * y, self.anchor_z),
                 fairlead=(self.fairlead_radius * x, self.fairlead_radius * y, self.fairlead_z),
-                length=self.length,
-                wet_weight=self.wet_weight,
-                EA=self.EA,
-                seabed_friction=self.seabed_friction,
+                **{key: getattr(self, key) for key in LineProperties.model_fields},
             )
             for x, y in directions
         )

@@ -12,7 +12,7 @@ import numpy as np
 
 from fowt_env.descriptions.array_files import read_arrays
 from fowt_env.descriptions.files import raise_problems
-from fowt_env.descriptions.records import Finite, Positive, Record, validate
+from fowt_env.descriptions.records import Finite, Positive, Record, checked_record
 from fowt_env.errors import InputError
 
 MAX_BYTES = 200_000_000  # of a file of coefficients: a full difference-frequency QTF has some 10 MB
@@ -78,8 +78,7 @@ def read_potential_flow(table, folder, gravity, density):
     gravity, density  of the water, which WAMIT's dimensionless figures need
     Raises: InputError naming the file, the key or the array and what is allowed.
     """
-    record, problems = validate(_PotentialFlowTable, table)
-    raise_problems("[potential_flow]", problems)
+    record = checked_record(_PotentialFlowTable, table, "[potential_flow]")
     path = folder / Path(record.coefficients).expanduser()
     if path.suffix == ".npz":
         found = read_coefficients(path)

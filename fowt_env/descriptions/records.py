@@ -25,6 +25,7 @@ from fowt_env.descriptions.checks import (
     plain_number,
     short,
 )
+from fowt_env.descriptions.files import raise_problems
 from fowt_env.descriptions.units import FILE_UNITS
 from fowt_env.errors import did_you_mean
 
@@ -156,6 +157,13 @@ def validate(model, data, origin=None):
         for item in error.errors(include_url=False):
             problems.extend(_problem(model, item, origin or {}))
         return None, problems
+
+
+def checked_record(model, data, where):
+    """Return the record of a pydantic model. Raises: InputError that names `where` and every wrong value."""
+    record, problems = validate(model, data)
+    raise_problems(where, problems)
+    return record
 
 
 def _problem(model, item, origin):

@@ -17,6 +17,7 @@ from fowt_env.descriptions.records import (
     NumberOrArray,
     Record,
     bounded,
+    checked_record,
     unknown_key,
     validate,
 )
@@ -231,9 +232,7 @@ def read_sea_state(name_or_path):
     if isinstance(name_or_path, str) and name_or_path in _sea_data()[0]:
         return _sea_data()[0][name_or_path]
     path = locate("sea_state", name_or_path, _sea_data()[0], listed=LISTED, also=SEA_FORMS)
-    state, problems = validate(SeaState, read_toml(path, "sea state"))
-    raise_problems(f"sea state file {str(path)!r}", problems)
-    return state
+    return checked_record(SeaState, read_toml(path, "sea state"), f"sea state file {str(path)!r}")
 
 
 def sea_of(spec):
@@ -269,9 +268,7 @@ def sea_state_of(spec):
     if isinstance(spec, SeaState):
         return spec
     if isinstance(spec, Mapping):
-        state, problems = validate(SeaState, dict(spec))
-        raise_problems("sea state", problems)
-        return state
+        return checked_record(SeaState, dict(spec), "sea state")
     if isinstance(spec, (str, Path)):
         return read_sea_state(spec)
     raise InputError(
@@ -288,8 +285,7 @@ def joint_sea_state(table, wind_speed):
         table = _sea_data()[1][table]
     elif not isinstance(table, JointTable):
         path = locate("joint_table", table, _sea_data()[1])
-        table, problems = validate(JointTable, read_toml(path, "joint table"))
-        raise_problems(f"joint table file {str(path)!r}", problems)
+        table = checked_record(JointTable, read_toml(path, "joint table"), f"joint table file {str(path)!r}")
     low, high = table.wind[0], table.wind[-1]
     allowed = f">= {low:g} and <= {high:g} m/s (table {table.name!r})"
     speed = check_number("wind_speed", wind_speed, low, high, allowed=allowed)

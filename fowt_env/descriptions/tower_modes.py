@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fowt_env.descriptions.files import DATA, column, raise_problems, read_table
-from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, bounded, validate
+from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, bounded, checked_record
 
 COLUMNS = ("height_fraction", "mass_density", "fore_aft_stiffness", "side_side_stiffness")
 POWERS = np.arange(2, 7)  # of the height fraction, in a shape
@@ -99,8 +99,7 @@ def read_tower_modes(table, folder):
 
     Raises: InputError naming the file, the key and what is allowed.
     """
-    record, problems = validate(_ModesTable, table)
-    raise_problems("tower.modes", problems)
+    record = checked_record(_ModesTable, table, "tower.modes")
     path = folder / Path(record.distribution).expanduser()
     if not path.exists() and (builtin := DATA / "platforms" / record.distribution).is_file():
         path = builtin
@@ -112,14 +111,11 @@ def _read_distribution(path):
     """{column: tuple of numbers} of a distribution file."""
     rows = read_table(path, "tower", COLUMNS)
     problems = []
-    values = {"height_fraction": column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False)}
+    place = column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False, increasing=True)
+    values = {"height_fraction": place}
     values |= {
         name: column(rows, name, problems, 0.0, largest, open_ends=True) for name, largest in LARGEST.items()
     }
-    place = values["height_fraction"]
-    for (number, row), before, here in zip(rows[1:], place[:-1], place[1:], strict=True):
-        if here <= before:
-            problems.append(f"line {number}: height_fraction = {row['height_fraction']}: must increase")
     if not problems and (place[0] != 0.0 or place[-1] != 1.0):
         problems.append(f"height_fraction: goes from {place[0]:g} to {place[-1]:g}; must go from 0 to 1")
     raise_problems(f"tower file {str(path)!r}", problems)

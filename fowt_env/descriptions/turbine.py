@@ -114,7 +114,7 @@ class SecondOrderDrive(Record):
     friction: NonNegative = 0.0  # rad, distance from the command at which a blade at rest begins to move
 
 
-class PitchDrive(Record):
+class PitchDrive(SecondOrderDrive):
     """Blade-pitch drive: first order with time_constant, second with natural_frequency and damping.
 
     time_constant 0: the command is followed at once. second_order is another drive of the same turbine, used
@@ -125,11 +125,8 @@ class PitchDrive(Record):
     rate_limit: Positive  # rad/s
     minimum: Finite  # rad
     maximum: Finite  # rad
-    natural_frequency: bounded(gt=0, le=100) | None = None  # and so on, as in SecondOrderDrive
+    natural_frequency: bounded(gt=0, le=100) | None = None
     damping: bounded(gt=0, le=5) | None = None
-    acceleration_limit: Positive | None = None
-    deadband: NonNegative = 0.0
-    friction: NonNegative = 0.0
     second_order: SecondOrderDrive | None = None
 
     @model_validator(mode="after")
@@ -468,12 +465,9 @@ def _read_blade(table, folder):
         path, "blade", ("radius_m", "chord_m", "twist_deg", "airfoil"), optional=("prebend_m", "sweep_m")
     )
     problems = []
-    radius = column(rows, "radius_m", problems, 0.0)
+    radius = column(rows, "radius_m", problems, 0.0, increasing=True)
     chord = column(rows, "chord_m", problems, 0.0)
     twist = np.deg2rad(column(rows, "twist_deg", problems, -180.0, 180.0, open_ends=False))
-    for (number, row), before, here in zip(rows[1:], radius[:-1], radius[1:], strict=True):
-        if here <= before:
-            problems.append(f"line {number}: radius_m = {row['radius_m']}: must increase from row to row")
     if len(rows) < 2:
         problems.append("has 1 row; allowed: at least 2")
     polar_folder = _beside(folder, table.polars)

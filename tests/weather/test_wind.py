@@ -386,7 +386,7 @@ def test_mean_of_a_gust_is_the_wind_before_it():
         ({"kind": "ntm", "speed": 12.0, "class": 1}, "wind.class = 1 A+, A, B, C"),
         ({"kind": "ntm", "speed": 12.0, "seed": -1}, "wind.seed = -1 >= 0"),
         ({"kind": "ntm", "speed": 12.0, "seed": 1.5}, "wind.seed = 1.5 whole"),
-        ({"kind": "ntm", "speed": 12.0, "average": "disc"}, "wind.average 'disc' point, rotor"),
+        ({"kind": "ntm", "speed": 12.0, "average": "disc"}, "wind.average 'disc' rotor, point"),
         ({"kind": "ntm", "speed": 12.0, "shear_turbulence": 1}, "wind.shear_turbulence = 1 True or False"),
         ({"kind": "ntm", "speed": 12.0, "period": 80.0}, "wind.period = 80.0 duration 100"),
         ({"kind": "ewm", "recurrence": 10}, "wind.recurrence = 10 50, 1"),

@@ -245,7 +245,7 @@ SOUND = (8, 2, 2, 0, 1, 140.0, 140.0, 0.1, 12.0, 90.0, 20.0, 1.0, 0.0, 1.0, 0.0,
         (17, -1, "-1 characters"),
         (7, float("nan"), "nan s"),
         (11, 0.0, "no scale zero"),
-        (8, 1e30, "speed = 1.0*15.*must be in .1, 100. m"),
+        (8, 1e30, "speed = 1.0*15.*must be a number in .1, 100. m"),
     ],
 )
 def test_a_turbsim_file_whose_head_cannot_be_is_refused_before_it_is_read(tmp_path, place, value, message):
