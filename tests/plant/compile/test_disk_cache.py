@@ -1,5 +1,6 @@
 """The kernel cache: made where it is missing, done without where it cannot be, right where old or shared."""
 
+import json
 import os
 import pickle
 import subprocess
@@ -439,6 +440,19 @@ def test_the_hash_of_a_source_is_that_of_its_code(before, after, same, tmp_path)
         path.write_text(text)
         hashes.append(read_source(path).code)
     assert (hashes[0] == hashes[1]) is same
+
+
+def test_a_broken_list_of_parsed_sources_is_made_anew_and_one_of_others_is_not_read(tmp_path):
+    """A wrong hash in it would have kernels of other code loaded."""
+    (used,) = output(start(WHERE, tmp_path / "cache"))
+    (kept,) = (tmp_path / "cache" / "sources").iterdir()
+    sound = json.loads(kept.read_bytes())
+    wrong = json.dumps({key: ["0" * 32, top] for key, (_, top) in sound.items()})
+    for content, mode in (("{", 0o600), ('{"a": 1}', 0o600), (wrong, 0o666)):
+        kept.write_text(content)
+        kept.chmod(mode)
+        assert output(start(WHERE, tmp_path / "cache")) == [used]
+        assert json.loads(kept.read_bytes()) == sound and kept.stat().st_mode & 0o777 == 0o600
 
 
 def test_functions_of_one_name_in_a_module_are_kept_apart(tmp_path):
