@@ -45,7 +45,7 @@ class PlantWarning(UserWarning):
 
 
 def level_outside() -> int:
-    """stacklevel with which warnings.warn of the caller names the first line outside of this package."""
+    """Return the stacklevel by which the caller's warnings name the first line outside of this package."""
     own = __name__.partition(".")[0]
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == own:
@@ -67,7 +67,7 @@ def warn_once(key: object, text: str) -> None:
 
 @contextmanager
 def muted() -> Iterator[None]:
-    """Context in which warn_once says nothing, and says it when it is asked to outside."""
+    """Return a context in which warn_once says nothing, and says it when it is asked to outside."""
     token = _muted.set(True)
     try:
         yield
@@ -79,7 +79,7 @@ MOST_LISTED, NEAREST = 30, 5  # names that are all listed; how many are where th
 
 
 def unknown(kind: str, name: object, known: Iterable[object], command: str | None = None) -> InputError:
-    """InputError for a name that is not known, with the nearest known one as a suggestion.
+    """Return the InputError for a name that is not known, with the nearest known one as a suggestion.
 
     Of more than MOST_LISTED names it lists the NEAREST, their number, and the command that prints them all.
     """

@@ -71,7 +71,7 @@ def warmup(
     jobs: int = 1,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> pd.DataFrame:
-    """DataFrame (kind, kernels, seconds) of the kinds that are compiled, where they are not yet on disk.
+    """Compile kinds of scene that are not yet on disk; return a DataFrame (kind, kernels, seconds).
 
     platform  a built-in name or the path of a TOML file
     kinds     names of KINDS; what they share is compiled with the first

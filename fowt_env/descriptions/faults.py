@@ -97,17 +97,17 @@ class Fault(Record):
 
     @property
     def grid_loss(self) -> float | None:
-        """Time (s) from which the generator is off the grid; None: it stays."""
+        """Return the time (s) from which the generator is off the grid; None: it stays."""
         return self.time if self.kind in ("grid_loss", "emergency_stop") else None
 
     @property
     def ends_operation(self) -> bool:
-        """Whether the turbine is to be stopped for it: what its protection does then is part of the case."""
+        """Return whether the turbine is stopped because of it: its protection then is part of the case."""
         return self.kind not in (*SENSOR_FAULTS, "pitch_offset")
 
 
 def read_faults(value: Any) -> tuple[Fault, ...]:
-    """Tuple of Faults from none, one or several, each a Fault or a mapping of its keys.
+    """Return a tuple of Faults from none, one or several, each a Fault or a mapping of its keys.
 
     Raises: InputError with a line per wrong key.
     """

@@ -23,7 +23,7 @@ _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_K
 
 
 def read_text(path, kind, largest=MAX_BYTES):
-    """Text of a file of at most `largest` bytes; kind ("platform", "blade" ...) is for the messages."""
+    """Return the text of a file of at most `largest` bytes; kind ("platform" ...) is for messages."""
     try:
         if not path.exists():
             raise InputError(f"{kind} file {str(path)!r} does not exist")
@@ -43,7 +43,7 @@ def read_text(path, kind, largest=MAX_BYTES):
 
 
 def read_toml(path, kind):
-    """Contents of a TOML file as nested dicts."""
+    """Return the contents of a TOML file as nested dicts."""
     text = read_text(path, kind)
     deep = _DEEP_KEY.search(text)
     if deep:
@@ -56,7 +56,7 @@ def read_toml(path, kind):
 
 
 def parse_json(text):
-    """Value of a JSON text, every number of it finite. Raises: ValueError."""
+    """Return the value of a JSON text, every number of it finite. Raises: ValueError."""
     try:
         return json.loads(text, parse_constant=_finite, parse_float=_finite)
     except RecursionError:
@@ -64,7 +64,7 @@ def parse_json(text):
 
 
 def json_text(where, text):
-    """Value of a text that is JSON. Raises: InputError naming where it stands, and why it is none."""
+    """Return the value of a JSON text. Raises: InputError that names its place and what is wrong."""
     try:
         return parse_json(text)
     except ValueError as error:
@@ -79,7 +79,7 @@ def _finite(text):
 
 
 def read_table(path, kind, columns, optional=()):
-    """Rows of a CSV file with these columns, in any order: a list of (line number, dict of strings).
+    """Return the rows of a CSV file with these columns, in any order: [(line number, dict of strings)].
 
     optional: columns that it may have beside them.
 
@@ -113,7 +113,7 @@ def read_table(path, kind, columns, optional=()):
 
 
 def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_ends=True, increasing=False):
-    """(n,) float64 values of one CSV column; appends one problem per value that is no number in the range.
+    """Return the (n,) float64 values of a CSV column; append a problem for each that is not in the range.
 
     open_ends: the limits themselves are not allowed. increasing: each value must be above the one before.
     """
@@ -134,7 +134,7 @@ def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_en
 
 
 def raise_problems(where, problems):
-    """Raises one InputError listing the problems found in where (a file), if there are any."""
+    """Raise one InputError that lists the problems found in where (a file), if there are any."""
     if not problems:
         return
     shown = problems[:MAX_LISTED]
@@ -145,7 +145,7 @@ def raise_problems(where, problems):
 
 
 def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, also=""):
-    """File of a known built-in name (builtin(name) -> Path), or of a user's path relative to folder.
+    """Return the file of a built-in name (builtin(name) -> Path), or of a path relative to a folder.
 
     listed: the command that prints the names, for messages; also: what is allowed beside name and path.
     """
@@ -175,7 +175,7 @@ def _unknown_name(kind, name, known, command, also):
 
 
 def _as_path(name_or_path):
-    """Path of a user's file, with ~ expanded; or None if the text is a plain name and not a path."""
+    """Return the path of a user's file, with ~ expanded; None if the text is a plain name."""
     text = str(name_or_path)
     has_separator = "/" in text or "\\" in text
     if isinstance(name_or_path, str) and not has_separator and not text.lower().endswith(".toml"):

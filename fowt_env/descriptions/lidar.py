@@ -50,7 +50,7 @@ class Lidar(Record):
 
 @cached(1)
 def lidars():
-    """{name: Lidar} of the built-in lidars."""
+    """Return {name: Lidar} of the built-in lidars."""
     path = DATA / "lidars.toml"
     found, problems = {}, []
     for name, entry in read_toml(path, "lidar")["lidar"].items():
@@ -61,7 +61,7 @@ def lidars():
 
 
 def read_lidar(lidar):
-    """Lidar of a built-in name (lidars()), a path to a TOML file with the keys at its top, or itself.
+    """Return the Lidar of a built-in name (lidars()), of a TOML file with the keys at its top, or itself.
 
     Raises: InputError naming the key, value and allowed range.
     """

@@ -226,7 +226,7 @@ class Platform(Record):
 
     @property
     def draft(self) -> float:
-        """Depth of the lowest part of the hull below still water, m; where no file says it, an estimate."""
+        """Return the depth of the lowest part of the hull, m; an estimate where no file says it."""
         if self.hull is not None:
             return -self.hull.z[0]
         if self.potential_flow is not None and self.potential_flow.draft is not None:
@@ -265,7 +265,7 @@ class Platform(Record):
 
 
 def _missing_half(name):
-    """Problem line for a hull without the coefficients of its strips, or the other way round."""
+    """Return the problem line for a hull without the coefficients of its strips, or the other way round."""
     return f"{name} is missing: must be a table; a platform has hull and hydro, or neither"
 
 
@@ -279,7 +279,7 @@ class MooringSpread(LineProperties):
     fairlead_z: Finite
 
     def lines(self):
-        """One Line per azimuth; directions are rounded to 14 decimals to keep symmetric spreads symmetric."""
+        """Return a Line per azimuth, its direction rounded so that symmetric spreads stay symmetric."""
         directions = [(round(math.cos(angle), 14), round(math.sin(angle), 14)) for angle in self.azimuth]
         return tuple(
             Line(
@@ -299,12 +299,12 @@ def _platform_file(name):
 
 
 def platform_names():
-    """Sorted names of the built-in platforms."""
+    """Return the sorted names of the built-in platforms."""
     return sorted(path.stem for path in (DATA / "platforms").glob("*.toml"))
 
 
 def read_platform(name_or_path: str | Path) -> Platform:
-    """Platform from a built-in name (platform_names()) or a user's TOML file.
+    """Return the Platform from a built-in name (platform_names()) or a user's TOML file.
 
     The turbine of the result is a built-in name or an absolute path; in the file it is relative to the file.
     """

@@ -77,7 +77,7 @@ OPTIONAL = ("added_mass_zero", *QTF_ARRAYS)
 
 
 def read_potential_flow(table, folder, gravity, density):
-    """PotentialFlow of the table [potential_flow] of a platform file in this folder.
+    """Return the PotentialFlow of the table [potential_flow] of a platform file in this folder.
 
     gravity, density  of the water, which WAMIT's dimensionless figures need
     Raises: InputError naming the file, the key or the array and what is allowed.
@@ -99,7 +99,7 @@ def read_potential_flow(table, folder, gravity, density):
 
 
 def read_coefficients(path):
-    """PotentialFlow of a .npz file as coefficient_arrays makes it, without volume, place and draft.
+    """Return the PotentialFlow of a .npz file of coefficient_arrays, without volume, place and draft.
 
     Nothing in the file is executed: arrays of numbers alone are read.
     """
@@ -135,7 +135,7 @@ def read_coefficients(path):
 
 
 def coefficient_arrays(body):
-    """{name: array} of a PotentialFlow for numpy.savez_compressed, single precision but for frequencies."""
+    """Return {name: array} of a PotentialFlow for savez_compressed, single precision but for frequencies."""
     values = {name: getattr(body, name, None) for name in ARRAYS}
     if (qtf := body.difference_qtf) is not None:
         values |= dict(zip(QTF_ARRAYS, (qtf.omega, qtf.heading, qtf.value), strict=True))
@@ -146,7 +146,7 @@ def coefficient_arrays(body):
 
 
 def _array_problems(arrays):
-    """What is wrong with the arrays of a file, one line each."""
+    """Return what is wrong with the arrays of a file, one line each."""
     problems = []
     for name, value in arrays.items():
         if name == "source":

@@ -26,7 +26,7 @@ class TripLimit(Record):
 
 
 def _none(value):
-    """None for false, which is how a file says that there is no such trip."""
+    """Return None for false, which is how a file says that there is no such trip."""
     return None if value is False else value
 
 
@@ -66,7 +66,7 @@ NO_TRIPS = dict.fromkeys(("overspeed", "overpower", "acceleration", "pitch_devia
 
 
 def read_protection(value: Any, own: Protection) -> Protection:
-    """Protection from what a run or case gives: None (no trips), "turbine" (own), a mapping or a Protection.
+    """Return the Protection of what a run gives: None (no trips), "turbine" (own), a mapping or a Protection.
 
     A mapping has the keys of a turbine file's [protection], in place of single ones of `own`; false for no
     trip. Raises: InputError naming the key, value and allowed range.

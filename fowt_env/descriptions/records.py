@@ -41,7 +41,7 @@ def bounded(**limits):
 
 
 def _float_array(value):
-    """A (n,) float64 copy of a list or array of finite numbers."""
+    """Return a (n,) float64 copy of a list or array of finite numbers."""
     try:
         array = np.array(value)
     except (ValueError, TypeError):  # a ragged list, or no list at all
@@ -52,7 +52,7 @@ def _float_array(value):
 
 
 def _number_or_array(value):
-    """A float, or a (n,) float64 copy of a list or array of finite numbers."""
+    """Return a float, or a (n,) float64 copy of a list or array of finite numbers."""
     if is_number(value):
         return float(value)
     return _float_array(value)
@@ -68,29 +68,29 @@ class Allowed(typing.NamedTuple):
 
 
 def checked(check, allowed, *arguments):
-    """Annotated type of what check(key, value, *arguments) of checks.py returns, which raises InputErrors."""
+    """Return the annotated type of what check(key, value, *arguments), a function of checks.py, returns."""
     return Annotated[
         typing.Any, BeforeValidator(lambda value: check(KEY, value, *arguments)), Allowed(allowed)
     ]
 
 
 def in_range(low, high, unit=""):
-    """Annotated type of a number within [low, high]."""
+    """Return the annotated type of a number within [low, high]."""
     return checked(check_in_range, f"a number in [{low:g}, {high:g}] {unit}".rstrip(), low, high, unit)
 
 
 def one_of(choices):
-    """Annotated type of one of a few names or numbers; letters of either case."""
+    """Return the annotated type of one of a few names or numbers; letters of either case."""
     return checked(check_choice, f"one of {', '.join(map(str, choices))}", choices)
 
 
 def samples(low, high, unit):
-    """Annotated type of a (n,) float64 array of at least one number within [low, high]."""
+    """Return the annotated type of a (n,) float64 array of at least one number within [low, high]."""
     return checked(check_samples, f"a list of numbers in [{low:g}, {high:g}] {unit}", low, high, unit)
 
 
 def array(axes):
-    """Annotated type of an array of finite numbers with this many axes."""
+    """Return the annotated type of an array of finite numbers with this many axes."""
     return checked(check_array, f"an array of numbers with {axes} axes", axes)
 
 
@@ -116,7 +116,7 @@ class Record(BaseModel):
 
 
 def to_si(data, problems, path=()):
-    """(data in SI units, {path in SI names: (path in the file, value in the file)}) of nested TOML data.
+    """Return (data in SI units, {path in SI names: (path in the file, value there)}) of nested TOML data.
 
     Only the keys of FILE_UNITS are converted; what is no number is left for the validation to reject.
     """
@@ -149,7 +149,7 @@ def _scaled(value, factor):
 
 
 def validate(model, data, origin=None):
-    """(record, []) of a pydantic model, or (None, problems) with one line per wrong value."""
+    """Return (record, []) of a pydantic model, or (None, problems) with one line per wrong value."""
     try:
         return model.model_validate(data), []
     except ValidationError as error:
@@ -167,7 +167,7 @@ def checked_record(model, data, where):
 
 
 def _problem(model, item, origin):
-    """Lines of text for one entry of pydantic's ValidationError.errors()."""
+    """Return the lines of text for one entry of pydantic's ValidationError.errors()."""
     loc = tuple(part for part in item["loc"] if part != "[key]")
     shown, value = loc, item["input"]
     for length in range(len(loc), 0, -1):
@@ -197,7 +197,7 @@ def _problem(model, item, origin):
 
 
 def unknown_key(key, name, known):
-    """Problem line for a key that is not known, with the nearest known one, or what it is called now."""
+    """Return the problem line for an unknown key, with the nearest known one, or its name of now."""
     if name in RENAMED:
         elsewhere = "" if RENAMED[name] in known else f", which is no key here. Allowed: {', '.join(known)}"
         return f"{key}: is called {RENAMED[name]} now{elsewhere}"
@@ -205,7 +205,7 @@ def unknown_key(key, name, known):
 
 
 def _fields_at(model, loc):
-    """Names of the keys allowed in the table at loc, those in a unit of files included."""
+    """Return the names of the keys allowed in the table at loc, those in a unit of files included."""
     here, _ = _type_at(model, loc)
     if not (isinstance(here, type) and issubclass(here, BaseModel)):
         return []
@@ -215,7 +215,7 @@ def _fields_at(model, loc):
 
 
 def _unwrapped(kind, metadata):
-    """(type, constraints) without Annotated and Optional."""
+    """Return (type, constraints) without Annotated and Optional."""
     while True:
         origin = typing.get_origin(kind)
         if origin is typing.Annotated:
@@ -229,7 +229,7 @@ def _unwrapped(kind, metadata):
 
 
 def _type_at(model, loc):
-    """(type, constraints) of the field at loc; (None, []) where the model has no such field."""
+    """Return (type, constraints) of the field at loc; (None, []) where the model has no such field."""
     kind, metadata = model, []
     for part in loc:
         if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -253,7 +253,7 @@ def _type_at(model, loc):
 
 
 def allowed(model, loc):
-    """What the field at loc of a pydantic model may be, in words: "a number > 0", "a table" ..."""
+    """Return what the field at loc of a pydantic model may be, in words: "a number > 0", "a table" ..."""
     kind, metadata = _type_at(model, loc)
     for entry in metadata:
         if isinstance(entry, Allowed):
@@ -290,7 +290,7 @@ def allowed(model, loc):
 
 
 def dotted(path):
-    """A key as it would be written in the file; positions in lists count from 1."""
+    """Return a key as it would be written in the file; positions in lists count from 1."""
     return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in path)
 
 

@@ -68,17 +68,17 @@ class TowerBending(ModeShapes):
     side_side_stiffness: tuple[Positive, ...]
 
     def mass(self, height):
-        """Mass (kg) of a tower of this height (m), summed over the elements."""
+        """Return the mass (kg) of a tower of this height (m), summed over the elements."""
         line = np.interp(self.middles(), self.height_fraction, self.mass_density)
         return float(line.mean()) * height + self.top_mass
 
     def middles(self):
-        """(elements,) height fractions of the middles of the elements."""
+        """Return (elements,) height fractions of the middles of the elements."""
         return (np.arange(self.elements) + 0.5) / self.elements
 
 
 def mass_problem(modes, mass, height):
-    """What is wrong between a TowerBending and its tower's mass (kg) and height (m); None if nothing is."""
+    """Return what is wrong between a TowerBending and its tower's mass (kg) and height (m), or None."""
     found = modes.mass(height)
     if abs(found - mass) <= MASS * mass:
         return None
@@ -95,7 +95,7 @@ class _ModesTable(ModeShapes):
 
 
 def read_tower_modes(table, folder):
-    """TowerBending of the table [tower.modes] of a platform file in this folder.
+    """Return the TowerBending of the table [tower.modes] of a platform file in this folder.
 
     Raises: InputError naming the file, the key and what is allowed.
     """
@@ -108,7 +108,7 @@ def read_tower_modes(table, folder):
 
 
 def _read_distribution(path):
-    """{column: tuple of numbers} of a distribution file."""
+    """Return {column: tuple of numbers} of a distribution file."""
     rows = read_table(path, "tower", COLUMNS)
     problems = []
     place = column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False, increasing=True)

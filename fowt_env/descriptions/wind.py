@@ -67,7 +67,7 @@ class WindKind(NamedTuple):
 
 
 def _kind(form, summary, keys):
-    """WindKind with these keys and the shear exponent."""
+    """Return the WindKind with these keys and the shear exponent."""
     return WindKind(form, summary, create_model("Wind", __base__=Record, **keys))
 
 
@@ -173,7 +173,7 @@ class WindSpec:
 
 
 def wind_of(spec: Any) -> Any:
-    """The wind that a text or a path stands for, as a number or a mapping; anything else as it is.
+    """Return the wind that a text or path stands for, as number or mapping; anything else as it is.
 
     "18"; "ntm:18:B", which is KIND:SPEED[:CLASS]; JSON of a mapping; "none"; a path to a .bts box, a uniform
     wind file of InflowWind (.wnd, .hh) or a table of time (s) and speed (m/s) (.csv, .parquet).
@@ -210,12 +210,12 @@ def wind_of(spec: Any) -> Any:
 
 
 def is_wind_file(text: str) -> bool:
-    """Whether a text is the path of a wind, by its ending."""
+    """Return whether a text is the path of a wind, by its ending."""
     return Path(text).suffix.lower() in (BOX, *UNIFORM, *TABLES) and not text.lstrip().startswith("{")
 
 
 def unknown_kind(kind):
-    """InputError for a kind of wind that there is not, with what others call a kind as a suggestion."""
+    """Return the InputError for an unknown kind of wind, with the name that a kind has elsewhere."""
     other = OTHER_NAMES.get(kind.lower()) if isinstance(kind, str) else None
     if other is None:
         return unknown("wind.kind", kind, ALL_KINDS)
@@ -226,7 +226,7 @@ def unknown_kind(kind):
 
 
 def read_wind(spec):
-    """WindSpec of a speed in m/s, a mapping with "kind", a text (wind_of), or a WindSpec.
+    """Return the WindSpec of a speed in m/s, a mapping with "kind", a text (wind_of), or a WindSpec.
 
     Raises: InputError naming the key, its value and what is allowed.
     """
@@ -248,7 +248,7 @@ def read_wind(spec):
 
 
 def checked_keys(spec):
-    """{key: value} of all keys of a mapping of a known kind. Raises: InputError with a line per wrong key."""
+    """Return {key: value} of a mapping of a known kind. Raises: InputError with a line per wrong key."""
     keys = ALL_KINDS[spec["kind"]].keys
     record, problems = validate(keys, {key: value for key, value in spec.items() if key != "kind"})
     if problems:
@@ -257,7 +257,7 @@ def checked_keys(spec):
 
 
 def _check_together(kind, values):
-    """Rules that join several keys. Raises InputError."""
+    """Check the rules that join several keys. Raises: InputError."""
     if kind == "series":
         time = values["time"]
         for key, array in values.items():

@@ -53,13 +53,13 @@ class Entry(NamedTuple):
 
 
 def _meaning(name):
-    """What a measured field is, and which way it counts."""
+    """Return what a measured field is, and which way it counts."""
     field = (MEASURED | BLADES_MEASURED)[name]
     return f"{field.meaning} ({field.positive})"
 
 
 def _symmetric(name, unit, scale, bound, meaning, signal):
-    """Entry about zero."""
+    """Return the Entry about zero."""
     return Entry(name, unit, int(signal), 0.0, scale, -bound, bound, meaning)
 
 
@@ -77,7 +77,7 @@ def _wind(name, signal, meaning):
 
 
 def _estimated(name):
-    """Signal of something estimated."""
+    """Return the signal of something estimated."""
     return ESTIMATES + ESTIMATED.index(name)
 
 
@@ -116,7 +116,7 @@ BLADE_CHANNELS = BladeMeasurement._fields[BladeMeasure.BLADE_PITCH_1 :]  # where
 
 
 def _blade_channels(turbine):
-    """{channel: (Entry,)} of BLADE_CHANNELS; moments over the rated torque on the rotor's shaft."""
+    """Return {channel: (Entry,)} of BLADE_CHANNELS; moments over the rated torque on the rotor's shaft."""
     drive, table = turbine.pitch_drive, {}
     moment = turbine.drivetrain.gear_ratio * turbine.torque_law.rated_torque
     for name in BLADE_CHANNELS:
@@ -132,7 +132,7 @@ def _blade_channels(turbine):
 
 
 def observation_channels(turbine, preview=(), actions=N_ACTIONS):
-    """{channel: tuple of its Entries} for a descriptions.turbine.Turbine.
+    """Return {channel: tuple of its Entries} for a descriptions.turbine.Turbine.
 
     preview: look-ahead times (s); actions: their number.
     """
@@ -176,7 +176,7 @@ def observation_channels(turbine, preview=(), actions=N_ACTIONS):
 
 
 def check_channels(where, names, default=None):
-    """Tuple of channel names, DEFAULT replaced by the default ones, each once.
+    """Return the tuple of channel names, DEFAULT replaced by the default ones, each once.
 
     Raises: InputError for unknown names, an empty list, or a string where a list is meant.
     """
@@ -209,7 +209,7 @@ KNOWN = (  # channels of every scene with wind
 
 
 def entries(names, turbine, preview, actions=N_ACTIONS, individual=False):
-    """Entries of an observation in order; individual: whether every blade has a pitch of its own.
+    """Return the entries of an observation in order; individual: whether every blade has a pitch of its own.
 
     Raises: InputError for a preview without times, and for channels of single blades where there are none.
     """
@@ -237,7 +237,7 @@ class ObservationMap(NamedTuple):
 
 
 def build_observation_map(observed, preview):
-    """ObservationMap of Entries."""
+    """Return the ObservationMap of Entries."""
     centre = np.array([entry.centre for entry in observed])
     scale = np.array([entry.scale for entry in observed])
     low = (np.array([entry.low for entry in observed]) - centre) / scale

@@ -45,7 +45,7 @@ def reading_scales(turbine, individual=False):
 
 
 def check_sensors(given, turbine=None):
-    """What an environment is given as sensors: {"noise", "delay"}, or a SensorChain; "exact" is None.
+    """Return what an environment is given as sensors: {"noise", "delay"}, or a SensorChain; "exact" is None.
 
     Raises: InputError.
     """
@@ -64,7 +64,7 @@ def check_sensors(given, turbine=None):
 
 
 def draw_sensors(settings, scales, control_dt, seed, readings):
-    """Sensors of an episode from what check_sensors returned, by the seed of its weather.
+    """Return the sensors of an episode from what check_sensors returned, by the seed of its weather.
 
     A noise is a fraction of the scales (reading_scales). What a SensorChain does not have reads as NaN.
     """

@@ -44,7 +44,7 @@ class Channel(NamedTuple):
 
 
 def _channels(columns):
-    """Channels of columns such as "RotSpeed_[rpm]"."""
+    """Return the channels of columns such as "RotSpeed_[rpm]"."""
     pairs = [column.rstrip("]").split("_[") for column in columns.split()]
     return tuple(Channel(name, unit, UNITS[unit]) for name, unit in pairs)
 
@@ -76,7 +76,7 @@ GROUPS = {"tower": TOWER_CHANNELS, "blades": BLADE_CHANNELS}  # of parts that a 
 
 
 def channels(n_lines, loads=(), groups=()):
-    """Every output channel of a model with n_lines mooring lines and loads of these names, in row order.
+    """Return every output channel of a model with n_lines mooring lines and these loads, in row order.
 
     groups: names of those GROUPS that the model has.
     """
@@ -113,7 +113,7 @@ class Layout(NamedTuple):
 
 @kernel
 def rotor_wind(t, pose, azimuth, aero, layout):
-    """Mean wind over the blades, relative to the hub and along the shaft, m/s: AeroDyn's RtVAvgxh.
+    """Return the mean wind over the blades, relative to the hub and along the shaft, m/s: AeroDyn's RtVAvgxh.
 
     As there every length of blade counts alike. Of a series it is the mean over the azimuth at rest, of a box
     that over the blades where they are now.
@@ -126,7 +126,7 @@ def rotor_wind(t, pose, azimuth, aero, layout):
 
 @kernel
 def _rotor_wind(t, pose, azimuth, now, series, field, layout):
-    """rotor_wind with the pose in rotor axes."""
+    """Return rotor_wind with the pose in rotor axes."""
     hub = layout.shaft_hub
     if field is None:
         u, v, w = now.u * series.rotor_factor, now.v * series.rotor_factor, now.w
@@ -150,14 +150,14 @@ def _rotor_wind(t, pose, azimuth, now, series, field, layout):
 
 @kernel
 def point_acceleration(pose, dx, px, py, pz):
-    """Absolute acceleration (body components) of a body-fixed point, from the rates of a state."""
+    """Return the absolute acceleration (body components) of a body-fixed point, from the rates of a state."""
     rates = Twist(dx[State.VX], dx[State.VY], dx[State.VZ], dx[State.WX], dx[State.WY], dx[State.WZ])
     return acceleration_at(pose, rates, px, py, pz)
 
 
 @kernel
 def acceleration_at(pose, rates, px, py, pz):
-    """Absolute acceleration of a point fixed in the frame of a Pose: v' + w x v + w' x p + w x (w x p).
+    """Return the absolute acceleration of a point of a Pose's frame: v' + w x v + w' x p + w x (w x p).
 
     rates: Twist of the pose. All components are the frame's.
     """
@@ -173,7 +173,7 @@ def acceleration_at(pose, rates, px, py, pz):
 
 @kernel
 def elevation_now(t, hydro, data):
-    """surface_at_origin, computed once for all outputs of an instant."""
+    """Return surface_at_origin, computed once for all outputs of an instant."""
     cache = data.cache
     if cache[LoadCache.ELEVATED] < 0.5:
         cache[LoadCache.ELEVATION] = surface_at_origin(t, hydro, data)
@@ -268,7 +268,7 @@ def record(model, data, x, dx, u, t, loads, row):
 
 @inlined_kernel
 def tower_base(pose, x, dx, loads, bend, body, layout, tower, row):
-    """Loads carried at the tower base: aerodynamics and weight above it less the momentum rate there.
+    """Fill in the loads at the tower base: aerodynamics and weight above it less the momentum rate there.
 
     Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
     on the lower one).
@@ -290,10 +290,10 @@ def put_hub_wind(rows, hub_wind, period):
 
 
 def to_units(rows, n_lines, loads=(), groups=()):
-    """Rows (k, n_channels) in SI -> a copy in the units of channels(n_lines, loads, groups)."""
+    """Return a copy of rows (k, n_channels) in SI, in the units of channels(n_lines, loads, groups)."""
     return rows * scales(n_lines, loads, groups)
 
 
 def scales(n_lines, loads=(), groups=()):
-    """(n_channels,) factors from SI to the units of channels(n_lines, loads, groups)."""
+    """Return (n_channels,) factors from SI to the units of channels(n_lines, loads, groups)."""
     return np.array([c.scale for c in channels(n_lines, loads, groups)])

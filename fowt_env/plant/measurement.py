@@ -120,7 +120,7 @@ class BladeMeasurement(NamedTuple):
 
 
 def _fields(of):
-    """{field: Measured} of a class of measurements, in its order."""
+    """Return {field: Measured} of a class of measurements, in its order."""
     hints = get_type_hints(of, include_extras=True)
     return {name: hints[name].__metadata__[0] for name in of._fields}
 

@@ -40,7 +40,7 @@ def _platforms():
 
 
 def _one_line(text):
-    """Text of a source in one line."""
+    """Return the text of a source in one line."""
     return " ".join((text or "not stated").split())
 
 
@@ -77,7 +77,7 @@ def _seas():
 
 
 def _natural(name):
-    """Key that sorts names with the numbers at their end by size."""
+    """Return the key that sorts names with the numbers at their end by size."""
     parts = name.split("_")
     return [(0, float(part), "") if part.isdigit() else (1, 0.0, part) for part in parts]
 
@@ -318,13 +318,13 @@ def list_names(
 
 
 def _rows_with(rows, part):
-    """The rows in which a text is found; all for None."""
+    """Return the rows in which a text is found; all for None."""
     wanted = (part or "").lower()
     return [row for row in rows if any(wanted in cell.lower() for cell in row)]
 
 
 def _as_mappings(kind, rows):
-    """[{heading: text}] of the rows of a Kind."""
+    """Return [{heading: text}] of the rows of a Kind."""
     keys = [" ".join(heading.split()) for heading in (*kind.headings, *kind.extra)]
     return [dict(zip(keys, row, strict=True)) for row in rows]
 

@@ -84,13 +84,13 @@ WEATHER = ("Wind1VelX_[m/s]", "Wave1Elev_[m]")  # of which neither less nor more
 
 
 def _metric_name(channel, statistic):
-    """ "RotSpeed_[rpm]", "std" -> "RotSpeed_std_[rpm]"."""
+    """Return the name of a metric: "RotSpeed_std_[rpm]" of "RotSpeed_[rpm]" and "std"."""
     name, unit = channel.split("_[")
     return f"{name}_{statistic}_[{unit}"
 
 
 def _of_channel(channel, statistic):
-    """Metric of a statistic of a channel; of the power alone more is better of the mean."""
+    """Return the Metric of a statistic of a channel; of the power alone more is better of the mean."""
     row = STATISTICS[statistic]
     better = 1 if (channel, statistic) == ("GenPwr_[kW]", "mean") else row.better
     return Metric(
@@ -102,17 +102,17 @@ def _of_channel(channel, statistic):
 
 
 def _size(meaning):
-    """Metric that cannot be below zero, of which less is better."""
+    """Return the Metric that cannot be below zero, of which less is better."""
     return Metric(meaning, -1, True)
 
 
 def _deviation(meaning):
-    """Metric of a standard deviation."""
+    """Return the Metric of a standard deviation."""
     return Metric(meaning, -1, True, 2.0)
 
 
 def _fatigue(meaning, exponent=TOWER_EXPONENT, material=""):
-    """Metric of a damage-equivalent load with the inverse slope of its S-N curve."""
+    """Return the Metric of a damage-equivalent load with the inverse slope of its S-N curve."""
     return Metric(
         f"1 Hz damage-equivalent load of the {meaning}, m = {exponent:g}{material}", -1, True, exponent
     )
@@ -188,17 +188,17 @@ def metric_table():
 
 
 def travel(time, value):
-    """Mean absolute rate over time, the first axis of the values: the sum of its steps' sizes per second."""
+    """Return the mean absolute rate over time, the first axis: the sum of the steps' sizes per second."""
     return np.sum(np.abs(np.diff(value, axis=0)), axis=0) / (time[-1] - time[0])
 
 
 def overspeed(fastest, rated):
-    """Greatest rotor speed above the rated one, in percent of it; 0 where it stays below."""
+    """Return the greatest rotor speed above the rated one, in percent of it; 0 where it stays below."""
     return np.maximum(0.0, 100.0 * (fastest / rated - 1.0))  # a plain max() would turn NaN into 0
 
 
 def damage_equivalent_load(values, duration, exponent):
-    """Range (unit of values) of the 1 Hz cycles that do the same fatigue damage in this time.
+    """Return the range (unit of values) of the 1 Hz cycles that do the same fatigue damage in this time.
 
     (sum n_i S_i^m / duration)^(1/m) over the rainflow cycles of the series (ASTM E1049-85, 5.4.4): ranges
     S_i, counts n_i (what is left over counts half), m the inverse slope of the S-N curve, duration in s.
@@ -212,7 +212,7 @@ def damage_equivalent_load(values, duration, exponent):
 
 
 def beyond(time, value, limit):
-    """(seconds that evenly spaced values spend above a limit, times that they come to do so); NaN of NaN."""
+    """Return (seconds that evenly spaced values spend above a limit, times they pass it); NaN of NaN."""
     if not np.isfinite(value).all():
         return float("nan"), float("nan")
     above = value > limit
@@ -230,7 +230,7 @@ def metrics(
     gust_start=None,
     stop=None,
 ):
-    """{metric: value} of a run, in the order and with the names of METRICS.
+    """Return {metric: value} of a run, in the order and with the names of METRICS.
 
     df                output of simulate: evenly spaced rows
     skip              seconds at the start that are left out (start-up transient)
@@ -301,14 +301,14 @@ def metrics(
 
 
 def turbine_metrics(df, turbine, skip=0.0, steady=False, gust_start=None, stop=None):
-    """metrics of a run of a turbine (its description), with its rated speed and power and its pitch drive."""
+    """Return the metrics of a run of a turbine, by its rated speed and power and its pitch drive."""
     power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
     rate = turbine.pitch_drive.rate_limit / DEGREE
     return metrics(df, skip, turbine.rated_rotor_speed / RPM, rate, power, steady, gust_start, stop)
 
 
 def _kept(df, skip):
-    """The scored rows of a run. Raises: InputError."""
+    """Return the scored rows of a run. Raises: InputError."""
     missing = [name for name in REQUIRED_CHANNELS if name not in df.columns]
     if missing:
         raise InputError(f"metrics: the run lacks the columns {', '.join(missing)}")
@@ -322,7 +322,7 @@ def _kept(df, skip):
 
 
 def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
-    """The metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
+    """Return the metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
     result = {
         "RotSpeed_offset_[%]": np.nan,
         "BldPitch_oscillation_[deg]": np.nan,
@@ -342,7 +342,7 @@ def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
 
 
 def _standstill(time, speed, rated_speed_rpm, stop):
-    """Seconds from a stop until the rotor stands for good; NaN where it does not, or is not stopped."""
+    """Return the seconds from a stop until the rotor stands for good; NaN where it never does."""
     fast = np.abs(speed) > 0.01 * STANDSTILL * rated_speed_rpm
     if stop is None or fast[-1] or not np.isfinite(speed).all():
         return np.nan
@@ -350,7 +350,7 @@ def _standstill(time, speed, rated_speed_rpm, stop):
 
 
 def _violations(kept, time, blade_pitch, rated_speed_rpm):
-    """The metrics of the constraints; the acceleration is the horizontal one, fore-aft and side to side."""
+    """Return the metrics of the constraints; the acceleration is horizontal, fore-aft and side to side."""
     rate = np.abs(np.diff(blade_pitch) / np.diff(time))
     axes = [
         kept[name].to_numpy() for name in ("NcIMUTAxs_[m/s^2]", "NcIMUTAys_[m/s^2]") if name in kept.columns

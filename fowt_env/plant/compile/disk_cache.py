@@ -44,7 +44,7 @@ class SharedCacheFile(caching.IndexDataCacheFile):
 
     @contextmanager
     def _lock(self):
-        """Context that one process at a time is in."""
+        """Return a context that one process at a time is in."""
         handle = os.open(self._index_path + ".lock", os.O_RDWR | os.O_CREAT, 0o600)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX)
@@ -67,12 +67,12 @@ class SharedCacheFile(caching.IndexDataCacheFile):
             raise OSError(f"{name}: {error}") from error
 
     def _open_for_write(self, path):
-        """Context with a file that takes the path's place at its end."""
+        """Return a context with a file that takes the path's place at its end."""
         return replaced_privately(path)
 
 
 def _check(path):
-    """Raises: PermissionError for a file that somebody else may have written."""
+    """Raise PermissionError for a file that somebody else may have written."""
     fault = distrust(path, stat.S_ISREG)
     if fault:
         raise PermissionError(f"{path} {fault}")
@@ -92,11 +92,11 @@ class _Locator(caching.UserProvidedCacheLocator):
         self._stamp = stamp
 
     def get_source_stamp(self):
-        """What must not have changed beside the folder's name."""
+        """Return what must not have changed beside the folder's name."""
         return self._stamp
 
     def get_disambiguator(self):
-        """Text that tells functions of one name in a module apart, by code and numbers."""
+        """Return the text that tells functions of one name in a module apart, by code and numbers."""
         numbers = [value for value in self._code.co_consts if isinstance(value, (int, float, complex, tuple))]
         shape = repr((self._code.co_code, self._code.co_names, numbers))
         return hashlib.sha256(shape.encode()).hexdigest()[:8]

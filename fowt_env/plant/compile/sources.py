@@ -53,7 +53,7 @@ def _read_source(path, time, size):
 
 
 def _parsed_source(content):
-    """[hash of the code, modules of this project imported at the top] of a file's bytes."""
+    """Return [hash of the code, modules of this project imported at the top] of a file's bytes."""
     try:
         tree = ast.parse(content)
     except (SyntaxError, ValueError, RecursionError):
@@ -75,7 +75,7 @@ def code_text(tree):
 
 
 def _imported_names(nodes):
-    """{(level, module)} of the import statements among nodes; of `from a import b` a and a.b."""
+    """Return {(level, module)} of the import statements among nodes; of `from a import b` a and a.b."""
     names = set()
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -132,12 +132,12 @@ def imported_at_top(path, but):
 
 @cache  # some twenty modules with kernels of their own import much the same
 def _imported_at_top(path):
-    """Sources that the statements at the top of one name; packages around them give no name to use."""
+    """Return the sources that statements at the top of one name, without the packages around them."""
     return [file for name in read_source(path).top for file in _module_files(PACKAGE.parent, name)[-1:]]
 
 
 def _followed(starts, inside, imported):
-    """Set of files that are inside, from some on by what imported(path) lists."""
+    """Return the set of files that are inside, from some on by what imported(path) lists."""
     found, left = set(), list(starts)
     while left:
         path = left.pop()
@@ -153,7 +153,7 @@ def in_order(paths):
 
 
 def _module_files(folder, name):
-    """Files of a dotted module beneath a folder, those of its packages included, as far as there are any."""
+    """Return the files of a dotted module beneath a folder and of its packages, as far as there are any."""
     files = [folder / "__init__.py"] if not name and (folder / "__init__.py").is_file() else []
     for part in filter(None, name.split(".")):
         if folder == PACKAGE and part in FOLDERS:
@@ -171,14 +171,14 @@ def _module_files(folder, name):
 
 
 def _store():
-    """Path of the file of parsed sources; None without a cache folder."""
+    """Return the path of the file of parsed sources; None without a cache folder."""
     root = cache_root()
     return root and root / "sources" / "parsed.json"
 
 
 @cache
 def _kept_sources():
-    """{hash of a source's bytes: [code, modules at the top]} of the file, {} where it cannot be used."""
+    """Return {hash of a source's bytes: [code, modules at the top]} of the file, {} if it is unusable."""
     path = _store()
     try:
         if path is None or distrust(path.parent) or distrust(path, stat.S_ISREG):

@@ -16,12 +16,12 @@ class Package(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether it is installed, in a version that will do."""
+        """Return whether it is installed, in a version that will do."""
         return self.version is not None and SpecifierSet(self.needed).contains(self.version, prereleases=True)
 
     @property
     def advice(self) -> str:
-        """What is wrong with it and what to do, for one that does not fit."""
+        """Return what is wrong with it and what to do, for one that does not fit."""
         if self.version is None:
             found = "is not installed"
         else:
