@@ -10,8 +10,6 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
 
 STOP_FAULTS = ("emergency_stop", "normal_stop")
-BLADE_FAULTS = ("stuck_pitch", "pitch_runaway", "pitch_offset")
-SENSOR_FAULTS = ("sensor_bias", "sensor_freeze", "sensor_loss")
 FIELDS = tuple(name for name in (*Measurement._fields, *BladeMeasurement._fields) if name != "time")
 
 
@@ -40,6 +38,8 @@ FAULTS = {
     "sensor_loss": FaultKind(("field",), "a reading is zero from TIME on (JSON: field)"),
 }
 KINDS = tuple(FAULTS)
+BLADE_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "blades" in fault.keys)
+SENSOR_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "field" in fault.keys)
 NEEDED = ("towards", "offset", "field", "value")  # by the kinds that have them
 Blade = Annotated[int, Field(ge=1, le=3, strict=True)]
 
