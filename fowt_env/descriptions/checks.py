@@ -96,10 +96,10 @@ def check_in_range(key, value, low, high, unit=""):
 
 def check_choice(key, value, choices):
     """Return which of a few names or numbers a value is, letters of either case. Raises: InputError."""
-    wanted = value.upper() if isinstance(value, str) else value
-    for choice in choices:
-        same = choice.upper() if isinstance(choice, str) else choice
-        if type(wanted) is not bool and wanted == same:
+    plain = plain_number(value)
+    wanted = plain.upper() if isinstance(plain, str) else plain
+    for choice in choices if isinstance(plain, str | int | float) and not isinstance(plain, bool) else ():
+        if wanted == (choice.upper() if isinstance(choice, str) else choice):
             return choice
     hint = did_you_mean(value, choices) if isinstance(value, str) else ""
     raise refusal(key, value, f"one of {', '.join(map(str, choices))}{'.' * bool(hint)}{hint}")

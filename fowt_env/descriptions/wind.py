@@ -250,7 +250,7 @@ def read_wind(spec):
 def checked_keys(spec):
     """Return {key: value} of a mapping of a known kind. Raises: InputError with a line per wrong key."""
     keys = ALL_KINDS[spec["kind"]].keys
-    record, problems = validate(keys, {key: value for key, value in spec.items() if key != "kind"})
+    record, problems = validate(keys, {str(key): value for key, value in spec.items() if key != "kind"})
     if problems:
         raise InputError("\n".join(f"wind.{problem}" for problem in problems))
     return {key: getattr(record, key) for key in keys.model_fields}
