@@ -10,7 +10,7 @@ from pathlib import Path
 
 import fowt_env
 from fowt_env.layout import FOLDERS, PACKAGE, installed_path, module_path
-from fowt_env.plant.compile.sources import imported_files, in_order, read_source
+from fowt_env.plant.compile.sources import imported_files, in_order, keep_sources, read_source
 
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
 NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
@@ -25,6 +25,7 @@ def _digest(paths, key=""):
     digest = hashlib.sha256(key.encode())
     for path in map(Path, paths):
         digest.update(read_source(path).code.encode() if path.suffix == ".py" else path.read_bytes())
+    keep_sources()
     return digest.hexdigest()[:16]
 
 
