@@ -154,6 +154,16 @@ def in_order(paths):
 
 def _module_files(folder, name):
     """Return the files of a dotted module beneath a folder and of its packages, as far as there are any."""
+    own = folder == PACKAGE.parent and name.partition(".")[0] == PACKAGE.name
+    return _own_files(name) if own else _found_files(folder, name)
+
+
+@cache  # the modules of this project stay as they are
+def _own_files(name):
+    return _found_files(PACKAGE.parent, name)
+
+
+def _found_files(folder, name):
     files = [folder / "__init__.py"] if not name and (folder / "__init__.py").is_file() else []
     for part in filter(None, name.split(".")):
         if folder == PACKAGE and part in FOLDERS:
