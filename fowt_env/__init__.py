@@ -17,12 +17,12 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
     from fowt_env.analysis.linear_model import natural_periods as natural_periods
     from fowt_env.analysis.trim import OperatingPoint as OperatingPoint
     from fowt_env.analysis.trim import trim as trim
-    from fowt_env.descriptions.measurements import Measurement as Measurement
     from fowt_env.errors import ControllerError as ControllerError
     from fowt_env.errors import InputError as InputError
     from fowt_env.errors import PlantWarning as PlantWarning
     from fowt_env.errors import SimulationStopped as SimulationStopped
     from fowt_env.plant.compile.notice import set_quiet as set_quiet
+    from fowt_env.plant.measurement import Measurement as Measurement
     from fowt_env.plant.user_loads import Force as Force
     from fowt_env.plant.user_loads import Motion as Motion
     from fowt_env.run.simulation import simulate as simulate
@@ -41,7 +41,7 @@ _PUBLIC = {
     "simulate": "fowt_env.run.simulation",
     "linearize": "fowt_env.analysis.linear_model",
     "natural_periods": "fowt_env.analysis.linear_model",
-    "Measurement": "fowt_env.descriptions.measurements",  # which gives it its table
+    "Measurement": "fowt_env.plant.measurement",
     "Load": "fowt_env.scene.user_loads",
     "Force": "fowt_env.plant.user_loads",
     "Motion": "fowt_env.plant.user_loads",

@@ -45,7 +45,7 @@ class PlantWarning(UserWarning):
 
 
 def level_outside() -> int:
-    """stacklevel with which warnings.warn of the caller names the first line outside of this package."""
+    """Return the stacklevel by which the caller's warnings name the first line outside of this package."""
     own = __name__.partition(".")[0]
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == own:
@@ -67,7 +67,7 @@ def warn_once(key: object, text: str) -> None:
 
 @contextmanager
 def muted() -> Iterator[None]:
-    """Context in which warn_once says nothing, and says it when it is asked to outside."""
+    """Return a context in which warn_once says nothing, and says it when it is asked to outside."""
     token = _muted.set(True)
     try:
         yield
@@ -79,7 +79,7 @@ MOST_LISTED, NEAREST = 30, 5  # names that are all listed; how many are where th
 
 
 def unknown(kind: str, name: object, known: Iterable[object], command: str | None = None) -> InputError:
-    """InputError for a name that is not known, with the nearest known one as a suggestion.
+    """Return the InputError for a name that is not known, with the nearest known one as a suggestion.
 
     Of more than MOST_LISTED names it lists the NEAREST, their number, and the command that prints them all.
     """
@@ -91,14 +91,25 @@ def unknown_keyword(function: str, name: str, known: Iterable[object]) -> Keywor
     return KeywordError(f"{function}() got an unexpected keyword argument {name!r}.{_nearest(name, known)}")
 
 
+def nearest(name: object, known: Iterable[object], most: int, cutoff: float = 0.6) -> list[str]:
+    """Return the known names that are most like one, whatever their case, the nearest first."""
+    lowered = {str(k).lower(): str(k) for k in known}
+    return [lowered[k] for k in difflib.get_close_matches(str(name).lower(), lowered, n=most, cutoff=cutoff)]
+
+
+def did_you_mean(name: object, known: Iterable[object], most: int = 1) -> str:
+    """Return " Did you mean 'a' or 'b'?" with known names like an unknown one; "" where there is none."""
+    near = nearest(name, known, most)
+    return f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
+
+
 def _nearest(name: object, known: Iterable[object], command: str | None = None) -> str:
     """Return the end of a message on an unknown name: which known ones are near it."""
     names = sorted(str(k) for k in known)
-    close = difflib.get_close_matches(str(name), names, n=1)
-    hint = f" Did you mean {close[0]!r}?" if close else ""
+    hint = did_you_mean(name, names)
     if len(names) <= MOST_LISTED:
         return f"{hint} Known: {', '.join(names)}"
-    near = ", ".join(difflib.get_close_matches(str(name), names, n=NEAREST, cutoff=0.0))
+    near = ", ".join(nearest(name, names, NEAREST, cutoff=0.0))
     all_of_them = "" if command is None else f"; all: {command}"
     return f"{hint} Nearest of {len(names)}: {near}{all_of_them}"
 

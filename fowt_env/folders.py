@@ -2,6 +2,8 @@
 
 import os
 import stat
+import tempfile
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 PRIVATE = 0o700
@@ -9,7 +11,7 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def user_folder(own, base, usual):
-    """Folder that the environment variable own names; else fowt_env in that of base, or in usual at home.
+    """Return the folder that the variable own names; else fowt_env in that of base, or in usual at home.
 
     A "~" at the beginning is the home folder, which no shell has put there in a Dockerfile or an .env file. A
     path that is not absolute begins at the working folder; in base it counts for nothing, as the XDG
@@ -27,7 +29,7 @@ def user_folder(own, base, usual):
 
 
 def cache_root():
-    """Folder of what can be made again (FOWT_CACHE_DIR, else the user's cache folder), or None."""
+    """Return the folder of what can be made again (FOWT_CACHE_DIR, else the user's cache folder), or None."""
     return user_folder("FOWT_CACHE_DIR", "XDG_CACHE_HOME", ".cache")
 
 
@@ -42,8 +44,23 @@ def make_private(folder):
         folder.mkdir(mode=PRIVATE, exist_ok=True)
 
 
+@contextmanager
+def replaced_privately(path):
+    """Return a context with a binary file that takes the path's place at its end, private to the user."""
+    folder, name = os.path.split(path)
+    handle, temporary = tempfile.mkstemp(dir=folder, prefix=f"{name}.tmp.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            yield file
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
 def distrust(path, kind=stat.S_ISDIR):
-    """Why what lies at a path may be from someone else than this user or root; "" where it cannot.
+    """Return why what lies at a path may be from someone else than this user or root; "" where it cannot.
 
     Who owns a folder above it can put another thing into its place, but none that belongs to this user.
     """

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 
 import numpy as np
 import pandas as pd
@@ -15,30 +16,30 @@ from fowt_env.errors import InputError, unknown
 WIND, SEA = {"kind": "ntm", "speed": 18.0}, {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 
 
-def _simulated(platform, fidelity, **weather):
-    from fowt_env.run.simulation import simulate
-    from fowt_env.scene.build import build_scene
+def _simulated(fidelity, **weather):
+    """Return what simulates a platform at a fidelity in a weather."""
 
-    scene = build_scene(platform, fidelity=fidelity, **weather)
-    simulate(scene, "pi", duration=1.0)
-    return scene
+    def run(platform):
+        from fowt_env.run.simulation import simulate
+        from fowt_env.scene.build import build_scene
 
+        simulate(build_scene(platform, fidelity=fidelity, **weather), "pi", duration=1.0)
 
-def _environment(platform):
-    from fowt_env.envs import FowtEnv
-
-    environment = FowtEnv("above_rated", platform=platform)
-    environment.reset(seed=0)
-    environment.step(np.zeros(environment.action_space.shape, dtype=np.float32))
+    return run
 
 
-def _vector(platform):
-    from fowt_env.envs import FowtVectorEnv
+def _stepped(name, **settings):
+    """Return what resets and steps an environment, a class of fowt_env.envs."""
 
-    environments = FowtVectorEnv(num_envs=2, task="above_rated", platform=platform)
-    environments.reset(seed=0)
-    environments.step(np.zeros(environments.action_space.shape, dtype=np.float32))
-    environments.close()
+    def run(platform):
+        from fowt_env import envs
+
+        environment = getattr(envs, name)(task="above_rated", platform=platform, **settings)
+        environment.reset(seed=0)
+        environment.step(np.zeros(environment.action_space.shape, dtype=np.float32))
+        environment.close()
+
+    return run
 
 
 def _linear(platform):
@@ -48,26 +49,18 @@ def _linear(platform):
     linearize(build_scene(platform, wind=18.0, sea=SEA, fidelity="standard"))
 
 
+RUNS = "runs in turbulence and a random sea at fidelity"
 KINDS: dict[str, tuple[str, Callable[[str], object]]] = {  # name: what it is, and how it is run
-    "standard": (
-        "runs in turbulence and a random sea at fidelity standard",
-        lambda platform: _simulated(platform, "standard", wind=WIND, sea=SEA),
-    ),
-    "environment": ("reset and step of the Gymnasium environment", _environment),
-    "vector": ("reset and step of the vector environment", _vector),
+    "standard": (f"{RUNS} standard", _simulated("standard", wind=WIND, sea=SEA)),
+    "environment": ("reset and step of the Gymnasium environment", _stepped("FowtEnv")),
+    "vector": ("reset and step of the vector environment", _stepped("FowtVectorEnv", num_envs=2)),
     "steady": (
         "runs in a steady wind and still water at fidelity standard",
-        lambda platform: _simulated(platform, "standard", wind=18.0),
+        _simulated("standard", wind=18.0),
     ),
     "linear": ("linear models", _linear),
-    "fast": (
-        "runs in turbulence and a random sea at fidelity fast",
-        lambda platform: _simulated(platform, "fast", wind=WIND, sea=SEA),
-    ),
-    "reference": (
-        "runs in turbulence and a random sea at fidelity reference",
-        lambda platform: _simulated(platform, "reference", wind=WIND, sea=SEA),
-    ),
+    "fast": (f"{RUNS} fast", _simulated("fast", wind=WIND, sea=SEA)),
+    "reference": (f"{RUNS} reference", _simulated("reference", wind=WIND, sea=SEA)),
 }
 USUAL = ("standard", "environment")
 
@@ -78,7 +71,7 @@ def warmup(
     jobs: int = 1,
     progress: Callable[[str, int, int], object] | None = None,
 ) -> pd.DataFrame:
-    """DataFrame (kind, kernels, seconds) of the kinds that are compiled, where they are not yet on disk.
+    """Compile kinds of scene that are not yet on disk; return a DataFrame (kind, kernels, seconds).
 
     platform  a built-in name or the path of a TOML file
     kinds     names of KINDS; what they share is compiled with the first
@@ -94,45 +87,35 @@ def warmup(
         if kind not in KINDS:
             raise unknown("kind", kind, KINDS)
     check_whole_number("jobs", jobs, 1)
-    rows, waiting = [], list(dict.fromkeys(kinds))
-    while waiting and (jobs == 1 or not rows):
-        kind = waiting.pop(0)
-        rows.append(_compiled(platform, kind, len(rows), progress or (lambda *_: None)))
-    running: dict[str, subprocess.Popen] = {}
+    progress = progress or (lambda *_: None)
+    first, *others = dict.fromkeys(kinds)
+    here = [first, *others] if jobs == 1 else [first]
+    rows = [_compiled(platform, kind, done, progress) for done, kind in enumerate(here)]
+    pool = ThreadPoolExecutor(jobs)
     try:
-        while waiting or running:
-            while waiting and len(running) < jobs:
-                kind = waiting.pop(0)
-                running[kind] = _started(platform, kind)
-            kind = next((name for name, one in running.items() if one.poll() is not None), "")
-            if not kind:
-                time.sleep(0.05)
-                continue
-            rows.append(_ended(kind, running.pop(kind)))
-            if progress is not None:
-                progress(kind, len(rows), 0)
+        tasks = [pool.submit(_compiled_apart, platform, kind) for kind in others if jobs > 1]
+        for task in as_completed(tasks):
+            rows.append(task.result())
+            progress(rows[-1][0], len(rows), 0)
     finally:
-        for process in running.values():
-            process.kill()
-            process.wait()
+        pool.shutdown(cancel_futures=True)
     return pd.DataFrame(rows, columns=["kind", "kernels", "seconds"])
 
 
 def _compiled(platform, kind, done, progress):
-    """Row of a kind that is compiled in this process."""
+    """Compile a kind in this process and return its row."""
     from fowt_env.plant.compile.notice import compilation_reported
 
-    begin, compiled = time.perf_counter(), 0
+    begin, counts = time.perf_counter(), [0]
 
-    def said(count):
-        nonlocal compiled
-        compiled = count
+    def report(count):
+        counts[0] = count
         progress(kind, done, count)
 
-    with compilation_reported(said):
+    with compilation_reported(report):
         KINDS[kind][1](platform)
-    progress(kind, done + 1, compiled)
-    return kind, compiled, time.perf_counter() - begin
+    progress(kind, done + 1, counts[0])
+    return kind, counts[0], time.perf_counter() - begin
 
 
 CHILD = """
@@ -148,15 +131,10 @@ print(json.dumps(list(row)))
 """
 
 
-def _started(platform, kind):
-    """A process that compiles a kind."""
+def _compiled_apart(platform, kind):
+    """Compile a kind in a process of its own and return its row. Raises: InputError."""
     words = [sys.executable, "-c", CHILD, json.dumps(sys.path), str(platform), kind]
-    return subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-
-
-def _ended(kind, process):
-    """Row of a kind from a process that has ended."""
-    stdout, stderr = process.communicate()
-    if process.returncode != 0:
-        raise InputError(f"kind {kind}: {stderr.strip()[-600:]}")
-    return tuple(json.loads(stdout.splitlines()[-1]))
+    done = subprocess.run(words, capture_output=True, text=True)
+    if done.returncode != 0:
+        raise InputError(f"kind {kind}: {done.stderr.strip()[-600:]}")
+    return tuple(json.loads(done.stdout.splitlines()[-1]))

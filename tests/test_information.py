@@ -21,7 +21,6 @@ from fowt_env.control import (
     view_of,
 )
 from fowt_env.controllers import CONTROLLERS
-from fowt_env.descriptions.measurements import measurement_rows
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.sensors import Sensor, SensorChain, built_in_chains
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
@@ -33,6 +32,7 @@ from fowt_env.plant.measurement import (
     BladeMeasurement,
     Measure,
     Measurement,
+    measurement_rows,
 )
 from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Motion, Preview, add_motion, exact_preview, rotor_wind_series

@@ -16,7 +16,6 @@ from pathlib import Path
 import typer
 from rich.text import Text
 
-from fowt_env.descriptions.measurements import HEAD, measurement_rows
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
@@ -39,7 +38,7 @@ from fowt_env.plant.advance import (
 )
 from fowt_env.plant.events import EVENTS
 from fowt_env.plant.integrators import INTEGRATORS
-from fowt_env.plant.measurement import BladeMeasurement, Measurement
+from fowt_env.plant.measurement import HEAD, BladeMeasurement, Measurement, measurement_rows
 from fowt_env.registration import ENTRY_POINT, ENVIRONMENTS, OTHER_PLATFORMS
 from fowt_env.scene.loads import LOADS
 from fowt_env.training.cli.app import app

@@ -13,13 +13,13 @@ from fowt_env.analysis.statics import central_difference, named_periods, rotatio
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
 from fowt_env.descriptions.checks import check_number, is_number, short
-from fowt_env.descriptions.measurements import MEASURED as FIELDS
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.channels import FIXED_CHANNELS, N_FIXED, Out, measure, record
 from fowt_env.plant.compile.decorators import entry, inlined_kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
+from fowt_env.plant.measurement import MEASURED as FIELDS
 from fowt_env.plant.measurement import Measure, Measurement
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State, pose_of

@@ -30,7 +30,6 @@ The built-in controllers are built on the simulator, and so it imports none of t
 package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
 """
 
-import difflib
 import reprlib
 import traceback
 from collections.abc import Callable
@@ -44,7 +43,7 @@ import numpy.typing as npt
 
 from fowt_env.control.information import declares_blades, mask
 from fowt_env.control.views import values_of_blades, view_class, wind_ahead
-from fowt_env.errors import ControllerError, InputError, SimulationStopped
+from fowt_env.errors import ControllerError, InputError, SimulationStopped, did_you_mean
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import (
     BLADE_SENSOR_FIELDS,
@@ -273,9 +272,8 @@ def _lacking(error):
     what = "measurement.blades has" if of_blades else "a measurement has"
     if not of_blades and error.name in BladeMeasurement._fields:
         return f"{what} no {error.name!r}: it is measurement.blades.{error.name}"
-    near = difflib.get_close_matches(str(error.name), known, n=3)
-    hint = f". Did you mean {' or '.join(map(repr, near))}?" if near else f": it has {', '.join(known)}"
-    return f"{what} no {error.name!r}{hint}"
+    hint = did_you_mean(error.name, known, 3)
+    return f"{what} no {error.name!r}" + (f".{hint}" if hint else f": it has {', '.join(known)}")
 
 
 def _shown(value: Any) -> str:

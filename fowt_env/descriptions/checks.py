@@ -4,30 +4,31 @@ A message is `key = value: must be ...`, with the allowed range in words.
 """
 
 import math
+from pathlib import Path
 
 import numpy as np
 
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, did_you_mean
 
 
 def plain_number(value):
-    """A numpy scalar as a Python number, which the strict float type takes (and no string or bool)."""
-    return value.item() if isinstance(value, (np.floating, np.integer)) else value
+    """Return a scalar of numpy or the like as Python's own, which the strict float type takes."""
+    return value.item() if getattr(value, "ndim", None) == 0 else value
 
 
 def is_number(value):
-    """Whether a value is a finite number that fits a float, and neither bool nor text."""
+    """Return whether a value is a finite number that fits a float, and neither bool nor text."""
     value = plain_number(value)
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1e300
 
 
 def is_whole(value):
-    """Whether a value is a whole number by its type, and no bool."""
+    """Return whether a value is a whole number by its type, and no bool."""
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def short(value):
-    """repr of a value, shortened for messages."""
+    """Return repr of a value, shortened for messages."""
     try:
         text = repr(plain_number(value))
     except ValueError:  # an integer of more digits than Python prints
@@ -36,12 +37,12 @@ def short(value):
 
 
 def refusal(key, value, allowed):
-    """InputError for a value that is not what is allowed, in words."""
+    """Return the InputError for a value that is not what is allowed, in words."""
     return InputError(f"{key} = {short(value)}: must be {allowed}")
 
 
 def interval(low, high, low_open, high_open, noun="a number"):
-    """A range in words, such as "a number > 0" or "a finite number"."""
+    """Return a range in words, such as "a number > 0" or "a finite number"."""
     above = f"{'>' if low_open else '>='} {low:g}" if low > -math.inf else ""
     below = f"{'<' if high_open else '<='} {high:g}" if high < math.inf else ""
     if not (above or below):
@@ -52,7 +53,7 @@ def interval(low, high, low_open, high_open, noun="a number"):
 def check_number(
     key, value, low=-math.inf, high=math.inf, *, low_open=False, high_open=False, infinite=False, allowed=None
 ):
-    """The value as a float. Raises: InputError unless it is a number from low to high.
+    """Return the value as a float. Raises: InputError unless it is a number from low to high.
 
     low_open, high_open   whether that end itself is left out
     infinite              whether infinity is a number
@@ -70,7 +71,7 @@ def check_number(
 
 
 def check_whole_number(key, value, low=None, high=None):
-    """The value as an int. Raises: InputError unless it is a whole number from low to high (None: no end)."""
+    """Return the value as an int. Raises: InputError unless it is whole, from low to high (None: no end)."""
     good = is_whole(value) and (low is None or low <= value) and (high is None or value <= high)
     if not good:
         allowed = "a whole number" if low is None else f"a whole number >= {low}"
@@ -78,15 +79,81 @@ def check_whole_number(key, value, low=None, high=None):
     return int(value)
 
 
+def check_pair(key, value, low, high):
+    """Return the (low, high) of an ordered pair of numbers. Raises: InputError, also beyond the range."""
+    if not isinstance(value, tuple | list) or len(value) != 2:
+        raise refusal(key, value, "a pair (low, high)")
+    first, last = (check_number(key, number, low, high) for number in value)
+    if first > last:
+        raise InputError(f"{key} = {short(value)}: the low end must not exceed the high end")
+    return first, last
+
+
+def check_in_range(key, value, low, high, unit=""):
+    """Return the value as a float. Raises: InputError unless it is a number in [low, high], with its unit."""
+    return check_number(key, value, low, high, allowed=f"a number in [{low:g}, {high:g}] {unit}".rstrip())
+
+
+def check_choice(key, value, choices):
+    """Return which of a few names or numbers a value is, letters of either case. Raises: InputError."""
+    plain = plain_number(value)
+    wanted = plain.upper() if isinstance(plain, str) else plain
+    for choice in choices if isinstance(plain, str | int | float) and not isinstance(plain, bool) else ():
+        if wanted == (choice.upper() if isinstance(choice, str) else choice):
+            return choice
+    hint = did_you_mean(value, choices) if isinstance(value, str) else ""
+    raise refusal(key, value, f"one of {', '.join(map(str, choices))}{'.' * bool(hint)}{hint}")
+
+
+def check_flag(key, value):
+    """Return the value as a bool. Raises: InputError unless it is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise refusal(key, value, "True or False")
+    return bool(value)
+
+
+def check_path(key, value):
+    """Return the value as a Path, with ~ expanded. Raises: InputError."""
+    if not isinstance(value, str | Path):
+        raise refusal(key, value, "a path")
+    return Path(value).expanduser()
+
+
+def check_samples(key, value, low, high, unit):
+    """Return a (n,) float64 copy of a list or array of numbers in [low, high], n > 0. Raises: InputError."""
+    try:
+        values = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise refusal(key, value, "a list of numbers") from None
+    if values.ndim != 1 or values.size == 0:
+        raise InputError(f"{key} has shape {values.shape}: must be a list of at least one number, shape (n,)")
+    wrong = np.flatnonzero(~((values >= low) & (values <= high)))
+    if wrong.size:
+        where = f"{key}[{wrong[0]}] = {values[wrong[0]]}"
+        raise InputError(f"{where}: must be in [{low:g}, {high:g}] {unit}")
+    return values
+
+
+def check_array(key, value, axes):
+    """Return an array of finite numbers, float32 where it has several axes. Raises: InputError."""
+    try:
+        values = np.asarray(value, dtype=np.float32 if axes > 1 else np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{key}: must be an array of numbers with {axes} axes") from None
+    if values.ndim != axes or values.size == 0 or not np.isfinite(values).all():
+        raise InputError(f"{key} has shape {values.shape}: must be finite numbers with {axes} axes")
+    return values
+
+
 def check_one_of(key, value, choices):
-    """The value. Raises: InputError unless it is one of a few."""
+    """Return the value. Raises: InputError unless it is one of a few."""
     if value not in tuple(choices):  # a tuple asks for no hash
         raise refusal(key, value, f"one of {', '.join(map(str, choices))}")
     return value
 
 
 def parse_numbers(text, what):
-    """List of numbers from "1,2,5" or "3:25:1" (start:stop:step, stop included; without a step it is 1)."""
+    """Return the numbers of "1,2,5" or "3:25:1" (start:stop:step, stop included; default step 1)."""
     if ":" in text:
         parts = [parse_number(part) for part in text.split(":")]
         parts = [*parts, 1.0] if len(parts) == 2 else parts
@@ -101,7 +168,7 @@ def parse_numbers(text, what):
 
 
 def parse_whole_numbers(text, what):
-    """List of whole numbers of a text, as parse_numbers takes it."""
+    """Return the list of whole numbers of a text, as parse_numbers takes it."""
     values = parse_numbers(text, what)
     if any(value != int(value) for value in values):
         raise InputError(f"{what} = {text!r}: must be whole numbers")
@@ -109,7 +176,7 @@ def parse_whole_numbers(text, what):
 
 
 def parse_number(text):
-    """The finite number that a text means, or None."""
+    """Return the finite number that a text means, or None."""
     try:
         value = float(text)
     except ValueError:

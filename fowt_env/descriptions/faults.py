@@ -1,33 +1,46 @@
 """What goes wrong in a run: the grid, a pitch drive, a sensor; and stops that are ordered."""
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import Field, model_validator
 
-from fowt_env.descriptions.files import raise_problems
-from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, validate
+from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, checked_record
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
 
 STOP_FAULTS = ("emergency_stop", "normal_stop")
-BLADE_FAULTS = ("stuck_pitch", "pitch_runaway", "pitch_offset")
-SENSOR_FAULTS = ("sensor_bias", "sensor_freeze", "sensor_loss")
-KINDS = ("grid_loss", *STOP_FAULTS, *BLADE_FAULTS, *SENSOR_FAULTS)
 FIELDS = tuple(name for name in (*Measurement._fields, *BladeMeasurement._fields) if name != "time")
-# keys of a kind beside kind and time; those that it needs
-KEYS = {
-    "grid_loss": ("delay", "rate"),
-    "emergency_stop": ("rate",),
-    "normal_stop": ("rate",),
-    "stuck_pitch": ("blades", "backup"),
-    "pitch_runaway": ("blades", "towards", "backup"),
-    "pitch_offset": ("blades", "offset"),
-    "sensor_bias": ("field", "value"),
-    "sensor_freeze": ("field",),
-    "sensor_loss": ("field",),
+
+
+class FaultKind(NamedTuple):
+    """A kind of fault."""
+
+    keys: tuple[str, ...]  # beside kind and time
+    summary: str  # TIME: its time
+
+
+FAULTS = {
+    "grid_loss": FaultKind(("delay", "rate"), "the generator torque is zero from TIME on"),
+    "emergency_stop": FaultKind(("rate",), "no torque, and the blades feather from TIME on"),
+    "normal_stop": FaultKind(
+        ("rate",), "the blades feather at the normal rate; the torque falls with the rotor speed"
+    ),
+    "stuck_pitch": FaultKind(("blades", "backup"), "blades stay where they are at TIME"),
+    "pitch_runaway": FaultKind(
+        ("blades", "towards", "backup"), "blades run to one end of their range (JSON: towards)"
+    ),
+    "pitch_offset": FaultKind(
+        ("blades", "offset"), "blades are off from what their encoders show (JSON: offset, deg)"
+    ),
+    "sensor_bias": FaultKind(("field", "value"), "a reading is off (JSON: field, value)"),
+    "sensor_freeze": FaultKind(("field",), "a reading stays as it is at TIME (JSON: field)"),
+    "sensor_loss": FaultKind(("field",), "a reading is zero from TIME on (JSON: field)"),
 }
-NEEDED = ("towards", "offset", "field", "value")
+KINDS = tuple(FAULTS)
+BLADE_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "blades" in fault.keys)
+SENSOR_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "field" in fault.keys)
+NEEDED = ("towards", "offset", "field", "value")  # by the kinds that have them
 Blade = Annotated[int, Field(ge=1, le=3, strict=True)]
 
 
@@ -69,11 +82,12 @@ class Fault(Record):
 
     @model_validator(mode="after")
     def _keys(self):
-        for key in sorted(self.model_fields_set - {"kind", "time", *KEYS[self.kind]}):
+        known = FAULTS[self.kind].keys
+        for key in sorted(self.model_fields_set - {"kind", "time", *known}):
             if getattr(self, key) not in (None, False):
-                raise ValueError(f"{key}: is no key of {self.kind}, which has {', '.join(KEYS[self.kind])}")
+                raise ValueError(f"{key}: is no key of {self.kind}, which has {', '.join(known)}")
         for key in NEEDED:
-            if key in KEYS[self.kind] and getattr(self, key) is None:
+            if key in known and getattr(self, key) is None:
                 raise ValueError(f"{key} is missing: {self.kind} needs it")
         if self.field is not None and self.field not in FIELDS:
             raise ValueError(str(unknown("field", self.field, FIELDS)))
@@ -83,17 +97,17 @@ class Fault(Record):
 
     @property
     def grid_loss(self) -> float | None:
-        """Time (s) from which the generator is off the grid; None: it stays."""
+        """Return the time (s) from which the generator is off the grid; None: it stays."""
         return self.time if self.kind in ("grid_loss", "emergency_stop") else None
 
     @property
     def ends_operation(self) -> bool:
-        """Whether the turbine is to be stopped for it: what its protection does then is part of the case."""
+        """Return whether the turbine is stopped because of it: its protection then is part of the case."""
         return self.kind not in (*SENSOR_FAULTS, "pitch_offset")
 
 
 def read_faults(value: Any) -> tuple[Fault, ...]:
-    """Tuple of Faults from none, one or several, each a Fault or a mapping of its keys.
+    """Return a tuple of Faults from none, one or several, each a Fault or a mapping of its keys.
 
     Raises: InputError with a line per wrong key.
     """
@@ -105,7 +119,5 @@ def read_faults(value: Any) -> tuple[Fault, ...]:
         raise InputError(f"faults = {value!r}: must be a Fault, a mapping of its keys, or a list of them")
     found = []
     for number, item in enumerate(value, 1):
-        record, problems = (item, []) if isinstance(item, Fault) else validate(Fault, item)
-        raise_problems(f"faults.{number}", problems)
-        found.append(record)
+        found.append(item if isinstance(item, Fault) else checked_record(Fault, item, f"faults.{number}"))
     return tuple(found)

@@ -1,7 +1,6 @@
 """Checked reading of TOML, JSON and CSV; whatever is wrong becomes an InputError that names the file."""
 
 import csv
-import difflib
 import io
 import json
 import math
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.descriptions.checks import interval, short
-from fowt_env.errors import NEAREST, InputError
+from fowt_env.errors import NEAREST, InputError, did_you_mean, nearest
 
 DATA = Path(__file__).parents[1] / "data"
 MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file
@@ -24,7 +23,7 @@ _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_K
 
 
 def read_text(path, kind, largest=MAX_BYTES):
-    """Text of a file of at most `largest` bytes; kind ("platform", "blade" ...) is for the messages."""
+    """Return the text of a file of at most `largest` bytes; kind ("platform" ...) is for messages."""
     try:
         if not path.exists():
             raise InputError(f"{kind} file {str(path)!r} does not exist")
@@ -44,7 +43,7 @@ def read_text(path, kind, largest=MAX_BYTES):
 
 
 def read_toml(path, kind):
-    """Contents of a TOML file as nested dicts."""
+    """Return the contents of a TOML file as nested dicts."""
     text = read_text(path, kind)
     deep = _DEEP_KEY.search(text)
     if deep:
@@ -57,7 +56,7 @@ def read_toml(path, kind):
 
 
 def parse_json(text):
-    """Value of a JSON text, every number of it finite. Raises: ValueError."""
+    """Return the value of a JSON text, every number of it finite. Raises: ValueError."""
     try:
         return json.loads(text, parse_constant=_finite, parse_float=_finite)
     except RecursionError:
@@ -65,7 +64,7 @@ def parse_json(text):
 
 
 def json_text(where, text):
-    """Value of a text that is JSON. Raises: InputError naming where it stands, and why it is none."""
+    """Return the value of a JSON text. Raises: InputError that names its place and what is wrong."""
     try:
         return parse_json(text)
     except ValueError as error:
@@ -80,7 +79,7 @@ def _finite(text):
 
 
 def read_table(path, kind, columns, optional=()):
-    """Rows of a CSV file with these columns, in any order: a list of (line number, dict of strings).
+    """Return the rows of a CSV file with these columns, in any order: [(line number, dict of strings)].
 
     optional: columns that it may have beside them.
 
@@ -113,10 +112,10 @@ def read_table(path, kind, columns, optional=()):
     return rows
 
 
-def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_ends=True):
-    """(n,) float64 values of one CSV column; appends one problem per value that is no number in the range.
+def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_ends=True, increasing=False):
+    """Return the (n,) float64 values of a CSV column; append a problem for each that is not in the range.
 
-    open_ends: the limits themselves are not allowed.
+    open_ends: the limits themselves are not allowed. increasing: each value must be above the one before.
     """
     values = np.full(len(rows), np.nan)
     allowed = interval(minimum, maximum, open_ends, open_ends)
@@ -128,12 +127,14 @@ def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_en
         inside = minimum < value < maximum if open_ends else minimum <= value <= maximum
         if not (math.isfinite(value) and inside):
             problems.append(f"line {number}: {name} = {row[name][:40]}: must be {allowed}")
+        elif increasing and i > 0 and value <= values[i - 1]:
+            problems.append(f"line {number}: {name} = {row[name][:40]}: must increase")
         values[i] = value
     return values
 
 
 def raise_problems(where, problems):
-    """Raises one InputError listing the problems found in where (a file), if there are any."""
+    """Raise one InputError that lists the problems found in where (a file), if there are any."""
     if not problems:
         return
     shown = problems[:MAX_LISTED]
@@ -144,7 +145,7 @@ def raise_problems(where, problems):
 
 
 def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, also=""):
-    """File of a known built-in name (builtin(name) -> Path), or of a user's path relative to folder.
+    """Return the file of a built-in name (builtin(name) -> Path), or of a path relative to a folder.
 
     listed: the command that prints the names, for messages; also: what is allowed beside name and path.
     """
@@ -159,12 +160,11 @@ def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, 
 
 
 def _unknown_name(kind, name, known, command, also):
-    nearest = difflib.get_close_matches(name.lower(), known, n=3)
-    hint = f" Did you mean {' or '.join(map(repr, nearest))}?" if nearest else ""
+    hint = did_you_mean(name, known, 3)
     if len(known) <= MOST_NAMED:
         listed = ", ".join(known)
     else:
-        near = difflib.get_close_matches(name.lower(), known, n=NEAREST, cutoff=0.0)
+        near = nearest(name, known, NEAREST, cutoff=0.0)
         printed = "" if command is None else f", all by `{command}`"
         listed = f"one of {len(known)} names (nearest: {', '.join(near)}{printed})"
     others = f", {also}" if also else ""
@@ -175,7 +175,7 @@ def _unknown_name(kind, name, known, command, also):
 
 
 def _as_path(name_or_path):
-    """Path of a user's file, with ~ expanded; or None if the text is a plain name and not a path."""
+    """Return the path of a user's file, with ~ expanded; None if the text is a plain name."""
     text = str(name_or_path)
     has_separator = "/" in text or "\\" in text
     if isinstance(name_or_path, str) and not has_separator and not text.lower().endswith(".toml"):

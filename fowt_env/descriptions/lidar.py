@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
-from fowt_env.descriptions.records import Record, bounded, validate
+from fowt_env.descriptions.records import Record, bounded, checked_record, validate
 
 Angle = bounded(gt=-60.0, lt=60.0)  # deg
 Distance = bounded(ge=10.0, le=1000.0)  # m
@@ -50,7 +50,7 @@ class Lidar(Record):
 
 @cached(1)
 def lidars():
-    """{name: Lidar} of the built-in lidars."""
+    """Return {name: Lidar} of the built-in lidars."""
     path = DATA / "lidars.toml"
     found, problems = {}, []
     for name, entry in read_toml(path, "lidar")["lidar"].items():
@@ -61,7 +61,7 @@ def lidars():
 
 
 def read_lidar(lidar):
-    """Lidar of a built-in name (lidars()), a path to a TOML file with the keys at its top, or itself.
+    """Return the Lidar of a built-in name (lidars()), of a TOML file with the keys at its top, or itself.
 
     Raises: InputError naming the key, value and allowed range.
     """
@@ -70,6 +70,5 @@ def read_lidar(lidar):
     if isinstance(lidar, str) and lidar in lidars():
         return lidars()[lidar]
     path = locate("lidar", lidar, lidars())
-    read, problems = validate(Lidar, {"name": path.stem, **read_toml(path, "lidar")})
-    raise_problems(f"lidar file {str(path)!r}", problems)
-    return read
+    data = {"name": path.stem, **read_toml(path, "lidar")}
+    return checked_record(Lidar, data, f"lidar file {str(path)!r}")

@@ -127,15 +127,26 @@ class AdditionalLoads(Record):
         return self
 
 
-class Member(Record):
+class Straight(Record):
+    """Base of what lies between two points of the body."""
+
+    start: Vector3  # m
+    end: Vector3
+
+    @model_validator(mode="after")
+    def _length(self):
+        if math.dist(self.start, self.end) < 1e-6:
+            raise ValueError(f"start = {list(self.start)}: must not be end")
+        return self
+
+
+class Member(Straight):
     """A straight cylinder of the hull, of any direction and taper, for strip (Morison) loads.
 
     start, end in body axes; end 1 is the start. The coefficients multiply 1/2 rho D |v| v, rho A a and, on
     an end that is an outer face of the hull, 1/2 rho A |v| v and the added mass of a half sphere.
     """
 
-    start: Vector3  # m
-    end: Vector3
     diameter: tuple[Positive, Positive]  # m, at start and end
     drag_coefficient: tuple[NonNegative, NonNegative]
     added_mass_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)
@@ -145,28 +156,18 @@ class Member(Record):
     axial_pressure_coefficient: tuple[NonNegative, NonNegative] = (1.0, 1.0)
     potential_flow: bool = False  # in the potential-flow body: drag alone, no inertia and no buoyancy
 
-    @model_validator(mode="after")
-    def _length(self):
-        if math.dist(self.start, self.end) < 1e-6:
-            raise ValueError(f"start = {list(self.start)}: must not be end")
-        return self
 
-
-class Shape(Record):
+class Shape(Straight):
     """A straight part of the hull for pictures alone: round, or a box of a horizontal axis. It has no loads.
 
     For hulls whose loads come from elsewhere, as a radiation database or a cylinder of the same drag.
     """
 
-    start: Vector3  # m, body axes
-    end: Vector3
     diameter: Positive | None = None  # m
     section: tuple[Positive, Positive] | None = None  # m, width and height of a box
 
     @model_validator(mode="after")
     def _one_section(self):
-        if math.dist(self.start, self.end) < 1e-6:
-            raise ValueError(f"start = {list(self.start)}: must not be end")
         if (self.diameter is None) == (self.section is None):
             raise ValueError("diameter: must be given where section is not, and only there")
         return self
@@ -195,15 +196,20 @@ class Tower(Record):
         return self
 
 
-class Line(Record):
-    """One mooring line. anchor in inertial, fairlead in body coordinates, m."""
+class LineProperties(Record):
+    """What a mooring line is made of."""
 
-    anchor: Vector3
-    fairlead: Vector3
     length: Positive  # unstretched, m
     wet_weight: Positive  # per length, N/m
     EA: Positive  # N
     seabed_friction: NonNegative = 0.0  # C_B
+
+
+class Line(LineProperties):
+    """One mooring line. anchor in inertial, fairlead in body coordinates, m."""
+
+    anchor: Vector3
+    fairlead: Vector3
 
 
 class Platform(Record):
@@ -227,7 +233,7 @@ class Platform(Record):
 
     @property
     def draft(self) -> float:
-        """Depth of the lowest part of the hull below still water, m; where no file says it, an estimate."""
+        """Return the depth of the lowest part of the hull, m; an estimate where no file says it."""
         if self.hull is not None:
             return -self.hull.z[0]
         if self.potential_flow is not None and self.potential_flow.draft is not None:
@@ -266,11 +272,11 @@ class Platform(Record):
 
 
 def _missing_half(name):
-    """Problem line for a hull without the coefficients of its strips, or the other way round."""
+    """Return the problem line for a hull without the coefficients of its strips, or the other way round."""
     return f"{name} is missing: must be a table; a platform has hull and hydro, or neither"
 
 
-class MooringSpread(Record):
+class MooringSpread(LineProperties):
     """Equal lines around the tower axis, as platform files may give them."""
 
     azimuth: tuple[Finite, ...]  # of the anchors, rad from +x towards +y
@@ -278,22 +284,15 @@ class MooringSpread(Record):
     anchor_z: Finite
     fairlead_radius: NonNegative
     fairlead_z: Finite
-    length: Positive
-    wet_weight: Positive
-    EA: Positive
-    seabed_friction: NonNegative = 0.0
 
     def lines(self):
-        """One Line per azimuth; directions are rounded to 14 decimals to keep symmetric spreads symmetric."""
+        """Return a Line per azimuth, its direction rounded so that symmetric spreads stay symmetric."""
         directions = [(round(math.cos(angle), 14), round(math.sin(angle), 14)) for angle in self.azimuth]
         return tuple(
             Line(
                 anchor=(self.anchor_radius * x, self.anchor_radius * y, self.anchor_z),
                 fairlead=(self.fairlead_radius * x, self.fairlead_radius * y, self.fairlead_z),
-                length=self.length,
-                wet_weight=self.wet_weight,
-                EA=self.EA,
-                seabed_friction=self.seabed_friction,
+                **{key: getattr(self, key) for key in LineProperties.model_fields},
             )
             for x, y in directions
         )
@@ -307,12 +306,12 @@ def _platform_file(name):
 
 
 def platform_names():
-    """Sorted names of the built-in platforms."""
+    """Return the sorted names of the built-in platforms."""
     return sorted(path.stem for path in (DATA / "platforms").glob("*.toml"))
 
 
 def read_platform(name_or_path: str | Path) -> Platform:
-    """Platform from a built-in name (platform_names()) or a user's TOML file.
+    """Return the Platform from a built-in name (platform_names()) or a user's TOML file.
 
     The turbine of the result is a built-in name or an absolute path; in the file it is relative to the file.
     """

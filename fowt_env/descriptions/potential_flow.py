@@ -12,7 +12,7 @@ import numpy as np
 
 from fowt_env.descriptions.array_files import read_arrays
 from fowt_env.descriptions.files import raise_problems
-from fowt_env.descriptions.records import Finite, Positive, Record, validate
+from fowt_env.descriptions.records import Finite, Positive, Record, checked_record
 from fowt_env.errors import InputError
 
 MAX_BYTES = 200_000_000  # of a file of coefficients: a full difference-frequency QTF has some 10 MB
@@ -64,22 +64,25 @@ class _PotentialFlowTable(Record):
     draft: Positive | None = None
 
 
-ARRAYS = (
-    "omega", "added_mass", "damping", "added_mass_infinite", "excitation_omega", "heading", "excitation",
-    "stiffness", "added_mass_zero",
-)  # fmt: skip
-QTF_ARRAYS = ("qtf_omega", "qtf_heading", "qtf_value")
+ARRAYS = {  # of a file: name -> shape, a letter for the size of the arrays that it names in SIZES
+    "omega": "n", "added_mass": "n66", "damping": "n66", "added_mass_infinite": "66", "excitation_omega": "k",
+    "heading": "m", "excitation": "km6", "stiffness": "66", "added_mass_zero": "66", "qtf_omega": "q",
+    "qtf_heading": "p2", "qtf_value": "pqq6",
+}  # fmt: skip
+SIZES = {"n": "omega", "k": "excitation_omega", "m": "heading", "q": "qtf_omega", "p": "qtf_heading"}
+LOWEST = {"omega": 0.0, "excitation_omega": 0.0, "heading": -math.inf, "qtf_omega": 0.0}  # of what increases
+COMPLEX = ("excitation", "qtf_value")
+QTF_ARRAYS = tuple(name for name in ARRAYS if name.startswith("qtf_"))
 OPTIONAL = ("added_mass_zero", *QTF_ARRAYS)
 
 
 def read_potential_flow(table, folder, gravity, density):
-    """PotentialFlow of the table [potential_flow] of a platform file in this folder.
+    """Return the PotentialFlow of the table [potential_flow] of a platform file in this folder.
 
     gravity, density  of the water, which WAMIT's dimensionless figures need
     Raises: InputError naming the file, the key or the array and what is allowed.
     """
-    record, problems = validate(_PotentialFlowTable, table)
-    raise_problems("[potential_flow]", problems)
+    record = checked_record(_PotentialFlowTable, table, "[potential_flow]")
     path = folder / Path(record.coefficients).expanduser()
     if path.suffix == ".npz":
         found = read_coefficients(path)
@@ -96,7 +99,7 @@ def read_potential_flow(table, folder, gravity, density):
 
 
 def read_coefficients(path):
-    """PotentialFlow of a .npz file as coefficient_arrays makes it, without volume, place and draft.
+    """Return the PotentialFlow of a .npz file of coefficient_arrays, without volume, place and draft.
 
     Nothing in the file is executed: arrays of numbers alone are read.
     """
@@ -111,23 +114,20 @@ def read_coefficients(path):
         raise
     except Exception as error:  # whatever a broken file makes zipfile, zlib and numpy raise
         raise InputError(f"{where} cannot be read: {error!s:.300}") from None
-    arrays = {name: value for name, value in arrays.items() if name in (*ARRAYS, *QTF_ARRAYS, "source")}
+    used = [name for name in ARRAYS if name not in QTF_ARRAYS or arrays.keys() >= set(QTF_ARRAYS)]
+    arrays = {name: value for name, value in arrays.items() if name in (*used, "source")}
     missing = [name for name in ARRAYS if name not in arrays and name not in OPTIONAL]
     if missing:
         raise InputError(f"{where}: arrays {', '.join(missing)} are missing")
     problems = _array_problems(arrays)
     raise_problems(where, problems)
-    qtf = None
-    if all(name in arrays for name in QTF_ARRAYS):
-        qtf = DifferenceQtf(
-            *(np.ascontiguousarray(arrays[name], dtype=kind) for name, kind in
-              zip(QTF_ARRAYS, (float, float, complex), strict=True))
-        )  # fmt: skip
     values = {
-        name: np.ascontiguousarray(arrays[name], dtype=complex if name == "excitation" else float)
-        for name in ARRAYS
-        if name in arrays
+        name: np.ascontiguousarray(value, dtype=complex if name in COMPLEX else float)
+        for name, value in arrays.items()
+        if name != "source"
     }
+    parts = [values.pop(name, None) for name in QTF_ARRAYS]
+    qtf = None if parts[0] is None else DifferenceQtf(*parts)
     source = str(arrays["source"]) if "source" in arrays else ""
     return PotentialFlow(
         **values, volume=math.nan, centre_of_buoyancy=(0.0, 0.0), difference_qtf=qtf, source=source[:2000]
@@ -135,52 +135,35 @@ def read_coefficients(path):
 
 
 def coefficient_arrays(body):
-    """{name: array} of a PotentialFlow for numpy.savez_compressed, single precision but for frequencies."""
-    arrays = {}
-    for name in ARRAYS:
-        value = getattr(body, name)
-        if value is not None:
-            small = np.complex64 if name == "excitation" else np.float32
-            arrays[name] = np.asarray(value) if name in ("omega", "excitation_omega", "heading") else (
-                np.asarray(value).astype(small)
-            )  # fmt: skip
-    if body.difference_qtf is not None:
-        qtf = body.difference_qtf
-        arrays |= {
-            "qtf_omega": qtf.omega,
-            "qtf_heading": qtf.heading,
-            "qtf_value": qtf.value.astype(np.complex64),
-        }
+    """Return {name: array} of a PotentialFlow for savez_compressed, single precision but for frequencies."""
+    values = {name: getattr(body, name, None) for name in ARRAYS}
+    if (qtf := body.difference_qtf) is not None:
+        values |= dict(zip(QTF_ARRAYS, (qtf.omega, qtf.heading, qtf.value), strict=True))
+    kinds = dict.fromkeys(ARRAYS, np.float32) | dict.fromkeys(COMPLEX, np.complex64)
+    kinds |= dict.fromkeys((*LOWEST, "qtf_heading"))  # as they are
+    arrays = {name: np.asarray(value, kinds[name]) for name, value in values.items() if value is not None}
     return arrays | {"source": np.array(body.source)}
 
 
 def _array_problems(arrays):
-    """What is wrong with the arrays of a file, one line each."""
+    """Return what is wrong with the arrays of a file, one line each."""
     problems = []
     for name, value in arrays.items():
         if name == "source":
             continue
-        if value.dtype.kind not in ("fiuc" if name in ("excitation", "qtf_value") else "fiu"):
+        if value.dtype.kind not in ("fiuc" if name in COMPLEX else "fiu"):
             problems.append(f"{name}: must be numbers, is {value.dtype}")
         elif name != "qtf_value" and not np.isfinite(value).all():
             problems.append(f"{name}: must be finite numbers")
     if problems:
         return problems
-    n, k, m = (arrays[name].size for name in ("omega", "excitation_omega", "heading"))
-    shapes = {
-        "omega": (n,), "added_mass": (n, 6, 6), "damping": (n, 6, 6), "added_mass_infinite": (6, 6),
-        "excitation_omega": (k,), "heading": (m,), "excitation": (k, m, 6), "stiffness": (6, 6),
-        "added_mass_zero": (6, 6),
-    }  # fmt: skip
-    if all(name in arrays for name in QTF_ARRAYS):
-        q, p = arrays["qtf_omega"].size, arrays["qtf_heading"].shape[0] if arrays["qtf_heading"].ndim else 0
-        shapes |= {"qtf_omega": (q,), "qtf_heading": (p, 2), "qtf_value": (p, q, q, 6)}
-    for name, shape in shapes.items():
-        if name in arrays and arrays[name].shape != shape:
+    sizes = {letter: len(np.atleast_1d(arrays[name])) for letter, name in SIZES.items() if name in arrays}
+    for name in (name for name in ARRAYS if name in arrays):
+        shape = tuple(sizes[axis] if axis in sizes else int(axis) for axis in ARRAYS[name])
+        if arrays[name].shape != shape:
             problems.append(f"{name}: has the shape {arrays[name].shape}; must be {shape}")
-    for name in ("omega", "excitation_omega", "heading", "qtf_omega"):
+    for name, low in LOWEST.items():
         if name in arrays and not problems:
-            low = -math.inf if name == "heading" else 0.0
             if not (arrays[name].size > 0 and arrays[name][0] > low and (np.diff(arrays[name]) > 0).all()):
                 problems.append(f"{name}: must increase{'' if name == 'heading' else ' and be > 0'}")
     return problems

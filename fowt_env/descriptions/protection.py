@@ -30,7 +30,7 @@ class TripLimit(Record):
 
 
 def _none(value):
-    """None for false, which is how a file says that there is no such trip."""
+    """Return None for false, which is how a file says that there is no such trip."""
     return None if value is False else value
 
 

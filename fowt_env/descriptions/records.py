@@ -3,7 +3,6 @@
 A problem is one line of text: key, value and allowed range. Keys are dotted paths as they stand in the file.
 """
 
-import difflib
 import math
 import types
 import typing
@@ -13,8 +12,22 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-from fowt_env.descriptions.checks import interval, is_number, plain_number, short
+from fowt_env.descriptions.checks import (
+    check_array,
+    check_choice,
+    check_flag,
+    check_in_range,
+    check_path,
+    check_samples,
+    check_whole_number,
+    interval,
+    is_number,
+    plain_number,
+    short,
+)
+from fowt_env.descriptions.files import raise_problems
 from fowt_env.descriptions.units import FILE_UNITS
+from fowt_env.errors import did_you_mean
 
 # Keys that had another name: the old one -> the one of now.
 RENAMED = {"designed_on": "nominal_plant"}
@@ -28,7 +41,7 @@ def bounded(**limits):
 
 
 def _float_array(value):
-    """A (n,) float64 copy of a list or array of finite numbers."""
+    """Return a (n,) float64 copy of a list or array of finite numbers."""
     try:
         array = np.array(value)
     except (ValueError, TypeError):  # a ragged list, or no list at all
@@ -39,12 +52,51 @@ def _float_array(value):
 
 
 def _number_or_array(value):
-    """A float, or a (n,) float64 copy of a list or array of finite numbers."""
+    """Return a float, or a (n,) float64 copy of a list or array of finite numbers."""
     if is_number(value):
         return float(value)
     return _float_array(value)
 
 
+KEY = "\0"  # where a message of a check has the key
+
+
+class Allowed(typing.NamedTuple):
+    """What a checked field may be, in words."""
+
+    text: str
+
+
+def checked(check, allowed, *arguments):
+    """Return the annotated type of what check(key, value, *arguments), a function of checks.py, returns."""
+    return Annotated[
+        typing.Any, BeforeValidator(lambda value: check(KEY, value, *arguments)), Allowed(allowed)
+    ]
+
+
+def in_range(low, high, unit=""):
+    """Return the annotated type of a number within [low, high]."""
+    return checked(check_in_range, f"a number in [{low:g}, {high:g}] {unit}".rstrip(), low, high, unit)
+
+
+def one_of(choices):
+    """Return the annotated type of one of a few names or numbers; letters of either case."""
+    return checked(check_choice, f"one of {', '.join(map(str, choices))}", choices)
+
+
+def samples(low, high, unit):
+    """Return the annotated type of a (n,) float64 array of at least one number within [low, high]."""
+    return checked(check_samples, f"a list of numbers in [{low:g}, {high:g}] {unit}", low, high, unit)
+
+
+def array(axes):
+    """Return the annotated type of an array of finite numbers with this many axes."""
+    return checked(check_array, f"an array of numbers with {axes} axes", axes)
+
+
+Flag = checked(check_flag, "True or False")
+Seed = checked(check_whole_number, "a whole number >= 0", 0)
+FilePath = checked(check_path, "a path")
 Positive = bounded(gt=0)
 NonNegative = bounded(ge=0)
 Finite = bounded()
@@ -64,7 +116,7 @@ class Record(BaseModel):
 
 
 def to_si(data, problems, path=()):
-    """(data in SI units, {path in SI names: (path in the file, value in the file)}) of nested TOML data.
+    """Return (data in SI units, {path in SI names: (path in the file, value there)}) of nested TOML data.
 
     Only the keys of FILE_UNITS are converted; what is no number is left for the validation to reject.
     """
@@ -97,7 +149,7 @@ def _scaled(value, factor):
 
 
 def validate(model, data, origin=None):
-    """(record, []) of a pydantic model, or (None, problems) with one line per wrong value."""
+    """Return (record, []) of a pydantic model, or (None, problems) with one line per wrong value."""
     try:
         return model.model_validate(data), []
     except ValidationError as error:
@@ -107,8 +159,15 @@ def validate(model, data, origin=None):
         return None, problems
 
 
+def checked_record(model, data, where):
+    """Return the record of a pydantic model. Raises: InputError that names `where` and every wrong value."""
+    record, problems = validate(model, data)
+    raise_problems(where, problems)
+    return record
+
+
 def _problem(model, item, origin):
-    """Lines of text for one entry of pydantic's ValidationError.errors()."""
+    """Return the lines of text for one entry of pydantic's ValidationError.errors()."""
     loc = tuple(part for part in item["loc"] if part != "[key]")
     shown, value = loc, item["input"]
     for length in range(len(loc), 0, -1):
@@ -126,29 +185,27 @@ def _problem(model, item, origin):
     if kind == "extra_forbidden":
         return [unknown_key(key, shown[-1], _fields_at(model, loc[:-1]))]
     if kind == "value_error":
+        if KEY in (text := str(item["ctx"]["error"])):
+            return [text.replace(KEY, key)]
         prefix = f"{key}: " if key else ""
         return [prefix + line for line in str(item["ctx"]["error"]).splitlines()]
     close = ""
     if isinstance(value, str) and kind == "literal_error":
         options = [option.strip("'") for option in allowed(model, loc).removeprefix("one of ").split(", ")]
-        nearest = difflib.get_close_matches(value, options, n=1)
-        close = f" Did you mean {nearest[0]!r}?" if nearest else ""
+        close = did_you_mean(value, options)
     return [f"{key} = {short(value)}: must be {allowed(model, loc)}.{close}".rstrip(".")]
 
 
 def unknown_key(key, name, known):
-    """Problem line for a key that is not known, with the nearest known one, or what it is called now."""
+    """Return the problem line for an unknown key, with the nearest known one, or its name of now."""
     if name in RENAMED:
         elsewhere = "" if RENAMED[name] in known else f", which is no key here. Allowed: {', '.join(known)}"
         return f"{key}: is called {RENAMED[name]} now{elsewhere}"
-    lowered = {option.lower(): option for option in known}
-    nearest = difflib.get_close_matches(str(name).lower(), lowered, n=1)
-    hint = f" Did you mean {lowered[nearest[0]]!r}?" if nearest else ""
-    return f"{key}: unknown key.{hint} Allowed: {', '.join(known)}"
+    return f"{key}: unknown key.{did_you_mean(name, known)} Allowed: {', '.join(known)}"
 
 
 def _fields_at(model, loc):
-    """Names of the keys allowed in the table at loc, those in a unit of files included."""
+    """Return the names of the keys allowed in the table at loc, those in a unit of files included."""
     here, _ = _type_at(model, loc)
     if not (isinstance(here, type) and issubclass(here, BaseModel)):
         return []
@@ -158,7 +215,7 @@ def _fields_at(model, loc):
 
 
 def _unwrapped(kind, metadata):
-    """(type, constraints) without Annotated and Optional."""
+    """Return (type, constraints) without Annotated and Optional."""
     while True:
         origin = typing.get_origin(kind)
         if origin is typing.Annotated:
@@ -172,7 +229,7 @@ def _unwrapped(kind, metadata):
 
 
 def _type_at(model, loc):
-    """(type, constraints) of the field at loc; (None, []) where the model has no such field."""
+    """Return (type, constraints) of the field at loc; (None, []) where the model has no such field."""
     kind, metadata = model, []
     for part in loc:
         if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -196,8 +253,11 @@ def _type_at(model, loc):
 
 
 def allowed(model, loc):
-    """What the field at loc of a pydantic model may be, in words: "a number > 0", "a table" ..."""
+    """Return what the field at loc of a pydantic model may be, in words: "a number > 0", "a table" ..."""
     kind, metadata = _type_at(model, loc)
+    for entry in metadata:
+        if isinstance(entry, Allowed):
+            return entry.text
     if kind in (float, int):
         low, high, low_open, high_open = -math.inf, math.inf, True, True
         for entry in metadata:
@@ -230,7 +290,7 @@ def allowed(model, loc):
 
 
 def dotted(path):
-    """A key as it would be written in the file; positions in lists count from 1."""
+    """Return a key as it would be written in the file; positions in lists count from 1."""
     return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in path)
 
 

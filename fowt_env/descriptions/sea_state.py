@@ -17,6 +17,7 @@ from fowt_env.descriptions.records import (
     NumberOrArray,
     Record,
     bounded,
+    checked_record,
     unknown_key,
     validate,
 )
@@ -75,7 +76,7 @@ class SeaState(Record):
 
     @property
     def height(self) -> float:
-        """Wave height, m: H or Hs, of components the largest that they can add up to; 0: still water."""
+        """Return the wave height, m: H or Hs, of components the largest possible sum; 0: still water."""
         if self.kind == "components":
             return 2.0 * float(np.sum(self.amplitude))
         return (self.H if self.kind == "regular" else self.Hs) or 0.0
@@ -83,7 +84,7 @@ class SeaState(Record):
     @model_validator(mode="before")
     @classmethod
     def _kind_keys(cls, data):
-        """Checks the keys against the kind and fills what the kind defines by rule."""
+        """Check the keys against the kind and fill what the kind defines by rule."""
         if not isinstance(data, dict) or str(data.get("kind")) not in SEA_KEYS:
             return data
         kind = data["kind"]
@@ -158,12 +159,12 @@ class JointTable(Record):
 
 
 def _usable(*values):
-    """Whether all values are numbers >= 0, so that a rule can be applied before they are validated."""
+    """Return whether all values are numbers >= 0, so that a rule can be applied before they are validated."""
     return all(is_number(value) and value >= 0 for value in values)
 
 
 def iec_gamma(Hs, Tp):
-    """JONSWAP peak enhancement gamma (-) of a sea state (Hs m, Tp s) by the rule of IEC 61400-3.
+    """Return the JONSWAP peak enhancement gamma (-) of a sea state (Hs m, Tp s) by the rule of IEC 61400-3.
 
     With r = Tp/sqrt(Hs): 5 up to r = 3.6, exp(5.75 - 1.15 r) to r = 5, 1 above; 1 for Hs = 0.
     """
@@ -176,7 +177,7 @@ def iec_gamma(Hs, Tp):
 
 
 def fully_developed_period(Hs):
-    """Peak period (s) of the one-parameter Pierson-Moskowitz sea with this Hs (m); 1 s without waves.
+    """Return the peak period (s) of the one-parameter Pierson-Moskowitz sea of an Hs (m); 1 s without waves.
 
     S = alpha g^2 omega^-5 exp(-1.25 (omega_p/omega)^4), alpha = 0.0081: Hs = 4 sqrt(alpha/5) g/omega_p^2.
     """
@@ -187,7 +188,7 @@ def fully_developed_period(Hs):
 
 @cached(1)
 def _sea_data():
-    """({name: SeaState}, {name: JointTable}) of the built-in file; every table row is a named state too."""
+    """Return ({name: SeaState}, {name: JointTable}) of the built-in file; a table's rows are states too."""
     path = DATA / "sea_states.toml"
     data = read_toml(path, "sea state")
     states, tables, problems = {}, {}, []
@@ -217,27 +218,25 @@ def _joint_state(table, wind, Hs, Tp, name):
 
 
 def sea_states():
-    """{name: SeaState} of all built-in sea states, rows of the joint tables included."""
+    """Return {name: SeaState} of all built-in sea states, rows of the joint tables included."""
     return dict(_sea_data()[0])
 
 
 def joint_tables():
-    """{name: JointTable} of the built-in tables of sea state against wind speed."""
+    """Return {name: JointTable} of the built-in tables of sea state against wind speed."""
     return dict(_sea_data()[1])
 
 
 def read_sea_state(name_or_path):
-    """SeaState from a built-in name (sea_states()) or a user's TOML file with its keys at the top level."""
+    """Return the SeaState of a built-in name (sea_states()) or a TOML file with its keys at the top level."""
     if isinstance(name_or_path, str) and name_or_path in _sea_data()[0]:
         return _sea_data()[0][name_or_path]
     path = locate("sea_state", name_or_path, _sea_data()[0], listed=LISTED, also=SEA_FORMS)
-    state, problems = validate(SeaState, read_toml(path, "sea state"))
-    raise_problems(f"sea state file {str(path)!r}", problems)
-    return state
+    return checked_record(SeaState, read_toml(path, "sea state"), f"sea state file {str(path)!r}")
 
 
 def sea_of(spec):
-    """The sea that a text stands for, as None or a mapping; names, paths and anything else as they are.
+    """Return the sea that a text stands for, as None or a mapping; names, paths and all else as they are.
 
     "jonswap:4:9" (Hs, Tp and, if given, gamma); "regular:3:5" (H, T); "pierson_moskowitz:4" (Hs and, if
     given, Tp); JSON of a mapping; "none" and "still".
@@ -262,16 +261,14 @@ def sea_of(spec):
 
 
 def sea_state_of(spec):
-    """SeaState from None (still water), a name, a path, a text (sea_of), a mapping or a SeaState."""
+    """Return the SeaState of None (still water), a name, path, text (sea_of), mapping or SeaState."""
     spec = sea_of(spec)
     if spec is None:
         return SeaState(kind="still")
     if isinstance(spec, SeaState):
         return spec
     if isinstance(spec, Mapping):
-        state, problems = validate(SeaState, dict(spec))
-        raise_problems("sea state", problems)
-        return state
+        return checked_record(SeaState, dict(spec), "sea state")
     if isinstance(spec, (str, Path)):
         return read_sea_state(spec)
     raise InputError(
@@ -280,7 +277,7 @@ def sea_state_of(spec):
 
 
 def joint_sea_state(table, wind_speed):
-    """JONSWAP SeaState of a joint table at a wind speed (m/s at hub height), linear between its rows.
+    """Return the JONSWAP SeaState of a joint table at a hub wind speed (m/s), linear between its rows.
 
     table: a built-in name (names("joint_tables")), a user's TOML file with wind, Hs, Tp, or a JointTable.
     """
@@ -288,8 +285,7 @@ def joint_sea_state(table, wind_speed):
         table = _sea_data()[1][table]
     elif not isinstance(table, JointTable):
         path = locate("joint_table", table, _sea_data()[1])
-        table, problems = validate(JointTable, read_toml(path, "joint table"))
-        raise_problems(f"joint table file {str(path)!r}", problems)
+        table = checked_record(JointTable, read_toml(path, "joint table"), f"joint table file {str(path)!r}")
     low, high = table.wind[0], table.wind[-1]
     allowed = f">= {low:g} and <= {high:g} m/s (table {table.name!r})"
     speed = check_number("wind_speed", wind_speed, low, high, allowed=allowed)

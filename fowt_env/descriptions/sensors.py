@@ -83,18 +83,18 @@ class SensorChain:
 
     @property
     def available(self) -> tuple[str, ...]:
-        """Fields of Measurement that the chain shows, in its order."""
+        """Return the fields of Measurement that the chain shows, in its order."""
         return tuple(name for name in Measurement._fields if name in self.sensors)
 
     @property
     def available_of_blades(self) -> tuple[str, ...]:
-        """Fields of BladeMeasurement that the chain shows, in its order."""
+        """Return the fields of BladeMeasurement that the chain shows, in its order."""
         return tuple(name for name in BladeMeasurement._fields if name in self.sensors)
 
 
 @cached(1)
 def built_in_chains() -> dict[str, SensorChain]:
-    """{name: SensorChain} of fowt_env/data/sensors.toml."""
+    """Return {name: SensorChain} of fowt_env/data/sensors.toml."""
     table = read_toml(DATA / "sensors.toml", "sensors")["chain"]
     return {name: _chain(name, entries) for name, entries in table.items()}
 
@@ -113,7 +113,7 @@ def _chain(name: str, entries: dict[str, Any]) -> SensorChain:
 
 
 def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | None:
-    """The SensorChain of what a run is given as sensors, for a turbine (its description); None for none.
+    """Return the SensorChain of the sensors of a run, for a turbine (its description); None for none.
 
     Noise and quantisation of speeds and torque on the shafts are fractions of the rated ones in a built-in
     chain, which is given by name, and those of bending moments of the rated torque on the rotor's shaft; a
@@ -140,7 +140,7 @@ def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | N
 
 
 def sensor_chain(given: str | SensorChain | None) -> SensorChain | None:
-    """The SensorChain of what a run is given as sensors; None, as for "exact", where readings are exact.
+    """Return the SensorChain of the sensors of a run; None, as for "exact", where readings are exact.
 
     Raises: InputError for an unknown name and for anything that is no chain.
     """

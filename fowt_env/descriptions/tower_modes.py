@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fowt_env.descriptions.files import DATA, column, raise_problems, read_table
-from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, bounded, validate
+from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, bounded, checked_record
 
 COLUMNS = ("height_fraction", "mass_density", "fore_aft_stiffness", "side_side_stiffness")
 POWERS = np.arange(2, 7)  # of the height fraction, in a shape
@@ -68,17 +68,17 @@ class TowerBending(ModeShapes):
     side_side_stiffness: tuple[Positive, ...]
 
     def mass(self, height):
-        """Mass (kg) of a tower of this height (m), summed over the elements."""
+        """Return the mass (kg) of a tower of this height (m), summed over the elements."""
         line = np.interp(self.middles(), self.height_fraction, self.mass_density)
         return float(line.mean()) * height + self.top_mass
 
     def middles(self):
-        """(elements,) height fractions of the middles of the elements."""
+        """Return (elements,) height fractions of the middles of the elements."""
         return (np.arange(self.elements) + 0.5) / self.elements
 
 
 def mass_problem(modes, mass, height):
-    """What is wrong between a TowerBending and its tower's mass (kg) and height (m); None if nothing is."""
+    """Return what is wrong between a TowerBending and its tower's mass (kg) and height (m), or None."""
     found = modes.mass(height)
     if abs(found - mass) <= MASS * mass:
         return None
@@ -95,12 +95,11 @@ class _ModesTable(ModeShapes):
 
 
 def read_tower_modes(table, folder):
-    """TowerBending of the table [tower.modes] of a platform file in this folder.
+    """Return the TowerBending of the table [tower.modes] of a platform file in this folder.
 
     Raises: InputError naming the file, the key and what is allowed.
     """
-    record, problems = validate(_ModesTable, table)
-    raise_problems("tower.modes", problems)
+    record = checked_record(_ModesTable, table, "tower.modes")
     path = folder / Path(record.distribution).expanduser()
     if not path.exists() and (builtin := DATA / "platforms" / record.distribution).is_file():
         path = builtin
@@ -109,17 +108,14 @@ def read_tower_modes(table, folder):
 
 
 def _read_distribution(path):
-    """{column: tuple of numbers} of a distribution file."""
+    """Return {column: tuple of numbers} of a distribution file."""
     rows = read_table(path, "tower", COLUMNS)
     problems = []
-    values = {"height_fraction": column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False)}
+    place = column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False, increasing=True)
+    values = {"height_fraction": place}
     values |= {
         name: column(rows, name, problems, 0.0, largest, open_ends=True) for name, largest in LARGEST.items()
     }
-    place = values["height_fraction"]
-    for (number, row), before, here in zip(rows[1:], place[:-1], place[1:], strict=True):
-        if here <= before:
-            problems.append(f"line {number}: height_fraction = {row['height_fraction']}: must increase")
     if not problems and (place[0] != 0.0 or place[-1] != 1.0):
         problems.append(f"height_fraction: goes from {place[0]:g} to {place[-1]:g}; must go from 0 to 1")
     raise_problems(f"tower file {str(path)!r}", problems)

@@ -114,7 +114,7 @@ class SecondOrderDrive(Record):
     friction: NonNegative = 0.0  # rad, distance from the command at which a blade at rest begins to move
 
 
-class PitchDrive(Record):
+class PitchDrive(SecondOrderDrive):
     """Blade-pitch drive: first order with time_constant, second with natural_frequency and damping.
 
     time_constant 0: the command is followed at once. second_order is another drive of the same turbine, used
@@ -125,11 +125,8 @@ class PitchDrive(Record):
     rate_limit: Positive  # rad/s
     minimum: Finite  # rad
     maximum: Finite  # rad
-    natural_frequency: bounded(gt=0, le=100) | None = None  # and so on, as in SecondOrderDrive
+    natural_frequency: bounded(gt=0, le=100) | None = None
     damping: bounded(gt=0, le=5) | None = None
-    acceleration_limit: Positive | None = None
-    deadband: NonNegative = 0.0
-    friction: NonNegative = 0.0
     second_order: SecondOrderDrive | None = None
 
     @model_validator(mode="after")
@@ -161,20 +158,20 @@ class PitchDrive(Record):
 
     @property
     def lag(self):
-        """Time constant of the first-order lag that trails a slow command by as much, s."""
+        """Return the time constant of the first-order lag that trails a slow command by as much, s."""
         if self.natural_frequency is None:
             return self.time_constant
         return 2.0 * self.damping / self.natural_frequency
 
     def slowed(self, factor):
-        """A copy with that many times the lag."""
+        """Return a copy with that many times the lag."""
         if self.natural_frequency is None:
             return self.model_copy(update={"time_constant": factor * self.time_constant})
         return self.model_copy(update={"natural_frequency": self.natural_frequency / factor})
 
 
 def with_second_order_drive(turbine):
-    """The turbine with the drive of its [pitch_drive.second_order]; itself where its drive is of that order.
+    """Return the turbine with the drive of its [pitch_drive.second_order]; itself where it has one.
 
     Raises: InputError where its file has none.
     """
@@ -237,7 +234,7 @@ BELOW_MEETING = 0.999  # of the speed at which region 2 reaches rated torque, wh
 
 
 def with_torque_defaults(data):
-    """The entries of a turbine (SI) with those of torque_law that follow from others.
+    """Return the entries of a turbine (SI) with those of torque_law that follow from others.
 
     rated_torque and rated_power follow from each other by rated_speed, and this from the rotor's and the
     gearbox; cut_in_speed and region2_start_speed from minimum_speed. Region 3 starts at 99 % of rated speed,
@@ -334,7 +331,7 @@ class Blade(Record):
 
 
 def _polar_problem(polar):
-    """What is wrong with a (m, 4) polar in rad, in words; None if nothing is."""
+    """Return what is wrong with a (m, 4) polar in rad, in words; None if nothing is."""
     if polar.ndim != 2 or polar.shape[0] < 2 or polar.shape[1] != 4 or not np.isfinite(polar).all():
         return f"shape {polar.shape}: must be finite numbers, (m >= 2, 4)"
     degrees = np.degrees(polar[:, 0])
@@ -398,17 +395,17 @@ class Turbine(Record):
 
 
 def turbine_file(name):
-    """Path of the file of a built-in turbine."""
+    """Return the path of the file of a built-in turbine."""
     return DATA / "turbines" / name / "turbine.toml"
 
 
 def turbine_names():
-    """Sorted names of the built-in turbines."""
+    """Return the sorted names of the built-in turbines."""
     return sorted(path.parent.name for path in (DATA / "turbines").glob("*/turbine.toml"))
 
 
 def read_turbine(name_or_path: str | Path) -> Turbine:
-    """Turbine from a built-in name (turbine_names()) or a user's TOML file.
+    """Return the Turbine from a built-in name (turbine_names()) or a user's TOML file.
 
     blade.stations and blade.polars are paths relative to the file or, if not there, to the folder of the
     built-in turbines ("nrel5mw/blade.csv", "nrel5mw/polars"); so is discon.
@@ -444,7 +441,7 @@ class _BladeFile(Record):
 
 
 def _beside(folder, text):
-    """Path relative to folder or else to the built-in turbines; the first if neither exists."""
+    """Return the path relative to folder or else to the built-in turbines; the first if neither exists."""
     try:
         mine = folder / Path(text).expanduser()
         builtin = DATA / "turbines" / text
@@ -454,7 +451,7 @@ def _beside(folder, text):
 
 
 def _discon(text, folder):
-    """Path of the DISCON.IN that a turbine file names. Raises: InputError where there is none."""
+    """Return the path of the DISCON.IN that a turbine file names. Raises: InputError where there is none."""
     path = _beside(folder, text)
     if not path.is_file():
         raise InputError(f"discon = {text[:60]!r}: must be a file, relative to the turbine file's folder")
@@ -462,18 +459,15 @@ def _discon(text, folder):
 
 
 def _read_blade(table, folder):
-    """Blade from the station file and polar folder that a turbine file names."""
+    """Return the Blade from the station file and polar folder that a turbine file names."""
     path = _beside(folder, table.stations)
     rows = read_table(
         path, "blade", ("radius_m", "chord_m", "twist_deg", "airfoil"), optional=("prebend_m", "sweep_m")
     )
     problems = []
-    radius = column(rows, "radius_m", problems, 0.0)
+    radius = column(rows, "radius_m", problems, 0.0, increasing=True)
     chord = column(rows, "chord_m", problems, 0.0)
     twist = np.deg2rad(column(rows, "twist_deg", problems, -180.0, 180.0, open_ends=False))
-    for (number, row), before, here in zip(rows[1:], radius[:-1], radius[1:], strict=True):
-        if here <= before:
-            problems.append(f"line {number}: radius_m = {row['radius_m']}: must increase from row to row")
     if len(rows) < 2:
         problems.append("has 1 row; allowed: at least 2")
     polar_folder = _beside(folder, table.polars)
@@ -500,7 +494,7 @@ def _read_blade(table, folder):
 
 
 def _read_polar(path):
-    """(m, 4) array alpha (rad), cl, cd, cm of a polar file."""
+    """Return the (m, 4) array alpha (rad), cl, cd, cm of a polar file."""
     rows = read_table(path, "polar", ("alpha_deg", "cl", "cd", "cm"))
     problems = []
     alpha = column(rows, "alpha_deg", problems, -180.0, 180.0, open_ends=False)

@@ -10,211 +10,143 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydantic import create_model
 
-from fowt_env.descriptions.checks import check_number, check_whole_number, parse_number, refusal, short
+from fowt_env.descriptions.checks import check_in_range, parse_number, short
 from fowt_env.descriptions.files import json_text
 from fowt_env.descriptions.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
+from fowt_env.descriptions.records import (
+    FilePath,
+    Flag,
+    Record,
+    Seed,
+    array,
+    in_range,
+    one_of,
+    samples,
+    validate,
+)
 from fowt_env.descriptions.wind_files import TABLES, UNIFORM, read_uniform_wind, read_wind_table
 from fowt_env.errors import InputError, unknown
 
-
-class Required:
-    """Mark of a key that has no default."""
-
-
-class Number(NamedTuple):
-    """A finite number within [low, high]."""
-
-    low: float
-    high: float
-    unit: str
-    default: Any = Required
-
-    def read(self, where, value):
-        allowed = f"in [{self.low:g}, {self.high:g}] {self.unit}".rstrip()
-        return check_number(where, as_float(where, value), self.low, self.high, allowed=allowed)
-
-
-class Choice(NamedTuple):
-    """One of a few names or numbers; letters of either case."""
-
-    allowed: tuple
-    default: Any = Required
-
-    def read(self, where, value):
-        wanted = value.upper() if isinstance(value, str) else value
-        for choice in self.allowed:
-            same = choice.upper() if isinstance(choice, str) else choice
-            if type(wanted) is not bool and wanted == same:
-                return choice
-        if isinstance(value, str):
-            raise unknown(where, value, self.allowed)
-        raise refusal(where, value, f"one of {', '.join(map(str, self.allowed))}")
-
-
-class Flag(NamedTuple):
-    """True or False."""
-
-    default: Any = Required
-
-    def read(self, where, value):
-        if not isinstance(value, (bool, np.bool_)):
-            raise refusal(where, value, "True or False")
-        return bool(value)
-
-
-class Samples(NamedTuple):
-    """A non-empty one-dimensional array of finite numbers within [low, high]."""
-
-    low: float
-    high: float
-    unit: str
-    default: Any = Required
-
-    def read(self, where, value):
-        try:
-            array = np.array(value, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise refusal(where, value, "a list of numbers") from None
-        if array.ndim != 1 or array.size == 0:
-            raise InputError(
-                f"{where} has shape {array.shape}: must be a list of at least one number, shape (n,)"
-            )
-        wrong = np.flatnonzero(~((array >= self.low) & (array <= self.high)))
-        if wrong.size:
-            raise InputError(
-                f"{where}[{wrong[0]}] = {array[wrong[0]]}: must be in "
-                f"[{self.low:g}, {self.high:g}] {self.unit}"
-            )
-        return array
-
-
-class Array(NamedTuple):
-    """A non-empty array of finite numbers with a given number of axes."""
-
-    axes: int
-    default: object = None
-
-    def read(self, where, value):
-        try:
-            array = np.asarray(value, dtype=np.float32 if self.axes > 1 else np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"{where}: must be an array of numbers with {self.axes} axes") from None
-        if array.ndim != self.axes or array.size == 0 or not np.isfinite(array).all():
-            raise InputError(f"{where} has shape {array.shape}: must be finite numbers with {self.axes} axes")
-        return array
-
-
-class Text(NamedTuple):
-    """A path."""
-
-    default: object = None
-
-    def read(self, where, value):
-        if not isinstance(value, str | Path):
-            raise InputError(f"{where} = {value!r}: must be a path")
-        return Path(value).expanduser()
-
-
-class Seed(NamedTuple):
-    """A non-negative whole number."""
-
-    default: Any = Required
-
-    def read(self, where, value):
-        return check_whole_number(where, value, 0)
-
-
-def as_float(where, value):
-    """float(value) of a real number; text and booleans are refused."""
-    if isinstance(value, (bool, np.bool_, str, bytes)):
-        raise refusal(where, value, "a number")
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise refusal(where, value, "a number") from None
-
-
 SPEED_LIMIT = 100.0  # m/s; above every extreme of the standard (70 m/s)
-SPEED = Number(0.0, SPEED_LIMIT, "m/s")
+SPEEDS = (0.0, SPEED_LIMIT, "m/s")
 # the mean of turbulence and gusts divides frequencies and angles, so it cannot be zero
-MOVING = Number(1.0, SPEED_LIMIT, "m/s")
-DIRECTION = Number(-180.0, 180.0, "deg", 0.0)  # towards which the wind blows, from +x towards +y
-TURBINE_CLASS = Choice(tuple(REFERENCE_SPEED), "I")
-TURBULENCE_CLASS = Choice(tuple(TURBULENCE_INTENSITY), "B")
-# of the normal turbulence model: the standard's representative value, or one drawn from its distribution
-NTM_SIGMA = Choice(("90%", "drawn"), "90%")
-START = Number(0.0, 1e6, "s", 60.0)
-SIGN = Choice((1, -1), 1)
-COMPONENT = Samples(-SPEED_LIMIT, SPEED_LIMIT, "m/s", None)
+MOVING_SPEEDS = (1.0, SPEED_LIMIT, "m/s")
+BOX_STEPS = (1e-4, 1e3, "s")
+NTM_SIGMAS = ("90%", "drawn")  # the standard's representative value, or one drawn from its distribution
 
+# A key is (type, default); one whose default is ... must be given, None: found from site, scene or box.
+SPEED, MOVING = (in_range(*SPEEDS), ...), (in_range(*MOVING_SPEEDS), ...)
+DIRECTION = (in_range(-180.0, 180.0, "deg"), 0.0)  # towards which the wind blows, from +x towards +y
+TURBINE_CLASS = (one_of(tuple(REFERENCE_SPEED)), "I")
+TURBULENCE_CLASS = (one_of(tuple(TURBULENCE_INTENSITY)), "B")
+NTM_SIGMA = (one_of(NTM_SIGMAS), "90%")
+START = (in_range(0.0, 1e6, "s"), 60.0)
+SIGN = (one_of((1, -1)), 1)
+COMPONENT = (samples(-SPEED_LIMIT, SPEED_LIMIT, "m/s") | None, None)
+SEED = (Seed | None, None)
+SHIFT = (in_range(0.0, 1e5, "s") | None, None)
+SHEAR_EXPONENT = (in_range(0.0, 1.0) | None, None)
 RANDOM = {  # keys of every turbulent wind
     "direction": DIRECTION,
-    "average": Choice(("rotor", "point"), "rotor"),
-    "shear_turbulence": Flag(True),
-    "period": Number(60.0, 1e5, "s", None),
-    "seed": Seed(None),
+    "average": (one_of(("rotor", "point")), "rotor"),
+    "shear_turbulence": (Flag, True),
+    "period": (in_range(60.0, 1e5, "s") | None, None),
+    "seed": SEED,
 }
 GUST = {"speed": MOVING, "start": START, "class": TURBULENCE_CLASS}
-SHARED = {"shear_exponent": Number(0.0, 1.0, "", None)}  # key of every kind; None: that of the site
+
+
+class WindKind(NamedTuple):
+    """A kind of wind."""
+
+    form: str  # on the command line
+    summary: str
+    keys: type[Record]
+
+
+def _kind(form, summary, keys):
+    """Return the WindKind with these keys and the shear exponent."""
+    return WindKind(form, summary, create_model("Wind", __base__=Record, **keys))
+
+
+def _uniform(form, summary, keys):
+    return _kind(form, summary, keys | {"shear_exponent": SHEAR_EXPONENT})
+
 
 KINDS = {
-    "steady": {
-        "speed": SPEED,
-        "direction": DIRECTION,
-        "vertical": Number(-SPEED_LIMIT, SPEED_LIMIT, "m/s", 0.0),
-    },
-    "series": {
-        "time": Samples(-1e6, 1e9, "s"),
-        "speed": Samples(0.0, SPEED_LIMIT, "m/s"),
-        "v": COMPONENT,
-        "w": COMPONENT,
-        "vertical_shear": COMPONENT,
-        "horizontal_shear": COMPONENT,
-    },
-    "steps": {
-        "speeds": Samples(0.0, SPEED_LIMIT, "m/s"),
-        "every": Number(0.01, 1e6, "s"),
-        "ramp": Number(1e-3, 1e6, "s", 0.1),
-    },
-    "eog": GUST | {"turbine_class": TURBINE_CLASS},
-    "edc": GUST | {"sign": SIGN},
-    "ecd": {"speed": MOVING, "start": START, "sign": SIGN},
-    "ews": GUST | {"sign": SIGN, "orientation": Choice(("vertical", "horizontal"), "vertical")},
-    "ntm": {"speed": MOVING, "class": TURBULENCE_CLASS, "sigma": NTM_SIGMA} | RANDOM,
-    "etm": {"speed": MOVING, "class": TURBULENCE_CLASS, "turbine_class": TURBINE_CLASS} | RANDOM,
-    "ewm": {"turbine_class": TURBINE_CLASS, "recurrence": Choice((50, 1), 50), "turbulent": Flag(False)}
-    | RANDOM,
-}
-REQUIRED = object()
-SHIFT = Number(0.0, 1e5, "s", None)
-FIELD_KINDS = {  # kind -> {key: (rule, default)}; None: found from the box
-    "bts": {
-        "path": (Text(), REQUIRED),
-        "periodic": (Flag(), None),
-        "shift": (SHIFT, None),
-    },
-    "box": {
-        "u": (Array(3), REQUIRED),
-        "v": (Array(3), None),
-        "w": (Array(3), None),
-        "y": (Array(1), REQUIRED),
-        "z": (Array(1), REQUIRED),
-        "dt": (Number(1e-4, 1e3, "s"), REQUIRED),
-        "speed": (MOVING, REQUIRED),
-        "periodic": (Flag(), False),
-        "shift": (SHIFT, None),
-    },
-    "mann": {
-        "speed": (MOVING, REQUIRED),
-        "class": (TURBULENCE_CLASS, "B"),
-        "sigma": (NTM_SIGMA, "90%"),
-        "seed": (Seed(), None),
-        "dt": (Number(0.05, 1.0, "s"), 0.2),
-        "shear_exponent": (Number(0.0, 1.0, ""), None),
-    },
-}
-ALL_KINDS = (*KINDS, *FIELD_KINDS)
+    "steady": _uniform(
+        "18", "constant wind, with the site's shear",
+        {
+            "speed": SPEED,
+            "direction": DIRECTION,
+            "vertical": (in_range(-SPEED_LIMIT, SPEED_LIMIT, "m/s"), 0.0),
+        },
+    ),
+    "ntm": _uniform(
+        "ntm:18:B", "normal turbulence model, IEC 61400-1; speed and class A+, A, B or C",
+        {"speed": MOVING, "class": TURBULENCE_CLASS, "sigma": NTM_SIGMA} | RANDOM,
+    ),
+    "etm": _uniform(
+        "etm:18:B", "extreme turbulence model, IEC 61400-1",
+        {"speed": MOVING, "class": TURBULENCE_CLASS, "turbine_class": TURBINE_CLASS} | RANDOM,
+    ),
+    "eog": _uniform(
+        "eog:18:B", "extreme operating gust, from 60 s on (JSON: start)",
+        GUST | {"turbine_class": TURBINE_CLASS},
+    ),
+    "edc": _uniform("edc:18:B", "extreme direction change", GUST | {"sign": SIGN}),
+    "ecd": _uniform(
+        "ecd:18", "extreme coherent gust with direction change",
+        {"speed": MOVING, "start": START, "sign": SIGN},
+    ),
+    "ews": _uniform(
+        "ews:18:B", "extreme wind shear, vertical or (JSON: orientation) horizontal",
+        GUST | {"sign": SIGN, "orientation": (one_of(("vertical", "horizontal")), "vertical")},
+    ),
+    "ewm": _uniform(
+        '{"kind": "ewm"}', "extreme wind of 50 years or one, steady or turbulent: a parked turbine",
+        {"turbine_class": TURBINE_CLASS, "recurrence": (one_of((50, 1)), 50), "turbulent": (Flag, False)}
+        | RANDOM,
+    ),
+    "steps": _uniform(
+        '{"kind": "steps", "speeds": [12, 14], "every": 60}',
+        "wind speeds one after the other, each held for a time, s",
+        {
+            "speeds": (samples(*SPEEDS), ...),
+            "every": (in_range(0.01, 1e6, "s"), ...),
+            "ramp": (in_range(1e-3, 1e6, "s"), 0.1),
+        },
+    ),
+    "series": _uniform(
+        "wind.csv, wind.parquet", "a table with columns time (s) and speed (m/s)",
+        {"time": (samples(-1e6, 1e9, "s"), ...), "speed": (samples(*SPEEDS), ...)}
+        | dict.fromkeys(("v", "w", "vertical_shear", "horizontal_shear"), COMPONENT),
+    ),
+}  # fmt: skip
+FIELD_KINDS = {
+    "bts": _kind(
+        "wind.bts", "TurbSim's full-field box, met by the blades point by point",
+        {"path": (FilePath, ...), "periodic": (Flag | None, None), "shift": SHIFT},
+    ),
+    "mann": _kind(
+        "mann:18:B", "full-field Mann turbulence (needs the extra mann)",
+        {
+            "speed": MOVING, "class": TURBULENCE_CLASS, "sigma": NTM_SIGMA, "seed": SEED,
+            "dt": (in_range(0.05, 1.0, "s"), 0.2), "shear_exponent": SHEAR_EXPONENT,
+        },
+    ),
+    "box": _kind(
+        "in Python alone", "a full-field box of your own arrays",
+        {
+            "u": (array(3), ...), "v": (array(3) | None, None), "w": (array(3) | None, None),
+            "y": (array(1), ...), "z": (array(1), ...), "dt": (in_range(*BOX_STEPS), ...),
+            "speed": MOVING, "periodic": (Flag, False), "shift": SHIFT,
+        },
+    ),
+}  # fmt: skip
+ALL_KINDS = KINDS | FIELD_KINDS
 BOX = ".bts"  # ending of TurbSim's boxes
 OTHER_NAMES = {  # what others call a kind
     "turbsim": "bts",
@@ -241,7 +173,7 @@ class WindSpec:
 
 
 def wind_of(spec: Any) -> Any:
-    """The wind that a text or a path stands for, as a number or a mapping; anything else as it is.
+    """Return the wind that a text or path stands for, as number or mapping; anything else as it is.
 
     "18"; "ntm:18:B", which is KIND:SPEED[:CLASS]; JSON of a mapping; "none"; a path to a .bts box, a uniform
     wind file of InflowWind (.wnd, .hh) or a table of time (s) and speed (m/s) (.csv, .parquet).
@@ -278,12 +210,12 @@ def wind_of(spec: Any) -> Any:
 
 
 def is_wind_file(text: str) -> bool:
-    """Whether a text is the path of a wind, by its ending."""
+    """Return whether a text is the path of a wind, by its ending."""
     return Path(text).suffix.lower() in (BOX, *UNIFORM, *TABLES) and not text.lstrip().startswith("{")
 
 
 def unknown_kind(kind):
-    """InputError for a kind of wind that there is not, with what others call a kind as a suggestion."""
+    """Return the InputError for an unknown kind of wind, with the name that a kind has elsewhere."""
     other = OTHER_NAMES.get(kind.lower()) if isinstance(kind, str) else None
     if other is None:
         return unknown("wind.kind", kind, ALL_KINDS)
@@ -294,7 +226,7 @@ def unknown_kind(kind):
 
 
 def read_wind(spec):
-    """WindSpec of a speed in m/s, a mapping with "kind", a text (wind_of), or a WindSpec.
+    """Return the WindSpec of a speed in m/s, a mapping with "kind", a text (wind_of), or a WindSpec.
 
     Raises: InputError naming the key, its value and what is allowed.
     """
@@ -304,28 +236,28 @@ def read_wind(spec):
     if isinstance(spec, list | tuple | set) or spec is None:
         raise InputError(f"wind = {short(spec)}: must be {FORMS}")
     if not isinstance(spec, dict):
-        spec = {"kind": "steady", "speed": SPEED.read("wind", spec)}
+        spec = {"kind": "steady", "speed": check_in_range("wind", spec, *SPEEDS)}
     if "kind" not in spec:
         raise InputError(f"wind.kind is missing: must be one of {', '.join(ALL_KINDS)}")
     kind = spec["kind"]
     if not isinstance(kind, str) or kind not in KINDS:
         raise unknown_kind(kind)
-    keys = KINDS[kind] | SHARED
-    for key in spec:
-        if key != "kind" and key not in keys:
-            raise unknown(f"key of the {kind} wind", key, keys)
-    values = {}
-    for key, rule in keys.items():
-        value = spec.get(key, rule.default)
-        if value is Required:
-            raise InputError(f"wind.{key} is missing: the {kind} wind needs it")
-        values[key] = value if value is None and rule.default is None else rule.read(f"wind.{key}", value)
+    values = checked_keys(spec)
     _check_together(kind, values)
     return WindSpec(kind, values)
 
 
+def checked_keys(spec):
+    """Return {key: value} of a mapping of a known kind. Raises: InputError with a line per wrong key."""
+    keys = ALL_KINDS[spec["kind"]].keys
+    record, problems = validate(keys, {str(key): value for key, value in spec.items() if key != "kind"})
+    if problems:
+        raise InputError("\n".join(f"wind.{problem}" for problem in problems))
+    return {key: getattr(record, key) for key in keys.model_fields}
+
+
 def _check_together(kind, values):
-    """Rules that join several keys. Raises InputError."""
+    """Check the rules that join several keys. Raises: InputError."""
     if kind == "series":
         time = values["time"]
         for key, array in values.items():
@@ -350,6 +282,6 @@ def _check_together(kind, values):
                 f" turbine class {values['turbine_class']}"
             )
     if kind == "ewm" and not values["turbulent"]:
-        for key, rule in RANDOM.items():
-            if key != "direction" and values[key] != rule.default:
+        for key, (_, default) in RANDOM.items():
+            if key != "direction" and values[key] != default:
                 raise InputError(f"wind.{key} = {values[key]!r}: needs wind.turbulent = True")

@@ -11,10 +11,11 @@ scored on what it learned from.
 """
 
 from dataclasses import dataclass
-from math import exp, isfinite
+from math import exp
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_number, check_whole_number, is_number
 from fowt_env.envs.actions import ActionMode
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.errors import InputError
@@ -37,26 +38,20 @@ class DecisionSettings:
 
     def __post_init__(self):
         for key, low, high in (("hold", 1, 100), ("history", 0, 200)):
-            value = getattr(self, key)
-            if type(value) is not int or not low <= value <= high:
-                raise InputError(f"decisions.{key} = {value!r}: must be a whole number from {low} to {high}")
+            number = check_whole_number(f"decisions.{key}", getattr(self, key), low, high)
+            object.__setattr__(self, key, number)
         for key, low, high in (("smoothing", 0.0, 60.0), ("washout", 0.0, 1e4), ("authority_time", 1.0, 1e4)):
-            value = getattr(self, key)
-            if not _is_number(value) or not low <= value <= high:
-                raise InputError(f"decisions.{key} = {value!r}: must be in [{low:g}, {high:g}] s")
+            allowed = f"in [{low:g}, {high:g}] s"
+            check_number(f"decisions.{key}", getattr(self, key), low, high, allowed=allowed)
         value = self.authority
         if value is None:
             return
-        pair = isinstance(value, tuple | list) and len(value) == 2 and all(map(_is_number, value))
+        pair = isinstance(value, tuple | list) and len(value) == 2 and all(map(is_number, value))
         if not pair or not 0.0 <= value[0] < value[1] <= 100.0:
             raise InputError(
                 f"decisions.authority = {value!r}: must be a pair (low, high) with 0 <= low < high <= 100 m/s"
             )
         object.__setattr__(self, "authority", (float(value[0]), float(value[1])))
-
-
-def _is_number(value):
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)
 
 
 def wind_entry(settings, mode, observed):

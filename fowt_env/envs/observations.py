@@ -5,7 +5,6 @@ far outside what happens before an episode fails; they are there so that the spa
 """
 
 from collections.abc import Iterable
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,8 @@ from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import (
+    BLADES_MEASURED,
+    MEASURED,
     N_BLADE_MEASUREMENTS,
     N_MEASUREMENTS,
     BladeMeasure,
@@ -50,29 +51,21 @@ class Entry(NamedTuple):
     meaning: str
 
 
-def _symmetric(name, unit, scale, bound, meaning, signal=None):
-    """Entry about zero; without a signal it is the measurement of that name."""
-    signal = Measure[name.upper()] if signal is None else signal
+def _meaning(name):
+    """Return what a measured field is, and which way it counts."""
+    field = (MEASURED | BLADES_MEASURED)[name]
+    return f"{field.meaning} ({field.positive})"
+
+
+def _symmetric(name, unit, scale, bound, meaning, signal):
+    """Return the Entry about zero."""
     return Entry(name, unit, int(signal), 0.0, scale, -bound, bound, meaning)
 
 
-FIXED = (  # channels that look the same for every turbine
-    _symmetric("surge", "m", 20.0, 200.0, "platform position downwind"),
-    _symmetric("sway", "m", 10.0, 200.0, "platform position to the left"),
-    _symmetric("heave", "m", 2.0, 50.0, "platform position upwards"),
-    _symmetric("roll", "rad", 2.0 * DEGREE, pi, "platform roll"),
-    _symmetric("platform_pitch", "rad", 5.0 * DEGREE, 0.5 * pi, "platform pitch, positive downwind"),
-    _symmetric("yaw", "rad", 5.0 * DEGREE, 2.0 * pi, "platform yaw"),
-    _symmetric("surge_rate", "m/s", 1.0, 50.0, "time derivative of surge"),
-    _symmetric("sway_rate", "m/s", 0.5, 50.0, "time derivative of sway"),
-    _symmetric("heave_rate", "m/s", 0.5, 50.0, "time derivative of heave"),
-    _symmetric("roll_rate", "rad/s", 0.5 * DEGREE, 2.0, "time derivative of roll"),
-    _symmetric("platform_pitch_rate", "rad/s", DEGREE, 2.0, "time derivative of platform pitch"),
-    _symmetric("yaw_rate", "rad/s", 0.5 * DEGREE, 2.0, "time derivative of yaw"),
-    _symmetric("nacelle_acceleration", "m/s2", 1.0, 100.0, "fore-aft acceleration of the tower top"),
-    _symmetric("nacelle_velocity", "m/s", 1.0, 100.0, "fore-aft velocity of the tower top"),
-    _symmetric("platform_pitch_acceleration", "rad/s2", 0.5 * DEGREE, 5.0, "pitch acceleration (body y)"),
-    _symmetric("wave_elevation", "m", 3.0, 50.0, "water surface at the platform's rest position"),
+FIXED = tuple(  # channels that look the same for every turbine
+    _symmetric(name, field.unit, field.scale, field.bound, _meaning(name), Measure[name.upper()])
+    for name, field in MEASURED.items()
+    if field.scale is not None
 )
 RATES = tuple(f"{name}_rate" for name in MOTIONS)
 STANDARD = (*MOTIONS, *RATES, "rotor_speed", "blade_pitch", "generator_torque")
@@ -83,7 +76,7 @@ def _wind(name, signal, meaning):
 
 
 def _estimated(name):
-    """Signal of something estimated."""
+    """Return the signal of something estimated."""
     return ESTIMATES + ESTIMATED.index(name)
 
 
@@ -118,38 +111,27 @@ STOP_CHANNELS = {  # of tasks in which the turbine is to be stopped
     ),
 }  # fmt: skip
 ORDINALS = ("first", "second", "third", "fourth")
-BLADE_MEANINGS = {  # of the fields of BladeMeasurement that are channels of their own
-    "root_out_of_plane": "bending moment of the root of blade {} out of the rotor plane",
-    "root_in_plane": "bending moment of the root of blade {} in the rotor plane",
-    "hub_tilt_moment": "tilting moment at the hub, axes that do not turn with the rotor",
-    "hub_yaw_moment": "yawing moment at the hub, axes that do not turn with the rotor",
-    "yaw_bearing_tilt_moment": "tilting moment at the yaw bearing",
-    "yaw_bearing_yaw_moment": "yawing moment at the yaw bearing",
-}
 BLADE_CHANNELS = BladeMeasurement._fields[BladeMeasure.BLADE_PITCH_1 :]  # where blades have own pitches
 
 
 def _blade_channels(turbine):
-    """{channel: (Entry,)} of BLADE_CHANNELS; moments over the rated torque on the rotor's shaft."""
+    """Return {channel: (Entry,)} of BLADE_CHANNELS; moments over the rated torque on the rotor's shaft."""
     drive, table = turbine.pitch_drive, {}
     moment = turbine.drivetrain.gear_ratio * turbine.torque_law.rated_torque
     for name in BLADE_CHANNELS:
         signal = OF_BLADES + int(BladeMeasure[name.upper()])
-        part, _, blade = name.rpartition("_")
-        if part == "blade_pitch":
+        if name.startswith("blade_pitch"):
             entry = Entry(
-                name, "rad", signal, 0.0, 15.0 * DEGREE, drive.minimum, drive.maximum,
-                f"pitch of blade {blade}, positive to feather",
-            )  # fmt: skip
+                name, "rad", signal, 0.0, 15.0 * DEGREE, drive.minimum, drive.maximum, _meaning(name)
+            )
         else:
-            meaning = BLADE_MEANINGS.get(part, BLADE_MEANINGS.get(name, "")).format(blade)
-            entry = _symmetric(name, "N m", moment, 50.0 * moment, meaning, signal)
+            entry = _symmetric(name, "N m", moment, 50.0 * moment, _meaning(name), signal)
         table[name] = (entry,)
     return table
 
 
 def observation_channels(turbine, preview=(), actions=N_ACTIONS):
-    """{channel: tuple of its Entries} for a descriptions.turbine.Turbine.
+    """Return {channel: tuple of its Entries} for a descriptions.turbine.Turbine.
 
     preview: look-ahead times (s); actions: their number.
     """
@@ -158,22 +140,22 @@ def observation_channels(turbine, preview=(), actions=N_ACTIONS):
     table["rotor_speed"] = (
         Entry(
             "rotor_speed", "rad/s", int(Measure.ROTOR_SPEED), rated, 0.2 * rated, -rated, 3.0 * rated,
-            "rotor speed, about rated",
+            _meaning("rotor_speed"),
         ),
     )  # fmt: skip
     table["blade_pitch"] = (
         Entry(
             "blade_pitch", "rad", int(Measure.BLADE_PITCH), 0.0, 15.0 * DEGREE, drive.minimum, drive.maximum,
-            "blade pitch, positive to feather; of blades with pitches of their own the mean",
+            _meaning("blade_pitch"),
         ),
     )  # fmt: skip
     table["generator_torque"] = (
         Entry(
             "generator_torque", "N m", int(Measure.GENERATOR_TORQUE), 0.0, law.rated_torque,
-            -law.max_torque, law.max_torque, "generator torque on the high-speed shaft",
+            -law.max_torque, law.max_torque, _meaning("generator_torque"),
         ),
     )  # fmt: skip
-    table["wind_speed"] = (_wind("wind_speed", Measure.WIND_SPEED, "wind along x at the hub"),)
+    table["wind_speed"] = (_wind("wind_speed", Measure.WIND_SPEED, _meaning("wind_speed")),)
     table["azimuth"] = (
         _symmetric("sin_azimuth", "-", 1.0, 1.0, "sine of the rotor azimuth", SIN_AZIMUTH),
         _symmetric("cos_azimuth", "-", 1.0, 1.0, "cosine of the rotor azimuth", COS_AZIMUTH),
@@ -193,7 +175,7 @@ def observation_channels(turbine, preview=(), actions=N_ACTIONS):
 
 
 def check_channels(where, names, default=None):
-    """Tuple of channel names, DEFAULT replaced by the default ones, each once.
+    """Return the tuple of channel names, DEFAULT replaced by the default ones, each once.
 
     Raises: InputError for unknown names, an empty list, or a string where a list is meant.
     """
@@ -226,7 +208,7 @@ KNOWN = (  # channels of every scene with wind
 
 
 def entries(names, turbine, preview, actions=N_ACTIONS, individual=False):
-    """Entries of an observation in order; individual: whether every blade has a pitch of its own.
+    """Return the entries of an observation in order; individual: whether every blade has a pitch of its own.
 
     Raises: InputError for a preview without times, and for channels of single blades where there are none.
     """
@@ -254,7 +236,7 @@ class ObservationMap(NamedTuple):
 
 
 def build_observation_map(observed, preview):
-    """ObservationMap of Entries."""
+    """Return the ObservationMap of Entries."""
     centre = np.array([entry.centre for entry in observed])
     scale = np.array([entry.scale for entry in observed])
     low = (np.array([entry.low for entry in observed]) - centre) / scale

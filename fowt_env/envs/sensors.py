@@ -6,16 +6,21 @@ are, by fowt_env/plant/sensing.py.
 """
 
 from collections.abc import Mapping
-from math import isfinite
 
 import numpy as np
 
-from fowt_env.descriptions.measurements import BLADES_MEASURED, MEASURED
+from fowt_env.descriptions.checks import check_number, check_whole_number
 from fowt_env.descriptions.sensors import SensorChain, sensor_chain, sensors_of
 from fowt_env.envs.observations import observation_channels
 from fowt_env.errors import InputError, unknown
 from fowt_env.loop.sensing import Sensors, Setting, open_chain
-from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measurement
+from fowt_env.plant.measurement import (
+    BLADES_MEASURED,
+    MEASURED,
+    N_MEASUREMENTS,
+    BladeMeasurement,
+    Measurement,
+)
 from fowt_env.weather.sensor_noise import draw_noise
 from fowt_env.weather.sensor_noise import draw_sensors as draw_chain
 
@@ -40,7 +45,7 @@ def reading_scales(turbine, individual=False):
 
 
 def check_sensors(given, turbine=None):
-    """What an environment is given as sensors: {"noise", "delay"}, or a SensorChain; "exact" is None.
+    """Return what an environment is given as sensors: {"noise", "delay"}, or a SensorChain; "exact" is None.
 
     Raises: InputError.
     """
@@ -54,18 +59,12 @@ def check_sensors(given, turbine=None):
     for key in given:
         if key not in ("noise", "delay"):
             raise unknown("key of sensors", key, ("noise", "delay"))
-    noise, delay = settings["noise"], settings["delay"]
-    number = isinstance(noise, int | float | np.number) and not isinstance(noise, bool)
-    if not number or not (isfinite(noise) and noise >= 0.0):
-        raise InputError(f"sensors.noise = {noise!r}: must be a finite number >= 0")
-    whole = isinstance(delay, int | np.integer) and not isinstance(delay, bool)
-    if not whole or not 0 <= delay <= LONGEST_DELAY:
-        raise InputError(f"sensors.delay = {delay!r}: must be a whole number from 0 to {LONGEST_DELAY}")
-    return {"noise": float(noise), "delay": int(delay)}
+    noise = check_number("sensors.noise", settings["noise"], 0.0, allowed="a finite number >= 0")
+    return {"noise": noise, "delay": check_whole_number("sensors.delay", settings["delay"], 0, LONGEST_DELAY)}
 
 
 def draw_sensors(settings, scales, control_dt, seed, readings):
-    """Sensors of an episode from what check_sensors returned, by the seed of its weather.
+    """Return the sensors of an episode from what check_sensors returned, by the seed of its weather.
 
     A noise is a fraction of the scales (reading_scales). What a SensorChain does not have reads as NaN.
     """

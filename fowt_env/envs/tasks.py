@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_number, check_pair
 from fowt_env.descriptions.faults import Fault, read_faults
 from fowt_env.descriptions.nrel5mw import CUT_IN, CUT_OUT, PITCH_RATE, RATED_WIND, ROTOR_SPEED
 from fowt_env.descriptions.sea_state import joint_sea_state, joint_tables, sea_of, sea_state_of
@@ -73,6 +74,7 @@ class Task:
     # None: nothing is to be stopped, and the agent has it from the start
     shutdown: tuple | None = None
     weather_seeds: tuple = (0, LARGEST_SEED)  # range (low, below) from which an episode's weather is drawn
+    summary: str = field(default="", compare=False)  # what is to be done, for lists
 
     def _repr_html_(self):
         """What a notebook shows: weather, observation, and the weights of the reward."""
@@ -97,18 +99,18 @@ class Task:
             raise InputError(f"task.name = {self.name!r}: must be a name")
         where = f"task {self.name!r}"
         set_field = object.__setattr__
-        _number(f"{where}: duration", self.duration, 0.0, 1e5, low_open=True)
+        check_number(f"{where}: duration", self.duration, 0.0, 1e5, low_open=True)
         set_field(self, "observation", check_channels(f"{where}: observation", self.observation))
         set_field(self, "weights", check_weights(f"{where}: weights", self.weights))
         set_field(self, "offsets", _check_offsets(where, self.offsets))
-        set_field(self, "blade_pitch", _range(f"{where}: blade_pitch", self.blade_pitch, -90.0, 180.0))
-        set_field(self, "setpoint", _range(f"{where}: setpoint", self.setpoint, 0.0, 2.0))
-        _number(f"{where}: residual_torque", self.residual_torque, 0.0, 1.0)
-        _number(f"{where}: residual_pitch", self.residual_pitch, 0.0, 90.0)
+        set_field(self, "blade_pitch", check_pair(f"{where}: blade_pitch", self.blade_pitch, -90.0, 180.0))
+        set_field(self, "setpoint", check_pair(f"{where}: setpoint", self.setpoint, 0.0, 2.0))
+        check_number(f"{where}: residual_torque", self.residual_torque, 0.0, 1.0)
+        check_number(f"{where}: residual_pitch", self.residual_pitch, 0.0, 90.0)
         set_field(self, "wind_preview", _check_preview(where, self.wind_preview))
         _check_seeds(where, self.weather_seeds)
         if self.shutdown is not None:
-            set_field(self, "shutdown", _range(f"{where}: shutdown", self.shutdown, 0.0, self.duration))
+            set_field(self, "shutdown", check_pair(f"{where}: shutdown", self.shutdown, 0.0, self.duration))
         for name in set(self.observation) & set(STOP_CHANNELS) if self.shutdown is None else ():
             raise InputError(f"{where}: observation: {name!r}: needs a task with shutdown")
         if is_mixture(self.wind):
@@ -196,7 +198,7 @@ def draw_faults(faults, rng):
     for fault in faults:
         if isinstance(fault, Mapping):
             fault = {
-                key: float(rng.uniform(*_range(f"faults: {key}", value, -FAR, FAR)))
+                key: float(rng.uniform(*check_pair(f"faults: {key}", value, -FAR, FAR)))
                 if key in RANGED and isinstance(value, tuple | list)
                 else value
                 for key, value in fault.items()
@@ -242,8 +244,8 @@ def _check_mixture(where, mixture, sea):
             raise InputError(f"{where}: wind[{i}] = {entry!r}: must be (share, wind, sea), as the others")
         if is_field(entry[1]):
             raise InputError(f"{where}: wind[{i}]: a box of full-field wind cannot be part of a mixture")
-        _number(f"{where}: share of wind[{i}]", entry[0], 0.0, 1e6, low_open=True)
-        checked.append((float(entry[0]), wind_of(entry[1]), sea_of(entry[2])))
+        share = check_number(f"{where}: share of wind[{i}]", entry[0], 0.0, 1e6, low_open=True)
+        checked.append((share, wind_of(entry[1]), sea_of(entry[2])))
     return tuple(checked)
 
 
@@ -271,11 +273,11 @@ def _has_waves(wind, sea):
 def _picked(where, spec, pick):
     """The spec with each range replaced by pick(low, high)."""
     if isinstance(spec, tuple):
-        return pick(*_range(where, spec, -1e9, 1e9))
+        return pick(*check_pair(where, spec, -1e9, 1e9))
     if not isinstance(spec, dict) or spec.get("kind") in SAMPLED:
         return spec
     return {
-        key: pick(*_range(f"{where}.{key}", value, -1e9, 1e9)) if isinstance(value, tuple) else value
+        key: pick(*check_pair(f"{where}.{key}", value, -1e9, 1e9)) if isinstance(value, tuple) else value
         for key, value in spec.items()
     }
 
@@ -289,32 +291,12 @@ def _joint(table, speed):
     return {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
 
 
-def _number(where, value, low, high, low_open=False):
-    """Raise InputError unless the value is a number within [low, high]."""
-    good = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-    if not good or not low <= value <= high or (low_open and value == low):
-        bracket = "(" if low_open else "["
-        raise InputError(f"{where} = {value!r}: must be a number in {bracket}{low:g}, {high:g}]")
-
-
-def _range(where, value, low, high):
-    """(low, high) of a pair of numbers. Raises: InputError."""
-    if not isinstance(value, tuple | list) or len(value) != 2:
-        raise InputError(f"{where} = {value!r}: must be a pair (low, high)")
-    for number in value:
-        _number(where, number, low, high)
-    if value[0] > value[1]:
-        raise InputError(f"{where} = {value!r}: the low end must not exceed the high end")
-    return float(value[0]), float(value[1])
-
-
 def check_offset(name, value):
     """The offset (in the channel's unit) of one episode. Raises: InputError."""
     name = channel_name(name)
     if name not in OFFSETS:
         raise unknown("channel of offsets", name, OFFSETS)
-    _number(f"offsets[{name!r}]", value, -360.0, 360.0)
-    return float(value)
+    return check_number(f"offsets[{name!r}]", value, -360.0, 360.0)
 
 
 def _check_offsets(where, offsets):
@@ -322,16 +304,14 @@ def _check_offsets(where, offsets):
     for name, bounds in {channel_name(name): bounds for name, bounds in dict(offsets).items()}.items():
         if name not in OFFSETS:
             raise unknown(f"channel of {where}: offsets", name, OFFSETS)
-        checked[name] = _range(f"{where}: offsets[{name!r}]", bounds, -360.0, 360.0)
+        checked[name] = check_pair(f"{where}: offsets[{name!r}]", bounds, -360.0, 360.0)
     return checked
 
 
 def _check_preview(where, times):
     if isinstance(times, int | float):
         raise InputError(f"{where}: wind_preview = {times!r}: must be a list of times, such as ({times!r},)")
-    for time in times:
-        _number(f"{where}: wind_preview", time, 0.0, 600.0, low_open=True)
-    return tuple(float(time) for time in times)
+    return tuple(check_number(f"{where}: wind_preview", time, 0.0, 600.0, low_open=True) for time in times)
 
 
 def _check_seeds(where, seeds):
@@ -397,18 +377,25 @@ TASKS = {
     for task in (
         Task(
             name="above_rated",
+            summary="hold rotor speed and platform in turbulence and waves",
             wind={"kind": "ntm", "speed": (12.0, 24.0), "class": "B"},
             sea={"kind": "joint", "table": SITE},
             setpoint=(0.85, 1.15),
         ),
         Task(
             name="full_range",
+            summary="produce power from cut-in to cut-out",
             wind={"kind": "ntm", "speed": (4.0, 25.0), "class": "B"},
             sea={"kind": "joint", "table": SITE},
         ),
-        Task(name="steady", wind={"kind": "steady", "speed": (4.0, 25.0)}, sea=None),
+        Task(
+            name="steady",
+            summary="steady wind over still water: the simplest to learn",
+            wind={"kind": "steady", "speed": (4.0, 25.0)},
+        ),
         Task(
             name="shutdown",
+            summary="stop the rotor gently after a signal",
             wind={"kind": "ntm", "speed": (12.0, 24.0), "class": "B"},
             sea={"kind": "joint", "table": SITE},
             duration=240.0,
@@ -417,7 +404,12 @@ TASKS = {
             blade_pitch=(0.0, 90.0),
             shutdown=(20.0, 60.0),
         ),
-        Task(name="above_rated_mixture", wind=_mixture(12.0, 24.0), setpoint=(0.85, 1.15)),
+        Task(
+            name="above_rated_mixture",
+            summary="above_rated with gusts, steady wind and direction changes mixed in",
+            wind=_mixture(12.0, 24.0),
+            setpoint=(0.85, 1.15),
+        ),
     )
 }
 

@@ -23,6 +23,12 @@ from fowt_env.plant.user_loads import record_user_loads, user_channels
 
 DEG_PER_RAD = 180.0 / pi
 RPM_PER_RAD_S = 30.0 / pi
+UNITS = {  # of output channels: factors from SI
+    **dict.fromkeys(("-", "s", "m", "m/s", "m/s^2", "N", "N-m"), 1.0),
+    **dict.fromkeys(("deg", "deg/s", "deg/s^2"), DEG_PER_RAD),
+    "rpm": RPM_PER_RAD_S,
+    **dict.fromkeys(("kN", "kN-m", "kW"), 1e-3),
+}
 
 
 class Channel(NamedTuple):
@@ -37,104 +43,49 @@ class Channel(NamedTuple):
         return f"{self.name}_[{self.unit}]"
 
 
-FIXED_CHANNELS = (
-    Channel("Time", "s", 1.0),
-    Channel("PtfmSurge", "m", 1.0),
-    Channel("PtfmSway", "m", 1.0),
-    Channel("PtfmHeave", "m", 1.0),
-    Channel("PtfmRoll", "deg", DEG_PER_RAD),
-    Channel("PtfmPitch", "deg", DEG_PER_RAD),
-    Channel("PtfmYaw", "deg", DEG_PER_RAD),
-    Channel("PtfmTVxi", "m/s", 1.0),
-    Channel("PtfmTVyi", "m/s", 1.0),
-    Channel("PtfmTVzi", "m/s", 1.0),
-    Channel("PtfmRVxi", "deg/s", DEG_PER_RAD),
-    Channel("PtfmRVyi", "deg/s", DEG_PER_RAD),
-    Channel("PtfmRVzi", "deg/s", DEG_PER_RAD),
-    Channel("PtfmTAxi", "m/s^2", 1.0),
-    Channel("PtfmTAyi", "m/s^2", 1.0),
-    Channel("PtfmTAzi", "m/s^2", 1.0),
-    Channel("PtfmRAxi", "deg/s^2", DEG_PER_RAD),
-    Channel("PtfmRAyi", "deg/s^2", DEG_PER_RAD),
-    Channel("PtfmRAzi", "deg/s^2", DEG_PER_RAD),
-    Channel("NcIMUTAxs", "m/s^2", 1.0),
-    Channel("NcIMUTAys", "m/s^2", 1.0),
-    Channel("Azimuth", "deg", DEG_PER_RAD),
-    Channel("RotSpeed", "rpm", RPM_PER_RAD_S),
-    Channel("GenSpeed", "rpm", RPM_PER_RAD_S),
-    Channel("BldPitch1", "deg", DEG_PER_RAD),
-    Channel("GenTq", "kN-m", 1e-3),
-    Channel("GenPwr", "kW", 1e-3),
-    Channel("GenTqLim", "-", 1.0),
-    Channel("RotThrust", "kN", 1e-3),
-    Channel("RotTorq", "kN-m", 1e-3),
-    Channel("RtFldFxh", "N", 1.0),
-    Channel("RtFldMxh", "N-m", 1.0),
-    Channel("TwrBsFxt", "kN", 1e-3),
-    Channel("TwrBsFyt", "kN", 1e-3),
-    Channel("TwrBsFzt", "kN", 1e-3),
-    Channel("TwrBsMxt", "kN-m", 1e-3),
-    Channel("TwrBsMyt", "kN-m", 1e-3),
-    Channel("TwrBsMzt", "kN-m", 1e-3),
-    Channel("HydroFxi", "N", 1.0),
-    Channel("HydroFyi", "N", 1.0),
-    Channel("HydroFzi", "N", 1.0),
-    Channel("HydroMxi", "N-m", 1.0),
-    Channel("HydroMyi", "N-m", 1.0),
-    Channel("HydroMzi", "N-m", 1.0),
-    Channel("Wave1Elev", "m", 1.0),
-    Channel("Wind1VelX", "m/s", 1.0),
-    Channel("Wind1VelY", "m/s", 1.0),
-    Channel("Wind1VelZ", "m/s", 1.0),
-    Channel("RtVAvgxh", "m/s", 1.0),
+def _channels(columns):
+    """Return the channels of columns such as "RotSpeed_[rpm]"."""
+    pairs = [column.rstrip("]").split("_[") for column in columns.split()]
+    return tuple(Channel(name, unit, UNITS[unit]) for name, unit in pairs)
+
+
+FIXED_CHANNELS = _channels(
+    "Time_[s] PtfmSurge_[m] PtfmSway_[m] PtfmHeave_[m] PtfmRoll_[deg] PtfmPitch_[deg] PtfmYaw_[deg]"
+    " PtfmTVxi_[m/s] PtfmTVyi_[m/s] PtfmTVzi_[m/s] PtfmRVxi_[deg/s] PtfmRVyi_[deg/s] PtfmRVzi_[deg/s]"
+    " PtfmTAxi_[m/s^2] PtfmTAyi_[m/s^2] PtfmTAzi_[m/s^2] PtfmRAxi_[deg/s^2] PtfmRAyi_[deg/s^2]"
+    " PtfmRAzi_[deg/s^2] NcIMUTAxs_[m/s^2] NcIMUTAys_[m/s^2] Azimuth_[deg] RotSpeed_[rpm] GenSpeed_[rpm]"
+    " BldPitch1_[deg] GenTq_[kN-m] GenPwr_[kW] GenTqLim_[-] RotThrust_[kN] RotTorq_[kN-m] RtFldFxh_[N]"
+    " RtFldMxh_[N-m] TwrBsFxt_[kN] TwrBsFyt_[kN] TwrBsFzt_[kN] TwrBsMxt_[kN-m] TwrBsMyt_[kN-m]"
+    " TwrBsMzt_[kN-m] HydroFxi_[N] HydroFyi_[N] HydroFzi_[N] HydroMxi_[N-m] HydroMyi_[N-m] HydroMzi_[N-m]"
+    " Wave1Elev_[m] Wind1VelX_[m/s] Wind1VelY_[m/s] Wind1VelZ_[m/s] RtVAvgxh_[m/s]"
 )
 Out = IntEnum("Out", [c.name.upper() for c in FIXED_CHANNELS], start=0)
 N_FIXED = len(FIXED_CHANNELS)
-LOAD_CHANNELS = (  # of each of the user's loads: about the body origin, inertial axes, as HydroFxi
-    ("Fxi", "N"),
-    ("Fyi", "N"),
-    ("Fzi", "N"),
-    ("Mxi", "N-m"),
-    ("Myi", "N-m"),
-    ("Mzi", "N-m"),
+# of each of the user's loads: about the body origin, inertial axes, as HydroFxi
+LOAD_CHANNELS = tuple(
+    channel[:2] for channel in _channels("Fxi_[N] Fyi_[N] Fzi_[N] Mxi_[N-m] Myi_[N-m] Mzi_[N-m]")
 )
-
-
-BLADE_CHANNELS = (  # of a rotor whose blades have pitches of their own
-    Channel("BldPitch2", "deg", DEG_PER_RAD),
-    Channel("BldPitch3", "deg", DEG_PER_RAD),
-    Channel("RootMxc1", "kN-m", 1e-3),
-    Channel("RootMxc2", "kN-m", 1e-3),
-    Channel("RootMxc3", "kN-m", 1e-3),
-    Channel("RootMyc1", "kN-m", 1e-3),
-    Channel("RootMyc2", "kN-m", 1e-3),
-    Channel("RootMyc3", "kN-m", 1e-3),
-    Channel("LSSTipMys", "kN-m", 1e-3),
-    Channel("LSSTipMzs", "kN-m", 1e-3),
-    Channel("YawBrMxp", "kN-m", 1e-3),
-    Channel("YawBrMyp", "kN-m", 1e-3),
-    Channel("YawBrMzp", "kN-m", 1e-3),
+BLADE_CHANNELS = _channels(  # of a rotor whose blades have pitches of their own
+    "BldPitch2_[deg] BldPitch3_[deg] RootMxc1_[kN-m] RootMxc2_[kN-m] RootMxc3_[kN-m] RootMyc1_[kN-m]"
+    " RootMyc2_[kN-m] RootMyc3_[kN-m] LSSTipMys_[kN-m] LSSTipMzs_[kN-m] YawBrMxp_[kN-m] YawBrMyp_[kN-m]"
+    " YawBrMzp_[kN-m]"
 )
-TOWER_CHANNELS = (  # of a tower that bends
-    Channel("TTDspFA", "m", 1.0),
-    Channel("TTDspSS", "m", 1.0),
-    Channel("YawBrTAxp", "m/s^2", 1.0),
-    Channel("YawBrTAyp", "m/s^2", 1.0),
-)
+# of a tower that bends
+TOWER_CHANNELS = _channels("TTDspFA_[m] TTDspSS_[m] YawBrTAxp_[m/s^2] YawBrTAyp_[m/s^2]")
 GROUPS = {"tower": TOWER_CHANNELS, "blades": BLADE_CHANNELS}  # of parts that a scene may have, in row order
 
 
 def channels(n_lines, loads=(), groups=()):
-    """Every output channel of a model with n_lines mooring lines and loads of these names, in row order.
+    """Return every output channel of a model with n_lines mooring lines and these loads, in row order.
 
     groups: names of those GROUPS that the model has.
     """
     lines = range(1, n_lines + 1)
     return (
         *FIXED_CHANNELS,
-        *(Channel(f"FAIRTEN{i}", "kN", 1e-3) for i in lines),
-        *(Channel(f"ANCHTEN{i}", "kN", 1e-3) for i in lines),
-        *(Channel(f"{name}{end}", unit, 1.0) for name in loads for end, unit in LOAD_CHANNELS),
+        *(Channel(f"FAIRTEN{i}", "kN", UNITS["kN"]) for i in lines),
+        *(Channel(f"ANCHTEN{i}", "kN", UNITS["kN"]) for i in lines),
+        *(Channel(f"{name}{end}", unit, UNITS[unit]) for name in loads for end, unit in LOAD_CHANNELS),
         *(channel for name, group in GROUPS.items() if name in groups for channel in group),
     )
 
@@ -162,7 +113,7 @@ class Layout(NamedTuple):
 
 @kernel
 def rotor_wind(t, pose, azimuth, aero, layout):
-    """Mean wind over the blades, relative to the hub and along the shaft, m/s: AeroDyn's RtVAvgxh.
+    """Return the mean wind over the blades, relative to the hub and along the shaft, m/s: AeroDyn's RtVAvgxh.
 
     As there every length of blade counts alike. Of a series it is the mean over the azimuth at rest, of a box
     that over the blades where they are now.
@@ -175,7 +126,7 @@ def rotor_wind(t, pose, azimuth, aero, layout):
 
 @kernel
 def _rotor_wind(t, pose, azimuth, now, series, field, layout):
-    """rotor_wind with the pose in rotor axes."""
+    """Return rotor_wind with the pose in rotor axes."""
     hub = layout.shaft_hub
     if field is None:
         u, v, w = now.u * series.rotor_factor, now.v * series.rotor_factor, now.w
@@ -199,14 +150,14 @@ def _rotor_wind(t, pose, azimuth, now, series, field, layout):
 
 @kernel
 def point_acceleration(pose, dx, px, py, pz):
-    """Absolute acceleration (body components) of a body-fixed point, from the rates of a state."""
+    """Return the absolute acceleration (body components) of a body-fixed point, from the rates of a state."""
     rates = Twist(dx[State.VX], dx[State.VY], dx[State.VZ], dx[State.WX], dx[State.WY], dx[State.WZ])
     return acceleration_at(pose, rates, px, py, pz)
 
 
 @kernel
 def acceleration_at(pose, rates, px, py, pz):
-    """Absolute acceleration of a point fixed in the frame of a Pose: v' + w x v + w' x p + w x (w x p).
+    """Return the absolute acceleration of a point of a Pose's frame: v' + w x v + w' x p + w x (w x p).
 
     rates: Twist of the pose. All components are the frame's.
     """
@@ -222,7 +173,7 @@ def acceleration_at(pose, rates, px, py, pz):
 
 @kernel
 def elevation_now(t, hydro, data):
-    """surface_at_origin, computed once for all outputs of an instant."""
+    """Return surface_at_origin, computed once for all outputs of an instant."""
     cache = data.cache
     if cache[LoadCache.ELEVATED] < 0.5:
         cache[LoadCache.ELEVATION] = surface_at_origin(t, hydro, data)
@@ -317,7 +268,7 @@ def record(model, data, x, dx, u, t, loads, row):
 
 @inlined_kernel
 def tower_base(pose, x, dx, loads, bend, body, layout, tower, row):
-    """Loads carried at the tower base: aerodynamics and weight above it less the momentum rate there.
+    """Fill in the loads at the tower base: aerodynamics and weight above it less the momentum rate there.
 
     Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
     on the lower one).
@@ -339,10 +290,10 @@ def put_hub_wind(rows, hub_wind, period):
 
 
 def to_units(rows, n_lines, loads=(), groups=()):
-    """Rows (k, n_channels) in SI -> a copy in the units of channels(n_lines, loads, groups)."""
+    """Return a copy of rows (k, n_channels) in SI, in the units of channels(n_lines, loads, groups)."""
     return rows * scales(n_lines, loads, groups)
 
 
 def scales(n_lines, loads=(), groups=()):
-    """(n_channels,) factors from SI to the units of channels(n_lines, loads, groups)."""
+    """Return (n_channels,) factors from SI to the units of channels(n_lines, loads, groups)."""
     return np.array([c.scale for c in channels(n_lines, loads, groups)])

@@ -99,45 +99,93 @@ FIDELITIES = {
 SLOW_GROWTH = 0.7
 LAG_MARGIN = 1.25  # of the shortest lag over what just does not grow
 FIELD_SAMPLES = 3  # rotor loads per step in a box of wind, whose cells the blades cross in 0.1 s
+
+
+class Range(NamedTuple):
+    """Numbers that an option may be."""
+
+    text: str
+    low: float
+    high: float
+    low_open: bool = False  # whether the lower end is left out
+    whole: bool = False
+
+    def __str__(self):
+        return self.text
+
+    def check(self, name, value):
+        """Return the value as a number. Raises: InputError."""
+        if self.whole:
+            return check_whole_number(name, value, self.low, self.high)
+        return check_number(name, value, self.low, self.high, low_open=self.low_open)
+
+
+class Option(NamedTuple):
+    """One option of build_scene."""
+
+    default: Any
+    allowed: tuple | Range | str  # the values, or what they are in words
+    summary: str
+
+
 OPTIONS = {
-    # name: (default, allowed values or a description of the allowed range)
-    "kinematics_position": ("instantaneous", ("instantaneous", "fixed")),
-    "surface": ("instantaneous", ("instantaneous", "swl")),
-    "stretching": ("wheeler", ("wheeler", "none")),
-    "diffraction": (None, (None, "none", "maccamy_fuchs")),
-    "skewed_wake": (False, (False, True)),
-    "dynamic_inflow": (False, (False, True)),
-    "tower_drag": (True, (False, True)),
-    "hydrodynamics": (True, (False, True)),
+    "kinematics_position": Option("instantaneous", ("instantaneous", "fixed"),
+        "where waves are evaluated: at the moving hull, or at rest"),
+    "surface": Option("instantaneous", ("instantaneous", "swl"),
+        "water surface of buoyancy and waves: instantaneous, or still-water level (swl)"),
+    "stretching": Option("wheeler", ("wheeler", "none"), "wave kinematics above still water"),
+    "diffraction": Option(None, (None, "none", "maccamy_fuchs"),
+        "correction of wave loads on a large column; None: the platform's"),
+    "skewed_wake": Option(False, (False, True), "loads of yawed inflow at rotor model bem"),
+    "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
+    "tower_drag": Option(True, (False, True), "wind drag of the tower"),
+    "hydrodynamics": Option(True, (False, True), "all loads of the water"),
     # True: the fidelity's; "table": tensions tabulated about rest, solved beyond
-    "mooring": (True, (False, True, "catenary", "table")),
-    "planar": (False, (False, True)),
-    "pitch": ("collective", ("collective", "individual")),  # of the blades
+    "mooring": Option(True, (False, True, "catenary", "table"),
+        "lines: catenary solved at each step, a table of tensions, or none"),
+    "planar": Option(False, (False, True), "motion in the vertical plane of the wind alone"),
+    "pitch": Option("collective", ("collective", "individual"),
+        "blades pitch together, or each by itself (individual pitch control)"),
     # "second_order": that of [pitch_drive.second_order] of the turbine file; "file": the file's [pitch_drive]
-    "pitch_drive": ("file", ("file", "second_order")),
+    "pitch_drive": Option("file", ("file", "second_order"),
+        "first-order drive of the turbine file, or its second-order one"),
     # bending of the tower: none, or its first mode or first two in each direction ([tower.modes] of the file)
-    "tower": ("rigid", ("rigid", "modes", "modes2")),
-    "integrator": (None, (None, *INTEGRATORS)),  # None: the fidelity's
+    "tower": Option("rigid", ("rigid", "modes", "modes2"),
+        "rigid, or with one or two bending modes in each direction"),
+    "integrator": Option(None, (None, *INTEGRATORS), "time stepping; None: the fidelity's"),
     # of the rotor's load per step, of an integrator that samples it; None: FIELD_SAMPLES in a box, else 1
-    "rotor_samples": (None, "None or a number of samples, 1 to 10"),
-    "wave_loads": (None, (None, "exact", "fast")),  # None: the fidelity's
-    # of a potential-flow body; None: the fidelity's
-    "radiation": (None, (None, "state_space", "convolution", "none")),
-    "radiation_error": (0.02, "rms error of each entry of the state space over its rms, 0.001 to 0.5"),
-    "current": (None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}"),
-    # where waves meet a potential-flow body: at rest, or at its surge and sway behind a low pass
-    "excitation_position": ("undisplaced", ("undisplaced", "filtered")),
-    "excitation_cutoff": (0.01, "Hz, 0.0001 to 0.5"),
-    # of a potential-flow body with a difference-frequency QTF; cutoff: differences above it make no force
-    "second_order": (None, (None, "none", *METHODS)),
-    "second_order_cutoff": (None, "None or rad/s, > 0"),
-    "duration": (700.0, "seconds of random wind and sea, > 0"),
-    "wave_components": (None, "None or a number of components, 1 to 10000"),
-    "blade_stations": (None, "None (the turbine file's) or a number of them, 3 up to the file's"),
-    "strip_length": (None, "None (fraction of the draft) or metres, 0.01 to 1000: cells of exact wave loads"),
-    "shear_exponent": (None, "None (the platform file's) or 0 to 1"),
-    "turbine": (None, "None (the platform file's), a name, a path or a descriptions.turbine.Turbine"),
-}
+    "rotor_samples": Option(None, Range("None or a number of samples, 1 to 10", 1, 10, whole=True),
+        "rotor loads per step of an integrator that samples them"),
+    "wave_loads": Option(None, (None, "exact", "fast"),
+        "sums over wave components: exact or fast; None: the fidelity's"),
+    "radiation": Option(None, (None, "state_space", "convolution", "none"),
+        "radiation memory of a potential-flow body; None: the fidelity's"),
+    "radiation_error": Option(0.02, Range(
+        "rms error of each entry of the state space over its rms, 0.001 to 0.5", 0.001, 0.5),
+        "of the state space fitted to the radiation memory"),
+    "current": Option(None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}", "of the water"),
+    "excitation_position": Option("undisplaced", ("undisplaced", "filtered"),
+        "where waves meet a potential-flow body: at rest, or behind its slow drift"),
+    "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "of that low pass"),
+    "second_order": Option(None, (None, "none", *METHODS),
+        "difference-frequency wave forces of a potential-flow body"),
+    "second_order_cutoff": Option(None, Range("None or rad/s, > 0", 0.0, 100.0, low_open=True),
+        "differences above it make no force"),
+    "duration": Option(700.0, Range("seconds of random wind and sea, > 0", 0.0, 1e6, low_open=True),
+        "for which random wind and sea are made"),
+    "wave_components": Option(None, Range(
+        "None or a number of components, 1 to 10000", 1, 10_000, whole=True),
+        "of an irregular sea; None: as many as the duration needs"),
+    "blade_stations": Option(None, "None (the turbine file's) or a number of them, 3 up to the file's",
+        "of the rotor model"),
+    "strip_length": Option(None, Range(
+        "None (fraction of the draft) or metres, 0.01 to 1000: cells of exact wave loads", 0.01, 1e3),
+        "of the hull's strips"),
+    "shear_exponent": Option(None, Range("None (the platform file's) or 0 to 1", 0.0, 1.0),
+        "of the power-law wind profile"),
+    "turbine": Option(None, "None (the platform file's), a name, a path or a descriptions.turbine.Turbine",
+        "in place of the platform's"),
+}  # fmt: skip
 # defaults of a floater that is no slender spar: linear theory knows it in its undisplaced pose alone
 UNDISPLACED = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none"}
 ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
@@ -185,7 +233,7 @@ def default_step(options, fastest=0.0):
 
 def checked_options(given, platform):
     """Return the options with defaults, the platform file's own ones and the caller's, checked."""
-    options = {name: default for name, (default, _) in OPTIONS.items()}
+    options = {name: option.default for name, option in OPTIONS.items()}
     if platform.hull is None:
         options |= UNDISPLACED
     for source, values in (
@@ -196,24 +244,13 @@ def checked_options(given, platform):
             if name not in OPTIONS:
                 own = () if values is platform.options else ARGUMENTS
                 raise unknown(f"option of {source}", name, (*OPTIONS, *own))
-            allowed = OPTIONS[name][1]
-            if isinstance(allowed, tuple) and not any(value is a or value == a for a in allowed):
+            allowed = OPTIONS[name].allowed
+            if type(allowed) is tuple and not any(value is a or value == a for a in allowed):
                 raise InputError(f"{name} = {value!r}: allowed {', '.join(repr(a) for a in allowed)}")
             options[name] = value
-    options["duration"] = check_number("duration", options["duration"], 0.0, 1e6, low_open=True)
-    if options["shear_exponent"] is not None:
-        options["shear_exponent"] = check_number("shear_exponent", options["shear_exponent"], 0.0, 1.0)
-    if options["strip_length"] is not None:
-        options["strip_length"] = check_number("strip_length", options["strip_length"], 0.01, 1e3)
-    options["radiation_error"] = check_number("radiation_error", options["radiation_error"], 0.001, 0.5)
-    options["excitation_cutoff"] = check_number("excitation_cutoff", options["excitation_cutoff"], 1e-4, 0.5)
-    if options["second_order_cutoff"] is not None:
-        options["second_order_cutoff"] = check_number(
-            "second_order_cutoff", options["second_order_cutoff"], 0.0, 100.0, low_open=True
-        )
-    for name, most in (("wave_components", 10000), ("rotor_samples", 10)):
-        if options[name] is not None:
-            options[name] = check_whole_number(name, options[name], 1, most)
+    for name, (default, allowed, _) in OPTIONS.items():
+        if isinstance(allowed, Range) and (options[name], default) != (None, None):
+            options[name] = allowed.check(name, options[name])
     return options
 
 

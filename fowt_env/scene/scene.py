@@ -285,7 +285,7 @@ def check_scene(scene: Any) -> None:
 
 def _default(name):
     """Return the default of an option, None where its fidelity decides it."""
-    return OPTIONS[name][0] if name in OPTIONS else None
+    return OPTIONS[name].default if name in OPTIONS else None
 
 
 def _replaced(part, path, value):

@@ -11,8 +11,9 @@ from math import cos, hypot, radians, sin
 import numpy as np
 
 from fowt_env.caches import cached
+from fowt_env.descriptions.checks import check_in_range, check_whole_number
 from fowt_env.descriptions.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
-from fowt_env.descriptions.wind import SHARED, Number, Seed, read_wind
+from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, WindSeries
 from fowt_env.weather import gusts
@@ -75,11 +76,11 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
     if isinstance(spec, WindSeries):
         return _of_kernel_types(spec)
     spec = read_wind(spec)
-    height = Number(1.0, 1000.0, "m").read("reference_height", reference_height)
-    diameter = Number(1.0, 1000.0, "m").read("rotor_diameter", rotor_diameter)
+    height = check_in_range("reference_height", reference_height, 1.0, 1000.0, "m")
+    diameter = check_in_range("rotor_diameter", rotor_diameter, 1.0, 1000.0, "m")
     exponent = spec["shear_exponent"]
     if exponent is None:
-        site = SHARED["shear_exponent"].read("shear_exponent", shear_exponent)
+        site = check_in_range("shear_exponent", shear_exponent, 0.0, 1.0)
         exponent = EXTREME_SHEAR_EXPONENT if spec.kind == "ewm" else site
     period = 0.0
     if spec.kind in GUSTS:
@@ -193,7 +194,7 @@ def _turbulent(spec, height, diameter, seed, duration):
 def _drawn(spec, height, diameter, seed, duration):
     """Return arguments of turbulence(): speed, sigma, height, diameter, period, seed. Raises: InputError."""
     speed = nominal_speed(spec)
-    duration = Number(0.0, 1e5, "s").read("duration", duration)
+    duration = check_in_range("duration", duration, 0.0, 1e5, "s")
     period = spec["period"]
     if period is None:
         period = max(duration, SHORTEST_PERIOD)
@@ -202,7 +203,7 @@ def _drawn(spec, height, diameter, seed, duration):
     if spec["seed"] is not None:
         seed = spec["seed"]
     elif not isinstance(seed, np.random.SeedSequence):
-        seed = Seed().read("seed", seed)
+        seed = check_whole_number("seed", seed, 0)
     if spec.kind == "etm":
         sigma = etm_sigma(speed, spec["class"], spec["turbine_class"])
     elif spec.kind == "ewm":

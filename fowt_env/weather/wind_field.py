@@ -12,9 +12,10 @@ from math import ceil
 
 import numpy as np
 
+from fowt_env.descriptions.checks import check_in_range
 from fowt_env.descriptions.iec import length_scale, ntm_sigma
-from fowt_env.descriptions.wind import FIELD_KINDS, REQUIRED, wind_of
-from fowt_env.errors import InputError, unknown
+from fowt_env.descriptions.wind import BOX_STEPS, FIELD_KINDS, MOVING_SPEEDS, checked_keys, wind_of
+from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind_field import WindField, field_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.weather.turbsim import read_bts
@@ -80,7 +81,8 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
     if isinstance(spec, WindBox):
         box = spec
     else:
-        box = _MAKERS[spec["kind"]](_values(spec), hub_height, rotor_diameter, shear_exponent, seed, duration)
+        make = _MAKERS[spec["kind"]]
+        box = make(checked_keys(spec), hub_height, rotor_diameter, shear_exponent, seed, duration)
     reach = 0.5 * rotor_diameter
     rise = box.z - hub_height
     if max(box.y[0], rise[0]) > -reach or min(box.y[-1], rise[-1]) < reach:
@@ -89,22 +91,6 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
             f" must hold the rotor, {reach:g} m about (0, {hub_height:g})"
         )
     return box
-
-
-def _values(spec):
-    """Return the checked values of every key of a specification."""
-    kind = spec["kind"]
-    keys = FIELD_KINDS[kind]
-    for key in spec:
-        if key != "kind" and key not in keys:
-            raise unknown(f"key of the {kind} wind", key, keys)
-    values = {}
-    for key, (rule, default) in keys.items():
-        value = spec.get(key, default)
-        if value is REQUIRED:
-            raise InputError(f"wind.{key} is missing: the {kind} wind needs it")
-        values[key] = None if value is None and default is None else rule.read(f"wind.{key}", value)
-    return values
 
 
 def _even(name, line):
@@ -138,8 +124,8 @@ def _box(velocity, y, z, dt, speed, periodic, shift=None):
 def _from_bts(values, *_):
     velocity, y, z, dt, speed, repeats = read_bts(values["path"])
     y, z = _even("y", y), _even("z", z)
-    for key, value in (("dt", dt), ("speed", speed)):
-        FIELD_KINDS["box"][key][0].read(f"wind.path = {str(values['path'])!r}: {key}", value)
+    for key, value, limits in (("dt", dt, BOX_STEPS), ("speed", speed, MOVING_SPEEDS)):
+        check_in_range(f"wind.path = {str(values['path'])!r}: {key}", value, *limits)
     periodic = repeats if values["periodic"] is None else values["periodic"]
     return _box(velocity, y, z, dt, speed, periodic, values["shift"])
 

@@ -9,13 +9,12 @@ from fowt_env import build_scene, simulate
 from fowt_env.control import call_law
 from fowt_env.controllers import make
 from fowt_env.controllers.lqr.law import WindEstimator
-from fowt_env.descriptions.measurements import MEASURED, Measured
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs import sensors as envs_sensors
 from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
-from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
+from fowt_env.plant.measurement import MEASURED, N_MEASUREMENTS, Measure, Measured, Measurement
 from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation, plant_settings
 

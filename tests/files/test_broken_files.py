@@ -14,12 +14,14 @@ from pathlib import Path
 import mutation
 import numpy as np
 import pytest
+from potential_body import made_up_body
 from typer.testing import CliRunner
 
 from fowt_env.controllers import make
 from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.descriptions.files import parse_json, read_toml
+from fowt_env.descriptions.potential_flow import coefficient_arrays, read_coefficients
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.training.cli import app as cli
@@ -84,13 +86,23 @@ def mark(tmp_path):
     return tmp_path / "code_was_run"
 
 
-def test_a_pickled_array_in_a_policy_is_not_loaded(tmp_path, mark):
-    path = tmp_path / "bomb.npz"
-    bomb = np.array([Bomb(mark)], dtype=object)
+def policy_arrays():
     with np.load(AGENTS / "ppo_lqr.npz") as file:
-        np.savez(path, **{name: file[name] for name in file.files if name != "mean"}, mean=bomb)
+        return {name: file[name] for name in file.files}
+
+
+READERS = {  # of arrays: the function, what makes sound ones, and the name of one
+    "policy": (read_policy, policy_arrays, "mean"),
+    "coefficients": (read_coefficients, lambda: coefficient_arrays(made_up_body()), "omega"),
+}
+
+
+@pytest.mark.parametrize(("read", "sound", "name"), READERS.values(), ids=READERS)
+def test_a_pickled_array_is_not_loaded(tmp_path, mark, read, sound, name):
+    path = tmp_path / "bomb.npz"
+    np.savez(path, **sound() | {name: np.array([Bomb(mark)], dtype=object)})
     with pytest.raises(InputError, match="bomb.npz.*holds pickled objects, which are not loaded"):
-        read_policy(path)
+        read(path)
     assert not mark.exists()
     pickle.loads(pickle.dumps(Bomb(mark)))
     assert mark.exists()  # it would have
@@ -117,14 +129,15 @@ def test_a_policy_that_unpacks_to_more_than_its_share_is_refused(tmp_path):
         read_policy(path)
 
 
-def test_an_array_that_claims_more_than_it_has_takes_no_memory(tmp_path):
+@pytest.mark.parametrize(("read", "name"), [(read, name) for read, _, name in READERS.values()], ids=READERS)
+def test_an_array_that_claims_more_than_it_has_takes_no_memory(tmp_path, read, name):
     path = tmp_path / "claims.npz"
     head = b"\x93NUMPY\x01\x00" + (118).to_bytes(2, "little")
     said = b"{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }"
     with zipfile.ZipFile(path, "w") as file:
-        file.writestr("mean.npy", head + said.ljust(117) + b"\n" + bytes(80))
-    with pytest.raises(InputError, match="mean.npy.*is not its size"):
-        read_policy(path)
+        file.writestr(f"{name}.npy", head + said.ljust(117) + b"\n" + bytes(80))
+    with pytest.raises(InputError, match=f"{name}.npy.*is not its size"):
+        read(path)
 
 
 def invoke(*words):
@@ -201,9 +214,7 @@ def changed(content, path, value):
 
 def policy_of_a_stranger(settings, path):
     """The path written: the shipped agent's arrays with other settings."""
-    with np.load(AGENTS / "ppo_lqr.npz") as file:
-        arrays = {name: file[name] for name in file.files}
-    np.savez(path, **arrays | {"settings": np.array(json.dumps(settings))})
+    np.savez(path, **policy_arrays() | {"settings": np.array(json.dumps(settings))})
     return path
 
 

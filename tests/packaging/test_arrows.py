@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import fowt_env
+from fowt_env.plant.compile.sources import all_imports
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 # from the ground up; a layer imports itself and what stands before it
@@ -39,15 +40,12 @@ def layer_of(module):
 
 def imports(path):
     """Modules of this project that a source imports, at its top or inside a function."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom):
-            assert not node.level, f"{path}: imports are absolute"
-            if node.module.partition(".")[0] == "fowt_env":
-                for alias in node.names:
-                    name = f"{node.module}.{alias.name}".partition(".")[2]
-                    yield name if name in MODULES else name.rpartition(".")[0]
-        elif isinstance(node, ast.Import):
-            yield from (a.name.partition(".")[2] for a in node.names if a.name.startswith("fowt_env."))
+    found = set()
+    for level, name in all_imports(path):
+        assert not level, f"{path}: imports are absolute"
+        top, _, inner = name.partition(".")
+        found |= {inner} & set(MODULES) if top == "fowt_env" else set()
+    return sorted(found - {""})
 
 
 def test_imports_go_down():

@@ -123,7 +123,7 @@ def test_bad_boxes_are_refused_by_name(change, words):
 
 
 def test_what_a_kind_of_box_needs_is_named_where_it_is_missing():
-    with pytest.raises(InputError, match="wind.path is missing: the bts wind needs it"):
+    with pytest.raises(InputError, match="wind.path is missing: must be a path"):
         read_box({"kind": "bts"}, hub_height=HUB, rotor_diameter=DIAMETER)
     with pytest.raises(InputError, match="wind.path = 3: must be a path"):
         read_box({"kind": "bts", "path": 3}, hub_height=HUB, rotor_diameter=DIAMETER)
@@ -248,7 +248,7 @@ SOUND = (8, 2, 2, 0, 1, 140.0, 140.0, 0.1, 12.0, 90.0, 20.0, 1.0, 0.0, 1.0, 0.0,
         (17, -1, "-1 characters"),
         (7, float("nan"), "nan s"),
         (11, 0.0, "no scale zero"),
-        (8, 1e30, "speed = 1.0*15.*must be in .1, 100. m"),
+        (8, 1e30, "speed = 1.0*15.*must be a number in .1, 100. m"),
     ],
 )
 def test_a_turbsim_file_whose_head_cannot_be_is_refused_before_it_is_read(tmp_path, place, value, message):

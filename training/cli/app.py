@@ -2,12 +2,8 @@
 
 from importlib import import_module
 
-from fowt_env.training.cli.console import app
+from fowt_env.training.cli.console import MODULES, app
 
-MODULES = (  # that add their commands to the app; console.GROUPS has the order of fowt --help
-    "simulate", "listing", "check", "evaluate", "validate", "doctor", "warmup", "cache", "benchmark",
-    "design", "plot", "report", "scores", "leaderboard", "import_deck", "hydro", "train",
-)  # fmt: skip
 for module in MODULES:
     import_module(f"fowt_env.training.cli.{module}")
 

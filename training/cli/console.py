@@ -27,6 +27,10 @@ EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STUDIES = "fowt_env.training.studies"  # left out of the wheel
 out = Console(emoji=False)  # a controller module:Name: is no picture
 err = Console(stderr=True, emoji=False)
+MODULES = (  # that add their commands to the app
+    "simulate", "listing", "check", "evaluate", "validate", "doctor", "warmup", "cache", "benchmark",
+    "design", "plot", "report", "scores", "leaderboard", "import_deck", "hydro", "train",
+)  # fmt: skip
 GROUPS = {  # of fowt --help: heading -> its commands, in the order in which they are shown
     "Run": ("simulate", "trim", "plot", "animate", "check", "import", "hydro"),
     "Design": ("linearize", "design"),

@@ -10,74 +10,6 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli.console import app, out, reported
 from fowt_env.training.cli.tables import figure, print_table
 
-WINDS = {  # kind -> (form on the command line, what it is); a test holds the kinds to those of build_scene
-    "steady": ("18", "constant wind, with the site's shear"),
-    "ntm": ("ntm:18:B", "normal turbulence model, IEC 61400-1; speed and class A+, A, B or C"),
-    "etm": ("etm:18:B", "extreme turbulence model, IEC 61400-1"),
-    "eog": ("eog:18:B", "extreme operating gust, from 60 s on (JSON: start)"),
-    "edc": ("edc:18:B", "extreme direction change"),
-    "ecd": ("ecd:18", "extreme coherent gust with direction change"),
-    "ews": ("ews:18:B", "extreme wind shear, vertical or (JSON: orientation) horizontal"),
-    "ewm": ('{"kind": "ewm"}', "extreme wind of 50 years or one, steady or turbulent: a parked turbine"),
-    "steps": (
-        '{"kind": "steps", "speeds": [12, 14], "every": 60}',
-        "wind speeds one after the other, each held for a time, s",
-    ),
-    "series": ("wind.csv, wind.parquet", "a table with columns time (s) and speed (m/s)"),
-    "uniform": ("wind.wnd, wind.hh", "OpenFAST's uniform wind file: speed, direction, shear over time"),
-    "bts": ("wind.bts", "TurbSim's full-field box, met by the blades point by point"),
-    "mann": ("mann:18:B", "full-field Mann turbulence (needs the extra mann)"),
-    "box": ("in Python alone", "a full-field box of your own arrays"),
-}
-FAULTS = {  # kind -> what happens; a test holds them to those of simulate
-    "grid_loss": "the generator torque is zero from TIME on",
-    "emergency_stop": "no torque, and the blades feather from TIME on",
-    "normal_stop": "the blades feather at the normal rate; the torque falls with the rotor speed",
-    "stuck_pitch": "blades stay where they are at TIME",
-    "pitch_runaway": "blades run to one end of their range (JSON: towards)",
-    "pitch_offset": "blades are off from what their encoders show (JSON: offset, deg)",
-    "sensor_bias": "a reading is off (JSON: field, value)",
-    "sensor_freeze": "a reading stays as it is at TIME (JSON: field)",
-    "sensor_loss": "a reading is zero from TIME on (JSON: field)",
-}
-OPTIONS = {  # option of build_scene -> what it is; a test holds them to those that there are
-    "kinematics_position": "where waves are evaluated: at the moving hull, or at rest",
-    "surface": "water surface of buoyancy and waves: instantaneous, or still-water level (swl)",
-    "stretching": "wave kinematics above still water",
-    "diffraction": "correction of wave loads on a large column; None: the platform's",
-    "skewed_wake": "loads of yawed inflow at rotor model bem",
-    "dynamic_inflow": "lag of the wake behind changes of thrust",
-    "tower_drag": "wind drag of the tower",
-    "hydrodynamics": "all loads of the water",
-    "mooring": "lines: catenary solved at each step, a table of tensions, or none",
-    "planar": "motion in the vertical plane of the wind alone",
-    "pitch": "blades pitch together, or each by itself (individual pitch control)",
-    "pitch_drive": "first-order drive of the turbine file, or its second-order one",
-    "tower": "rigid, or with one or two bending modes in each direction",
-    "integrator": "time stepping; None: the fidelity's",
-    "rotor_samples": "rotor loads per step of an integrator that samples them",
-    "wave_loads": "sums over wave components: exact or fast; None: the fidelity's",
-    "radiation": "radiation memory of a potential-flow body; None: the fidelity's",
-    "radiation_error": "of the state space fitted to the radiation memory",
-    "current": "of the water",
-    "excitation_position": "where waves meet a potential-flow body: at rest, or behind its slow drift",
-    "excitation_cutoff": "of that low pass",
-    "second_order": "difference-frequency wave forces of a potential-flow body",
-    "second_order_cutoff": "differences above it make no force",
-    "duration": "for which random wind and sea are made",
-    "wave_components": "of an irregular sea; None: as many as the duration needs",
-    "blade_stations": "of the rotor model",
-    "strip_length": "of the hull's strips",
-    "shear_exponent": "of the power-law wind profile",
-    "turbine": "in place of the platform's",
-}
-TASKS = {  # task of an environment -> what it is; a test holds them to those that there are
-    "above_rated": "hold rotor speed and platform in turbulence and waves",
-    "full_range": "produce power from cut-in to cut-out",
-    "steady": "steady wind over still water: the simplest to learn",
-    "shutdown": "stop the rotor gently after a signal",
-    "above_rated_mixture": "above_rated with gusts, steady wind and direction changes mixed in",
-}
 LAST = ("DEMONSTRATION", "comparison only")  # in the summaries of controllers that nobody should choose
 
 
@@ -108,7 +40,7 @@ def _platforms():
 
 
 def _one_line(text):
-    """Text of a source in one line."""
+    """Return the text of a source in one line."""
     return " ".join((text or "not stated").split())
 
 
@@ -125,6 +57,13 @@ def _turbines():
     return rows
 
 
+def _winds():
+    from fowt_env.descriptions.wind import ALL_KINDS
+
+    file = ("uniform", "wind.wnd, wind.hh", "OpenFAST's uniform wind file: speed, direction, shear over time")
+    return [*((name, kind.form, kind.summary) for name, kind in ALL_KINDS.items()), file]
+
+
 def _seas():
     from fowt_env.descriptions.sea_state import sea_states
 
@@ -138,7 +77,7 @@ def _seas():
 
 
 def _natural(name):
-    """Key that sorts names with the numbers at their end by size."""
+    """Return the key that sorts names with the numbers at their end by size."""
     parts = name.split("_")
     return [(0, float(part), "") if part.isdigit() else (1, 0.0, part) for part in parts]
 
@@ -198,21 +137,21 @@ def _cases():
 
 
 def _tasks():
-    from fowt_env.envs.tasks import TASKS as KNOWN
+    from fowt_env.envs.tasks import TASKS
     from fowt_env.training.evaluation.conditions import STILL
 
     rows = []
-    for name, task in KNOWN.items():
+    for name, task in TASKS.items():
         weathers = task.weathers
         speeds = {f"{wind['speed'][0]:g} to {wind['speed'][1]:g} m/s" for _, wind, _ in weathers}
         kinds = ", ".join(dict.fromkeys(wind["kind"] for _, wind, _ in weathers))
         sea = STILL if all(sea is None for *_, sea in weathers) else "of the site, by the wind"
-        rows.append((name, TASKS[name], f"{kinds}, {', '.join(speeds)}", sea, f"{task.duration:g}"))
+        rows.append((name, task.summary, f"{kinds}, {', '.join(speeds)}", sea, f"{task.duration:g}"))
     return rows
 
 
 def _metrics():
-    from fowt_env.training.evaluation.metric_meanings import metric_table
+    from fowt_env.training.evaluation.metrics import metric_table
 
     return metric_table()
 
@@ -231,20 +170,22 @@ def _channels():
 
 
 def _options():
-    from fowt_env.scene.options import OPTIONS as KNOWN
+    from fowt_env.scene.options import OPTIONS
 
     rows = []
-    for name, (default, allowed) in KNOWN.items():
-        if isinstance(allowed, str):
-            text = f"{allowed}; default {default}"
-        else:
+    for name, (default, allowed, summary) in OPTIONS.items():
+        text = f"{allowed}; default {default}"
+        if type(allowed) is tuple:
             text = ", ".join(str(value) for value in sorted(allowed, key=lambda value: value != default))
-        rows.append((name, OPTIONS[name], text))
+        rows.append((name, summary, text))
     return rows
 
 
 def _faults():
-    return [(kind, f"{kind}:100" if "JSON" not in text else "JSON", text) for kind, text in FAULTS.items()]
+    from fowt_env.descriptions.faults import FAULTS
+
+    texts = {kind: fault.summary for kind, fault in FAULTS.items()}
+    return [(kind, f"{kind}:100" if "JSON" not in text else "JSON", text) for kind, text in texts.items()]
 
 
 def _sensors():
@@ -275,7 +216,7 @@ KINDS = {
     ),
     "winds": Kind(
         "--wind", "kinds of wind, and how each is written",
-        ("kind", "--wind", "what it is"), lambda: [(kind, *row) for kind, row in WINDS.items()],
+        ("kind", "--wind", "what it is"), _winds,
         prose=(1, 2), remark="Any of them as JSON, with further keys. Speeds in m/s at hub height.",
     ),
     "seas": Kind(
@@ -377,13 +318,13 @@ def list_names(
 
 
 def _rows_with(rows, part):
-    """The rows in which a text is found; all for None."""
+    """Return the rows in which a text is found; all for None."""
     wanted = (part or "").lower()
     return [row for row in rows if any(wanted in cell.lower() for cell in row)]
 
 
 def _as_mappings(kind, rows):
-    """[{heading: text}] of the rows of a Kind."""
+    """Return [{heading: text}] of the rows of a Kind."""
     keys = [" ".join(heading.split()) for heading in (*kind.headings, *kind.extra)]
     return [dict(zip(keys, row, strict=True)) for row in rows]
 

@@ -3,6 +3,8 @@
 import platform
 import re
 
+from packaging.requirements import Requirement
+
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.versions import NUMBA, Package
 
@@ -31,12 +33,11 @@ def requirements() -> dict[str, list[Package]]:
         raise InputError(f"{DISTRIBUTION} is not installed here: pip install -e . in its folder") from None
     found: dict[str, list[Package]] = {}
     for line in lines:
-        wanted, _, marker = line.partition(";")
-        name, needed = re.fullmatch(r"\s*([A-Za-z0-9._-]+)(?:\[.*\])?\s*\(?([^()]*?)\)?\s*", wanted).groups()
-        extra = re.search(r"extra == ['\"]([^'\"]+)['\"]", marker)
+        wanted = Requirement(line)
+        extra = re.search('extra == "(.+?)"', str(wanted.marker))
         key = extra.group(1) if extra else ""
-        if key != "dev" and name != DISTRIBUTION:
-            found.setdefault(key, []).append(_found(name, needed))
+        if key != "dev" and wanted.name != DISTRIBUTION:
+            found.setdefault(key, []).append(_found(wanted.name, str(wanted.specifier)))
     return found
 
 

@@ -1,32 +1,17 @@
 """The metrics of one run, computed from its OpenFAST-named columns."""
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
 import rainflow
 
+from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 
 TIME = "Time_[s]"
-ALL = ("mean", "std", "min", "max")
-# channel -> statistics; a channel that a run lacks (mooring without lines) gives NaN
-STATISTICS = {
-    "Wind1VelX_[m/s]": ALL,
-    "Wave1Elev_[m]": ALL,
-    "RotSpeed_[rpm]": ALL,
-    "GenPwr_[kW]": ALL,
-    "GenTq_[kN-m]": ALL,
-    "PtfmPitch_[deg]": ALL,
-    "PtfmSurge_[m]": ALL,
-    "PtfmHeave_[m]": ALL,
-    "PtfmRoll_[deg]": ALL,
-    "PtfmYaw_[deg]": ALL,
-    "BldPitch1_[deg]": ALL,
-    "RotThrust_[kN]": ALL,
-    "RotTorq_[kN-m]": ALL,
-    "TwrBsMyt_[kN-m]": ALL,
-    "NcIMUTAxs_[m/s^2]": (*ALL, "rms"),
-}
 # Inverse slopes m of the S-N curves. Welded steel of the tower: 4, the usual choice for tubular towers in
 # IEC 61400-1 practice. Stud or studless chain at the fairlead: 3 (DNV-OS-E301, T-N curves; 5 is wire rope's).
 # Glass-fibre laminate of blades: 10, as in IEC 61400-1 practice.
@@ -56,103 +41,164 @@ REQUIRED_CHANNELS = (
     "BldPitch1_[deg]",
     "GenTq_[kN-m]",
 )
-REDUCTIONS = {  # of values over time, the first axis
-    "mean": lambda x: np.mean(x, axis=0),
-    "std": lambda x: np.std(x, axis=0),  # about the run's own mean, N in the denominator
-    "min": lambda x: np.min(x, axis=0),
-    "max": lambda x: np.max(x, axis=0),
-    "rms": lambda x: np.sqrt(np.mean(x**2, axis=0)),
+
+
+class Metric(NamedTuple):
+    """What a metric is, and how its figures are compared and averaged."""
+
+    meaning: str
+    better: int = 0  # -1: less is better, 1: more is, 0: neither can be said
+    never_negative: bool = False
+    exponent: float = 1.0  # p of its mean over winds and seeds, see mean_exponent
+
+
+class Statistic(NamedTuple):
+    """A statistic of a channel."""
+
+    meaning: str
+    of: Callable  # of values over time, the first axis
+    better: int = 0
+    never_negative: bool = False
+    exponent: float = 1.0
+
+
+STATISTICS = {
+    "mean": Statistic("mean", lambda x: np.mean(x, axis=0)),
+    # about the run's own mean, N in the denominator
+    "std": Statistic("standard deviation", lambda x: np.std(x, axis=0), -1, True, 2.0),
+    "min": Statistic("least value", lambda x: np.min(x, axis=0)),
+    "max": Statistic("greatest value", lambda x: np.max(x, axis=0), -1),
+    "rms": Statistic("root mean square", lambda x: np.sqrt(np.mean(x**2, axis=0)), -1, True, 2.0),
 }
+# channel -> its statistics; a channel that a run lacks (mooring without lines) gives NaN
+ALL = ("mean", "std", "min", "max")
+CHANNELS = dict.fromkeys(
+    (
+        "Wind1VelX_[m/s]", "Wave1Elev_[m]", "RotSpeed_[rpm]", "GenPwr_[kW]", "GenTq_[kN-m]",
+        "PtfmPitch_[deg]", "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmRoll_[deg]", "PtfmYaw_[deg]",
+        "BldPitch1_[deg]", "RotThrust_[kN]", "RotTorq_[kN-m]", "TwrBsMyt_[kN-m]",
+    ),
+    ALL,
+) | {"NcIMUTAxs_[m/s^2]": (*ALL, "rms")}  # fmt: skip
+WEATHER = ("Wind1VelX_[m/s]", "Wave1Elev_[m]")  # of which neither less nor more is better
 
 
 def _metric_name(channel, statistic):
-    """ "RotSpeed_[rpm]", "std" -> "RotSpeed_std_[rpm]"."""
+    """Return the name of a metric: "RotSpeed_std_[rpm]" of "RotSpeed_[rpm]" and "std"."""
     name, unit = channel.split("_[")
     return f"{name}_{statistic}_[{unit}"
 
 
-METRICS = (
-    *(_metric_name(channel, s) for channel, statistics in STATISTICS.items() for s in statistics),
-    "overspeed_[%]",
-    "energy_[kWh]",
-    "GenPwr_capped_mean_[kW]",
-    "blade_pitch_travel_[deg/s]",
-    "actuator_duty_[%]",
-    "torque_travel_[kN-m/s]",
-    "torque_limited_[s]",
-    "FAIRTEN_std_[kN]",
-    "FAIRTEN_max_[kN]",
-    "TwrBsMyt_DEL_[kN-m]",
-    "RotTorq_DEL_[kN-m]",
-    "FAIRTEN_DEL_[kN]",
-    *(f"{name}_DEL_[kN-m]" for name in (*BLADE_ROOTS, *HUB_LOADS)),
-    "each_blade_travel_[deg/s]",
-    "PtfmSway_std_[m]",
-    "blade_pitch_rate_beyond_[s]",
-    "blade_pitch_rate_violations_[-]",
-    "tower_top_acceleration_beyond_[s]",
-    "tower_top_acceleration_violations_[-]",
-    "rotor_speed_beyond_[s]",
-    "rotor_speed_violations_[-]",
-    "RotSpeed_offset_[%]",
-    "BldPitch_oscillation_[deg]",
-    "settling_time_[s]",
-    "standstill_time_[s]",
-)
+def _of_channel(channel, statistic):
+    """Return the Metric of a statistic of a channel; of the power alone more is better of the mean."""
+    row = STATISTICS[statistic]
+    better = 1 if (channel, statistic) == ("GenPwr_[kW]", "mean") else row.better
+    return Metric(
+        f"{channel_meaning(channel)}: {row.meaning}",
+        0 if channel in WEATHER else better,
+        row.never_negative,
+        row.exponent,
+    )
 
-# what names of figures that cannot be below zero have in them
-_NEVER_NEGATIVE = (
-    *("_std_", "_rms_", "_DEL_", "_travel_", "_duty_"),
-    *("_limited_", "_beyond_", "_violations_", "FAIRTEN_"),
-    *("_offset_", "_oscillation_", "settling_time_", "standstill_time_"),
-)
-# what names of figures have in them of which less, or more, is better; of any other neither can be said
-_LESS_IS_BETTER = (*_NEVER_NEGATIVE, "overspeed", "_max_")
-_MORE_IS_BETTER = ("energy", "GenPwr_capped_mean", "GenPwr_mean")
-_WEATHER = ("Wind", "Wave")
+
+def _size(meaning):
+    """Return the Metric that cannot be below zero, of which less is better."""
+    return Metric(meaning, -1, True)
+
+
+def _deviation(meaning):
+    """Return the Metric of a standard deviation."""
+    return Metric(meaning, -1, True, 2.0)
+
+
+def _fatigue(meaning, exponent=TOWER_EXPONENT, material=""):
+    """Return the Metric of a damage-equivalent load with the inverse slope of its S-N curve."""
+    return Metric(
+        f"1 Hz damage-equivalent load of the {meaning}, m = {exponent:g}{material}", -1, True, exponent
+    )
+
+
+TABLE = {  # metric -> what it is, in the order of columns
+    _metric_name(channel, statistic): _of_channel(channel, statistic)
+    for channel, statistics in CHANNELS.items()
+    for statistic in statistics
+} | {
+    "overspeed_[%]": Metric("greatest rotor speed over rated", -1),
+    "energy_[kWh]": Metric("electrical energy, power counted up to rated", 1),
+    "GenPwr_capped_mean_[kW]": Metric("mean electrical power, counted up to rated", 1),
+    "blade_pitch_travel_[deg/s]": _size("mean absolute blade-pitch rate"),
+    "actuator_duty_[%]": _size("mean absolute blade-pitch rate over the drive's limit"),
+    "torque_travel_[kN-m/s]": _size("mean absolute rate of the generator torque"),
+    "torque_limited_[s]": _size("time with the generator torque at a range or rate limit"),
+    "FAIRTEN_std_[kN]": _deviation("standard deviation of the fairlead tension, worst line"),
+    "FAIRTEN_max_[kN]": _size("greatest fairlead tension of all lines"),
+    "TwrBsMyt_DEL_[kN-m]": _fatigue("fore-aft tower-base moment", material=" (welded steel)"),
+    "RotTorq_DEL_[kN-m]": _fatigue("low-speed shaft torque"),
+    "FAIRTEN_DEL_[kN]": _fatigue("worst fairlead", CHAIN_EXPONENT, " (chain)"),
+    "RootMyc_DEL_[kN-m]": _fatigue("worst blade root out of the rotor plane", BLADE_EXPONENT),
+    "RootMxc_DEL_[kN-m]": _fatigue("worst blade root in the rotor plane", BLADE_EXPONENT),
+    "LSSTipMys_DEL_[kN-m]": _fatigue("hub's tilt moment, non-rotating"),
+    "LSSTipMzs_DEL_[kN-m]": _fatigue("hub's yaw moment, non-rotating"),
+    "YawBrMyp_DEL_[kN-m]": _fatigue("yaw bearing's tilt moment"),
+    "YawBrMzp_DEL_[kN-m]": _fatigue("yaw bearing's yaw moment"),
+    "each_blade_travel_[deg/s]": _size("mean absolute pitch rate of single blades, mean of the three"),
+    "PtfmSway_std_[m]": _deviation("standard deviation of the platform's sway"),
+    "blade_pitch_rate_beyond_[s]": _size("time with a blade-pitch rate above 10 deg/s"),
+    "blade_pitch_rate_violations_[-]": _size("how often the blade-pitch rate passes 10 deg/s"),
+    "tower_top_acceleration_beyond_[s]": _size("time with a tower-top acceleration above 3.3 m/s2"),
+    "tower_top_acceleration_violations_[-]": _size("how often the tower-top acceleration passes 3.3 m/s2"),
+    "rotor_speed_beyond_[s]": _size("time with a rotor speed above 1.3 times rated"),
+    "rotor_speed_violations_[-]": _size("how often the rotor speed passes 1.3 times rated"),
+    "RotSpeed_offset_[%]": _size("steady wind: distance of the final mean rotor speed from rated"),
+    "BldPitch_oscillation_[deg]": _size("steady wind: peak-to-peak blade pitch of the last 100 s"),
+    "settling_time_[s]": _size("time from a gust until the rotor speed stays within 5 % of its final mean"),
+    "standstill_time_[s]": _size("time from a stop until the rotor stays below 10 % of rated speed"),
+}
+METRICS = tuple(TABLE)
+UNKNOWN = Metric("")  # a column that is no metric of this version
+DIRECTIONS = {-1: "lower", 0: "", 1: "higher"}
 
 
 def never_negative(metric):
-    """Whether a metric cannot be below zero: deviations, travel, fatigue, tensions, times and counts."""
-    return any(part in metric for part in _NEVER_NEGATIVE)
+    """Return whether a metric cannot be below zero: deviations, travel, fatigue, tensions, times, counts."""
+    return TABLE.get(metric, UNKNOWN).never_negative
 
 
 def better(metric):
-    """-1 where less of a metric is better, 1 where more is, 0 where neither can be said."""
-    if metric.startswith(_WEATHER):
-        return 0
-    if any(part in metric for part in _MORE_IS_BETTER):
-        return 1
-    return -1 if any(part in metric for part in _LESS_IS_BETTER) else 0
+    """Return -1 where less of a metric is better, 1 where more is, 0 where neither can be said."""
+    return TABLE.get(metric, UNKNOWN).better
 
 
 def mean_exponent(metric):
-    """Exponent p with which a metric is averaged over winds and seeds: (mean of x^p)^(1/p).
+    """Return the exponent p with which a metric is averaged over winds and seeds: (mean of x^p)^(1/p).
 
     Damage-equivalent loads: that of their S-N curve, since damage adds up. Standard deviations and rms: 2,
     since variances add up: their mean is the deviation of the whole lifetime about the means of the single
     runs, so that what the means themselves do from wind to wind, which is the wind's doing and no
     controller's, is no part of it. Any other: 1.
     """
-    if "_DEL_" in metric:
-        if metric.startswith(BLADE_ROOTS):
-            return BLADE_EXPONENT
-        return CHAIN_EXPONENT if metric.startswith("FAIRTEN") else TOWER_EXPONENT
-    return 2.0 if "_std_" in metric or "_rms_" in metric else 1.0
+    return TABLE.get(metric, UNKNOWN).exponent
+
+
+def metric_table():
+    """Return [(name, unit, meaning, "lower", "higher" or "" of which is better)] of all METRICS."""
+    return [
+        (*name.rstrip("]").split("_["), row.meaning, DIRECTIONS[row.better]) for name, row in TABLE.items()
+    ]
 
 
 def travel(time, value):
-    """Mean absolute rate over time, the first axis of the values: the sum of its steps' sizes per second."""
+    """Return the mean absolute rate over time, the first axis: the sum of the steps' sizes per second."""
     return np.sum(np.abs(np.diff(value, axis=0)), axis=0) / (time[-1] - time[0])
 
 
 def overspeed(fastest, rated):
-    """Greatest rotor speed above the rated one, in percent of it; 0 where it stays below."""
+    """Return the greatest rotor speed above the rated one, in percent of it; 0 where it stays below."""
     return np.maximum(0.0, 100.0 * (fastest / rated - 1.0))  # a plain max() would turn NaN into 0
 
 
 def damage_equivalent_load(values, duration, exponent):
-    """Range (unit of values) of the 1 Hz cycles that do the same fatigue damage in this time.
+    """Return the range (unit of values) of the 1 Hz cycles that do the same fatigue damage in this time.
 
     (sum n_i S_i^m / duration)^(1/m) over the rainflow cycles of the series (ASTM E1049-85, 5.4.4): ranges
     S_i, counts n_i (what is left over counts half), m the inverse slope of the S-N curve, duration in s.
@@ -166,7 +212,7 @@ def damage_equivalent_load(values, duration, exponent):
 
 
 def beyond(time, value, limit):
-    """(seconds that evenly spaced values spend above a limit, times that they come to do so); NaN of NaN."""
+    """Return (seconds that evenly spaced values spend above a limit, times they pass it); NaN of NaN."""
     if not np.isfinite(value).all():
         return float("nan"), float("nan")
     above = value > limit
@@ -184,7 +230,7 @@ def metrics(
     gust_start=None,
     stop=None,
 ):
-    """{metric: value} of a run, in the order and with the names of METRICS.
+    """Return {metric: value} of a run, in the order and with the names of METRICS.
 
     df                output of simulate: evenly spaced rows
     skip              seconds at the start that are left out (start-up transient)
@@ -212,10 +258,10 @@ def metrics(
     time = kept[TIME].to_numpy()
     length = time[-1] - time[0]
     result = {}
-    for channel, statistics in STATISTICS.items():
+    for channel, statistics in CHANNELS.items():
         values = kept[channel].to_numpy() if channel in kept.columns else None
         for statistic in statistics:
-            value = np.nan if values is None else REDUCTIONS[statistic](values)
+            value = np.nan if values is None else STATISTICS[statistic].of(values)
             result[_metric_name(channel, statistic)] = float(value)
     result["overspeed_[%]"] = float(overspeed(result["RotSpeed_max_[rpm]"], rated_speed_rpm))
     capped = np.minimum(kept["GenPwr_[kW]"].to_numpy(), rated_power_kW)
@@ -255,14 +301,14 @@ def metrics(
 
 
 def turbine_metrics(df, turbine, skip=0.0, steady=False, gust_start=None, stop=None):
-    """metrics of a run of a turbine (its description), with its rated speed and power and its pitch drive."""
+    """Return the metrics of a run of a turbine, by its rated speed and power and its pitch drive."""
     power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
     rate = turbine.pitch_drive.rate_limit / DEGREE
     return metrics(df, skip, turbine.rated_rotor_speed / RPM, rate, power, steady, gust_start, stop)
 
 
 def _kept(df, skip):
-    """The scored rows of a run. Raises: InputError."""
+    """Return the scored rows of a run. Raises: InputError."""
     missing = [name for name in REQUIRED_CHANNELS if name not in df.columns]
     if missing:
         raise InputError(f"metrics: the run lacks the columns {', '.join(missing)}")
@@ -276,7 +322,7 @@ def _kept(df, skip):
 
 
 def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
-    """The metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
+    """Return the metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
     result = {
         "RotSpeed_offset_[%]": np.nan,
         "BldPitch_oscillation_[deg]": np.nan,
@@ -296,7 +342,7 @@ def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
 
 
 def _standstill(time, speed, rated_speed_rpm, stop):
-    """Seconds from a stop until the rotor stands for good; NaN where it does not, or is not stopped."""
+    """Return the seconds from a stop until the rotor stands for good; NaN where it never does."""
     fast = np.abs(speed) > 0.01 * STANDSTILL * rated_speed_rpm
     if stop is None or fast[-1] or not np.isfinite(speed).all():
         return np.nan
@@ -304,7 +350,7 @@ def _standstill(time, speed, rated_speed_rpm, stop):
 
 
 def _violations(kept, time, blade_pitch, rated_speed_rpm):
-    """The metrics of the constraints; the acceleration is the horizontal one, fore-aft and side to side."""
+    """Return the metrics of the constraints; the acceleration is horizontal, fore-aft and side to side."""
     rate = np.abs(np.diff(blade_pitch) / np.diff(time))
     axes = [
         kept[name].to_numpy() for name in ("NcIMUTAxs_[m/s^2]", "NcIMUTAys_[m/s^2]") if name in kept.columns

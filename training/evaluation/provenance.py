@@ -10,7 +10,7 @@ from pathlib import Path
 
 import fowt_env
 from fowt_env.layout import FOLDERS, PACKAGE, installed_path, module_path
-from fowt_env.training.evaluation.sources import imported_files, in_order
+from fowt_env.plant.compile.sources import imported_files, in_order, keep_sources, read_source
 
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
 NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
@@ -21,10 +21,11 @@ INSTALLED = {"site-packages", "dist-packages"}
 
 
 def _digest(paths, key=""):
-    """Hash of files, by their order and contents, and of a key."""
+    """Return the hash of files in order, Python's by their code, others by their bytes, and of a key."""
     digest = hashlib.sha256(key.encode())
-    for path in paths:
-        digest.update(Path(path).read_bytes())
+    for path in map(Path, paths):
+        digest.update(read_source(path).code.encode() if path.suffix == ".py" else path.read_bytes())
+    keep_sources()
     return digest.hexdigest()[:16]
 
 
@@ -38,12 +39,12 @@ def plant_files():
 
 
 def plant_code():
-    """Hash of all sources and data that shape a run, but for the controllers."""
+    """Return the hash of all sources and data that shape a run, but for the controllers."""
     return _digest(plant_files())
 
 
 def _data(folder):
-    """Files beneath a folder that are no sources."""
+    """Return the files beneath a folder that are no sources."""
     return [
         path
         for path in folder.rglob("*")
@@ -52,7 +53,7 @@ def _data(folder):
 
 
 def controller_code(controller):
-    """{"name", "code"}: what a controller is called, and a hash of the files that define it.
+    """Return {"name", "code"}: what a controller is called, and a hash of the files that define it.
 
     A name of CONTROLLERS: its module, what it imports of this project, and the data of the package
     controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
@@ -83,7 +84,7 @@ def controller_code(controller):
 
 
 def _package_files(factory):
-    """Files that a factory of the package controllers depends on; those of all controllers for any other."""
+    """Return the files that a factory of our controllers depends on; those of all for any other."""
     start = getattr(factory, "__module__", None) or ""
     if start.startswith("fowt_env.controllers."):
         starts = [module_path(start).with_suffix(".py")]
@@ -93,7 +94,7 @@ def _package_files(factory):
 
 
 def _user_files(module):
-    """Files that a user's module depends on: those of its own project, and of this one what they import."""
+    """Return the files that a user's module depends on: of its project, and what they import of this one."""
     file = _module_file(module)
     if file is None:
         return []
@@ -109,7 +110,7 @@ def _user_files(module):
 
 
 def _module_file(name):
-    """File of a module, without running it where it is not imported yet; None where there is none."""
+    """Return the file of a module, which is not run for it; None where there is none."""
     if name in sys.modules:
         file = getattr(sys.modules[name], "__file__", None)
         return None if file is None else _located(Path(file))
@@ -130,7 +131,7 @@ def _module_file(name):
 
 
 def _with_own(files, roots):
-    """Files, and what they import of this project's controllers, and with those of fowt_env."""
+    """Return the files, and what they import of this project's controllers, and with those of fowt_env."""
     files, registry = set(files), CONTROLLERS / "__init__.py"  # which imports every controller
     for package in ("controllers", "simulator"):
 
@@ -147,7 +148,7 @@ def _located(path):
 
 
 def _package_of(path):
-    """What of this project a file belongs to: "controllers", "training", "visual", "simulator", or None.
+    """Return the part of this project of a file: "controllers", "training", "visual", "simulator" or None.
 
     visual draws what was computed: environments import it, and it shapes no run.
     """
@@ -159,7 +160,7 @@ def _package_of(path):
 
 
 def versions():
-    """{package: version} of what shapes the figures, Python and processor included."""
+    """Return {package: version} of what shapes the figures, Python and processor included."""
     found = {
         "fowt_env": fowt_env.__version__,
         "python": machine.python_version(),
@@ -174,7 +175,7 @@ def versions():
 
 
 def version_gap(old, new):
-    """The first package that shapes figures and has different versions in two mappings, with both; or None.
+    """Return the first package that shapes figures and differs between two mappings, with both; or None.
 
     One that is missing in a mapping shaped no figure there: its controllers failed.
     """

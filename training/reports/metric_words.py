@@ -1,7 +1,6 @@
 """Short names of the metrics that reports lead with, and what a reader is told of any metric."""
 
-from fowt_env.training.evaluation.metric_meanings import metric_meaning
-from fowt_env.training.evaluation.metrics import METRICS, better
+from fowt_env.training.evaluation.metrics import TABLE, better
 
 SHORT = {
     "RotSpeed_std_[rpm]": "rotor-speed std",
@@ -24,5 +23,5 @@ def short_name(metric):
 def about_metric(metric):
     """What a metric is, its unit and which direction is better, in sentences; of an unknown one its name."""
     name, _, unit = metric.partition("_[")
-    meaning = metric_meaning(metric) if metric in METRICS else name.replace("_", " ")
+    meaning = TABLE[metric].meaning if metric in TABLE else name.replace("_", " ")
     return f"{meaning[:1].upper()}{meaning[1:]}. Unit: {unit.removesuffix(']')}. {DIRECTIONS[better(metric)]}"

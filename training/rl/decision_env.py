@@ -11,7 +11,7 @@ from fowt_env.envs.decisions import Decisions, wind_entry
 from fowt_env.envs.observations import BLADE_CHANNELS, N_ACTIONS
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measure
-from fowt_env.training.evaluation.metrics import REDUCTIONS, TOWER_EXPONENT, damage_equivalent_load, travel
+from fowt_env.training.evaluation.metrics import STATISTICS, TOWER_EXPONENT, damage_equivalent_load, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 SETTLED_AFTER = 300.0  # s, from which on an episode of steady wind must be at rest
@@ -156,7 +156,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
         """
         record = np.where(self._failed[:, None], np.nan, self._record[self.skip : self._clock - 1])
         speed, platform_pitch, blade_pitch, torque = np.moveaxis(record, 2, 0)
-        first, mean, std = self.env.envs[0], REDUCTIONS["mean"], REDUCTIONS["std"]
+        first, mean, std = self.env.envs[0], STATISTICS["mean"].of, STATISTICS["std"].of
         time = first.control_dt * np.arange(len(record))
         turbine = first.scene.turbine
         gear, rated = turbine.drivetrain.gear_ratio, turbine.torque_law.rated_power

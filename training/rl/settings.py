@@ -18,7 +18,7 @@ from fowt_env.descriptions.records import (
     unknown_key,
     validate,
 )
-from fowt_env.descriptions.wind import NTM_SIGMA
+from fowt_env.descriptions.wind import NTM_SIGMAS
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.settings import KEYWORDS
 from fowt_env.errors import InputError
@@ -69,7 +69,7 @@ class Validation(Record):
     every: PositiveInteger  # decisions
     skip: NonNegative = 60.0  # s
     reference: Literal[tuple(CONTROLLERS)] = REFERENCE  # that figures are ratios to
-    sigma: Literal[NTM_SIGMA.allowed] = "90%"  # of the turbulence, as of the ntm wind
+    sigma: Literal[NTM_SIGMAS] = "90%"  # of the turbulence, as of the ntm wind
     steady: list[Positive] = []  # m/s, winds in which an agent must come to rest in still water
     gusts: list[Positive] = []  # m/s, mean winds of a gust (EOG) and a change of direction (EDC) each
     # of FowtEnv, in turn over the seeds of each wind; none: exact readings, as always in steady wind

@@ -2,7 +2,7 @@
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile, bare, number_of, same_key, words_of
@@ -72,18 +72,8 @@ def read_map(path, depth, density, gravity):
                 raise file.refusal("repeat: must be angles in degrees", number)
         elif "solver" in section:
             file.entries[head] = (words[0], number, words[1:] or ["True"])
-    lines = []
+    lines = _lines(file, rows, types, nodes, ("Line", "LineType", "UnstrLen", "NodeAnch", "NodeFair"))
     for number, words in rows:
-        if len(words) < 5:
-            raise file.refusal("must be Line, LineType, UnstrLen, NodeAnch, NodeFair", number, "line")
-        if words[1].lower() not in types:
-            raise file.refusal(f"line {words[0]}: unknown line type {words[1]!r}", number)
-        length = _positive(file, number, "UnstrLen", number_of(words[2]))
-        ends = []
-        for name in words[3:5]:
-            if name not in nodes:
-                raise file.refusal(f"line {words[0]}: node {name!r} is not there", number)
-            ends.append(nodes[name])
         for i, flag in enumerate(map(str.lower, words[5:]), 6):
             if "linear" in flag:
                 notes.append((f"line {words[0]} as a linear spring", "an elastic catenary of the same line"))
@@ -92,8 +82,6 @@ def read_map(path, depth, density, gravity):
             if number_of(flag) is None:
                 value = number_of(words[i]) if i < len(words) else None
                 file.columns.setdefault(flag, []).append((number, "True" if value is None else value))
-        lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
-    _check_count(file, lines)
     turned = [_turned(line, angle) for angle in angles for line in lines]
     _check_count(file, lines + turned)
     return file, lines + turned, [*notes, *differences(file)]
@@ -131,6 +119,28 @@ def _positive(file, number, key, value):
     return value
 
 
+def _lines(file, rows, types, points, columns):
+    """MooringLines of rows (line from 0, words) with these columns, by the ends and types that they name."""
+    lines, size = [], columns.index("UnstrLen")
+    places = [i for i, column in enumerate(columns) if column.startswith(("Node", "Attach"))]
+    for number, words in rows:
+        if len(words) < len(columns):
+            raise file.refusal(f"must be {', '.join(columns)}", number, "line")
+        if words[1].lower() not in types:
+            raise file.refusal(f"line {words[0]}: unknown line type {words[1]!r}", number)
+        length = _positive(file, number, "UnstrLen", number_of(words[size]))
+        for name in (words[place] for place in places):
+            if name.lower() not in points:
+                raise file.refusal(
+                    f"line {words[0]}: {name!r} is no point here (rods and bodies cannot be represented)",
+                    number,
+                )
+        ends = [points[words[place].lower()] for place in places]
+        lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
+    _check_count(file, lines)
+    return lines
+
+
 def _line(file, number, name, ends, length, kind, type_name):
     """MooringLine of its two ends (line, type, place) in either order."""
     kinds = ["anchor" if end[1] in ANCHORS else "fairlead" if end[1] in FAIRLEADS else None for end in ends]
@@ -153,15 +163,8 @@ def _line(file, number, name, ends, length, kind, type_name):
 def _turned(line, angle):
     """The line turned about the vertical axis."""
     c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-
-    def turn(place):
-        x, y, z = place
-        return (round(c * x - s * y, 9), round(s * x + c * y, 9), z)
-
-    return MooringLine(
-        turn(line.anchor), turn(line.fairlead), line.length, line.wet_weight, line.EA, line.seabed_friction,
-        line.kind,
-    )  # fmt: skip
+    ends = ((round(c * x - s * y, 9), round(s * x + c * y, 9), z) for x, y, z in (line.anchor, line.fairlead))
+    return replace(line, **dict(zip(("anchor", "fairlead"), ends, strict=True)))
 
 
 def _check_count(file, lines):
@@ -186,6 +189,7 @@ _SECTIONS = (  # a section of MoorDyn, and what its header may have, in the orde
 )
 _REFUSED = ("bodies", "rods", "external loads", "control", "failure")
 _COUNTS = ("ntypes", "nconnects", "nlines", "npoints", "nconns")  # of version 1
+VERSION_2 = ("ID", "LineType", "AttachA", "AttachB", "UnstrLen", "NumSegs")
 _ON_BED = ("seabed", "ground", "floor", "depth")
 
 
@@ -238,26 +242,11 @@ def read_moordyn(path, depth, density, gravity):
                 _check_fairlead(file, number, words, 7, ("FX", "FY", "FZ"))
             _keep_columns(file, number, words, -2 if len(words) < 12 else 10, ("CdA", "CA"))
     old = any("nodeanch" in text.lower() or "nodefair" in text.lower() for text in file.lines)
-    lines, known = [], {}
+    columns = ("Line", "LineType", "UnstrLen", "NumSegs", "NodeAnch", "NodeFair") if old else VERSION_2
+    known = set()
     for number, words in of["lines"]:
-        # version 1: Line LineType UnstrLen NumSegs NodeAnch NodeFair; version 2: ID LineType A B UnstrLen
-        places = (2, 4, 5) if old else (4, 2, 3)
-        if len(words) < 6:
-            raise file.refusal("must be ID, LineType, AttachA, AttachB, UnstrLen, NumSegs", number, "line")
-        known[file.new(number, known, words[0].lower(), "line")] = number
-        if words[1].lower() not in types:
-            raise file.refusal(f"line {words[0]}: unknown line type {words[1]!r}", number)
-        length = _positive(file, number, "UnstrLen", number_of(words[places[0]]))
-        ends = []
-        for name in (words[places[1]], words[places[2]]):
-            if name.lower() not in points:
-                raise file.refusal(
-                    f"line {words[0]}: point {name!r} is not there (rods and bodies cannot be represented)",
-                    number,
-                )
-            ends.append(points[name.lower()])
-        lines.append(_line(file, number, words[0], ends, length, types[words[1].lower()], words[1]))
-    _check_count(file, lines)
+        known.add(file.new(number, known, words[0].lower(), "line"))
+    lines = _lines(file, of["lines"], types, points, columns)
     return file, lines, [*notes, *differences(file)]
 
 

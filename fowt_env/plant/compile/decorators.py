@@ -2,8 +2,9 @@
 
 Numba's own cache watches only the file of the function itself: after an edit of a callee in
 another file a cached caller would go on returning the old result. So the cache lives in a folder
-named by a hash of every source of the plant. A kernel of another package (an environment's, a controller's)
-carries the hash of what its module imports besides. A user's function is compiled anew in each process.
+named by a hash of the code of every source of the plant, without its texts (sources.py). A kernel of another
+package (an environment's, a controller's) carries the hash of what its module imports besides. A user's
+function is compiled anew in each process.
 """
 
 import hashlib
@@ -31,7 +32,7 @@ from fowt_env.layout import PACKAGE, installed_path  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
 from fowt_env.plant.compile.linked import LinkedDispatcher  # noqa: E402
 from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # listens from here on
-from fowt_env.plant.compile.sources import imported_at_top  # noqa: E402
+from fowt_env.plant.compile.sources import imported_at_top, keep_sources, read_source  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
 DAY = 86400.0  # s; what was used within it may be in use still
@@ -42,16 +43,17 @@ PLANT = Path(__file__).absolute().parents[1]
 
 
 def _hash(paths):
-    """Hash (16 hexadecimal digits) of sources and of the versions that shape machine code."""
+    """Return the hash (16 hexadecimal digits) of sources' code and of versions that shape machine code."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
     for place, path in sorted((installed_path(path), path) for path in paths):
         digest.update(place.relative_to(PACKAGE).as_posix().encode())
-        digest.update(path.read_bytes())
+        digest.update(read_source(path).code.encode())
+    keep_sources()
     return digest.hexdigest()[:16]
 
 
 def own_folders(kernels):
-    """Folders of compiled kernels in a folder, those that this package made and no others."""
+    """Return the folders of compiled kernels in a folder, those that this package made and no others."""
     return [
         path
         for path in kernels.iterdir()
@@ -69,14 +71,14 @@ def _drop_oldest(folder):
 
 
 def _places(folder):
-    """The folders that must be ours, one by one, for an inner one can only be looked at if its outer is."""
+    """Yield the folders that must be ours: an inner one can only be looked at if its outer one is."""
     yield folder.parent
     yield folder
     yield from (Path(entry) for entry in os.scandir(folder) if entry.is_dir())
 
 
 def _cache_folder(sources):
-    """Folder of this source version's kernels, made if need be; the oldest others are dropped.
+    """Return the folder of this source version's kernels, made if need be; the oldest others are dropped.
 
     One that cannot be written, but is there, is read all the same. None, and kernels are then compiled in
     each process, where there is none or, after a warning, where somebody else may have put files into it.
@@ -139,7 +141,7 @@ def _keep(compiled, function):
 
 
 def _decorator(linked=False, **options):
-    """Decorator: numba.njit with these options, kept on disk. linked: for kernels to call, see linked.py."""
+    """Return the decorator numba.njit with these options, kept on disk; linked: by linked.py."""
 
     def decorate(function):
         if numba.config.DISABLE_JIT:
@@ -189,7 +191,7 @@ class ControlKernel:
 
     @cached_property
     def compiled(self):
-        """First-class function, or the Python function itself under NUMBA_DISABLE_JIT."""
+        """Return the first-class function, or the Python function itself under NUMBA_DISABLE_JIT."""
         if numba.config.DISABLE_JIT:
             return self.function
         signature = CONTROL_SIGNATURE.args, CONTROL_SIGNATURE.return_type
@@ -200,7 +202,7 @@ class ControlKernel:
 
 
 def control_kernel(function):
-    """A ControlKernel: a control law as a first-class function, so that one compiled loop serves them all.
+    """Return a ControlKernel: a law as a first-class function, so that one compiled loop serves all.
 
     function(parameters, memory, measurement, command): four (n,) float64 arrays; it reads the
     first and third and writes the second and fourth. A user's law is compiled in each process, a fifth

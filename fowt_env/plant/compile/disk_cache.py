@@ -9,18 +9,18 @@ The files are pickles, which run code as they are read: one that may be from som
 """
 
 import fcntl
+import hashlib
 import inspect
 import itertools
 import os
 import stat
-import tempfile
 from contextlib import contextmanager, suppress
 from functools import partial
 
 import numba
 from numba.core import caching
 
-from fowt_env.folders import distrust, make_private
+from fowt_env.folders import distrust, make_private, replaced_privately
 from fowt_env.plant.compile import linked
 
 
@@ -44,7 +44,7 @@ class SharedCacheFile(caching.IndexDataCacheFile):
 
     @contextmanager
     def _lock(self):
-        """Context that one process at a time is in."""
+        """Return a context that one process at a time is in."""
         handle = os.open(self._index_path + ".lock", os.O_RDWR | os.O_CREAT, 0o600)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX)
@@ -66,22 +66,13 @@ class SharedCacheFile(caching.IndexDataCacheFile):
         except Exception as error:  # likewise; numba compiles anew where the file cannot be read
             raise OSError(f"{name}: {error}") from error
 
-    @contextmanager
     def _open_for_write(self, path):
-        """Context with a file that takes the path's place at its end, private whatever the umask."""
-        handle, temporary = tempfile.mkstemp(dir=self._cache_path, prefix=os.path.basename(path) + ".tmp.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                yield file
-            os.replace(temporary, path)
-        except BaseException:
-            with suppress(OSError):
-                os.unlink(temporary)
-            raise
+        """Return a context with a file that takes the path's place at its end."""
+        return replaced_privately(path)
 
 
 def _check(path):
-    """Raises: PermissionError for a file that somebody else may have written."""
+    """Raise PermissionError for a file that somebody else may have written."""
     fault = distrust(path, stat.S_ISREG)
     if fault:
         raise PermissionError(f"{path} {fault}")
@@ -90,18 +81,25 @@ def _check(path):
 class _Locator(caching.UserProvidedCacheLocator):
     """Where a kernel's files are: in the folder that it is given, and not where numba's settings say.
 
-    Named by the package, not by the path: other installations of the same sources load what one compiled.
+    Named by the package, not by the path or the line: other installations of the same code load what one
+    compiled, and so does this one when a text has moved a function.
     """
 
     def __init__(self, function, path, folder, stamp):
         self._py_file = path
-        self._lineno = function.__code__.co_firstlineno
+        self._code = function.__code__
         self._cache_path = os.path.join(folder, function.__module__.rpartition(".")[0])
         self._stamp = stamp
 
     def get_source_stamp(self):
-        """What must not have changed: the function's file, and the stamp."""
-        return super().get_source_stamp(), self._stamp
+        """Return what must not have changed beside the folder's name."""
+        return self._stamp
+
+    def get_disambiguator(self):
+        """Return the text that tells functions of one name in a module apart, by code and numbers."""
+        numbers = [value for value in self._code.co_consts if isinstance(value, (int, float, complex, tuple))]
+        shape = repr((self._code.co_code, self._code.co_names, numbers))
+        return hashlib.sha256(shape.encode()).hexdigest()[:8]
 
     def ensure_cache_path(self):
         """Make the folder if it can be made; where it cannot, nothing is kept."""
@@ -137,7 +135,7 @@ class _LinkedFiles(_Files):
 class KernelCache(caching.FunctionCache):
     """Cache of one compiled function beneath a folder, for compiled functions' attribute _cache.
 
-    stamp: whatever it depends on beside its own file, its key and the name of the folder.
+    stamp: whatever it depends on beside its key and the name of the folder.
     links: whether it is a kernel of linked.py.
     """
 

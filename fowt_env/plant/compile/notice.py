@@ -31,7 +31,7 @@ COLLECT_AFTER = 200_000
 
 
 def own(compiled):
-    """Whether an event of numba is about a kernel of this project, not one of numba's or a user's."""
+    """Return whether an event of numba is about a kernel of this project, not one of numba's or a user's."""
     return (compiled.data["dispatcher"].py_func.__module__ or "").startswith("fowt_env.")
 
 
@@ -61,7 +61,7 @@ class Notice(event.Listener):
         self.thresholds = None
 
     def on_start(self, compiled):
-        """Numba begins with a kernel."""
+        """Note that numba begins with a kernel."""
         if not own(compiled):
             return
         self.depth += 1
@@ -76,7 +76,7 @@ class Notice(event.Listener):
             self._begin()
 
     def on_end(self, compiled):
-        """Numba has ended with it, or failed."""
+        """Note that numba has ended with a kernel, or failed."""
         if not own(compiled):
             return
         self.count += 1
@@ -159,13 +159,13 @@ atexit.register(NOTICE.close)
 
 
 def set_quiet(quiet: bool = True) -> None:
-    """None. Whether this process is silent while it compiles kernels, as with the variable FOWT_QUIET=1."""
+    """Silence this process while it compiles kernels (quiet), as the variable FOWT_QUIET=1 does, or not."""
     NOTICE.quiet = bool(quiet)
 
 
 @contextmanager
 def compilation_reported(said: Callable[[int], object]):
-    """Context in which nothing is printed: each compiled kernel calls said(kernels compiled within it)."""
+    """Return a context without prints, in which each compiled kernel calls said(kernels compiled so far)."""
     count = 0
 
     def counter():

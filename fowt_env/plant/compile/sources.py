@@ -1,49 +1,216 @@
-"""Which sources of this project a module imports at its top: what a kernel in it can depend on.
+"""What a source file holds for the compiler: a hash of its code, without its texts, and what it imports.
 
-A kernel freezes what its module's globals hold when it is compiled, and an import inside a function adds
-nothing to these. Statements are found by a pattern, as this runs at every start and a parser takes ten times
-as long; the project has no relative imports, and none in a condition that a kernel could see.
+The hash is of the syntax tree without comments, docstrings and the metadata of `Annotated`, none of which a
+kernel can depend on: texts may lie beside the code that they describe. Parsing takes some ms a file, so a
+small file in the cache folder keeps the result by a hash of the source's bytes.
 """
 
-import re
+import ast
+import hashlib
+import json
+import stat
+import sys
 from functools import cache
+from pathlib import Path
+from typing import NamedTuple
 
-from fowt_env.layout import module_path
+from fowt_env.caches import cached
+from fowt_env.folders import cache_root, distrust, make_private, replaced_privately
+from fowt_env.layout import FOLDERS, PACKAGE, installed_path
 
-MODULE = r"(fowt_env(?:\.\w+)*)"
-STATEMENT = re.compile(rf"^(?:from {MODULE} import (\([^)]*\)|.*)|import {MODULE})", re.MULTILINE)
-COMMENT = re.compile("#.*")
-NAME = re.compile(r"(\w+)(?: as \w+)?")
+MOST_KEPT = 1000  # sources in the file, the latest
+_unsaved: set[str] = set()  # keys of what was parsed since the file was written
+DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
+
+
+class Source(NamedTuple):
+    """What one file of Python holds."""
+
+    code: str  # hash of its code, 32 hexadecimal digits
+    top: tuple[str, ...]  # modules of this project that statements at its top import
+
+
+# --------------------------------------------------------------------------- one file
+
+
+def read_source(path):
+    """Return the Source of a file; the code of what is no Python is a hash of its bytes."""
+    path = Path(path)
+    status = path.stat()
+    return _read_source(path, status.st_mtime_ns, status.st_size)
+
+
+@cached(4096)
+def _read_source(path, time, size):
+    content = path.read_bytes()
+    known = _kept_sources()
+    key = hashlib.sha256(sys.version.encode() + content).hexdigest()[:32]
+    if key not in known:
+        known[key] = _parsed_source(content)
+        _unsaved.add(key)
+    code, top = known[key]
+    return Source(code, tuple(top))
+
+
+def _parsed_source(content):
+    """Return [hash of the code, modules of this project imported at the top] of a file's bytes."""
+    try:
+        tree = ast.parse(content)
+    except (SyntaxError, ValueError, RecursionError):
+        return [hashlib.sha256(content).hexdigest()[:32], []]
+    names = {name for level, name in _imported_names(tree.body) if not level}
+    top = sorted(name for name in names if name.partition(".")[0] == PACKAGE.name)
+    return [hashlib.sha256(code_text(tree).encode()).hexdigest()[:32], top]
+
+
+def code_text(tree):
+    """Return a text of a syntax tree, the same for sources that differ in texts and lines alone."""
+    for node in ast.walk(tree):
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            del node.body[0]
+        elif isinstance(node, ast.AnnAssign) and isinstance(kind := node.annotation, ast.Subscript):
+            if getattr(kind.value, "id", "") == "Annotated" and isinstance(kind.slice, ast.Tuple):
+                node.annotation = kind.slice.elts[0]
+    return ast.dump(tree)
+
+
+def _imported_names(nodes):
+    """Return {(level, module)} of the import statements among nodes; of `from a import b` a and a.b."""
+    names = set()
+    for node in nodes:
+        if isinstance(node, ast.Import):
+            names |= {(0, alias.name) for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            names.add((node.level, module))
+            names |= {(node.level, f"{module}.{alias.name}".strip(".")) for alias in node.names}
+    return names
+
+
+def all_imports(path):
+    """Return (level, module) of every import of a file, at its top or in a function; of no Python none."""
+    return _all_imports(path, path.stat().st_mtime_ns)
+
+
+@cached(4096)
+def _all_imports(path, time):
+    try:
+        return tuple(sorted(_imported_names(ast.walk(ast.parse(path.read_bytes())))))
+    except (SyntaxError, ValueError, RecursionError):
+        return ()
+
+
+# --------------------------------------------------------------------------- what sources import
+
+
+def imported_files(starts, roots, inside):
+    """Return the files `starts` and the Python files that they import, directly or not, in order.
+
+    Imports inside functions count too, and the packages around a module.
+    roots    folders that top-level modules lie in; the first that has one counts
+    inside   inside(path) -> whether a file belongs to them: others are neither in it nor followed
+    """
+
+    def imported(path):
+        files = []
+        for level, name in all_imports(path):
+            places = [path.parents[level - 1]] if level else roots
+            files += next(filter(None, (_module_files(place, name) for place in places)), [])
+        return files
+
+    return in_order(_followed(map(Path, starts), inside, imported))
 
 
 def imported_at_top(path, but):
-    """Return the paths of a source of fowt_env and of all that it imports of this project.
+    """Return the paths of a source of this project and of all that it imports at its top: what a kernel in it
+    can depend on, which freezes what its module's globals hold when it is compiled.
 
     but: a folder whose sources are neither followed nor among them.
     """
-    found, left = set(), [path]
-    while left:
-        path = left.pop()
-        if path in found or but in path.parents:
-            continue
-        found.add(path)
-        left += _imported(path)
-    return found
+    return _followed([path], lambda found: but not in found.parents, _imported_at_top)
 
 
 @cache  # some twenty modules with kernels of their own import much the same
-def _imported(path):
-    """Sources that the statements of one source name."""
-    found = []
-    for source, names, module in STATEMENT.findall(path.read_text(encoding="utf-8")):
-        inner = NAME.findall(COMMENT.sub("", names))
-        for dotted in (source or module, *(f"{source}.{name}" for name in inner)):
-            found += _files(dotted)
-    return tuple(found)
+def _imported_at_top(path):
+    """Return the sources that statements at the top of one name, without the packages around them."""
+    return [file for name in read_source(path).top for file in _module_files(PACKAGE.parent, name)[-1:]]
+
+
+def _followed(starts, inside, imported):
+    """Return the set of files that are inside, from some on by what imported(path) lists."""
+    found, left = set(), list(starts)
+    while left:
+        path = left.pop()
+        if path not in found and inside(path):
+            found.add(path)
+            left += imported(path)
+    return found
+
+
+def in_order(paths):
+    """Return files sorted by their paths, those of this package by the paths they have once installed."""
+    return sorted(paths, key=lambda path: installed_path(path) or path)
+
+
+def _module_files(folder, name):
+    """Return the files of a dotted module beneath a folder and of its packages, as far as there are any."""
+    own = folder == PACKAGE.parent and name.partition(".")[0] == PACKAGE.name
+    return _own_files(name) if own else _found_files(folder, name)
+
+
+@cache  # the modules of this project stay as they are
+def _own_files(name):
+    return _found_files(PACKAGE.parent, name)
+
+
+def _found_files(folder, name):
+    files = [folder / "__init__.py"] if not name and (folder / "__init__.py").is_file() else []
+    for part in filter(None, name.split(".")):
+        if folder == PACKAGE and part in FOLDERS:
+            folder = FOLDERS[part].parent
+        package, module = folder / part / "__init__.py", folder / f"{part}.py"
+        if package.is_file() or module.is_file():
+            files.append(package if package.is_file() else module)
+        elif not (folder / part).is_dir():
+            break
+        folder = folder / part
+    return files
+
+
+# --------------------------------------------------------------------------- what is kept on disk
+
+
+def _store():
+    """Return the path of the file of parsed sources; None without a cache folder."""
+    root = cache_root()
+    return root and root / "sources" / "parsed.json"
 
 
 @cache
-def _files(module):
-    """Source of a module; nothing for what is no module. The packages around it give it no name to use."""
-    place = module_path(module)
-    return [file for file in (place / "__init__.py", place.with_suffix(".py")) if file.is_file()]
+def _kept_sources():
+    """Return {hash of a source's bytes: [code, modules at the top]} of the file, {} if it is unusable."""
+    path = _store()
+    try:
+        if path is None or distrust(path.parent) or distrust(path, stat.S_ISREG):
+            return {}
+        return {
+            str(key): [str(code), list(map(str, top))]
+            for key, (code, top) in json.loads(path.read_bytes()).items()
+        }
+    except (OSError, ValueError, TypeError, AttributeError):  # there is none, or a broken one
+        return {}
+
+
+def keep_sources():
+    """Write what was parsed since into the file, where that can be; returns None."""
+    known, path = _kept_sources(), _store()
+    if not _unsaved or path is None:
+        return
+    _unsaved.clear()
+    try:
+        make_private(path.parent)
+        if not distrust(path.parent):
+            with replaced_privately(path) as file:
+                file.write(json.dumps(dict(list(known.items())[-MOST_KEPT:])).encode())
+    except OSError:  # no space, or no place to write
+        return

@@ -1,6 +1,6 @@
 """The kernel cache: made where it is missing, done without where it cannot be, right where old or shared."""
 
-import ast
+import json
 import os
 import pickle
 import subprocess
@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numba
 import pytest
-from copied_code import LOOKS, SOURCES, copied_code, edit
+from copied_code import LOOKS, copied_code, edit
 
-from fowt_env.layout import PACKAGE, installed_path, module_path
+from fowt_env.layout import PACKAGE, module_path
 from fowt_env.plant.compile import disk_cache
-from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER
+from fowt_env.plant.compile.decorators import KEEP_CACHES, MARKER, PLANT
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
 from fowt_env.plant.compile.notice import compilation_reported
-from fowt_env.plant.compile.sources import imported_at_top
+from fowt_env.plant.compile.sources import read_source
 
 ROOT = PACKAGE.parent
 SMALL = """
@@ -410,12 +410,61 @@ def test_an_edit_of_a_text_or_a_plot_compiles_nothing(tmp_path):
     assert {"envs/episode.py", "envs/rewards.py", "simulation.py"} < set(before) and before["loaded"] == "0"
     for folder in LOOKS:
         edit(code / folder)
+    rewards = code / "fowt_env" / "envs" / "rewards.py"
+    for path in (code / "fowt_env" / "plant" / "hydro" / "waves.py", rewards):  # functions move, texts change
+        text = path.read_text().replace('"""', '"""Other words.\n\n\n', 1)
+        path.write_text(text.replace('):\n    """', '):\n    # a comment\n    """Also here. '))
     assert keys(code, cache) == before | {"loaded": "1"}
-    edit(code / "fowt_env" / "envs" / "rewards.py")  # and of a reward what uses it
+    edit(rewards)  # and of a reward what uses it
     after = keys(code, cache)
     changed = {name for name in before if after[name] != before[name]} - {"loaded"}
     assert {"envs/rewards.py", "envs/episode.py"} <= changed
     assert not {"folder", "simulation.py", "controllers/pi.py"} & changed
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "same"),
+    [
+        ('"""A."""\ndef f(x):\n    """F."""\n    return x', "# note\n\ndef f(x):\n    return (x)", True),
+        ("class A(T):\n    x: Annotated[float, 'm']", "class A(T):\n    'A.'\n    x: float  # m", True),
+        ("class A(T):\n    x: Annotated[int, 'm']", "class A(T):\n    x: Annotated[float, 'm']", False),
+        ("def f(x):\n    return x + 1", "def f(x):\n    return x + 2", False),
+        ("A = 'text'", "A = 'other'", False),
+        ("def f():\n    return 'text'", "def f():\n    return 'other'", False),
+    ],
+)
+def test_the_hash_of_a_source_is_that_of_its_code(before, after, same, tmp_path):
+    hashes = []
+    for number, text in enumerate((before, after)):
+        path = tmp_path / f"{number}.py"
+        path.write_text(text)
+        hashes.append(read_source(path).code)
+    assert (hashes[0] == hashes[1]) is same
+
+
+def test_a_broken_list_of_parsed_sources_is_made_anew_and_one_of_others_is_not_read(tmp_path):
+    """A wrong hash in it would have kernels of other code loaded."""
+    (used,) = output(start(WHERE, tmp_path / "cache"))
+    (kept,) = (tmp_path / "cache" / "sources").iterdir()
+    sound = json.loads(kept.read_bytes())
+    wrong = json.dumps({key: ["0" * 32, top] for key, (_, top) in sound.items()})
+    for content, mode in (("{", 0o600), ('{"a": 1}', 0o600), (wrong, 0o666)):
+        kept.write_text(content)
+        kept.chmod(mode)
+        assert output(start(WHERE, tmp_path / "cache")) == [used]
+        assert json.loads(kept.read_bytes()) == sound and kept.stat().st_mode & 0o777 == 0o600
+
+
+def test_functions_of_one_name_in_a_module_are_kept_apart(tmp_path):
+    """Numba tells them apart by their lines, which change with every text above them."""
+    kept = []
+    for factor in (2.0, 3.0):
+        scope = {"__name__": __name__}
+        exec(compile(f"def scaled(x):\n    return {factor} * x", __file__, "exec"), scope)
+        compiled = numba.njit(scope["scaled"])
+        compiled._cache = disk_cache.KernelCache(scope["scaled"], tmp_path)
+        kept.append(compiled(1.0))
+    assert kept == [2.0, 3.0] and len(list(tmp_path.rglob("*.nbi"))) == 2
 
 
 def test_kernels_of_other_sources_of_the_plant_are_never_used(tmp_path):
@@ -440,48 +489,10 @@ def test_kernels_of_other_sources_of_the_plant_are_never_used(tmp_path):
     assert len(list((tmp_path / "cache" / "kernels").iterdir())) == 2
 
 
-def _module_files():
-    """{module name: path} of the package."""
-    files = {}
-    for path in (path for source in SOURCES for path in source.rglob("*.py")):
-        parts = installed_path(path).relative_to(ROOT).with_suffix("").parts
-        files[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    return files
-
-
-def _imported_at_the_top(path, files):
-    """Names of files' modules that a source imports outside its functions, as a parser finds them."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom | ast.Import):
-            assert not getattr(node, "level", 0), f"{path}: relative imports are not followed"
-    for node in ast.parse(path.read_text()).body:
-        if isinstance(node, ast.ImportFrom):
-            names = (f"{node.module}.{alias.name}" for alias in node.names)
-            found |= {name if name in files else node.module for name in names}
-        elif isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-    return found & set(files)
-
-
-@pytest.mark.parametrize("name", ["controllers.pi", "envs.episode_batch", "training.benchmarks.speed"])
-def test_imports_are_found_as_a_parser_finds_them(name):
-    files = _module_files()
-    waiting, seen = [f"fowt_env.{name}"], set()
-    while waiting:
-        module = waiting.pop()
-        if module not in seen:
-            seen.add(module)
-            waiting += _imported_at_the_top(files[module], files)
-    start = module_path(f"fowt_env.{name}").with_suffix(".py")
-    found, expected = imported_at_top(start, but=Path("nothing")), {files[module] for module in seen}
-    assert expected <= found and all(path.name == "__init__.py" for path in found - expected)
-
-
 def test_the_plant_imports_nothing_of_this_project_that_could_be_compiled_into_it():
-    files = _module_files()
-    plant = {name for name in files if name.startswith("fowt_env.plant")}
-    outside = set().union(*(_imported_at_the_top(files[name], files) for name in plant)) - plant
+    names = {name for path in PLANT.rglob("*.py") for name in read_source(path).top}
+    modules = {name for name in names if module_path(name).with_suffix(".py").is_file()}
+    outside = {name for name in modules if not name.startswith("fowt_env.plant.")}
     # what raises errors, finds folders and keeps tables is Python's alone: numba could not compile it
     assert outside == {"fowt_env.errors", "fowt_env.folders", "fowt_env.caches", "fowt_env.layout"}
 
@@ -509,7 +520,6 @@ def test_without_space_for_machine_code_kernels_work_all_the_same(tmp_path):
 KEEPER = """
 import pathlib, sys
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
-from fowt_env.plant.compile.sources import imported_at_top
 file = SharedCacheFile(sys.argv[1], "function", "stamp")
 ready = pathlib.Path(sys.argv[2])
 (ready / sys.argv[3]).touch()

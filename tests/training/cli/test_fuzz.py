@@ -132,7 +132,7 @@ JUNK = st.one_of(
     st.sampled_from((10**400, "nan", "ntm", b"bytes", 1j, (1.0, 2.0), [], {}, [1, "a"], [[1.0]], {"a": {}})),
     st.lists(st.floats(-10.0, 30.0), max_size=4),
 )
-WIND_KEYS = sorted({key for kind in KINDS.values() for key in kind})
+WIND_KEYS = sorted({key for kind in KINDS.values() for key in kind.keys.model_fields})
 WAVE_KEYS = sorted({key for needed, further in SEA_KEYS.values() for key in (*needed, *further)})
 
 

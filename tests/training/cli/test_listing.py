@@ -6,16 +6,14 @@ import pytest
 from command_line import fowt
 from typer.testing import CliRunner
 
-from fowt_env.descriptions import faults, sea_state, wind
+from fowt_env.descriptions import sea_state, wind
 from fowt_env.envs import tasks
 from fowt_env.plant.channels import BLADE_CHANNELS, FIXED_CHANNELS, TOWER_CHANNELS
 from fowt_env.scene import options
 from fowt_env.training.cli import listing
 from fowt_env.training.cli.app import app
 from fowt_env.training.evaluation.cases import read_suite
-from fowt_env.training.evaluation.metric_meanings import metric_meaning
-from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.weather.wind_field import FIELD_KINDS
+from fowt_env.training.evaluation.metrics import METRICS, TABLE
 
 
 def rows(*words):
@@ -23,11 +21,10 @@ def rows(*words):
 
 
 def test_what_is_described_here_is_what_there_is():
-    assert set(listing.WINDS) - {"uniform"} == {*wind.KINDS, *FIELD_KINDS}  # uniform: a form of series
-    assert set(listing.FAULTS) == set(faults.KINDS)
-    assert set(listing.OPTIONS) == set(options.OPTIONS)
-    assert set(listing.TASKS) == set(tasks.TASKS)
-    assert len(rows("metrics")) == len(METRICS) and all(metric_meaning(metric) for metric in METRICS)
+    assert {row["kind"] for row in rows("winds")} - {"uniform"} == set(wind.ALL_KINDS)
+    assert all(option.summary for option in options.OPTIONS.values())
+    assert all(task.summary for task in tasks.TASKS.values())
+    assert len(rows("metrics")) == len(METRICS) and all(metric.meaning for metric in TABLE.values())
 
 
 def test_every_channel_has_a_meaning():
