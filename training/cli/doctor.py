@@ -8,27 +8,24 @@ from rich.markup import escape
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli import requirements
-from fowt_env.training.cli.console import app, reported
-
-DOCTOR_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt doctor[/cyan]  # all of it; the self-test compiles kernels if it must, up to a minute
-
-[cyan]fowt doctor --no-test[/cyan]  # versions, optional parts and the cache alone
-
-[bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not."""
+from fowt_env.training.cli.console import command
 
 out = Console(emoji=False)
 
 
-@app.command(epilog=DOCTOR_EXAMPLES)
-@reported
+@command()
 def doctor(
     test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True,
 ):
     """Check this installation.
 
     Versions, optional parts, the cache of compiled kernels, and a short run with known results.
+
+    Examples:
+    fowt doctor  # all of it; the self-test compiles kernels if it must, up to a minute
+    fowt doctor --no-test  # versions, optional parts and the cache alone
+
+    [bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not.
     """
     _print_versions()
     _print_extras()

@@ -3,48 +3,40 @@
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cli.console import app, note, output, reported
+from fowt_env.training.cli.console import command, note, output
 
 PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
-PLOT_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt plot series run.csv[/cyan]  # stacked time series, into series.png
-
-[cyan]fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png[/cyan]  # two runs over each other
-
-[cyan]fowt plot series openfast.outb run.csv[/cyan]  # a run of OpenFAST beside one of fowt simulate
-
-[cyan]fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png[/cyan]  # a box for each run
-
-[cyan]fowt plot raos waves.parquet --skip 100[/cyan]  # motion per metre of wave, of a run in irregular waves
-
-[cyan]fowt plot schedule steady.csv[/cyan]  # operating points that fowt trim --out wrote
-
-Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST."""
 
 
-@app.command(epilog=PLOT_EXAMPLES)
-@reported
+@command()
 def plot(
-    kind: Annotated[str, typer.Argument(help="series, spectra, boxes, raos or schedule.")],
-    files: Annotated[
-        list[str], typer.Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")
-    ],
+    kind: Annotated[str, Argument(help="series, spectra, boxes, raos or schedule.")],
+    files: Annotated[list[str], Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")],
     out_path: Annotated[
-        str | None, typer.Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
+        str | None, Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
     ] = None,
-    skip: Annotated[float, typer.Option(min=0.0, help="Seconds at the start left out; not of series.")] = 0.0,
-    title: Annotated[str | None, typer.Option(help="Heading.")] = None,
+    skip: Annotated[float, Option(min=0.0, help="Seconds at the start left out; not of series.")] = 0.0,
+    title: Annotated[str | None, Option(help="Heading.")] = None,
     platform: Annotated[
-        str, typer.Option(help="Whose natural period of platform pitch the spectra mark; or none.")
+        str, Option(help="Whose natural period of platform pitch the spectra mark; or none.")
     ] = "oc3_hywind",
 ):
     """Plot saved runs: time series, spectra, box plots.
 
     Also the response to waves, and the steady schedule of a table of fowt trim.
+
+    Examples:
+    fowt plot series run.csv  # stacked time series, into series.png
+    fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png  # two runs over each other
+    fowt plot series openfast.outb run.csv  # a run of OpenFAST beside one of fowt simulate
+    fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png  # a box for each run
+    fowt plot raos waves.parquet --skip 100  # motion per metre of wave, of a run in irregular waves
+    fowt plot schedule steady.csv  # operating points that fowt trim --out wrote
+
+    Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST.
     """
     from fowt_env.files.tables import read_series
 

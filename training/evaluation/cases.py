@@ -485,6 +485,25 @@ def all_cases(platform=None):
     return cases
 
 
+def chosen_cases(suite, cases, platform=None):
+    """Return the Suite or list of Cases for the names of a suite and of cases, either of which may be None.
+
+    platform: a name or a path to which they are scaled; None: that of the suite.
+    Raises: InputError for an unknown name, and for a case that is not in the suite.
+    """
+    if suite is None:
+        return named_cases("above_rated" if cases is None else cases, platform)
+    whole = read_suite(suite, platform)
+    if cases is None:
+        return whole
+    known = {case.name: case for case in whole.cases}
+    names = [name.strip() for name in cases.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise unknown(f"case of suite {whole.name!r}", name, known)
+    return replace(whole, cases=tuple(known[name] for name in dict.fromkeys(names)))
+
+
 def named_cases(names, platform=None):
     """List of Cases for names of cases and suites, each once, in the order asked for.
 

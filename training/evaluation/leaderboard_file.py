@@ -1,15 +1,21 @@
-"""What leaderboard.json must hold for a page to be made of it; keys beyond these are let be.
+"""leaderboard.json of a results folder: written, and checked before a page is made of it.
 
-The file is checked whole before anything is read from it, since it may come from another version or hand.
+The whole file is checked at once, since another version may have written it; further keys are ignored.
 """
 
+import json
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from fowt_env.descriptions.records import validate
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.cases import Limits, Score
 from fowt_env.training.evaluation.failures import KINDS, lost_text
+from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.results import write_json
+
+COPIED = ("format", "fowt_env", "plant", "versions", "suite", "options", "created")  # from the manifest
 
 WholeNumber = Annotated[int, Field(ge=0, le=10**9)]
 FiniteNumber = Annotated[float, Field(ge=-1e300, le=1e300)]
@@ -88,4 +94,20 @@ def check_leaderboard(content, path):
             f"{str(path)!r} is not of this version ({'; '.join(problems[:3])}): run fowt evaluate on the"
             " folder again, or remove that file to have means of results.csv"
         )
+    return board
+
+
+def write_leaderboard(table, folder, baseline=None):
+    """Return the leaderboard of a results folder, and write it to leaderboard.json there.
+
+    Suite, score and limits are those of the folder's manifest.json.
+    Raises: InputError for a baseline that was not evaluated.
+    """
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    rules = {}
+    for key, kind in (("score", Score), ("limits", Limits)):
+        values = (manifest["suite"] or {}).get(key)
+        rules[key] = None if values is None else kind(**values)
+    board = {key: manifest[key] for key in COPIED} | leaderboard(table, baseline, **rules)
+    write_json(board, folder / "leaderboard.json")
     return board

@@ -1,17 +1,13 @@
 """What people look at after an evaluation: the printed table and the plots."""
 
 import json
-from dataclasses import replace
 
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.ratings import ratings
-from fowt_env.errors import unknown
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import holm
-from fowt_env.training.evaluation.cases import Limits, Score, named_cases, read_suite
 from fowt_env.training.evaluation.failures import KINDS, lost_text
-from fowt_env.training.evaluation.leaderboard import leaderboard
-from fowt_env.training.evaluation.results import file_name, run_file, write_json
+from fowt_env.training.evaluation.results import file_name, run_file
 from fowt_env.training.evaluation.run_case import OK, REFERENCE
 from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.evaluation.seeds import ranges
@@ -74,46 +70,6 @@ def summary_rows(means, width):
             break
     headings, texts = zip(*shown, strict=True)
     return headings, list(zip(*texts, strict=True)), lost
-
-
-def chosen_cases(suite, cases, platform=None):
-    """Suite or list of Cases for the names of a suite and of cases, either of which may be None.
-
-    platform: a name or a path to which they are scaled; None: that of the suite.
-    Raises: InputError for an unknown name, and for a case that the suite does not hold.
-    """
-    if suite is None:
-        return named_cases("above_rated" if cases is None else cases, platform)
-    whole = read_suite(suite, platform)
-    if cases is None:
-        return whole
-    known = {case.name: case for case in whole.cases}
-    wanted = [name.strip() for name in cases.split(",") if name.strip()]
-    for name in wanted:
-        if name not in known:
-            raise unknown(f"case of suite {whole.name!r}", name, known)
-    return replace(whole, cases=tuple(known[name] for name in dict.fromkeys(wanted)))
-
-
-def write_leaderboard(table, folder, baseline=None):
-    """Mapping of the leaderboard of a results folder, also written to leaderboard.json in it.
-
-    The settings are those of the folder's manifest.json.
-    Raises: InputError for a baseline that was not evaluated.
-    """
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    suite = manifest["suite"] or {}
-    score, limits = suite.get("score"), suite.get("limits")
-    rules = {
-        "score": None if score is None else Score(**score),
-        "limits": None if limits is None else Limits(**limits),
-    }
-    board = {
-        key: manifest[key]
-        for key in ("format", "fowt_env", "plant", "versions", "suite", "options", "created")
-    } | leaderboard(table, baseline, **rules)
-    write_json(board, folder / "leaderboard.json")
-    return board
 
 
 # the printed leaderboard: heading, metric, format, with its interval, with its paired difference

@@ -43,7 +43,7 @@ def test_a_run_at_the_generator_s_limits_or_past_the_overspeed_says_so(tmp_path,
     monkeypatch.syspath_prepend(tmp_path)
     stderr = fowt("simulate", "--wind", "18", "--duration", "20", "--controller", "runaway:Off")[1]
     assert "rate limit for 13.9 % of the run" in stderr  # 28 of 201 rows: from 43.1 kN m to zero
-    assert "beyond the turbine's overspeed of 15.73 rpm" in stderr
+    assert "above the turbine's overspeed of 15.73 rpm" in stderr
     quiet = fowt("simulate", *SHORT)[1]
     assert "overspeed" not in quiet and "rate limit" not in quiet
 
@@ -450,7 +450,7 @@ def test_without_a_terminal_progress_is_a_line_now_and_then(monkeypatch, capsys)
     monkeypatch.setattr(console.time, "monotonic", lambda: next(clock))
     with console.progress_bar("training", None, every=10.0) as update:
         for done in (1, 2, 3, 4):
-            update(done, f"step {done}", 8)
+            update(done, 8, f"step {done}")
     assert capsys.readouterr().err.splitlines() == ["11 s, 25 %: step 2", "25 s, 50 %: step 4"]
 
 

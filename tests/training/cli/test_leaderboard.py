@@ -48,5 +48,5 @@ def test_evaluate_draws_the_seeds_of_a_suite_and_says_so_in_what_it_writes(tmp_p
 @pytest.mark.parametrize("words", [(), ("--suite", "above_rated", "--seeds", "1"), ("--cases", "ntm_18")])
 def test_drawn_seeds_need_a_suite_and_no_other_seeds(tmp_path, words):
     done = fowt("evaluate", *words, "--draw-seeds", HASH, "--out", tmp_path / "out", code=2)
-    assert "--draw-seeds: draws the seeds of a --suite" in " ".join(done.stderr.split())
+    assert "--draw-seeds: needs a --suite" in " ".join(done.stderr.split())
     assert not (tmp_path / "out").exists()

@@ -69,7 +69,7 @@ def test_gust_draws_its_picture_of_each_controller(tmp_path):
     [
         (("baselines", "{}", "--against", "gspi"), "unknown controller of the evaluation 'gspi'"),
         (("baselines", "{}", "--group", "g"), "must be NAME=LABEL,LABEL"),
-        (("baselines", "{}", "--group", "g=a", "--group", "g=b"), "there twice"),
+        (("baselines", "{}", "--group", "g=a", "--group", "g=b"), "used twice"),
         (("baselines", "nowhere"), "no such file"),
         (("cases", "{}", "--figures", "power"), "unknown figure 'power'"),
         (("bound", "{}", "--bound", "nowhere.csv"), "there is no such file"),
