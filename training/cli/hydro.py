@@ -28,7 +28,7 @@ def hydro(
 ):
     """Wave loads of a hull from its panel mesh (Capytaine).
 
-    These are added mass, damping, wave excitation and hydrostatics.
+    Computes added mass, damping, wave excitation and hydrostatics.
 
     Examples:
     fowt hydro semi.gdf --depth 200 --out hydro.npz  # 0.05 to 3 rad/s, waves from -180 to 180 deg

@@ -29,7 +29,10 @@ def validate(
         ),
     ] = None,
     out_folder: Annotated[
-        str | None, Option("--out", help="Folder; default: results/validation[/PLATFORM, except for OC3].")
+        str | None,
+        Option(
+            "--out", help="Folder; default: results/validation, for others than OC3 its subfolder PLATFORM."
+        ),
     ] = None,
     reference: Annotated[str | None, Option(help="Folder of the OpenFAST series.")] = None,
     bts: Annotated[str | None, Option(help="Full TurbSim box instead of the stored region.")] = None,
