@@ -10,7 +10,7 @@ import pandas as pd
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.engines import outcomes
-from fowt_env.training.evaluation.evaluate import planned, score, score_and_send
+from fowt_env.training.evaluation.evaluate import planned, score, stored
 from fowt_env.training.evaluation.results import read_row
 
 STAGES = ("whole run", "without its file", "reading its row")
@@ -29,12 +29,12 @@ def evaluation_cost(count=21, suite="above_rated", controller="pi"):
     with tempfile.TemporaryDirectory() as folder:
         runs = planned(controller, chosen, seeds=seeds, runs_folder=folder)
         for run in runs[:: len(seeds)]:
-            score(run)
+            stored(run, score(run))
         runs = runs[:count]
         spent = dict.fromkeys(STAGES, 0.0)
         for run in runs:
             start = time.process_time()
-            score(run)
+            stored(run, score(run))
             spent["whole run"] += time.process_time() - start
             start = time.process_time()
             read_row(run.frame_path)
@@ -63,7 +63,7 @@ def ray_cost(count=200, controller="pi", suite="above_rated"):
     """
     chosen = read_suite(suite)
     with tempfile.TemporaryDirectory() as folder:
-        _, content = score_and_send(planned(controller, chosen, seeds=(1,), runs_folder=folder)[0])
+        _, content = score(planned(controller, chosen, seeds=(1,), runs_folder=folder)[0])
     rows = []
     for what, size in (
         ("an empty task", 0),

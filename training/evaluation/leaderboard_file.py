@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from fowt_env.descriptions.records import validate
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL
 from fowt_env.training.evaluation.cases import Limits, Score
 from fowt_env.training.evaluation.failures import KINDS, lost_text
 from fowt_env.training.evaluation.leaderboard import leaderboard
@@ -26,9 +27,9 @@ class _Part(BaseModel):
 
 
 class Statistic(_Part):
-    """A mean or a difference with the ends of its interval; null where there is none.
+    """A mean or a difference with the ends of its interval (null: none).
 
-    Of a difference also percent, of the baseline's mean, and its two-sided p-value.
+    A difference has also percent, of the baseline's mean, and a two-sided p-value.
     """
 
     mean: FiniteNumber | None
@@ -39,7 +40,7 @@ class Statistic(_Part):
 
 
 class Figures(_Part):
-    """What a controller did, over all cases or in one."""
+    """Runs and metrics of a controller, over all cases or in one."""
 
     runs: WholeNumber
     failed: WholeNumber
@@ -50,12 +51,12 @@ class Figures(_Part):
 
     @property
     def lost(self):
-        """Number of runs that did not end well."""
+        """Number of lost runs."""
         return self.failed + self.tripped + self.lost_power
 
     @property
     def lost_text(self):
-        """Text "1 failed, 2 tripped" of these, "" for none."""
+        """Text "1 failed, 2 tripped" of the lost runs, "" for none."""
         return lost_text({name: getattr(self, name) for name in KINDS})
 
 
@@ -70,29 +71,29 @@ class LeaderboardEntry(Figures):
 
 
 class Interval(_Part):
-    """How the intervals were made."""
+    """How the intervals were computed."""
 
-    level: Annotated[float, Field(gt=0, lt=1)]
-    method: str
-    least_seeds: Annotated[int, Field(ge=1, le=10**9)] = 2
+    level: Annotated[float, Field(gt=0, lt=1)] = LEVEL
+    method: str = ""
+    least_seeds: Annotated[int, Field(ge=1, le=10**9)] = LEAST_SEEDS
 
 
 class LeaderboardFile(_Part):
     """The file."""
 
     baseline: str | None
-    interval: Interval | None = None
+    interval: Interval = Interval()
     penalty: FiniteNumber | None = None
     controllers: list[LeaderboardEntry]
 
 
 def check_leaderboard(content, path):
-    """A LeaderboardFile of parsed JSON. Raises: InputError that names the first keys that are wrong."""
+    """Return the LeaderboardFile of parsed JSON. Raises: InputError that names the first wrong keys."""
     board, problems = validate(LeaderboardFile, content)
     if problems:
         raise InputError(
             f"{str(path)!r} is not of this version ({'; '.join(problems[:3])}): run fowt evaluate on the"
-            " folder again, or remove that file to have means of results.csv"
+            " folder again, or remove that file to show means of results.csv"
         )
     return board
 

@@ -10,6 +10,7 @@ leaderboard.json are made from those files, so an interrupted evaluation loses a
 """
 
 import hashlib
+import io
 import json
 import re
 import time
@@ -64,18 +65,22 @@ def check_name(what, name):
         raise InputError(f"{what} {shown!r} must be a printable text of at most {LONGEST_NAME} characters")
 
 
-def parquet_of(frame, row):
-    """Arrow table of a run (None: no rows) with its row of results in the metadata."""
+def run_content(frame, row):
+    """Return the Parquet file of a run as bytes: its time series (None: no rows), its row in the metadata."""
     if frame is None:
         frame = pd.DataFrame({"Time_[s]": pd.Series(dtype="float64")})
     table = pa.Table.from_pandas(frame, preserve_index=False)
-    return table.replace_schema_metadata({**table.schema.metadata, ROW_KEY: _json(row).encode()})
+    content = io.BytesIO()
+    pq.write_table(
+        table.replace_schema_metadata({**table.schema.metadata, ROW_KEY: _json(row).encode()}), content
+    )
+    return content.getvalue()
 
 
-def write_run(frame, row, path):
-    """The path written: the run's time series and row, whole or not at all."""
+def write_run(content, path):
+    """Write the file of a run, of the bytes of `run_content`, whole or not at all; return its path."""
     with replacing(path) as temporary:
-        pq.write_table(parquet_of(frame, row), temporary)
+        temporary.write_bytes(content)
     return path
 
 

@@ -12,7 +12,7 @@ from fowt_env.training.board.folder import Board, write_secret_seeds
 from fowt_env.training.board.judge import _unordered, check_figures, judge
 from fowt_env.training.board.page import FIGURES, board_rows, cell, escaped, ratio_text, write_board
 from fowt_env.training.evaluation.cases import read_suite
-from fowt_env.training.evaluation.results import read_row, run_file, write_run
+from fowt_env.training.evaluation.results import read_row, run_content, run_file, write_run
 from fowt_env.training.evaluation.seeds import DRAWN, drawn_seeds
 
 SUITE = """
@@ -183,7 +183,7 @@ def test_figures_that_are_not_those_of_the_series_are_refused(board, judged):
     shown = pd.read_parquet(path)
     shown["RotSpeed_[rpm]"] *= 1.001
     try:
-        write_run(shown, row, path)
+        write_run(run_content(shown, row), path)
         with pytest.raises(InputError, match="from its series"):
             check_figures(table, folder, board.suite("short"))
         left = judge(board, trust_code=True)
@@ -191,7 +191,7 @@ def test_figures_that_are_not_those_of_the_series_are_refused(board, judged):
         assert set(left.public["short"]["controller"]) == {"reference", "gspi_oc3"}
     finally:
         shown["RotSpeed_[rpm]"] /= 1.001
-        write_run(shown, row, path)
+        write_run(run_content(shown, row), path)
 
 
 def test_secret_runs_come_in_an_order_that_nobody_knows():

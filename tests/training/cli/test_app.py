@@ -347,9 +347,7 @@ def test_trim_prints_the_operating_points_of_trim(tmp_path):
     assert "RotThrust" in stdout
     table = pd.read_csv(out)
     assert table["Wind_[m/s]"].tolist() == [8.0, 18.0]
-    point = fowt_env.trim(
-        fowt_env.build_scene("oc3_hywind", wind=18.0), platform="floating"
-    )
+    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0), platform="floating")
     assert table["RotThrust_[kN]"][1] == pytest.approx(point["RotThrust"], rel=1e-9)
 
 

@@ -25,9 +25,17 @@ from fowt_env.training.cli.console import EXIT_STOPPED
 from fowt_env.training.evaluation import engines, guard, provenance, results
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.evaluation.results import LONGEST_NAME, check_name, read_row, run_file, write_run
-from fowt_env.training.reports.terminal import evaluation_plots, write_leaderboard
+from fowt_env.training.evaluation.results import (
+    LONGEST_NAME,
+    check_name,
+    read_row,
+    run_content,
+    run_file,
+    write_run,
+)
+from fowt_env.training.reports.terminal import evaluation_plots
 
 CALM = Case("calm", 16.0)
 SHORT = {"duration": 4.0, "skip": 1.0}
@@ -257,7 +265,7 @@ def written_row(tmp_path, **changes):
     row = dict.fromkeys(COLUMNS, 1.5) | {"controller": "pi", "case": "calm", "seed": 1, "status": "ok"}
     row = row | {"reason": "", "events": "", "warning": ""} | changes
     row = {name: value for name, value in row.items() if value is not Ellipsis}
-    return write_run(None, row, tmp_path / "runs" / "pi" / "calm_seed1.parquet")
+    return write_run(run_content(None, row), tmp_path / "runs" / "pi" / "calm_seed1.parquet")
 
 
 @pytest.mark.parametrize(
@@ -308,10 +316,10 @@ def test_a_folder_of_other_versions_is_refused_with_both_of_them(tmp_path, packa
 
 
 def test_a_ray_worker_of_other_versions_does_nothing(monkeypatch):
-    from fowt_env.training.evaluation.evaluate import score_and_send
+    from fowt_env.training.evaluation.evaluate import score
 
     with pytest.raises(InputError, match="numpy 0.1 here and numpy .* at the worker"):
-        score_and_send(None, here=provenance.versions() | {"numpy": "0.1"})
+        score(None, here=provenance.versions() | {"numpy": "0.1"})
 
 
 def test_rare_events_of_a_run_are_in_its_row(plant, tmp_path):

@@ -19,8 +19,9 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation import provenance, results
 from fowt_env.training.evaluation.cases import Case, Suite
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.reports.terminal import leaderboard_rows, write_leaderboard
+from fowt_env.training.reports.terminal import leaderboard_rows
 
 CALM = Case("calm", 16.0)
 WINDY = Case("windy", 18.0)

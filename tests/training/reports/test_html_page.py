@@ -243,7 +243,7 @@ def test_a_page_comes_out_where_the_platform_of_the_evaluation_is_a_file_of_anot
     cases = {case: {"platform": "/home/alice/<b>.toml"} for case in CASES}
     (copy / "manifest.json").write_text(json.dumps({"cases": cases}))
     text = write_report(copy).read_text(encoding="utf-8")
-    assert "&#x27;/home/alice/&lt;b&gt;.toml&#x27; does not exist. Give another with --platform" in text
+    assert "&#x27;/home/alice/&lt;b&gt;.toml&#x27; does not exist. Choose another --platform" in text
     assert data_of(copy / "report.html")["schedule"] is None
     with pytest.raises(InputError, match="mine.toml"):
         write_report(copy, platform="mine.toml")

@@ -70,7 +70,7 @@ def test_with_too_few_seeds_nothing_is_called_better(seeds, count):
 
 def test_lost_runs_are_said_of_who_lost_them_and_of_the_baseline():
     text = words(verdict(board(("mypid", gaps(0.001, -45.0), 2)), 6, 4))
-    assert "2 failed of 8 runs, of which there are no figures" in text
+    assert "2 failed of 8 runs, which are not in these means" in text
     assert "The baseline itself" not in text
     text = words(verdict(board(("mypid", gaps(0.001, -45.0), 2), baseline="mypid"), 6, 4))
     assert "The baseline itself lost runs (2 failed of 8 runs), of which there are no differences" in text
