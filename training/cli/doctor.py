@@ -14,9 +14,7 @@ out = Console(emoji=False)
 
 
 @command()
-def doctor(
-    test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True,
-):
+def doctor(test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True):
     """Check this installation.
 
     Versions, optional parts, the cache of compiled kernels, and a short run with known results.

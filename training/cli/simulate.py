@@ -54,8 +54,7 @@ def simulate(
         list[str] | None, Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
     ] = None,
     fault: Annotated[
-        list[str] | None,
-        Option(metavar="KIND:TIME or JSON", help="Fault, e.g. grid_loss:100; repeats."),
+        list[str] | None, Option(metavar="KIND:TIME or JSON", help="Fault, e.g. grid_loss:100; repeats.")
     ] = None,
     protection: Annotated[
         str, Option(help="Trips: none, turbine (those of its file), or JSON of single ones.")

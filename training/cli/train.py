@@ -37,8 +37,7 @@ def train(
     out_folder: Annotated[str | None, Option("--out", help="Folder of the run.")] = None,
     resume: Annotated[bool, Option("--resume", help="Continue from the newest checkpoint.")] = False,
     trust_zip: Annotated[
-        bool,
-        Option("--trust-zip", help="With --resume: load a checkpoint of others, executing its code."),
+        bool, Option("--trust-zip", help="With --resume: load a checkpoint of others, executing its code.")
     ] = False,
     change: Annotated[
         list[str] | None, Option("--set", metavar="KEY=VALUE", help="Change a setting; repeatable.")

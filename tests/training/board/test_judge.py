@@ -108,15 +108,15 @@ def judged(board, tmp_path_factory):
 
 
 def test_code_runs_only_where_it_is_trusted(board):
-    with pytest.raises(InputError, match="submissions mine: hold Python code"):
+    with pytest.raises(InputError, match="submissions mine: contain Python code"):
         judge(board)
-    with pytest.raises(InputError, match="jobs = 100000: .* give at most that many"):
+    with pytest.raises(InputError, match="jobs = 100000: .* use at most that many"):
         judge(board, 100000, trust_code=True)
 
 
 def test_runs_of_secret_seeds_lie_outside_of_the_board(board, tmp_path):
     write_secret_seeds(tmp_path / "seeds.txt", 1)
-    with pytest.raises(InputError, match="must lie outside"):
+    with pytest.raises(InputError, match="must be outside"):
         judge(board, 1, tmp_path / "seeds.txt", board.folder / "private", trust_code=True)
     with pytest.raises(InputError, match="need a folder"):
         judge(board, 1, tmp_path / "seeds.txt", trust_code=True)

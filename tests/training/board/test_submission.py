@@ -107,7 +107,7 @@ def test_added_submissions_are_kept_and_never_replaced(tmp_path):
 def test_names_that_readers_take_for_each_other_are_refused(tmp_path):
     board = new_board(tmp_path / "board")
     board.add(write(tmp_path / "a", name="one_more"))
-    with pytest.raises(InputError, match="the board has 'one_more', which readers would take for it"):
+    with pytest.raises(InputError, match="the board has 'one_more', which readers would confuse with it"):
         board.add(write(tmp_path / "b", name="one-more"))
 
 

@@ -62,11 +62,7 @@ def test_it_shows_folder_versions_and_sizes(root):
 
 @pytest.mark.parametrize(
     "words, gone",
-    [
-        ((), OLD),
-        (("--all", "--yes"), OLD | {THIS}),
-        (("--wind-boxes", "--yes"), OLD | {f"{'a' * 24}.npz"}),
-    ],
+    [((), OLD), (("--all", "--yes"), OLD | {THIS}), (("--wind-boxes", "--yes"), OLD | {f"{'a' * 24}.npz"})],
 )
 def test_it_removes_what_is_named_and_nothing_else(root, words, gone):
     assert fowt("clear", *words).exit_code == 0

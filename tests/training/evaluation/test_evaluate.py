@@ -127,7 +127,7 @@ def test_a_rotor_beyond_the_trip_is_no_good_run_and_says_when_and_why():
     options = {"duration": 40.0, "skip": 5.0}
     row = evaluate({"runaway": Runaway()}, [CALM], **options).iloc[0]
     assert row["status"] == "tripped" and 0.0 < row["stopped_[s]"] < 40.0
-    assert row["reason"] == f"overspeed trip at {row['stopped_[s]']:.1f} s: rotor speed beyond 1.3 of rated"
+    assert row["reason"] == f"overspeed trip at {row['stopped_[s]']:.1f} s: rotor speed above 1.3 of rated"
     assert row["overspeed_[%]"] > 25.0  # the figures are those of what happened
     later = evaluate({"runaway": Runaway()}, [replace(CALM, trip=1.6)], **options).iloc[0]
     assert later["stopped_[s]"] > row["stopped_[s]"]

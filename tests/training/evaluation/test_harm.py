@@ -288,7 +288,7 @@ def test_a_row_of_a_file_elsewhere_is_refused_and_a_strangers_reason_made_printa
     path = written_row(tmp_path, status="failed", reason="a\x1b[31m\nb" + "c" * 900)
     assert read_row(path)["reason"] == "a\\x1b[31m b" + "c" * 485 + " ..."
     path.rename(path.with_name("calm_seed2.parquet"))
-    with pytest.raises(InputError, match="calm_seed2.parquet' holds the run pi, calm, 1: remove it"):
+    with pytest.raises(InputError, match="calm_seed2.parquet' contains the run pi, calm, 1: remove it"):
         with results.open_results(tmp_path, SETTINGS, COLUMNS):
             pass
 

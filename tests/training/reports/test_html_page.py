@@ -219,7 +219,7 @@ def test_settings_that_cannot_be_used_are_named(folder, arguments, message):
 
 
 def test_a_folder_without_results_is_refused(tmp_path):
-    with pytest.raises(InputError, match="holds no results.csv"):
+    with pytest.raises(InputError, match="contains no results.csv"):
         write_report(tmp_path)
     with pytest.raises(InputError, match="is no folder"):
         write_report(tmp_path / "none")
@@ -251,7 +251,7 @@ def test_a_page_comes_out_where_the_platform_of_the_evaluation_is_a_file_of_anot
 
 def test_the_command_names_what_is_wrong(tmp_path):
     result = CliRunner().invoke(cli.app, ["report", str(tmp_path)])
-    assert result.exit_code == EXIT_INPUT and "holds no results.csv" in result.stderr
+    assert result.exit_code == EXIT_INPUT and "contains no results.csv" in result.stderr
 
 
 @pytest.fixture(scope="module")

@@ -51,11 +51,7 @@ def table(cases=("a", "b"), status="ok", reason=""):
         ({"cases": {"a": CASE}}, list("abcd"), "Controllers on oc3_hywind: 4 load cases"),
         ({"cases": {"a": {"platform": "/home/x/mine.toml"}}}, ["a"], "Controllers on mine: a"),
         ({"suite": {"name": "dlc", "version": 3}}, ["a"], "Controllers: suite dlc, version 3"),
-        (
-            {"cases": {"a": CASE, "b": {"platform": "iea15"}}},
-            ["a", "b"],
-            "Controllers on 2 platforms: a, b",
-        ),
+        ({"cases": {"a": CASE, "b": {"platform": "iea15"}}}, ["a", "b"], "Controllers on 2 platforms: a, b"),
     ],
 )
 def test_the_title_is_what_was_evaluated(manifest, cases, title):

@@ -73,7 +73,7 @@ def test_lost_runs_are_said_of_who_lost_them_and_of_the_baseline():
     assert "2 failed of 8 runs, which are not in these means" in text
     assert "The baseline itself" not in text
     text = words(verdict(board(("mypid", gaps(0.001, -45.0), 2), baseline="mypid"), 6, 4))
-    assert "The baseline itself lost runs (2 failed of 8 runs), of which there are no differences" in text
+    assert "The baseline itself lost runs (2 failed of 8 runs); these have no differences" in text
 
 
 def test_names_are_escaped_and_of_many_controllers_the_first_ones_stand_open():
