@@ -29,19 +29,8 @@ CASE = {
 
 
 def table(cases=("a", "b"), status="ok", reason=""):
-    rows = [
-        {
-            "controller": "pi",
-            "case": case,
-            "seed": seed,
-            "status": status,
-            "reason": reason,
-            "stopped_[s]": 41.25,
-        }
-        for case in cases
-        for seed in (1, 2, 4)
-    ]
-    return pd.DataFrame(rows)
+    row = {"controller": "pi", "status": status, "reason": reason, "stopped_[s]": 41.25}
+    return pd.DataFrame([row | {"case": case, "seed": seed} for case in cases for seed in (1, 2, 4)])
 
 
 @pytest.mark.parametrize(
