@@ -1,4 +1,4 @@
-"""What the commands of fowt share: the application, messages on stderr, exit codes, progress."""
+"""Shared parts of the commands of fowt: the application, messages on stderr, exit codes, progress."""
 
 import functools
 import inspect
@@ -27,8 +27,8 @@ from fowt_env.files.tables import table_path, write_table
 from fowt_env.training.cli.tables import figure, print_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
-STUDIES = "fowt_env.training.studies"  # left out of the wheel
-out = Console(emoji=False)  # a controller module:Name: is no picture
+STUDIES = "fowt_env.training.studies"  # not in the wheel
+out = Console(emoji=False)  # no emoji for a controller module:Name:
 err = Console(stderr=True, emoji=False)
 GROUPS = {  # of fowt --help: heading -> its commands, in the order in which they are shown
     "Run": ("simulate", "trim", "plot", "animate", "check", "import", "hydro"),
@@ -38,7 +38,7 @@ GROUPS = {  # of fowt --help: heading -> its commands, in the order in which the
     "Set up": ("list", "doctor", "warmup", "cache"),
     "Develop": ("validate", "paper", "benchmark"),
 }
-START = (  # lines of fowt --help for those who have never used it
+START = (  # first examples in fowt --help
     ("fowt simulate --wind 18 --plot run.png", "one run: statistics and a picture"),
     ("fowt list", "names: platforms, seas, controllers"),
     ("fowt evaluate --controllers pi,lqr", "compare controllers"),
@@ -66,21 +66,16 @@ class Overview(TyperGroup):
                 out.print(line, highlight=False)
 
     def by_group(self):
-        """{heading: names of its commands}; those of no group stand with the last."""
-        found = {group: [name for name in names if name in self.commands] for group, names in GROUPS.items()}
-        known = {name for names in GROUPS.values() for name in names}
-        found[list(GROUPS)[-1]] += [
-            name for name, command in self.commands.items() if name not in known and not command.hidden
-        ]
-        return {group: names for group, names in found.items() if names}
+        """Return {heading: names of its commands}."""
+        return {group: [name for name in names if name in self.commands] for group, names in GROUPS.items()}
 
 
 def summary_of(command):
-    """First paragraph of a command's help, without its full stop."""
+    """Return the first paragraph of a command's help, without its full stop."""
     return " ".join((command.help or "").split("\n\n")[0].split()).removesuffix(".")
 
 
-new_folders: list[Path] = []  # that the command under way may make
+new_folders: list[Path] = []  # that the running command may make
 app = typer.Typer(
     name="fowt",
     cls=Overview,
@@ -145,7 +140,7 @@ def reported(function):
         except KeyboardInterrupt:
             fail("interrupted", EXIT_INTERRUPTED)
         except (SystemExit, GeneratorExit) as error:
-            if isinstance(error.__context__, BrokenPipeError):  # whoever reads our output has read enough
+            if isinstance(error.__context__, BrokenPipeError):  # the reader of the output has closed it
                 raise typer.Exit(EXIT_STOPPED) from None
             # raised by a controller or a library, not by the command itself
             fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
@@ -156,7 +151,7 @@ def reported(function):
 
 
 def announce_folders():
-    """Say once which of the folders that were missing have been made."""
+    """Print which of the missing folders have been made, once."""
     for folder in new_folders:
         if folder.is_dir():
             note(f"made the folder {folder}")
@@ -165,7 +160,7 @@ def announce_folders():
 
 @contextmanager
 def from_a_clone(command):
-    """Around imports of the studies. Raises: InputError that names the command where they are missing."""
+    """Wrap imports of the studies. Raises: InputError that names the command if they are not installed."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -190,7 +185,7 @@ def fail(message, code):
 
 
 def note(message):
-    """Print a remark on stderr, so that stdout holds results alone."""
+    """Print a remark on stderr, so that stdout has only results."""
     err.print(f"[dim]{escape(message)}[/dim]", soft_wrap=True, highlight=False)
 
 
@@ -273,7 +268,7 @@ def save_table(frame, path):
 
 
 def show(frame, title=None):
-    """Print a DataFrame, its columns of texts to the left."""
+    """Print a DataFrame with left-aligned columns of texts."""
     rows = [list(map(figure, row)) for row in frame.itertuples(index=False)]
     texts = [i for i, name in enumerate(frame.columns) if frame[name].map(type).eq(str).any()]
     keys = max([i + 1 for i in texts if i < 2], default=1)

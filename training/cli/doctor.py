@@ -1,4 +1,4 @@
-"""`fowt doctor`: is this installation whole, what is missing, and does it give the right figures?"""
+"""`fowt doctor`: a check of the installation, of missing parts and of the results of a short run."""
 
 from typing import Annotated
 
@@ -23,7 +23,7 @@ def doctor(test: Annotated[bool, typer.Option("--test/--no-test", help="Run the 
     fowt doctor  # all of it; the self-test compiles kernels if it must, up to a minute
     fowt doctor --no-test  # versions, optional parts and the cache alone
 
-    [bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not.
+    [bold]Exit code[/bold]: 0 if versions and the self-test (unless left out) are right, 1 if not.
     """
     _print_versions()
     _print_extras()
@@ -84,7 +84,7 @@ def _print_extras():
 
 
 def _print_notebook():
-    """A line on whether a notebook that uses this Python can show progress."""
+    """Print a line if notebooks with this Python cannot show progress."""
     if requirements.installed("ipykernel") and not requirements.installed("ipywidgets"):
         advice = (
             'Jupyter is here without ipywidgets, which progress bars need: pip install "fowt-env[notebook]"'
@@ -93,7 +93,7 @@ def _print_notebook():
 
 
 def _named(package):
-    """Name and version, with what is needed where that is another."""
+    """Return name and version, with the needed one if it differs."""
     if package.version is None or package.fits:
         return f"{package.name} {package.version or 'missing'}"
     return f"{package.name} {package.version} (needed: {package.needed})"
@@ -110,7 +110,7 @@ def _print_cache(state):
 
 
 def _self_test(health):
-    """SelfTest, printed."""
+    """Run and print the SelfTest, and return it."""
     _heading("self-test")
     result = health.self_test()
     for name, expected in health.EXPECTED.items():

@@ -11,7 +11,7 @@ SHORT = {
     "torque_travel_[kN-m/s]": "torque travel",
     "RotTorq_DEL_[kN-m]": "shaft-torque DEL",
     "TwrBsMyt_DEL_[kN-m]": "tower-base DEL",
-    "GenPwr_capped_mean_[kW]": "capped power",
+    "GenPwr_capped_mean_[kW]": "power up to rated",
     "GenPwr_max_[kW]": "greatest power",
 }
 DIRECTIONS = {-1: "Less is better.", 0: "Neither direction is better.", 1: "More is better."}

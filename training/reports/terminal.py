@@ -20,7 +20,7 @@ PRINTED_METRICS = (
     ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f"),
     ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f"),
     ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f"),
-    ("power\ncapped\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
+    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
     ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f"),
     ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f"),
     ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f"),
@@ -82,7 +82,7 @@ LEADERBOARD = (
     ("torque travel\nkN m/s", "torque_travel_[kN-m/s]", ".3f", False, True),
     ("shaft DEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", False, True),
     ("tower DEL\nkN m", "TwrBsMyt_DEL_[kN-m]", ".0f", False, True),
-    ("capped power\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
+    ("power up to rated\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
     ("greatest power\nkW", "GenPwr_max_[kW]", ".0f", False, False),
 )
 # left out one by one in a narrow terminal; pitch and torque travel stay beside the deviations

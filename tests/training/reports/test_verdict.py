@@ -37,7 +37,7 @@ def test_gains_and_costs_are_named_where_they_are_significant():
     found = {SPEED: (-45.2, 0.001), TRAVEL: (115.0, 0.002), PITCH: (-3.4, 0.4), POWER: (0.01, 0.9)}
     text = verdict(board(("mypid", found, 0)), 6, 4)
     assert f"mypid: rotor-speed std {MINUS}45 %* for pitch travel +115 %*; not significant: " in words(text)
-    assert f"platform-pitch std {MINUS}3.4 %, capped power +0.01 %." in words(text)
+    assert f"platform-pitch std {MINUS}3.4 %, power up to rated +0.01 %." in words(text)
     assert f'<span class="better">rotor-speed std {MINUS}45' in text
     assert '<span class="worse">pitch travel +115' in text
     assert "paired by case and seed" in text
@@ -45,8 +45,8 @@ def test_gains_and_costs_are_named_where_they_are_significant():
 
 def test_more_power_is_better_and_less_is_worse():
     text = verdict(board(("a", {POWER: (2.0, 0.001)}, 0), ("b", {POWER: (-2.0, 0.001)}, 0)), 6, 4)
-    assert "capped power +2.0 %* (better)" in words(text)
-    assert f"capped power {MINUS}2.0 %* (worse)" in words(text)
+    assert "power up to rated +2.0 %* (better)" in words(text)
+    assert f"power up to rated {MINUS}2.0 %* (worse)" in words(text)
 
 
 def test_a_p_value_counts_after_its_correction_for_the_number_of_metrics():
