@@ -37,7 +37,7 @@ from fowt_env.training.evaluation.seeds import DRAWN, LEAST_SECRET, new_secret_s
 SETTINGS = "board.toml"
 DEFAULT_PLATFORM = "oc3_hywind"  # of the suites
 SALT = re.compile("salt [0-9a-f]{32,}")
-ENTRIES = Path(__file__).parent / "entries"  # cards of the package's own controllers
+ENTRIES = Path(__file__).parent / "entries"  # cards of the package's controllers
 REGIMES = (  # name, suites: of a new board
     ("in distribution", ("above_rated",)),
     ("gusts", ("gusts", "settling")),

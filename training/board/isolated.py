@@ -197,7 +197,7 @@ def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactor
 
 
 class _Process:
-    """A started process, asked through its standard input and output."""
+    """A running process that answers requests through its standard input and output."""
 
     def __init__(self, factory):
         supervisor.prctl(supervisor.DUMPABLE, 0)  # hide the weather in this process's memory from others
@@ -300,7 +300,7 @@ def serve() -> None:
             try:
                 controller, answer = _done(what, content, controller)
                 kind = OK
-            except BaseException as error:  # SystemExit too: the run is told why it fails
+            except BaseException as error:  # including SystemExit: the run fails with its name
                 own = error.__cause__ if isinstance(error, ControllerError) else None  # the controller's
                 kind, answer = ERROR, type(error if own is None else own).__name__.encode()[:LONGEST_ANSWER]
             content = kind + LENGTH.pack(len(answer)) + answer

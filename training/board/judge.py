@@ -39,7 +39,7 @@ from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
 RELATIVE = 1e-9  # to which figures computed anew agree with those of the rows
-CALLS = "slowest_calls.csv"  # of a results folder: name, key, s of each run in a process of its own
+CALLS = "slowest_calls.csv"  # of a results folder: name, key, s of each isolated run
 
 
 @dataclass

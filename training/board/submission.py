@@ -182,7 +182,7 @@ def _check_information(card, kind, problems):
             problems.append(f"information: {unknown('input', name, INPUTS)}")
     times = f"preview_times = [{', '.join(f'{time:g}' for time in card.preview_times[:9])}]"
     if bool(card.preview_times) != ("wind_preview" in card.information):
-        problems.append(f"{times}: must be given with 'wind_preview' in information, and only then")
+        problems.append(f"{times}: must be set if and only if 'wind_preview' is in information")
     if list(card.preview_times) != sorted(set(card.preview_times)):
         problems.append(f"{times}: must rise")
     if len(card.preview_times) > MOST_TIMES or max(card.preview_times, default=0.0) > FURTHEST:

@@ -17,7 +17,7 @@ import sys
 from contextlib import suppress
 
 PDEATHSIG, DUMPABLE, SUBREAPER = 1, 4, 36  # of prctl, which only Linux has
-# a signal of its own, since a parent with threads keeps its process id until the last of them has ended
+# a separate signal: a parent with threads keeps its process id until the last of them has ended
 PARENT_ENDED = signal.SIGHUP
 
 

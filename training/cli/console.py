@@ -242,14 +242,14 @@ def progress_bar(description, total, every=LINE_EVERY):
 
 def _lines(description, total, every):
     """Return update(done, total=None, text=None) that prints a line on stderr every `every` seconds."""
-    began = said = time.monotonic()
+    began = printed = time.monotonic()
     whole = total
 
     def update(done, total=None, text=None):
-        nonlocal said, whole
+        nonlocal printed, whole
         now, whole = time.monotonic(), total or whole
-        if now - said >= every:
-            said = now
+        if now - printed >= every:
+            printed = now
             share = f", {100.0 * done / whole:.0f} %" if whole else ""
             note(f"{now - began:.0f} s{share}: {text or description}")
 

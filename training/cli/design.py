@@ -334,7 +334,7 @@ def lqr(
     out_path: Annotated[str | None, Option("--out", help="The design, .json.")] = None,
     vary: Annotated[list[str] | None, Option(hidden=True)] = None,
 ):
-    """Design an LQG controller with settings of your own, and save it.
+    """Design an LQG controller with your settings, and save it.
 
     Examples:
     fowt design lqr  # the settings and their defaults

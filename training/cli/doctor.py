@@ -34,7 +34,7 @@ def doctor(test: Annotated[bool, typer.Option("--test/--no-test", help="Run the 
             from fowt_env.training.cli import (
                 health,  # numba and what it needs, which other commands' help can do without
             )
-        except ImportError as error:  # numba's own, where NumPy is too new for it
+        except ImportError as error:  # raised by numba, e.g. for a NumPy that is too new
             faults = [str(error)]
     _print_notebook()
     if faults:

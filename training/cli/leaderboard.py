@@ -96,10 +96,10 @@ def run_command(
     fowt leaderboard run --draw-seeds $COMMIT  # seeds from a commit
     fowt leaderboard run --secret seeds.txt --private private --trust-code  # secret seeds too
 
-    Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's
-    rights: read them first, or run them in a container with [bold]--within[/bold]
-    (docs/guides/leaderboard.md). The same command goes on where it was stopped. Written: index.html,
-    board.csv, history.csv and runs/ in the board's folder; runs of secret seeds in the folder --private.
+    Python files run only with [bold]--trust-code[/bold], each in a separate process, with your user's rights:
+    read them first, or run them in a container with [bold]--within[/bold] (docs/guides/leaderboard.md). The
+    same command resumes an interrupted judging. Written: index.html, board.csv, history.csv and runs/ in the
+    board's folder; runs of secret seeds in the folder --private.
     """
     from fowt_env.training.board.folder import Board
     from fowt_env.training.board.judge import judge

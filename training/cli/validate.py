@@ -1,4 +1,4 @@
-"""fowt validate and paper: the model held against OpenFAST, and the source paper's load cases."""
+"""fowt validate and paper: comparison with OpenFAST, and the source paper's load cases."""
 
 from typing import Annotated
 

@@ -49,7 +49,7 @@ def interval(estimate, resampled, n, positive=False):
     resampled = _known(resampled)
     least = np.fmin(estimate, np.nanmin(resampled, axis=0))
     log = positive & (least > 0.0)
-    with np.errstate(all="ignore"):  # logarithms that are not used, and ends beyond the largest float
+    with np.errstate(all="ignore"):  # unused logarithms, and overflows of the ends
         centre = np.where(log, np.log(estimate), estimate)
         spread = _spread(centre, np.where(log, np.log(resampled), resampled), n)
         low, high = (np.where(log, np.exp(centre + side), centre + side) for side in spread)

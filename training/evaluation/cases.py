@@ -311,7 +311,7 @@ def _built_in(name, platform):
 
 
 def _read(path, platform=None):
-    """Return the Suite of a file, for another platform than its own if one is named."""
+    """Return the Suite of a file, scaled to a platform if one is named."""
     where = f"suite file {str(path)!r}"
     file, problems = validate(SuiteFile, read_toml(path, "suite"))
     raise_problems(where, problems)

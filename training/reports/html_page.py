@@ -287,19 +287,19 @@ def _platform_of(manifest):
     return only if isinstance(only, str) else "oc3_hywind"
 
 
-def _schedule(asked, own, say):
+def _schedule(chosen, default, say):
     """Return {"platform", "wind", "panels"} of the steady operating points over wind speed.
 
-    asked: platform, or None for that of the evaluation; if its file does not exist here: {"platform",
+    chosen: platform, or None for the default, that of the evaluation; if its file does not exist here: {"platform",
     "missing": why}.
     """
     import fowt_env
 
-    platform = asked or own
+    platform = chosen or default
     try:
         fowt_env.build_scene(platform)
     except InputError as error:
-        if asked:
+        if chosen:
             raise
         return {"platform": platform, "missing": str(error)}
     points = []

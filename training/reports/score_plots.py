@@ -1,6 +1,6 @@
-"""Plots of agents beside baselines and the performance limit, and of one gust under many controllers.
+"""Plots of agents with baselines and the performance limit, and of one gust under many controllers.
 
-As in visual/time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
+As in visual/time_series.py, every function returns a matplotlib Figure and writes it to a path, if any.
 """
 
 from fowt_env.errors import InputError
@@ -14,7 +14,7 @@ FRONTS = (
     ("measured", "--", "limit: five sensors"),
     ("full_preview_11", ":", "limit: wind 11 s ahead"),
 )
-FRAME = 1.3  # ends of both axes of plot_fractions
+FRAME = 1.3  # upper end of both axes of plot_fractions
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
 GUST = (  # panels of plot_gust: label, channel
     ("wind\n(m/s)", "Wind1VelX_[m/s]"),
@@ -29,16 +29,16 @@ GUST = (  # panels of plot_gust: label, channel
 
 
 def agent_style(number):
-    """(colour, mark) of the number-th of several controllers; no two of the first 84 have both."""
+    """Return (colour, mark) of the number-th of several controllers; those of the first 84 differ."""
     return COLOURS[number % len(COLOURS)], AGENT_MARKERS[number % len(AGENT_MARKERS)]
 
 
 def plot_fractions(fractions, bound, path=None, title=None):
-    """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the Pareto fronts.
+    """Plot rotor-speed against platform-pitch deviation over gspi_oc3's per wind, with Pareto fronts.
 
-    fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks:
-    agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
-    gspi_oc3, so that the limit does not hold. Agents beyond FRAME stand in the corner with their figures.
+    fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks: agents; small ones:
+    their training seeds. Hollow: more travel or power deviation than gspi_oc3, so that the limit does not
+    apply. Agents outside FRAME are listed in the corner with their ratios.
     """
     from fowt_env.training.design.linear_bound import efficient
 
@@ -75,9 +75,9 @@ def plot_fractions(fractions, bound, path=None, title=None):
 
 
 def _marks(axes, rows, colour, mark, beyond):
-    """Draw one agent at one wind; the number of agents (0 or 1) that lie beyond the frame.
+    """Draw one agent at one wind; return the number of agents (0 or 1) outside the frame.
 
-    Such a one stands as text in the corner, below `beyond` others.
+    Such an agent is written as text in the corner, below `beyond` others.
     """
     outside = 0
     for row in rows.sort_values("seed_of").to_dict("records"):
@@ -99,7 +99,7 @@ def _marks(axes, rows, colour, mark, beyond):
 
 
 def plot_gust(runs, path=None, title=None, start=None, end=None):
-    """Time series of {controller: frame} over each other between two times (s), one legend for all panels."""
+    """Plot the time series of {controller: frame} between two times (s), with one legend for all panels."""
     runs = named_runs(runs)
     low = -float("inf") if start is None else start
     high = float("inf") if end is None else end

@@ -6,7 +6,9 @@ from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.ratings import ratings
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import holm
+from fowt_env.training.evaluation.cases import chosen_cases
 from fowt_env.training.evaluation.failures import KINDS, lost_text
+from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 from fowt_env.training.evaluation.results import file_name, run_file
 from fowt_env.training.evaluation.run_case import OK, REFERENCE
 from fowt_env.training.evaluation.scaling import turbine_of
@@ -14,6 +16,9 @@ from fowt_env.training.reports.evaluation_plots import plot_evaluation, plot_par
 from fowt_env.training.reports.metric_words import counted, seeds_text
 from fowt_env.visual.response import BOXES, plot_boxes
 from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
+
+# chosen_cases and write_leaderboard are defined in evaluation; this is their former place
+__all__ = ["chosen_cases", "evaluation_plots", "leaderboard_rows", "summary_rows", "write_leaderboard"]
 
 # printed columns: heading, metric, format
 PRINTED_METRICS = (
