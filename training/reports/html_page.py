@@ -290,8 +290,8 @@ def _platform_of(manifest):
 def _schedule(chosen, default, say):
     """Return {"platform", "wind", "panels"} of the steady operating points over wind speed.
 
-    chosen: platform, or None for the default, that of the evaluation; if its file does not exist here: {"platform",
-    "missing": why}.
+    chosen: platform, or None for the default, that of the evaluation; if the default has no file here:
+    {"platform", "missing": why}.
     """
     import fowt_env
 

@@ -249,20 +249,14 @@ def test_the_reference_of_a_suite_runs_to_its_end_where_its_law_as_an_entry_trip
 
 
 @pytest.mark.slow
-def test_worker_processes_warn_of_units_once_for_each_controller():
-    controllers = {"one": Degrees(), "two": Degrees()}
-    with pytest.warns(PlantWarning) as warned:
-        table = evaluate(controllers, [GUSTY], seeds=(1, 2, 3), jobs=2, **SHORT)
-    assert (table["warning"] != "").all()
-    assert len([each for each in warned if issubclass(each.category, PlantWarning)]) == 2
-
-
-@pytest.mark.slow
-def test_worker_processes_give_the_same_table():
-    arguments = ({"pi": "pi", "frozen": Frozen()}, [GUSTY, CALM])
-    serial = evaluate(*arguments, seeds=(3,), **SHORT)
-    parallel = evaluate(*arguments, seeds=(3,), jobs=2, **SHORT)
-    pd.testing.assert_frame_equal(serial, parallel, check_exact=True)
+def test_worker_processes_give_the_same_table_and_warn_of_units_once_for_each_controller():
+    controllers = {"pi": "pi", "frozen": Frozen(), "one": Degrees(), "two": Degrees()}
+    tables = []
+    for jobs in (1, 2):
+        with pytest.warns(PlantWarning) as warned:
+            tables.append(evaluate(controllers, [GUSTY, CALM], seeds=(1, 3), jobs=jobs, **SHORT))
+        assert len([each for each in warned if issubclass(each.category, PlantWarning)]) == 2
+    pd.testing.assert_frame_equal(*tables, check_exact=True)
 
 
 def test_named_suites_hold_their_cases_once():

@@ -218,8 +218,8 @@ def test_settings_that_cannot_be_used_are_named(folder, arguments, message):
 
 
 def test_a_folder_without_results_is_refused(tmp_path):
-    with pytest.raises(InputError, match="contains no results.csv"):
-        write_report(tmp_path)
+    result = CliRunner().invoke(cli.app, ["report", str(tmp_path)])
+    assert result.exit_code == EXIT_INPUT and "contains no results.csv" in result.stderr
     with pytest.raises(InputError, match="is no folder"):
         write_report(tmp_path / "none")
 
@@ -244,11 +244,6 @@ def test_a_page_comes_out_where_the_platform_of_the_evaluation_is_a_file_of_anot
     assert data_of(copy / "report.html")["schedule"] is None
     with pytest.raises(InputError, match="mine.toml"):
         write_report(copy, platform="mine.toml")
-
-
-def test_the_command_names_what_is_wrong(tmp_path):
-    result = CliRunner().invoke(cli.app, ["report", str(tmp_path)])
-    assert result.exit_code == EXIT_INPUT and "contains no results.csv" in result.stderr
 
 
 @pytest.fixture(scope="module")
