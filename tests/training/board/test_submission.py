@@ -97,7 +97,7 @@ def test_added_submissions_are_kept_and_never_replaced(tmp_path):
     board = new_board(tmp_path / "board")
     assert board.add(write(tmp_path / "a")) == "mine"
     assert board.add(tmp_path / "a") == "mine"
-    with pytest.raises(InputError, match="another one of this name"):
+    with pytest.raises(InputError, match="a different one of this name"):
         board.add(write(tmp_path / "b", source="x = 1"))
     kept = tmp_path / "board" / "submissions" / "mine" / "mine.py"
     assert "was run" in kept.read_text()
