@@ -5,8 +5,8 @@ As in visual/time_series.py, every function returns a matplotlib Figure and writ
 
 from fowt_env.errors import InputError
 from fowt_env.training.design.plots import WIND, finish_bound
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
-from fowt_env.visual.time_series import TIME, named_runs
+from fowt_env.visual.style import COLOURS, INK, new_figure, style_axes
+from fowt_env.visual.time_series import TIME, named_runs, plot_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (
@@ -23,7 +23,7 @@ GUST = (  # panels of plot_gust: label, channel
     ("torque\n(kN m)", "GenTq_[kN-m]"),
     ("power\n(kW)", "GenPwr_[kW]"),
     ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
-    ("tower-base\nmoment (MN m)", "TwrBsMyt_[kN-m]"),
+    ("tower-base\nmoment (kN m)", "TwrBsMyt_[kN-m]"),
     ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
 )
 
@@ -100,35 +100,6 @@ def _marks(axes, rows, colour, mark, beyond):
 
 def plot_gust(runs, path=None, title=None, start=None, end=None):
     """Plot the time series of {controller: frame} between two times (s), with one legend for all panels."""
-    runs = named_runs(runs)
-    low = -float("inf") if start is None else start
-    high = float("inf") if end is None else end
-    kept = {label: f[(f[TIME] >= low) & (f[TIME] <= high)] for label, f in runs.items()}
-    kept = named_runs(kept)
-    panels = [panel for panel in GUST if any(panel[1] in frame for frame in kept.values())]
-    if not panels:
-        raise InputError(f"nothing to plot: no run has {', '.join(channel for _, channel in GUST)}")
-    figure = new_figure(9.5, 0.9 + 1.25 * len(panels))
-    places = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (label, channel) in zip(places, panels, strict=True):
-        style_axes(axes)
-        scale = 1e-3 if "MN m" in label else 1.0
-        shown = {name: frame for name, frame in kept.items() if channel in frame}
-        values = [frame[channel].to_numpy() for frame in shown.values()]
-        if channel.startswith("Wind"):  # the same for all
-            axes.plot(next(iter(shown.values()))[TIME], values[0], color=INK, linewidth=1.2)
-        else:
-            for number, (name, frame) in enumerate(kept.items()):
-                if name in shown:
-                    style = {"color": COLOURS[number % len(COLOURS)], "linewidth": 1.1}
-                    style["ls"] = ("-", "--", ":")[number // len(COLOURS) % 3]
-                    axes.plot(frame[TIME], scale * frame[channel], label=name, **style)
-        axes.set_ylabel(label, fontsize=8, color=INK)
-        axes.margins(x=0.0)
-    places[-1].set_xlabel("time (s)", fontsize=9, color=INK)
-    handles, names = places[-1].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    figure.align_ylabels(places)
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
-    return save_figure(figure, path)
+    low, high = -float("inf") if start is None else start, float("inf") if end is None else end
+    kept = {label: frame[frame[TIME].between(low, high)] for label, frame in named_runs(runs).items()}
+    return plot_runs(kept, path, title, panels=GUST)
