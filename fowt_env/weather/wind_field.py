@@ -90,7 +90,8 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
     if isinstance(spec, WindBox):
         box = spec
     else:
-        box = _MAKERS[spec["kind"]](_values(spec), hub_height, rotor_diameter, shear_exponent, seed, duration)
+        values = field_values(spec)
+        box = _MAKERS[spec["kind"]](values, hub_height, rotor_diameter, shear_exponent, seed, duration)
     reach = 0.5 * rotor_diameter
     rise = box.z - hub_height
     if max(box.y[0], rise[0]) > -reach or min(box.y[-1], rise[-1]) < reach:
@@ -101,8 +102,8 @@ def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, du
     return box
 
 
-def _values(spec):
-    """Checked values of every key of a specification."""
+def field_values(spec):
+    """Return the checked values of every key of a specification. Raises: InputError."""
     kind = spec["kind"]
     keys = FIELD_KINDS[kind]
     for key in spec:

@@ -44,7 +44,7 @@ def check(
 
 
 def print_faults(faults):
-    """Print the sentences on what does not fit, or that everything does."""
+    """Print the faults of a platform, or that there are none."""
     for fault in faults:
         out.print(f"[yellow]{escape(fault)}[/yellow]", soft_wrap=True, highlight=False)
     if not faults:
@@ -52,7 +52,7 @@ def print_faults(faults):
 
 
 def _figures(found):
-    """(name, value, unit) of a Check."""
+    """Return (name, value, unit) of the values of a Check."""
     still = found.statics
     rows = [
         ("weight", still.weight / 1e3, "kN"),
@@ -80,18 +80,12 @@ def _figures(found):
 
 
 def _plain(found):
-    """A Check as what JSON holds; None for what is not finite."""
+    """Return a Check as a mapping for JSON, with None for values that are not finite."""
+    from fowt_env.training.evaluation.results import finite
+
     still = {name: np.asarray(value).tolist() for name, value in found.statics._asdict().items()}
     whole = {"platform": found.label, "draft": found.draft, **still}
     whole |= {"rest": found.rest, "natural_periods": found.periods}
     whole |= {"tower_frequencies": {mode: values._asdict() for mode, values in found.tower.items()}}
     whole |= {"faults": list(found.faults)}
-    return _finite(whole)
-
-
-def _finite(value):
-    if isinstance(value, dict):
-        return {name: _finite(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+    return finite(whole)

@@ -21,13 +21,13 @@ from fowt_env.descriptions.protection import Protection, read_protection
 from fowt_env.descriptions.records import NonNegative, Positive, Record, validate
 from fowt_env.descriptions.sea_state import SeaState, joint_sea_state, sea_state_of
 from fowt_env.descriptions.sensors import EXACT, sensor_chain
-from fowt_env.descriptions.wind import FIELD_KINDS, FORMS, REQUIRED, is_wind_file, read_wind, wind_of
+from fowt_env.descriptions.wind import FORMS, is_wind_file, read_wind, wind_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import OPTIONS
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
 from fowt_env.training.evaluation.scaling import scaled_file, within_table
-from fowt_env.weather.wind_field import is_field
+from fowt_env.weather.wind_field import field_values, is_field
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
@@ -435,15 +435,7 @@ def _wind(spec, speed, folder):
     if not is_field(spec):
         read_wind(spec)
         return spec
-    keys = FIELD_KINDS[spec["kind"]]
-    for key in spec:
-        if key != "kind" and key not in keys:
-            raise unknown(f"key of the {spec['kind']} wind", key, keys)
-    for key, (rule, default) in keys.items():
-        if default is REQUIRED and key not in spec:
-            raise InputError(f"wind.{key} is missing: the {spec['kind']} wind needs it")
-        if key in spec:
-            rule.read(f"wind.{key}", spec[key])
+    field_values(spec)
     if "path" in spec:
         spec["path"] = str(folder / Path(spec["path"]).expanduser())
     return spec
