@@ -13,8 +13,8 @@ Needs pip install "fowt-env[report]".
 from pathlib import Path
 
 from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 from fowt_env.training.reports.html_page import write_report
-from fowt_env.training.reports.terminal import write_leaderboard
 
 FOLDER = Path("results/examples/report")
 

@@ -253,7 +253,14 @@ class Samples:
         from fowt_env.files.tables import read_table
         from fowt_env.training.evaluation import provenance
         from fowt_env.training.evaluation.evaluate import COLUMNS
-        from fowt_env.training.evaluation.results import FORMAT, open_results, read_row, write_json, write_run
+        from fowt_env.training.evaluation.results import (
+            FORMAT,
+            open_results,
+            read_row,
+            run_content,
+            write_json,
+            write_run,
+        )
         from fowt_env.training.reports.html_page import write_report
         from fowt_env.training.rl.train import Training, resolve
 
@@ -277,7 +284,7 @@ class Samples:
         def report():
             return write_report(folder, schedule=False)
 
-        write_run(frame, row, run)
+        write_run(run_content(frame, row), run)
         with contextlib.suppress(Exception):
             reopen()
         (folder / "results.csv").unlink(missing_ok=True)
@@ -285,9 +292,9 @@ class Samples:
         reopen()
         manifest = json.loads((folder / "manifest.json").read_text())
         write_json(manifest | {"created": "2026-01-01T00:00:00+0000"}, folder / "manifest.json")
-        write_run(frame, row, run)
+        write_run(run_content(frame, row), run)
         table = reopen()
-        from fowt_env.training.reports.terminal import write_leaderboard
+        from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 
         write_leaderboard(table, folder)
         assert json.loads((folder / "manifest.json").read_text())["format"] == FORMAT

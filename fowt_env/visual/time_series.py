@@ -93,18 +93,19 @@ def plot_run(frame, path=None, title=None, *, skip=0.0, ratings=None):
     return plot_runs({"": frame}, path=path, title=title, skip=skip, ratings=ratings)
 
 
-def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None):
+def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None, panels=PANELS):
     """Plot stacked time series of several runs {label: frame} in common panels.
 
     skip      s from the start, shaded as not scored
     ratings   {name: value} of descriptions.ratings.ratings, drawn as lines in rotor speed and power;
               None: attrs["ratings"] of the first frame, which simulate sets
+    panels    (label, channel) of each panel; those without a run that has the channel are left out
     """
     runs = named_runs(runs)
     check_number("skip", skip, 0.0)
-    panels = [panel for panel in PANELS if any(panel[1] in frame.columns for frame in runs.values())]
+    wanted = ", ".join(channel for _, channel in panels)
+    panels = [panel for panel in panels if any(panel[1] in frame.columns for frame in runs.values())]
     if not panels:
-        wanted = ", ".join(channel for _, channel in PANELS)
         raise InputError(f"nothing to plot: none of {wanted} is in the run")
     first = next(iter(runs.values()))
     ratings = first.attrs.get("ratings", {}) if ratings is None else ratings

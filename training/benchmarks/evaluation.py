@@ -10,7 +10,7 @@ import pandas as pd
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.engines import outcomes
-from fowt_env.training.evaluation.evaluate import planned, score, score_and_send
+from fowt_env.training.evaluation.evaluate import planned, score, stored
 from fowt_env.training.evaluation.results import read_row
 
 STAGES = ("whole run", "without its file", "reading its row")
@@ -36,10 +36,10 @@ def evaluation_cost(count=21, suite="above_rated", controller="pi"):
     with tempfile.TemporaryDirectory() as folder:
         runs = planned(controller, chosen, seeds=seeds, runs_folder=folder)
         for run in runs[:: len(seeds)]:
-            score(run)
+            stored(run, score(run))
         runs = runs[:count]
         for run in runs:
-            timed("whole run", score, run)
+            timed("whole run", lambda run: stored(run, score(run)), run)
             timed("reading its row", read_row, run.frame_path)
         size = np.mean([Path(run.frame_path).stat().st_size for run in runs]) / 1e6
         for run in planned(controller, chosen, seeds=seeds)[:count]:
@@ -57,7 +57,7 @@ def ray_cost(count=200, controller="pi", suite="above_rated"):
     """
     chosen = read_suite(suite)
     with tempfile.TemporaryDirectory() as folder:
-        _, content = score_and_send(planned(controller, chosen, seeds=(1,), runs_folder=folder)[0])
+        _, content = score(planned(controller, chosen, seeds=(1,), runs_folder=folder)[0])
     rows = []
     full = f"a task that returns {len(content) / 1e6:.1f} MB"
     for what, size in (("an empty task", 0), (full, len(content))):

@@ -1,4 +1,4 @@
-"""The files of a submission: which count, their hash, and copies of them."""
+"""The files of a submission: list, hash and copy."""
 
 import hashlib
 import shutil
@@ -7,11 +7,11 @@ from pathlib import Path
 from fowt_env.errors import InputError
 
 LARGEST_FOLDER = 50e6  # bytes
-COMPILED = "__pycache__"  # of Python, which makes it again: it neither counts nor is copied
+COMPILED = "__pycache__"  # neither hashed nor copied
 
 
 def files_of(folder: Path | str) -> list[Path]:
-    """Sorted files of a submission's folder. Raises: InputError for links and for too large a folder."""
+    """Return the sorted files of a submission's folder. Raises: InputError for links and large folders."""
     folder, found = Path(folder), []
     for path in sorted(folder.rglob("*")):
         if path.is_symlink() or not (path.is_file() or path.is_dir()):
@@ -21,14 +21,13 @@ def files_of(folder: Path | str) -> list[Path]:
     size = sum(path.stat().st_size for path in found)
     if size > LARGEST_FOLDER:
         raise InputError(
-            f"submission {str(folder)!r}: {size / 1e6:.0f} MB: at most {LARGEST_FOLDER / 1e6:.0f} MB are"
-            f" allowed"
+            f"submission {str(folder)!r}: {size / 1e6:.0f} MB: must be at most {LARGEST_FOLDER / 1e6:.0f} MB"
         )
     return found
 
 
 def digest_of(folder: Path | str) -> str:
-    """SHA-256 of the names, lengths and contents of a submission's files."""
+    """Return the SHA-256 of the names, lengths and contents of a submission's files."""
     digest = hashlib.sha256()
     for path in files_of(folder):
         content = path.read_bytes()
@@ -38,5 +37,5 @@ def digest_of(folder: Path | str) -> str:
 
 
 def copy_files(folder: Path | str, place: Path | str) -> None:
-    """Copy a submission's folder to a place that is not there yet; links stay links."""
+    """Copy a submission's folder to a new folder; links stay links."""
     shutil.copytree(folder, place, symlinks=True, ignore=shutil.ignore_patterns(COMPILED))

@@ -1,11 +1,11 @@
-"""The folder of a standing board: its settings, its frozen suites, its submissions, what was judged.
+"""The folder of a leaderboard: settings, frozen suites, submissions and results.
 
 board.toml            seeds, limits, and the suites of each regime
-suites/*.toml         copies of the suites, taken when the board was made: a later version changes no board
-submissions/NAME/     what was added
+suites/*.toml         copies of the suites from when the board was made, independent of later versions
+submissions/NAME/     added submissions
 runs/                 results folders of the public seeds, one for each suite, kind of preview and drawing
 history.csv           a row for every submission, regime and judging
-board.csv, index.html what was judged last
+board.csv, index.html results of the last judging
 """
 
 import hashlib
@@ -37,7 +37,7 @@ from fowt_env.training.evaluation.seeds import DRAWN, LEAST_SECRET, new_secret_s
 SETTINGS = "board.toml"
 DEFAULT_PLATFORM = "oc3_hywind"  # of the suites
 SALT = re.compile("salt [0-9a-f]{32,}")
-ENTRIES = Path(__file__).parent / "entries"  # cards of the package's own controllers
+ENTRIES = Path(__file__).parent / "entries"  # cards of the package's controllers
 REGIMES = (  # name, suites: of a new board
     ("in distribution", ("above_rated",)),
     ("gusts", ("gusts", "settling")),
@@ -46,8 +46,7 @@ REGIMES = (  # name, suites: of a new board
 
 
 class Regime(Record):
-    """Suites that are read together: the winds a controller was made for, gusts, plants that it does not
-    know."""
+    """Suites of one kind of conditions: design winds, gusts, or perturbed plants."""
 
     name: str
     suites: Annotated[tuple[str, ...], BeforeValidator(tuple)] = Field(min_length=1)
@@ -57,7 +56,7 @@ class BoardFile(Record):
     """The text of board.toml."""
 
     title: str
-    platform: str | None = None  # on which its suites run; None: that of each suite
+    platform: str | None = None  # of its suites; None: that of each suite
     baseline: str = "gspi_oc3"
     seeds: Seeds
     call_limit: Positive = 0.1  # s, of one call of a controller's act()
@@ -67,14 +66,14 @@ class BoardFile(Record):
 
 
 class Board:
-    """A board's folder. Raises: InputError for a folder that is none, or whose settings cannot be used."""
+    """A board's folder. Raises: InputError for any other folder, or for unusable settings."""
 
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
         path = self.folder / SETTINGS
         if not path.is_file():
             raise InputError(
-                f"board {str(folder)!r}: has no {SETTINGS}: make one with fowt leaderboard add, or give"
+                f"board {str(folder)!r}: has no {SETTINGS}: make one with fowt leaderboard add, or choose"
                 " another --board"
             )
         self.settings, problems = validate(BoardFile, read_toml(path, "board"))
@@ -91,28 +90,28 @@ class Board:
         return self.folder / "suites" / f"{name}.toml"
 
     def suite(self, name: str) -> Suite:
-        """The board's own copy of a suite."""
+        """Return the board's copy of a suite."""
         return read_suite(self._suite_path(name), self.settings.platform)
 
     @property
     def turbine(self) -> Turbine:
-        """Turbine of the board's platform, which controllers are made for."""
+        """Turbine of the board's platform, for which controllers are made."""
         return turbine_of(self.settings.platform or DEFAULT_PLATFORM)
 
     @property
     def limits(self) -> ProcessLimits:
-        """Limits of controllers that run in a process of their own."""
+        """Limits of isolated controllers."""
         s = self.settings
         return ProcessLimits(prepare=s.prepare_limit, call=s.call_limit, memory=s.memory)
 
     def submissions(self) -> list:
-        """Sound submissions of the board, by name."""
+        """Return the valid submissions of the board, by name."""
         return self.read()[0]
 
     def read(self) -> tuple[list, dict[str, str]]:
-        """(sound submissions, {folder: why it is left out}), by name.
+        """Return (valid submissions, {folder: why it is left out}), by name.
 
-        Names that no submission has, as that of a copy which is being made, are passed over.
+        Folders that are no submissions, such as unfinished copies, are ignored.
         """
         sound, left_out = {}, {}
         folder = self.folder / "submissions"
@@ -130,9 +129,9 @@ class Board:
         return sorted(sound.values(), key=lambda each: each.name), left_out
 
     def add(self, source: Path | str) -> str:
-        """Copy a submission into the board; its name. Nothing of it is run.
+        """Copy a submission into the board without running it; return its name.
 
-        Raises: InputError where it is not sound, or one of another content has its name or nearly its name.
+        Raises: InputError if it is not valid, or if a different one has its name or nearly its name.
         """
         submission = read_submission(source)
         place = self.folder / "submissions" / submission.name
@@ -140,14 +139,14 @@ class Board:
             if read_submission(place).digest == submission.digest:
                 return submission.name
             raise InputError(
-                f"submission {submission.name!r}: the board has another one of this name, which is kept: give"
-                f" {CARD} another name"
+                f"submission {submission.name!r}: the board has a different one of this name: change the name"
+                f" in {CARD}"
             )
         for other in self.submissions():
             if alike(other.name) == alike(submission.name):
                 raise InputError(
-                    f"submission {submission.name!r}: the board has {other.name!r}, which readers would take"
-                    f" for it: give {CARD} another name"
+                    f"submission {submission.name!r}: the board has {other.name!r}, which readers would"
+                    f" confuse with it: change the name in {CARD}"
                 )
         place.parent.mkdir(parents=True, exist_ok=True)
         waiting = place.with_name(f".{submission.name}-{time.monotonic_ns()}")
@@ -163,10 +162,10 @@ class Board:
 def new_board(
     folder: Path | str, title: str = "Controllers of floating wind turbines", platform: str | None = None
 ) -> Board:
-    """A new board with the package's own controllers as its first submissions.
+    """Make a board with the package's controllers as its first submissions, and return it.
 
-    platform: a name or a path, to whose turbine the suites are scaled; None: the suites' own.
-    Raises: InputError where there is one already, and for a platform that cannot be read.
+    platform: a name or a path, to whose turbine the suites are scaled; None: that of the suites.
+    Raises: InputError if there is a board already, and for a platform that cannot be read.
     """
     folder = Path(folder)
     if platform is not None:
@@ -197,10 +196,10 @@ def new_board(
 
 
 def write_secret_seeds(path: Path | str, count: int) -> str:
-    """SHA-256 of a new file of secret seeds, which this user alone may read; the hash may be published.
+    """Write a file of secret seeds that only this user can read; return its SHA-256, which may be published.
 
-    Its salt makes the hash say nothing of the seeds.
-    Raises: InputError where there is a file already, or for a count below 1.
+    Its salt keeps the hash from revealing the seeds.
+    Raises: InputError if the file exists, or for a count below 1.
     """
     if count < 1:
         raise InputError(f"count = {count}: must be at least 1")
@@ -216,10 +215,10 @@ def write_secret_seeds(path: Path | str, count: int) -> str:
 
 
 def read_seeds(path: Path | str) -> tuple[tuple[int, ...], str]:
-    """(the organiser's secret seeds, SHA-256 of their file), of a file of write_secret_seeds.
+    """Return (the organiser's secret seeds, SHA-256 of their file) of a file of write_secret_seeds.
 
-    path: "-" for standard input, so that no other process can read from the command where the file lies.
-    Raises: InputError, also for a file without a salt and for seeds that can be found by trying.
+    path: "-" for standard input, which hides the file's path from other processes.
+    Raises: InputError, also for a file without a salt and for seeds that can be guessed.
     """
     where = f"secret seeds {str(path)!r}"
     if str(path) == "-":
@@ -233,16 +232,16 @@ def read_seeds(path: Path | str) -> tuple[tuple[int, ...], str]:
     if not SALT.fullmatch(first.strip()):
         raise InputError(
             f"{where}: must begin with a line of 'salt' and 32 hexadecimal digits or more, without which its"
-            " hash would give the seeds away; fowt leaderboard seeds makes such a file"
+            " hash would reveal the seeds; fowt leaderboard seeds makes such a file"
         )
     if not words or not all(word.isdecimal() and len(word) < 20 for word in words):
-        raise InputError(f"{where}: must hold whole numbers, one a line, behind the salt")
+        raise InputError(f"{where}: must contain whole numbers, one per line, after the salt")
     seeds = tuple(int(word) for word in words)
     if len(set(seeds)) < len(seeds):
-        raise InputError(f"{where}: a seed stands there twice")
+        raise InputError(f"{where}: a seed occurs twice")
     if not all(LEAST_SECRET <= seed < DRAWN.stop for seed in seeds):
         raise InputError(
-            f"{where}: {min(seeds)} to {max(seeds)}: must be from 2**40, below which a seed is found by"
-            " trying, to 2**63 - 1"
+            f"{where}: {min(seeds)} to {max(seeds)}: must be from 2**40, below which a seed can be guessed,"
+            " to 2**63 - 1"
         )
     return seeds, hashlib.sha256(content).hexdigest()

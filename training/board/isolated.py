@@ -1,11 +1,11 @@
-"""A controller in a process of its own, which is given its readings and nothing else.
+"""A controller in a separate process, which receives its readings and nothing else.
 
-The process has a copy of the submission's folder, an empty home folder, its own copy of the kernels that it
-compiled beforehand, none of the caller's environment variables but those in KEPT, and limits of memory,
-files, processes and processor time. A supervisor (supervisor.py) ends what it leaves behind. Its answers are
-two numbers or the name of an exception: they are not unpickled, so that nothing which it sends runs code
-here, and none of its words are kept. It starts anew for every run. It is no jail: it may read whatever this
-user may read, and open connections, unless it is started within a container (docs/guides/leaderboard.md).
+The process has a copy of the submission's folder, an empty home folder, a copy of the kernels that it
+compiled beforehand, only the environment variables in KEPT, and limits of memory, files, processes and
+processor time. A supervisor (supervisor.py) ends what it leaves behind. Its answers are two numbers or the
+name of an exception, and are not unpickled, so that they cannot run code here. It is restarted for every run.
+It is no sandbox: it can read what this user can read, and open connections, unless it is started in a
+container (docs/guides/leaderboard.md).
 """
 
 import builtins
@@ -38,10 +38,10 @@ OK, ERROR = b"k", b"e"
 LONGEST_ANSWER = 100  # bytes
 START, PREPARE, RESET, ACT = "start", "prepare", "reset", "act"
 FOLDER = "{folder}"  # in `within`: the process's folder
-LIMITS = {"FSIZE": 2 * 10**8, "NPROC": 256, "NOFILE": 256, "CORE": 0}  # bytes; beyond the user's own; files
-PATIENCE = 10.0  # s that the supervisor has to end what is left
-WARM_UP = 1.0  # s of simulated time in which a submission compiles what it needs
-# what an exception may be called: a name of a submission's own could say anything
+LIMITS = {"FSIZE": 2 * 10**8, "NPROC": 256, "NOFILE": 256, "CORE": 0}  # bytes; on top of the user's; files
+PATIENCE = 10.0  # s for the supervisor to end
+WARM_UP = 1.0  # s of simulated time in which a submission compiles its kernels
+# reported names of exceptions: a name chosen by a submission could contain a message
 KNOWN_ERRORS = {name for name, kind in vars(builtins).items() if isinstance(kind, type)} | {
     "ControllerError", "InputError", "LinAlgError",
 }  # fmt: skip
@@ -49,7 +49,7 @@ KNOWN_ERRORS = {name for name, kind in vars(builtins).items() if isinstance(kind
 
 @dataclass(frozen=True)
 class ProcessLimits:
-    """What a controller may use. A call beyond its limit ends the run as failed."""
+    """Limits of a controller. A call that exceeds one fails the run."""
 
     start: float = 120.0  # s, to import and make it; kernels may be compiled
     prepare: float = 300.0  # s
@@ -60,7 +60,7 @@ class ProcessLimits:
 
 @dataclass(frozen=True)
 class IsolatedFactory:
-    """Makes controllers of a Python file, each in a process of its own; can be sent to worker processes."""
+    """Makes controllers of a Python file, each in a separate process; can be sent to worker processes."""
 
     folder: str
     file: str
@@ -69,15 +69,15 @@ class IsolatedFactory:
     information: tuple[str, ...]
     preview_times: tuple[float, ...]
     limits: ProcessLimits = ProcessLimits()
-    digest: str = ""  # of the folder's files, which must still have it as a run begins; "": any
-    within: tuple[str, ...] = ()  # command that the process is started by, as that of a container
-    kernels: str = ""  # folder of what it compiled, of which each process has a copy; "": none
-    keeps: bool = False  # whether `kernels` becomes what a process of it leaves
+    digest: str = ""  # of the folder's files, checked when a run begins; "": not checked
+    within: tuple[str, ...] = ()  # command that starts the process, such as a container's
+    kernels: str = ""  # folder of compiled kernels, copied for each process; "": none
+    keeps: bool = False  # whether `kernels` is replaced by those of the process
     log: str = ""  # file for the slowest call of each run; "": none
 
     @property
     def content_key(self) -> str:
-        """Hash of what shapes a run of it beside the sources of this package."""
+        """Hash of all that affects its runs besides the sources of this package."""
         parts = (
             *(self.digest, self.file, self.attribute, self.name, self.information, self.preview_times),
             *(asdict(self.limits), self.within),
@@ -85,15 +85,15 @@ class IsolatedFactory:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
     def __call__(self, turbine: Any, control_dt: float) -> "CheckedController":
-        """The controller for a turbine and control period (s)."""
+        """Return the controller for a turbine and control period (s)."""
         return CheckedController(IsolatedController(self, turbine, control_dt), self.name)
 
 
 class IsolatedController:
-    """What the simulator sees of a controller that runs in another process.
+    """The simulator's side of a controller that runs in another process.
 
-    Raises: ControllerError where the process ends, fails, or takes longer than its limits; InputError where
-    the submission's files are not those of its digest.
+    Raises: ControllerError if the process ends, fails, or exceeds its limits; InputError if the submission's
+    files do not match its digest.
     """
 
     def __init__(self, factory: IsolatedFactory, turbine: Any, control_dt: float) -> None:
@@ -105,11 +105,11 @@ class IsolatedController:
         self.process: _Process | None = None
 
     def prepare(self, scene: Any) -> None:
-        """Keep what is known of the plant for the process, which starts at reset()."""
+        """Store the nominal scene for the process, which starts at reset()."""
         self.known = scene
 
     def reset(self, measurement: Any) -> None:
-        """A new process, prepared and reset."""
+        """Start a new process, and prepare and reset its controller."""
         self.close()
         factory, limits = self.factory, self.factory.limits
         self.process = _Process(factory)
@@ -118,7 +118,7 @@ class IsolatedController:
         self._ask(RESET, measurement, limits.prepare)
 
     def act(self, measurement: Any) -> tuple[float, float]:
-        """(generator torque N m, blade pitch rad) as the process answers."""
+        """Return (generator torque N m, blade pitch rad) from the process."""
         moment = float(measurement.time)
         answer = self._ask(ACT, measurement, self.factory.limits.call, moment)
         if len(answer) != COMMAND.size:
@@ -152,7 +152,7 @@ class IsolatedController:
         return ControllerError(f"controller {self.name!r}: {why}", self.name, moment, None)
 
     def close(self) -> None:
-        """End the process, if there is one, and note its slowest call."""
+        """End the process, if there is one, and log its slowest call."""
         process, self.process = self.process, None
         if process is None:
             return
@@ -168,10 +168,10 @@ class IsolatedController:
 
 
 def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactory:
-    """The factory with kernels that it compiled in short runs of scenes, none of which has any weather.
+    """Return the factory with kernels that it compiled in short runs of scenes without weather.
 
-    Runs of the board begin with copies of these, so that nothing which one writes is there in another.
-    scenes: called for the scenes where they are needed; key: what tells these, and the plant, apart.
+    Runs of the board begin with copies of these, so that they cannot exchange data.
+    scenes: called for the scenes if needed; key: identifies these scenes and the plant.
     """
     root = cache_root()
     if root is None:
@@ -182,13 +182,13 @@ def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactor
         import fowt_env
 
         make_private(place.parent)
-        # it gets its name once it is whole, so that one which was interrupted is made again
+        # renamed once it is complete, so that an interrupted one is repeated
         unfinished = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=place.parent))
         limits = replace(factory.limits, call=factory.limits.start)  # the first act() compiles too
         compiling = replace(factory, kernels=str(unfinished), keeps=True, log="", limits=limits)
         try:
             for scene in scenes():
-                with suppress(ControllerError, InputError):  # its judged runs will fail as well, and say so
+                with suppress(ControllerError, InputError):  # its judged runs will fail with the reason
                     fowt_env.simulate(scene, compiling, duration=WARM_UP)
             unfinished.rename(place)
         finally:
@@ -197,10 +197,10 @@ def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactor
 
 
 class _Process:
-    """A started process, asked through its standard input and output."""
+    """A running process that answers requests through its standard input and output."""
 
     def __init__(self, factory):
-        supervisor.prctl(supervisor.DUMPABLE, 0)  # this process knows the weather: its memory is no file
+        supervisor.prctl(supervisor.DUMPABLE, 0)  # hide the weather in this process's memory from others
         self.factory = factory
         self.folder = Path(tempfile.mkdtemp(prefix="fowt-submission-"))
         try:
@@ -237,7 +237,7 @@ class _Process:
         os.set_blocking(self.to, False)
 
     def ask(self, content, limit):
-        """(OK or ERROR, bytes) of its answer. Raises: TimeoutError after `limit` s; OSError, EOFError."""
+        """Return (OK or ERROR, answer as bytes). Raises: TimeoutError after `limit` s, OSError, EOFError."""
         deadline = time.monotonic() + limit
         self._write(LENGTH.pack(len(content)) + content, deadline)
         head = self._read(1 + LENGTH.size, deadline)
@@ -268,7 +268,7 @@ class _Process:
         return found
 
     def close(self):
-        """End it and whatever it started, keep its kernels where that is asked for, and remove its folder."""
+        """End the process and its children, keep its kernels if requested, and remove its folder."""
         with suppress(OSError):
             self.process.stdin.close()
         self.process.stdout.close()
@@ -285,13 +285,10 @@ class _Process:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-# ------------------------------------------------------------------------------- in the other process
-
-
 def serve() -> None:
-    """Answer what comes in until it is closed: the main loop of the other process.
+    """Answer requests from standard input until it is closed: the main loop of the other process.
 
-    Standard input and output are then those of a process that has neither, as a controller may print.
+    Standard input and output are redirected to the null device, since a controller may print.
     """
     incoming, outgoing, nothing = os.dup(0), os.dup(1), os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 0)
@@ -303,7 +300,7 @@ def serve() -> None:
             try:
                 controller, answer = _done(what, content, controller)
                 kind = OK
-            except BaseException as error:  # SystemExit too: the run is told why it fails
+            except BaseException as error:  # including SystemExit: the run fails with its name
                 own = error.__cause__ if isinstance(error, ControllerError) else None  # the controller's
                 kind, answer = ERROR, type(error if own is None else own).__name__.encode()[:LONGEST_ANSWER]
             content = kind + LENGTH.pack(len(answer)) + answer
@@ -312,7 +309,7 @@ def serve() -> None:
 
 
 def _done(what, content, controller):
-    """(controller, answer) of one request."""
+    """Return (controller, answer) of one request."""
     if what == START:
         return _made(*content), b""
     if what == PREPARE:
@@ -325,7 +322,7 @@ def _done(what, content, controller):
 
 
 def _made(file, attribute, turbine, control_dt):
-    """The controller that a file in the working folder makes."""
+    """Return the controller of a file in the working folder."""
     from fowt_env.control import make
 
     sys.path.insert(0, os.getcwd())

@@ -1,9 +1,9 @@
-"""Judging: every submission run anew on the board's suites, every figure computed from the time series.
+"""Judging: every submission is run on the board's suites, and all metrics are computed from the time series.
 
-Submissions bring no results. A run is kept under a key of all that shapes it, so that those of another
-content, card or limit are never shown. Controllers of Python files run in processes of their own
-(training.board.isolated); the organiser's secret seeds are in none of the files that the page is made of, but
-for their number and the hash of their file, with which the organiser can prove later which they were.
+A run is stored under a key of everything that affects it, so that runs of a changed submission, card or limit
+are never shown. Controllers of Python files run in separate processes (training.board.isolated). The page has
+only the number of the organiser's secret seeds and the hash of their file, which proves later which they
+were.
 """
 
 import hashlib
@@ -39,26 +39,26 @@ from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
 RELATIVE = 1e-9  # to which figures computed anew agree with those of the rows
-CALLS = "slowest_calls.csv"  # of a results folder: name, key, s of each run in a process of its own
+CALLS = "slowest_calls.csv"  # of a results folder: name, key, s of each isolated run
 
 
 @dataclass
 class Judged:
-    """What was run: a table of results for each suite, of public and of secret seeds."""
+    """Result of a judging: a table for each suite, of public and of secret seeds."""
 
     board: Board
     submissions: list
     public: dict[str, pd.DataFrame] = field(default_factory=dict)  # suite -> table of evaluate
     secret: dict[str, pd.DataFrame] = field(default_factory=dict)
     seeds_hash: str = ""  # of the file of secret seeds
-    drawn: str = ""  # hash that the public seeds were drawn from; "": they are the board's
+    drawn: str = ""  # hash from which the public seeds were drawn; "": listed ones
     when: str = ""
     left_out: dict[str, str] = field(default_factory=dict)  # {submission, or "submission, suite": why}
     slowest: dict[tuple[str, str], float] = field(default_factory=dict)  # {(suite, name): s of a call}
 
     @property
     def shown(self) -> list:
-        """Submissions that were run on a suite or more."""
+        """Submissions that were run on at least one suite."""
         names = {name for table in self.public.values() for name in table["controller"]}
         return [each for each in self.submissions if each.name in names]
 
@@ -66,14 +66,14 @@ class Judged:
 def judge(
     board, jobs=1, secret=None, private=None, trust_code=False, progress=None, draw_seeds=None, within=()
 ):
-    """Judged of all submissions of a Board that can be run, and why the others cannot.
+    """Run all submissions of a Board that can be run, and return the Judged.
 
-    secret      file of the organiser's seeds ("-": standard input); private: folder for the runs of these
+    secret      file of the organiser's seeds ("-": standard input); private: folder for their runs
     progress    called as progress(done, total, text)
-    draw_seeds  hash from which the public seeds are drawn, as many as the board lists; None: those
-    within      words of a command in which Python files are run, as that of a container
-    Raises: InputError where a Python file is among the submissions and trust_code is not set, where seeds
-    are given without a folder for their runs, or where the baseline is missing or cannot be run.
+    draw_seeds  hash from which as many public seeds are drawn as the board lists; None: the listed ones
+    within      words of a command that starts Python files, such as a container's
+    Raises: InputError if a Python file is among the submissions without trust_code, for secret seeds without
+    a folder for their runs, or if the baseline is missing or cannot be run.
     """
     submissions, left_out = board.read()
     baseline, names = board.settings.baseline, [each.name for each in submissions]
@@ -85,19 +85,19 @@ def judge(
     code = [each.name for each in submissions if each.kind == PYTHON_FILE]
     if code and not trust_code:
         raise InputError(
-            f"submissions {', '.join(code)}: hold Python code of their authors, which judging runs: read it,"
-            " then give --trust-code (each runs in a process of its own, with this user's rights)"
+            f"submissions {', '.join(code)}: contain Python code, which judging runs: read it, then use"
+            " --trust-code (each runs in a separate process, with this user's rights)"
         )
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if code and jobs > processors:
         raise InputError(
             f"jobs = {jobs}: the calls of Python files are timed by the clock, and this machine has"
-            f" {processors} processors: give at most that many"
+            f" {processors} processors: use at most that many"
         )
     if (secret is None) != (private is None):
-        raise InputError("secret seeds: need a folder for their runs (--private), which is not the board's")
+        raise InputError("secret seeds: need a folder for their runs (--private) outside the board")
     if private is not None and Path(private).resolve().is_relative_to(board.folder.resolve()):
-        raise InputError(f"private = {str(private)!r}: must lie outside of the board's folder")
+        raise InputError(f"private = {str(private)!r}: must be outside of the board's folder")
     made = Judged(board, submissions, when=time.strftime("%Y-%m-%d"), left_out=left_out)
     suites = [board.suite(name) for regime in board.settings.regime for name in regime.suites]
     suites = [replace(suite, seeds=tuple(board.settings.seeds)) for suite in suites]
@@ -120,7 +120,7 @@ def judge(
 
 
 def _unordered(suite, seeds):
-    """A Suite of secret seeds, whose runs come in an order that no controller can know."""
+    """Return a Suite of secret seeds with its runs in random order."""
     order = list(seeds)
     cases = [
         case if case.seeds is None else replace(case, seeds=tuple(seeds[: len(case.seeds)]))
@@ -132,7 +132,7 @@ def _unordered(suite, seeds):
 
 
 def _factories(submissions, limits, within, suites):
-    """{name: what evaluate is given}; Python files with the kernels that they have compiled beforehand."""
+    """Return {name: controller for evaluate}; Python files with kernels that they have compiled."""
     found = {each.name: each.controller(limits) for each in submissions}
     for each in submissions:
         if each.kind == PYTHON_FILE:
@@ -144,7 +144,7 @@ def _factories(submissions, limits, within, suites):
 
 
 def _kinds(suites):
-    """[(Case, seed)] of suites: one of each kind of scene that a controller is prepared for."""
+    """Return [(Case, seed)] of suites: one for each kind of scene that a controller is prepared for."""
     found = {}
     for suite in suites:
         for case in suite.cases:
@@ -157,13 +157,13 @@ def _kinds(suites):
 
 
 class _Asking:
-    """What known_scene is asked for."""
+    """A controller whose known_scene is built."""
 
     name, information = "board", ("plant_model",)
 
 
 def _quiet(case, seed):
-    """Scene of a Case as a controller is prepared for it: no wind and no waves of a run."""
+    """Return the nominal scene of a Case for `prepare`, without the weather of a run."""
     options = {"duration": SHORTEST_CASE_WEATHER, **case.options}
     wind = cached_box(case.wind, case.platform, seed, options) if is_field(case.wind) else case.wind
     with muted():
@@ -171,7 +171,7 @@ def _quiet(case, seed):
 
 
 def _suite_table(made, factories, suite, folder, jobs, progress):
-    """Table of a suite: all submissions that can be run on it, each with its kind of preview."""
+    """Return the table of a suite with all submissions that it can run, each with its kind of preview."""
     parts = []
     drawn = "" if suite.drawn is None else f"-{suite.drawn['hash'][:12]}"
     for preview in sorted({each.card.preview for each in made.submissions}):
@@ -205,13 +205,13 @@ def _suite_table(made, factories, suite, folder, jobs, progress):
 
 
 def _key(submission, controller):
-    """Hash of all that shapes the runs of a submission beside suite, seeds and plant."""
+    """Return the hash of all that affects the runs of a submission besides suite, seeds and plant."""
     parts = [submission.digest, controller_code(controller)["code"]]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 
 
 def _run(labelled, suite, place, **options):
-    """(table of evaluate or None, {label: why it cannot be run}) of {label: controller}."""
+    """Return (table of evaluate or None, {label: why it cannot be run}) of {label: controller}."""
     try:
         table = evaluate(labelled, suite, folder=place, **options)
         table = table[table["controller"].isin([*labelled, REFERENCE]) & table["seed"].isin(_seeds(suite))]
@@ -221,7 +221,7 @@ def _run(labelled, suite, place, **options):
         if len(labelled) == 1:
             return None, dict.fromkeys(labelled, printable(str(error)))
     parts, refused = [], {}
-    for label, controller in labelled.items():  # what one of them cannot do must not keep the others
+    for label, controller in labelled.items():  # one by one, without those that cannot be run
         table, why = _run({label: controller}, suite, place, **options)
         parts += [] if table is None else [table]
         refused |= why
@@ -233,7 +233,7 @@ def _seeds(suite):
 
 
 def _note_slowest(made, suite, path, labelled, names):
-    """Put the slowest call of each Python file among the runs of a results folder into made.slowest."""
+    """Add the slowest call of each Python file of a results folder to made.slowest."""
     if not path.is_file():
         return
     calls = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
@@ -246,14 +246,14 @@ def _note_slowest(made, suite, path, labelled, names):
 
 
 def check_figures(table, folder, suite):
-    """Raises: InputError where figures of a table are not those of the time series of its runs."""
+    """Compare the metrics of a table with those of its time series. Raises: InputError if they differ."""
     cases = {case.name: case for case in suite.cases}
-    scenes = {}  # what the metrics take of one, turbine and mean wind, is the same for all runs of a case
+    scenes = {}  # per case: the metrics need only its turbine and mean wind
     for place in np.flatnonzero(table["status"] != "failed"):
         row = table.iloc[place]
         case = cases[row["case"]]
         if case.name not in scenes:
-            wind = None if is_field(case.wind) else case.wind  # a box takes minutes and rests nowhere
+            wind = None if is_field(case.wind) else case.wind  # a box takes minutes and is not needed
             scenes[case.name] = build_scene(case.platform, wind=wind, sea=case.sea, **case.options)
         frame = read_table(run_file(Path(folder) / "runs", *row[list(KEY)]))
         skip = suite.skip if case.skip is None else case.skip
@@ -269,12 +269,12 @@ def check_figures(table, folder, suite):
 
 
 def inputs_of(submission, turbine):
-    """What a submission is given: its declared inputs, or those of the built-in controller or policy."""
+    """Return the inputs of a submission: the declared ones, or those of the built-in controller or policy."""
     if submission.kind == PYTHON_FILE:
         return tuple(submission.card.information)
     return tuple(make(submission.controller(None), turbine, CONTROL_DT).information)
 
 
 def package_version():
-    """What the runs were made with."""
+    """Return the version of the package."""
     return f"fowt_env {fowt_env.__version__}"

@@ -1,7 +1,7 @@
-"""What a judged board is shown as: one HTML page that asks nothing of a network, a CSV and a history.
+"""The output of a judged board: an HTML page that loads nothing from a network, a CSV and a history.
 
-Every text of a submission is escaped, characters that cannot be seen or that turn the direction of writing
-among them, and its address is a link only where it begins with http.
+Every text of a submission is escaped, including invisible characters and those that change the direction of
+writing; its address is a link only if it begins with http.
 """
 
 import html
@@ -15,10 +15,12 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.training.board.judge import inputs_of, package_version
+from fowt_env.training.evaluation.bootstrap import LEVEL, holm
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import better
 from fowt_env.training.reports.metric_words import about_metric
 from fowt_env.training.reports.page_policy import content_policy
+from fowt_env.training.reports.page_words import table_rows
 
 FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "rotor speed": "RotSpeed_std_[rpm]",
@@ -28,14 +30,14 @@ FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "shaft DEL": "RotTorq_DEL_[kN-m]",
     "tower DEL": "TwrBsMyt_DEL_[kN-m]",
 }
-LISTED = "listed"  # seeds of a judging that draws none
+LISTED = "listed"  # seeds of a judging without drawn ones
 PER_WIND = ("rotor speed", "platform pitch", "travel")
 MODEL, PREVIEW = "plant_model", "wind_preview"
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # with which a spreadsheet begins to compute
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # begin a formula in a spreadsheet
 PLANT = {"rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "time"}
 CANNOT = (
     "Whether a controller recognises seeds that are listed: compare its score on drawn or secret ones.",
-    "What was tuned on which seeds and with what budget: that is the author's word.",
+    "What was tuned on which seeds and with what budget: this is only declared by the author.",
     "Whether code read files or the network of the organiser's machine, unless it ran in a container.",
     "Submissions that differ in name alone.",
 )
@@ -65,41 +67,38 @@ background:var(--head);color:var(--ink)}
 """
 
 
+def _visible(text):
+    """Return a text of a submission with Python escapes for characters that cannot be printed."""
+    return "".join(c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in str(text))
+
+
 def escaped(text):
-    """HTML of a text of a submission: escaped, and what cannot be printed as its Python escape."""
-    words = (c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in str(text))
-    return html.escape("".join(words))
+    """Return HTML of a text of a submission, escaped."""
+    return html.escape(_visible(text))
 
 
 def cell(text):
-    """A text of a submission for a CSV file, in which no spreadsheet takes it for a formula."""
-    text = "".join(c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in text)
+    """Return a text of a submission for a CSV file, quoted so that no spreadsheet reads a formula."""
+    text = _visible(text)
     return f"'{text}" if text.lstrip().startswith(FORMULA) else text
 
 
 def information_class(submission, turbine):
-    """What a submission is given, in one of a few words that rows are compared within."""
-    used = set(inputs_of(submission, turbine))
-    sensors = used - set(PRIVILEGED_INPUTS)
-    words = ["rotor and blades" if sensors <= PLANT else "sensors"]
-    if used & {"wind_speed", "wave_elevation"}:
-        words.append("exact weather")
-    if MODEL in used:
-        words.append("plant model")
-    if PREVIEW in used:
-        words.append(
-            "exact preview" if submission.card.preview == "exact" else f"lidar {submission.card.preview}"
-        )
+    """Return the class of a submission by its inputs, such as "sensors + plant model"."""
+    used, preview = set(inputs_of(submission, turbine)), submission.card.preview
+    words = ["rotor and blades" if used - set(PRIVILEGED_INPUTS) <= PLANT else "sensors"]
+    words += ["exact weather"] if used & {"wind_speed", "wave_elevation"} else []
+    words += ["plant model"] if MODEL in used else []
+    words += ["exact preview" if preview == "exact" else f"lidar {preview}"] if PREVIEW in used else []
     return " + ".join(words)
 
 
 def board_frame(judged):
-    """DataFrame of a Judged: a row for each suite and submission, in the order of the ranks.
+    """Return a DataFrame of a Judged: a row for each suite and submission, in the order of the ranks.
 
-    Columns: regime, suite, version, rank (none without a score), name, author, licence, information, runs,
-    failed (also those that lost power), tripped, for each of FIGURES its ratio to the baseline's and p-value,
-    score with its interval, score_secret, beyond (limits passed), slowest_call_[s] (of a Python file, by the
-    clock; NaN for others).
+    Columns: regime, suite, version, rank (NaN without a score), name, author, licence, information, runs,
+    failed (also lost power), tripped, for each of FIGURES its ratio to the baseline and p-value, score with
+    its interval, score_secret, beyond (exceeded limits), slowest_call_[s] (of a Python file; NaN for others).
     """
     rows = []
     board = judged.board
@@ -114,13 +113,11 @@ def board_frame(judged):
                 who = entry["controller"]
                 row = {"regime": regime.name, "suite": name, "version": suite.version, "rank": entry["rank"]}
                 row |= {"name": who, "author": cell(cards[who].author), "licence": cell(cards[who].licence)}
-                row |= {"information": classes[who]}
-                row |= {key: entry[key] for key in ("runs", "failed", "tripped")}
-                row["failed"] += entry["lost_power"]
+                row |= {"information": classes[who], "runs": entry["runs"]}
+                row |= {"failed": entry["failed"] + entry["lost_power"], "tripped": entry["tripped"]}
                 for heading, metric in FIGURES.items():
-                    found = entry["difference"][metric]
-                    row[heading] = 1.0 + found["percent"] / 100.0
-                    row[f"p({heading})"] = found["p"]
+                    gap = entry["difference"][metric]
+                    row |= {heading: 1.0 + gap["percent"] / 100.0, f"p({heading})": gap["p"]}
                 row |= _score_columns(entry)
                 row["score_secret"] = _score_columns(secret[who])["score"] if who in secret else np.nan
                 row["beyond"] = "; ".join(entry["beyond"])
@@ -130,7 +127,7 @@ def board_frame(judged):
 
 
 def _compared(table, suite, board):
-    """{name: entry of the leaderboard} of a suite's table, in the order of the ranks."""
+    """Return {name: entry of the leaderboard} of a suite's table, in the order of the ranks."""
     found = leaderboard(table, board.settings.baseline, suite.score, limits=suite.limits)
     return {entry["controller"]: entry for entry in found["controllers"]}
 
@@ -143,21 +140,20 @@ def _score_columns(entry):
 
 
 def write_board(judged):
-    """Paths written in the board's folder: index.html, board.csv, history.csv."""
+    """Write index.html, board.csv and history.csv in the board's folder; return their paths."""
     folder = judged.board.folder
     frame = board_frame(judged)
     history = _history(folder / "history.csv", frame, judged)
     paths = folder / "index.html", folder / "board.csv", folder / "history.csv"
     write_table(frame, paths[1])
     write_table(history, paths[2])
-    text = _page(judged, frame, history)
     with replacing(paths[0]) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
+        temporary.write_text(_page(judged, frame, history), encoding="utf-8")
     return paths
 
 
 def _history(path, frame, judged):
-    """DataFrame of the history and, in place of its rows of the same day and digest, of this judging."""
+    """Return the history with the rows of this judging, which replace those of the same day and digest."""
     digests = {each.name: each.digest for each in judged.shown}
     here = frame[["suite", "version", "name", "rank", "score", "failed", "tripped"]].assign(
         date=judged.when,
@@ -173,7 +169,7 @@ def _history(path, frame, judged):
 
 
 def board_rows(folder, regime=None):
-    """(title, headings, rows) of a judged board's CSV for one regime, for a terminal.
+    """Return (title, headings, rows) of a judged board's CSV for one regime, for a terminal.
 
     Raises: InputError for a board that was not judged, or an unknown regime.
     """
@@ -199,7 +195,7 @@ def board_rows(folder, regime=None):
 
 
 def _rank_text(rank):
-    """Text of a rank; "-" where there is none, of a suite without a score."""
+    """Return the text of a rank; "-" for none, in a suite without a score."""
     return "-" if pd.isna(rank) else f"{rank:.0f}"
 
 
@@ -207,11 +203,8 @@ def _number(value, digits=3):
     return f"{value:.{digits}f}" if np.isfinite(value) else "-"
 
 
-# ------------------------------------------------------------------------------------------- the page
-
-
 def _page(judged, frame, history):
-    """HTML text of the page."""
+    """Return the HTML text of the page."""
     board = judged.board
     title, baseline = html.escape(board.settings.title), html.escape(board.settings.baseline)
     policy = content_policy(styles=[STYLE])
@@ -222,13 +215,13 @@ def _page(judged, frame, history):
         f"<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>",
         f"<p>Judged {judged.when} with {html.escape(package_version())}; baseline"
         f" <b>{baseline}</b>; {_public(judged)}. {_secret(judged)}</p>",
-        "<details open><summary>How to read it</summary><p class=small>Ratios are of lifetime means over the"
-        " baseline's on the same wind and waves, less is better but for energy (power up to rated). In"
+        "<details open><summary>How to read it</summary><p class=small>Ratios are of lifetime means to the"
+        " baseline's in the same wind and waves; less is better except for energy (power up to rated). In"
         " brackets: 95 % interval of the score; * significant: the p-value, after Holm's correction over the"
         ' row, is at most 0.05, and the difference <span class="better">✓ better</span> or <span'
-        ' class="worse">✗ worse</span>. Ranks: first those within every limit, then those beyond one, then'
+        ' class="worse">✗ worse</span>. Ranks: first those within every limit, then those above one, then'
         " those that lost runs (failed, tripped, or with less than half of the reference's energy); within"
-        " each by the score, in which a lost run counts ten times the reference's figures. A heading explains"
+        " each by the score, in which a lost run counts ten times the reference's metrics. A heading explains"
         " its metric. Wide tables scroll sideways.</p></details>",
         *_explanations(),
         *_left_out(judged),
@@ -249,7 +242,7 @@ def _page(judged, frame, history):
 
 
 def _public(judged):
-    """Words for the public seeds."""
+    """Return the text on the public seeds."""
     if not judged.drawn:
         seeds = ", ".join(map(str, judged.board.settings.seeds))
         return f"public seeds {seeds}, which are for development and which a controller may recognise"
@@ -258,7 +251,7 @@ def _public(judged):
 
 
 def _left_out(judged):
-    """List of the submissions that were not run, and why."""
+    """Return the list of the submissions that were not run, and why."""
     if not judged.left_out:
         return []
     lines = (f"<li><b>{escaped(who)}</b>: {escaped(why)}</li>" for who, why in judged.left_out.items())
@@ -273,18 +266,12 @@ def _secret(judged):
 
 
 def _table(headings, rows, texts=()):
-    """HTML of a table; texts: numbers of the columns that stand left."""
-
-    def cells(row, tag):
-        marked = (' class="text"' if i in texts else "" for i in range(len(row)))
-        return "".join(f"<{tag}{mark}>{cell}</{tag}>" for mark, cell in zip(marked, row, strict=True))
-
-    lines = [f"<tr>{cells(headings, 'th')}</tr>", *(f"<tr>{cells(row, 'td')}</tr>" for row in rows)]
-    return f'<div class="scroll" tabindex="0"><table>{"".join(lines)}</table></div>'
+    """Return HTML of a table that scrolls; texts: numbers of the left-aligned columns."""
+    return f'<div class="scroll" tabindex="0"><table>{table_rows(headings, rows, texts)}</table></div>'
 
 
 def _explanations():
-    """Popovers that say what the metrics are, which open from their headings without a script."""
+    """Return popovers that explain the metrics and open from their headings without a script."""
     return [
         f'<div popover id="metric-{number}"><b>{heading}</b>, ratio to the baseline.'
         f" {html.escape(about_metric(metric))}</div>"
@@ -293,7 +280,7 @@ def _explanations():
 
 
 def _explained_headings():
-    """Headings of FIGURES as buttons, explained on a touch or a key, and to a pointer that rests there."""
+    """Return the headings of FIGURES as buttons that open the explanations."""
     return [
         f'<button popovertarget="metric-{number}" title="{html.escape(about_metric(metric))}">'
         f"{heading}</button>"
@@ -302,7 +289,7 @@ def _explained_headings():
 
 
 def ratio_text(ratio, metric, significant):
-    """HTML of a ratio, marked as better or worse where that is significant."""
+    """Return HTML of a ratio, marked as better or worse if significant."""
     if not significant:
         return _number(ratio)
     word, mark = ("better", "✓") if (ratio - 1.0) * better(metric) > 0.0 else ("worse", "✗")
@@ -310,8 +297,6 @@ def ratio_text(ratio, metric, significant):
 
 
 def _ranking(rows, judged):
-    from fowt_env.training.evaluation.bootstrap import LEVEL, holm
-
     shown = []
     for row in rows.to_dict("records"):
         corrected = holm([row[f"p({figure})"] for figure in FIGURES])
@@ -329,21 +314,21 @@ def _ranking(rows, judged):
         ])  # fmt: skip
     calls = f"slowest call, s (limit {judged.board.settings.call_limit:g})"
     last = ["score", calls, *(["score, secret seeds"] if judged.secret else [])]
-    first = ["rank", "controller", "is given", "lost runs"]
+    first = ["rank", "controller", "inputs", "lost runs"]
     return _table([*first, *_explained_headings(), *last], shown, (1, 2))
 
 
 def _beyond(rows):
-    """List of who passed which limit."""
+    """Return the list of exceeded limits."""
     found = [(row["name"], row["beyond"]) for row in rows.to_dict("records") if row["beyond"]]
     if not found:
         return ""
     lines = "".join(f"<li><b>{html.escape(name)}</b>: {html.escape(text)}</li>" for name, text in found)
-    return f"<p class=small>Beyond a limit of the suite:</p><ul class=small>{lines}</ul>"
+    return f"<p class=small>Exceeded limits of the suite:</p><ul class=small>{lines}</ul>"
 
 
 def _per_wind(judged, name):
-    """A table for each of PER_WIND: ratios case by case."""
+    """Return a table for each of PER_WIND: ratios case by case."""
     board = judged.board
     entries = _compared(judged.public[name], board.suite(name), board)
     cases = list(next(iter(entries.values()))["cases"])
@@ -359,38 +344,28 @@ def _per_wind(judged, name):
 
 
 def _submissions(judged):
-    """Table of the cards."""
+    """Return the table of the cards."""
     rows = []
     for each in judged.shown:
         card = each.card
         name = escaped(card.name)
         if card.url.startswith(("https://", "http://")):
             name = f'<a href="{escaped(card.url)}" rel="nofollow noreferrer">{name}</a>'
-        texts = (
-            card.author,
-            card.licence,
-            each.kind,
-            ", ".join(inputs_of(each, judged.board.turbine)),
-            card.description,
-            card.tuning,
-        )
+        inputs = ", ".join(inputs_of(each, judged.board.turbine))
+        texts = (card.author, card.licence, each.kind, inputs, card.description, card.tuning)
         rows.append([name, *map(escaped, texts), f"<code>{each.digest[:16]}</code>"])
     headings = ["name", "author", "licence", "kind", "inputs", "description", "tuning", "files"]
     return "<h2>Submissions</h2>" + _table(headings, rows, range(8))
 
 
 def _history_table(history):
-    """Table of the scores over the judgings, newest first."""
+    """Return the table of the scores of all judgings, newest first."""
     rows = []
     for row in history.sort_values("date", ascending=False, kind="stable").to_dict("records"):
         words = [row[key] for key in ("date", "suite", "version", "seeds", "name", "package")]
         words.append(_rank_text(row["rank"]))
         lost = int(row["failed"] + row["tripped"])
         rows.append([*(html.escape(str(word)) for word in words), _number(row["score"]), str(lost)])
-    headings = ["date", "suite", "version", "seeds", "controller", "judged with", "rank", "score"]
-    headings.append("lost runs")
-    return (
-        "<h2>History</h2><details><summary>all judgings</summary>"
-        + _table(headings, rows, (0, 1, 3, 4, 5))
-        + "</details>"
-    )
+    headings = "date,suite,version,seeds,controller,judged with,rank,score,lost runs".split(",")
+    table = _table(headings, rows, (0, 1, 3, 4, 5))
+    return f"<h2>History</h2><details><summary>all judgings</summary>{table}</details>"

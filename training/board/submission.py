@@ -1,11 +1,11 @@
-"""A submission to a standing board: a folder with a card and the controller that it names.
+"""A submission to a leaderboard: a folder with a card and the controller that it names.
 
     my_controller/
-        card.toml            who made it, what it is given, under what licence
-        controller.py        or a policy file (.npz); what card.toml names as its controller
+        card.toml            author, licence, inputs
+        controller.py        or a policy file (.npz): the controller of card.toml
 
-A policy file holds arrays and runs no code. A Python file is code: `fowt leaderboard run` runs it only where
---trust-code is given, and then in a process of its own (training.board.isolated).
+A policy file contains arrays and no code. `fowt leaderboard run` runs a Python file only with --trust-code,
+and then in a separate process (training.board.isolated).
 """
 
 import re
@@ -30,13 +30,13 @@ CARD = "card.toml"
 BUILT_IN, POLICY_FILE, PYTHON_FILE = "built-in", "policy file", "Python file"
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,49}")
 RESERVED = (PARKED,)  # of turbines without a controller
-MOST_TIMES, FURTHEST = 100, 60.0  # preview_times, and s ahead: a judge keeps a series for each of them
+MOST_TIMES, FURTHEST = 100, 60.0  # number of preview_times, each with a series in memory, and s ahead
 LONGEST_TEXT = 2000  # characters of each text of a card
 INPUTS = (*Measurement._fields, *PRIVILEGED_INPUTS)
 
 
 def _tuple(value):
-    """A tuple of a list; anything else as it is, for the validation to refuse."""
+    """Return a tuple of a list; any other value unchanged, for the validation to refuse."""
     return tuple(value) if isinstance(value, list) else value
 
 
@@ -45,11 +45,11 @@ class Card(Record):
 
     controller     a name of fowt list controllers; "FILE.npz"; or "FILE.py:Name", where Name is a class or
                    factory called with (turbine, control_dt), or with nothing
-    information    what the controller is given: fields of Measurement and PRIVILEGED_INPUTS; read from the
-                   controller itself where it is a built-in one or a policy file
-    preview_times  s ahead at which it is given the wind, rising; with "wind_preview" in information
-    preview        "exact", or the lidar preset (fowt list lidars) through which it sees the wind ahead
-    tuning         what was tuned or trained, on which seeds, with which budget
+    information    inputs of the controller: fields of Measurement and PRIVILEGED_INPUTS; a built-in
+                   controller or a policy file declares them itself
+    preview_times  of the wind, s, increasing; with "wind_preview" in information
+    preview        "exact", or the lidar preset (fowt list lidars) that measures the wind ahead
+    tuning         tuned settings or training, its seeds and budget
     """
 
     name: str
@@ -75,11 +75,11 @@ class Submission:
 
     @property
     def name(self) -> str:
-        """What the board calls it."""
+        """Name on the board."""
         return self.card.name
 
     def controller(self, limits: Any, **options: Any) -> Any:
-        """What evaluate is given: a name, or a factory of controllers in a process of their own.
+        """Return the controller for evaluate: a name, or a factory of isolated controllers.
 
         limits: training.board.isolated.ProcessLimits of a Python file; options: further fields of its
         IsolatedFactory.
@@ -103,9 +103,9 @@ def alike(name: str) -> str:
 
 
 def read_submission(folder: Path | str) -> Submission:
-    """The submission in a folder; none of its code is run.
+    """Return the submission in a folder; its code is not run.
 
-    Raises: InputError for a folder without a sound card, or whose controller cannot be used.
+    Raises: InputError for a folder without a valid card, or whose controller cannot be used.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -119,7 +119,7 @@ def read_submission(folder: Path | str) -> Submission:
     if not NAME.fullmatch(card.name):
         problems.append(
             f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', a letter or"
-            f" digit first"
+            " digit first"
         )
     if card.name in RESERVED:
         problems.append(f"name = {card.name!r}: is reserved")
@@ -138,7 +138,7 @@ def read_submission(folder: Path | str) -> Submission:
 
 
 def _kind(card, folder, problems):
-    """BUILT_IN, POLICY_FILE or PYTHON_FILE; what is wrong with the controller goes to problems."""
+    """Return BUILT_IN, POLICY_FILE or PYTHON_FILE; append problems of the controller."""
     file, colon, attribute = card.controller.partition(":")
     if file.endswith(".py") and colon:
         if not attribute.isidentifier():
@@ -163,26 +163,26 @@ def _kind(card, folder, problems):
 
 
 def _inside(folder, name):
-    """Whether a name is that of a file in the folder itself, and no link out of it."""
+    """Return whether a name is that of a file in the folder itself, and no link."""
     path = folder / name
     return path.is_file() and not path.is_symlink() and path.resolve().parent == folder.resolve()
 
 
 def _check_information(card, kind, problems):
-    """What is wrong with the declared inputs goes to problems."""
+    """Append problems of the declared inputs."""
     if kind != PYTHON_FILE:
         if card.information is not None:
             problems.append(f"information: is read from a {kind} itself; leave it out")
         return
     if card.information is None:
-        problems.append("information is missing: the inputs that the controller is to be given")
+        problems.append("information is missing: the inputs of the controller")
         return
     for name in card.information:
         if name not in INPUTS:
             problems.append(f"information: {unknown('input', name, INPUTS)}")
     times = f"preview_times = [{', '.join(f'{time:g}' for time in card.preview_times[:9])}]"
     if bool(card.preview_times) != ("wind_preview" in card.information):
-        problems.append(f"{times}: must be given with 'wind_preview' in information, and only then")
+        problems.append(f"{times}: must be set if and only if 'wind_preview' is in information")
     if list(card.preview_times) != sorted(set(card.preview_times)):
         problems.append(f"{times}: must rise")
     if len(card.preview_times) > MOST_TIMES or max(card.preview_times, default=0.0) > FURTHEST:

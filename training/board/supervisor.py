@@ -1,11 +1,10 @@
-"""Runs one command under limits and ends whatever it leaves behind.
+"""Runs a command under limits and ends all processes that it leaves behind.
 
     python supervisor.py PARENT FOLDER LIMITS COMMAND...
 
-Of the standard library alone, so that it starts in some 20 ms and holds nothing that is worth reading.
-Processes whose own parent has ended become children of this one, so that none gets away by leaving its
-session. Where PARENT, a process id, has ended too, FOLDER is removed. LIMITS: {name of resource: value} as
-JSON.
+It uses the standard library only, so that it starts in some 20 ms and has no secrets in memory. Processes
+whose parent has ended become its children, so that none escapes by leaving its session. If PARENT, a process
+id, has ended too, FOLDER is removed. LIMITS: {name of resource: value} as JSON.
 """
 
 import ctypes
@@ -18,18 +17,18 @@ import sys
 from contextlib import suppress
 
 PDEATHSIG, DUMPABLE, SUBREAPER = 1, 4, 36  # of prctl, which only Linux has
-# a signal of its own, since a parent with threads keeps its process id until the last of them has ended
+# a separate signal: a parent with threads keeps its process id until the last of them has ended
 PARENT_ENDED = signal.SIGHUP
 
 
 def prctl(option: int, value: int) -> None:
-    """Set an attribute of this process where the system has such a thing."""
+    """Set an attribute of this process if the system supports it."""
     with suppress(AttributeError, OSError):
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def children() -> list[int]:
-    """Process ids of the children of this process; [] without /proc."""
+    """Return the process ids of the children of this process; [] without /proc."""
     found, me = [], os.getpid()
     with suppress(OSError):
         for name in filter(str.isdigit, os.listdir("/proc")):
@@ -40,7 +39,7 @@ def children() -> list[int]:
 
 
 def tasks() -> int:
-    """How many threads of this user run."""
+    """Return the number of this user's threads."""
     count = 0
     with suppress(OSError):
         for name in filter(str.isdigit, os.listdir("/proc")):
@@ -51,7 +50,7 @@ def tasks() -> int:
 
 
 def limit(limits: dict[str, int]) -> None:
-    """Set {name of resource: value}; NPROC, which counts all that the user runs, beyond what runs already."""
+    """Set {name of resource: value}; NPROC, which counts all threads of the user, on top of those running."""
     for name, value in limits.items():
         number = getattr(resource, f"RLIMIT_{name}", None)
         if number is not None:
@@ -63,7 +62,7 @@ def limit(limits: dict[str, int]) -> None:
 
 
 def supervise(parent: int, folder: str, limits: dict[str, int], command: list[str]) -> None:
-    """Run the command until it, this process or the parent is to end; then end all that is left of it."""
+    """Run the command until it or the parent ends, or this process is terminated; then end what is left."""
     prctl(SUBREAPER, 1)
     prctl(PDEATHSIG, PARENT_ENDED)
     first = 0
@@ -77,7 +76,7 @@ def supervise(parent: int, folder: str, limits: dict[str, int], command: list[st
                 with suppress(OSError):
                     os.kill(child, signal.SIGKILL)
             try:
-                os.wait()  # children of what ends here come to this process, and are ended in the next round
+                os.wait()  # grandchildren become children of this process, and are ended in the next round
             except ChildProcessError:
                 break
         if number == PARENT_ENDED or os.getppid() != parent:
@@ -96,7 +95,7 @@ def supervise(parent: int, folder: str, limits: dict[str, int], command: list[st
     signal.signal(signal.SIGTERM, end)
     signal.signal(PARENT_ENDED, end)
     nothing = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nothing, 0)  # so that the other end hears when the command closes its own
+    os.dup2(nothing, 0)  # so that the other end notices when the command closes its pipes
     os.dup2(nothing, 1)
     if os.getppid() != parent:
         end()

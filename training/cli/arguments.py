@@ -8,18 +8,23 @@ from fowt_env.descriptions.wind import wind_of
 from fowt_env.errors import InputError
 
 
+def parse_names(text):
+    """Return the list of the names in a text with commas; None for None."""
+    return None if text is None else [name.strip() for name in text.split(",") if name.strip()]
+
+
 def parse_wind(text):
-    """What build_scene takes as wind, from what wind_of takes; None for no text. Raises: InputError."""
+    """Return a wind for build_scene from a text that wind_of takes; None for None. Raises: InputError."""
     return None if text is None else wind_of(text)
 
 
 def parse_sea(text):
-    """What build_scene takes as sea, from what sea_of takes; None for no text. Raises: InputError."""
+    """Return a sea for build_scene from a text that sea_of takes; None for None. Raises: InputError."""
     return None if text is None else sea_of(text)
 
 
 def parse_fault(text):
-    """Mapping that simulate takes as a fault, from "grid_loss:100" (kind and time, s) or JSON."""
+    """Return a fault for simulate from "grid_loss:100" (kind and time, s) or JSON."""
     if text.lstrip().startswith("{"):
         return _json(text, "fault")
     kind, _, time = text.partition(":")
@@ -29,14 +34,14 @@ def parse_fault(text):
 
 
 def parse_protection(text):
-    """What simulate takes as protection, from "none", "turbine" or JSON of trips."""
+    """Return a protection for simulate from "none", "turbine" or JSON of trips."""
     if text.strip().lower() == "none":
         return None
     return _json(text, "protection") if text.lstrip().startswith("{") else text
 
 
 def parse_pairs(pairs, what):
-    """{key: value} from "key=value" texts (None: none); values are JSON where they can be, else text."""
+    """Return {key: value} of "key=value" texts (None: none); a value that is no JSON stays a text."""
     result = {}
     for pair in pairs or ():
         key, sign, value = pair.partition("=")

@@ -4,22 +4,16 @@ from typing import Annotated
 
 import typer
 from rich.markup import escape
+from typer import Option
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import app, note, out, reported
+from fowt_env.training.cli.console import app, command, note, out, reported
 from fowt_env.training.cli.tables import print_table
 
 cache = typer.Typer(
     invoke_without_command=True, rich_markup_mode="rich", help="Show or clear what is kept on disk."
 )
 app.add_typer(cache, name="cache")
-CLEAR_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt cache clear[/cyan]  compiled kernels of other versions, and those of a leaderboard's submissions
-
-[cyan]fowt cache clear --all[/cyan]  this version's too: the next run compiles them again
-
-[cyan]fowt cache clear --wind-boxes --yes[/cyan]  full-field wind besides, without a question"""
 
 
 @cache.callback()
@@ -38,14 +32,19 @@ def show(context: typer.Context):
     print_table(out, ("", "folders or files", "MB"), rows, left=(0,))
 
 
-@cache.command(epilog=CLEAR_EXAMPLES)
-@reported
+@command(cache)
 def clear(
-    every: Annotated[bool, typer.Option("--all", help="Kernels of this version too.")] = False,
-    wind_boxes: Annotated[bool, typer.Option("--wind-boxes", help="Full-field wind too.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    every: Annotated[bool, Option("--all", help="Kernels of this version too.")] = False,
+    wind_boxes: Annotated[bool, Option("--wind-boxes", help="Full-field wind too.")] = False,
+    yes: Annotated[bool, Option("--yes", "-y", help="Do not ask.")] = False,
 ):
-    """Remove compiled kernels of other versions and of submissions; what this package did not make stays."""
+    """Remove compiled kernels of other versions and of submissions; what this package did not make stays.
+
+    Examples:
+    fowt cache clear  # compiled kernels of other versions, and those of a leaderboard's submissions
+    fowt cache clear --all  # this version's too: the next run compiles them again
+    fowt cache clear --wind-boxes --yes  # full-field wind besides, without a question
+    """
     from fowt_env.training.cli import health
 
     wanted = ["other versions", "submissions", *["this version"] * every, *["wind boxes"] * wind_boxes]

@@ -1,4 +1,4 @@
-"""fowt check: the figures of a platform at rest, and what in its file can hardly be meant."""
+"""fowt check: a platform at rest, and contradictions in its file."""
 
 import json
 from typing import Annotated
@@ -6,30 +6,29 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.markup import escape
+from typer import Argument, Option
 
 from fowt_env.training.cli.arguments import parse_pairs
-from fowt_env.training.cli.console import EXIT_STOPPED, OptionOption, app, out, reported
+from fowt_env.training.cli.console import EXIT_STOPPED, command, out
+from fowt_env.training.cli.options import OptionOption
 from fowt_env.training.cli.tables import figure, print_table
 
-CHECK_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt check mine.toml[/cyan]  # weight against buoyancy, stability, pretension, rest, natural periods
-
-[cyan]fowt check oc3_hywind --json[/cyan]  # the same for a program
-
-[bold]Exit code[/bold]: 0 if everything fits, 1 if something does not, 2 if the file cannot be read."""
-
-
-@app.command(epilog=CHECK_EXAMPLES)
-@reported
+@command()
 def check(
-    platform: Annotated[str, typer.Argument(help="A built-in name or a path to a TOML file.")],
+    platform: Annotated[str, Argument(help="A built-in name or a path to a TOML file.")],
     option: OptionOption = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON in SI units and degrees.")] = False,
+    as_json: Annotated[bool, Option("--json", help="Print JSON in SI units and degrees.")] = False,
 ):
     """Check a platform: weight, stability, natural periods.
 
-    Prints what it is at rest without wind, and what in its file does not fit together.
+    Prints the platform at rest without wind, and what in its file is contradictory.
+
+    Examples:
+    fowt check mine.toml  # weight against buoyancy, stability, pretension, rest, natural periods
+    fowt check oc3_hywind --json  # the same for a program
+
+    [bold]Exit code[/bold]: 0 if everything fits, 1 if something does not, 2 if the file cannot be read.
     """
     from fowt_env.analysis.check import check_platform
 
@@ -45,7 +44,7 @@ def check(
 
 
 def print_faults(faults):
-    """Print the sentences on what does not fit, or that everything does."""
+    """Print the faults of a platform, or that there are none."""
     for fault in faults:
         out.print(f"[yellow]{escape(fault)}[/yellow]", soft_wrap=True, highlight=False)
     if not faults:
@@ -53,7 +52,7 @@ def print_faults(faults):
 
 
 def _figures(found):
-    """(name, value, unit) of a Check."""
+    """Return (name, value, unit) of the values of a Check."""
     still = found.statics
     rows = [
         ("weight", still.weight / 1e3, "kN"),
@@ -63,12 +62,9 @@ def _figures(found):
         ("buoyancy less weight and pull", (still.buoyancy - still.weight - still.pull) / 1e3, "kN"),
         ("draft", found.draft, "m"),
         *(
-            (f"centre of mass, {axis}", value, "m")
-            for axis, value in zip("xyz", still.mass_centre, strict=True)
-        ),
-        *(
-            (f"centre of buoyancy, {axis}", value, "m")
-            for axis, value in zip("xyz", still.buoyancy_centre, strict=True)
+            (f"centre of {what}, {axis}", value, "m")
+            for what, centre in (("mass", still.mass_centre), ("buoyancy", still.buoyancy_centre))
+            for axis, value in zip("xyz", centre, strict=True)
         ),
         ("metacentric height, roll", still.metacentric_height[0], "m"),
         ("metacentric height, pitch", still.metacentric_height[1], "m"),
@@ -84,18 +80,12 @@ def _figures(found):
 
 
 def _plain(found):
-    """A Check as what JSON holds; None for what is not finite."""
+    """Return a Check as a mapping for JSON, with None for values that are not finite."""
+    from fowt_env.training.evaluation.results import finite
+
     still = {name: np.asarray(value).tolist() for name, value in found.statics._asdict().items()}
     whole = {"platform": found.label, "draft": found.draft, **still}
     whole |= {"rest": found.rest, "natural_periods": found.periods}
     whole |= {"tower_frequencies": {mode: values._asdict() for mode, values in found.tower.items()}}
     whole |= {"faults": list(found.faults)}
-    return _finite(whole)
-
-
-def _finite(value):
-    if isinstance(value, dict):
-        return {name: _finite(item) for name, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
+    return finite(whole)

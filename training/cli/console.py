@@ -1,6 +1,8 @@
-"""What the commands of fowt share: the application, messages on stderr, exit codes, progress."""
+"""Shared parts of the commands of fowt: the application, messages on stderr, exit codes, progress."""
 
 import functools
+import inspect
+import re
 import time
 import warnings
 from contextlib import contextmanager
@@ -21,11 +23,12 @@ from rich.progress import (
 from typer.core import TyperGroup
 
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
+from fowt_env.files.tables import table_path, write_table
 from fowt_env.training.cli.tables import figure, print_table
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
-STUDIES = "fowt_env.training.studies"  # left out of the wheel
-out = Console(emoji=False)  # a controller module:Name: is no picture
+STUDIES = "fowt_env.training.studies"  # not in the wheel
+out = Console(emoji=False)  # no emoji for a controller module:Name:
 err = Console(stderr=True, emoji=False)
 MODULES = (  # that add their commands to the app
     "simulate", "listing", "check", "evaluate", "validate", "doctor", "warmup", "cache", "benchmark",
@@ -39,7 +42,7 @@ GROUPS = {  # of fowt --help: heading -> its commands, in the order in which the
     "Set up": ("list", "doctor", "warmup", "cache"),
     "Develop": ("validate", "paper", "benchmark"),
 }
-START = (  # lines of fowt --help for those who have never used it
+START = (  # first examples in fowt --help
     ("fowt simulate --wind 18 --plot run.png", "one run: statistics and a picture"),
     ("fowt list", "names: platforms, seas, controllers"),
     ("fowt evaluate --controllers pi,lqr", "compare controllers"),
@@ -67,21 +70,16 @@ class Overview(TyperGroup):
                 out.print(line, highlight=False)
 
     def by_group(self):
-        """{heading: names of its commands}; those of no group stand with the last."""
-        found = {group: [name for name in names if name in self.commands] for group, names in GROUPS.items()}
-        known = {name for names in GROUPS.values() for name in names}
-        found[list(GROUPS)[-1]] += [
-            name for name, command in self.commands.items() if name not in known and not command.hidden
-        ]
-        return {group: names for group, names in found.items() if names}
+        """Return {heading: names of its commands}."""
+        return {group: [name for name in names if name in self.commands] for group, names in GROUPS.items()}
 
 
 def summary_of(command):
-    """First paragraph of a command's help, without its full stop."""
+    """Return the first paragraph of a command's help, without its full stop."""
     return " ".join((command.help or "").split("\n\n")[0].split()).removesuffix(".")
 
 
-new_folders: list[Path] = []  # that the command under way may make
+new_folders: list[Path] = []  # that the running command may make
 app = typer.Typer(
     name="fowt",
     cls=Overview,
@@ -105,28 +103,50 @@ def version_option(
         raise typer.Exit
 
 
-def reported(command):
-    """The command with errors as one clear line on stderr, and an exit code that says what happened."""
+def command(group=app):
+    """Return a decorator that adds a function to a group of commands, with its errors `reported`.
 
-    @functools.wraps(command)
+    The command has the name of the function, without an ending "_command". The docstring is the help, and
+    below its line "Examples:" the epilog, in which lines that begin with "fowt" are examples.
+    """
+
+    def add(function):
+        text, _, examples = inspect.cleandoc(function.__doc__).partition("\n\nExamples:\n")
+        name = function.__name__.removesuffix("_command").replace("_", "-")
+        return group.command(name=name, help=text, epilog=_epilog(examples))(reported(function))
+
+    return add
+
+
+def _epilog(examples):
+    """Return the examples of a docstring with the markup of the help page."""
+
+    def coloured(line):
+        return f"[cyan]{escape(line[1])}[/cyan]{escape(line[2])}\n"
+
+    return "[bold]Examples[/bold]\n\n" + re.sub(r"^(fowt .*?)((?:  # .*)?)$", coloured, examples, flags=re.M)
+
+
+def reported(function):
+    """Return the function of a command that prints errors in one line and sets the exit code."""
+
+    @functools.wraps(function)
     def run(*args, **kwargs):
         new_folders.clear()
         try:
             with warnings.catch_warnings():
                 warnings.showwarning = _show_warning
-                return command(*args, **kwargs)
+                return function(*args, **kwargs)
         except (SimulationStopped, ControllerError) as error:
             fail(error, EXIT_STOPPED)
-        except InputError as error:
-            fail(error, EXIT_INPUT)
-        except (OSError, ImportError) as error:
+        except (InputError, OSError, ImportError) as error:
             fail(error, EXIT_INPUT)
         except KeyboardInterrupt:
             fail("interrupted", EXIT_INTERRUPTED)
         except (SystemExit, GeneratorExit) as error:
-            if isinstance(error.__context__, BrokenPipeError):  # whoever reads our output has read enough
+            if isinstance(error.__context__, BrokenPipeError):  # the reader of the output has closed it
                 raise typer.Exit(EXIT_STOPPED) from None
-            # of a controller or a library, not the command's own
+            # raised by a controller or a library, not by the command itself
             fail(f"ended early by {type(error).__name__}: {error}", EXIT_STOPPED)
         finally:
             announce_folders()
@@ -135,7 +155,7 @@ def reported(command):
 
 
 def announce_folders():
-    """Say once which of the folders that were missing have been made."""
+    """Print which of the missing folders have been made, once."""
     for folder in new_folders:
         if folder.is_dir():
             note(f"made the folder {folder}")
@@ -144,7 +164,7 @@ def announce_folders():
 
 @contextmanager
 def from_a_clone(command):
-    """Around imports of the studies. Raises: InputError that names the command where they are missing."""
+    """Wrap imports of the studies. Raises: InputError that names the command if they are not installed."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -169,19 +189,22 @@ def fail(message, code):
 
 
 def note(message):
-    """Print a remark on stderr, so that stdout holds results alone."""
+    """Print a remark on stderr, so that stdout has only results."""
     err.print(f"[dim]{escape(message)}[/dim]", soft_wrap=True, highlight=False)
 
 
-def output(path, option="--out", folder=False):
-    """The path that an option names, None for None, once what is written there has a folder or may make one.
+def output(path, option="--out", folder=False, endings=()):
+    """Return the path of an option (None: None), once its folder exists or may be made.
 
-    A missing folder may be made in the working folder alone; elsewhere it must exist, but for the last part
-    of an option that names a folder. None is made here; `reported` says at the end which have been.
-    Raises: InputError naming option, path and the folder that is missing.
+    endings: those that the file may have; (): any. A missing folder may be made in the working folder alone;
+    elsewhere it must exist, except for the last part of an option that names a folder. Nothing is made here;
+    `reported` says at the end what has been.
+    Raises: InputError that names the option, the path and the missing folder.
     """
     if path is None:
         return None
+    if endings:
+        table_path(path, endings)
     place = Path(path) if folder else Path(path).parent
     if place.is_dir():
         return path
@@ -203,7 +226,7 @@ LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal 
 
 @contextmanager
 def progress_bar(description, total, every=LINE_EVERY):
-    """A bar on stderr that disappears when done; yields update(done, text=None, total=None).
+    """Show a bar on stderr that disappears when done; yield update(done, total=None, text=None).
 
     Without a terminal (a file, a pipe, a batch job) it is a line each `every` seconds.
     """
@@ -215,45 +238,41 @@ def progress_bar(description, total, every=LINE_EVERY):
     with bar:
         task = bar.add_task(description, total=total)
 
-        def update(done, text=None, total=None):
+        def update(done, total=None, text=None):
             bar.update(task, completed=done, description=text or description, total=total)
 
         yield update
 
 
 def _lines(description, total, every):
-    """update(done, text=None, total=None) that prints a line on stderr when `every` seconds have passed."""
-    began = said = time.monotonic()
+    """Return update(done, total=None, text=None) that prints a line on stderr every `every` seconds."""
+    began = printed = time.monotonic()
     whole = total
 
-    def update(done, text=None, total=None):
-        nonlocal said, whole
+    def update(done, total=None, text=None):
+        nonlocal printed, whole
         now, whole = time.monotonic(), total or whole
-        if now - said >= every:
-            said = now
+        if now - printed >= every:
+            printed = now
             share = f", {100.0 * done / whole:.0f} %" if whole else ""
             note(f"{now - began:.0f} s{share}: {text or description}")
 
     return update
 
 
-RANGE = "a list (8,12,18) or START:STOP[:STEP], STOP included"
-PlatformOption = Annotated[
-    str, typer.Option(help="Platform: a name of fowt list platforms, or a path to a TOML file.")
-]
-OptionOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--option", metavar="KEY=VALUE", help="Option of the scene, of fowt list options; repeatable."
-    ),
-]
-RotorOption = Annotated[
-    str | None, typer.Option(help="Rotor model: bem, lookup or table; default: that of the fidelity.")
-]
+def text_first(update, label=""):
+    """Return progress(text, done, total), as some studies call it, of update(done, total, text)."""
+    return lambda text, done, total: update(done, total, f"{label}{text}")
+
+
+def save_table(frame, path):
+    """Write a table to the path of an option and say so; None: nothing."""
+    if path is not None:
+        note(f"wrote {write_table(frame, path)}")
 
 
 def show(frame, title=None):
-    """Print a DataFrame, its columns of texts to the left."""
+    """Print a DataFrame with left-aligned columns of texts."""
     rows = [list(map(figure, row)) for row in frame.itertuples(index=False)]
     texts = [i for i, name in enumerate(frame.columns) if frame[name].map(type).eq(str).any()]
     keys = max([i + 1 for i in texts if i < 2], default=1)

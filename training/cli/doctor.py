@@ -1,4 +1,4 @@
-"""`fowt doctor`: is this installation whole, what is missing, and does it give the right figures?"""
+"""`fowt doctor`: a check of the installation, of missing parts and of the results of a short run."""
 
 from typing import Annotated
 
@@ -8,27 +8,22 @@ from rich.markup import escape
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli import requirements
-from fowt_env.training.cli.console import app, reported
-
-DOCTOR_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt doctor[/cyan]  # all of it; the self-test compiles kernels if it must, up to a minute
-
-[cyan]fowt doctor --no-test[/cyan]  # versions, optional parts and the cache alone
-
-[bold]Exit code[/bold]: 0 if versions and the self-test's figures (unless left out) are right, 1 if not."""
+from fowt_env.training.cli.console import command
 
 out = Console(emoji=False)
 
 
-@app.command(epilog=DOCTOR_EXAMPLES)
-@reported
-def doctor(
-    test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True,
-):
+@command()
+def doctor(test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True):
     """Check this installation.
 
     Versions, optional parts, the cache of compiled kernels, and a short run with known results.
+
+    Examples:
+    fowt doctor  # all of it; the self-test compiles kernels if it must, up to a minute
+    fowt doctor --no-test  # versions, optional parts and the cache alone
+
+    [bold]Exit code[/bold]: 0 if versions and the self-test (unless left out) are right, 1 if not.
     """
     _print_versions()
     _print_extras()
@@ -39,7 +34,7 @@ def doctor(
             from fowt_env.training.cli import (
                 health,  # numba and what it needs, which other commands' help can do without
             )
-        except ImportError as error:  # numba's own, where NumPy is too new for it
+        except ImportError as error:  # raised by numba, e.g. for a NumPy that is too new
             faults = [str(error)]
     _print_notebook()
     if faults:
@@ -89,7 +84,7 @@ def _print_extras():
 
 
 def _print_notebook():
-    """A line on whether a notebook that uses this Python can show progress."""
+    """Print a line if notebooks with this Python cannot show progress."""
     if requirements.installed("ipykernel") and not requirements.installed("ipywidgets"):
         advice = (
             'Jupyter is here without ipywidgets, which progress bars need: pip install "fowt-env[notebook]"'
@@ -98,7 +93,7 @@ def _print_notebook():
 
 
 def _named(package):
-    """Name and version, with what is needed where that is another."""
+    """Return name and version, with the needed one if it differs."""
     if package.version is None or package.fits:
         return f"{package.name} {package.version or 'missing'}"
     return f"{package.name} {package.version} (needed: {package.needed})"
@@ -115,7 +110,7 @@ def _print_cache(state):
 
 
 def _self_test(health):
-    """SelfTest, printed."""
+    """Run and print the SelfTest, and return it."""
     _heading("self-test")
     result = health.self_test()
     for name, expected in health.EXPECTED.items():

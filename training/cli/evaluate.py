@@ -4,129 +4,117 @@ import json
 from pathlib import Path
 from typing import Annotated
 
-import typer
 from rich.markup import escape
+from typer import Option
 
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import write_table
+from fowt_env.training.cli.arguments import parse_names
 from fowt_env.training.cli.console import (
     EXIT_INTERRUPTED,
     EXIT_STOPPED,
-    app,
+    command,
     err,
     fail,
     note,
     out,
     output,
     progress_bar,
-    reported,
 )
+from fowt_env.training.cli.options import AddressOption, EngineOption, FolderOption, JobsOption, PlotsOption
 from fowt_env.training.cli.tables import print_table, table_width
 
-MOST_CASES = 12  # whose conditions are printed
-EVALUATE_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2[/cyan]  # the headline comparison
-
-[cyan]fowt evaluate --controllers pi --cases above_rated[/cyan]  # the PI of Eq. (8), 12 to 24 m/s, one seed
-
-[cyan]fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2[/cyan]
-
-[cyan]fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi[/cyan]  # your own cases
-
-[cyan]fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4[/cyan]
-
-[cyan]fowt evaluate --suite above_rated --sensors exact --out results/exact[/cyan]  # without noise and delay
-
-[cyan]fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed[/cyan]  # what failed
-
-[cyan]fowt evaluate --suite above_rated --draw-seeds $COMMIT --out results/drawn[/cyan]  # seeds from a commit
-
-[bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run), leaderboard.json
-(means, intervals, paired differences, versions), manifest.json (the settings), summary.csv (means by
-case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png. The same command
-resumes where it was stopped; further controllers, cases or seeds are added to the folder."""
+MOST_CASES = 12  # more cases are not printed with their conditions
 
 
-@app.command(name="evaluate", epilog=EVALUATE_EXAMPLES)
-@reported
+@command()
 def evaluate_command(
     controllers: Annotated[
-        str, typer.Option(help="Names, policy:NAME, design:FILE or module:Name, comma-separated.")
+        str, Option(help="Names, policy:NAME, design:FILE or module:Name, comma-separated.")
     ] = "pi",
     suite: Annotated[
-        str | None, typer.Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
+        str | None, Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
     ] = None,
     cases: Annotated[
         str | None,
-        typer.Option(
-            help="Cases or suites, comma-separated; with --suite: those of its cases. Default: above_rated."
+        Option(
+            help="Cases or suites, comma-separated; with --suite: some of its cases. Default: above_rated."
         ),
     ] = None,
     platform: Annotated[
         str | None,
-        typer.Option(help="Platform: a name or a path; winds and limits are scaled. Default: the suite's."),
+        Option(help="Platform: a name or a path; winds and limits are scaled. Default: the suite's."),
     ] = None,
     seeds: Annotated[
         str | None,
-        typer.Option(
+        Option(
             help="1,2,3 or 1:6:1 (6 included), the same for each controller. Default: the suite's, else 1."
         ),
     ] = None,
     draw_seeds: Annotated[
         str | None,
-        typer.Option(
-            "--draw-seeds",
-            help="Hash, as of the commit in which entries are fixed, from which the suite's seeds are drawn.",
-        ),
+        Option(help="Hash, e.g. of the commit that fixes the entries, to draw the suite's seeds from."),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="Length of each run, s. Default: the suite's, else 660.")
+        float | None, Option(help="Length of each run, s. Default: the suite's, else 660.")
     ] = None,
     skip: Annotated[
-        float | None, typer.Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
+        float | None, Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
     ] = None,
     preview: Annotated[
-        str, typer.Option(help="Wind ahead: exact, or seen by four_beam_pulsed or circular_cw.")
+        str, Option(help="Wind ahead: exact, or measured by the lidar four_beam_pulsed or circular_cw.")
     ] = "exact",
     sensors: Annotated[
-        str | None, typer.Option(help="exact, or the name of a sensor chain. Default: each case's own.")
+        str | None, Option(help="exact, or the name of a sensor chain. Default: that of each case.")
     ] = None,
     baseline: Annotated[
-        str | None, typer.Option(help="Controller of the paired differences. Default: gspi_oc3, else pi.")
+        str | None, Option(help="Controller of the paired differences. Default: gspi_oc3, else pi.")
     ] = None,
-    jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
-    engine: Annotated[str, typer.Option(help="processes, or ray.")] = "processes",
-    address: Annotated[str | None, typer.Option(help="Address of a running Ray cluster.")] = None,
+    jobs: JobsOption = 1,
+    engine: EngineOption = "processes",
+    address: AddressOption = None,
     time_limit: Annotated[
-        float, typer.Option(help="Wall-clock seconds after which a run fails; 0: never.")
+        float, Option(help="Wall-clock seconds after which a run fails; 0: never.")
     ] = 3600.0,
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Do runs of the folder again that failed.")
-    ] = False,
-    out_folder: Annotated[
-        str, typer.Option("--out", help="Folder for what is written.")
-    ] = "results/evaluation",
-    plot: Annotated[bool, typer.Option("--plot/--no-plot", help="Make the plots.")] = True,
+    retry_failed: Annotated[bool, Option("--retry-failed", help="Repeat failed runs of the folder.")] = False,
+    out_folder: FolderOption = "results/evaluation",
+    plot: PlotsOption = True,
 ):
     """Compare controllers on load cases: a leaderboard.
 
-    With intervals, metrics by case, the time series of all runs, and plots.
+    Also writes intervals, metrics by case, the time series of all runs, and plots.
+
+    Examples:
+    fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2  # the headline comparison
+    fowt evaluate --controllers pi --cases above_rated  # the PI of Eq. (8), 12 to 24 m/s, one seed
+    fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2
+    fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi  # your own cases
+    fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4
+    fowt evaluate --suite above_rated --sensors exact --out results/exact  # without noise and delay
+    fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed  # failed runs again
+    fowt evaluate --suite above_rated --draw-seeds $COMMIT --out results/drawn  # seeds from a commit
+
+    [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run),
+    leaderboard.json (means, intervals, paired differences, versions), manifest.json (the settings),
+    summary.csv (means by case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png.
+    The same command resumes an interrupted evaluation and adds further controllers, cases or seeds to the
+    folder.
     """
+    from fowt_env.training.evaluation.cases import chosen_cases
     from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.evaluation.evaluate import evaluate, summary
+    from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
     from fowt_env.training.evaluation.seeds import with_drawn_seeds
-    from fowt_env.training.reports.terminal import chosen_cases, write_leaderboard
 
     folder = Path(output(out_folder, folder=True))
     chosen = chosen_cases(suite, cases, platform)
     numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
     if draw_seeds is not None:
         if suite is None or seeds is not None:
-            raise InputError("--draw-seeds: draws the seeds of a --suite, and leaves no choice of --seeds")
+            raise InputError("--draw-seeds: needs a --suite, and no --seeds")
         chosen = with_drawn_seeds(chosen, draw_seeds)
-    if baseline is not None and baseline not in (names := [name.strip() for name in controllers.split(",")]):
+    if baseline is not None and baseline not in (names := parse_names(controllers)):
         raise unknown("baseline among --controllers", baseline, names)
     finished = 0
     with progress_bar("evaluating", None) as update:
@@ -134,7 +122,7 @@ def evaluate_command(
         def report(done, total, _):
             nonlocal finished
             finished = done
-            update(done, f"evaluating, {done} of {total} runs done", total)
+            update(done, total, f"evaluating, {done} of {total} runs done")
 
         try:
             table = evaluate(
@@ -154,8 +142,8 @@ def evaluate_command(
                 **({} if preview == "exact" else {"preview": preview}),
             )
         except KeyboardInterrupt:
-            place = f"in {folder / 'results.csv'}; the same command continues with the others"
-            fail(f"interrupted; the {finished} finished runs are {place}", EXIT_INTERRUPTED)
+            where = f"in {folder / 'results.csv'}; the same command resumes the evaluation"
+            fail(f"interrupted; the {finished} finished runs are {where}", EXIT_INTERRUPTED)
         except WorkersLost as error:
             fail(error, EXIT_STOPPED)
     _print_conditions(folder, suite)
@@ -170,7 +158,7 @@ def evaluate_command(
 
 
 def _print_conditions(folder, suite):
-    """Print wind, sea, event and length of each case of a results folder; of many, where they are listed."""
+    """Print wind, sea, event and length of each case of a results folder, or how to list many cases."""
     from fowt_env.training.evaluation.conditions import described_texts
 
     cases = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["cases"]
@@ -183,7 +171,7 @@ def _print_conditions(folder, suite):
 
 
 def _print_evaluation(table, means, board):
-    """Print metrics by case and the leaderboard, and on stderr lost runs and what has no valid score."""
+    """Print metrics by case and the leaderboard; on stderr lost runs and why a score is invalid."""
     from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
     width = table_width(out) or float("inf")
@@ -208,12 +196,12 @@ def _print_evaluation(table, means, board):
 
 
 def _places(flags):
-    """Numbers of the flags that are set."""
-    return [place for place, flag in enumerate(flags) if flag]
+    """Return the indices of the flags that are set."""
+    return [index for index, flag in enumerate(flags) if flag]
 
 
 def _evaluation_plots(table, board, folder):
-    """Paths of the plots made; none, with a note, where matplotlib is missing."""
+    """Return the paths of the plots; none, with a note, if matplotlib is missing."""
     from fowt_env.training.reports.terminal import evaluation_plots
 
     try:

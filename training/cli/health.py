@@ -1,4 +1,4 @@
-"""What `fowt doctor` looks at beside versions: the kernel cache, and a short run with known figures."""
+"""Checks of `fowt doctor` besides versions: the kernel cache, and a short run with known results."""
 
 import os
 import platform
@@ -17,41 +17,41 @@ from fowt_env.folders import cache_root, distrust
 from fowt_env.plant.compile.decorators import CACHE_FOLDER, kernels_compiled, own_folders
 
 BOX_NAME = re.compile(r"[0-9a-f]{24}\.npz")  # of a box of wind (training/evaluation/wind_boxes.py)
-# of a submission's kernels (training/board/isolated.py), and of such that were never finished
+# of a submission's kernels (training/board/isolated.py), complete or unfinished
 SUBMISSION_NAME = re.compile(r"[0-9a-f]{24}(-\w+)?")
 TEST_DURATION = 60.0  # s
-# Last row of reference_run(). They guard an installation, not the physics (tests do that): a part that is
-# compiled wrongly or a data file that is not the shipped one moves them far beyond the tolerance.
+# Last row of reference_run(). It checks the installation, not the physics (the tests do): a wrongly compiled
+# part or a changed data file shifts it far outside the tolerance.
 EXPECTED = {
     "PtfmSurge_[m]": 19.2783,
     "PtfmPitch_[deg]": 2.6417,
     "RotSpeed_[rpm]": 12.6687,
     "FAIRTEN1_[kN]": 607.274,
 }
-TOLERANCE = 1e-3  # of each figure; half the step moves them by 1.4e-4
+TOLERANCE = 1e-3  # relative; half the step changes the values by 1.4e-4
 
 
 @dataclass(frozen=True)
 class CacheState:
-    """Where compiled kernels are kept, and what is there."""
+    """Folder and content of the cache of compiled kernels."""
 
-    folder: Path | None  # None: neither FOWT_CACHE_DIR nor a home folder says where
-    read: bool  # kernels that are there are used; False: all are compiled at each start
-    written: bool  # those that are compiled are kept
+    folder: Path | None  # None: neither FOWT_CACHE_DIR nor a home folder exists
+    read: bool  # whether cached kernels are used; False: all are compiled at each start
+    written: bool  # whether compiled kernels are cached
     compiled: bool  # at least one kind of scene of this version
     megabytes: float  # of this version
     others: int  # folders of other source versions
 
     @property
     def advice(self):
-        """What to do about it, "" where nothing is wrong."""
+        """Advice on a problem of the cache, "" for none."""
         if not self.read:
             return "kernels are compiled at each start: set FOWT_CACHE_DIR to a folder that can be written"
-        return "" if self.written else "read only: kernels that are not there are compiled at each start"
+        return "" if self.written else "read only: missing kernels are compiled at each start"
 
 
 class SelfTest(NamedTuple):
-    """A short run beside the figures it must give."""
+    """The result of a short run, compared with EXPECTED."""
 
     found: dict  # {channel: last value}
     worst: float  # largest relative difference from EXPECTED
@@ -60,7 +60,7 @@ class SelfTest(NamedTuple):
 
 
 def machine():
-    """One line on the machine and the compiler's settings."""
+    """Return a line on the machine and the compiler's settings."""
     jit = "switched off (NUMBA_DISABLE_JIT)" if numba.config.DISABLE_JIT else "on"
     return (
         f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors,"
@@ -69,7 +69,7 @@ def machine():
 
 
 def cache_state():
-    """CacheState of this process."""
+    """Return the CacheState of this process."""
     root = cache_root()
     if CACHE_FOLDER is None:
         return CacheState(root and root / "kernels", False, False, kernels_compiled(), 0.0, 0)
@@ -79,12 +79,12 @@ def cache_state():
         size = _bytes(CACHE_FOLDER)
         others = sum(path != CACHE_FOLDER for path in own_folders(CACHE_FOLDER.parent))
     except OSError:
-        pass  # gone, or not ours to read: then there is nothing to count
+        pass  # removed meanwhile, or not readable
     return CacheState(CACHE_FOLDER, True, written, kernels_compiled(), size / 1e6, others)
 
 
 class CachePart(NamedTuple):
-    """Something that is kept on disk and can be made again."""
+    """A part of the cache on disk."""
 
     what: str  # "this version", "other versions" (of compiled kernels), "wind boxes" or "submissions"
     paths: list[Path]  # folders, or files of wind
@@ -92,7 +92,7 @@ class CachePart(NamedTuple):
 
 
 def cache_parts() -> list[CachePart]:
-    """CacheParts of this user, of what this package made; [] without a cache folder."""
+    """Return the CacheParts of this user that this package made; [] without a cache folder."""
     root = cache_root()
     if root is None:
         return []
@@ -113,7 +113,7 @@ def cache_parts() -> list[CachePart]:
 
 
 def remove(parts: list[CachePart]) -> list[Path]:
-    """Remove parts of the cache; the paths that are still there."""
+    """Remove parts of the cache; return the paths that could not be removed."""
     for path in (path for part in parts for path in part.paths):
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
@@ -124,7 +124,7 @@ def remove(parts: list[CachePart]) -> list[Path]:
 
 
 def _ours(folder):
-    """Whether a folder is there and nobody else could have put things into it."""
+    """Return whether a folder exists and no other user can write to it."""
     try:
         return folder.is_dir() and not distrust(folder)
     except OSError:
@@ -132,7 +132,7 @@ def _ours(folder):
 
 
 def _bytes(path):
-    """Size of a file, or of all files in a folder; of what another process removes meanwhile nothing."""
+    """Return the size of a file or of all files in a folder, without those removed meanwhile."""
     total = 0
     for file in (path, *path.rglob("*")):
         with suppress(OSError):
@@ -141,7 +141,7 @@ def _bytes(path):
 
 
 def reference_run():
-    """DataFrame of the self-test: 60 s from rest in steady 18 m/s and a regular wave, PI controller."""
+    """Return the DataFrame of the self-test: 60 s from rest in steady 18 m/s and a regular wave with pi."""
     from fowt_env import build_scene, simulate
 
     sea = {"kind": "regular", "H": 4.0, "T": 10.0}

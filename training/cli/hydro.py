@@ -4,44 +4,38 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-import typer
+from typer import Argument, Option
 
 from fowt_env.descriptions.checks import check_number, parse_numbers
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import RANGE, app, note, out, output, progress_bar, reported
+from fowt_env.training.cli.console import command, note, out, output, progress_bar, text_first
+from fowt_env.training.cli.options import RANGE
 from fowt_env.training.cli.tables import print_table
 
-EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt hydro semi.gdf --depth 200 --out hydro.npz[/cyan]  # 0.05 to 3 rad/s, waves from -180 to 180 deg
-
-[cyan]fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0[/cyan]  # fewer of both
-
-In the platform file: [potential_flow] coefficients = "hydro.npz" and displaced_volume, which is printed.
-A problem takes a second with 3000 panels; there are six and one per heading at each frequency."""
-
-
-@app.command(epilog=EXAMPLES)
-@reported
+@command()
 def hydro(
-    mesh: Annotated[Path, typer.Argument(help="Panel mesh in metres, z up from still water, normals out.")],
-    depth: Annotated[float, typer.Option(help="Water depth, m.")],
-    out_file: Annotated[Path, typer.Option("--out", help="Coefficients to write (.npz).")] = Path(
-        "hydro.npz"
-    ),
-    omega: Annotated[str, typer.Option(help=f"Frequencies, rad/s: {RANGE}.")] = "0.05:3:0.05",
-    heading: Annotated[
-        str, typer.Option(help=f"Directions of travel of the waves, deg: {RANGE}.")
-    ] = "-180:180:30",
-    density: Annotated[float, typer.Option(help="Of the water, kg/m3.")] = 1025.0,
-    gravity: Annotated[float, typer.Option(help="m/s2.")] = 9.80665,
+    mesh: Annotated[Path, Argument(help="Panel mesh in metres, z up from still water, normals out.")],
+    depth: Annotated[float, Option(help="Water depth, m.")],
+    out_file: Annotated[Path, Option("--out", help="Coefficients to write (.npz).")] = Path("hydro.npz"),
+    omega: Annotated[str, Option(help=f"Frequencies, rad/s: {RANGE}.")] = "0.05:3:0.05",
+    heading: Annotated[str, Option(help=f"Wave directions (of travel), deg: {RANGE}.")] = "-180:180:30",
+    density: Annotated[float, Option(help="Density of the water, kg/m3.")] = 1025.0,
+    gravity: Annotated[float, Option(help="Gravity, m/s2.")] = 9.80665,
     lid: Annotated[
-        bool, typer.Option("--lid/--no-lid", help="Close the inner water plane (irregular frequencies).")
+        bool, Option("--lid/--no-lid", help="Close the inner water plane (irregular frequencies).")
     ] = True,
 ):
     """Wave loads of a hull from its panel mesh (Capytaine).
 
     Computes added mass, damping, wave excitation and hydrostatics.
+
+    Examples:
+    fowt hydro semi.gdf --depth 200 --out hydro.npz  # 0.05 to 3 rad/s, waves from -180 to 180 deg
+    fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0  # fewer of both
+
+    In the platform file: \\[potential_flow] coefficients = "hydro.npz" and displaced_volume, which is
+    printed. A problem takes a second with 3000 panels; there are six and one per heading at each frequency.
     """
     from fowt_env.analysis.panel_method import solve_mesh
     from fowt_env.descriptions.potential_flow import coefficient_arrays
@@ -60,7 +54,7 @@ def hydro(
             water_density=check_number("--density", density, 0.0, low_open=True),
             gravity=check_number("--gravity", gravity, 0.0, low_open=True),
             lid=lid,
-            report=lambda text, done, total: update(done, f"solving: {text}", total),
+            report=text_first(update, "solving: "),
         )
     with replacing(out_file) as path, path.open("wb") as file:
         np.savez_compressed(file, **coefficient_arrays(body))
@@ -74,5 +68,5 @@ def hydro(
             for i, name, unit in ((0, "surge", "kg"), (2, "heave", "kg"), (4, "platform pitch", "kg m2"))
         ),
     ]
-    print_table(out, ["figure", "value", "unit"], rows, None, 1)
+    print_table(out, ("quantity", "value", "unit"), rows, None, 1)
     note(f"written: {out_file}")

@@ -4,40 +4,21 @@ from typing import Annotated
 
 import typer
 from rich.markup import escape
+from typer import Argument, Option
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli.check import print_faults
-from fowt_env.training.cli.console import EXIT_STOPPED, app, note, out, output, reported
+from fowt_env.training.cli.console import EXIT_STOPPED, command, note, out, output
 from fowt_env.training.cli.tables import print_table
 
-EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt import deck/5MW_OC4Semi.fst --out my_semi[/cyan]  # platform.toml, turbine, coefficients and report.md
-
-[cyan]fowt import deck.fst --out mine --discon tuned_DISCON.IN[/cyan]  # another controller than the deck's
-
-[cyan]fowt import --elastodyn ED.dat --aerodyn AD15.dat --hydrodyn HD.dat --mooring MAP.dat --out mine[/cyan]  # without an .fst
-
-[cyan]fowt simulate --platform my_semi/platform.toml --wind 14[/cyan]  # what comes next
-
-docs/guides/import.md says what is read, what is approximated and what is refused.
-
-[bold]Exit code[/bold]: 0 if everything fits, 1 if the files are written but something in them does not fit (as fowt check),
-2 if the deck cannot be imported."""  # noqa: E501
-
-Part = Annotated[str | None, typer.Option(help="This part file, in place of the one that the .fst names.")]
+Part = Annotated[str | None, Option(help="This part file, in place of the one that the .fst names.")]
 
 
-@app.command("import", epilog=EXAMPLES)
-@reported
+@command()
 def import_command(
-    deck: Annotated[
-        str | None, typer.Argument(help="The .fst file; may be left out with part files.")
-    ] = None,
-    out_path: Annotated[
-        str, typer.Option("--out", help="Folder for the files, made if need be.")
-    ] = "imported",
-    name: Annotated[str | None, typer.Option(help="Of platform and turbine; default: the folder's.")] = None,
+    deck: Annotated[str | None, Argument(help="The .fst file; optional with part files.")] = None,
+    out_path: Annotated[str, Option("--out", help="Folder for the files, made if missing.")] = "imported",
+    name: Annotated[str | None, Option(help="Name of platform and turbine; default: the folder's.")] = None,
     elastodyn: Part = None,
     aerodyn: Part = None,
     servodyn: Part = None,
@@ -45,17 +26,26 @@ def import_command(
     seastate: Part = None,
     mooring: Part = None,
     inflow: Part = None,
-    discon: Annotated[str | None, typer.Option(help="A DISCON.IN of ROSCO, in place of the deck's.")] = None,
+    discon: Annotated[str | None, Option(help="A DISCON.IN of ROSCO, in place of the deck's.")] = None,
     search: Annotated[
-        list[str] | None,
-        typer.Option(help="Folder in which files that the deck names are looked for as well; repeatable."),
+        list[str] | None, Option(help="Further folder to search for files of the deck; repeatable.")
     ] = None,
-    overwrite: Annotated[bool, typer.Option(help="Replace the files of an earlier import.")] = False,
-    check: Annotated[
-        bool, typer.Option(help="Look at the imported platform at rest, as fowt check does.")
-    ] = True,
+    overwrite: Annotated[bool, Option(help="Replace the files of an earlier import.")] = False,
+    check: Annotated[bool, Option(help="Check the imported platform at rest, as fowt check does.")] = True,
 ) -> None:
-    """Convert an OpenFAST or FAST 8 deck to a platform file."""
+    """Convert an OpenFAST or FAST 8 deck to a platform file.
+
+    Examples:
+    fowt import deck/5MW_OC4Semi.fst --out my_semi  # platform.toml, turbine, coefficients and report.md
+    fowt import deck.fst --out mine --discon tuned_DISCON.IN  # another controller than the deck's
+    fowt import --elastodyn ED.dat --aerodyn AD.dat --hydrodyn HD.dat --mooring MAP.dat --out mine  # no .fst
+    fowt simulate --platform my_semi/platform.toml --wind 14  # what comes next
+
+    docs/guides/import.md says what is read, what is approximated and what is refused.
+
+    [bold]Exit code[/bold]: 0 if everything fits, 1 if the files are written but something in them does not
+    fit (as fowt check), 2 if the deck cannot be imported.
+    """
     from fowt_env.analysis.check import check_platform
     from fowt_env.files.openfast_deck.importer import import_deck
 
@@ -73,11 +63,10 @@ def import_command(
     )
     print_table(out, ("figure", "value"), report.figures, report.title, left=(0, 1))
     out.print()
-    tables = (
-        (("in the deck", "here"), report.differences, "What is not as in the deck"),
-        (("the deck", "what follows"), report.contradictions, "Where the deck contradicts itself"),
-    )
-    for columns, rows, title in tables:
+    for columns, rows, title in (
+        (("in the deck", "here"), report.differences, "Differences from the deck"),
+        (("the deck", "consequence"), report.contradictions, "Contradictions in the deck"),
+    ):
         if rows:
             print_table(out, columns, rows, title, left=(0, 1), prose=(0, 1))
             out.print()

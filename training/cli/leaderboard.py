@@ -1,45 +1,44 @@
-"""fowt leaderboard: a standing board of submitted controllers, judged anew by whoever holds it."""
+"""fowt leaderboard: a public ranking of submitted controllers, which its organiser re-runs."""
 
 import shlex
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option, Typer
 
-from fowt_env.training.cli.console import app, note, out, output, progress_bar, reported
+from fowt_env.training.cli.console import app, command, note, out, output, progress_bar
+from fowt_env.training.cli.options import JobsOption
 from fowt_env.training.cli.tables import print_table
 
-board_app = typer.Typer(help="Keep a standing board of submitted controllers.", no_args_is_help=True)
+board_app = Typer(help="Keep a public ranking of submitted controllers.", no_args_is_help=True)
 app.add_typer(board_app, name="leaderboard")
 
-BoardOption = Annotated[Path, typer.Option("--board", help="Folder of the board.")]
-
-ADD_EXAMPLES = """A submission is a folder with card.toml and the controller that it names:
-
-    name = "my_controller"
-    author = "A. Researcher"
-    licence = "MIT"
-    controller = "controller.py:Mine"      # or "policy.npz"
-    information = ["generator_speed", "blade_pitch"]
-    tuning = "gains by hand, seeds 1001 to 1004"
-
-[cyan]fowt leaderboard add my_controller[/cyan]  # into ./board, which is made with the package's own
-controllers if there is none"""
+BoardOption = Annotated[Path, Option("--board", help="Folder of the board.")]
 
 
-@board_app.command(name="add", epilog=ADD_EXAMPLES)
-@reported
+@command(board_app)
 def add_command(
-    submissions: Annotated[list[Path], typer.Argument(help="Folders, each with a card.toml.")],
+    submissions: Annotated[list[Path], Argument(help="Folders, each with a card.toml.")],
     board: BoardOption = Path("board"),
     platform: Annotated[
-        str | None,
-        typer.Option(help="Of a board that is made: a name or a path, to which the suites are scaled."),
+        str | None, Option(help="Platform of a new board: a name or a path, to which its suites are scaled.")
     ] = None,
 ):
     """Check submissions and copy them into the board.
 
-    None of their code is run.
+    Their code is not run.
+
+    Examples:
+    fowt leaderboard add my_controller  # into ./board; a new one begins with the package's controllers
+
+    A submission is a folder with card.toml and the controller that it names:
+
+        name = "my_controller"
+        author = "A. Researcher"
+        licence = "MIT"
+        controller = "controller.py:Mine"      # or "policy.npz"
+        information = ["generator_speed", "blade_pitch"]
+        tuning = "gains by hand, seeds 1001 to 1004"
     """
     from fowt_env.training.board.folder import SETTINGS, Board, new_board
     from fowt_env.training.board.submission import PYTHON_FILE, read_submission
@@ -56,60 +55,52 @@ def add_command(
         note(f"added {name}; judge it with: fowt leaderboard run --board {board}{trusted}")
 
 
-SEEDS_EXAMPLES = """[cyan]fowt leaderboard seeds seeds.txt[/cyan]  # publish the SHA-256 that it prints, and
-keep the file"""
-
-
-@board_app.command(name="seeds", epilog=SEEDS_EXAMPLES)
-@reported
+@command(board_app)
 def seeds_command(
-    path: Annotated[Path, typer.Argument(help="File that is made; only you can read it.")],
-    count: Annotated[int, typer.Option(help="How many seeds.")] = 6,
+    path: Annotated[Path, Argument(help="New file, which only you can read.")],
+    count: Annotated[int, Option(help="Number of seeds.")] = 6,
 ):
-    """Draw an organiser's secret seeds, which are too large to be found by trying, with a salt."""
+    """Draw an organiser's secret seeds, too large to be guessed, with a salt.
+
+    Examples:
+    fowt leaderboard seeds seeds.txt  # publish the SHA-256 that it prints, and keep the file
+    """
     from fowt_env.training.board.folder import write_secret_seeds
 
     digest = write_secret_seeds(path, count)
     out.print(digest, highlight=False)
-    note(f"wrote {count} seeds to {path}; publish the SHA-256 above, which says nothing of them")
+    note(f"wrote {count} seeds to {path}; publish the SHA-256 above, which does not reveal them")
 
 
-RUN_EXAMPLES = """[cyan]fowt leaderboard run --jobs 2[/cyan]  # all submissions on the board's seeds
-
-[cyan]fowt leaderboard run --draw-seeds $COMMIT[/cyan]  # seeds from a commit
-
-[cyan]fowt leaderboard run --secret seeds.txt --private private --trust-code[/cyan]  # secret seeds too
-
-Python files run only with [bold]--trust-code[/bold], each in a process of its own, with your user's rights:
-read them first, or run them in a container with [bold]--within[/bold] (docs/guides/leaderboard.md). The same
-command goes on where it was stopped. Written: index.html, board.csv, history.csv and runs/ in the board's
-folder; runs of secret seeds in the folder --private."""
-
-
-@board_app.command(name="run", epilog=RUN_EXAMPLES)
-@reported
+@command(board_app)
 def run_command(
     board: BoardOption = Path("board"),
-    jobs: Annotated[int, typer.Option(help="Worker processes.")] = 1,
+    jobs: JobsOption = 1,
     draw_seeds: Annotated[
-        str | None,
-        typer.Option(
-            "--draw-seeds", help="Hash from which the public seeds are drawn, in place of the board's."
-        ),
+        str | None, Option(help="Hash from which the public seeds are drawn, in place of the board's.")
     ] = None,
-    secret: Annotated[
-        Path | None, typer.Option(help="File of fowt leaderboard seeds; - reads standard input.")
-    ] = None,
-    private: Annotated[Path | None, typer.Option(help="Folder for the runs of the secret seeds.")] = None,
+    secret: Annotated[Path | None, Option(help="File of fowt leaderboard seeds; -: standard input.")] = None,
+    private: Annotated[Path | None, Option(help="Folder for the runs of the secret seeds.")] = None,
     trust_code: Annotated[
-        bool, typer.Option("--trust-code", help="Run submissions that are Python files.")
+        bool, Option("--trust-code", help="Run submissions that are Python files.")
     ] = False,
     within: Annotated[
         str | None,
-        typer.Option(help="Command that starts each Python file, as of a container; {folder}: its folder."),
+        Option(help="Command that starts each Python file, e.g. a container; {folder}: its folder."),
     ] = None,
 ):
-    """Run every submission on the board's frozen suites and write its page."""
+    """Run every submission on the board's frozen suites and write its page.
+
+    Examples:
+    fowt leaderboard run --jobs 2  # all submissions on the board's seeds
+    fowt leaderboard run --draw-seeds $COMMIT  # seeds from a commit
+    fowt leaderboard run --secret seeds.txt --private private --trust-code  # secret seeds too
+
+    Python files run only with [bold]--trust-code[/bold], each in a separate process, with your user's rights:
+    read them first, or run them in a container with [bold]--within[/bold] (docs/guides/leaderboard.md). The
+    same command resumes an interrupted judging. Written: index.html, board.csv, history.csv and runs/ in the
+    board's folder; runs of secret seeds in the folder --private.
+    """
     from fowt_env.training.board.folder import Board
     from fowt_env.training.board.judge import judge
     from fowt_env.training.board.page import write_board
@@ -118,27 +109,23 @@ def run_command(
     output(private, "--private", folder=True)
     words = shlex.split(within or "")
     with progress_bar("judging", None) as update:
-
-        def report(done, total, text):
-            update(done, text, total)
-
-        judged = judge(holder, jobs, secret, private, trust_code, report, draw_seeds, words)
+        judged = judge(holder, jobs, secret, private, trust_code, update, draw_seeds, words)
     written = write_board(judged)
     for name, why in judged.left_out.items():
         note(f"left out: {name}: {why}")
     note(f"wrote {', '.join(path.name for path in written)} in {board}")
 
 
-SHOW_EXAMPLES = """[cyan]fowt leaderboard show[/cyan]  # the board in ./board, its first regime"""
-
-
-@board_app.command(name="show", epilog=SHOW_EXAMPLES)
-@reported
+@command(board_app)
 def show_command(
     board: BoardOption = Path("board"),
-    regime: Annotated[str | None, typer.Option(help="Regime; default: the first of the board.")] = None,
+    regime: Annotated[str | None, Option(help="Regime; default: the first of the board.")] = None,
 ):
-    """Print the board as it was judged last."""
+    """Print the last judged board.
+
+    Examples:
+    fowt leaderboard show  # the board in ./board, its first regime
+    """
     from fowt_env.training.board.page import board_rows
 
     title, headings, rows = board_rows(board, regime)

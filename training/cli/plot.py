@@ -1,50 +1,42 @@
-"""The command that makes a picture of files that the others wrote: fowt plot."""
+"""fowt plot: pictures of saved runs and tables."""
 
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cli.console import app, note, output, reported
+from fowt_env.training.cli.console import command, note, output
 
 PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
-PLOT_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt plot series run.csv[/cyan]  # stacked time series, into series.png
-
-[cyan]fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png[/cyan]  # two runs over each other
-
-[cyan]fowt plot series openfast.outb run.csv[/cyan]  # a run of OpenFAST beside one of fowt simulate
-
-[cyan]fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png[/cyan]  # a box for each run
-
-[cyan]fowt plot raos waves.parquet --skip 100[/cyan]  # motion per metre of wave, of a run in irregular waves
-
-[cyan]fowt plot schedule steady.csv[/cyan]  # operating points that fowt trim --out wrote
-
-Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST."""
 
 
-@app.command(epilog=PLOT_EXAMPLES)
-@reported
+@command()
 def plot(
-    kind: Annotated[str, typer.Argument(help="series, spectra, boxes, raos or schedule.")],
-    files: Annotated[
-        list[str], typer.Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")
-    ],
+    kind: Annotated[str, Argument(help="series, spectra, boxes, raos or schedule.")],
+    files: Annotated[list[str], Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")],
     out_path: Annotated[
-        str | None, typer.Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
+        str | None, Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
     ] = None,
-    skip: Annotated[float, typer.Option(min=0.0, help="Seconds at the start left out; not of series.")] = 0.0,
-    title: Annotated[str | None, typer.Option(help="Heading.")] = None,
+    skip: Annotated[float, Option(min=0.0, help="Seconds at the start left out; not of series.")] = 0.0,
+    title: Annotated[str | None, Option(help="Heading.")] = None,
     platform: Annotated[
-        str, typer.Option(help="Whose natural period of platform pitch the spectra mark; or none.")
+        str, Option(help="Platform of rated values and of the marked pitch period; or none.")
     ] = "oc3_hywind",
 ):
     """Plot saved runs: time series, spectra, box plots.
 
     Also the response to waves, and the steady schedule of a table of fowt trim.
+
+    Examples:
+    fowt plot series run.csv  # stacked time series, into series.png
+    fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png  # two runs over each other
+    fowt plot series openfast.outb run.csv  # a run of OpenFAST beside one of fowt simulate
+    fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png  # a box for each run
+    fowt plot raos waves.parquet --skip 100  # motion per metre of wave, of a run in irregular waves
+    fowt plot schedule steady.csv  # operating points that fowt trim --out wrote
+
+    Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST.
     """
     from fowt_env.files.tables import read_series
 
@@ -52,58 +44,44 @@ def plot(
         raise unknown("kind of plot", kind, PLOTS)
     out_path = f"{kind}.png" if out_path is None else output(out_path)
     frames = {name: read_series(path) for name, path in _names(files).items()}
-    if len(frames) == 1:  # nothing to tell apart
+    if len(frames) == 1:  # no legend
         frames = {"": next(iter(frames.values()))}
     _draw(kind, frames, out_path, title, skip, platform)
     note(f"wrote {out_path}")
 
 
 def _names(files):
-    """{what tells the path from the others, folders and endings that all share left out: path}."""
+    """Return {the part of the path that differs from the others: path}."""
     if len(set(files)) < len(files):
-        raise InputError(f"files {', '.join(files)}: each must be given once")
+        raise InputError(f"files {', '.join(files)}: each must be named once")
     parts = [[*Path(file).parts[:-1], Path(file).stem] for file in files]
     for end in (0, -1):
-        while len({own[end] for own in parts}) == 1 and min(map(len, parts)) > 1:
-            for own in parts:
-                own.pop(end)
-    names = ["/".join(own) for own in parts]
+        while len({each[end] for each in parts}) == 1 and min(map(len, parts)) > 1:
+            for each in parts:
+                each.pop(end)
+    names = ["/".join(each) for each in parts]
     if len(set(names)) < len(names):  # the same run as .csv and as .parquet
         names = files
     return dict(zip(names, files, strict=True))
 
 
 def _draw(kind, frames, path, title, skip, platform):
-    """Write the picture of a kind."""
+    """Write the picture of a kind; platform: of its ratings and pitch period, or "none"."""
+    from fowt_env.descriptions.platform import read_platform
+    from fowt_env.descriptions.ratings import ratings
+    from fowt_env.training.evaluation.scaling import turbine_of
     from fowt_env.visual import response, time_series
 
-    known = None if platform.lower() == "none" else platform
+    known = None if platform.lower() == "none" else read_platform(platform)
+    levels = {} if known is None else ratings(turbine_of(known))
+    period = known and known.published.get("natural_periods", {}).get("pitch")
     if kind == "series":
-        levels = {} if known is None else _ratings(known)
         time_series.plot_runs(frames, path, title, skip=skip, ratings=levels)
     elif kind == "spectra":
-        period = known and _platform_pitch_period(known)
         time_series.plot_spectra(frames, path, title, skip, platform_pitch_period=period)
     elif kind == "boxes":
         response.plot_boxes({"": frames}, path, title, skip)
     elif kind == "raos":
-        period = known and _platform_pitch_period(known)
         response.plot_raos(frames, path, title, skip, platform_pitch_period=period)
     else:
-        wind = known and _ratings(known)["rated_wind_speed_[m/s]"]
-        response.plot_schedule(frames, path, title, rated_wind=wind)
-
-
-def _ratings(platform):
-    """descriptions.ratings.ratings of a platform's turbine."""
-    from fowt_env.descriptions.ratings import ratings
-    from fowt_env.training.evaluation.scaling import turbine_of
-
-    return ratings(turbine_of(platform))
-
-
-def _platform_pitch_period(platform):
-    """Natural period (s) of platform pitch that a platform's file states, or None."""
-    from fowt_env.descriptions.platform import read_platform
-
-    return read_platform(platform).published.get("natural_periods", {}).get("pitch")
+        response.plot_schedule(frames, path, title, rated_wind=levels.get("rated_wind_speed_[m/s]"))

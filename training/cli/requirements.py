@@ -1,4 +1,4 @@
-"""What this package needs of others, as its metadata has it, and whether what is installed will do."""
+"""Requirements of this package, from its metadata, and the installed versions."""
 
 import platform
 import re
@@ -21,9 +21,9 @@ def _found(name, needed=""):
 
 
 def requirements() -> dict[str, list[Package]]:
-    """{extra or "": [Package]} of the installed package; those of [dev] are for its developers.
+    """Return {extra or "": [Package]} of the installed package, without [dev].
 
-    Raises: InputError where the package runs from a folder and was never installed.
+    Raises: InputError if the package runs from a folder and was never installed.
     """
     from importlib import metadata
 
@@ -42,12 +42,12 @@ def requirements() -> dict[str, list[Package]]:
 
 
 def installed(name: str) -> bool:
-    """Whether a distribution is installed, in any version."""
+    """Return whether a distribution is installed, in any version."""
     return _found(name).version is not None
 
 
 def _python() -> Package:
-    """This Python, beside the versions that the package is tested with."""
+    """Return this Python, with the versions that the package supports."""
     from importlib import metadata
 
     try:
@@ -58,7 +58,7 @@ def _python() -> Package:
 
 
 def versions() -> list[Package]:
-    """Python, this package and what it cannot do without."""
+    """Return Python, this package and its required packages."""
     from fowt_env import __version__
 
     try:
@@ -71,5 +71,5 @@ def versions() -> list[Package]:
 
 
 def optional_parts() -> dict[str, list[Package]]:
-    """{extra: [Package]}: what each extra of the package would bring, installed or not."""
+    """Return {extra: [Package]}: the packages of each extra, installed or not."""
     return {extra: packages for extra, packages in sorted(requirements().items()) if extra}

@@ -2,116 +2,86 @@
 
 from typing import Annotated
 
-import typer
+from typer import Option
 
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.errors import SimulationStopped
-from fowt_env.files.tables import SERIES_SUFFIXES, table_path, write_table
+from fowt_env.files.tables import SERIES_SUFFIXES, TABLE_SUFFIXES, write_table
 from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
-from fowt_env.training.cli.console import (
-    RANGE,
-    OptionOption,
-    PlatformOption,
-    RotorOption,
-    app,
-    note,
-    out,
-    output,
-    progress_bar,
-    reported,
-)
+from fowt_env.training.cli.console import command, note, out, output, progress_bar, save_table
+from fowt_env.training.cli.options import RANGE, OptionOption, PlatformOption, RotorOption
 from fowt_env.training.cli.tables import figure, print_table
 
-ROUNDING = 1e-9  # a standard deviation below this fraction of the mean is none
-SIMULATE_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt simulate --wind 18 --sea paper_wind_wave --plot run.png[/cyan]  # steady wind, irregular sea
-
-[cyan]fowt simulate --wind ntm:18:B --seed 3 --controller gspi_oc3 --out run.csv[/cyan]  # turbulence
-
-[cyan]fowt simulate --wind none --sea regular:3:5 --controller none --start zero[/cyan]  # waves alone
-
-[cyan]fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10[/cyan]  # free decay
-
-[cyan]fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'[/cyan]  # any wind, as JSON
-
-[cyan]fowt simulate --controller policy:ppo_lqr --wind ntm:16:B[/cyan]  # a trained agent
-
-[cyan]fowt simulate --controller ipc --option pitch=individual[/cyan]  # a pitch for each blade
-
-[cyan]fowt simulate --wind 18 --fault grid_loss:100 --protection turbine[/cyan]  # a fault, and trips"""
+ROUNDING = 1e-9  # fraction of the mean below which a standard deviation is rounding
 OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
 
 
-@app.command(epilog=SIMULATE_EXAMPLES)
-@reported
+@command()
 def simulate(
     platform: PlatformOption = "oc3_hywind",
     wind: Annotated[
         str,
-        typer.Option(
+        Option(
             help="m/s; KIND:SPEED[:CLASS] as ntm:18:B, eog:18 or (full-field) mann:18:B; a file: .csv of time"
-            " and speed, .bts, .wnd, .hh; JSON, as of kind box; or none. See fowt list winds."
+            " and speed, .bts, .wnd, .hh; JSON, e.g. kind box; or none. See fowt list winds."
         ),
     ] = "18",
     sea: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Name of fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
         ),
     ] = "none",
     controller: Annotated[
         str,
-        typer.Option(
+        Option(
             help="Name of fowt list controllers, policy:NAME of fowt list agents, policy:FILE.npz,"
-            " design:FILE.json, module:Name of your own. none: rotor speed and blade pitch held (at rest"
-            " without wind); constant: torque and blade pitch held, the rotor turns freely."
+            " design:FILE.json, or your module:Name. none: constant rotor speed and blade pitch (at rest"
+            " without wind); constant: constant torque and blade pitch, the rotor turns freely."
         ),
     ] = "pi",
-    duration: Annotated[float, typer.Option(help="Length of the run, s.")] = 600.0,
-    dt: Annotated[float | None, typer.Option(help="Physics step, s; default: that of the fidelity.")] = None,
-    control_dt: Annotated[float, typer.Option(help="Control period, s; a multiple of dt.")] = 0.1,
-    output_dt: Annotated[float, typer.Option(help="Output period, s; a multiple of dt.")] = 0.1,
-    seed: Annotated[int, typer.Option(help="Seed of wind and waves.")] = 0,
+    duration: Annotated[float, Option(help="Length of the run, s.")] = 600.0,
+    dt: Annotated[float | None, Option(help="Physics step, s; default: that of the fidelity.")] = None,
+    control_dt: Annotated[float, Option(help="Control period, s; a multiple of dt.")] = 0.1,
+    output_dt: Annotated[float, Option(help="Output period, s; a multiple of dt.")] = 0.1,
+    seed: Annotated[int, Option(help="Seed of wind and waves.")] = 0,
     fidelity: Annotated[
-        str,
-        typer.Option(
-            help="reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table)."
-        ),
+        str, Option(help="reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table).")
     ] = "standard",
     rotor: RotorOption = None,
-    start: Annotated[str, typer.Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
+    start: Annotated[str, Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
     initial: Annotated[
-        list[str] | None, typer.Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
+        list[str] | None, Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
     ] = None,
     fault: Annotated[
-        list[str] | None,
-        typer.Option(metavar="KIND:TIME or JSON", help="What goes wrong: grid_loss:100; repeats."),
+        list[str] | None, Option(metavar="KIND:TIME or JSON", help="Fault, e.g. grid_loss:100; repeats.")
     ] = None,
     protection: Annotated[
-        str, typer.Option(help="Trips: none, turbine (those of its file), or JSON of single ones.")
+        str, Option(help="Trips: none, turbine (those of its file), or JSON of single ones.")
     ] = "none",
     option: OptionOption = None,
-    out_path: Annotated[str | None, typer.Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
-    plot: Annotated[str | None, typer.Option(help="Stacked plot of the run, e.g. run.png.")] = None,
+    out_path: Annotated[str | None, Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
+    plot: Annotated[str | None, Option(help="Stacked plot of the run, e.g. run.png.")] = None,
 ):
-    """Simulate one run: statistics, time series and a plot."""
+    """Simulate one run: statistics, time series and a plot.
+
+    Examples:
+    fowt simulate --wind 18 --sea paper_wind_wave --plot run.png  # steady wind, irregular sea
+    fowt simulate --wind ntm:18:B --seed 3 --controller gspi_oc3 --out run.csv  # turbulence
+    fowt simulate --wind none --sea regular:3:5 --controller none --start zero  # waves alone
+    fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10  # free decay
+    fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'  # any wind, as JSON
+    fowt simulate --controller policy:ppo_lqr --wind ntm:16:B  # a trained agent
+    fowt simulate --controller ipc --option pitch=individual  # a pitch for each blade
+    fowt simulate --wind 18 --fault grid_loss:100 --protection turbine  # a fault, and trips
+    """
     import fowt_env
 
-    if out_path is not None:
-        table_path(out_path, SERIES_SUFFIXES)  # a wrong ending should not cost a run
     options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
-    output(out_path)
+    output(out_path, endings=SERIES_SUFFIXES)  # before the run
     output(plot, "--plot")
-    scene = fowt_env.build_scene(
-        platform,
-        wind=parse_wind(wind),
-        sea=parse_sea(sea),
-        seed=seed,
-        rotor=rotor,
-        fidelity=fidelity,
-        **options,
-    )
+    options |= {"seed": seed, "rotor": rotor, "fidelity": fidelity}
+    scene = fowt_env.build_scene(platform, wind=parse_wind(wind), sea=parse_sea(sea), **options)
     title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
     with progress_bar("simulating", 1.0) as update:
         try:
@@ -129,7 +99,7 @@ def simulate(
                 progress=update,
             )
         except (SimulationStopped, KeyboardInterrupt) as error:
-            rows = getattr(error, "frame", None)  # what there is of the run
+            rows = getattr(error, "frame", None)  # the rows so far
             if rows is not None and len(rows):
                 _save_run(rows, out_path, None, title)
             raise
@@ -142,25 +112,25 @@ def simulate(
 
 
 def _note_limits(frame, turbine):
-    """Say where a run was at the generator's limits, and that its rotor passed the turbine's overspeed."""
+    """Print notes on torque at the generator's limits and on rotor speeds above the turbine's overspeed."""
     from fowt_env.descriptions.units import RPM
 
     limited = frame["GenTqLim_[-]"].mean()
     if limited > 0.0:
         note(
-            f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: it was"
-            " commanded more than it can follow"
+            f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: the"
+            " commands are more than the generator can follow"
         )
     fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed / RPM
     if fastest > limit:
         note(
-            f"rotor speed of up to {fastest:.2f} rpm is beyond the turbine's overspeed of {limit:g} rpm,"
-            " where an environment ends and an evaluation counts the run as failed"
+            f"rotor speed of up to {fastest:.2f} rpm is above the turbine's overspeed of {limit:g} rpm,"
+            " at which an environment ends and an evaluation counts the run as failed"
         )
 
 
 def _save_run(frame, out_path, plot, title):
-    """Write the requested time series and plot, and print where."""
+    """Write the requested time series and plot, and print their paths."""
     if out_path is not None:
         note(f"wrote {write_table(frame, out_path)} ({len(frame)} rows)")
     if plot is not None:
@@ -181,51 +151,40 @@ def _print_channels(frame, title):
             x = frame[channel]
             mean, deviation = x.mean(), x.std(ddof=0)
             if deviation < ROUNDING * abs(mean):
-                deviation = 0.0  # what the sums of a constant leave
+                deviation = 0.0  # rounding errors of a constant
             values = (mean, deviation, x.min(), x.max())
             rows.append((channel.replace("_", " "), *map(figure, values)))
     print_table(out, ("channel", "mean", "std", "min", "max"), rows, title)
 
 
-TRIM_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt trim[/cyan]  # the floating turbine from cut-in to cut-out
-
-[cyan]fowt trim --winds 8,11.4,18 --fixed --out steady.csv[/cyan]  # fixed platform, into a file
-
-[cyan]fowt trim --plot schedule.png[/cyan]  # the steady schedule as a picture"""
 TRIM_CHANNELS = (
-    "RotSpeed",
-    "BldPitch1",
-    "GenTq",
-    "GenPwr",
-    "RotThrust",
-    "PtfmSurge",
-    "PtfmHeave",
-    "PtfmPitch",
-    "FAIRTEN1",
+    *("RotSpeed", "BldPitch1", "GenTq", "GenPwr", "RotThrust"),
+    *("PtfmSurge", "PtfmHeave", "PtfmPitch", "FAIRTEN1"),
 )
 
 
-@app.command(epilog=TRIM_EXAMPLES)
-@reported
+@command()
 def trim(
     platform: PlatformOption = "oc3_hywind",
-    winds: Annotated[str, typer.Option(help=f"Steady winds, m/s: {RANGE}.")] = "4:24:1",
-    fixed: Annotated[bool, typer.Option("--fixed", help="Fix the platform.")] = False,
+    winds: Annotated[str, Option(help=f"Steady winds, m/s: {RANGE}.")] = "4:24:1",
+    fixed: Annotated[bool, Option("--fixed", help="Fix the platform.")] = False,
     rotor: RotorOption = None,
     option: OptionOption = None,
-    out_path: Annotated[str | None, typer.Option("--out", help="All channels: .csv or .parquet.")] = None,
-    plot: Annotated[str | None, typer.Option(help="Plot of the schedule, e.g. schedule.png.")] = None,
+    out_path: Annotated[str | None, Option("--out", help="All channels: .csv or .parquet.")] = None,
+    plot: Annotated[str | None, Option(help="Plot of the schedule, e.g. schedule.png.")] = None,
 ):
-    """Steady operating points over the wind speed."""
+    """Compute steady operating points over the wind speed.
+
+    Examples:
+    fowt trim  # the floating turbine from cut-in to cut-out
+    fowt trim --winds 8,11.4,18 --fixed --out steady.csv  # fixed platform, into a file
+    fowt trim --plot schedule.png  # the steady schedule as a picture
+    """
     import pandas as pd
 
     import fowt_env
 
-    if out_path is not None:
-        table_path(out_path)
-    output(out_path)
+    output(out_path, endings=TABLE_SUFFIXES)
     output(plot, "--plot")
     speeds = parse_numbers(winds, "winds")
     options = parse_pairs(option, "option")
@@ -235,7 +194,7 @@ def trim(
             scene = fowt_env.build_scene(platform, wind=speed, rotor=rotor, **options)
             point = fowt_env.trim(scene, platform="fixed" if fixed else "floating")
             rows.append({"wind": speed, **point})
-            update(number, f"wind {speed:g} m/s")
+            update(number, text=f"wind {speed:g} m/s")
     units = {channel.name: channel.unit for channel in scene.channels}
     title = f"{platform}, {'fixed' if fixed else 'floating'}, steady wind"
     shown = [name for name in TRIM_CHANNELS if name in rows[0]]
@@ -244,8 +203,7 @@ def trim(
     print_table(out, headings, lines, title, left=())
     names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
     points = pd.DataFrame(rows).rename(columns=names)
-    if out_path is not None:
-        note(f"wrote {write_table(points, out_path)}")
+    save_table(points, out_path)
     if plot is not None:
         from fowt_env.visual.response import plot_schedule
 

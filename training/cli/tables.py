@@ -1,8 +1,7 @@
-"""The one table of the command line: no frame, and no digit left out however narrow the terminal is.
+"""Tables of the command line: without a frame, and with all digits in a terminal of any width.
 
-Where a table is wider than the terminal, its headings are wrapped over several lines; where it still is, it
-comes in blocks of columns, each with the first ones again. A file or a pipe gets it whole, unless COLUMNS
-says how wide it is.
+If a table is wider than the terminal, its headings are wrapped; if it still is, it is printed in blocks of
+columns, each beginning with the first ones. A file or a pipe gets full lines, unless COLUMNS is set.
 """
 
 import os
@@ -13,28 +12,28 @@ from rich.cells import cell_len
 from rich.text import Text
 
 GAP = "  "
-BREAK = "\u200b"  # where a long word of prose may go on in the next line
+BREAK = "\u200b"  # allows a line break within a long word of prose
 LONG_WORD = re.compile(r"\S{17,}")
 
 
 def table_width(console):
-    """Characters in a line of a console; None: as many as it takes (a file or a pipe)."""
+    """Return the characters in a line of a console; None: no limit (a file or a pipe)."""
     if console.is_terminal or os.environ.get("COLUMNS", "").isdigit():
         return console.width
     return None
 
 
 def figure(value):
-    """Text of a value: whole numbers whole, others with four significant digits; a text as it is."""
+    """Return the text of a value: integers in full, other numbers with four significant digits."""
     return str(value) if isinstance(value, str | Integral) else f"{value or 0.0:.4g}"
 
 
 def print_table(console, headings, rows, title=None, keys=1, left=(0,), prose=(), red=()):
     """Print rows (sequences of texts) below headings, numbers to the right.
 
-    keys   how many columns, from the first, every block of columns has
-    left   numbers of the columns that stand to the left; prose: of those whose texts may take several lines
-    red    numbers of the rows that are red
+    keys   number of first columns that every block repeats
+    left   numbers of left-aligned columns; prose: of those whose texts may take several lines
+    red    numbers of red rows
     """
     width = table_width(console)
     columns = [
@@ -63,7 +62,7 @@ def print_table(console, headings, rows, title=None, keys=1, left=(0,), prose=()
 
 
 def _print_lines(console, cells, ways, style):
-    """Print one row; cells: lines of each, ways: (size, whether to the left) of each."""
+    """Print one row; cells: lines of each, ways: (size, whether left-aligned) of each."""
     for line in range(max(map(len, cells))):
         texts = []
         for lines, (size, left) in zip(cells, ways, strict=True):
@@ -74,23 +73,23 @@ def _print_lines(console, cells, ways, style):
 
 
 def _longest(lines):
-    """Width of the widest of some lines."""
+    """Return the width of the widest of some lines."""
     return max(map(cell_len, lines))
 
 
 def _size(head, column):
-    """Width of a column with its heading."""
+    """Return the width of a column with its heading."""
     return max(map(_longest, [head, *column]))
 
 
 def _total(sizes):
-    """Width of columns side by side."""
+    """Return the width of columns side by side."""
     sizes = list(sizes)
     return sum(sizes) + len(GAP) * (len(sizes) - 1)
 
 
 def _filled(words, size):
-    """Lines of words, each as full as `size` or the longest word allows."""
+    """Return lines of words, each filled up to `size` or the longest word."""
     size = max([size, *map(cell_len, words)])
     lines = [words[0]]
     for word in words[1:]:
@@ -103,17 +102,17 @@ def _filled(words, size):
 
 
 def _breakable(text):
-    """Text whose long words, such as paths, have BREAK after each slash and underscore."""
+    """Return a text with BREAK after each slash and underscore of its long words, such as paths."""
     return LONG_WORD.sub(lambda match: re.sub(r"([/_])(?=\w)", rf"\1{BREAK}", match.group()), text)
 
 
 def _words(text):
-    """Words of a text, parted at spaces and at each BREAK, which stays."""
+    """Return the words of a text, split at spaces and after each BREAK."""
     return [word for word in re.split(rf"\s+|(?<={BREAK})", text) if word]
 
 
 def _folded(heads, columns, prose, width):
-    """The columns, those of prose with their texts over as many lines as it takes to fit the width."""
+    """Return the columns, with prose over more lines until they fit the width."""
     columns = list(columns)
     while _total(map(_size, heads, columns)) > width:
         able = [i for i in prose if _size([""], columns[i]) > max(_least(columns[i]), _longest(heads[i]))]
@@ -128,25 +127,20 @@ def _folded(heads, columns, prose, width):
 
 
 def _joined(lines):
-    """The text of which these are the lines."""
+    """Return the text of some lines."""
     return " ".join(lines).replace(f"{BREAK} ", BREAK)
 
 
 def _least(column):
-    """Width of the longest word of a column."""
+    """Return the width of the longest word of a column."""
     return max(cell_len(word) for lines in column for line in lines for word in (_words(line) or [""]))
 
 
 def _blocks(sizes, keys, width):
-    """[numbers of columns] of each block: the first `keys` and as many more as fit, one at the least."""
-    first = list(range(keys))
-    blocks = [first[:]]
+    """Return [numbers of columns] of each block: the first `keys` and as many more as fit, at least one."""
+    blocks, most = [list(range(keys))], float("inf") if width is None else width
     for i in range(keys, len(sizes)):
-        if (
-            len(blocks[-1]) > keys
-            and width is not None
-            and _total(sizes[j] for j in (*blocks[-1], i)) > width
-        ):
-            blocks.append(first[:])
+        if len(blocks[-1]) > keys and _total(sizes[j] for j in (*blocks[-1], i)) > most:
+            blocks.append(list(range(keys)))
         blocks[-1].append(i)
     return blocks

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
@@ -12,56 +13,50 @@ from fowt_env.training.cli.benchmark import benchmarks
 from fowt_env.training.cli.console import (
     EXIT_INTERRUPTED,
     announce_folders,
-    app,
+    command,
     err,
     note,
     out,
     output,
     progress_bar,
-    reported,
+    show,
 )
+from fowt_env.training.cli.options import CsvOption
 from fowt_env.training.cli.tables import figure, print_table
 
 LINE_EVERY = 10.0  # s between lines of progress without a terminal
 WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
-TRAIN_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt train --steps 20000 --out runs/first[/cyan]  # a first try
-
-[cyan]fowt train --algo ppo --steps 4000000 --seed 0 --out runs/ppo_0[/cyan]
-
-[cyan]fowt train --out runs/ppo_0 --resume[/cyan]  # go on after Ctrl-C, kill or a crash
-
-[cyan]fowt train --set environment.observation=preview --set environment.reward.pitch_travel=20[/cyan]
-
-[bold]Steps[/bold] are decisions of the agent, each several control periods (decisions.hold).
-[bold]Files written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png, settings.yml,
-versions.json, checkpoints/, tensorboard/. A policy runs as the controller policy:runs/ppo_0/best.npz.
-Without a terminal a line of progress is printed every 10 s."""
 
 
-@app.command(epilog=TRAIN_EXAMPLES)
-@reported
+@command()
 def train(
-    algo: Annotated[str, typer.Option(help="ppo, sac or tqc.")] = "ppo",
-    task: Annotated[
-        str, typer.Option(help="Settings of training/rl/ALGO.yml: above_rated, ...")
-    ] = "above_rated",
-    seed: Annotated[int, typer.Option(help="Random seed of networks and episodes.")] = 0,
-    steps: Annotated[int | None, typer.Option(help="Decisions; default 2000000, or as before.")] = None,
-    out_folder: Annotated[str | None, typer.Option("--out", help="Folder of the run.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue from the newest checkpoint.")] = False,
+    algo: Annotated[str, Option(help="ppo, sac or tqc.")] = "ppo",
+    task: Annotated[str, Option(help="Settings of training/rl/ALGO.yml: above_rated, ...")] = "above_rated",
+    seed: Annotated[int, Option(help="Random seed of networks and episodes.")] = 0,
+    steps: Annotated[int | None, Option(help="Decisions; default 2000000, or as before.")] = None,
+    out_folder: Annotated[str | None, Option("--out", help="Folder of the run.")] = None,
+    resume: Annotated[bool, Option("--resume", help="Continue from the newest checkpoint.")] = False,
     trust_zip: Annotated[
-        bool,
-        typer.Option("--trust-zip", help="With --resume: load a checkpoint of others, executing its code."),
+        bool, Option("--trust-zip", help="With --resume: load a checkpoint of others, executing its code.")
     ] = False,
     change: Annotated[
-        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a setting; repeatable.")
+        list[str] | None, Option("--set", metavar="KEY=VALUE", help="Change a setting; repeatable.")
     ] = None,
 ):
     """Train an agent with stable-baselines3 (PPO, SAC, TQC).
 
     It is validated as it learns and at the end; best.npz is the policy that scored best.
+
+    Examples:
+    fowt train --steps 20000 --out runs/first  # a first try
+    fowt train --algo ppo --steps 4000000 --seed 0 --out runs/ppo_0
+    fowt train --out runs/ppo_0 --resume  # go on after Ctrl-C, kill or a crash
+    fowt train --set environment.observation=preview --set environment.reward.pitch_travel=20
+
+    [bold]Steps[/bold] are decisions of the agent, each several control periods (decisions.hold). [bold]Files
+    written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png, settings.yml,
+    versions.json, checkpoints/, tensorboard/. A policy runs as the controller policy:runs/ppo_0/best.npz.
+    Without a terminal a line of progress is printed every 10 s.
     """
     from fowt_env.training.rl.train import Training, resolve
 
@@ -82,7 +77,7 @@ def train(
     with progress_bar("training", None, every=LINE_EVERY) as update:
 
         def report(done, total, text):
-            update(done, text if err.is_terminal else f"{done:,} of {total:,}, {text}", total)
+            update(done, total, text if err.is_terminal else f"{done:,} of {total:,}, {text}")
 
         finished = run.run(report)
     announce_folders()
@@ -117,25 +112,22 @@ def _print_validations(run):
     print_table(out, headings, rows, f"over {run.reference_name}, whose score is 1; less is better")
 
 
-EXPORT_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt export-policy runs/ppo_0 --out mine.npz --trust-zip[/cyan]  # of a run of your own
-
-[cyan]fowt evaluate --controllers policy:mine.npz,pi[/cyan]  # compare it
-
-fowt train writes best.npz and last.npz by itself: this is for a run that was stopped."""
-
-
-@app.command(epilog=EXPORT_EXAMPLES)
-@reported
+@command()
 def export_policy(
-    folder: Annotated[str, typer.Argument(help="Folder of a run of fowt train.")],
-    out_path: Annotated[str, typer.Option("--out", help="The policy file, .npz.")],
+    folder: Annotated[str, Argument(help="Folder of a run of fowt train.")],
+    out_path: Annotated[str, Option("--out", help="The policy file, .npz.")],
     trust_zip: Annotated[
-        bool, typer.Option("--trust-zip", help="Load the checkpoint, which executes code from it.")
+        bool, Option("--trust-zip", help="Load the checkpoint, which executes code from it.")
     ] = False,
 ):
-    """Turn a training run's checkpoint into a policy file."""
+    """Turn a training run's checkpoint into a policy file.
+
+    Examples:
+    fowt export-policy runs/ppo_0 --out mine.npz --trust-zip  # of a run of your own
+    fowt evaluate --controllers policy:mine.npz,pi  # compare it
+
+    Training writes best.npz and last.npz by itself: this is for an interrupted run.
+    """
     from fowt_env.training.rl.export import export_run
 
     if Path(out_path).suffix != ".npz":
@@ -150,27 +142,24 @@ def export_policy(
     note(f"wrote {export_run(folder, out_path)}")
 
 
-TRAINING_EXAMPLES = """[bold]Example[/bold]
-
-[cyan]fowt benchmark training --envs 16 --steps 20000[/cyan]  # a first look"""
-
-
-@benchmarks.command(epilog=TRAINING_EXAMPLES)
-@reported
+@command(benchmarks)
 def training(
-    envs: Annotated[int, typer.Option(help="Environments in a batch.")] = 64,
-    steps: Annotated[int, typer.Option(help="Steps of PPO that are timed.")] = 50_000,
-    out_path: Annotated[str, typer.Option("--out", help="CSV to write.")] = "results/benchmark/training.csv",
+    envs: Annotated[int, Option(help="Environments in a batch.")] = 64,
+    steps: Annotated[int, Option(help="Steps of PPO that are timed.")] = 50_000,
+    out_path: CsvOption = "results/benchmark/training.csv",
 ):
     """Time PPO on each kind of vector environment.
 
     With the times of physics, torch and Python apart.
+
+    Examples:
+    fowt benchmark training --envs 16 --steps 20000  # a first look
     """
     from fowt_env.training.benchmarks.speed import write_csv
     from fowt_env.training.benchmarks.training import benchmark_training
 
     output(out_path)
     with progress_bar("training speed", None) as update:
-        table = benchmark_training(envs, steps, progress=lambda done, total, kind: update(done, kind, total))
-    out.print(table.round(3).to_string(index=False), highlight=False)
+        table = benchmark_training(envs, steps, progress=update)
+    show(table.round(3))
     note(f"wrote {write_csv(table, out_path)}")

@@ -2,39 +2,38 @@
 
 from typing import Annotated
 
-import typer
+from typer import Option
 
-from fowt_env.training.cli.console import PlatformOption, app, err, note, out, progress_bar, reported
+from fowt_env.training.cli.arguments import parse_names
+from fowt_env.training.cli.console import command, err, note, out, progress_bar
+from fowt_env.training.cli.options import PlatformOption
 from fowt_env.training.cli.tables import print_table
 
-WARMUP_EXAMPLES = """[bold]Examples[/bold]
 
-[cyan]fowt warmup[/cyan]  runs and the environment of OC3-Hywind, so that later ones start at once
-
-[cyan]fowt warmup --kinds standard,vector,linear --jobs 2[/cyan]  other kinds, the later ones side by side
-
-[cyan]fowt warmup --kinds all[/cyan]  standard, environment, vector, steady, linear, fast and reference"""
-
-
-@app.command(epilog=WARMUP_EXAMPLES)
-@reported
+@command()
 def warmup(
     platform: PlatformOption = "oc3_hywind",
-    kinds: Annotated[str, typer.Option(help="Kinds of scene, with commas, or all.")] = "standard,environment",
-    jobs: Annotated[int, typer.Option(help="Processes; each needs about 1 GB.")] = 1,
+    kinds: Annotated[str, Option(help="Kinds of scene, with commas, or all.")] = "standard,environment",
+    jobs: Annotated[int, Option(help="Processes; each needs about 1 GB.")] = 1,
 ):
-    """Compile kernels of the usual scenes ahead."""
+    """Compile kernels of the usual scenes ahead.
+
+    Examples:
+    fowt warmup  # runs and the environment of OC3-Hywind, so that later ones start at once
+    fowt warmup --kinds standard,vector,linear --jobs 2  # other kinds, the later ones side by side
+    fowt warmup --kinds all  # standard, environment, vector, steady, linear, fast and reference
+    """
     from fowt_env.warmup import KINDS
     from fowt_env.warmup import warmup as compile_kinds
 
-    names = list(KINDS) if kinds == "all" else [name.strip() for name in kinds.split(",") if name.strip()]
+    names = list(KINDS) if kinds == "all" else parse_names(kinds)
     total = len(dict.fromkeys(names))
     if not err.is_terminal:
         note(f"compiling {total} kinds of scene: {', '.join(names)}")
     with progress_bar("compiling", total) as update:
 
         def show(kind, done, kernels):
-            update(done, f"{kind}: {kernels} kernels" if kernels else kind)
+            update(done, text=f"{kind}: {kernels} kernels" if kernels else kind)
             if not err.is_terminal and done > show.done:
                 note(f"{done} of {total}: {kind}")
             show.done = done
@@ -44,4 +43,4 @@ def warmup(
     rows = [
         (row.kind, KINDS[row.kind][0], str(row.kernels), f"{row.seconds:.1f}") for row in table.itertuples()
     ]
-    print_table(out, ("kind", "what it is for", "compiled", "s"), rows, f"{platform}", left=(0, 1))
+    print_table(out, ("kind", "what it is for", "compiled", "s"), rows, platform, left=(0, 1))

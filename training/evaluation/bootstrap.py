@@ -1,14 +1,14 @@
 """Bootstrap intervals over a few weather seeds, and over training seeds crossed with them.
 
-The unit of chance is the seed: one seed draws the wind and waves of every case from the same random
-phases, so its cases are not independent of each other. Seeds are resampled with all their cases (cluster
-bootstrap), and so are the training seeds of an agent with all their runs.
+One seed draws the wind and waves of every case from the same random phases, so its cases are not independent.
+Seeds are therefore resampled with all their cases (cluster bootstrap), and so are the training seeds of an
+agent with all their runs.
 
-Fewer than LEAST_SEEDS seeds have no interval: Student's t makes one of two seeds 6.5 times as wide as the
-normal one, beyond anything that a figure can be, and of their deviation next to nothing is known.
+Fewer than LEAST_SEEDS seeds have no interval: with two seeds Student's t would widen it 6.5 times over the
+normal one, and their deviation is hardly known.
 
-Means over the cases are lifetime means: each case counts by its share of the lifetime, and what adds up by a
-power of it (variances, damage) is averaged by that power.
+Means over the cases are lifetime means: cases are weighted by their share of the lifetime, and metrics that
+add up by a power (variances, damage) are averaged by that power.
 """
 
 from dataclasses import dataclass
@@ -26,29 +26,30 @@ P_STEPS = 40  # halvings of the logarithm of a p-value: exact to 1e-10
 
 
 def resample_weights(n, resamples=RESAMPLES, random_seed=RANDOM_SEED):
-    """(resamples, n) counts of how often each of n seeds is drawn, n draws with replacement."""
+    """Return counts (resamples, n) of how often each of n seeds is drawn, n draws with replacement."""
     draws = np.random.default_rng(random_seed).integers(n, size=(resamples, n))
     return np.stack([(draws == seed).sum(axis=1) for seed in range(n)], axis=1).astype(np.float64)
 
 
 def interval(estimate, resampled, n, positive=False):
-    """(low, high) of the estimate (metrics,) from resampled ones (resamples, metrics); NaN below LEAST_SEEDS.
+    """Return (low, high) of the estimate (metrics,) from its resamples (resamples, metrics).
 
-    Percentiles of n resampled values are too narrow for small n: of 6 normal ones they hold the truth in
-    84 % of trials. Widening them as Student's interval is wider than the normal one makes it 94 %, and
-    keeps their skewness. Hesterberg, The American Statistician 69(4), 2015, section 5.3, does the same
-    with the percentiles' levels.
+    NaN below LEAST_SEEDS.
 
-    positive: whether the estimate (each of them, or all) is of a figure that cannot be below zero. Its
-    interval is that of its logarithm, so that it never reaches zero; where a resample is zero, as of a count,
-    it ends there.
+    Percentiles are too narrow for small n: with 6 normal values they contain the truth in 84 % of trials.
+    Widening them by the ratio of Student's to the normal interval makes it 94 % and keeps their skewness.
+    Hesterberg, The American Statistician 69(4), 2015, section 5.3, does the same with the percentiles'
+    levels.
+
+    positive: whether the estimate (each of them, or all) cannot be below zero. The interval is then that of
+    the logarithm, above zero; if a resample is zero, as of a count, it ends at zero.
     """
     if n < LEAST_SEEDS:
         return np.full_like(estimate, np.nan), np.full_like(estimate, np.nan)
     resampled = _known(resampled)
     least = np.fmin(estimate, np.nanmin(resampled, axis=0))
     log = positive & (least > 0.0)
-    with np.errstate(all="ignore"):  # logarithms that are not used, and ends beyond the largest float
+    with np.errstate(all="ignore"):  # unused logarithms, and overflows of the ends
         centre = np.where(log, np.log(estimate), estimate)
         spread = _spread(centre, np.where(log, np.log(resampled), resampled), n)
         low, high = (np.where(log, np.exp(centre + side), centre + side) for side in spread)
@@ -56,25 +57,22 @@ def interval(estimate, resampled, n, positive=False):
 
 
 def _spread(estimate, resampled, n):
-    """(2, metrics): how far the ends of the interval are from the estimate, for n seeds."""
+    """Return the distances (2, metrics) of the interval's ends from the estimate, for n seeds."""
     tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
     away = _known(resampled - estimate)
-    percentile = (
-        np.nanpercentile if np.isnan(away).any() else np.percentile
-    )  # the slower one where it must be
+    percentile = np.nanpercentile if np.isnan(away).any() else np.percentile  # nanpercentile is slow
     return percentile(away, tails, axis=0) * _widening(n, 1.0 - LEVEL)
 
 
 def _known(values):
-    """The array with zeros in columns that are NaN throughout: their estimate is NaN, so their result is."""
+    """Return the array with zeros in all-NaN columns, whose estimate, and so result, is NaN."""
     return np.where(np.isnan(values).all(axis=0), 0.0, values)
 
 
 def case_means(values, weights):
-    """(resamples, metrics) weighted means over the seeds of values (seeds, metrics); NaN is no value.
+    """Return weighted means (resamples, metrics) over the seeds of values (seeds, metrics); NaN is no value.
 
-    With a single value there is nothing to resample: it is the mean of every resample. A resample that has
-    drawn no value is NaN.
+    A single value is the mean of every resample. A resample that has drawn no value is NaN.
     """
     there = np.isfinite(values)
     filled = np.where(there, values, 0.0)
@@ -86,11 +84,11 @@ def case_means(values, weights):
 
 
 def lifetime_means(values, weights, shares, exponents):
-    """(resamples, metrics): (sum over cases of share x mean over seeds of x^p)^(1/p) of x = values.
+    """Return (sum over cases of share x mean over seeds of x^p)^(1/p) of x = values, (resamples, metrics).
 
     values (cases, seeds, metrics), NaN is no value; weights (resamples, seeds) of the seeds; shares (cases,)
-    of the lifetime; exponents p (metrics,). Shares of cases without any value of a metric go to the others.
-    NaN where no case with a share has a value.
+    of the lifetime; exponents p (metrics,). Shares of cases without a value of a metric go to the others.
+    NaN if no case with a share has a value.
     """
     share = np.where(np.isfinite(values).any(axis=1), np.asarray(shares)[:, None], 0.0)  # (cases, metrics)
     bent = exponents != 1.0
@@ -107,18 +105,18 @@ def lifetime_means(values, weights, shares, exponents):
 
 
 def _widening(n, alpha):
-    """By how much the 1 - alpha interval of n resampled values is widened; alpha of any shape, in (0, 1]."""
+    """Return the widening of the 1 - alpha interval of n resampled values; alpha of any shape, in (0, 1]."""
     tail = np.minimum(0.5 * alpha, 0.5 - 1e-9)
     return np.sqrt(n / (n - 1.0)) * student.isf(tail, n - 1) / normal.isf(tail)
 
 
 def p_values(deviations, distance):
-    """(metrics,) two-sided p-values: 1 less the level of the interval that just reaches so far.
+    """Return two-sided p-values (metrics,): 1 less the level of the interval that ends at the tested value.
 
-    deviations  [(resampled less estimate (resamples, metrics), n)], one for each kind of seed that is
-                resampled; as independent errors each side combines by the root of its squares
-    distance    (metrics,) from the estimate to the value that is tested, in the same terms (logarithms)
-    At the least LEAST_P, which resamples cannot resolve; NaN of a NaN distance, or without deviations.
+    deviations  [(resampled less estimate (resamples, metrics), n)] for each kind of seed; each side combines
+                by the root of its squares, as independent errors do
+    distance    (metrics,) from the estimate to the tested value, in the same terms (logarithms)
+    At least LEAST_P, below the resolution of resamples; NaN for a NaN distance, or without deviations.
     """
     distance = np.asarray(distance, dtype=np.float64)
     if not deviations:
@@ -140,7 +138,7 @@ def p_values(deviations, distance):
 
 
 def _quantile(ordered, q):
-    """(metrics,) quantiles q (metrics,) of columns in rising order, NaN at their ends left out."""
+    """Return the quantiles q (metrics,) of sorted columns, without NaN at their ends."""
     last = np.isfinite(ordered).sum(axis=0) - 1
     place = np.maximum(last, 0) * q
     below = np.floor(place).astype(int)
@@ -150,10 +148,10 @@ def _quantile(ordered, q):
 
 
 def holm(p):
-    """(n,) p-values adjusted for being several (Holm, Scandinavian Journal of Statistics 6(2), 1979).
+    """Return p-values (n,) adjusted for multiple tests (Holm, Scandinavian Journal of Statistics 6(2), 1979).
 
-    Of those at most alpha none is a chance finding but with probability alpha. The k-th smallest of n times
-    n + 1 - k, and none below a smaller one's; NaN is no test.
+    The probability of any false rejection at level alpha is at most alpha. The k-th smallest of n p-values is
+    multiplied by n + 1 - k, with the results kept in order; NaN is no test.
     """
     p = np.asarray(p, dtype=np.float64)
     adjusted = np.full(p.shape, np.nan)
@@ -167,7 +165,7 @@ def holm(p):
 
 @dataclass(frozen=True)
 class Estimate:
-    """A ratio with its 95 % interval (NaN: none), and what its p-values come from."""
+    """A ratio with its 95 % interval (NaN: none), and the deviations for its p-values."""
 
     value: float
     low: float = float("nan")
@@ -176,7 +174,7 @@ class Estimate:
     log: bool = False  # whether they are of the logarithm
 
     def p_value(self, tested):
-        """Two-sided p-value of the hypothesis that the ratio is the one tested; NaN without an interval."""
+        """Return the two-sided p-value of the ratio being `tested`; NaN without an interval."""
         if not np.isfinite(self.low):
             return float("nan")
         own, other = np.log([self.value, tested]) if self.log else (self.value, tested)
@@ -184,14 +182,13 @@ class Estimate:
 
 
 def crossed_ratio(own, base, shares, exponent=1.0, resamples=RESAMPLES, positive=False):
-    """Estimate of the ratio of lifetime means over a baseline's on the same runs, mean over training seeds.
+    """Return the Estimate of the ratio of lifetime means to a baseline's, its mean over training seeds.
 
-    own (training seeds, cases, weather seeds), base (cases, weather seeds), NaN: none; shares and exponent as
-    lifetime_means takes them. Each kind of seed is resampled by itself, the interval is widened for how few
-    there are (interval), and the two combine as independent errors do, each side by the root of its squares.
-    A kind with a single seed adds nothing: the interval is then for that one alone. No interval where a kind
-    has two or more, but fewer than LEAST_SEEDS, or where neither has two.
-    positive: whether no value can be below zero; as interval takes it.
+    own (training seeds, cases, weather seeds), base (cases, weather seeds), NaN: none; shares and exponent:
+    as in lifetime_means; positive: as in `interval`. Each kind of seed is resampled by itself, its interval
+    is widened for few seeds, and the two combine as independent errors do, each side by the root of its
+    squares. A kind with a single seed adds nothing: the interval is for that seed. No interval if a kind has
+    two or more, but fewer than LEAST_SEEDS, or if neither has two.
     """
     own = np.asarray(own, dtype=np.float64)
     there = np.isfinite(own) & np.isfinite(base)

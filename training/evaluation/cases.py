@@ -1,8 +1,7 @@
-"""Load cases and suites of them, read from files: what controllers are compared on.
+"""Load cases, and suites of them read from TOML files of the folder suites or of the user.
 
-A suite is a TOML file of the folder suites, or the user's own. One `[[case]]` may stand for several: with
-`speed = [12, 14]` and `name = "ntm_{speed}"` it is one case per mean wind speed, which then also stands
-in its wind and picks the row of its sea's table.
+One `[[case]]` may define several: with `speed = [12, 14]` and `name = "ntm_{speed}"` it is one case per mean
+wind speed, which is filled into its wind and selects the row of its sea's table.
 """
 
 from collections import Counter
@@ -19,12 +18,7 @@ from fowt_env.descriptions.faults import Fault
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
 from fowt_env.descriptions.platform import platform_names, read_platform
 from fowt_env.descriptions.protection import Protection, read_protection
-from fowt_env.descriptions.records import (
-    NonNegative,
-    Positive,
-    Record,
-    validate,
-)
+from fowt_env.descriptions.records import NonNegative, Positive, Record, validate
 from fowt_env.descriptions.sea_state import SeaState, joint_sea_state, sea_state_of
 from fowt_env.descriptions.sensors import EXACT, sensor_chain
 from fowt_env.descriptions.wind import FORMS, checked_keys, is_wind_file, read_wind, wind_of
@@ -37,17 +31,30 @@ from fowt_env.weather.wind_field import is_field
 
 FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
-TRIP = 1.3  # fraction of rated rotor speed at which a turbine's protection stops it
+TRIP = 1.3  # fraction of rated rotor speed of the default overspeed trip
+DESCRIBED = (
+    "name",
+    "wind",
+    "sea",
+    "platform",
+    "options",
+    "fault",
+    "parked",
+    "initial",
+    "shift",
+    "trip",
+    "sensors",
+)
 
 
 @dataclass(frozen=True)
 class Case:
-    """One load case: what build_scene is given, apart from the seed, and what happens in it.
+    """One load case: the arguments of build_scene except the seed, and the events of the run.
 
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
-    initial: absolute values of channels at the start, as simulate takes them.
-    seeds, duration, skip: of this case where they differ from the suite's. shift: how the plant differs from
-    the nominal one, which controllers are prepared for (training.evaluation.model_mismatch).
+    initial: absolute values of channels at the start, as in simulate.
+    seeds, duration, skip: of this case if they differ from the suite's. shift: difference of the plant from
+    the nominal one that controllers are prepared for (training.evaluation.model_mismatch).
     """
 
     name: str
@@ -62,16 +69,16 @@ class Case:
     seeds: tuple | None = None
     duration: float | None = None  # s
     skip: float | None = None  # s
-    shift: PlantPerturbation | None = None  # what of the plant its controllers do not know
+    shift: PlantPerturbation | None = None  # unknown to the controllers
     trip: float | None = TRIP  # fraction of rated rotor speed; None: that of the protection, if it has one
     sensors: str = EXACT  # sensor chain that controllers read through, by its name
-    displaced: dict | None = None  # {channel: what is added to the trim of the platform at the start}
+    displaced: dict | None = None  # {channel: offset from the trim at the start}
     protection: object = None  # as simulate takes it: None, "turbine" or a mapping of trips
-    source: str = ""  # of the case, where it is another than the suite's
+    source: str = ""  # of the case, if it differs from the suite's
 
 
 def mean_speed(case):
-    """Mean wind speed (m/s) of a Case; None where it has none by itself (no wind, a series, a file)."""
+    """Return the mean wind speed (m/s) of a Case; None for no wind, a series or a file."""
     if is_number(case.wind):
         return float(case.wind)
     speed = case.wind.get("speed") if isinstance(case.wind, dict) else None
@@ -79,28 +86,16 @@ def mean_speed(case):
 
 
 def described(case):
-    """A Case as a mapping of plain values that JSON can hold; arrays and objects by their text."""
-    sea = case.sea.model_dump(exclude_none=True) if isinstance(case.sea, SeaState) else case.sea
-    values = {
-        "name": case.name,
-        "wind": case.wind,
-        "sea": sea,
-        "platform": case.platform,
-        "options": case.options,
-        "fault": None if case.fault is None else case.fault.model_dump(exclude_none=True),
-        "parked": case.parked,
-        "initial": case.initial,
-        "shift": None if case.shift is None else case.shift.model_dump(exclude_defaults=True),
-        "trip": case.trip,
-        "sensors": case.sensors,
-    }
-    if case.displaced is not None:
-        values["displaced"] = case.displaced
-    if case.protection is not None:
-        values["protection"] = case.protection
-    if case.source:
-        values["source"] = case.source
-    return _plain(values)
+    """Return a Case as a mapping of plain values for JSON; arrays as lists, objects as their text."""
+    values = {key: getattr(case, key) for key in DESCRIBED}
+    if isinstance(case.sea, SeaState):
+        values["sea"] = case.sea.model_dump(exclude_none=True)
+    if case.fault is not None:
+        values["fault"] = case.fault.model_dump(exclude_none=True)
+    if case.shift is not None:
+        values["shift"] = case.shift.model_dump(exclude_defaults=True)
+    further = {key: getattr(case, key) for key in ("displaced", "protection", "source")}
+    return _plain(values | {key: value for key, value in further.items() if value not in (None, "")})
 
 
 def _plain(value):
@@ -117,25 +112,25 @@ def _plain(value):
 
 
 def _many(value):
-    """A list of what is given, one thing or several."""
+    """Return a list of one value or several."""
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
 Seeds = Annotated[tuple[Annotated[int, Field(ge=0, strict=True)], ...], BeforeValidator(_many)]
 
 
-def _no_trip(value):
-    """None for false, which is how a TOML file says that there is none."""
+def _unless_false(value):
+    """Return None for false, as a TOML file writes it, else the value."""
     return None if value is False else value
 
 
 # of rated rotor speed; false: none
-Trip = Annotated[Annotated[float, Field(gt=1.0, le=3.0, strict=True)] | None, BeforeValidator(_no_trip)]
+Trip = Annotated[Annotated[float, Field(gt=1.0, le=3.0, strict=True)] | None, BeforeValidator(_unless_false)]
 
 
 def _checked_protection(value):
-    """What simulate takes as protection, if it can be read; None for false."""
-    if value is False or value is None:
+    """Return the protection of a case, once it is read without an error; None for false."""
+    if _unless_false(value) is None:
         return None
     read_protection(value, Protection())
     return value
@@ -160,22 +155,22 @@ class CaseEntry(Record):
     duration: Positive | None = None
     skip: NonNegative | None = None
     shift: PlantPerturbation | None = None
-    trip: Trip = None  # where it is given; else the suite's
-    protection: Protected = None  # likewise
+    trip: Trip = None  # default: the suite's
+    protection: Protected = None  # default: the suite's
     source: str = ""
     sensors: str | None = None
     displaced: dict[str, float] | None = None  # from the trim, in place of initial on another platform
 
 
 class Site(Record):
-    """How often winds blow at a place: the Weibull distribution of ten-minute means at hub height."""
+    """Wind climate of a site: the Weibull distribution of ten-minute means at hub height."""
 
     A: Positive  # m/s, scale
     k: Positive  # shape
     source: str
 
     def below(self, speed):
-        """Share of the time with a mean wind below a speed, m/s."""
+        """Return the share of the time with a mean wind below a speed, m/s."""
         return 1.0 - exp(-((max(speed, 0.0) / self.A) ** self.k))
 
 
@@ -198,7 +193,7 @@ class Score(Record):
 
 
 class Limits(Record):
-    """What a controller must not exceed; beyond one it ranks below those within all of them.
+    """Limits of metrics; a controller that exceeds one ranks below those that exceed none.
 
     run: {metric: greatest value in any run}. lifetime: {metric: greatest mean over the lifetime}. relative:
     {metric: greatest ratio of its mean over the lifetime to that of the reference on the same runs}.
@@ -222,9 +217,7 @@ class SuiteFile(Record):
     duration: Positive
     skip: NonNegative = 0.0
     platform: str = "oc3_hywind"
-    turbine: str | None = (
-        None  # whose winds and limits the file has: they are scaled to that of another platform
-    )
+    turbine: str | None = None  # of the file's winds and limits, which are scaled to other turbines
     options: dict[str, Any] = {"fidelity": "standard"}
     left_out: str = ""
     case: tuple[CaseEntry, ...]
@@ -238,7 +231,7 @@ class SuiteFile(Record):
 
 @dataclass(frozen=True)
 class Suite:
-    """Cases with the settings under which they are run and compared."""
+    """Cases with the settings of their runs and comparison."""
 
     name: str
     version: int
@@ -254,23 +247,23 @@ class Suite:
     site: Site | None = None
     limits: Limits = Limits()
     weights: dict = field(default_factory=dict)  # {case: share of the lifetime}; {}: every case alike
-    drawn: dict | None = None  # the hash that its seeds come from, and how (seeds.py); None: they are listed
+    drawn: dict | None = None  # hash and rule of drawn seeds (seeds.py); None: listed ones
 
     @property
     def reference(self):
-        """Name of the controller whose runs its score and relative limits are over; None: it has none."""
+        """Name of the controller of the reference runs of score and relative limits; None: none."""
         if self.score is not None:
             return self.score.baseline
         return self.limits.baseline if self.limits.relative else None
 
 
 def lifetime_weights(cases, site):
-    """{name: share of the lifetime} of Cases by their mean wind speeds; {} without a Site.
+    """Return {name: share of the lifetime} of Cases by their mean wind speeds; {} without a Site.
 
-    The winds of the cases stand for bins that meet half-way between them; the outer bins reach as far out as
-    in. A bin's share is its probability over that of all bins; cases of one wind share it alike. A parked
-    turbine and a case without a mean wind speed have no share.
-    Raises: InputError where only one wind or none is left, which makes no bins.
+    The winds of the cases are bins that meet half-way between them; the outer bins are symmetric. A bin's
+    share is its probability over that of all bins, and cases of one wind share it equally. A parked turbine
+    and a case without a mean wind speed have share 0.
+    Raises: InputError for fewer than two winds.
     """
     if site is None:
         return {}
@@ -290,15 +283,15 @@ def lifetime_weights(cases, site):
 
 
 def suite_names():
-    """Names of the built-in suites, sorted."""
+    """Return the names of the built-in suites, sorted."""
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 def read_suite(name_or_path, platform=None):
-    """Suite of a built-in name or of a user's TOML file.
+    """Return the Suite of a built-in name or of a user's TOML file; a Suite as it is.
 
-    platform: a name or a path, on which its cases run in place of the file's, scaled to its turbine
-    (training/evaluation/scaling.py); None: that of the file. A Suite stays as it is.
+    platform: a name or a path that replaces the file's, with cases scaled to its turbine
+    (training/evaluation/scaling.py); None: that of the file.
     Raises: InputError for an unknown name (with a suggestion), and with one line per wrong entry.
     """
     if isinstance(name_or_path, Suite):
@@ -318,7 +311,7 @@ def _built_in(name, platform):
 
 
 def _read(path, platform=None):
-    """Suite of a file, for a platform in place of its own."""
+    """Return the Suite of a file, scaled to a platform if one is named."""
     where = f"suite file {str(path)!r}"
     file, problems = validate(SuiteFile, read_toml(path, "suite"))
     raise_problems(where, problems)
@@ -338,8 +331,8 @@ def _read(path, platform=None):
         problems.append("case is missing: at least one [[case]] is needed")
     problems += _metric_problems(file)
     if file.score is not None and file.limits.relative and file.limits.baseline != file.score.baseline:
-        own, other = file.limits.baseline, file.score.baseline
-        problems.append(f"limits.baseline = {own!r}: must be that of the score, {other!r}")
+        names = file.limits.baseline, file.score.baseline
+        problems.append("limits.baseline = {!r}: must be that of the score, {!r}".format(*names))
     for case in cases:
         duration, skip = case.duration or file.duration, file.skip if case.skip is None else case.skip
         if not duration > skip:
@@ -365,7 +358,7 @@ def _read(path, platform=None):
 
 
 def _metric_problems(file):
-    """One line per metric of a file's score and limits that there is not."""
+    """Return one line per unknown metric of a file's score and limits."""
     score, named = file.score, {"limits": [*file.limits.run, *file.limits.lifetime, *file.limits.relative]}
     if score is not None:
         named["score"] = [term.metric for term in score.term] + ([score.power] if score.power else [])
@@ -378,7 +371,7 @@ def _metric_problems(file):
 
 
 def _spread(entry, file, folder):
-    """Cases of a CaseEntry: one, or one per speed. Raises: InputError."""
+    """Return the Cases of a CaseEntry: one, or one per speed. Raises: InputError."""
     if entry.speed is None:
         return [_case(entry, None, file, folder)]
     if "{speed}" not in entry.name and len(entry.speed) > 1:
@@ -387,7 +380,7 @@ def _spread(entry, file, folder):
 
 
 def _case(entry, speed, file, folder):
-    """Case of a CaseEntry at a mean wind speed (None: it has none to fill in)."""
+    """Return the Case of a CaseEntry at a mean wind speed (None: none to fill in)."""
     label = "" if speed is None else f"{speed:g}".replace(".", "_")
     if entry.parked and entry.fault is not None:
         raise InputError("parked: a parked turbine has no controller that a fault could act on")
@@ -399,35 +392,31 @@ def _case(entry, speed, file, folder):
         raise InputError("shift: a case with one takes the turbine of its platform, not that of an option")
     if entry.platform is not None or file.platform != "oc3_hywind":
         read_platform(entry.platform or file.platform)
+    same = ("fault", "parked", "initial", "seeds", "duration", "skip", "shift", "source")
+    stops = {
+        key: getattr(entry if key in entry.model_fields_set else file, key) for key in ("trip", "protection")
+    }
     return Case(
         entry.name.replace("{speed}", label),
         _wind(entry.wind, speed, folder),
         _sea(entry.sea, speed, file),
         entry.platform or file.platform,
         options,
-        entry.fault,
-        entry.parked,
-        entry.initial,
-        entry.seeds,
-        entry.duration,
-        entry.skip,
-        entry.shift,
-        entry.trip if "trip" in entry.model_fields_set else file.trip,
-        check_sensors(file.sensors if entry.sensors is None else entry.sensors),
-        entry.displaced if entry.initial is None else None,
-        entry.protection if "protection" in entry.model_fields_set else file.protection,
-        entry.source,
+        sensors=check_sensors(file.sensors if entry.sensors is None else entry.sensors),
+        displaced=entry.displaced if entry.initial is None else None,
+        **stops,
+        **{key: getattr(entry, key) for key in same},
     )
 
 
 def check_sensors(name):
-    """Name of a built-in sensor chain, or "exact", if there is one. Raises: InputError."""
+    """Return the name of a built-in sensor chain or "exact". Raises: InputError for another name."""
     sensor_chain(name)
     return name
 
 
 def _wind(spec, speed, folder):
-    """The wind of a case, checked. Raises: InputError."""
+    """Return the wind of a case, checked. Raises: InputError."""
     if spec is None:
         if speed is not None:
             raise InputError("wind is missing: speed has nothing to fill")
@@ -441,7 +430,7 @@ def _wind(spec, speed, folder):
     spec = dict(spec)
     if speed is not None:
         if "speed" in spec:
-            raise InputError("speed: given twice, for the case and in its wind")
+            raise InputError("speed: set twice, for the case and in its wind")
         spec["speed"] = float(speed)
     if not is_field(spec):
         read_wind(spec)
@@ -453,7 +442,7 @@ def _wind(spec, speed, folder):
 
 
 def _sea(spec, speed, file):
-    """The sea of a case, checked; that of a scaled wind is within its table. Raises: InputError."""
+    """Return the sea of a case, checked; a scaled wind is limited to its table. Raises: InputError."""
     if isinstance(spec, dict) and "table" in spec:
         at = spec.get("speed", speed)
         extra = set(spec) - {"table", "speed"}
@@ -469,7 +458,7 @@ def _sea(spec, speed, file):
 
 
 def all_cases(platform=None):
-    """{name: Case} of the built-in suites; a name that several hold means the same in each."""
+    """Return {name: Case} of the built-in suites; a name means the same case in each."""
     cases = {}
     for suite in suite_names():
         for case in read_suite(suite, platform).cases:
@@ -477,11 +466,30 @@ def all_cases(platform=None):
     return cases
 
 
+def chosen_cases(suite, cases, platform=None):
+    """Return the Suite or list of Cases for the names of a suite and of cases, either of which may be None.
+
+    platform: a name or a path to which they are scaled; None: that of the suite.
+    Raises: InputError for an unknown name, and for a case that is not in the suite.
+    """
+    if suite is None:
+        return named_cases("above_rated" if cases is None else cases, platform)
+    whole = read_suite(suite, platform)
+    if cases is None:
+        return whole
+    known = {case.name: case for case in whole.cases}
+    names = [name.strip() for name in cases.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise unknown(f"case of suite {whole.name!r}", name, known)
+    return replace(whole, cases=tuple(known[name] for name in dict.fromkeys(names)))
+
+
 def named_cases(names, platform=None):
-    """List of Cases for names of cases and suites, each once, in the order asked for.
+    """Return the list of Cases of some names of cases and suites, each once, in their order.
 
     names: a name, several separated by commas, or a sequence of names; a suite may be a path. platform: as
-    of read_suite.
+    in read_suite.
     Raises: InputError for an unknown name.
     """
     if isinstance(names, str):

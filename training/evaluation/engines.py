@@ -1,7 +1,6 @@
-"""Where the runs of an evaluation are done: here, in worker processes, or on a Ray cluster.
+"""Engines of an evaluation: this process, worker processes, or a Ray cluster.
 
-Every engine yields (index, what the function returns) as runs end, in any order; the function is the same
-for all, so are its bits.
+Every engine yields (index, outcome of the function) as tasks end, in any order, with identical bits.
 """
 
 import itertools
@@ -31,18 +30,18 @@ from fowt_env.training.evaluation.guard import (
 ENGINES = ("processes", "ray")
 NICENESS = "RAY_worker_niceness"  # environment variable that sets the niceness of Ray's workers
 WINDOW = 4  # Ray tasks handed out per processor
-ATTEMPTS = 3  # tries of one run before a worker that dies on it is taken as its own doing
+ATTEMPTS = 3  # workers that die on a task before the task is given up
 PATIENCE = 10.0  # s that a worker has to end after its last task
 NO_WORKERS = (
     f"worker processes died {ATTEMPTS} times (out of memory, killed, or started by a program without"
     " `if __name__ == '__main__':`); {} runs are left: the same command continues with them"
 )
 LONGEST_REASON = 200  # characters of what Ray says
-DONE, RAISED, UNREADABLE = "done", "raised", "unreadable"  # what an answer of a worker is
+DONE, RAISED, UNREADABLE = "done", "raised", "unreadable"  # kinds of a worker's answers
 
 
 class WorkersLost(RuntimeError):
-    """Worker processes that cannot be started; what was done before is kept."""
+    """Worker processes that cannot be started; finished tasks are kept."""
 
 
 def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=None, lost=None):
@@ -50,10 +49,10 @@ def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=No
 
     engine   "processes": this process for jobs = 1, else that many spawned ones; "ray": a Ray cluster
              at the address, or a local one of `jobs` workers
-    limit    seconds that a task should take at most: a worker that dies later on it is not tried again
+    limit    time limit of a task, s: after a worker's death later than this the task is not tried again
     lost     lost(task, reason) is the outcome of a task on which workers die; None: RuntimeError
     Raises: InputError for an unknown engine, jobs < 1, tasks that cannot be sent, or a Ray that does not
-    start; WorkersLost where workers cannot be started.
+    start; WorkersLost if workers cannot be started.
     """
     if engine not in ENGINES:
         raise unknown("engine", engine, ENGINES)
@@ -80,7 +79,7 @@ def _raise_lost(task, reason):
 
 
 def _sendable(tasks, jobs):
-    """Pickles of the tasks. Raises: InputError."""
+    """Return the pickled tasks. Raises: InputError."""
     packed, error = attempt(lambda: [pickle.dumps(task) for task in tasks])
     if error is not None:
         raise InputError(
@@ -91,7 +90,7 @@ def _sendable(tasks, jobs):
 
 
 def _processes(function, tasks, indices, jobs, limit, lost):
-    """Yield outcomes from worker processes; one that dies costs its own task another try."""
+    """Yield outcomes from worker processes; after a worker's death its task is tried again."""
     packed = _sendable(tasks, jobs)
     queue, workers, unborn = _Queue(indices), [], 0
     try:
@@ -130,24 +129,24 @@ def _processes(function, tasks, indices, jobs, limit, lost):
 
 
 class _Queue:
-    """Indices of the tasks that no worker has, and how often workers died on each."""
+    """Indices of the waiting tasks, and how often workers died on each."""
 
     def __init__(self, indices):
         self.waiting, self.alone, self.deaths = deque(indices), deque(), Counter()
 
     @property
     def left(self):
-        """How many there are."""
+        """Number of waiting tasks."""
         return len(self.waiting) + len(self.alone)
 
     def next(self, busy):
-        """The next one, or None. The last try of a task waits until no other worker is busy."""
+        """Return the next index, or None. The last try of a task waits until no other worker is busy."""
         if self.waiting:
             return self.waiting.popleft()
         return self.alone.popleft() if self.alone and not busy else None
 
     def reason(self, index, code, seconds, limit):
-        """Why a task (None: there was none) failed on which a worker died; None where it is tried again."""
+        """Return why a task is lost on which a worker died; None if it is tried again, or without a task."""
         if index is None:
             return None
         if limit is not None and code == LIMIT_CODE and seconds >= limit + GRACE:
@@ -161,7 +160,7 @@ class _Queue:
 
 
 def _heard(workers):
-    """Workers that have answered or ended, once there are any."""
+    """Wait until workers have answered or ended, and return these."""
     handles = {handle: worker for worker in workers for handle in (worker.pipe, worker.process.sentinel)}
     return {handles[handle]: None for handle in connection.wait(list(handles))}
 
@@ -183,21 +182,21 @@ class _Worker:
         return self.index is not None
 
     def give(self, index, packed):
-        """Send it a task (None: none); where it has died meanwhile, its end will be heard."""
+        """Send the worker a task (None: none); `_heard` finds out if it has died."""
         self.index, self.began = index, time.monotonic()
         if index is not None:
             with suppress(OSError):
                 self.pipe.send_bytes(packed[index])
 
     def answer(self):
-        """Bytes that it has sent, or None if it has ended."""
+        """Return the bytes that it has sent, or None if it has ended."""
         try:
             return self.pipe.recv_bytes() if self.pipe.poll() else None
         except (EOFError, OSError):
             return None
 
     def end(self, patience=1.0):
-        """Exit code of its process, which is killed if it does not end by itself."""
+        """Return the exit code of its process, which is killed after `patience` seconds."""
         self.process.join(patience)
         if self.process.is_alive():
             self.process.kill()
@@ -206,7 +205,7 @@ class _Worker:
 
 
 def _work(pipe, parent, function):
-    """Do tasks as they come, until the pipe is closed."""
+    """Do tasks from a pipe until it is closed."""
     _start_worker(parent)
     pipe.send_bytes(b"ready")
     while True:
@@ -218,7 +217,7 @@ def _work(pipe, parent, function):
 
 
 def _answer(function, packed):
-    """Pickle of what came of a pickled task: (DONE, outcome), (RAISED, exception) or (UNREADABLE, reason)."""
+    """Return the pickled (DONE, outcome), (RAISED, exception) or (UNREADABLE, reason) of a pickled task."""
     task, error = attempt(lambda: pickle.loads(packed))
     if error is not None:
         return pickle.dumps((UNREADABLE, f"cannot be sent to a worker process: {reason_of(error)}"))
@@ -233,7 +232,7 @@ def _answer(function, packed):
 
 
 def _outcome(answer, task, lost):
-    """Outcome of a task whose _answer this is. Raises: what the function raised."""
+    """Return the outcome of a task from its _answer. Raises: the exception of the function."""
     kind, value = pickle.loads(answer)
     if kind == RAISED:
         raise value
@@ -241,37 +240,34 @@ def _outcome(answer, task, lost):
 
 
 def _start_worker(parent):
-    """Leave Ctrl-C to the parent, which alone decides what is saved, and do not outlive it."""
+    """Leave Ctrl-C to the parent process, and end when it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     as_worker()
 
     def watch():
         while os.getppid() == parent:
             time.sleep(0.5)
-        os._exit(1)  # a killed parent leaves its workers waiting for ever
+        os._exit(1)  # else the workers of a killed parent wait forever
 
     threading.Thread(target=watch, daemon=True).start()
 
 
 @contextmanager
 def session(engine, jobs=1, address=None):
-    """Context that stays connected to Ray, so that several evaluations inside share its warm workers.
+    """Stay connected to Ray during a block, so that its evaluations share warm workers.
 
-    Does nothing for other engines, nor where this process is connected already.
-    Raises: InputError where Ray is not installed, does not start or cannot be reached.
+    Does nothing for other engines, or if this process is connected already.
+    Raises: InputError if Ray is not installed, does not start or cannot be reached.
     """
-    if engine != "ray":
-        yield
-        return
-    ray = _ray_module()
-    if ray.is_initialized():
+    ray = _ray_module() if engine == "ray" else None
+    if ray is None or ray.is_initialized():
         yield
         return
     if address:
         options = {"address": address}
     else:
         options = {"num_cpus": jobs, "include_dashboard": False}
-        if NICENESS not in os.environ:  # Ray's own choice, 15, waits for whatever else the machine does
+        if NICENESS not in os.environ:  # Ray's default, 15, yields to any other process
             options["_system_config"] = {"worker_niceness": 0}
     _start(ray, options)
     try:
@@ -281,11 +277,11 @@ def session(engine, jobs=1, address=None):
 
 
 def _start(ray, options):
-    """Connect to Ray. Raises: InputError in one line, whatever Ray raises and says."""
+    """Connect to Ray. Raises: InputError in one line for any error of Ray."""
     try:
         ray.init(log_to_driver=False, logging_level="error", **options)
     except Exception as error:
-        attempt(ray.shutdown)  # of what has been started of it
+        attempt(ray.shutdown)  # a part of it may have started
         what = f"no cluster at {options['address']!r}" if "address" in options else "Ray does not start"
         reason = " ".join(str(error).split())[:LONGEST_REASON]
         raise InputError(
@@ -294,7 +290,7 @@ def _start(ray, options):
 
 
 def _ray_module():
-    """Ray. Raises: InputError where it is not installed."""
+    """Return the module of Ray. Raises: InputError if it is not installed."""
     try:
         import ray
     except ImportError:
@@ -303,13 +299,13 @@ def _ray_module():
 
 
 def _answer_of_ray(function, packed):
-    """_answer of a pickled task: Ray's own way of sending would leave its arrays read-only."""
+    """Return _answer of a pickled task, pickled here since arrays that Ray sends are read-only."""
     as_worker()
     return _answer(function, packed)
 
 
 def _ray(function, tasks, jobs, address, lost):
-    """Yield outcomes of Ray tasks; Ray itself tries a task again whose worker dies."""
+    """Yield outcomes of Ray tasks; Ray repeats a task whose worker dies."""
     ray = _ray_module()
     _sendable(tasks, jobs)
     deaths = (ray.exceptions.WorkerCrashedError, ray.exceptions.OutOfMemoryError)

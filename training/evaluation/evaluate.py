@@ -1,31 +1,27 @@
-"""Any controllers on any cases, measured alike: one table of metrics.
+"""Evaluate controllers on load cases: one table of metrics.
 
     from fowt_env.training.evaluation.evaluate import evaluate
     table = evaluate(["pi", "pi_land"], "above_rated", seeds=(1, 2), jobs=2)
 
-Every controller meets the same wind and waves: a (case, seed) is one realisation. A run that fails
-is a row with its reason, and the others go on. With jobs > 1 a script needs the usual
-`if __name__ == "__main__":` guard, since worker processes import it.
+Every controller meets the same wind and waves: a (case, seed) is one realisation. A failed run is a row with
+its reason and does not affect the others. With jobs > 1 a script needs the usual `if __name__ == "__main__":`
+guard, since worker processes import it.
 """
 
-import csv
-import io
 import socket
 import warnings
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pandas as pd
-import pyarrow.parquet as pq
 
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import check_number, check_whole_number, plain_number
 from fowt_env.errors import InputError, PlantWarning, level_outside
-from fowt_env.files.atomic import replacing
-from fowt_env.files.tables import write_table
+from fowt_env.files.tables import table_path, write_table
 from fowt_env.training.evaluation.cases import Case, Suite, check_sensors, described, named_cases
 from fowt_env.training.evaluation.engines import outcomes
 from fowt_env.training.evaluation.failures import KINDS, known_figures, lost_counts, with_lost_power
@@ -33,7 +29,7 @@ from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
 from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
-from fowt_env.training.evaluation.results import check_name, open_results, parquet_of, run_file, write_run
+from fowt_env.training.evaluation.results import check_name, open_results, run_content, run_file, write_run
 from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import (
     COLUMNS,
@@ -49,7 +45,7 @@ __all__ = [
     "COLUMNS", "SHORTEST_CASE_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary",
 ]  # fmt: skip
 
-DURATION, SKIP, SEEDS = 660.0, 60.0, (1,)  # where neither the caller nor a suite says otherwise
+DURATION, SKIP, SEEDS = 660.0, 60.0, (1,)  # defaults where neither the caller nor a suite sets them
 LARGEST_RUN_SEED = 2**63 - 1  # of a column of whole numbers
 # s of wall clock: a run of eleven minutes takes 0.05 s with compiled laws and some minutes with slow Python
 TIME_LIMIT = 3600.0
@@ -74,48 +70,46 @@ def evaluate(
     reference=True,
     **options,
 ):
-    """DataFrame with one row per controller, case and seed, and the columns COLUMNS.
+    """Return a DataFrame with one row per controller, case and seed, and the columns COLUMNS.
 
     controllers   names (a sequence, or one string with commas), or {label: name or controller object}
     cases         a Suite (training.evaluation.cases.read_suite), Cases, or names of cases and suites
-    duration      length of each run, s, of which the first `skip` seconds are not scored. None: those of the
+    duration      length of each run, s; skip: seconds at its start that are not scored. None: those of the
                   case, else of the Suite, else 660 and 60
     seeds         one realisation of wind and waves each, the same for all controllers. None: as above, else 1
     jobs          worker processes
     progress      called as progress(done, total, row) after each run (row None: before the first)
-    out           CSV file: a row is appended as soon as its run ends; sorted at the end
+    out           CSV file: a row is appended when its run ends; sorted at the end
     runs_folder   folder for the time series, <controller>/<case>_seed<n>.parquet
-    folder        results folder (results.py) instead of out and runs_folder: what is done in it is not
-                  done again, and the table is that of the whole folder
+    folder        results folder (results.py) instead of out and runs_folder: finished runs are not repeated,
+                  and the returned table is that of the whole folder
     engine        "processes" or "ray" (address: of a running cluster)
-    time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it is heard in the
-                  main thread alone, and not by C code that never returns; with more, the worker is ended
-    sensors       name of the sensor chain of all cases, "exact" for none; None: each case's own
-    retry_failed  whether failed runs of a results folder are done again, also with changed code
-    reference     whose runs are the reference of scores and limits: the name of a controller, True for that
-                  of the Suite (none without a score or relative limits), False for none. They are done as
-                  rows of the name "reference", without trip and protection, so that they have figures
+    time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it works in the
+                  main thread only, and not in C code that never returns; with more, the worker is ended
+    sensors       name of the sensor chain of all cases, "exact" for none; None: that of each case
+    retry_failed  whether failed runs of a results folder are repeated, also with changed code
+    reference     controller whose runs are the reference of scores and limits: a name, True for that of the
+                  Suite (none without a score or relative limits), False for none. Its rows have the name
+                  "reference"; they have no trip and no protection, so that they have metrics
     options       further options of simulate: dt, control_dt, output_dt, start, preview
-    A run that the protection ended (the case's trip) has status "tripped", the reason, and metrics of what it
-    was; one with less than half of the energy of the reference "lost power" (failures.with_lost_power).
-    Failed runs have status "failed", the reason, and NaN metrics; so have those of a controller that cannot
-    be prepared, as where its library is missing, that calls sys.exit, or whose worker process dies three
-    times.
-    Column events: rare numerical events of the run and how often each came; warning: of commands that can
-    hardly be in N m and rad, which is also given (PlantWarning) once per controller. A parked turbine has no
+    Status of a row: "tripped" if the protection ended the run (the metrics are those until then), "lost
+    power" with less than half of the reference's energy (failures.with_lost_power), "failed" with a reason
+    and NaN metrics, also for a controller that cannot be prepared, calls sys.exit, or whose worker process
+    dies three times. Column events: rare numerical events and their counts; warning: commands that are
+    hardly in N m and rad, also warned of (PlantWarning) once per controller. A parked turbine has no
     controller: such a case is run once, under the name "parked".
     Raises: InputError for settings that no run could use.
     """
     if folder is not None:
         if out is not None or runs_folder is not None:
-            raise InputError("folder: holds the table and the runs, so out and runs_folder must be None")
+            raise InputError("folder: contains the table and the runs, so out and runs_folder must be None")
         runs_folder = Path(folder) / "runs"
     controllers = _labelled(controllers)
     suite = cases if isinstance(cases, Suite) else None
     if reference is True:
         reference = suite.reference if suite is not None else None
     if reference:
-        controllers = {REFERENCE: reference, **controllers}  # first, so that an interrupted one has it
+        controllers = {REFERENCE: reference, **controllers}  # first: an interrupted evaluation needs it
     given = (duration, skip, seeds, runs_folder, time_limit)
     runs = _plan(controllers, _sensed(_case_list(cases), sensors), suite, *given, options)
     _check_controllers(controllers, runs)
@@ -127,8 +121,8 @@ def evaluate(
             table = results.table()
         _warn(table, controllers)
         return table
-    with _RowFile(out) as row_file:
-        rows = _go(runs, len(runs), jobs, progress, engine, address, row_file.append)
+    with _growing_table(out) as append:
+        rows = _go(runs, len(runs), jobs, progress, engine, address, append)
     table = pd.DataFrame([rows[run.key] for run in runs], columns=list(COLUMNS))
     table = with_lost_power(table, {run.case.name for run in runs if run.case.fault is not None})
     _warn(table, controllers)
@@ -138,7 +132,7 @@ def evaluate(
 
 
 def _warn(table, controllers):
-    """Warn (PlantWarning) once of each of the controllers whose runs were warned of."""
+    """Warn (PlantWarning) once of each controller whose rows have a warning."""
     warned = table[(table["warning"] != "") & table["controller"].isin(list(controllers))]
     for text in warned.groupby("controller", sort=False)["warning"].first():
         warnings.warn(text, PlantWarning, stacklevel=level_outside())
@@ -147,45 +141,66 @@ def _warn(table, controllers):
 def planned(
     controllers, cases, duration=None, skip=None, seeds=None, runs_folder=None, sensors=None, **options
 ):
-    """List of the Runs that evaluate would make of these arguments, for score."""
+    """Return the list of Runs of an evaluation with these arguments, for `score`."""
     suite = cases if isinstance(cases, Suite) else None
     given = (duration, skip, seeds, runs_folder, TIME_LIMIT)
     return _plan(_labelled(controllers), _sensed(_case_list(cases), sensors), suite, *given, options)
 
 
 def _go(runs, total, jobs, progress, engine, address, keep):
-    """{run key: row} of the runs; keep(row) and progress are called as each ends."""
+    """Return {run key: row} of the runs; keep(row) and progress are called when each ends."""
     report = progress or (lambda done, total, row: None)
     before = total - len(runs)
     report(before, total, None)
     rows = {}
-    collect = engine == "ray"  # workers may be on machines that do not share this one's disk
-    here = versions()
-    function, lost = (partial(score_and_send, here=here), _lost_and_sent) if collect else (score, _lost)
+    function = partial(score, here=versions()) if engine == "ray" else score
     limit = runs[0].time_limit if runs else None
-    with closing(outcomes(function, runs, jobs, engine, address, limit, lost)) as ended:
+    with closing(outcomes(function, runs, jobs, engine, address, limit, _lost)) as ended:
         for index, outcome in ended:
-            row, content = outcome if collect else (outcome, None)
-            if content is not None:
-                with replacing(runs[index].frame_path) as temporary:
-                    temporary.write_bytes(content)
+            row = stored(runs[index], outcome)
             rows[runs[index].key] = row
             keep(row)
             report(before + len(rows), total, row)
     return rows
 
 
+def score(run, here=None):
+    """Return (row {column: value}, content of the run's file or None) of a run, which may have failed.
+
+    here: versions of packages where the rows are collected, if this is another machine.
+    Raises: InputError if this machine has other versions, with other results.
+    """
+    if here is not None and (gap := version_gap(here, versions())):
+        raise InputError(f"engine = 'ray': {gap[0]} here and {gap[1]} at the worker {socket.gethostname()}")
+    row, frame = scored(run)
+    return row, None if run.frame_path is None else run_content(frame, row)
+
+
+def _lost(run, reason):
+    """Return what `score` would return of a run whose worker ended."""
+    row = lost_row(run, reason)
+    return row, None if run.frame_path is None else run_content(None, row)
+
+
+def stored(run, outcome):
+    """Return the row of an outcome of `score`, once the run's file is written, whole or not at all."""
+    row, content = outcome
+    if content is not None:
+        write_run(content, run.frame_path)
+    return row
+
+
 def _labelled(controllers):
-    """{label: controller} of what evaluate takes."""
+    """Return {label: controller} of the argument of evaluate."""
     if isinstance(controllers, str):
         controllers = [name.strip() for name in controllers.split(",") if name.strip()]
     if not isinstance(controllers, dict):
         labelled = {}
-        for given in controllers:
-            name = given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
-            if name in labelled and not isinstance(given, str):
-                raise InputError(f"controllers: two have the name {name!r}: give {{name: controller}}")
-            labelled[name] = given
+        for each in controllers:
+            name = each if isinstance(each, str) else getattr(each, "__name__", type(each).__name__)
+            if name in labelled and not isinstance(each, str):
+                raise InputError(f"controllers: two have the name {name!r}: pass {{name: controller}}")
+            labelled[name] = each
         controllers = labelled
     for label in controllers:
         check_name("controllers: the name", label)
@@ -196,7 +211,7 @@ def _labelled(controllers):
 
 
 def _case_list(cases):
-    """List of Cases of what evaluate takes."""
+    """Return the list of Cases of the argument of evaluate."""
     if isinstance(cases, Suite):
         return list(cases.cases)
     if isinstance(cases, Case):
@@ -209,25 +224,21 @@ def _case_list(cases):
 
 
 def _sensed(cases, sensors):
-    """The Cases, with other sensors where they are named. Raises: InputError."""
+    """Return the Cases with the named sensor chain (None: as they are). Raises: InputError."""
     return cases if sensors is None else [replace(case, sensors=check_sensors(sensors)) for case in cases]
 
 
 def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_limit, options):
-    """The Runs of an evaluation, case by case, so that an interrupted one compares what it has."""
+    """Return the Runs of an evaluation, case by case, so that an interrupted one has comparable runs."""
     if seeds is not None:
         seeds = [_seed(seed) for seed in seeds]
     if time_limit is not None:
         allowed = "a positive number of seconds, or None"
         time_limit = check_number("time_limit", time_limit, 0.0, low_open=True, allowed=allowed)
     if runs_folder is not None:
-        runs_folder = Path(runs_folder).absolute()  # of here, wherever a controller or a worker goes
-    for what, given in (
-        ("controllers", controllers),
-        ("cases", cases),
-        ("seeds", (1,) if seeds is None else seeds),
-    ):
-        if not given:
+        runs_folder = Path(runs_folder).absolute()  # a controller or worker may change the working folder
+    for what, values in {"controllers": controllers, "cases": cases, "seeds": seeds}.items():
+        if values is not None and not values:
             raise InputError(f"{what}: at least one is needed")
     if len(set(seeds or ())) < len(seeds or ()) or len({case.name for case in cases}) < len(cases):
         raise InputError("seeds and names of cases must differ from each other")
@@ -242,26 +253,26 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
             raise InputError(
                 f"duration = {length:g} s: the fault of case {case.name!r} comes at {case.fault.time:g} s"
             )
-        # nothing is random in a case with its own single seed: more would be the same run again
+        # a case with a single seed has nothing random: further seeds would repeat the run
         chosen = case.seeds if case.seeds is not None and len(case.seeds) == 1 else None
         for seed in _first(chosen, seeds, case.seeds, suite and suite.seeds, SEEDS):
             for label, controller in ({PARKED: None} if case.parked else controllers).items():
                 path = None if runs_folder is None else run_file(runs_folder, label, case.name, seed)
                 weight = weights.get(case.name, float("nan"))
-                given = (label, controller, case, seed, length, start, dict(options), path, time_limit)
-                run = Run(*given, weight)
+                settings = (label, controller, case, seed, length, start, dict(options), path, time_limit)
+                run = Run(*settings, weight)
                 other = places.setdefault(str(path).casefold(), run)
                 if path is not None and other is not run:
                     raise InputError(
                         f"controller {other.label!r} in case {other.case.name!r} and controller {label!r} in"
-                        f" case {case.name!r} would have one file, {path.name!r}: give one another name"
+                        f" case {case.name!r} would have one file, {path.name!r}: rename one"
                     )
                 runs.append(run)
     return runs
 
 
 def _seed(value):
-    """A seed as an int; a float that is whole counts as one. Raises: InputError."""
+    """Return a seed as an int, also of a float without a fraction. Raises: InputError."""
     value = plain_number(value)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
@@ -269,23 +280,23 @@ def _seed(value):
 
 
 def _first(*values):
-    """The first value that is not None."""
+    """Return the first value that is not None."""
     return next(value for value in values if value is not None)
 
 
 def _check_controllers(controllers, runs):
-    """Raises: InputError for a controller that cannot be made, before anything runs."""
+    """Make each controller once before anything runs. Raises: InputError if one cannot be made."""
     turbine = fowt_env.build_scene(runs[0].case.platform).turbine
     control_dt = runs[0].options.get("control_dt", CONTROL_DT)
     for controller in controllers.values():
-        _, error = attempt(lambda given=controller: make(given, turbine, control_dt), runs[0].time_limit)
+        _, error = attempt(lambda each=controller: make(each, turbine, control_dt), runs[0].time_limit)
         if isinstance(error, InputError):
             raise error
-        # any other is a bug of the user's: its runs fail with the reason, the others go on
+        # any other error is a bug of that controller: its runs fail with the reason
 
 
 def _settings(controllers, runs, suite, options):
-    """What a results folder has to know about an evaluation."""
+    """Return the settings of an evaluation for its results folder."""
     cases, labels = {}, {}
     for run in runs:
         cases[run.case.name] = described(run.case) | {"duration": run.duration, "skip": run.skip}
@@ -312,84 +323,29 @@ def _settings(controllers, runs, suite, options):
     }
 
 
-def score(run):
-    """Row {column: value} of one run; a run that fails gives its reason instead of metrics."""
-    row, frame = scored(run)
-    if run.frame_path is not None:
-        write_run(frame, row, run.frame_path)
-    return row
+@contextmanager
+def _growing_table(path):
+    """Yield append(row), which adds a line to a CSV file as soon as a run ends (None: does nothing)."""
+    if path is None:
+        yield lambda row: None
+        return
+    path = table_path(path, (".csv",), "evaluation table")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        pd.DataFrame(columns=list(COLUMNS)).to_csv(file, index=False)
 
+        def append(row):
+            line = pd.DataFrame([row], columns=list(COLUMNS))
+            line.to_csv(file, header=False, index=False, float_format="%.10g")
+            file.flush()
 
-def score_and_send(run, here=None):
-    """(row, content of the run's file or None): score for a worker on another machine.
-
-    here: versions of the machine that collects the runs, or None.
-    Raises: InputError where this machine has others, which would not give the same bits.
-    """
-    if here is not None and (gap := version_gap(here, versions())):
-        raise InputError(f"engine = 'ray': {gap[0]} here and {gap[1]} at the worker {socket.gethostname()}")
-    return _sent(run, *scored(run))
-
-
-def _lost(run, reason):
-    """Row of a run whose worker ended, with its file."""
-    row = lost_row(run, reason)
-    if run.frame_path is not None:
-        write_run(None, row, run.frame_path)
-    return row
-
-
-def _lost_and_sent(run, reason):
-    """What score_and_send would return of a run whose worker ended."""
-    return _sent(run, lost_row(run, reason), None)
-
-
-def _sent(run, row, frame):
-    """(row, content of the run's file or None)."""
-    if run.frame_path is None:
-        return row, None
-    content = io.BytesIO()
-    pq.write_table(parquet_of(frame, row), content)
-    return row, content.getvalue()
-
-
-def _cell(value):
-    """Text of a table entry: NaN is empty, floats have 10 digits."""
-    if isinstance(value, float):
-        return "" if value != value else f"{value:.10g}"
-    return value
-
-
-class _RowFile:
-    """CSV file that grows by one complete line per finished run; does nothing without a path."""
-
-    def __init__(self, path):
-        self.path = None if path is None else Path(path)
-        if self.path is not None and self.path.suffix.lower() != ".csv":
-            raise InputError(f"evaluation table {str(path)!r}: must end with .csv")
-
-    def __enter__(self):
-        if self.path is not None:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.file = self.path.open("w", newline="", encoding="utf-8")
-            self.writer = csv.DictWriter(self.file, COLUMNS)
-            self.writer.writeheader()
-        return self
-
-    def append(self, row):
-        if self.path is not None:
-            self.writer.writerow({name: _cell(value) for name, value in row.items()})
-            self.file.flush()
-
-    def __exit__(self, *exception):
-        if self.path is not None:
-            self.file.close()
+        yield append
 
 
 def mean_ratios(table, over, columns):
-    """DataFrame by controller: mean over the runs of each column over what controller `over` has in the same.
+    """Return a DataFrame by controller: the mean over the runs of each column's ratio to that of `over`.
 
-    NaN where a run of either was lost.
+    NaN if a run of either was lost.
     """
     values = known_figures(table, columns).set_index(KEY)[list(columns)].sort_index()
     base, names = values.loc[over], dict.fromkeys(table["controller"])
@@ -397,9 +353,9 @@ def mean_ratios(table, over, columns):
 
 
 def summary(table):
-    """DataFrame by controller and case: runs, lost ones by kind, metrics' means over the seeds.
+    """Return a DataFrame by controller and case: runs, lost runs by kind, means of the metrics over seeds.
 
-    Means are over the runs that ended well, NaN where there is none.
+    Means are over the runs that ended well; NaN if there is none.
     """
     groups = known_figures(table[table["controller"] != REFERENCE]).groupby(
         ["controller", "case"], sort=False

@@ -1,8 +1,7 @@
-"""Lost runs: which they are, and what they count for in a score.
+"""Lost runs (failed, tripped, or with too little energy) and their penalties in a score.
 
-A run is lost that failed, that tripped, or that lost power: its turbine stood still, or nearly so. A lost run
-has no figure in tables and plots. A score may not leave it out, or giving up would pay; it counts PENALTY
-times the figures of the reference there, so that a score depends on nobody else's runs.
+A lost run has no metrics in tables and plots. In a score it counts PENALTY times the metrics of the reference
+in the same case and seed, so that giving up never pays and a score depends on no other controller.
 """
 
 import numpy as np
@@ -10,18 +9,17 @@ import numpy as np
 from fowt_env.training.evaluation.metrics import METRICS, better
 from fowt_env.training.evaluation.run_case import FAILED, LOST_POWER, OK, REFERENCE, TRIPPED
 
-BASELINES = ("gspi_oc3", "pi")  # whom others are compared with: the first of these that was evaluated
+BASELINES = ("gspi_oc3", "pi")  # default baseline: the first of these that was evaluated
 ENERGY = "energy_[kWh]"
 LEAST_ENERGY = 0.5  # of the reference's in the same case and seed, below which a run has lost power
-# Times the reference's figures that a lost run counts, so that giving up never pays: with it a lost run has a
-# score of 100 by itself. The worst of runs that just ended well, under limit cycles and commands that swing,
-# had 10 by themselves, up to 10 times the reference in each load, and 43 times its pitch travel.
+# A lost run alone has a score of PENALTY**2 = 100. The worst runs that just ended well, with limit cycles and
+# oscillating commands, had a score of 10, up to 10 times the reference's loads and 43 times its pitch travel.
 PENALTY = 10.0
 KINDS = {"failed": FAILED, "tripped": TRIPPED, "lost_power": LOST_POWER}  # count: status
 
 
 def lost_counts(statuses):
-    """{name of KINDS: how many of some runs were lost so}; an unknown status counts as failed."""
+    """Return {name of KINDS: count} of lost runs; an unknown status counts as failed."""
     statuses = np.asarray(statuses)
     counts = {name: int(np.sum(statuses == status)) for name, status in KINDS.items()}
     counts["failed"] += int(np.sum(~np.isin(statuses, (OK, *KINDS.values()))))
@@ -29,12 +27,12 @@ def lost_counts(statuses):
 
 
 def lost_text(counts):
-    """Text "1 failed, 2 tripped, 1 lost power" of lost_counts, "" for none; counts may have other keys."""
+    """Return "1 failed, 2 tripped, 1 lost power" of lost_counts, "" for none; other keys are ignored."""
     return ", ".join(f"{counts[name]} {name.replace('_', ' ')}" for name in KINDS if counts[name])
 
 
 def known_figures(table, metrics=METRICS):
-    """The table of an evaluation with NaN for the metrics of lost runs."""
+    """Return the table of an evaluation with NaN for the metrics of lost runs."""
     metrics = [name for name in metrics if name in table.columns]
     result = table.copy()
     result[metrics] = table[metrics].where(table["status"] == OK, axis=0)
@@ -42,9 +40,9 @@ def known_figures(table, metrics=METRICS):
 
 
 def penalties(figures, directions):
-    """What a lost run counts for: figures (..., metrics) of the reference, PENALTY times as bad.
+    """Return the metrics (..., metrics) of the reference, PENALTY times as bad.
 
-    directions (metrics,): -1 where less is better, 1 where more is, 0 where neither is: NaN there.
+    directions (metrics,): -1 if less is better, 1 if more is, 0 if neither is: NaN.
     """
     directions = np.asarray(directions)
     more = figures + (PENALTY - 1.0) * np.abs(figures)
@@ -53,10 +51,10 @@ def penalties(figures, directions):
 
 
 def penalised(table, base, metrics=METRICS):
-    """The table of an evaluation in which a lost run counts by the figures of the controller `base` there.
+    """Return the table of an evaluation with penalties for lost runs, from the metrics of `base`.
 
-    A lost run of `base` has no figure, nor has then that of another in the same case and seed. A run that
-    ended well without a figure that the one of `base` has counts as lost in it.
+    A lost run of `base` has NaN, and so has the lost run of another controller in that case and seed. A
+    metric that a run lacks and that of `base` has counts as lost, too.
     """
     metrics = [name for name in metrics if name in table.columns]
     result = known_figures(table, metrics)
@@ -72,11 +70,10 @@ def penalised(table, base, metrics=METRICS):
 
 
 def with_lost_power(table, faulty=()):
-    """The table of an evaluation, in which runs with too little energy have the status LOST_POWER.
+    """Return the table of an evaluation with the status LOST_POWER for runs with too little energy.
 
-    That is less than LEAST_ENERGY of what the reference has in the same case and seed; without one, of the
-    first of BASELINES that was evaluated. faulty: names of the cases with a fault, where it is the fault
-    that costs energy, and no run is judged.
+    That is less than LEAST_ENERGY of the reference's in the same case and seed; without a reference, of the
+    first of BASELINES that was evaluated. faulty: names of cases with a fault, in which no run is judged.
     """
     names = set(table["controller"])
     base = next((name for name in (REFERENCE, *BASELINES) if name in names), None)

@@ -1,4 +1,4 @@
-"""Other people's code, run so that it ends no more than its own run: exits, time limits, odd messages."""
+"""Isolation of a run from the code of its controller: exits, time limits, unprintable messages."""
 
 import faulthandler
 import os
@@ -10,38 +10,37 @@ from contextlib import contextmanager, suppress
 from fowt_env.errors import ControllerError, ControllerInputError, SimulationStopped
 
 LONGEST_REASON = 500  # characters
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # from outside: they end more than a run
-AGAIN = 1.0  # s until code that swallowed the time limit meets it again
-GRACE = 5.0  # s after the limit at which a worker ends that has not come back to Python
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # from outside: they end the evaluation
+AGAIN = 1.0  # s between repetitions of TimeLimit, for code that catches it
+GRACE = 5.0  # s after the limit at which a worker in C code is ended
 LIMIT_CODE = 1  # exit code of such a worker
 REASON_LIMIT = 5.0  # s that the making of a message may take
 
-_last_words = None  # in a worker: file for what faulthandler writes
+_last_words = None  # in a worker: file for the output of faulthandler
 
 
 class TimeLimit(KeyboardInterrupt):
     """A run that took too long.
 
-    No Exception, so that a controller does not catch it with its own errors; a KeyboardInterrupt, with which
-    simulate hands out the rows so far.
+    No Exception, so that a controller does not catch it with its own errors, but a KeyboardInterrupt, to
+    which simulate attaches the rows so far.
     """
 
 
 def as_worker():
-    """Let this process be ended where a run in it goes on for GRACE seconds after its limit."""
+    """Let faulthandler end this process if a run exceeds its limit by GRACE seconds."""
     global _last_words
     if _last_words is None:
         _last_words = open(os.devnull, "w")  # noqa: SIM115 (for as long as the process lives)
 
 
 def attempt(function, limit=None):
-    """(function(), None), or (None, what it raised), SystemExit and KeyboardInterrupt included.
+    """Return (function(), None), or (None, its exception), including SystemExit and KeyboardInterrupt.
 
-    limit: seconds of wall clock after which TimeLimit is raised in the function. Heard by the main thread
-    alone, and where Python runs: code of C that never returns is ended in a worker only, and the worker
-    with it. The working folder is afterwards what it was.
-    Raises: what the handler of a signal from outside raised meanwhile (Ctrl-C: KeyboardInterrupt), whatever
-    the function made of that.
+    limit: seconds of wall clock after which TimeLimit is raised in the function. It works in Python code of
+    the main thread; C code that never returns is ended in a worker only, with the worker. The working folder
+    is restored.
+    Raises: the exception of a handler of SIGNALS (Ctrl-C: KeyboardInterrupt), even if the function caught it.
     """
     folder = os.path.abspath(os.curdir)
     with _noted_signals() as raised:
@@ -50,7 +49,7 @@ def attempt(function, limit=None):
                 outcome = function(), None
         except BaseException as error:
             outcome = None, error
-        with suppress(OSError):  # one that the function has removed
+        with suppress(OSError):  # the function may have removed it
             os.chdir(folder)
     if raised:
         raise raised[0]
@@ -59,7 +58,7 @@ def attempt(function, limit=None):
 
 @contextmanager
 def _noted_signals():
-    """Yields a list, which gets what a handler of one of SIGNALS raises."""
+    """Yield a list of the exceptions that handlers of SIGNALS raise during the block."""
     raised, handlers = [], {}
     if threading.current_thread() is threading.main_thread():
         handlers = {number: signal.getsignal(number) for number in SIGNALS}
@@ -83,7 +82,7 @@ def _noted_signals():
 
 @contextmanager
 def _time_limit(seconds):
-    """Raise TimeLimit in the block after so many seconds, and again every AGAIN seconds; None: never."""
+    """Raise TimeLimit in the block after some seconds, and again every AGAIN seconds; None: never."""
     if seconds is None or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -93,11 +92,11 @@ def _time_limit(seconds):
         if armed:
             raise TimeLimit(time_limit_reason(seconds))
 
-    rest, period = signal.getitimer(signal.ITIMER_REAL)  # somebody else's alarm
+    rest, period = signal.getitimer(signal.ITIMER_REAL)  # an alarm of the program, restored below
     began = time.monotonic()
     handler = signal.signal(signal.SIGALRM, late)
     signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
-    if _last_words is not None:  # a thread without Python: it ends what holds the interpreter's lock, too
+    if _last_words is not None:  # its thread needs no Python, so it ends C code that holds the GIL
         faulthandler.dump_traceback_later(seconds + GRACE, exit=True, file=_last_words)
     try:
         try:
@@ -114,12 +113,12 @@ def _time_limit(seconds):
 
 
 def time_limit_reason(seconds):
-    """Why a run failed that took longer than so many seconds."""
+    """Return the reason of a run that took longer than some seconds."""
     return f"time limit: more than {seconds:g} s of wall clock"
 
 
 def reason_of(error):
-    """One printable line of at most LONGEST_REASON characters that says why a run failed."""
+    """Return the reason of a failed run, in a printable line of at most LONGEST_REASON characters."""
 
     def said():
         if isinstance(error, SimulationStopped):
@@ -136,7 +135,7 @@ def reason_of(error):
 
 
 def printable(text):
-    """A text in one line of at most LONGEST_REASON characters; what cannot be printed as its escape."""
+    """Return a text in one line of at most LONGEST_REASON characters, unprintable ones escaped."""
     words = " ".join(text[: 2 * LONGEST_REASON].split())
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in words)
     if len(line) > LONGEST_REASON or len(text) > 2 * LONGEST_REASON:

@@ -1,7 +1,7 @@
-"""Controllers compared on equal seeds: means with intervals, paired differences, and a suite's score.
+"""Comparison of controllers on equal seeds: means with intervals, paired differences, and a suite's score.
 
-Seeds are resampled, with all their cases (bootstrap.py). A mean is that of the lifetime: each case counts by
-its share of it, as the suite's site has its wind; without a site all count alike.
+Seeds are resampled with all their cases (bootstrap.py). Means are over the lifetime: cases are weighted by
+the wind climate of the suite's site, or equally without a site.
 """
 
 from typing import NamedTuple
@@ -19,26 +19,20 @@ from fowt_env.training.evaluation.bootstrap import (
     p_values,
     resample_weights,
 )
-from fowt_env.training.evaluation.failures import (
-    BASELINES,
-    PENALTY,
-    known_figures,
-    lost_counts,
-    penalties,
-)
+from fowt_env.training.evaluation.failures import BASELINES, PENALTY, known_figures, lost_counts, penalties
 from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
 from fowt_env.training.evaluation.results_table import case_shares
 from fowt_env.training.evaluation.run_case import OK, REFERENCE, TRIPPED
 
 POSITIVE = np.array([never_negative(name) for name in METRICS])
-SHOWN = {  # what a notebook shows of a leaderboard: {heading: metric}
+SHOWN = {  # columns of a leaderboard in a notebook: {heading: metric}
     "rotor-speed std (rpm)": "RotSpeed_std_[rpm]",
     "platform-pitch std (deg)": "PtfmPitch_std_[deg]",
     "blade-pitch travel (deg/s)": "blade_pitch_travel_[deg/s]",
     "tower-base DEL (kN m)": "TwrBsMyt_DEL_[kN-m]",
 }
-MOST_OF_BASELINE = 1e6  # larger differences, as multiples of the baseline's own value, get no percentage
+MOST_OF_BASELINE = 1e6  # a difference above this multiple of the baseline's value gets no percentage
 EXPONENTS = np.array([mean_exponent(name) for name in METRICS])
 METHOD = (
     "lifetime means: each case by its share of the lifetime, deviations by their squares, damage-equivalent"
@@ -51,10 +45,9 @@ METHOD = (
 
 
 def default_baseline(controllers, baseline=None, failed=()):
-    """Name of the controller that others are compared with; None: there is none.
+    """Return the name of the baseline, or None if there is none.
 
-    It is the one that is named; else the first of BASELINES, or of all, that is not in `failed` (those with
-    failed runs).
+    It is the named one; else the first of BASELINES, or of all, that is not in `failed` (with failed runs).
     Raises: InputError if it was not evaluated.
     """
     if baseline is not None:
@@ -66,10 +59,10 @@ def default_baseline(controllers, baseline=None, failed=()):
 
 
 class _Runs:
-    """The runs of a table by controller, case and seed; those of the reference aside.
+    """The runs of a table by controller, case and seed; those of the reference apart.
 
-    Everything that is made of a controller comes from its own runs, the reference's and those of whom it is
-    compared with, on its own cases and seeds: whoever else is in the table changes none of it.
+    The results of a controller depend on its runs, the reference's and the baseline's, on its cases and
+    seeds, and on no other controller of the table.
     """
 
     def __init__(self, table):
@@ -82,7 +75,7 @@ class _Runs:
         self.places = {key: number for number, key in enumerate(keys)}
 
     def part(self, name, base=None):
-        """_Part of a controller, beside another (None: none)."""
+        """Return the _Part of a controller, with the runs of a baseline (None: none)."""
         own = self.table[self.table["controller"] == name]
         cases, seeds = list(dict.fromkeys(own["case"])), sorted(set(own["seed"]))
         index = {
@@ -98,9 +91,9 @@ class _Runs:
 
 
 class _Part(NamedTuple):
-    """What is known of a controller over some cases; arrays (cases, seeds[, metrics]), shares (cases,).
+    """The runs of a controller over some cases; arrays (cases, seeds[, metrics]), shares (cases,).
 
-    values and base are NaN where a run was lost or not made.
+    values and base are NaN for a lost or missing run.
     """
 
     cases: list
@@ -112,30 +105,30 @@ class _Part(NamedTuple):
     shares: np.ndarray
 
     def case(self, number):
-        """The _Part of one of its cases."""
+        """Return the _Part of one of its cases."""
         chosen = slice(number, number + 1)
         parts = (each[chosen] for each in self[:-1])
         return _Part(*parts, np.ones(1))
 
     @property
     def lost(self):
-        """(cases, seeds) whether a run was made and lost."""
+        """Whether each run (cases, seeds) exists and was lost."""
         return self.runs & (self.statuses != OK)
 
     @property
     def nothing(self):
-        """Whether all runs of a case with a share were lost: there is then no mean over the lifetime."""
+        """Whether all runs of a case with a share were lost, so that there is no lifetime mean."""
         whole = self.runs.any(axis=1) & ~(self.runs & ~self.lost).any(axis=1)
         return bool((whole & (self.shares > 0.0)).any())
 
 
 def _means(values, weights, shares, chosen=slice(None)):
-    """lifetime_means of METRICS, or those chosen of them."""
+    """Return lifetime_means of METRICS, or of some of them."""
     return lifetime_means(values[..., chosen], weights, shares, EXPONENTS[chosen])
 
 
 def _figures(part, resampled):
-    """(estimate, low, high), each (metrics,), of the lifetime means of a _Part."""
+    """Return (estimate, low, high), each (metrics,), of the lifetime means of a _Part."""
     estimate = _means(part.values, np.ones((1, part.values.shape[1])), part.shares)[0]
     estimate[:] = np.nan if part.nothing else estimate
     seeds = int(np.isfinite(part.values).any(axis=(0, 2)).sum())
@@ -143,10 +136,10 @@ def _figures(part, resampled):
 
 
 def _differences(part, weights, own_resampled, tested):
-    """{"estimate", "low", "high", "percent", "pairs", "p"} of a _Part less its base, each (metrics,).
+    """Return {"estimate", "low", "high", "percent", "pairs", "p"} of a _Part less its base, each (metrics,).
 
-    own_resampled: resampled means of all its runs. tested: whether p is among them (NaN: too few seeds, or
-    lost runs: the others are then no fair sample).
+    own_resampled: resampled means of all its runs. tested: whether to add p (NaN with too few seeds or with
+    lost runs, since the others are a biased sample).
     """
     known = np.isfinite(part.values)
     there = known & np.isfinite(part.base)
@@ -159,7 +152,7 @@ def _differences(part, weights, own_resampled, tested):
     resampled = own_resampled - _means(pair[1], weights, part.shares)
     seeds = int(there.any(axis=(0, 2)).sum())
     low, high = interval(gap, resampled, seeds)
-    # a ratio to zero, or to what rounding left of zero, says nothing
+    # no ratio to zero or to a rounding error
     with np.errstate(all="ignore"):
         measured = np.abs(gap) < MOST_OF_BASELINE * np.abs(theirs)
         percent = 100.0 * np.divide(gap, np.abs(theirs), out=np.full_like(gap, np.nan), where=measured)
@@ -172,7 +165,7 @@ def _differences(part, weights, own_resampled, tested):
 
 
 def _seed_range(part):
-    """(least, greatest), each (metrics,), over the seeds with every case of the lifetime mean."""
+    """Return (least, greatest), each (metrics,), over the seeds with every case of the lifetime mean."""
     used = np.isfinite(part.values).any(axis=(1, 2)) & (part.shares > 0.0)
     values = part.values[used]
     alone = np.eye(values.shape[1])
@@ -183,7 +176,7 @@ def _seed_range(part):
 
 
 def _named(estimate, low, high, **more):
-    """{metric: {"mean", "low", "high", ...}} of arrays over METRICS."""
+    """Return {metric: {"mean", "low", "high", ...}} of arrays over METRICS."""
     columns = {"mean": estimate, "low": low, "high": high, **more}
     return {
         name: {key: float(column[i]) for key, column in columns.items()} for i, name in enumerate(METRICS)
@@ -191,10 +184,10 @@ def _named(estimate, low, high, **more):
 
 
 class Leaderboard(dict):
-    """What leaderboard() returns: a plain mapping that a notebook shows as a table."""
+    """The mapping of leaderboard(), which a notebook shows as a table."""
 
     def _repr_html_(self):
-        """Ranks, the means of SHOWN with paired differences from the baseline, and the score."""
+        """Return HTML of ranks, means of SHOWN with paired differences from the baseline, and scores."""
         rows = []
         for entry in self["controllers"]:
             cells = []
@@ -217,27 +210,26 @@ class Leaderboard(dict):
 
 
 def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
-    """Mapping of plain values: how the controllers of an evaluation's table compare.
+    """Return a mapping of plain values that compares the controllers of an evaluation's table.
 
     baseline   controller of the paired differences; None: gspi_oc3, else pi, else the first, of those
                without failed runs
     score      training.evaluation.cases.Score of a suite, or None
-    cases      names of the cases that count; None: all
+    cases      names of the cases to use; None: all
     limits     training.evaluation.cases.Limits of a suite, or None
-    Means are lifetime means (METHOD); the shares of the cases stand in the table's column weight_[-].
-    Lost runs (failures.py) have no figures, but count in the score.
+    Means are lifetime means (METHOD) with the shares of the column weight_[-]. Lost runs (failures.py) have
+    no metrics, but count in the score.
     Keys: baseline (None: each has runs that failed or lost power), interval (level, method, resamples,
-    least_seeds), penalty (times the reference's figures that a lost run counts), unchecked (metrics whose
-    relative limits need the runs of a reference), cases, shares {case: share}, seeds, controllers: a list of
-    mappings with rank (None without a score), controller, runs, lost and of these failed, tripped,
-    lost_power, metrics {metric: mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low,
-    high, percent, pairs, p}, beyond (a text for each limit passed), score (mean, low, high, valid, why; None
-    without one), cases {case: runs, ..., metrics, difference}. seed_low and seed_high are the range over the
-    seeds of the lifetime mean, worst the greatest over all runs; percent the mean difference over the
-    baseline's mean of the same runs, p its two-sided p-value (not case by case, nor of a controller with lost
-    runs).
-    The list is in the order of the ranks: those whose runs all ended well and within the limits, those
-    beyond a limit, those with lost runs; within each by score, else as in the table.
+    least_seeds), penalty (of a lost run, times the reference's metrics), unchecked (metrics whose relative
+    limits lack the runs of a reference), cases, shares {case: share}, seeds, controllers: a list of mappings
+    with rank (None without a score), controller, runs, lost, failed, tripped, lost_power, metrics {metric:
+    mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent, pairs, p},
+    beyond (a text per exceeded limit), score (mean, low, high, valid, why; None without one), cases {case:
+    runs, ..., metrics, difference}. seed_low and seed_high: range of the lifetime mean over the seeds; worst:
+    greatest over all runs; percent: mean difference over the baseline's mean of the same runs; p: its
+    two-sided p-value (not case by case, nor with lost runs).
+    The list is in the order of the ranks: first those with all runs within the limits, then those above a
+    limit, then those with lost runs; within each by score, else as in the table.
     Raises: InputError for a baseline that was not evaluated.
     """
     if cases is not None:
@@ -268,12 +260,7 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     names = list(dict.fromkeys(own["case"]))
     return Leaderboard(
         baseline=baseline,
-        interval={
-            "level": LEVEL,
-            "method": METHOD,
-            "resamples": RESAMPLES,
-            "least_seeds": LEAST_SEEDS,
-        },
+        interval={"level": LEVEL, "method": METHOD, "resamples": RESAMPLES, "least_seeds": LEAST_SEEDS},
         penalty=PENALTY,
         unchecked=[] if limits is None or runs.has_reference else list(limits.relative),
         cases=names,
@@ -284,19 +271,19 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
 
 
 def _known_score(entry):
-    """Whether an entry has a score."""
+    """Return whether an entry has a score."""
     score = entry["score"]
     return score is not None and score["mean"] is not None and bool(np.isfinite(score["mean"]))
 
 
 def _rank_key(entry):
-    """What entries are ranked by: less is better."""
+    """Return the sort key of the ranks; less is better."""
     known = _known_score(entry)
     return entry["lost"] > 0, bool(entry["beyond"]), not known, entry["score"]["mean"] if known else 0.0
 
 
 def _entry(part, weights, tested=False):
-    """Figures of one controller over the cases of a _Part."""
+    """Return runs, metrics and differences of one controller over the cases of a _Part."""
     resampled = _means(part.values, weights, part.shares)
     estimate, low, high = _figures(part, resampled)
     least, greatest = _seed_range(part)
@@ -312,9 +299,9 @@ def _entry(part, weights, tested=False):
 
 
 def _beyond(limits, part):
-    """Texts "figure = value, allowed value" of the Limits passed in runs that were not lost.
+    """Return texts "metric = value, allowed value" of the exceeded Limits of runs that were not lost.
 
-    A figure that all runs lack is no part of the suite; one that some lack is not within its limit.
+    A metric that all runs lack is not checked; one that some lack exceeds its limit.
     """
     found = []
     one = np.ones((1, part.values.shape[1]))
@@ -344,10 +331,10 @@ def _beyond(limits, part):
 
 
 def _score(score, part, weights, beyond):
-    """{"mean", "low", "high", "valid", "why"} of a controller by a Score; figures are None with a reason.
+    """Return {"mean", "low", "high", "valid", "why"} of a controller by a Score; None with a reason.
 
-    A lost run counts the penalties of the reference's figures; so does a figure that a run lacks and the
-    reference has. A case and seed in which the reference has no figure counts for nobody.
+    A lost run, and a metric that a run lacks and the reference has, count as penalties of the reference's
+    metrics. A case and seed without a metric of the reference is left out.
     """
     named = list(dict.fromkeys([term.metric for term in score.term] + ([score.power] if score.power else [])))
     chosen = [METRICS.index(name) for name in named]

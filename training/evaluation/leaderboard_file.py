@@ -1,15 +1,22 @@
-"""What leaderboard.json must hold for a page to be made of it; keys beyond these are let be.
+"""leaderboard.json of a results folder: written, and checked before a page is made of it.
 
-The file is checked whole before anything is read from it, since it may come from another version or hand.
+The whole file is checked at once, since another version may have written it; further keys are ignored.
 """
 
+import json
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from fowt_env.descriptions.records import validate
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL
+from fowt_env.training.evaluation.cases import Limits, Score
 from fowt_env.training.evaluation.failures import KINDS, lost_text
+from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.results import write_json
+
+COPIED = ("format", "fowt_env", "plant", "versions", "suite", "options", "created")  # from the manifest
 
 WholeNumber = Annotated[int, Field(ge=0, le=10**9)]
 FiniteNumber = Annotated[float, Field(ge=-1e300, le=1e300)]
@@ -20,9 +27,9 @@ class _Part(BaseModel):
 
 
 class Statistic(_Part):
-    """A mean or a difference with the ends of its interval; null where there is none.
+    """A mean or a difference with the ends of its interval (null: none).
 
-    Of a difference also percent, of the baseline's mean, and its two-sided p-value.
+    A difference has also percent, of the baseline's mean, and a two-sided p-value.
     """
 
     mean: FiniteNumber | None
@@ -33,7 +40,7 @@ class Statistic(_Part):
 
 
 class Figures(_Part):
-    """What a controller did, over all cases or in one."""
+    """Runs and metrics of a controller, over all cases or in one."""
 
     runs: WholeNumber
     failed: WholeNumber
@@ -44,12 +51,12 @@ class Figures(_Part):
 
     @property
     def lost(self):
-        """Number of runs that did not end well."""
+        """Number of lost runs."""
         return self.failed + self.tripped + self.lost_power
 
     @property
     def lost_text(self):
-        """Text "1 failed, 2 tripped" of these, "" for none."""
+        """Text "1 failed, 2 tripped" of the lost runs, "" for none."""
         return lost_text({name: getattr(self, name) for name in KINDS})
 
 
@@ -64,28 +71,44 @@ class LeaderboardEntry(Figures):
 
 
 class Interval(_Part):
-    """How the intervals were made."""
+    """How the intervals were computed."""
 
-    level: Annotated[float, Field(gt=0, lt=1)]
-    method: str
-    least_seeds: Annotated[int, Field(ge=1, le=10**9)] = 2
+    level: Annotated[float, Field(gt=0, lt=1)] = LEVEL
+    method: str = ""
+    least_seeds: Annotated[int, Field(ge=1, le=10**9)] = LEAST_SEEDS
 
 
 class LeaderboardFile(_Part):
     """The file."""
 
     baseline: str | None
-    interval: Interval | None = None
+    interval: Interval = Interval()
     penalty: FiniteNumber | None = None
     controllers: list[LeaderboardEntry]
 
 
 def check_leaderboard(content, path):
-    """A LeaderboardFile of parsed JSON. Raises: InputError that names the first keys that are wrong."""
+    """Return the LeaderboardFile of parsed JSON. Raises: InputError that names the first wrong keys."""
     board, problems = validate(LeaderboardFile, content)
     if problems:
         raise InputError(
             f"{str(path)!r} is not of this version ({'; '.join(problems[:3])}): run fowt evaluate on the"
-            " folder again, or remove that file to have means of results.csv"
+            " folder again, or remove that file to show means of results.csv"
         )
+    return board
+
+
+def write_leaderboard(table, folder, baseline=None):
+    """Return the leaderboard of a results folder, and write it to leaderboard.json there.
+
+    Suite, score and limits are those of the folder's manifest.json.
+    Raises: InputError for a baseline that was not evaluated.
+    """
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    rules = {}
+    for key, kind in (("score", Score), ("limits", Limits)):
+        values = (manifest["suite"] or {}).get(key)
+        rules[key] = None if values is None else kind(**values)
+    board = {key: manifest[key] for key in COPIED} | leaderboard(table, baseline, **rules)
+    write_json(board, folder / "leaderboard.json")
     return board

@@ -1,4 +1,4 @@
-"""One process at a time in a folder."""
+"""Lock of a folder: one process at a time."""
 
 import fcntl
 import os
@@ -10,11 +10,11 @@ from fowt_env.errors import InputError
 
 @contextmanager
 def locked(folder, what, busy):
-    """Path of the folder, made where there is none, in which no other such block is while this one runs.
+    """Lock a folder (made if missing) against other blocks; yield its path.
 
-    The lock is the kernel's: it ends with the process that holds it, however that ends. A folder that was
-    made for the block goes where the block raises and leaves it empty.
-    Raises: InputError "{what}: {busy}" where another block has the folder, or that it cannot be had.
+    The lock is the kernel's: it ends with its process, however that ends. If the block raises, folders made
+    for it are removed if they are empty.
+    Raises: InputError "{what}: {busy}" if another block has locked the folder, or if it cannot be locked.
     """
     folder = Path(folder)
     made = [path for path in (folder, *folder.parents) if not path.exists()]
@@ -34,7 +34,7 @@ def locked(folder, what, busy):
         try:
             yield folder
         except BaseException:
-            with suppress(OSError):  # what is not empty stays, and so does all above it
+            with suppress(OSError):  # one that is not empty, with those above it
                 for path in made:
                     path.rmdir()
             raise

@@ -1,9 +1,8 @@
-"""Load cases on a plant that no controller knows: masses, moorings and actuators off, sensors noisy.
+"""Model mismatch of load cases: a perturbed plant and noisy sensors, with a controller of the nominal plant.
 
-The run is that of the true plant, a perturbed one. The controller is made for the nominal turbine and
-prepared with the nominal scene, so that one that designs itself on the plant's equations (lqr, rosco,
-preview) designs on the wrong ones, as it would at sea. Metrics are of the true motions: noise is on the
-controller's readings alone.
+The run uses the perturbed plant. The controller is made for the nominal turbine and prepared with the nominal
+scene, so that model-based designs (lqr, rosco, preview) are based on a wrong model, as they would be at sea.
+Metrics are of the true motions: noise is only on the controller's readings.
 """
 
 from fowt_env.descriptions.sensors import Sensor, SensorChain
@@ -12,7 +11,7 @@ from fowt_env.plant.measurement import Measurement
 
 
 def perturbed_sensors(perturbation, turbine, control_dt):
-    """SensorChain of a PlantPerturbation's noise and delay on every reading; None where it has neither."""
+    """Return the SensorChain of a PlantPerturbation's noise and delay on every reading; None without both."""
     if perturbation.noise == 0.0 and perturbation.delay == 0:
         return None
     scales = dict(zip(Measurement._fields, reading_scales(turbine).tolist(), strict=True))
@@ -22,4 +21,4 @@ def perturbed_sensors(perturbation, turbine, control_dt):
         for name, scale in scales.items()
         if name != "time"
     }
-    return SensorChain("shifted", sensors, "every reading with the same share of noise and the same delay")
+    return SensorChain("shifted", sensors, "equal relative noise and delay on every reading")

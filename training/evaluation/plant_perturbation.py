@@ -1,4 +1,4 @@
-"""Plants whose figures differ from the files': factors on masses, hydrodynamics, moorings and actuators."""
+"""Perturbed plants: factors on masses, hydrodynamics, moorings and actuators of the files."""
 
 import dataclasses
 from typing import Annotated
@@ -27,11 +27,11 @@ PLANT = {
     "actuator_lag": ("factor on the time constant of the blade-pitch drive", ("loguniform", 0.5, 2.0)),
     "air_density": ("factor on the density of air", ("normal", 1.0, 0.02)),
 }
-PLATFORM = "oc3_hywind"  # whose figures are multiplied, and which controllers know
+PLATFORM = "oc3_hywind"  # default nominal platform
 
 
 def plant_settings(factors, platform=PLATFORM):
-    """{"platform", "turbine"} settings of FowtEnv for a plant with {name of PLANT: factor}."""
+    """Return {"platform", "turbine"} settings of FowtEnv for a plant with {name of PLANT: factor}."""
     base = read_platform(platform)
     turbine = read_turbine(base.turbine)
 
@@ -43,11 +43,12 @@ def plant_settings(factors, platform=PLATFORM):
 
     def scaled(part, by, *names):
         values = {name: getattr(part, name) for name in names}
-        return part.model_copy(
-            update={
-                n: tuple(by * x for x in v) if isinstance(v, tuple) else by * v for n, v in values.items()
-            }
-        )
+        return part.model_copy(update={name: times(by, value) for name, value in values.items()})
+
+    def times(by, value):  # None: none
+        if isinstance(value, tuple):
+            return tuple(times(by, each) for each in value)
+        return None if value is None else by * value
 
     hydro, potential, additional = base.hydro, base.potential_flow, base.additional
     mass, drag = factor("added_mass"), factor("drag")
@@ -56,18 +57,10 @@ def plant_settings(factors, platform=PLATFORM):
         hydro = scaled(hydro, drag, "drag_coefficient", "linear_damping")
     if potential is not None and mass != 1.0:
         names = ("added_mass", "added_mass_infinite", "added_mass_zero")
-        known = {name: getattr(potential, name) for name in names}
-        changed = {name: mass * value for name, value in known.items() if value is not None}
-        potential = dataclasses.replace(potential, **changed)
+        scaled_mass = {name: times(mass, getattr(potential, name)) for name in names}
+        potential = dataclasses.replace(potential, **scaled_mass)
     if additional is not None and drag != 1.0:
-        names = ("linear_damping", "quadratic_damping")
-        known = {name: getattr(additional, name) for name in names}
-        changed = {
-            name: tuple(tuple(drag * x for x in row) for row in value)
-            for name, value in known.items()
-            if value is not None
-        }
-        additional = additional.model_copy(update=changed)
+        additional = scaled(additional, drag, "linear_damping", "quadratic_damping")
     upper, tau = factor("upper_mass"), factor("actuator_lag")
     tower = scaled(base.tower, upper, "mass", "inertia")
     if tower.modes is not None and upper != 1.0:
@@ -104,12 +97,12 @@ def plant_settings(factors, platform=PLATFORM):
 
 
 class PlantPerturbation(Record):
-    """How a case's plant differs from the one that its controller knows; names as in PLANT.
+    """Difference of a case's plant from the nominal one; names as in PLANT.
 
-    Factors on what the files say. noise: standard deviation of white noise on each reading, as a fraction of
-    the scale that the channel has in observations (rotor speed: 20 % of rated; blade pitch: 15 deg; platform
-    pitch: 5 deg, its rate: 1 deg/s; nacelle acceleration: 1 m/s2). delay: control periods from
-    measurement to reading.
+    Factors on the values of the files. noise: standard deviation of white noise on each reading, as a
+    fraction of the channel's scale in observations (rotor speed: 20 % of rated; blade pitch: 15 deg; platform
+    pitch: 5 deg, its rate: 1 deg/s; nacelle acceleration: 1 m/s2). delay: control periods from measurement to
+    reading.
     """
 
     ballast_mass: Positive = 1.0
@@ -124,11 +117,11 @@ class PlantPerturbation(Record):
 
     @property
     def factors(self):
-        """{name of PLANT: factor} of those that are not 1."""
+        """{name of PLANT: factor} of the factors other than 1."""
         return {name: getattr(self, name) for name in PLANT if getattr(self, name) != 1.0}
 
 
 @cached(64)
 def perturbed_parts(perturbation, platform="oc3_hywind"):
-    """{"platform", "turbine"} of a built-in platform or file with a PlantPerturbation, for build_scene."""
+    """Return {"platform", "turbine"} of a perturbed platform (a name or file), for build_scene."""
     return plant_settings(perturbation.factors, platform)

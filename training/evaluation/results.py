@@ -1,15 +1,16 @@
-"""The folder of an evaluation: every run once, whatever interrupts it.
+"""The results folder of an evaluation, which can be interrupted and resumed.
 
-    manifest.json                              what was asked for: versions, suite, cases, controllers
+    manifest.json                              settings: versions, suite, cases, controllers
     runs/<controller>/<case>_seed<n>.parquet   time series of one run, its row of the table in the metadata
     results.csv                                one row per run, columns evaluate.COLUMNS
     leaderboard.json                           means, intervals and paired differences (leaderboard.py)
 
-A run is done when its Parquet file is there, and that file appears whole or not at all. results.csv and
+A run is finished when its Parquet file exists, which is written whole or not at all. results.csv and
 leaderboard.json are made from those files, so an interrupted evaluation loses and repeats nothing.
 """
 
 import hashlib
+import io
 import json
 import re
 import time
@@ -32,25 +33,25 @@ from fowt_env.training.evaluation.guard import printable
 from fowt_env.training.evaluation.locks import locked
 from fowt_env.training.evaluation.run_case import FAILED, STATUSES
 
-FORMAT = 4  # of the folder; raised when files or their meaning change
-MANIFEST = {  # what each key of manifest.json holds, beside its format
+FORMAT = 4  # version of the folder's files
+MANIFEST = {  # types of the keys of manifest.json, beside its format
     "fowt_env": str, "plant": str, "versions": dict, "created": str, "suite": dict | None, "options": dict,
     "cases": dict, "seeds": list, "controllers": dict,
 }  # fmt: skip
 ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
-PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # of a file that no other name's can be taken for
+PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # distinct on every file system
 LONGEST_NAME = 500
-TEXTS = ("controller", "case", "status", "reason", "events", "warning")  # of a row; all else are numbers
+TEXTS = ("controller", "case", "status", "reason", "events", "warning")  # of a row; the others are numbers
 
 
 def run_file(folder, label, case, seed):
-    """Path of a run's time series. Names that files should not bear get a hash, so that each has its own."""
+    """Return the path of a run's time series; a name that is no plain file name gets a hash."""
     return Path(folder) / file_name(label) / f"{file_name(case)}_seed{seed}.parquet"
 
 
 def file_name(text):
-    """A name as it is where every file system keeps it apart, else what can be read of it and a hash."""
+    """Return a name itself if it is a PLAIN_NAME, else its readable characters and a hash."""
     if PLAIN_NAME.fullmatch(text):
         return text
     readable = re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip(".")[:80]
@@ -58,29 +59,33 @@ def file_name(text):
 
 
 def check_name(what, name):
-    """Raises: InputError for the name of a controller or case that a table cannot hold."""
+    """Check the name of a controller or case. Raises: InputError."""
     if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
         shown = printable(name) if isinstance(name, str) else type(name).__name__
         raise InputError(f"{what} {shown!r} must be a printable text of at most {LONGEST_NAME} characters")
 
 
-def parquet_of(frame, row):
-    """Arrow table of a run (None: no rows) with its row of results in the metadata."""
+def run_content(frame, row):
+    """Return the Parquet file of a run as bytes: its time series (None: no rows), its row in the metadata."""
     if frame is None:
         frame = pd.DataFrame({"Time_[s]": pd.Series(dtype="float64")})
     table = pa.Table.from_pandas(frame, preserve_index=False)
-    return table.replace_schema_metadata({**table.schema.metadata, ROW_KEY: _json(row).encode()})
+    content = io.BytesIO()
+    pq.write_table(
+        table.replace_schema_metadata({**table.schema.metadata, ROW_KEY: _json(row).encode()}), content
+    )
+    return content.getvalue()
 
 
-def write_run(frame, row, path):
-    """The path written: the run's time series and row, whole or not at all."""
+def write_run(content, path):
+    """Write the file of a run, of the bytes of `run_content`, whole or not at all; return its path."""
     with replacing(path) as temporary:
-        pq.write_table(parquet_of(frame, row), temporary)
+        temporary.write_bytes(content)
     return path
 
 
 def read_row(path):
-    """Row {column: value} in a run's file. Raises: InputError for a file that write_run did not write."""
+    """Return the row {column: value} of a run's file. Raises: InputError for any other file."""
     try:
         metadata = pq.read_schema(path).metadata or {}
         row = parse_json(metadata[ROW_KEY].decode("utf-8"))
@@ -94,7 +99,7 @@ def read_row(path):
 
 
 def _check_row(row):
-    """Raises: ValueError for what is no row of a run."""
+    """Check the row of a run. Raises: ValueError."""
     if not isinstance(row, dict) or {*TEXTS, "seed"} - set(row):
         raise ValueError(f"its row lacks one of {', '.join((*TEXTS, 'seed'))}")
     for name, value in row.items():
@@ -113,38 +118,39 @@ def _check_row(row):
 
 
 def _json(value, **options):
-    """JSON text in which NaN is null, since JSON has none."""
-    return json.dumps(_finite(value), allow_nan=False, **options)
+    """Return JSON text with null for NaN and infinity."""
+    return json.dumps(finite(value), allow_nan=False, **options)
 
 
-def _finite(value):
+def finite(value):
+    """Return a value of mappings, sequences and numbers with None for NaN and infinity."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
         return None
     return value
 
 
 def write_json(value, path):
-    """The path written, whole or not at all."""
+    """Write JSON, whole or not at all; return the path."""
     with replacing(path) as temporary:
         Path(temporary).write_text(_json(value, indent=1) + "\n", encoding="utf-8")
     return path
 
 
 class ResultsFolder:
-    """A locked folder of an evaluation: what is done in it, and what is added to it.
+    """The locked folder of an evaluation, with the rows of its runs.
 
     settings: {"suite", "options", "cases" {name: description}, "seeds", "controllers" {label: code}}.
-    Controllers, cases and seeds may be added to a folder; anything else must be as it was.
-    again: keys (controller, case, seed) of runs that count as not done where they failed.
+    Controllers, cases and seeds may be added to a folder; any other setting must not change.
+    again: keys (controller, case, seed) of runs to repeat if they failed.
     """
 
     def __init__(self, folder, settings, columns, again=()):
-        self.given = Path(folder)  # for messages
-        self.folder = self.given.absolute()  # of here, wherever a controller goes
+        self.name = Path(folder)  # for messages
+        self.folder = self.name.absolute()  # a controller may change the working folder
         self.columns = list(columns)
         self.again = frozenset(again)
         self.settings = settings
@@ -152,7 +158,7 @@ class ResultsFolder:
         self.written = 0.0
 
     def _open(self):
-        """Check the folder, join the settings and read what is done."""
+        """Check the folder, join the settings and read the rows of finished runs."""
         wanted = {
             "format": FORMAT,
             "fowt_env": fowt_env.__version__,
@@ -167,7 +173,7 @@ class ResultsFolder:
             row = read_row(path)
             key = row["controller"], row["case"], row["seed"]
             if run_file(self.folder / "runs", *key) != path:
-                raise InputError(f"{str(path)!r} holds the run {', '.join(map(str, key))}: remove it")
+                raise InputError(f"{str(path)!r} contains the run {', '.join(map(str, key))}: remove it")
             if row["status"] != FAILED or key not in self.again:
                 self.rows[key] = row
         parts = {key: dict(self.settings[key]) for key in ("cases", "controllers")}
@@ -178,7 +184,7 @@ class ResultsFolder:
                 parts[key] = old[key] | parts[key]
             seeds = sorted({*old["seeds"], *seeds})
         elif self.rows or (self.folder / "results.csv").exists():
-            raise self._refused("holds runs but no manifest.json")
+            raise self._refused("contains runs but no manifest.json")
         created = time.strftime("%Y-%m-%dT%H:%M:%S%z") if old is None else old["created"]
         self.manifest = {
             **wanted,
@@ -206,11 +212,11 @@ class ResultsFolder:
                 raise self._refused(f"has a manifest.json without a sound {key!r}")
         sound = all(type(seed) is int for seed in old["seeds"])
         if not sound or not all(isinstance(case, dict) for case in old["cases"].values()):
-            raise self._refused("has a manifest.json whose seeds or cases are none")
+            raise self._refused("has a manifest.json with wrong seeds or cases")
         return old
 
     def _compare(self, old, wanted):
-        """Raises: InputError where the folder's runs cannot stand beside those now asked for."""
+        """Compare the settings with those of the manifest. Raises: InputError if they do not match."""
         if old["fowt_env"] != wanted["fowt_env"]:
             raise self._refused(f"was made by fowt_env {old['fowt_env']}, this is {wanted['fowt_env']}")
         if old["plant"] != wanted["plant"]:
@@ -232,33 +238,33 @@ class ResultsFolder:
             before = old["controllers"].get(label, code)
             done = [row["status"] for key, row in self.rows.items() if key[0] == label]
             if before != code and done:
-                place = run_file(self.given / "runs", label, "", 0).parent
+                place = run_file(self.name / "runs", label, "", 0).parent
                 failed = ", or use --retry-failed" if set(done) == {FAILED} else ""
                 raise InputError(
-                    f"results folder {str(self.given)!r}: controller {label!r} or its code has changed since"
+                    f"results folder {str(self.name)!r}: controller {label!r} or its code has changed since"
                     f" its runs there; remove {str(place)!r} to run them again, or choose another"
                     f" folder{failed}"
                 )
 
     def _refused(self, why):
         return InputError(
-            f"results folder {str(self.given)!r} {why}: choose another folder (--out), or remove this one"
+            f"results folder {str(self.name)!r} {why}: choose another folder (--out), or remove this one"
         )
 
     def add(self, row):
-        """Take in the row of a run whose file has been written."""
+        """Add the row of a run whose file has been written."""
         self.rows[row["controller"], row["case"], row["seed"]] = row
         if time.monotonic() - self.written > TABLE_EVERY:
             self.write()
 
     def table(self):
-        """DataFrame of all runs of the folder, by case, seed and controller in the order asked for."""
-        places = [
+        """Return a DataFrame of all runs, by case, seed and controller in the manifest's order."""
+        cases, controllers = (
             {name: number for number, name in enumerate(self.manifest[key])}
             for key in ("cases", "controllers")
-        ]
+        )
         order = sorted(
-            self.rows, key=lambda key: (places[0].get(key[1], 1e9), key[2], places[1].get(key[0], 1e9), key)
+            self.rows, key=lambda key: (cases.get(key[1], 1e9), key[2], controllers.get(key[0], 1e9), key)
         )
         table = pd.DataFrame([self.rows[key] for key in order], columns=self.columns)
         faulty = {name for name, case in self.manifest["cases"].items() if case.get("fault") is not None}
@@ -271,7 +277,7 @@ class ResultsFolder:
 
 
 def _short(value):
-    """Text of a setting for a message."""
+    """Return the text of a setting for a message."""
     if isinstance(value, dict) and "name" in value:
         drawn = value.get("drawn")
         seeds = f" with seeds drawn from {drawn['hash'][:12]}" if isinstance(drawn, dict) else ""
@@ -281,9 +287,9 @@ def _short(value):
 
 @contextmanager
 def open_results(folder, settings, columns, again=()):
-    """ResultsFolder, locked against other processes while the block runs; results.csv is written at its end.
+    """Yield the ResultsFolder, locked against other processes; results.csv is written at the end.
 
-    Raises: InputError where the folder is in use, or holds runs of another version or other settings.
+    Raises: InputError if the folder is in use, or has runs of another version or other settings.
     """
     results = ResultsFolder(folder, settings, columns, again)
     with locked(results.folder, f"results folder {str(folder)!r}", "another evaluation is writing to it"):

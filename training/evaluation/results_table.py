@@ -1,4 +1,4 @@
-"""The table of an evaluation read back: one set of checks for reports, scores and whatever else asks."""
+"""Reading the table of an evaluation, with its checks, for reports and scores."""
 
 from pathlib import Path
 
@@ -9,47 +9,46 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.run_case import REFERENCE
 
-KEY = ["controller", "case", "seed"]  # what tells runs apart
+KEY = ["controller", "case", "seed"]  # of a run
 WORDS = ["status", "reason", "events", "warning"]  # columns of text beside those of KEY
 WEIGHT = "weight_[-]"  # share of a run's case in the lifetime; NaN, or no such column: every case alike
-TABLES = ("results.csv", "metrics.csv")  # of a folder: the first that is there
+TABLES = ("results.csv", "metrics.csv")  # of a folder: the first that exists
 
 
 def read_results(paths, needed=(), cases=None, parked=True):
-    """DataFrame of the runs of fowt evaluate: controller, case, status, reason, seed, and figures as floats.
+    """Return a DataFrame of the runs of fowt evaluate: controller, case, status, reason, seed, metrics.
 
     paths    a results folder or CSV file, or a sequence of them, whose runs are joined
-    needed   columns of figures that each of them must have
+    needed   columns of metrics that each of them must have
     cases    names of the cases to keep; None: all
     parked   whether the runs of parked turbines are kept, which have no controller
-    A figure that is missing or infinite is NaN; columns of other words are left out. A run that several of
-    the tables hold counts once. The runs of the reference are left out: they are no controller's.
-    Raises: InputError for what is no such table, for an unknown case, and where two tables hold the same run
-    with other figures.
+    A missing or infinite metric is NaN; other columns of text are left out. A run in several tables counts
+    once. The runs of the reference are left out.
+    Raises: InputError for any other table, for an unknown case, and if two tables have different metrics of
+    the same run.
     """
-    given = [paths] if isinstance(paths, str | Path) else paths
-    tables = [_read_one(Path(path), needed) for path in given]
+    paths = [paths] if isinstance(paths, str | Path) else paths
+    tables = [_read_one(Path(path), needed) for path in paths]
     shared = [name for name in tables[0] if all(name in table for table in tables)]
     table = pd.concat(tables, ignore_index=True)
     table = table.drop_duplicates([name for name in shared if name != "reason"])
     twice = table[table.duplicated(KEY)]
     if len(twice):
         name, case, seed = twice.iloc[0][KEY]
-        raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different figures")
+        raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different metrics")
     table = table[table["controller"] != REFERENCE]
     if not parked:
         table = table[table["controller"] != PARKED]
     if cases is not None:
         known = list(dict.fromkeys(table["case"]))
-        for name in cases:
-            if name not in known:
-                raise unknown("case of the evaluation", name, known)
+        for name in (name for name in cases if name not in known):
+            raise unknown("case of the evaluation", name, known)
         table = table[table["case"].isin(cases)]
     return table.reset_index(drop=True)
 
 
 def case_shares(table, cases):
-    """(cases,) shares of the lifetime, in sum 1, of the cases of a table; alike where it does not say."""
+    """Return the shares (cases,) of the lifetime, with sum 1; equal if the table has no weights."""
     if WEIGHT not in table or not np.isfinite(table[WEIGHT].to_numpy(dtype=np.float64)).all():
         return np.full(len(cases), 1.0 / max(1, len(cases)))
     share = table.groupby("case")[WEIGHT].first().reindex(cases).to_numpy(dtype=np.float64)
@@ -57,17 +56,17 @@ def case_shares(table, cases):
 
 
 def _table_file(path):
-    """File of the table of a folder, or the file itself. Raises: InputError."""
+    """Return the file of the table of a folder, or the file itself. Raises: InputError."""
     files = [path / name for name in TABLES] if path.is_dir() else [path]
     found = next((file for file in files if file.is_file()), None)
     if found is None:
-        lack = "holds no results.csv" if path.is_dir() else "is no such file or folder"
+        lack = "contains no results.csv" if path.is_dir() else "is no such file or folder"
         raise InputError(f"results {str(path)!r} {lack}: make it with fowt evaluate --out FOLDER")
     return found
 
 
 def _read_one(path, needed):
-    """The checked table of one folder or file."""
+    """Return the checked table of one folder or file."""
     file = _table_file(path)
     where = f"table {str(file)!r}"
     try:
@@ -84,15 +83,15 @@ def _read_one(path, needed):
     try:
         table["seed"] = pd.to_numeric(texts["seed"]).astype(int)
     except (ValueError, TypeError, OverflowError) as error:
-        raise InputError(f"{where}: column seed must hold whole numbers ({error})") from None
+        raise InputError(f"{where}: column seed must contain whole numbers ({error})") from None
     figures = {}
     for name in texts.columns.drop([n for n in (*KEY, *WORDS) if n in texts.columns]):
         numbers = pd.to_numeric(texts[name].replace("", "nan"), errors="coerce")
-        given = ~texts[name].str.lower().isin(["", "nan"])
-        if numbers.notna().sum() == given.sum():  # else a column of words
+        filled = ~texts[name].str.lower().isin(["", "nan"])
+        if numbers.notna().sum() == filled.sum():  # else a column of text
             figures[name] = numbers.astype(float).replace([np.inf, -np.inf], np.nan)
         elif name in needed:
-            raise InputError(f"{where}: column {name} must hold numbers")
+            raise InputError(f"{where}: column {name} must contain numbers")
     table = pd.concat([table, pd.DataFrame(figures, index=table.index)], axis=1)
     if table.duplicated(KEY).any():
         raise InputError(f"{where}: a controller, case and seed occur twice")

@@ -1,4 +1,4 @@
-"""One run of one controller on one case, to its row: what shapes a figure is imported from here."""
+"""One run of one controller on one case, to its row. Its imports are the sources that affect a result."""
 
 import warnings
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ from fowt_env.weather.wind import GUSTS
 from fowt_env.weather.wind_field import is_field
 
 STATUSES = OK, TRIPPED, FAILED, LOST_POWER = ("ok", "tripped", "failed", "lost power")
-REFERENCE = "reference"  # in place of a controller's name: the suite's baseline, with nothing that stops it
+REFERENCE = "reference"  # name of the runs of the suite's baseline without trip and protection
 CONTROL_DT = 0.1  # s, simulate's own
 SHORTEST_CASE_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
 COLUMNS = (
@@ -61,19 +61,19 @@ class Run:
 
     @property
     def key(self):
-        """What tells runs of one evaluation apart."""
+        """Key of the run within its evaluation."""
         return self.label, self.case.name, self.seed
 
     @property
     def protected(self):
-        """Whether trips may stop the turbine: not the reference's, which has to have figures."""
+        """Whether trips may stop the turbine; not for the reference, which needs metrics."""
         return not (self.case.parked or self.label == REFERENCE)
 
 
 def scored(run):
-    """(row, time series or None) of one run; one that fails has its reason instead of metrics.
+    """Return (row, time series or None) of one run; a failed one has its reason instead of metrics.
 
-    A run that the turbine's protection ended has the metrics of what it was, its time, and the reason.
+    A run that the turbine's protection ended has its metrics until then, the time, and the reason.
     Raises: InputError for settings that no controller could use.
     """
     case = run.case
@@ -81,7 +81,7 @@ def scored(run):
     wind = case.wind
     if is_field(wind):
         wind = cached_box(wind, case.platform, run.seed, options)
-    with muted():  # a case's weather is what it is for, and others build its platform too
+    with muted():  # extreme weather is the purpose of a case
         nominal = scene = fowt_env.build_scene(
             case.platform, wind=wind, sea=case.sea, seed=run.seed, **options
         )
@@ -93,7 +93,7 @@ def scored(run):
 
     def work():
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlantWarning)  # the row's events and warning say the same
+            warnings.simplefilter("ignore", PlantWarning)  # in the row's events and warning
             frame = fowt_env.simulate(
                 scene,
                 controller=run_controller(run, nominal),
@@ -106,7 +106,7 @@ def scored(run):
             )
         return frame, run_metrics(frame, case, nominal, run.skip)
 
-    # whatever a controller raises or does costs its run, not the evaluation
+    # an error of the controller fails this run, not the evaluation
     outcome, error = attempt(work, run.time_limit)
     if error is None:
         frame, figures = outcome
@@ -139,19 +139,19 @@ def protection_of(case, turbine, protected, ends):
 
 
 def lost_row(run, reason):
-    """Row of a run that failed without one of its own, as where its process ended."""
+    """Return the row of a failed run whose process ended without one."""
     return _row(run, FAILED, None) | {"reason": reason}
 
 
 def run_metrics(frame, case, scene, skip):
-    """{metric: value} of the time series of a run of a Case in its nominal scene, scored from `skip` s on."""
+    """Return {metric: value} of the time series of a run of a Case in its nominal scene, after `skip` s."""
     fault = case.fault
     stop = fault.time if fault is not None and fault.ends_operation else None
     return turbine_metrics(frame, scene.turbine, skip, _is_steady(case, scene), _gust_start(case), stop)
 
 
 def _is_steady(case, scene):
-    """Whether a Case is steady wind above rated over still water: a controller then has to come to rest."""
+    """Return whether a Case has steady wind above rated and still water, so that a controller must settle."""
     kind = case.wind.get("kind") if isinstance(case.wind, dict) else "steady"
     if kind != "steady" or case.wind is None or case.parked or case.fault is not None:
         return False
@@ -160,7 +160,7 @@ def _is_steady(case, scene):
 
 
 def _start(case, scene):
-    """Absolute values of channels at the start of a Case; None: its operating point."""
+    """Return the absolute values of channels at the start of a Case; None: its operating point."""
     if case.displaced is None:
         return case.initial
     point = trim(scene)
@@ -168,14 +168,14 @@ def _start(case, scene):
 
 
 def _gust_start(case):
-    """Time (s) at which the gust of a Case begins; None without one."""
+    """Return the time (s) at which the gust of a Case begins; None without one."""
     if case.parked or not isinstance(case.wind, dict) or case.wind.get("kind") not in GUSTS:
         return None
     return read_wind(case.wind)["start"]
 
 
 def _row(run, status, frame):
-    """Row of a run without reason and figures."""
+    """Return the row of a run without reason and metrics."""
     row = dict.fromkeys(COLUMNS, float("nan"))
     row |= {"controller": run.label, "case": run.case.name, "seed": run.seed, "status": status, "reason": ""}
     row["warning"] = "" if frame is None else frame.attrs.get("doubtful_commands", "")
@@ -186,9 +186,9 @@ def _row(run, status, frame):
 
 
 def _end(error):
-    """(rows so far or None, time of the end or NaN, s) of what ended a run.
+    """Return (rows so far or None, time of the end in s or NaN) of the exception that ended a run.
 
-    Only of what simulate raises, and read without calling anything: an exception may be a controller's own.
+    Only an exception of simulate has them; the attributes are read without calling a controller's code.
     """
     held = vars(error) if isinstance(error, SimulationStopped | ControllerError | KeyboardInterrupt) else {}
     frame, stopped = held.get("frame"), held.get("time")
@@ -200,21 +200,21 @@ def _end(error):
 
 
 def _expected(case, time):
-    """Whether a trip at a time (s) is what the protection of a Case is for, and no controller's failure."""
+    """Return whether a trip at a time (s) follows from the fault of a Case, not from the controller."""
     fault = case.fault
     return fault is not None and fault.ends_operation and time >= fault.time - 1e-9
 
 
-TRIPS = {  # what each watches, with its limit
-    "overspeed": "rotor speed beyond {:g} of rated",
-    "overpower": "generator power beyond {:g} of rated",
-    "acceleration": "tower-top acceleration beyond {:g} m/s2",
+TRIPS = {  # reason of each, with its limit
+    "overspeed": "rotor speed above {:g} of rated",
+    "overpower": "generator power above {:g} of rated",
+    "acceleration": "tower-top acceleration above {:g} m/s2",
     "pitch_deviation": "a blade pitch off its command by more than {:.3g} deg",
 }
 
 
 def _trip_reason(trip, time, case, turbine):
-    """Text of a trip: which, when, and its limit."""
+    """Return the reason of a trip: its name, time and limit."""
     limit = case.trip
     if trip != "overspeed" or limit is None:
         limit = getattr(read_protection(case.protection, turbine.protection), trip).limit
@@ -224,7 +224,7 @@ def _trip_reason(trip, time, case, turbine):
 
 
 def _degraded(run, turbine):
-    """{"sensors": SensorChain} of a case that degrades them, in place of the run's own; else nothing."""
+    """Return {"sensors": SensorChain} of a case that degrades them, else {}."""
     shift = run.case.shift
     control_dt = run.options.get("control_dt", CONTROL_DT)
     chain = None if shift is None else perturbed_sensors(shift, turbine, control_dt)
@@ -232,10 +232,10 @@ def _degraded(run, turbine):
 
 
 def run_controller(run, nominal):
-    """What simulate is given as controller: the run's own, or a parked turbine's.
+    """Return the controller of a run for simulate, or that of a parked turbine.
 
     nominal: the scene that the controller is prepared for.
-    Raises: ControllerInputError where it cannot be made.
+    Raises: ControllerInputError if it cannot be made.
     """
     case = run.case
     if case.parked:

@@ -1,14 +1,14 @@
-"""A suite for another platform: the winds, limits and starts of its file in terms of that one's turbine.
+"""Scaling of a suite to another platform: winds, limits and starts for its turbine.
 
-Only suites that name the turbine of their figures are scaled; those that stand for a site, a paper or a sea
-state keep their winds. With the same turbine the winds stay, and only what depends on the platform changes.
+Only suites that name a turbine are scaled; those of a site, a paper or a sea state keep their winds. With the
+same turbine the winds stay, and only settings of the platform change.
 
-winds above rated   moved by the difference of the rated winds in whole m/s, up to cut-out
-rated and cut-out   those of the turbine; others that are no whole number by the exact difference
-winds below rated   the same share of the way from cut-in to rated, to the whole m/s
-winds beyond cut-out, of parked turbines, are the site's and stay
+winds above rated   shifted by the difference of the rated winds in whole m/s, up to cut-out
+rated and cut-out   those of the turbine; other fractional winds are shifted by the exact difference
+winds below rated   the same fraction between cut-in and rated, rounded to m/s
+winds above cut-out unchanged (parked turbines)
 limits              powers by the rated power, torques by the rated torque, rotor speeds by the rated one
-starts              `displaced` from the platform's own trim, in place of `initial`
+starts              `displaced` from the platform's trim, in place of `initial`
 """
 
 import re
@@ -21,33 +21,33 @@ from fowt_env.descriptions.sea_state import joint_tables
 from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.errors import InputError
 
-BY_POWER = ("GenPwr", "energy")  # what names of metrics in these units begin with
+BY_POWER = ("GenPwr", "energy")  # prefixes of metrics that scale with the quantity
 BY_TORQUE = ("GenTq", "torque_travel", "RotTorq")
 BY_SPEED = ("RotSpeed",)
 
 
 def turbine_of(platform):
-    """Turbine of a platform: a name, a path or a descriptions.platform.Platform."""
+    """Return the turbine of a platform: a name, a path or a descriptions.platform.Platform."""
     found = platform if isinstance(platform, Platform) else read_platform(platform)
     return read_turbine(found.turbine)
 
 
 @dataclass(frozen=True)
 class Scaling:
-    """From the turbine of a suite's figures to another."""
+    """Scaling from the turbine of a suite to another."""
 
     old: Turbine
     new: Turbine
 
     @property
     def shift(self):
-        """Whole m/s by which winds above rated move."""
+        """Shift of winds above rated, in whole m/s."""
         old, new = self.old.rated_wind_speed, self.new.rated_wind_speed
         moved = round(new - old)
         return moved + 1 if ceil(old) + moved <= new else moved
 
     def wind(self, speed):
-        """Mean wind speed (m/s) that stands for one of the suite's."""
+        """Return the scaled mean wind speed, m/s."""
         old, new = self.old, self.new
         winds = [(t.cut_in_wind_speed, t.rated_wind_speed, t.cut_out_wind_speed) for t in (old, new)]
         if winds[0] == winds[1] or speed > old.cut_out_wind_speed:
@@ -67,7 +67,7 @@ class Scaling:
         return min(max(moved, new.cut_in_wind_speed), new.cut_out_wind_speed)
 
     def limit(self, metric, value):
-        """Limit of a metric."""
+        """Return the scaled limit of a metric."""
         if "[%]" in metric:
             return value
         for names, figure in ((BY_POWER, _power), (BY_TORQUE, _torque), (BY_SPEED, _speed)):
@@ -76,17 +76,16 @@ class Scaling:
         return value
 
     def sea(self, spec):
-        """Sea of a case; the row of a table is that of the wind, within the table."""
+        """Return the sea of a case; the row of a table is that of the scaled wind, within the table."""
         if not isinstance(spec, dict) or "table" not in spec or "speed" not in spec:
             return spec
         return spec | {"speed": within_table(spec["table"], self.wind(spec["speed"]))}
 
     def entry(self, entry):
-        """CaseEntry of a case."""
+        """Return the scaled CaseEntry of a case."""
         changes = {"sea": self.sea(entry.sea)}
         if entry.speed is not None:
-            speeds = tuple(dict.fromkeys(self.wind(speed) for speed in entry.speed))
-            changes["speed"] = speeds
+            changes["speed"] = tuple(dict.fromkeys(map(self.wind, entry.speed)))
         if is_number(entry.wind):
             changes["wind"] = self.wind(entry.wind)
         elif isinstance(entry.wind, dict) and is_number(entry.wind.get("speed")):
@@ -96,13 +95,13 @@ class Scaling:
             changes["name"] = re.sub(rf"_{before:g}$", f"_{after:g}".replace(".", "_"), entry.name)
         if entry.initial is not None:
             if entry.displaced is None:
-                raise InputError(f"case {entry.name!r}: initial: is that of another platform; give displaced")
+                raise InputError(f"case {entry.name!r}: initial: is that of another platform; use displaced")
             changes["initial"] = None
         return entry.model_copy(update=changes)
 
 
 def within_table(table, speed):
-    """The wind speed (m/s), held within a table of joint sea states."""
+    """Return the wind speed (m/s), limited to a table of joint sea states."""
     winds = joint_tables()[table].wind if table in joint_tables() else (speed,)
     return float(min(max(speed, winds[0]), winds[-1]))
 
@@ -120,7 +119,7 @@ def _speed(turbine):
 
 
 def scaled_file(file, platform):
-    """A SuiteFile for a platform: its own where that is the one of the file."""
+    """Return a SuiteFile scaled to a platform; unchanged for the platform of the file."""
     if platform is None or platform == file.platform:
         return file
     changes = {"platform": platform}

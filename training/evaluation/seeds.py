@@ -1,11 +1,10 @@
-"""Which weather seeds are for what: training, validation and test never share one, by construction.
+"""Disjoint ranges of weather seeds for training, validation and test.
 
-A realisation of wind and waves is fixed by its weather seed (build_scene's seed). Each purpose has a
-range of its own, and the ranges do not touch.
+A realisation of wind and waves is fixed by its weather seed (build_scene's seed).
 
-Seeds that a suite lists are for development: whoever has this package can rebuild their weather, and a
-controller can recognise it. A table that others are to trust has seeds drawn from a hash which nobody knew
-while the controllers were tuned (with_drawn_seeds), or secret ones (new_secret_seeds).
+Seeds listed in a suite are for development: their weather can be rebuilt, and a controller can recognise it.
+A published comparison needs seeds drawn from a hash that was unknown while the controllers were tuned
+(with_drawn_seeds), or secret ones (new_secret_seeds).
 """
 
 import hashlib
@@ -16,12 +15,12 @@ from dataclasses import replace
 from fowt_env.envs.tasks import LARGEST_SEED
 from fowt_env.errors import InputError
 
-TEST = range(0, 1000)  # scores that are published: the suites' seeds 1, 2, ... are in it
+TEST = range(0, 1000)  # published scores, with the suites' seeds 1, 2, ...
 VALIDATION = range(1000, 100_000)  # choices between agents, and between gains of the baselines
-TRAINING = range(100_000, LARGEST_SEED)  # episodes that agents learn from
+TRAINING = range(100_000, LARGEST_SEED)  # episodes of the training of agents
 
-DRAWN = range(2**62, 2**63)  # too many to try: those drawn from a hash, and an organiser's secret ones
-LEAST_SECRET = 2**40  # smaller ones are found by trying
+DRAWN = range(2**62, 2**63)  # seeds drawn from a hash and secret seeds: too many for a search
+LEAST_SECRET = 2**40  # smaller seeds are found by a search
 DRAWING_RULE = "2**62 + (first 8 bytes of SHA-256 of 'HASH/SUITE/VERSION/i', big-endian) // 4, i = 0, 1, ..."
 HASH = re.compile("[0-9a-f]{40,128}")
 
@@ -29,7 +28,7 @@ PURPOSES = {"test": TEST, "validation": VALIDATION, "training": TRAINING}
 
 
 def seeds_for(purpose, first, count):
-    """Tuple of count seeds of a purpose, from its number first on. Raises: InputError beyond its range."""
+    """Return count seeds of a purpose, from index first on. Raises: InputError outside its range."""
     allowed = PURPOSES[purpose]
     if first < 0 or count < 1 or first + count > len(allowed):
         raise InputError(
@@ -39,10 +38,10 @@ def seeds_for(purpose, first, count):
 
 
 def drawn_seeds(source, suite, version, count):
-    """Tuple of count seeds of DRAWN by DRAWING_RULE: anybody who has the hash finds the same.
+    """Return count seeds of DRAWN by DRAWING_RULE, which are reproducible from the hash.
 
-    source: 40 to 128 hexadecimal digits that nobody could choose or know while controllers were tuned, as the
-    commit in which these and the suite are fixed. suite, version: name and version of the suite.
+    source: 40 to 128 hexadecimal digits that were unknown while controllers were tuned, such as the commit
+    that fixes them and the suite. suite, version: name and version of the suite.
     Raises: InputError for another source.
     """
     text = str(source).lower()
@@ -56,9 +55,9 @@ def drawn_seeds(source, suite, version, count):
 
 
 def with_drawn_seeds(suite, source):
-    """The Suite with seeds of drawn_seeds in place of those that it lists, as many for each of its cases.
+    """Return the Suite with drawn_seeds in place of its listed ones, as many for each case.
 
-    Its `drawn` says from which hash and how, and goes into the manifest of a results folder.
+    Its `drawn` is {"hash", "rule"}, for the manifest of a results folder.
     Raises: InputError for a source that is no hash.
     """
     most = max(len(seeds) for seeds in (suite.seeds, *(case.seeds or () for case in suite.cases)))
@@ -71,7 +70,7 @@ def with_drawn_seeds(suite, source):
 
 
 def new_secret_seeds(count):
-    """Tuple of count different seeds of DRAWN from the system's source of randomness."""
+    """Return count different seeds of DRAWN from the system's source of randomness."""
     found = set()
     while len(found) < count:
         found.add(DRAWN.start + secrets.randbelow(len(DRAWN)))
@@ -79,7 +78,7 @@ def new_secret_seeds(count):
 
 
 def ranges(seeds):
-    """[(first, last)] of the unbroken ranges of seeds in rising order."""
+    """Return [(first, last)] of the contiguous ranges of sorted seeds."""
     found = []
     for seed in seeds:
         if found and seed == found[-1][1] + 1:

@@ -1,4 +1,4 @@
-"""Boxes of full-field wind, made once and kept: a box takes far longer to make than a run in it."""
+"""Cache of full-field wind boxes, which take far longer to generate than a run."""
 
 import hashlib
 import json
@@ -12,14 +12,14 @@ from fowt_env.files.atomic import replacing
 from fowt_env.folders import cache_root, distrust, make_private
 from fowt_env.weather.wind_field import WindBox, read_box
 
-FORMAT = 1  # of the files; raised when read_box makes other boxes of the same specification
+FORMAT = 1  # of the files; increased when read_box makes different boxes of a specification
 ARRAYS, NUMBERS = ("velocity", "y", "z"), ("dt", "speed", "periodic", "shift")
 
 
 def cached_box(spec, platform, seed, options):
-    """WindBox of a specification for a platform's turbine, from the user's cache folder where it is there.
+    """Return the WindBox of a specification for a platform's turbine, from the user's cache if it is there.
 
-    Only generated boxes (kind "mann") are kept; files and arrays are read as they are.
+    Only generated boxes (kind "mann") are cached; files and arrays are read directly.
     """
     description = platform if isinstance(platform, Platform) else read_platform(platform)
     turbine = options.get("turbine") or description.turbine
@@ -45,16 +45,16 @@ def cached_box(spec, platform, seed, options):
             with path.open("rb") as content, np.load(content, allow_pickle=False) as file:
                 values = {key: file[key] for key in ARRAYS}
                 return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
-        except Exception:  # whatever a broken file makes numpy raise: it is made again
+        except Exception:  # a broken file can raise anything: the box is generated again
             pass
     box = read_box(spec, **arguments)
-    with suppress(OSError), replacing(path) as temporary:  # without space it is made again the next time
+    with suppress(OSError), replacing(path) as temporary:  # e.g. no space on the disk
         np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})
     return box
 
 
 def _folder():
-    """Folder for boxes, beside that of the kernels; None where there can be none of this user's own."""
+    """Return the folder of the boxes, beside that of the kernels; None if the user has no private one."""
     root = cache_root()
     if root is None:
         return None

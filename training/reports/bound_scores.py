@@ -1,13 +1,13 @@
-"""How much of the performance limit of linear control a controller reaches, per wind speed.
+"""Fraction of the performance limit of linear control that a controller reaches, per wind speed.
 
     fowt scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
 
-Each controller is held against the limit for what it knows and moves (training/design/linear_bound.py):
-the wind ahead or not, five sensors or fewer, the generator torque or the blade pitch alone. The limit holds
-for linear feedback at the blade-pitch travel and power deviation of gspi_oc3: a controller that spends more
-of either is not held by it, and is marked.
+The limit depends on the controller's information and actuators (training/design/linear_bound.py): preview
+of the wind, five sensors or fewer, torque and blade pitch or blade pitch alone. It applies to linear feedback
+at the blade-pitch travel and power deviation of gspi_oc3; a controller with more of either is marked.
 """
 
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -28,22 +28,17 @@ from fowt_env.training.design.linear_bound import (
 from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.reports.scores import frame_markdown, grouped
 
-BASELINE = "gspi_oc3"  # whose travel and power the limit keeps
+BASELINE = "gspi_oc3"  # with the travel and power deviation of the limit
 WIND = "wind_[m/s]"
 MORE = 1.02  # ratios of travel and power deviation above this are more than those of gspi_oc3
 TORQUE_TRAVEL = "torque_travel_[kN-m/s]"
 MOVED = 1.5  # ratio of torque travel to that of gspi_oc3 above which a controller uses the torque
-FREE = {
-    "time",
-    "generator_torque",
-    "generator_speed",
-    "plant_model",
-}  # own commands; speed and plant are in all
+FREE = {"time", "generator_torque", "generator_speed", "plant_model"}  # inputs that every limit has
 AHEAD = "_preview_"  # in the names of limits
 
 
 def read_bound(path=None):
-    """bound_table of a file that fowt design bound wrote; None: the one of this package."""
+    """Return the bound_table of a file of fowt design bound; None: that of this package."""
     file = BOUND if path is None else Path(path)
     if not file.is_file():
         raise InputError(
@@ -53,19 +48,18 @@ def read_bound(path=None):
 
 
 def limit_for(information, moves_torque, bound, preview_times=()):
-    """Name of the limit in a bound_table that holds a controller; None where the table has none.
+    """Return the name of the limit in a bound_table that applies to a controller; None without one.
 
-    information    what the controller uses: Measurement fields and PRIVILEGED_INPUTS (fowt_env.control)
+    information    inputs of the controller: Measurement fields and PRIVILEGED_INPUTS (fowt_env.control)
     moves_torque   whether it uses the generator torque above rated wind
-    preview_times  s for which it knows the wind ahead; none with "wind_preview": the longest of the table
-
+    preview_times  of the wind, s; () with "wind_preview": the longest of the table
     Preview counts as exact, and the next longer one of the table is taken: that of the same sensors, or else
-    of all states, which is less than 1 % from it.
+    of all states, which differs by less than 1 %.
     """
     used = set(information) - FREE
     ahead = "wind_preview" in used
     if ahead:
-        used -= {"wind_preview", "wind_speed"}  # the wind of now is the first of what is ahead
+        used -= {"wind_preview", "wind_speed"}  # the preview begins with the present wind
     known = [name for name, (_, sensors) in KNOWN.items() if sensors is None or used <= set(sensors)]
     name, end = known[-1], "" if moves_torque else PITCH_ONLY
     limits = set(bound["information"])
@@ -82,16 +76,15 @@ def limit_for(information, moves_torque, bound, preview_times=()):
 
 
 def bound_fractions(table, bound, groups=None, agents=None, information=None):
-    """DataFrame: per agent or group, each of its training seeds and wind: fraction of its limit reached.
+    """Return a DataFrame: per agent or group, training seed and wind, the fraction of its limit reached.
 
-    table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents as
-    scores.grouped takes them. information: {label: (inputs, preview_times)} of controllers; others are asked
-    themselves, and those that cannot be are held against full information. Columns: agent, seed_of (label
-    of the training seed; "" for the agent as a whole, whose ratios are the means over its seeds), ratios of
-    linear_bound.RATIOS (mean over the weather seeds on which both succeeded), limit (name of limit_for),
-    of_limit_[-] (NaN: no better than gspi_oc3, or none of the limit's winds), within (no more travel and
-    power deviation than gspi_oc3's). A group is held against the limit of its first member.
-    Raises: InputError without gspi_oc3, without cases at winds of the limit, or where no run succeeded.
+    table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents: as in scores.grouped.
+    information: {label: (inputs, preview_times)}; other controllers declare it, or count as having full
+    information. Columns: agent, seed_of (label of the training seed; "" for the means over the seeds), ratios
+    of linear_bound.RATIOS (mean over the weather seeds on which both succeeded), limit (name of limit_for),
+    of_limit_[-] (NaN: no better than gspi_oc3, or not at a wind of the limit), within (no more travel and
+    power deviation than gspi_oc3's). A group has the limit of its first member.
+    Raises: InputError without gspi_oc3, without cases at winds of the limit, or if no run succeeded.
     """
     chosen = grouped(table, [BASELINE], groups, agents)
     winds = set(bound[WIND])
@@ -120,29 +113,27 @@ def bound_fractions(table, bound, groups=None, agents=None, information=None):
 
 
 def declared(label):
-    """(inputs, preview_times) that a controller declares, by its label in a table.
+    """Return (inputs, preview_times) that a controller declares, by its label in a table.
 
-    Code of the user's own is not run for it, and labels may name what is no longer there: such a controller
-    counts as knowing all but the wind ahead.
+    The user's code is not run, and a label may name a file that no longer exists: such a controller counts as
+    having full information without preview.
     """
     if ":" not in label or label.startswith((POLICY, DESIGN)):
-        try:
+        with suppress(InputError):
             controller = make(label, read_turbine("nrel5mw"), 0.1)
-        except InputError:
-            return ("surge",), ()
-        return tuple(controller.information), tuple(getattr(controller, "preview_times", ()))
+            return tuple(controller.information), tuple(getattr(controller, "preview_times", ()))
     return ("surge",), ()
 
 
 def _moves_torque(good, base, labels):
-    """Whether controllers move the torque more than MOVED times as much as gspi_oc3 on the same runs."""
+    """Return whether the torque travel is more than MOVED times that of gspi_oc3 on the same runs."""
     own = good[good["controller"].isin(labels)].merge(base[[*KEY[1:], TORQUE_TRAVEL]], on=KEY[1:])
     travels = own[[f"{TORQUE_TRAVEL}_x", f"{TORQUE_TRAVEL}_y"]].mean()
     return bool(travels.iloc[0] > MOVED * travels.iloc[1])
 
 
 def _wind(case):
-    """Wind speed at the end of a case's name, or NaN."""
+    """Return the wind speed at the end of a case's name, or NaN."""
     try:
         return float(case.rpartition("_")[2])
     except ValueError:
@@ -150,7 +141,7 @@ def _wind(case):
 
 
 def _ratios(own, base, label):
-    """ratio_table of one label over gspi_oc3 on the runs that both have."""
+    """Return the ratio_table of one label over gspi_oc3 on their common runs."""
     shared = own.merge(base[KEY[1:]], on=KEY[1:])[KEY[1:]]
     if shared.empty:
         return pd.DataFrame()
@@ -160,7 +151,7 @@ def _ratios(own, base, label):
 
 
 def _with_fractions(ratios, bound, limit):
-    """The ratios with the name of the limit and their fractions of it."""
+    """Return the ratios with the name of the limit and their fractions of it."""
     found = [
         float("nan") if limit is None else fraction_of_bound(bound, wind, speed, lean, limit)
         for wind, speed, lean in ratios[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
@@ -169,10 +160,10 @@ def _with_fractions(ratios, bound, limit):
 
 
 def bound_markdown(fractions):
-    """Markdown text of bound_fractions: agents by winds; in brackets where travel or power deviation is more.
+    """Return the markdown table of bound_fractions: agents by winds.
 
-    A group has the range over its training seeds behind the fraction of its mean ratios; "worse" is a
-    controller that is no better than gspi_oc3 in either deviation, "-" one without a limit of its kind.
+    [0.9]: more travel or power deviation than gspi_oc3; (0.8 to 0.9): range over the training seeds of a
+    group; "worse": no better than gspi_oc3 in either deviation; "-": no limit for its information.
     """
     rows = {}
     winds = sorted(fractions[WIND].unique())
@@ -188,7 +179,7 @@ def bound_markdown(fractions):
 
 
 def _cell(whole, seeds):
-    """Text of one agent at one wind."""
+    """Return the text of one agent at one wind."""
     column = "of_limit_[-]"
     if whole.empty or whole["limit"].iloc[0] == "none":
         return "-"

@@ -5,6 +5,7 @@ import numpy as np
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.failures import known_figures, lost_text
 from fowt_env.training.evaluation.run_case import OK
+from fowt_env.training.reports.metric_words import counted
 from fowt_env.visual.style import (
     COLOURS,
     FAINT,
@@ -39,7 +40,7 @@ ROOM = 0.6  # of the distance between two cases that the marks of one may take
 
 
 def metric_title(name):
-    """What a metric is, with its unit: of TITLES, else made of its name."""
+    """Return the title of a panel: that of TITLES, else the metric's name with its unit."""
     if name in TITLES:
         return TITLES[name]
     text, _, unit = name.rpartition("_[")
@@ -47,7 +48,7 @@ def metric_title(name):
 
 
 def plot_evaluation(table, metrics, path=None, title=None):
-    """Figure with one panel per metric: a group of marks for each case, one mark per controller.
+    """Plot one panel per metric: a group of marks for each case, one mark per controller.
 
     table      the DataFrame of training.evaluation.evaluate.evaluate; lost runs are left out, and counted
     metrics    column names; marks are the mean over the seeds, bars reach from least to greatest
@@ -112,14 +113,13 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours: 56 pa
 
 
 def plot_pareto(board, path=None, title=None, order=()):
-    """Figure of rotor-speed std (x) against platform-pitch std (y) of each controller over the baseline's.
+    """Plot rotor-speed std (x) against platform-pitch std (y) of each controller, as ratios to the baseline.
 
-    board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that
-    both finished; with too few seeds there are none. The mark's area is its mean blade-pitch rate; that of a
-    controller with lost runs is hollow, and of the others. The stepped line joins the controllers without
-    lost runs that no other betters in both. Without a baseline the axes are rpm
-    and deg, and the bars the intervals of the means or, with too few seeds for one, lines without ends
-    over the range of the seeds. order: controllers as other plots have them, whose colours are then the same.
+    board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that both
+    finished; with too few seeds there are none. The mark's area is the mean blade-pitch rate; hollow: the
+    controller has lost runs. The stepped line is the Pareto front of those without lost runs. Without a
+    baseline the axes are rpm and deg, and the bars the intervals of the means or, with too few seeds, lines
+    without ends over the range of the seeds. order: controllers in the order (and colours) of other plots.
     """
     order = list(dict.fromkeys([*order, *(entry["controller"] for entry in board["controllers"])]))
     kept = []
@@ -137,7 +137,7 @@ def plot_pareto(board, path=None, title=None, order=()):
     points = np.array([point for point, _, _ in places])
     rates = np.array([figures[2]["mean"] for _, figures in kept])
     areas = np.maximum(LARGEST_MARK * rates / max(rates.max(), 1e-9), SMALLEST_MARK)
-    whole = [not entry["lost"] for entry, _ in kept]  # a controller that lost runs betters nobody
+    whole = [not entry["lost"] for entry, _ in kept]  # one that lost runs dominates no other
     front = _undominated(points[whole])
     if len(front) > 1:
         axes.step(*front.T, where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
@@ -186,25 +186,20 @@ def plot_pareto(board, path=None, title=None, order=()):
     )
     for handle in legend.legend_handles:
         handle.set_sizes([40.0])
-    level, cases, seeds = (
-        round(100 * board["interval"]["level"]),
-        len(board["cases"]),
-        len(board.get("seeds", ())),
-    )
-    text = f"means over {cases} case{'' if cases == 1 else 's'}"
+    level = round(100 * board["interval"]["level"])
+    text = f"means over {counted(len(board['cases']), 'case')}"
     text += f"; bars: {level} % intervals of the paired ratio" if "ratio" in drawn else ""
     text += f"; bars: {level} % intervals" if "mean" in drawn else ""
     text += "; lines: range over the seeds, too few for an interval" if "seeds" in drawn else ""
-    text += (
-        f"; {seeds} seed{'' if seeds == 1 else 's'}: no interval" if base is not None and not drawn else ""
-    )
+    if base is not None and not drawn:
+        text += f"; {counted(len(board.get('seeds', ())), 'seed')}: no interval"
     figure.suptitle(f"{title}\n{text}" if title else text, fontsize=9, color=INK, x=0.01, ha="left")
     _label_marks(figure, axes, [names[entry["controller"]] for entry, _ in kept], points, areas, places)
     return save_figure(figure, path)
 
 
 def _absolute_axes(axes, speed, pitch):
-    """The same scales in rpm and deg, on the top and on the right."""
+    """Add the scales in rpm and deg, on the top and on the right."""
     top = axes.secondary_xaxis("top", functions=(lambda x: x * speed, lambda x: x / speed))
     right = axes.secondary_yaxis("right", functions=(lambda y: y * pitch, lambda y: y / pitch))
     for other, name, set_label in (
@@ -218,7 +213,7 @@ def _absolute_axes(axes, speed, pitch):
 
 
 def _place(entry, figures, base, baseline):
-    """(point (2,), bars (2, 2, 1) or None, "ratio", "mean" or "seeds") of a controller."""
+    """Return (point (2,), bars (2, 2, 1) or None, "ratio", "mean", "seeds" or "") of a controller."""
     if base is not None and entry["controller"] == baseline:
         return np.ones(2), None, ""
     if base is not None:
@@ -241,20 +236,20 @@ def _place(entry, figures, base, baseline):
 
 
 def _ratio_ends(gap, share):
-    """(low, high) of 1 + difference/baseline; a ratio of deviations is never negative."""
+    """Return (low, high) of 1 + difference/baseline; a ratio of deviations is never negative."""
     if gap["low"] != gap["low"] or gap["mean"] == 0.0:
         return (np.nan, np.nan) if gap["low"] != gap["low"] else (1.0, 1.0)
     return tuple(max(0.0, 1.0 + share * gap[end] / gap["mean"]) for end in ("low", "high"))
 
 
 def _undominated(points):
-    """The points (n, 2) that no other betters in both figures, from left to right."""
+    """Return the points (n, 2) of the Pareto front, from left to right."""
     kept = [p for p in points if not ((points <= p).all(axis=1) & (points < p).any(axis=1)).any()]
     return np.array(sorted(map(tuple, kept)))
 
 
 def _label_marks(figure, axes, names, points, areas, places):
-    """Write each name beside its mark, where it covers no mark, bar or other name if such a place exists."""
+    """Write each name beside its mark, if possible without covering a mark, bar or other name."""
     from matplotlib.patheffects import withStroke
 
     figure.draw_without_rendering()  # settles the layout, and with it where the marks are

@@ -1,9 +1,9 @@
-"""One self-contained HTML page of an evaluation: table, plots, schedule, provenance.
+"""A self-contained HTML page of an evaluation: table, plots, schedule, provenance.
 
     from fowt_env.training.reports.html_page import write_report
     write_report("results/above_rated")
 
-The page holds its data and plotly.js, and asks nothing of a network. Needs plotly:
+The page contains its data and plotly.js, and loads nothing from a network. Needs plotly:
 pip install "fowt-env[report]".
 """
 
@@ -20,24 +20,22 @@ from fowt_env.descriptions.files import parse_json
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table
-from fowt_env.training.evaluation.bootstrap import LEAST_SEEDS, LEVEL, lifetime_means
+from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.evaluate import run_file
 from fowt_env.training.evaluation.failures import known_figures, lost_counts, lost_text
-from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
+from fowt_env.training.evaluation.leaderboard_file import Interval, check_leaderboard
 from fowt_env.training.evaluation.metrics import better, mean_exponent
 from fowt_env.training.evaluation.results_table import KEY, WEIGHT, WORDS, case_shares, read_results
 from fowt_env.training.evaluation.run_case import OK
-from fowt_env.training.reports.metric_words import SHORT, about_metric, short_name
+from fowt_env.training.reports.metric_words import SHORT, about_metric, counted, seeds_text, short_name
 from fowt_env.training.reports.page_policy import content_policy
 from fowt_env.training.reports.page_words import (
     case_conditions,
     conditions_table,
     conditions_text,
-    counted,
     described_cases,
     lost_list,
     lost_runs,
-    numbers_text,
     page_lead,
     page_title,
     provenance,
@@ -47,23 +45,18 @@ from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
-PAGE_METRICS = tuple(SHORT)  # that the leaderboard shows at once, those of them that the table has
+PAGE_METRICS = tuple(SHORT)  # columns of the leaderboard before "all metrics" is chosen
 PARETO_AXES = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]")  # across, up, size
 ALL_CASES = ""
-# what the shown size allows; stated on the page
 DISPLAY_RATE = 2.0  # Hz
 MAX_POINTS = 3000  # of one drawn series
-MAX_SERIES_RUNS = 120  # whose time series are in the page, unless cases or seeds are named
+MAX_SERIES_RUNS = 120  # with time series in the page, unless cases or seeds are named
 SPECTRUM_RANGE = (0.002, 1.0)  # Hz
 SPECTRUM_SPAN = 1e-6  # of the peak, down to which the axis reaches
 PERCENTILES = (1.0, 25.0, 50.0, 75.0, 99.0)
-SAMPLED_CHANNELS = (  # channels whose samples have boxes
-    "RotSpeed_[rpm]",
-    "GenPwr_[kW]",
-    "PtfmPitch_[deg]",
-    "PtfmSurge_[m]",
-    "BldPitch1_[deg]",
-    "FAIRTEN1_[kN]",
+SAMPLED_CHANNELS = (  # of the box plots
+    *("RotSpeed_[rpm]", "GenPwr_[kW]", "PtfmPitch_[deg]"),
+    *("PtfmSurge_[m]", "BldPitch1_[deg]", "FAIRTEN1_[kN]"),
 )
 # m/s
 SCHEDULE_WINDS = (4.0, 6.0, 8.0, 10.0, 11.0, 11.5, 12.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0, 25.0)
@@ -80,22 +73,22 @@ SCHEDULE = (
 def write_report(
     folder, out=None, cases=None, seeds=None, rate=None, platform=None, schedule=True, progress=None
 ):
-    """Path of the HTML page written of an evaluation's folder.
+    """Write the HTML page of an evaluation's folder; return its path.
 
-    folder     holds results.csv (or metrics.csv) and runs/<controller>/<case>_seed<n>.parquet; its
-               leaderboard.json and manifest.json are used where they are there
+    folder     contains results.csv (or metrics.csv) and runs/<controller>/<case>_seed<n>.parquet, and
+               optionally leaderboard.json and manifest.json
     out        the page; None: report.html in the folder
-    cases      names of the cases whose time series go into the page; None: all
-    seeds      whose time series go in; None: all. With neither named at most MAX_SERIES_RUNS runs do: the
-               first seed of each case (of evenly chosen cases, if those are too many), then the further ones
-    rate       samples per second of the drawn series, means over their interval; None: DISPLAY_RATE, or
-               what MAX_POINTS allow
-    platform   whose steady schedule is shown; None: that of the manifest's cases, else oc3_hywind; where its
-               file cannot be read here, the page says so in place of the schedule
-    schedule   whether there is one (it takes some seconds)
+    cases      names of the cases with time series; None: all
+    seeds      seeds with time series; None: all. With neither, at most MAX_SERIES_RUNS runs have them: the
+               first seed of each case (of evenly spaced cases, if these are too many), then further seeds
+    rate       samples per second of the series, means over their interval; None: DISPLAY_RATE, or what
+               MAX_POINTS allow
+    platform   of the steady schedule; None: that of the manifest's cases, else oc3_hywind; if its file
+               cannot be read here, the page says so in place of the schedule
+    schedule   whether the page has a steady schedule (some seconds)
     progress   called as progress(done, total, text)
     Raises: InputError for a folder without results, a table or run that cannot be read, an unknown case
-    or seed, or where plotly is missing.
+    or seed, or if plotly is missing.
     """
     plotly_script = _plotly_script()
     folder = Path(folder)
@@ -107,7 +100,8 @@ def write_report(
     if not folder.is_dir():
         raise InputError(f"results {str(folder)!r} is no folder: make one with fowt evaluate --out FOLDER")
     table = read_results(folder)
-    board_file, manifest = _leaderboard(folder / "leaderboard.json"), _json_file(folder / "manifest.json")
+    manifest, path = _json_file(folder / "manifest.json"), folder / "leaderboard.json"
+    board_file = check_leaderboard(_json_file(path), path) if path.is_file() else None
     say = progress or (lambda done, total, text: None)
     chosen = _chosen_runs(table, cases, seeds)
     runs = _read_runs(folder, table, chosen, described_cases(manifest), rate, say)
@@ -127,7 +121,7 @@ def write_report(
 
 
 def _plotly_script():
-    """plotly.js itself. Raises: InputError that names the extra to install."""
+    """Return plotly.js. Raises: InputError that names the extra to install."""
     try:
         from plotly.offline import get_plotlyjs
     except ImportError as error:
@@ -136,7 +130,7 @@ def _plotly_script():
 
 
 def _json_file(path):
-    """Mapping in a JSON file, {} without one. Raises: InputError for a file that holds something else."""
+    """Return the mapping of a JSON file, {} without one. Raises: InputError for any other content."""
     if not path.is_file():
         return {}
     try:
@@ -144,31 +138,20 @@ def _json_file(path):
     except ValueError as error:
         raise InputError(f"file {str(path)!r} is not JSON: {error}") from None
     if not isinstance(value, dict):
-        raise InputError(f"file {str(path)!r}: must hold a mapping")
+        raise InputError(f"file {str(path)!r}: must contain a mapping")
     return value
 
 
-def _leaderboard(path):
-    """LeaderboardFile, or None without the file. Raises: InputError for a file that holds something else."""
-    return check_leaderboard(_json_file(path), path) if path.is_file() else None
-
-
 def _chosen_runs(table, cases, seeds):
-    """Rows of the runs whose time series go into the page."""
+    """Return the rows of the runs with time series in the page."""
     known = list(dict.fromkeys(table["case"]))
-    for case in cases or ():
-        if case not in known:
-            raise unknown("case of the results", case, known)
-    there = set(table["seed"])
-    for seed in seeds or ():
-        if seed not in there:
-            raise unknown("seed of the results", seed, there)
-    if cases is not None:
-        table = table[table["case"].isin(cases)]
-    if seeds is not None:
-        table = table[table["seed"].isin(seeds)]
+    for what, names in (("case", cases), ("seed", seeds)):
+        for name in names or ():
+            if name not in set(table[what]):
+                raise unknown(f"{what} of the results", name, list(dict.fromkeys(table[what])))
     if cases is not None or seeds is not None:
-        return table
+        kept = table["case"].isin(known if cases is None else cases)
+        return table[kept & (True if seeds is None else table["seed"].isin(seeds))]
     # one group of runs for each case and seed: the first seed of every case, the second, ...
     turn = table.groupby("case")["seed"].rank(method="dense")
     groups = [rows.index for _, rows in table.groupby([turn, table["case"].map(known.index)])]
@@ -183,11 +166,10 @@ def _chosen_runs(table, cases, seeds):
 
 
 def _read_runs(folder, table, chosen, about, rate, say):
-    """{"series": {case: {seed: {controller: drawn run}}}, "pool", "quantiles", "rates" in Hz, "missing": n}.
+    """Return {"series": {case: {seed: {controller: run}}}, "pool", "quantiles", "rates" (Hz), "missing": n}.
 
-    Every run is read once: its samples count in the boxes, and if it is a chosen one it is drawn.
-    about: {case: mapping} of the manifest. pool: codes of the drawn series, each once, in which a series has
-    its place.
+    Every run is read once: for the box plots, and for its time series if it is a chosen one.
+    about: {case: mapping} of the manifest. pool: codes of the series, each once; a series has its index.
     """
     drawn, pool = set(chosen.index), {}
     periods = {case: _pitch_period(each.get("platform")) for case, each in about.items()}
@@ -219,7 +201,7 @@ def _read_runs(folder, table, chosen, about, rate, say):
 
 
 def _pitch_period(platform):
-    """Natural period (s) in platform pitch of a platform's file; None: none, or no such file here."""
+    """Return the natural period (s) in platform pitch of a platform's file; None: none, or no such file."""
     try:
         return platform_pitch_period(str(platform))
     except InputError:
@@ -227,7 +209,7 @@ def _pitch_period(platform):
 
 
 def _skipped(row, frame, about):
-    """Seconds at the start of a run that are not scored: the manifest's, else what the table implies."""
+    """Return the seconds at the start of a run that are not scored, of the manifest or the table."""
     if is_number(about.get("skip")):
         return float(max(0.0, about["skip"]))
     scored = row.get("scored_[s]", float("nan"))
@@ -236,7 +218,7 @@ def _skipped(row, frame, about):
 
 
 def _drawn_run(frame, skip, rate, pitch_period, pool):
-    """({"series", "spectra", "marks", "start", "skip"} of one run, samples per second that are drawn)."""
+    """Return ({"series", "spectra", "marks", "start", "skip"} of one run, samples per second)."""
     time = frame[TIME].to_numpy(dtype=float)
     step = (time[-1] - time[0]) / (len(time) - 1)
     wanted = DISPLAY_RATE if rate is None else rate
@@ -267,16 +249,16 @@ def _drawn_run(frame, skip, rate, pitch_period, pool):
 
 
 def _block_means(values, block):
-    """Means over `block` samples each; a shorter rest at the end is left out."""
+    """Return the means over `block` samples each; a shorter rest at the end is left out."""
     if block == 1:
         return values
     return values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
 
 
 def _packed(values, start, step, pool):
-    """Evenly spaced values as 16-bit codes between their bounds, in base64 in a pool; code 0 is missing.
+    """Return evenly spaced values as 16-bit codes between their bounds, in base64; code 0 is missing.
 
-    pool: {codes: place}, to which they are added; the weather of all controllers is there once.
+    pool: {codes: index}, to which they are added, so that equal series (the weather) are stored once.
     """
     finite = np.isfinite(values)
     low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)
@@ -289,37 +271,35 @@ def _packed(values, start, step, pool):
 
 
 def _rounded(values):
-    """Floats with six digits, NaN as None: what JSON can hold."""
+    """Return floats with six digits, and None for NaN, which JSON lacks."""
     return [float(f"{v:.6g}") if v is not None and np.isfinite(v) else None for v in values]
 
 
 def _rounded_items(values):
-    """The mapping with its floats rounded, without those that are None."""
+    """Return the mapping with its floats rounded, without None."""
     return {name: float(f"{value:.6g}") for name, value in values.items() if value is not None}
 
 
 def _platform_of(manifest):
-    """Platform of a manifest's cases where they name a single one, else oc3_hywind."""
-    cases = manifest.get("cases")
-    described = cases.values() if isinstance(cases, dict) else ()
-    named = {case.get("platform") for case in described if isinstance(case, dict)} - {None}
+    """Return the only platform of a manifest's cases, else oc3_hywind."""
+    named = {case.get("platform") for case in described_cases(manifest).values()} - {None}
     only = named.pop() if len(named) == 1 else None
     return only if isinstance(only, str) else "oc3_hywind"
 
 
-def _schedule(asked, own, say):
-    """{"platform", "wind", "panels"} of the steady operating points over wind speed.
+def _schedule(chosen, default, say):
+    """Return {"platform", "wind", "panels"} of the steady operating points over wind speed.
 
-    Of the platform that was asked for, else of the evaluation's own: {"platform", "missing": why} where that
-    is a file of another place.
+    chosen: platform, or None for the default, that of the evaluation; if the default has no file here:
+    {"platform", "missing": why}.
     """
     import fowt_env
 
-    platform = asked or own
+    platform = chosen or default
     try:
         fowt_env.build_scene(platform)
     except InputError as error:
-        if asked:
+        if chosen:
             raise
         return {"platform": platform, "missing": str(error)}
     points = []
@@ -333,27 +313,24 @@ def _schedule(asked, own, say):
 
 
 def _metric_columns(table):
-    """[{name, label, unit, headline, better, about}] of the table's metrics, the headline ones first."""
+    """Return [{name, label, unit, headline, better, about}] of the metrics, headline ones first."""
     names = [name for name in table.columns if name not in NO_METRIC and table[name].notna().any()]
     first = [name for name in PAGE_METRICS if name in names]
-    columns = []
-    for name in [*first, *(name for name in names if name not in first)]:
-        _, _, unit = name.partition("_[")
-        columns.append(
-            {
-                "name": name,
-                "label": short_name(name),
-                "unit": unit.removesuffix("]"),
-                "headline": name in first or not first,
-                "better": better(name),
-                "about": f"{about_metric(name)} ({name})",
-            }
-        )
-    return columns
+    return [
+        {
+            "name": name,
+            "label": short_name(name),
+            "unit": name.partition("_[")[2].removesuffix("]"),
+            "headline": name in first or not first,
+            "better": better(name),
+            "about": f"{about_metric(name)} ({name})",
+        }
+        for name in [*first, *(name for name in names if name not in first)]
+    ]
 
 
 def _means(table, metrics, case):
-    """Leaderboard rows from the table alone: lifetime means of the runs that ended well."""
+    """Return leaderboard rows from the table alone: lifetime means of the runs that ended well."""
     rows = []
     part = known_figures(table if case == ALL_CASES else table[table["case"] == case], metrics)
     exponents = np.array([mean_exponent(name) for name in metrics])
@@ -362,24 +339,18 @@ def _means(table, metrics, case):
         by_case = (group[metrics] ** exponents).groupby(group["case"]).mean().reindex(cases).to_numpy()
         shares = np.ones(1) if case != ALL_CASES else case_shares(group, cases)
         means = lifetime_means(by_case[:, None] ** (1.0 / exponents), np.ones((1, 1)), shares, exponents)[0]
-        whole = set(group.loc[group["status"] == OK, "case"]) == set(cases)  # else no lifetime is known
+        whole = set(group.loc[group["status"] == OK, "case"]) == set(cases)  # else there is no lifetime mean
         values = dict(zip(metrics, _rounded(means if whole else np.full_like(means, np.nan)), strict=True))
-        rows.append(
-            {"controller": controller, "runs": len(group), **_lost(group["status"]), "values": values}
-        )
+        counts = lost_counts(group["status"])
+        lost = {"lost": sum(counts.values()), "lost_text": lost_text(counts)}
+        rows.append({"controller": controller, "runs": len(group), **lost, "values": values})
     return rows
 
 
-def _lost(statuses):
-    """{"lost": how many of some runs were, "lost_text": of which kinds}."""
-    counts = lost_counts(statuses)
-    return {"lost": sum(counts.values()), "lost_text": lost_text(counts)}
-
-
 def _board_rows(board, case):
-    """Leaderboard rows of a LeaderboardFile: means and paired differences, with their intervals.
+    """Return leaderboard rows of a LeaderboardFile: means and paired differences, with their intervals.
 
-    p: {metric: p-value} of the tested differences, corrected for their number; {} where none is tested.
+    p: {metric: p-value} of the tested differences, corrected for their number; {}: none is tested.
     """
     rows = []
     for entry in board.controllers:
@@ -410,70 +381,69 @@ def _board_rows(board, case):
 
 
 def _intervals(figures):
-    """{metric: [low, high]} of those that have an interval."""
+    """Return {metric: [low, high]} of the intervals."""
     known = {name: (f.low, f.high) for name, f in figures.items() if None not in (f.low, f.high)}
     return {name: _rounded(ends) for name, ends in known.items()}
 
 
 def _board(table, board_file, metrics):
-    """{case: rows} of the leaderboard, from leaderboard.json where it is there."""
+    """Return {case: rows} of the leaderboard, from leaderboard.json if it exists."""
     cases = [ALL_CASES, *dict.fromkeys(table["case"])]
     if board_file is None:
         return {case: _means(table, metrics, case) for case in cases}
     return {case: _board_rows(board_file, case) for case in cases}
 
 
-def _least_seeds(board_file):
-    """Number of seeds from which on there are intervals and tests."""
-    known = board_file is not None and board_file.interval is not None
-    return board_file.interval.least_seeds if known else LEAST_SEEDS
+def _interval(board_file):
+    """Return the Interval of a leaderboard.json, or the default without that file."""
+    return Interval() if board_file is None else board_file.interval
 
 
 def _remark(table, board_file, case):
-    """What the rows of the leaderboard are made of, in a line."""
+    """Return a line on runs, cases, seeds and tests of the leaderboard."""
     part = table if case == ALL_CASES else table[table["case"] == case]
     seeds = sorted(set(part["seed"]))
-    text = f"{counted(len(part), 'run')}, {counted(part['case'].nunique(), 'case')}, "
-    text += f"{'seed' if len(seeds) == 1 else 'seeds'} {numbers_text(seeds)}."
+    text = f"{counted(len(part), 'run')}, {counted(part['case'].nunique(), 'case')}, {seeds_text(seeds)}."
     if board_file is None:
         return f"{text} Means only: the folder has no leaderboard.json with intervals and differences."
-    if len(seeds) < _least_seeds(board_file):
+    if len(seeds) < board_file.interval.least_seeds:
         count = "a single seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-        return f"{text} No intervals and no tests: {count} of the {_least_seeds(board_file)} they need."
+        return (
+            f"{text} No intervals and no tests: {count} of the {board_file.interval.least_seeds} they need."
+        )
     if case != ALL_CASES and board_file.baseline is not None:
         return f"{text} Differences are tested over all cases together, not case by case."
     return text
 
 
 def _fine_print(board_file):
-    """HTML of what stands under the question mark of the leaderboard."""
+    """Return HTML of the help text of the leaderboard."""
     lines = [
-        "Choose a heading to sort by it; it also says what the metric is. Bold: the best of a column, among"
+        "Choose a heading to sort by it; it also explains the metric. Bold: the best of a column, among"
         " controllers that lost no run."
     ]
+    level = _interval(board_file).level
+    names = ", ".join(short_name(name) for name in TESTED)
     if board_file is None:
         lines.append("Means over the lifetime, of the runs that ended well.")
-        return "".join(f"<p>{line}</p>" for line in lines)
-    level = LEVEL if board_file.interval is None else board_file.interval.level
-    names = ", ".join(short_name(name) for name in TESTED)
-    if board_file.baseline is not None:
+    elif board_file.baseline is not None:
         lines += [
             f"Differences are paired: each run against that of {html.escape(board_file.baseline)} in the same"
             " wind and waves.",
             "* significant: without a real difference, one as large would be found with a probability of at"
             f" most {1.0 - level:.2g} (p-value with Holm's correction over the {len(TESTED)} tested metrics:"
             f" {names})."
-            " Without a star a difference may be chance; it is not shown to be none.",
+            " Without a star a difference may be due to chance, which does not prove that there is none.",
             '<span class="better">✓ better</span> and <span class="worse">✗ worse</span> than the baseline;'
             " grey: tested and not significant; regular weight: not tested.",
         ]
-    if board_file.interval is not None:
+    if _interval(board_file).method:
         lines.append(f"Intervals: {100 * level:g} %, {html.escape(board_file.interval.method)}.")
     return "".join(f"<p>{line}</p>" for line in lines)
 
 
 def _page_data(table, board_file, manifest, runs, schedule):
-    """Mapping that the page's script reads."""
+    """Return the mapping that the page's script reads."""
     metrics = _metric_columns(table)
     names = [metric["name"] for metric in metrics]
     board = _board(table, board_file, names)
@@ -504,8 +474,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         "controllers": list(dict.fromkeys(table["controller"])),
         "ranked": ranked,
         "baseline": None if board_file is None else board_file.baseline,
-        "alpha": 1.0
-        - (LEVEL if board_file is None or board_file.interval is None else board_file.interval.level),
+        "alpha": 1.0 - _interval(board_file).level,
         "shares": shares,
         "cases": cases,
         "seeds": {case: [str(seed) for seed in sorted(each)] for case, each in seeds.items()},
@@ -532,21 +501,18 @@ def _page_data(table, board_file, manifest, runs, schedule):
 
 
 def _embedded_json(data):
-    """JSON that can stand inside a script element: no < that could end it, and no NaN."""
+    """Return JSON for a script element: without NaN, and without a < that could end the element."""
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
-    """{placeholder: HTML} of what the page says in words; every name is escaped."""
-    all_cases = len(data["cases"])
-    series = "The samples are means over 1/rate seconds; the files under runs/ hold every sample."
+    """Return {placeholder: HTML} of the page's texts; every name is escaped."""
+    series = "The samples are means over 1/rate seconds; the files under runs/ contain every sample."
     shown = sum(len(each) for each in runs["series"].values())
     known = sum(map(len, data["seeds"].values()))
     rates = " or ".join(f"{rate:g}" for rate in runs["rates"]) or "no"
-    scope = (
-        f"{shown} of {known} combinations of case and seed are in this page, at {rates} samples per second."
-    )
+    scope = f"{shown} of {known} combinations of case and seed are shown, at {rates} samples per second."
     if shown < known:
         scope += " Others: fowt report FOLDER --cases NAME --seeds 1,2."
     if runs["missing"]:
@@ -556,11 +522,11 @@ def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
         "lead": page_lead(table, manifest),
         "controllers": ", ".join(data["controllers"]),
         "series_remark": f"{scope} {series}",
-        "case_count": counted(all_cases, "case"),
+        "case_count": counted(len(data["cases"]), "case"),
     }
     return {
         **{name: html.escape(text) for name, text in texts.items()},
-        "verdict": verdict(board_file, table["seed"].nunique(), _least_seeds(board_file)),
+        "verdict": verdict(board_file, table["seed"].nunique(), _interval(board_file).least_seeds),
         "fine_print": _fine_print(board_file),
         "conditions": conditions_table(case_conditions(table, manifest, data["shares"])),
         "failures": lost_list(lost_runs(table), len(table)),
@@ -571,19 +537,16 @@ def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
 
 
 def _schedule_section(schedule):
-    """HTML of the section of the steady schedule, or of why it is not there; "" for none."""
+    """Return HTML of the section of the steady schedule, or why it is missing; "" for none."""
     if not schedule:
         return ""
     where = html.escape(schedule["platform"])
-    body = (
-        f'<p class="remark">Operating points of {where} in steady wind and still water, the platform'
-        " floating.</p>"
-        '<div class="plot" id="schedule-plot"></div>'
-    )
+    remark, plot = f"Operating points of {where} in steady wind and still water, the platform floating.", ""
     if "missing" in schedule:
-        why = html.escape(schedule["missing"])
-        body = (
-            f'<p class="remark">Not shown: {why}. Give another with --platform, or none with'
-            " --no-schedule.</p>"
+        remark = (
+            f"Not shown: {html.escape(schedule['missing'])}. Choose another --platform, or --no-schedule."
         )
+    else:
+        plot = '<div class="plot" id="schedule-plot"></div>'
+    body = f'<p class="remark">{remark}</p>{plot}'
     return f'<section id="schedule"><div class="heading"><h2>Steady schedule</h2></div>{body}</section>'

@@ -1,6 +1,7 @@
-"""Short names of the metrics that reports lead with, and what a reader is told of any metric."""
+"""Words of reports: short names and explanations of metrics, counts and lists of seeds."""
 
 from fowt_env.training.evaluation.metrics import TABLE, better
+from fowt_env.training.evaluation.seeds import ranges
 
 SHORT = {
     "RotSpeed_std_[rpm]": "rotor-speed std",
@@ -9,19 +10,35 @@ SHORT = {
     "torque_travel_[kN-m/s]": "torque travel",
     "RotTorq_DEL_[kN-m]": "shaft-torque DEL",
     "TwrBsMyt_DEL_[kN-m]": "tower-base DEL",
-    "GenPwr_capped_mean_[kW]": "capped power",
+    "GenPwr_capped_mean_[kW]": "power up to rated",
     "GenPwr_max_[kW]": "greatest power",
 }
-DIRECTIONS = {-1: "Less is better.", 0: "Neither more nor less is better by itself.", 1: "More is better."}
+DIRECTIONS = {-1: "Less is better.", 0: "Neither direction is better.", 1: "More is better."}
 
 
 def short_name(metric):
-    """ "rotor-speed std" for "RotSpeed_std_[rpm]"; of a metric without a short name its own, in words."""
+    """Return "rotor-speed std" for "RotSpeed_std_[rpm]"; without a short name, the metric in words."""
     return SHORT.get(metric, metric.partition("_[")[0].replace("_", " "))
 
 
 def about_metric(metric):
-    """What a metric is, its unit and which direction is better, in sentences; of an unknown one its name."""
+    """Return sentences on a metric: meaning, unit, and which direction is better."""
     name, _, unit = metric.partition("_[")
     meaning = TABLE[metric].meaning if metric in TABLE else name.replace("_", " ")
     return f"{meaning[:1].upper()}{meaning[1:]}. Unit: {unit.removesuffix(']')}. {DIRECTIONS[better(metric)]}"
+
+
+def counted(count, noun):
+    """Return "1 case", "2 cases"."""
+    return f"{count} {noun}{'' if count == 1 else 's'}"
+
+
+def numbers_text(values):
+    """Return "1 to 3, 7" for 1, 2, 3, 7."""
+    texts = (str(a) if a == b else f"{a} to {b}" if b > a + 1 else f"{a}, {b}" for a, b in ranges(values))
+    return ", ".join(texts)
+
+
+def seeds_text(seeds):
+    """Return "seed 1", "seeds 1 to 6, 9"."""
+    return f"seed{'' if len(seeds) == 1 else 's'} {numbers_text(seeds)}"

@@ -1,6 +1,6 @@
-"""The Content-Security-Policy of pages whose scripts and styles stand in the file itself.
+"""The Content-Security-Policy of pages with inline scripts and styles.
 
-A script runs only if its hash is in the policy, so that a name which slips through as markup does nothing.
+A script runs only if its hash is in the policy, so that a name that is not escaped as markup has no effect.
 """
 
 import base64
@@ -8,10 +8,10 @@ import hashlib
 
 
 def content_policy(scripts=(), styles=(), dynamic_styles=False):
-    """Text of the policy's meta tag: these scripts and styles, pictures made by the page, and no network.
+    """Return the policy's meta tag: these scripts and styles, pictures made by the page, and no network.
 
-    scripts, styles   texts of the page's elements, exactly as they stand between the tags
-    dynamic_styles    whether any style may be set: a plotting library makes its own
+    scripts, styles   contents of the page's elements, exactly as between their tags
+    dynamic_styles    whether any style may be set, as plotting libraries do
     """
     style = "'unsafe-inline'" if dynamic_styles else _hashes(styles)
     parts = ["default-src 'none'", f"script-src {_hashes(scripts)}", f"style-src {style}"]
@@ -19,7 +19,7 @@ def content_policy(scripts=(), styles=(), dynamic_styles=False):
 
 
 def _hashes(texts):
-    """Sources of inline texts, "'none'" for none; a parser of HTML reads every line end as a line feed."""
+    """Return the sources of inline texts, "'none'" for none; HTML parsers read line ends as line feeds."""
     plain = (text.replace("\r\n", "\n").replace("\r", "\n").encode("utf-8") for text in texts)
     digests = (base64.b64encode(hashlib.sha256(text).digest()).decode("ascii") for text in plain)
     return " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"

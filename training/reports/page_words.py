@@ -1,6 +1,6 @@
-"""What a report page says in words: title, conditions of the cases, lost runs, provenance.
+"""HTML texts of a report page: title, conditions of the cases, lost runs, provenance.
 
-All of it comes from a results folder, which may be of another's making: every text is escaped here.
+The results folder may come from somebody else: every text is escaped here.
 """
 
 import html
@@ -12,9 +12,9 @@ from fowt_env.descriptions.checks import is_number
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.conditions import sea_text, wind_text
 from fowt_env.training.evaluation.run_case import OK
-from fowt_env.training.evaluation.seeds import ranges
+from fowt_env.training.reports.metric_words import counted, numbers_text, seeds_text
 
-NAMED_CASES = 3  # up to which a title has the names of the cases
+NAMED_CASES = 3  # the most cases that a title names
 WIND_KINDS = {
     "ntm": "normal turbulence (NTM)",
     "etm": "extreme turbulence (ETM)",
@@ -27,30 +27,19 @@ WIND_KINDS = {
 }
 
 
-def numbers_text(values):
-    """1, 2, 3, 7 as "1 to 3, 7"."""
-    texts = (str(a) if a == b else f"{a} to {b}" if b > a + 1 else f"{a}, {b}" for a, b in ranges(values))
-    return ", ".join(texts)
-
-
-def counted(count, noun):
-    """ "1 case", "2 cases"."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
 def described_cases(manifest):
-    """{case: mapping} of a manifest; what is no mapping is left out."""
+    """Return {case: mapping} of a manifest; anything but a mapping is left out."""
     cases = manifest.get("cases")
     found = cases.items() if isinstance(cases, dict) else ()
     return {name: case for name, case in found if isinstance(case, dict)}
 
 
 def page_title(manifest, cases):
-    """What was evaluated: the platform, and the suite or the cases by name or number."""
+    """Return the title: the platform, and the suite or the cases by name or number."""
     about = described_cases(manifest)
     platforms = {str(about[name].get("platform")) for name in cases if name in about} - {"None"}
-    where = f" on {Path(next(iter(platforms))).stem}" if len(platforms) == 1 else ""
-    where = f" on {len(platforms)} platforms" if len(platforms) > 1 else where
+    where = f" on {Path(min(platforms)).stem}" if len(platforms) == 1 else f" on {len(platforms)} platforms"
+    where = where if platforms else ""
     suite = manifest.get("suite")
     if isinstance(suite, dict) and suite.get("name"):
         what = f"suite {suite['name']}" + (f", version {suite['version']}" if "version" in suite else "")
@@ -62,19 +51,18 @@ def page_title(manifest, cases):
 
 
 def page_lead(table, manifest):
-    """The size of an evaluation in one line."""
-    seeds = sorted(set(table["seed"]))
+    """Return the size of an evaluation in one line."""
     parts = [counted(table["controller"].nunique(), "controller"), counted(table["case"].nunique(), "case")]
-    parts += [f"{'seed' if len(seeds) == 1 else 'seeds'} {numbers_text(seeds)}", counted(len(table), "run")]
+    parts += [seeds_text(sorted(set(table["seed"]))), counted(len(table), "run")]
     if isinstance(manifest.get("created"), str):
         parts.append(f"evaluated {manifest['created'][:10]}")
     return " · ".join(parts)
 
 
 def case_conditions(table, manifest, shares=None):
-    """[{heading: text}] of the cases of a table in its order: what each was run in.
+    """Return [{heading: text}] of the conditions of the cases of a table, in its order.
 
-    shares: {case: share of the lifetime}, or None. A case that the manifest does not describe has its seeds.
+    shares: {case: share of the lifetime}, or None. A case that is not in the manifest has only its seeds.
     """
     about, rows = described_cases(manifest), []
     for name, runs in table.groupby("case", sort=False):
@@ -94,7 +82,7 @@ def case_conditions(table, manifest, shares=None):
 
 
 def conditions_text(row):
-    """The conditions of one case as a sentence, for the places where only its name stands."""
+    """Return the conditions of one case as a sentence, for tooltips."""
     parts = [row.get(key) for key in ("wind", "sea", "events")]
     if row.get("duration (s)"):
         parts.append(f"{row['duration (s)']} s, scored from {row.get('scored from (s)') or 0} s")
@@ -103,28 +91,36 @@ def conditions_text(row):
 
 
 def conditions_table(rows):
-    """HTML of a table of case_conditions, without columns that no case fills or a platform all share."""
+    """Return the rows of an HTML table of case_conditions, without empty columns and a common platform."""
     headings = list(dict.fromkeys(heading for row in rows for heading in row))
     kept = [name for name in headings if any(row.get(name) for row in rows)]
     if len({row.get("platform") for row in rows}) == 1 and "platform" in kept:
         kept.remove("platform")
-    head = "".join(f'<th scope="col">{html.escape(name)}</th>' for name in kept)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(row.get(name) or '–')}</td>" for name in kept) + "</tr>"
-        for row in rows
-    )
+    cells = [[html.escape(row.get(name) or "–") for name in kept] for row in rows]
+    return table_rows(map(html.escape, kept), cells)
+
+
+def table_rows(headings, rows, texts=()):
+    """Return the head and body of an HTML table; texts: numbers of the columns of class "text"."""
+
+    def cells(row, tag, scope=""):
+        marks = (' class="text"' if number in texts else "" for number in range(len(row)))
+        return "".join(f"<{tag}{scope}{mark}>{cell}</{tag}>" for mark, cell in zip(marks, row, strict=True))
+
+    head = cells(list(headings), "th", ' scope="col"')
+    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
     return f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
 
 
 def _wind(wind):
-    """Text of a manifest's wind, with the name of its kind spelt out."""
+    """Return the text of a manifest's wind, with the full name of its kind."""
     text = wind_text(wind)
     kind = text.partition(" ")[0].rstrip(",")
     return WIND_KINDS.get(kind, kind) + text[len(kind) :]
 
 
 def _sea(sea):
-    """Text of a manifest's sea, with its peak enhancement."""
+    """Return the text of a manifest's sea, with its peak enhancement."""
     try:
         text = sea_text(sea)
     except InputError:
@@ -134,7 +130,7 @@ def _sea(sea):
 
 
 def _events(case):
-    """Text of what is out of the ordinary in a manifest's case, "" for nothing."""
+    """Return the text of faults, shifts and starts of a manifest's case, "" for none."""
     parts = ["parked"] if case.get("parked") else []
     fault = case.get("fault")
     if isinstance(fault, dict):
@@ -151,20 +147,20 @@ def _number(value):
 
 
 def lost_runs(table):
-    """[(controller, case, seed, text)] of the runs that failed, tripped or lost power, with when and why."""
+    """Return [(controller, case, seed, text)] of lost runs; text: status, time and reason."""
     lost = []
     for row in table[table["status"] != OK].to_dict("records"):
         at = row.get("stopped_[s]")
         when = f" at {at:.1f} s" if is_number(at) and at == at else ""
         when = "" if when in row["reason"] else when
         text = f"{row['status']}{when}: {row['reason']}" if row["reason"] else f"{row['status']}{when}"
-        text = row["reason"] if row["reason"].startswith(f"{row['status']}:") else text  # no word twice
+        text = row["reason"] if row["reason"].startswith(f"{row['status']}:") else text  # not repeated
         lost.append((row["controller"], row["case"], int(row["seed"]), text))
     return lost
 
 
 def lost_list(lost, runs):
-    """HTML of the list of lost runs, "" for none."""
+    """Return HTML of the list of lost runs, "" for none."""
     items = "".join(
         f"<li><b>{html.escape(who)}</b>, {html.escape(case)}, seed {seed}: {html.escape(text)}</li>"
         for who, case, seed, text in lost
@@ -174,7 +170,7 @@ def lost_list(lost, runs):
 
 
 def provenance(folder, table, manifest, board_file):
-    """Rows of the table of provenance, as HTML."""
+    """Return the rows of the table of provenance, as HTML."""
     facts = {"folder": folder.resolve().name}
     if manifest:
         suite = manifest.get("suite")
@@ -188,7 +184,7 @@ def provenance(folder, table, manifest, board_file):
                     f"{name} {_brief(name, value)}" for name, value in manifest[key].items()
                 )
     else:
-        facts["evaluation"] = "the folder has no manifest.json: the versions that made its runs are not known"
+        facts["evaluation"] = "the folder has no manifest.json: the versions of its runs are unknown"
     if board_file is not None and board_file.baseline is not None:
         facts["baseline"] = board_file.baseline
     if "scored_[s]" in table.columns:
@@ -205,7 +201,7 @@ def provenance(folder, table, manifest, board_file):
 
 
 def _case_facts(manifest):
-    """{"trip", "site"} of a manifest's cases and suite, as texts."""
+    """Return {"overspeed trip", "site"} of a manifest's cases and suite, as texts."""
     found = dict.fromkeys(
         f"{_number(case['trip'])} times rated rotor speed"
         for case in described_cases(manifest).values()
@@ -220,7 +216,7 @@ def _case_facts(manifest):
 
 
 def _brief(label, value):
-    """A manifest's value in a few characters: a controller's name, where it has another, and its hash."""
+    """Return a manifest's value as a short text: a controller's name, if it differs, and its hash."""
     if not isinstance(value, dict):
         return str(value)
     words = [str(item) for key, item in value.items() if not (key == "name" and item == label)]
@@ -228,7 +224,7 @@ def _brief(label, value):
 
 
 def _version(name):
-    """Version of an installed package, or "unknown"."""
+    """Return the version of an installed package, or "unknown"."""
     try:
         return version(name)
     except PackageNotFoundError:

@@ -1,12 +1,12 @@
-"""Plots of agents beside baselines and the performance limit, and of one gust under many controllers.
+"""Plots of agents with baselines and the performance limit, and of one gust under many controllers.
 
-As in visual/time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
+As in visual/time_series.py, every function returns a matplotlib Figure and writes it to a path, if any.
 """
 
 from fowt_env.errors import InputError
 from fowt_env.training.design.plots import WIND, finish_bound
-from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
-from fowt_env.visual.time_series import TIME, named_runs
+from fowt_env.visual.style import COLOURS, INK, new_figure, style_axes
+from fowt_env.visual.time_series import TIME, named_runs, plot_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = (
@@ -14,7 +14,7 @@ FRONTS = (
     ("measured", "--", "limit: five sensors"),
     ("full_preview_11", ":", "limit: wind 11 s ahead"),
 )
-FRAME = 1.3  # ends of both axes of plot_fractions
+FRAME = 1.3  # upper end of both axes of plot_fractions
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
 GUST = (  # panels of plot_gust: label, channel
     ("wind\n(m/s)", "Wind1VelX_[m/s]"),
@@ -23,22 +23,22 @@ GUST = (  # panels of plot_gust: label, channel
     ("torque\n(kN m)", "GenTq_[kN-m]"),
     ("power\n(kW)", "GenPwr_[kW]"),
     ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
-    ("tower-base\nmoment (MN m)", "TwrBsMyt_[kN-m]"),
+    ("tower-base\nmoment (kN m)", "TwrBsMyt_[kN-m]"),
     ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
 )
 
 
 def agent_style(number):
-    """(colour, mark) of the number-th of several controllers; no two of the first 84 have both."""
+    """Return (colour, mark) of the number-th of several controllers; those of the first 84 differ."""
     return COLOURS[number % len(COLOURS)], AGENT_MARKERS[number % len(AGENT_MARKERS)]
 
 
 def plot_fractions(fractions, bound, path=None, title=None):
-    """Rotor-speed against platform-pitch deviation over gspi_oc3's, a panel per wind, with the Pareto fronts.
+    """Plot rotor-speed against platform-pitch deviation over gspi_oc3's per wind, with Pareto fronts.
 
-    fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks:
-    agents; small ones of the same kind: their training seeds. Hollow: more travel or power deviation than
-    gspi_oc3, so that the limit does not hold. Agents beyond FRAME stand in the corner with their figures.
+    fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks: agents; small ones:
+    their training seeds. Hollow: more travel or power deviation than gspi_oc3, so that the limit does not
+    apply. Agents outside FRAME are listed in the corner with their ratios.
     """
     from fowt_env.training.design.linear_bound import efficient
 
@@ -75,9 +75,9 @@ def plot_fractions(fractions, bound, path=None, title=None):
 
 
 def _marks(axes, rows, colour, mark, beyond):
-    """Draw one agent at one wind; the number of agents (0 or 1) that lie beyond the frame.
+    """Draw one agent at one wind; return the number of agents (0 or 1) outside the frame.
 
-    Such a one stands as text in the corner, below `beyond` others.
+    Such an agent is written as text in the corner, below `beyond` others.
     """
     outside = 0
     for row in rows.sort_values("seed_of").to_dict("records"):
@@ -99,36 +99,7 @@ def _marks(axes, rows, colour, mark, beyond):
 
 
 def plot_gust(runs, path=None, title=None, start=None, end=None):
-    """Time series of {controller: frame} over each other between two times (s), one legend for all panels."""
-    runs = named_runs(runs)
-    low = -float("inf") if start is None else start
-    high = float("inf") if end is None else end
-    kept = {label: f[(f[TIME] >= low) & (f[TIME] <= high)] for label, f in runs.items()}
-    kept = named_runs(kept)
-    panels = [panel for panel in GUST if any(panel[1] in frame for frame in kept.values())]
-    if not panels:
-        raise InputError(f"nothing to plot: no run has {', '.join(channel for _, channel in GUST)}")
-    figure = new_figure(9.5, 0.9 + 1.25 * len(panels))
-    places = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, (label, channel) in zip(places, panels, strict=True):
-        style_axes(axes)
-        scale = 1e-3 if "MN m" in label else 1.0
-        shown = {name: frame for name, frame in kept.items() if channel in frame}
-        values = [frame[channel].to_numpy() for frame in shown.values()]
-        if channel.startswith("Wind"):  # the same for all
-            axes.plot(next(iter(shown.values()))[TIME], values[0], color=INK, linewidth=1.2)
-        else:
-            for number, (name, frame) in enumerate(kept.items()):
-                if name in shown:
-                    style = {"color": COLOURS[number % len(COLOURS)], "linewidth": 1.1}
-                    style["ls"] = ("-", "--", ":")[number // len(COLOURS) % 3]
-                    axes.plot(frame[TIME], scale * frame[channel], label=name, **style)
-        axes.set_ylabel(label, fontsize=8, color=INK)
-        axes.margins(x=0.0)
-    places[-1].set_xlabel("time (s)", fontsize=9, color=INK)
-    handles, names = places[-1].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside lower center", ncols=4, fontsize=8, frameon=False)
-    figure.align_ylabels(places)
-    if title:
-        figure.suptitle(title, fontsize=11, color=INK)
-    return save_figure(figure, path)
+    """Plot the time series of {controller: frame} between two times (s), with one legend for all panels."""
+    low, high = -float("inf") if start is None else start, float("inf") if end is None else end
+    kept = {label: frame[frame[TIME].between(low, high)] for label, frame in named_runs(runs).items()}
+    return plot_runs(kept, path, title, panels=GUST)

@@ -1,14 +1,13 @@
-"""How agents compare with baselines on the same runs: ratios of lifetime means, with 95 % intervals.
+"""Scores of agents against baselines on the same runs: ratios of lifetime means, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores baselines results/rl --against gspi_oc3,rosco_float
 
-Each ratio is of one metric of an agent over that of a baseline in the same wind and waves, each of them a
-mean over the lifetime: every case by its share of it (column weight_[-] of the table; without one all
-alike). Several training seeds of one configuration make a group, whose interval resamples training and
-weather seeds (training.evaluation.bootstrap). A lost run of an agent counts PENALTY times the baseline's
-figures in the same case and seed (training.evaluation.failures); where the baseline lost its run there is no
-ratio.
+Each ratio is one metric of an agent over that of a baseline in the same wind and waves, both means over the
+lifetime: cases are weighted by the column weight_[-] of the table, or equally without it. Training seeds of
+one configuration form a group, whose interval resamples training and weather seeds
+(training.evaluation.bootstrap). A lost run of an agent counts PENALTY times the baseline's metrics of that
+case and seed (training.evaluation.failures); a lost run of the baseline has no ratio.
 """
 
 import re
@@ -37,9 +36,9 @@ PAST_ANY = "past a constraint"
 
 @dataclass(frozen=True)
 class Figure:
-    """A metric that is scored as ratio to a baseline's, and what is aimed at: first, then; None: nothing.
+    """A metric scored as ratio to a baseline's, with a first and a second target (None: no target).
 
-    more: whether the ratio is to be at least the aim; else at most.
+    more: whether the ratio must be at least the target; else at most.
     """
 
     name: str
@@ -49,11 +48,11 @@ class Figure:
     more: bool = False
 
     def reaches(self, ratio, aim):
-        """Whether a ratio reaches an aim."""
+        """Return whether a ratio reaches a target."""
         return ratio >= aim if self.more else ratio <= aim
 
     def level(self, ratio):
-        """ "then", "first" or "missed"; where there is one aim only, "met" or "missed"."""
+        """Return "then", "first" or "missed"; with a single target "met" or "missed"."""
         if self.then is not None and self.reaches(ratio, self.then):
             return "then"
         if self.reaches(ratio, self.first):
@@ -62,15 +61,15 @@ class Figure:
 
     @property
     def aims(self):
-        """The aims that there are, the first one first."""
+        """The targets, the first one first."""
         return tuple(aim for aim in (self.first, self.then) if aim is not None)
 
     def verdict(self, ratio, sure=(), failed=0):
-        """What the ratio reaches (level), with "*" where that is no chance finding; "" without a ratio.
+        """Return the level that a ratio reaches, with "*" if significant; "" without a ratio.
 
-        sure: for each of the aims, whether the hypothesis that the ratio equals it is rejected, after
-        correction for all those that are tested (agent_scores). "then, first*": the ratio reaches the second
-        aim, and surely the first. "failed" where runs were lost.
+        sure: for each target, whether the hypothesis that the ratio equals it is rejected, after correction
+        for all tests (agent_scores). "then, first*": the ratio reaches the second target, and significantly
+        the first. "failed": runs were lost.
         """
         if self.first is None or not np.isfinite(ratio):
             return ""
@@ -95,7 +94,7 @@ FIGURES = (
     Figure("shaft-torque DEL", "RotTorq_DEL_[kN-m]", 1.0),
     Figure("torque travel", "torque_travel_[kN-m/s]", 1.0),
 )
-COUNTS = {  # constraint: metric that counts how often it was passed
+COUNTS = {  # constraint: metric that counts how often it was exceeded
     "rotor past 130 %": "rotor_speed_violations_[-]",
     "tower top past 3.3 m/s2": "tower_top_acceleration_violations_[-]",
     "blade pitch past 10 deg/s": "blade_pitch_rate_violations_[-]",
@@ -103,7 +102,7 @@ COUNTS = {  # constraint: metric that counts how often it was passed
 
 
 def figures_named(names):
-    """List of the Figures of names: those of FIGURES, and metrics as figures without an aim.
+    """Return the Figures of names: those of FIGURES, and metrics as figures without a target.
 
     Raises: InputError for other names.
     """
@@ -116,10 +115,10 @@ def figures_named(names):
 
 
 def grouped(table, baselines, groups=None, agents=None):
-    """{name: labels of its training seeds} of what is scored: groups, then single agents.
+    """Return {name: labels of its training seeds} of groups, then single agents.
 
     groups: {name: labels}. agents: labels; None: all that are neither baselines nor in a group.
-    Raises: InputError for labels that were not run, and names that are taken.
+    Raises: InputError for labels without runs, and for duplicate names.
     """
     known = list(dict.fromkeys(table["controller"]))
     groups = dict(groups or {})
@@ -139,28 +138,27 @@ def grouped(table, baselines, groups=None, agents=None):
 
 
 def _values(runs, labels, cases, seeds, metric):
-    """(labels, cases, seeds) values of a metric; NaN where a run failed or was not made."""
+    """Return the values (labels, cases, seeds) of a metric; NaN: the run failed or does not exist."""
     index = pd.MultiIndex.from_product([labels, cases, seeds])
     return runs[metric].reindex(index).to_numpy(dtype=float).reshape(len(labels), len(cases), len(seeds))
 
 
 def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
-    """DataFrame: per agent or group, baseline and figure the ratio, its interval, and what that reaches.
+    """Return a DataFrame: per agent or group, baseline and figure the ratio, its interval and a verdict.
 
-    table: what evaluate.evaluate returns; groups, agents: as grouped takes them. Columns: agent,
-    baseline, figure, metric, ratio (of the lifetime means, its mean over the training seeds), low, high (NaN
-    for too few seeds: training.evaluation.bootstrap.crossed_ratio), p_first, p_then (two-sided p-values of
-    the ratio being the aim), holm_first, holm_then (the same, corrected for all aims of all figures over this
-    baseline), pairs (runs with a ratio), runs, failed, tripped, lost_power, training_seeds, verdict
-    (Figure.verdict, sure where a corrected p-value is at most 1 - LEVEL). Where the baseline's figure is 0
-    there is no ratio.
-    Raises: InputError for labels that were not run, or where agent and baseline have no run in common.
+    table: of evaluate.evaluate; groups, agents: as in `grouped`. Columns: agent, baseline, figure, metric,
+    ratio (of the lifetime means, its mean over the training seeds), low, high (NaN with too few seeds:
+    training.evaluation.bootstrap.crossed_ratio), p_first, p_then (two-sided p-values of the ratio being the
+    target), holm_first, holm_then (corrected for all targets of all figures over this baseline), pairs (runs
+    with a ratio), runs, failed, tripped, lost_power, training_seeds, verdict (Figure.verdict; significant:
+    a corrected p-value of at most 1 - LEVEL). A baseline's metric of 0 gives no ratio.
+    Raises: InputError for labels without runs, or if agent and baseline have no run in common.
     """
     return _scores(table, baselines, grouped(table, baselines, groups, agents), figures)
 
 
 def _scores(table, baselines, chosen, figures):
-    """agent_scores of {name: labels}."""
+    """Return agent_scores of {name: labels}."""
     over = {name: penalised(table, name).set_index(KEY).sort_index() for name in baselines}
     cases, seeds = list(dict.fromkeys(table["case"])), sorted(set(table["seed"]))
     shares = case_shares(table, cases)
@@ -182,7 +180,7 @@ def _scores(table, baselines, chosen, figures):
 
 
 def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
-    """{column: value} of one Figure: ratio, interval, p-values, pairs."""
+    """Return {column: value} of one Figure: ratio, interval, p-values, pairs."""
     own = _values(runs, list(labels), cases, seeds, figure.metric)
     other = _values(runs, [baseline], cases, seeds, figure.metric)[0]
     exponent = mean_exponent(figure.metric)
@@ -195,17 +193,17 @@ def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
 
 
 def agent_counts(table, baselines, groups=None, agents=None):
-    """DataFrame: per agent, group and baseline its runs, those that failed, those past a constraint.
+    """Return a DataFrame: per agent, group and baseline its runs, lost runs and exceeded constraints.
 
-    Columns: agent, inputs (as the function has them), runs, failed, tripped, lost_power, the names of COUNTS
-    (runs in which it was passed at least once), past any of them, largest overspeed (%), verdict ("met" where
-    no run was lost and nothing passed). The figures are the runs' own.
+    Columns: agent, inputs (of `inputs`), runs, failed, tripped, lost_power, the names of COUNTS (runs that
+    exceed it at least once), PAST_ANY, largest overspeed (%), verdict ("met" if no run was lost and no
+    constraint exceeded).
     """
     return _counts(table, grouped(table, baselines, groups, agents) | {name: (name,) for name in baselines})
 
 
 def _counts(table, chosen):
-    """agent_counts of {name: labels}."""
+    """Return agent_counts of {name: labels}."""
     rows = []
     for name, labels in chosen.items():
         here = table[table["controller"].isin(labels)]
@@ -221,12 +219,12 @@ def _counts(table, chosen):
 
 @cached(256)
 def inputs(label):
-    """What a controller uses: "measured" for channels of MEASURED, and by name what else it uses.
+    """Return the inputs of a controller: "measured" for sensor channels, the others by name.
 
-    "" for labels that name neither a controller of the package nor an agent or design that is still there.
+    "" for labels that name neither a controller of the package nor an existing agent or design.
     """
     if ":" in label and not label.startswith((POLICY, DESIGN)):
-        return ""  # code of the user's own, which a table is no reason to run
+        return ""  # a table must not run code of the user
     try:
         used = information(label)
     except InputError:
@@ -236,17 +234,15 @@ def inputs(label):
 
 
 def kind_of(case):
-    """Name of a case without the wind speed at its end: "ntm_18" and "ntm_11_4" are "ntm"."""
+    """Return the name of a case without the wind speed at its end: "ntm" for "ntm_18" and "ntm_11_4"."""
     return re.sub(r"(_\d+){1,2}$", "", case)
 
 
 def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=False):
-    """(scores, counts) as agent_scores and agent_counts give, for each kind of case by itself.
+    """Return (scores, counts) of agent_scores and agent_counts per kind of case, in a first column `kind`.
 
-    each: every case is a kind of its own; else the winds of a kind (kind_of) are taken together.
-
-    Both have a further first column, kind. A kind in which an agent has no run with a figure has NaN ratios
-    there. The correction of the p-values is for the figures of one kind.
+    each: every case is a kind; else the winds of a kind (kind_of) are taken together. Ratios are NaN in a
+    kind in which an agent has no metric. p-values are corrected for the figures of one kind.
     """
     chosen = grouped(table, [baseline], groups, agents)
     scores, counts = [], []
@@ -255,7 +251,7 @@ def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=Fal
         for name, labels in chosen.items():
             try:
                 scores.append(_scores(here, [baseline], {name: labels}, figures).assign(kind=kind))
-            except (InputError, KeyError):  # none was made or nobody has a figure, which the counts say
+            except (InputError, KeyError):  # no run has a metric, as the counts show
                 blank = {"agent": name, "baseline": baseline, "kind": kind, "pairs": 0, "verdict": ""}
                 scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in figures]))
     whole = pd.concat(scores, ignore_index=True), pd.concat(counts, ignore_index=True)
@@ -263,7 +259,7 @@ def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=Fal
 
 
 def ratio_text(row):
-    """Text of one row of agent_scores: ratio [low, high]."""
+    """Return the text of a row of agent_scores: ratio [low, high]."""
     if not np.isfinite(row["ratio"]):
         return "-"
     text = f"{row['ratio']:.3f}"
@@ -271,31 +267,36 @@ def ratio_text(row):
 
 
 def frame_markdown(frame):
-    """Markdown text of a DataFrame of texts, its index (if it has a name) as first column."""
+    """Return the markdown table of a DataFrame of texts, a named index as first column."""
     frame = frame.reset_index() if frame.index.name else frame
     return markdown_table(frame.columns, frame.astype(str).to_numpy()) + "\n"
 
 
+def wide_markdown(frame, title, index, rows, column, names):
+    """Return the markdown table of the column `text`: values of `index` by those of `column`."""
+    wide = frame.pivot(index=index, columns=column, values="text").loc[rows, names]
+    wide.index.name = title
+    wide.columns = [f"`{name}`" for name in names]
+    return frame_markdown(wide)
+
+
 def _remark(scores):
-    """[line] that says why ratios have no interval; [] where each has one."""
+    """Return [line] on why ratios have no interval; [] if each has one."""
     bare = np.isfinite(scores["ratio"]) & ~np.isfinite(scores["low"])
     text = f"No interval: fewer than {LEAST_SEEDS} weather seeds, or two or three training seeds.\n"
     return [text] if bare.any() else []
 
 
 def scores_markdown(scores, counts):
-    """Markdown text of agent_scores and agent_counts: a table for each baseline, one of failures."""
+    """Return markdown of agent_scores and agent_counts: a table per baseline, one of failures."""
     parts = []
     names = list(dict.fromkeys(scores["agent"]))
     for baseline, rows in scores.groupby("baseline", sort=False):
         shown = rows.assign(
             text=[f"{ratio_text(row)} {row['verdict']}".rstrip() for _, row in rows.iterrows()]
         )
-        wide = shown.pivot(index="figure", columns="agent", values="text")
-        wide = wide.loc[list(dict.fromkeys(scores["figure"])), names]
-        wide.index.name = f"over `{baseline}`"
-        wide.columns = [f"`{name}`" for name in names]
-        parts.append(frame_markdown(wide))
+        figures = list(dict.fromkeys(scores["figure"]))
+        parts.append(wide_markdown(shown, f"over `{baseline}`", "figure", figures, "agent", names))
     parts += _remark(scores)
     shown = counts.copy()
     shown["largest overspeed (%)"] = shown["largest overspeed (%)"].map("{:.1f}".format)
@@ -305,31 +306,26 @@ def scores_markdown(scores, counts):
 
 
 def kinds_markdown(scores, counts, figures=None):
-    """Markdown text of by_kind: a table for each of its figures (names; None: all), one of failures."""
+    """Return markdown of by_kind: a table per figure (names; None: all), one of failures."""
     parts = []
     names = list(dict.fromkeys(scores["agent"]))
     kinds = list(dict.fromkeys(scores["kind"]))
     for name in figures or list(dict.fromkeys(scores["figure"])):
         rows = scores[scores["figure"] == name]
         shown = rows.assign(text=[ratio_text(row) for _, row in rows.iterrows()])
-        wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, names]
-        wide.index.name = f"{name} over `{rows['baseline'].iloc[0]}`"
-        wide.columns = [f"`{agent}`" for agent in names]
-        parts.append(frame_markdown(wide))
+        title = f"{name} over `{rows['baseline'].iloc[0]}`"
+        parts.append(wide_markdown(shown, title, "kind", kinds, "agent", names))
     parts += _remark(scores)
     lost = counts[list(KINDS)].sum(axis=1)
     columns = zip(lost, counts[PAST_ANY], counts["runs"], strict=True)
     shown = counts.assign(text=[f"{missing} / {past} of {runs}" for missing, past, runs in columns])
     agents = list(dict.fromkeys(counts["agent"]))
-    wide = shown.pivot(index="kind", columns="agent", values="text").loc[kinds, agents]
-    wide.index.name = "lost / past a constraint"
-    wide.columns = [f"`{agent}`" for agent in agents]
-    parts.append(frame_markdown(wide))
+    parts.append(wide_markdown(shown, f"lost / {PAST_ANY}", "kind", kinds, "agent", agents))
     return "\n".join(parts)
 
 
 def write_scores(tables, text, path):
-    """Paths written: PATH.md of the text, and PATH_suffix.csv of {suffix: DataFrame} ("": PATH.csv)."""
+    """Write PATH.md of the text and PATH_suffix.csv of {suffix: frame} ("": PATH.csv); return the paths."""
     path = Path(path)
     written = [path.with_name(path.name + ".md")]
     with replacing(written[0]) as temporary:

@@ -1,4 +1,4 @@
-"""Which controllers survive which faults: tables of an evaluation of the suite faults."""
+"""Tables of the faults that each controller survives, from an evaluation of the suite faults."""
 
 import re
 
@@ -7,27 +7,27 @@ import pandas as pd
 
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.run_case import FAILED
-from fowt_env.training.reports.scores import frame_markdown, kind_of
+from fowt_env.training.reports.scores import kind_of, wide_markdown
 
-FIGURES = {  # what is shown: column of the survival table, digits
+FIGURES = {  # heading: column of the survival table, digits
     "largest rotor speed (% of rated)": ("rotor_speed", 0),
     "largest platform pitch (deg)": ("platform_pitch", 1),
     "largest tower-base moment (MN m)": ("tower_base", 0),
     "largest fairlead tension (kN)": ("tension", 0),
     "longest time to standstill (s)": ("standstill", 0),
 }
-NEVER = "-"  # of a time that some run does not have
+NEVER = "-"  # a run did not come to rest
 TRIP = re.compile(r"^(.*) trip at ")
 
 
 def survival(table, limits=None):
-    """DataFrame by kind of case and controller: runs, those survived, trips, and the largest figures.
+    """Return a DataFrame by kind of case and controller: runs, survived runs, trips, largest motions, loads.
 
     table    of read_results
-    limits   {metric: greatest value} that a run must keep to survive; None: those of the suite faults
-    A run has survived that neither failed (capsize, numerical blow-up, a controller's error) nor passed a
+    limits   {metric: greatest value} of a survived run; None: those of the suite faults
+    A run survived if it neither failed (capsize, numerical blow-up, a controller's error) nor exceeded a
     limit; a trip is no failure. Platform pitch and moment: the larger of both directions. standstill: NaN
-    where a run that is stopped does not come to rest.
+    if a stopped run does not come to rest.
     """
     limits = read_suite("faults").limits.run if limits is None else limits
     kept = table["status"] != FAILED
@@ -56,39 +56,32 @@ def survival(table, limits=None):
 
 
 def _size(table, name):
-    """The larger size of a channel's least and greatest value."""
+    """Return the larger magnitude of a channel's least and greatest value."""
     return np.maximum(table[name.format("max")].abs(), table[name.format("min")].abs())
 
 
 def _trip(reason):
-    """Name of the trip that a run's reason tells of; "" for none."""
+    """Return the name of the trip in a run's reason; "" for none."""
     found = TRIP.match(reason)
     return found.group(1) if found else ""
 
 
 def _counted(trips):
-    """Text of which trips there were, and how often."""
+    """Return a text of the trips and their counts."""
     counts = trips[trips != ""].value_counts()
     return ", ".join(f"{count} {name}" for name, count in counts.items())
 
 
 def survival_markdown(found):
-    """Markdown text of survival: who survives what, the figures, and the trips."""
+    """Return markdown tables of `survival`: survived runs, motions and loads, trips."""
     kinds, names = (list(dict.fromkeys(found[key])) for key in ("kind", "controller"))
     shares = [f"{kept} of {runs}" for kept, runs in zip(found["survived"], found["runs"], strict=True)]
-    parts = [_wide(found.assign(text=shares), "survived", kinds, names)]
+    parts = [wide_markdown(found.assign(text=shares), "survived", "kind", kinds, "controller", names)]
     for title, (column, digits) in FIGURES.items():
         texts = [NEVER if np.isnan(value) else f"{value:.{digits}f}" for value in found[column]]
         shown = found.assign(text=texts)
         stopped = [kind for kind in kinds if (shown["text"][shown["kind"] == kind] != NEVER).any()]
-        parts.append(_wide(shown, title, stopped, names))
+        parts.append(wide_markdown(shown, title, "kind", stopped, "controller", names))
     tripped = found.assign(text=found["trips"].replace("", "none"))
-    parts.append(_wide(tripped, "trips", kinds, names))
+    parts.append(wide_markdown(tripped, "trips", "kind", kinds, "controller", names))
     return "\n".join(parts)
-
-
-def _wide(found, title, kinds, names):
-    wide = found.pivot(index="kind", columns="controller", values="text").loc[kinds, names]
-    wide.index.name = title
-    wide.columns = [f"`{name}`" for name in names]
-    return frame_markdown(wide)

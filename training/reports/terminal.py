@@ -1,30 +1,31 @@
-"""What people look at after an evaluation: the printed table and the plots."""
+"""The printed tables and the plots of an evaluation."""
 
 import json
-from dataclasses import replace
 
 from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.ratings import ratings
-from fowt_env.errors import unknown
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import holm
-from fowt_env.training.evaluation.cases import Limits, Score, named_cases, read_suite
+from fowt_env.training.evaluation.cases import chosen_cases
 from fowt_env.training.evaluation.failures import KINDS, lost_text
-from fowt_env.training.evaluation.leaderboard import leaderboard
-from fowt_env.training.evaluation.results import file_name, run_file, write_json
+from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
+from fowt_env.training.evaluation.results import file_name, run_file
 from fowt_env.training.evaluation.run_case import OK, REFERENCE
 from fowt_env.training.evaluation.scaling import turbine_of
-from fowt_env.training.evaluation.seeds import ranges
 from fowt_env.training.reports.evaluation_plots import plot_evaluation, plot_pareto
+from fowt_env.training.reports.metric_words import counted, seeds_text
 from fowt_env.visual.response import BOXES, plot_boxes
 from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
+
+# chosen_cases and write_leaderboard are defined in evaluation; this is their former place
+__all__ = ["chosen_cases", "evaluation_plots", "leaderboard_rows", "summary_rows", "write_leaderboard"]
 
 # printed columns: heading, metric, format
 PRINTED_METRICS = (
     ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f"),
     ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f"),
     ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f"),
-    ("power\ncapped\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
+    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
     ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f"),
     ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f"),
     ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f"),
@@ -38,7 +39,7 @@ PRINTED_METRICS = (
 )
 
 
-# dropped from the printed table, first to last, where it is wider than the terminal
+# left out of a table wider than the terminal, the first one first
 DROPPED_FIRST = (
     "FAIRTEN_max_[kN]",
     "NcIMUTAxs_rms_[m/s^2]",
@@ -53,67 +54,29 @@ DROPPED_FIRST = (
 
 
 def summary_rows(means, width):
-    """(headings, rows of texts, lost runs per row) of what evaluate.summary gives.
-
-    Columns are dropped until headings and values, two spaces between them, take at most `width` characters.
-    """
+    """Return (headings, rows of texts, lost runs per row) of evaluate.summary, in `width` characters."""
     lost = list(means[list(KINDS)].sum(axis=1))
-    columns = [
-        ("controller", list(means["controller"])),
-        ("case", list(means["case"])),
-        ("runs", [f"{n - bad}/{n}" for n, bad in zip(means["runs"], lost, strict=True)]),
-    ]
-    optional = {}
-    for heading, name, form in PRINTED_METRICS:
-        texts = ["-" if value != value else format(value, form) for value in means[name]]
-        optional[name] = (heading, texts)
-    for name in (None, *DROPPED_FIRST):
-        optional.pop(name, None)
-        shown = [*columns, *optional.values()]
-        if sum(2 + max(map(len, [*heading.split("\n"), *texts])) for heading, texts in shown) <= width:
-            break
-    headings, texts = zip(*shown, strict=True)
-    return headings, list(zip(*texts, strict=True)), lost
-
-
-def chosen_cases(suite, cases, platform=None):
-    """Suite or list of Cases for the names of a suite and of cases, either of which may be None.
-
-    platform: a name or a path to which they are scaled; None: that of the suite.
-    Raises: InputError for an unknown name, and for a case that the suite does not hold.
-    """
-    if suite is None:
-        return named_cases("above_rated" if cases is None else cases, platform)
-    whole = read_suite(suite, platform)
-    if cases is None:
-        return whole
-    known = {case.name: case for case in whole.cases}
-    wanted = [name.strip() for name in cases.split(",") if name.strip()]
-    for name in wanted:
-        if name not in known:
-            raise unknown(f"case of suite {whole.name!r}", name, known)
-    return replace(whole, cases=tuple(known[name] for name in dict.fromkeys(wanted)))
-
-
-def write_leaderboard(table, folder, baseline=None):
-    """Mapping of the leaderboard of a results folder, also written to leaderboard.json in it.
-
-    The settings are those of the folder's manifest.json.
-    Raises: InputError for a baseline that was not evaluated.
-    """
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    suite = manifest["suite"] or {}
-    score, limits = suite.get("score"), suite.get("limits")
-    rules = {
-        "score": None if score is None else Score(**score),
-        "limits": None if limits is None else Limits(**limits),
+    columns = {
+        "controller": ("controller", list(means["controller"])),
+        "case": ("case", list(means["case"])),
+        "runs": ("runs", [f"{n - bad}/{n}" for n, bad in zip(means["runs"], lost, strict=True)]),
     }
-    board = {
-        key: manifest[key]
-        for key in ("format", "fowt_env", "plant", "versions", "suite", "options", "created")
-    } | leaderboard(table, baseline, **rules)
-    write_json(board, folder / "leaderboard.json")
-    return board
+    for heading, name, form in PRINTED_METRICS:
+        columns[name] = heading, ["-" if value != value else format(value, form) for value in means[name]]
+    return *_fitted(columns, DROPPED_FIRST, width), lost
+
+
+def _fitted(columns, drops, width):
+    """Return (headings, rows of texts) of {name: (heading, texts)}, with fewer columns if too wide.
+
+    drops: names of the columns that may be left out, the first one first.
+    """
+    for name in (None, *drops):
+        columns.pop(name, None)
+        if sum(2 + max(map(len, [*head.split("\n"), *texts])) for head, texts in columns.values()) <= width:
+            break
+    headings, texts = zip(*columns.values(), strict=True)
+    return headings, list(zip(*texts, strict=True))
 
 
 # the printed leaderboard: heading, metric, format, with its interval, with its paired difference
@@ -124,66 +87,63 @@ LEADERBOARD = (
     ("torque travel\nkN m/s", "torque_travel_[kN-m/s]", ".3f", False, True),
     ("shaft DEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", False, True),
     ("tower DEL\nkN m", "TwrBsMyt_DEL_[kN-m]", ".0f", False, True),
-    ("capped power\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
+    ("power up to rated\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
     ("greatest power\nkW", "GenPwr_max_[kW]", ".0f", False, False),
 )
-# left out one by one where the terminal is narrow; what is spent stays beside the deviations
+# left out one by one in a narrow terminal; pitch and torque travel stay beside the deviations
 LEADERBOARD_DROPS = ("GenPwr_max_[kW]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_capped_mean_[kW]")
 
 
 def leaderboard_rows(board, width=200):
-    """(title, headings, rows of texts, remarks) of a leaderboard, in `width` characters if possible.
+    """Return (title, headings, rows of texts, remarks) of a leaderboard, in `width` characters if possible.
 
-    A difference is in percent of the baseline, "*" where it is no chance finding: its p-value, corrected for
-    all figures of the row (bootstrap.holm), is at most 1 less the level of the intervals. Remarks: lines on
+    A difference is in percent of the baseline, with "*" if significant: its p-value, corrected for all
+    metrics of the row (bootstrap.holm), is at most 1 less the level of the intervals. Remarks: lines on
     what the table lacks or does not show, and why.
     """
-    baseline = board["baseline"]
+    baseline, entries = board["baseline"], board["controllers"]
     name = "" if not board.get("suite") else f"suite {board['suite']['name']} {board['suite']['version']}, "
     intervals = has_intervals(board)
     kind = "lifetime means" if len(set(board["shares"].values())) > 1 else "means"
-    title = f"{name}{_counted(len(board['cases']), 'case')}, {_seeds(board['seeds'])}: {kind}"
+    title = f"{name}{counted(len(board['cases']), 'case')}, {seeds_text(board['seeds'])}: {kind}"
     if intervals:
         title += f" [{round(100 * board['interval']['level'])} % interval]"
     if baseline is not None:
-        title += f", paired difference from {baseline}{' (* no chance finding)' if intervals else ''}"
-    sure = [_sure(entry, board["interval"]["level"]) for entry in board["controllers"]]
-    dropped = set()
-    for drop in (None, *LEADERBOARD_DROPS):
-        dropped.add(drop)
-        columns = [("controller", [entry["controller"] for entry in board["controllers"]])]
-        columns.append(("runs", [_runs_text(entry) for entry in board["controllers"]]))
-        if any(entry["score"] for entry in board["controllers"]):
-            columns.append(("score", [_score_text(entry["score"]) for entry in board["controllers"]]))
-        for heading, metric, form, with_interval, with_difference in LEADERBOARD:
-            if metric not in dropped:
-                texts = [
-                    _cell(
-                        entry,
-                        metric,
-                        form,
-                        with_interval,
-                        with_difference and entry["controller"] != baseline,
-                        metric in stars,
-                    )
-                    for entry, stars in zip(board["controllers"], sure, strict=True)
-                ]
-                columns.append((heading, texts))
-        if sum(2 + max(map(len, [*heading.split("\n"), *texts])) for heading, texts in columns) <= width:
-            break
-    headings, texts = zip(*columns, strict=True)
-    return title, headings, list(zip(*texts, strict=True)), _remarks(board, intervals)
+        title += f", paired difference from {baseline}{' (* significant)' if intervals else ''}"
+    sure = [_sure(entry, board["interval"]["level"]) for entry in entries]
+    columns = {
+        "controller": ("controller", [entry["controller"] for entry in entries]),
+        "runs": ("runs", [_runs_text(entry) for entry in entries]),
+    }
+    if any(entry["score"] for entry in entries):
+        columns["score"] = "score", [_score_text(entry["score"]) for entry in entries]
+    for heading, metric, form, with_interval, with_difference in LEADERBOARD:
+        columns[metric] = (
+            heading,
+            [
+                _cell(
+                    entry,
+                    metric,
+                    form,
+                    with_interval,
+                    with_difference and entry["controller"] != baseline,
+                    stars,
+                )
+                for entry, stars in zip(entries, sure, strict=True)
+            ],
+        )
+    return title, *_fitted(columns, LEADERBOARD_DROPS, width), _remarks(board, intervals)
 
 
 def _sure(entry, level):
-    """Set of the printed metrics whose difference is no chance finding, all of them taken together."""
+    """Return the set of printed metrics with a significant difference, corrected for all of them."""
     names = [metric for _, metric, _, _, different in LEADERBOARD if different]
     adjusted = holm([entry["difference"][name]["p"] for name in names])
     return {name for name, p in zip(names, adjusted, strict=True) if p <= 1.0 - level}
 
 
 def has_intervals(board):
-    """Whether any figure of a leaderboard has an interval: it had seeds enough."""
+    """Return whether any metric of a leaderboard has an interval, which needs enough seeds."""
     return any(
         figure["low"] is not None and figure["low"] == figure["low"]
         for entry in board["controllers"]
@@ -192,54 +152,39 @@ def has_intervals(board):
 
 
 def no_interval(board):
-    """ "3 seeds: no interval", and from how many there is one."""
-    return f"{_counted(len(board['seeds']), 'seed')}: no interval (needs {board['interval']['least_seeds']})"
+    """Return "3 seeds: no interval (needs 4)"."""
+    return f"{counted(len(board['seeds']), 'seed')}: no interval (needs {board['interval']['least_seeds']})"
 
 
 def _remarks(board, intervals):
-    """Lines below the leaderboard: on intervals, failed runs and the baseline."""
+    """Return the lines below the leaderboard: on intervals, lost runs, the baseline and limits."""
     lines = [] if intervals else [no_interval(board)]
     lost = {entry["controller"]: lost_text(entry) for entry in board["controllers"] if entry["lost"]}
     if lost:
         texts = "; ".join(f"{name}: {text}" for name, text in lost.items())
         scored = any(entry["score"] for entry in board["controllers"])
         counts = f"; a score counts them {board['penalty']:g} times the reference's" if scored else ""
-        lines.append(f"runs lost by {texts}: without figures here{counts}; listed last")
+        lines.append(f"runs lost by {texts}: not in these means{counts}; ranked last")
     if board["baseline"] is None and board["controllers"]:
         lines.append("no paired differences: every controller has runs that failed or lost power")
     if board["baseline"] in lost:
-        lines.append(f"differences from {board['baseline']} are of the runs that it did not lose")
+        lines.append(f"differences from {board['baseline']} are over the runs that it did not lose")
     for entry in board["controllers"]:
         if entry["beyond"]:
-            lines.append(f"{entry['controller']} is beyond a limit: {'; '.join(entry['beyond'])}")
+            lines.append(f"{entry['controller']} exceeds a limit: {'; '.join(entry['beyond'])}")
     if board["unchecked"]:
         lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")
     return lines
 
 
-def _counted(count, noun):
-    """ "1 case", "2 cases"."""
-    return f"{count} {noun}{'' if count == 1 else 's'}"
-
-
 def _runs_text(entry):
-    """ "6/6" of a controller's runs, with the numbers of those that were lost."""
+    """Return "6/6" of a controller's runs that ended well, with the numbers of lost ones."""
     lost = f", {lost_text(entry)}" if entry["lost"] else ""
     return f"{entry['runs'] - entry['lost']}/{entry['runs']}{lost}"
 
 
-def _seeds(seeds):
-    """ "seed 1", "seeds 1-6, 9"."""
-    return f"seed{'' if len(seeds) == 1 else 's'} {_ranges(seeds)}"
-
-
-def _ranges(seeds):
-    """ "1-6, 9" for [1, 2, 3, 4, 5, 6, 9]."""
-    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in ranges(seeds))
-
-
 def _cell(entry, metric, form, with_interval, with_difference, sure):
-    """Text of one figure: mean [low, high] difference %, "*" where that is sure."""
+    """Return the text of a metric: mean [low, high] difference %, with "*" if it is in `sure`."""
     figure, gap = entry["metrics"][metric], entry["difference"][metric]
     if figure["mean"] != figure["mean"]:
         return "-"
@@ -247,23 +192,23 @@ def _cell(entry, metric, form, with_interval, with_difference, sure):
     if with_interval and figure["low"] == figure["low"]:
         text += f" [{format(figure['low'], form)}, {format(figure['high'], form)}]"
     if with_difference and gap["percent"] == gap["percent"]:
-        text += f" {gap['percent']:+.1f}%{'*' if sure else ' '}"
+        text += f" {gap['percent']:+.1f}%{'*' if metric in sure else ' '}"
     return text
 
 
 def _score_text(score):
-    """Text of a score; in brackets where a limit is passed or a run was lost."""
+    """Return the text of a score, in brackets if a limit is exceeded or a run was lost."""
     if score is None or score["mean"] is None:
         return "-"
     return f"{score['mean']:.3f}" if score["valid"] else f"({score['mean']:.3f})"
 
 
 def evaluation_plots(table, board, folder):
-    """Paths of the plots made of a results folder, its table and its leaderboard.
+    """Plot a results folder with its table and leaderboard; return the paths.
 
-    pareto.png sets rotor-speed against platform-pitch deviation; metrics.png compares the controllers over
-    all cases; boxes.png has quartiles and extremes, timeseries_CASE.png and spectra_CASE.png the series
-    and spectra, of the first seed of each case that succeeded.
+    pareto.png: rotor-speed against platform-pitch deviation; metrics.png: the controllers over all cases;
+    boxes.png, timeseries_CASE.png and spectra_CASE.png: quartiles, series and spectra of the first seed of
+    each case that succeeded.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     table = table[table["controller"] != REFERENCE]
@@ -295,12 +240,12 @@ def evaluation_plots(table, board, folder):
 
 
 def _scored_rows(frame, skip):
-    """The drawn channels of a run after what is not scored."""
+    """Return the plotted channels of the scored part of a run."""
     columns = [TIME, *(channel for _, channel in BOXES if channel in frame.columns)]
     return frame.loc[frame[TIME] >= skip, columns]
 
 
 def platform_pitch_period(platform):
-    """Natural period (s) in platform pitch that a platform's file states, or None."""
+    """Return the natural period (s) in platform pitch of a platform's file, or None."""
     description = platform if isinstance(platform, Platform) else read_platform(platform)
     return description.published.get("natural_periods", {}).get("pitch")

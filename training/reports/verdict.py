@@ -1,7 +1,7 @@
 """The outcome of an evaluation in sentences, from the paired statistics of its leaderboard.
 
 A difference is called better or worse only if it is significant; with too few seeds for a test the sentences
-say so and give what was observed.
+say so and list the observed differences.
 """
 
 import html
@@ -19,18 +19,18 @@ OBSERVED = (
     "blade_pitch_travel_[deg/s]",
     "GenPwr_capped_mean_[kW]",
 )
-SHOWN = 5  # sentences that stand open
+SHOWN = 5  # sentences that are not folded away
 
 
 def corrected_p(entry):
-    """{metric: p-value} of a LeaderboardEntry over TESTED, corrected for their number (Holm); {}: no test."""
+    """Return {metric: p-value} of a LeaderboardEntry over TESTED, corrected by Holm's method; {}: no test."""
     gaps = {name: entry.difference.get(name) for name in TESTED}
     adjusted = holm([math.nan if gap is None or gap.p is None else gap.p for gap in gaps.values()])
     return {name: float(p) for name, p in zip(gaps, adjusted, strict=True) if math.isfinite(p)}
 
 
 def percent_text(percent):
-    """ "+34 %", "+9.2 %", "+0.03 %": two digits below ten, a true minus sign and no break before the unit."""
+    """Return "+34 %", "+9.2 %", "+0.03 %": two digits below ten, with a minus sign and a no-break space."""
     size = abs(percent)
     text = f"{size:.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}"
     sign = "±" if float(text) == 0.0 else "+" if percent > 0.0 else "\N{MINUS SIGN}"
@@ -38,20 +38,20 @@ def percent_text(percent):
 
 
 def verdict(board, seeds, least_seeds):
-    """HTML of the verdict over a LeaderboardFile (None: there is none); every name is escaped.
+    """Return HTML of the verdict over a LeaderboardFile (or None); every name is escaped.
 
-    seeds: how many the evaluation has; least_seeds: from how many on differences are tested.
+    seeds: number of seeds of the evaluation; least_seeds: the least number for a test.
     """
     if board is None:
-        return "<p>No verdict: without leaderboard.json nothing has been compared pair by pair.</p>"
+        return "<p>No verdict: without leaderboard.json there are no paired differences.</p>"
     others = [entry for entry in board.controllers if entry.controller != board.baseline]
     if board.baseline is None:
         return "<p>No verdict: no baseline, as every controller has runs that failed or lost power.</p>"
     if not others:
-        return "<p>No verdict: a single controller was evaluated, so that there is nothing to compare.</p>"
+        return "<p>No verdict: a single controller was evaluated, without another to compare.</p>"
     baseline = next((e for e in board.controllers if e.controller == board.baseline), None)
     tested = {entry.controller: corrected_p(entry) for entry in others}
-    level = 1.0 - (0.95 if board.interval is None else board.interval.level)
+    level = 1.0 - board.interval.level
     name = f"<b>{html.escape(board.baseline)}</b>"
     if any(tested.values()) or seeds >= least_seeds:
         head = f"Against {name}, paired by case and seed; * significant (p ≤ {level:.2g}, Holm-corrected)."
@@ -59,7 +59,7 @@ def verdict(board, seeds, least_seeds):
         count = "A single seed" if seeds == 1 else f"{seeds} seeds"
         head = f"{count}: no difference is tested (that needs {least_seeds} seeds). Observed against {name}:"
     if baseline is not None and baseline.lost:
-        head += f" The baseline itself lost runs ({_lost(baseline)}), of which there are no differences."
+        head += f" The baseline itself lost runs ({_lost(baseline)}); these have no differences."
     items = [f"<li>{_sentence(entry, tested[entry.controller], level)}</li>" for entry in others]
     text = f"<p>{head}</p><ul>{''.join(items[:SHOWN])}</ul>"
     if items[SHOWN:]:
@@ -69,7 +69,7 @@ def verdict(board, seeds, least_seeds):
 
 
 def _sentence(entry, tested, level):
-    """HTML of what is known of one controller."""
+    """Return HTML of the sentence on one controller."""
     gaps = {
         name: entry.difference[name].percent
         for name in (tested or OBSERVED)
@@ -91,23 +91,23 @@ def _sentence(entry, tested, level):
     else:
         text = f"{name}: no significant difference ({', '.join(rest)})"
     if entry.lost:
-        text += f'; <span class="bad">{_lost(entry)}</span>, of which there are no figures'
+        text += f'; <span class="bad">{_lost(entry)}</span>, which are not in these means'
     if entry.beyond:
-        text += f'; <span class="bad">beyond a limit: {html.escape("; ".join(entry.beyond))}</span>'
+        text += f'; <span class="bad">exceeds a limit: {html.escape("; ".join(entry.beyond))}</span>'
     return text + "."
 
 
 def _gap(name, percent, kind="", star=""):
-    """HTML of one difference."""
+    """Return HTML of one difference."""
     words = f"{html.escape(short_name(name))} {percent_text(percent)}{star}"
     return f'<span class="{kind}">{words}</span>' if kind else words
 
 
 def _joined(parts):
-    """ "a, b and c"."""
+    """Return "a, b and c"."""
     return " and ".join(filter(None, (", ".join(parts[:-1]), *parts[-1:])))
 
 
 def _lost(entry):
-    """ "1 failed, 2 tripped of 12 runs"."""
+    """Return "1 failed, 2 tripped of 12 runs"."""
     return f"{entry.lost_text} of {entry.runs} runs"

@@ -137,12 +137,15 @@ def test_kernels_come_from_a_run_without_weather_and_are_those_of_each_run(tmp_p
 
 def test_kernels_may_take_long_to_compile_in_the_first_call_of_act(tmp_path, monkeypatch):
     monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "cache"))
-    source = SOUND.replace(LINE, f"""import os, time
+    source = SOUND.replace(
+        LINE,
+        f"""import os, time
         kernel = os.environ["FOWT_CACHE_DIR"] + "/kernel"
         if not os.path.exists(kernel):
             time.sleep(3.0)
             open(kernel, "w").close()
-        {LINE}""")
+        {LINE}""",
+    )
     submission = tmp_path / "submission"
     submission.mkdir()
     made = factory(submission, source, call=2.0)

@@ -12,7 +12,7 @@ from fowt_env.training.board.folder import Board, write_secret_seeds
 from fowt_env.training.board.judge import _unordered, check_figures, judge
 from fowt_env.training.board.page import FIGURES, board_rows, cell, escaped, ratio_text, write_board
 from fowt_env.training.evaluation.cases import read_suite
-from fowt_env.training.evaluation.results import read_row, run_file, write_run
+from fowt_env.training.evaluation.results import read_row, run_content, run_file, write_run
 from fowt_env.training.evaluation.seeds import DRAWN, drawn_seeds
 
 SUITE = """
@@ -108,15 +108,15 @@ def judged(board, tmp_path_factory):
 
 
 def test_code_runs_only_where_it_is_trusted(board):
-    with pytest.raises(InputError, match="submissions mine: hold Python code"):
+    with pytest.raises(InputError, match="submissions mine: contain Python code"):
         judge(board)
-    with pytest.raises(InputError, match="jobs = 100000: .* give at most that many"):
+    with pytest.raises(InputError, match="jobs = 100000: .* use at most that many"):
         judge(board, 100000, trust_code=True)
 
 
 def test_runs_of_secret_seeds_lie_outside_of_the_board(board, tmp_path):
     write_secret_seeds(tmp_path / "seeds.txt", 1)
-    with pytest.raises(InputError, match="must lie outside"):
+    with pytest.raises(InputError, match="must be outside"):
         judge(board, 1, tmp_path / "seeds.txt", board.folder / "private", trust_code=True)
     with pytest.raises(InputError, match="need a folder"):
         judge(board, 1, tmp_path / "seeds.txt", trust_code=True)
@@ -183,7 +183,7 @@ def test_figures_that_are_not_those_of_the_series_are_refused(board, judged):
     shown = pd.read_parquet(path)
     shown["RotSpeed_[rpm]"] *= 1.001
     try:
-        write_run(shown, row, path)
+        write_run(run_content(shown, row), path)
         with pytest.raises(InputError, match="from its series"):
             check_figures(table, folder, board.suite("short"))
         left = judge(board, trust_code=True)
@@ -191,7 +191,7 @@ def test_figures_that_are_not_those_of_the_series_are_refused(board, judged):
         assert set(left.public["short"]["controller"]) == {"reference", "gspi_oc3"}
     finally:
         shown["RotSpeed_[rpm]"] /= 1.001
-        write_run(shown, row, path)
+        write_run(run_content(shown, row), path)
 
 
 def test_secret_runs_come_in_an_order_that_nobody_knows():

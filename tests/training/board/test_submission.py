@@ -51,8 +51,8 @@ def test_a_sound_card_is_read_and_nothing_is_run(tmp_path):
         ({"controller": "lqr"}, "information: is read from a built-in itself"),
         ({"information": None}, "information is missing"),
         ({"information": ["wind"]}, "unknown input 'wind'"),
-        ({"information": ["wind_preview"]}, "preview_times = ..: must be given with"),
-        ({"preview_times": [2.0]}, "must be given with"),
+        ({"information": ["wind_preview"]}, "preview_times = ..: must be set if and only if"),
+        ({"preview_times": [2.0]}, "must be set if and only if"),
         ({"information": ["wind_preview"], "preview_times": [2.0, 1.0]}, "must rise"),
         ({"information": ["wind_preview"], "preview_times": [-1.0]}, "preview_times"),
         ({"colour": "red"}, "colour"),
@@ -97,7 +97,7 @@ def test_added_submissions_are_kept_and_never_replaced(tmp_path):
     board = new_board(tmp_path / "board")
     assert board.add(write(tmp_path / "a")) == "mine"
     assert board.add(tmp_path / "a") == "mine"
-    with pytest.raises(InputError, match="another one of this name"):
+    with pytest.raises(InputError, match="a different one of this name"):
         board.add(write(tmp_path / "b", source="x = 1"))
     kept = tmp_path / "board" / "submissions" / "mine" / "mine.py"
     assert "was run" in kept.read_text()
@@ -107,7 +107,7 @@ def test_added_submissions_are_kept_and_never_replaced(tmp_path):
 def test_names_that_readers_take_for_each_other_are_refused(tmp_path):
     board = new_board(tmp_path / "board")
     board.add(write(tmp_path / "a", name="one_more"))
-    with pytest.raises(InputError, match="the board has 'one_more', which readers would take for it"):
+    with pytest.raises(InputError, match="the board has 'one_more', which readers would confuse with it"):
         board.add(write(tmp_path / "b", name="one-more"))
 
 

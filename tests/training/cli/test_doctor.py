@@ -8,12 +8,11 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from command_line import fowt
 
 import fowt_env
 from fowt_env.plant.compile import decorators
 from fowt_env.plant.compile.versions import NUMBA, Package, check_numba
-from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import health, requirements
 
 REQUIRES = [
@@ -26,18 +25,12 @@ REQUIRES = [
 
 
 def doctor(*arguments, code=0):
-    result = CliRunner().invoke(cli.app, ["doctor", *arguments], env={"COLUMNS": "200", "NO_COLOR": "1"})
-    assert result.exit_code == code, f"{result.stdout}\n{result.exception!r}"
-    return result.stdout
+    return fowt("doctor", *arguments, code=code)[0]
 
 
-def test_the_self_test_gives_its_figures():
+def test_the_self_test_gives_its_figures_and_fails_with_code_1_on_a_wrong_one(monkeypatch):
     stdout = doctor()
-    assert "passed" in stdout and "expected" in stdout
-    assert "60 s simulated in" in stdout
-
-
-def test_a_wrong_figure_fails_with_code_1(monkeypatch):
+    assert "passed" in stdout and "expected" in stdout and "60 s simulated in" in stdout
     moved = health.reference_run()
     moved["RotSpeed_[rpm]"] *= 1.002
     monkeypatch.setattr(health, "reference_run", lambda: moved)
@@ -86,17 +79,13 @@ def test_the_cache_is_measured_and_other_versions_counted(tmp_path, monkeypatch)
     assert "2.0 MB" in doctor("--no-test") and str(folder) in doctor("--no-test")
 
 
-def test_a_cache_that_cannot_be_used_is_told_with_what_to_do(monkeypatch):
-    monkeypatch.setattr(health, "CACHE_FOLDER", None)
-    monkeypatch.setattr(decorators, "CACHE_FOLDER", None)
-    assert not health.cache_state().read
-    assert "FOWT_CACHE_DIR to a folder" in doctor("--no-test")
-
-
-def test_a_cache_that_is_read_only_is_told(monkeypatch, tmp_path):
+def test_a_cache_that_cannot_be_used_or_written_is_told_with_what_to_do(monkeypatch, tmp_path):
     monkeypatch.setattr(health, "CACHE_FOLDER", tmp_path)
     monkeypatch.setattr(health.os, "access", lambda path, mode: False)
     assert "read only" in doctor("--no-test")
+    for module in (health, decorators):
+        monkeypatch.setattr(module, "CACHE_FOLDER", None)
+    assert not health.cache_state().read and "FOWT_CACHE_DIR to a folder" in doctor("--no-test")
 
 
 @pytest.mark.parametrize(

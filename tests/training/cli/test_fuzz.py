@@ -93,18 +93,20 @@ def check_command(arguments, odd):
         assert odd and any(name in said for name in (*names, *filter(None, values))), result.stderr
 
 
-@examples(150)
-@given(simulate_arguments())
-def test_simulate_works_or_names_what_is_wrong(case):
-    check_command(["simulate", *case[0]], case[1])
+def often(count):
+    """Parameters of a search: a quick one, and one of `count` examples that runs at night."""
+    marks = (pytest.mark.slow, pytest.mark.nightly)
+    return pytest.mark.parametrize("count", [None, pytest.param(count, marks=marks)])
 
 
-@pytest.mark.slow
-@pytest.mark.nightly
-@examples(1000)
-@given(simulate_arguments())
-def test_simulate_works_or_names_what_is_wrong_thousands_of_times(case):
-    check_command(["simulate", *case[0]], case[1])
+@often(1000)
+def test_simulate_works_or_names_what_is_wrong(count):
+    @examples(count or 150)
+    @given(simulate_arguments())
+    def search(case):
+        check_command(["simulate", *case[0]], case[1])
+
+    search()
 
 
 @examples(60)
@@ -180,15 +182,6 @@ def check_scene(arguments):
             assert scene.model.rigid_body.mass > 0.0
 
 
-@examples(200)
-@given(SCENE)
-def test_a_scene_is_built_or_refused_by_name(arguments):
-    check_scene(arguments)
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-@examples(5000)
-@given(SCENE)
-def test_a_scene_is_built_or_refused_by_name_thousands_of_times(arguments):
-    check_scene(arguments)
+@often(5000)
+def test_a_scene_is_built_or_refused_by_name(count):
+    examples(count or 200)(given(SCENE)(check_scene))()

@@ -24,15 +24,9 @@ def results(tmp_path):
     for case in ("ntm_14", "ntm_18"):
         for seed in (1, 2, 3, 4):
             for name, ratio in (("gspi_oc3", 1.0), ("a", 0.7), ("b", 0.75)):
-                row = dict.fromkeys(COLUMNS, 0.0) | {
-                    "weight_[-]": float("nan"),
-                    "controller": name,
-                    "case": case,
-                    "seed": seed,
-                }
-                rows.append(
-                    row | {"status": "ok"} | {figure.metric: ratio * (1.0 + seed) for figure in FIGURES}
-                )
+                row = dict.fromkeys(COLUMNS, 0.0) | {"controller": name, "case": case, "seed": seed}
+                row |= {"weight_[-]": float("nan"), "status": "ok"}
+                rows.append(row | {figure.metric: ratio * (1.0 + seed) for figure in FIGURES})
     write_table(pd.DataFrame(rows, columns=list(COLUMNS)), tmp_path / "results.csv")
     return tmp_path
 
@@ -69,7 +63,7 @@ def test_gust_draws_its_picture_of_each_controller(tmp_path):
     [
         (("baselines", "{}", "--against", "gspi"), "unknown controller of the evaluation 'gspi'"),
         (("baselines", "{}", "--group", "g"), "must be NAME=LABEL,LABEL"),
-        (("baselines", "{}", "--group", "g=a", "--group", "g=b"), "there twice"),
+        (("baselines", "{}", "--group", "g=a", "--group", "g=b"), "used twice"),
         (("baselines", "nowhere"), "no such file"),
         (("cases", "{}", "--figures", "power"), "unknown figure 'power'"),
         (("bound", "{}", "--bound", "nowhere.csv"), "there is no such file"),

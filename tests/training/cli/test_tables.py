@@ -1,8 +1,6 @@
 """Tables of the command line: every figure stands in full, at 80 columns and in a pipe, in every command."""
 
 import json
-from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,10 +9,11 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 import fowt_env
+from fowt_env.layout import FOLDERS, PACKAGE
 from fowt_env.training.cli import app as cli
+from fowt_env.training.cli import console
 from fowt_env.training.cli import tables as cli_tables
 from fowt_env.training.cli.evaluate import _print_evaluation
-from fowt_env.training.cli.simulate import TRIM_CHANNELS
 
 WIDTHS = {"80 columns": {"COLUMNS": "80"}, "a pipe": {}}
 
@@ -36,11 +35,6 @@ def frame_of(columns, rows, **texts):
     return pd.concat([pd.DataFrame(texts, index=range(rows)), values], axis=1)
 
 
-def texts_of(frame):
-    """The texts of all figures of a DataFrame."""
-    return [f"{value:.4g}" for value in frame.select_dtypes("number").to_numpy().ravel()]
-
-
 def assert_whole(printed, wanted, width):
     """Every text is there, nothing is cut, and no line is wider than the terminal."""
     words = printed.split()
@@ -55,147 +49,16 @@ def printed_by(*words):
     return done.stdout
 
 
-# ------------------------------------------------------------------ the commands, with figures that are given
+# ------------------------------------------------------------------ what commands print
 
 
-def simulate_command(monkeypatch, tmp_path):
-    channels = ["Wind1VelX_[m/s]", "RotSpeed_[rpm]", "GenPwr_[kW]", "PtfmPitch_[deg]", "GenTq_[kN-m]"]
-    frame = frame_of(channels, 4)
-    frame["GenTqLim_[-]"] = 0.0
-    monkeypatch.setattr(fowt_env, "simulate", lambda *a, **k: frame)
-    wanted = [f(frame[name]) for name in channels for f in (np.mean, np.std, np.min, np.max)]
-    return ["simulate"], [f"{value:.4g}" for value in wanted]
-
-
-def trim_command(monkeypatch, tmp_path):
-    points = frame_of(TRIM_CHANNELS, 2)
-    rows = iter(points.to_dict("records"))
-    monkeypatch.setattr(fowt_env, "trim", lambda *a, **k: next(rows))
-    return ["trim", "--winds", "8,18"], texts_of(points)
-
-
-def linearize_command(monkeypatch, tmp_path):
-    from fowt_env.training.design import sweeps
-
-    modes = frame_of(["wind_[m/s]", "period_[s]", "damping_ratio_[-]", *"abcdefgh"], 3)
-    modes.insert(1, "mode", ["surge", "platform_pitch", "heave"])
-    zeros = frame_of(["wind_[m/s]", "real_[rad/s]", "imag_[rad/s]"], 2)
-    monkeypatch.setattr(sweeps, "models_over", lambda *a: {18.0: SimpleNamespace(pitch_rests=False)})
-    monkeypatch.setattr(sweeps, "mode_table", lambda models: modes)
-    monkeypatch.setattr(sweeps, "zero_table", lambda models: zeros)
-    return ["linearize", "--winds", "18"], texts_of(modes) + texts_of(zeros)
-
-
-def design_pi_command(monkeypatch, tmp_path):
-    from fowt_env.controllers.design import pi as pi_design
-    from fowt_env.training.design import sweeps
-
-    names = ["wind_[m/s]", "blade_pitch_[deg]", "slope_[1/s2]", "KP_[s]", "KI_[-]", "omega_[rad/s]"]
-    table = frame_of([*names, "zeta_[-]", "platform_zeta_[-]", "platform_omega_[rad/s]"], 3)
-    found = SimpleNamespace(table=table.to_dict("records"), KP=1.0, KI=1.0, gain_schedule_pitch=1.0)
-    monkeypatch.setattr(sweeps, "models_over", lambda *a: {})
-    monkeypatch.setattr(pi_design, "design_pi", lambda *a: found)
-    return ["design", "pi", "--winds", "18"], texts_of(table)
-
-
-def design_bound_command(monkeypatch, tmp_path):
-    from fowt_env.training.design import linear_bound
-
-    names = ["speed_ratio_[-]", "pitch_ratio_[-]", "travel_ratio_[-]", "power_ratio_[-]", "torque_std_[%]"]
-    table = frame_of(["wind_[m/s]", "share_[-]", *names, "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]"], 5)
-    table.insert(1, "information", list(linear_bound.INFORMATION)[:1] * 5)
-    monkeypatch.setattr(linear_bound, "bound_table", lambda *a, **k: table)
-    return ["design", "bound", "--wind", "18"], texts_of(table)
-
-
-def design_front_command(monkeypatch, tmp_path):
-    from fowt_env.files import tables
-    from fowt_env.training.design import linear_bound
-
-    table = frame_of(["wind_[m/s]", *linear_bound.RATIOS, "of_bound_[-]", "of_measured_[-]"], 3)
-    table.insert(1, "variant", ["{'pitch_rate': 8.0}", "{'pitch_rate': 80.0}", "default"])
-    monkeypatch.setattr(tables, "read_table", lambda path: table)
-    monkeypatch.setattr(linear_bound, "ratio_table", lambda *a: table)
-    return ["design", "front", "--runs", "a.csv", "--bound", "b.csv"], texts_of(table)
-
-
-def design_lqr_command(monkeypatch, tmp_path):
-    from fowt_env.training.design import sweeps
-
-    table = frame_of(sweeps.SHOWN, 2, case=["ntm_18"] * 2, variant=["gspi_oc3", "{'pitch_rate': 8.0}"])
-    monkeypatch.setattr(sweeps, "sweep", lambda *a, **k: table)
-    return ["design", "lqr-sweep"], texts_of(table)
-
-
-def validate_command(monkeypatch, tmp_path):
-    from fowt_env.training.validation import comparison, validate
-    from fowt_env.training.validation import report as validation_report
-
-    study = comparison.Study()
-    for number in range(123):
-        study.add(
-            "second harmonic, position instantaneous, surface instantaneous" * 2, str(number), "m", 1, 1
-        )
-    monkeypatch.setattr(validate, "validate_cases", lambda *a, **k: study)
-    monkeypatch.setattr(validation_report, "write_validation_report", lambda *a: [])
-    return ["validate"], ["123", "reported"]
-
-
-def paper_command(monkeypatch, tmp_path):
-    from fowt_env.training.studies.paper import load_cases
-    from fowt_env.training.studies.paper import report as paper_report
-
-    table = frame_of(["mean", "std", "min", "max"], 2, case=["LC5"] * 2)
-    table.insert(1, "channel", ["PtfmSurge_[m]", "PtfmPitch_[deg]"])
-    monkeypatch.setattr(load_cases, "run_paper", lambda *a: SimpleNamespace(runs=[1], claims=[]))
-    monkeypatch.setattr(load_cases, "statistics", lambda runs: table)
-    monkeypatch.setattr(paper_report, "write_paper_report", lambda *a: [])
-    return ["paper", "LC5"], texts_of(table)
-
-
-def benchmark_speed_command(monkeypatch, tmp_path):
-    from fowt_env.training.benchmarks import speed as benchmark
-
-    kinds = list(benchmark.TIMED_SCENES)[:8]
-    table = frame_of(["step_us", "loop_us", "simulate_x", "seconds"], 8, kind=kinds, absent=[""] * 8)
-    monkeypatch.setattr(benchmark, "speed", lambda *a, **k: table)
-    return ["benchmark", "speed", "--out", str(tmp_path / "speed.csv")], texts_of(table)
-
-
-def benchmark_accuracy_command(monkeypatch, tmp_path):
-    from fowt_env.training.benchmarks import accuracy as benchmark_accuracy
-
-    name = "rotor as a table, midpoint, 0.05 s, waves by bands, one call in two, and more words of this kind"
-    row = {"variant": name, "worst": 0.0123, "worst_of": "PtfmPitch_[deg]", "front": True}
-    row |= {"real_time_factor": 30412.4, "kernel_factor": 123456.4}
-    monkeypatch.setattr(benchmark_accuracy, "accuracy", lambda *a, **k: None)
-    monkeypatch.setattr(benchmark_accuracy, "accuracy_summary", lambda table: pd.DataFrame([row]))
-    return ["benchmark", "accuracy", "--no-plot"], ["0.0123", "30412", "123456"]
-
-
-def benchmark_evaluation_command(monkeypatch, tmp_path):
-    from fowt_env.training.benchmarks import evaluation as benchmark_evaluation
-
-    table = frame_of([f"a_rather_long_name_{i}_ms" for i in range(9)], 2, case=["ntm_18", "ntm_20"])
-    table["runs"] = [1234567, 3]
-    monkeypatch.setattr(benchmark_evaluation, "evaluation_cost", lambda *a: table)
-    words = ["benchmark", "evaluation", "--out", str(tmp_path / "e.csv")]
-    return words, [*texts_of(table.drop(columns="runs")), "1234567"]
-
-
-COMMANDS = (
-    simulate_command, trim_command, linearize_command, design_pi_command, design_bound_command,
-    design_front_command, design_lqr_command, validate_command, paper_command, benchmark_speed_command,
-    benchmark_accuracy_command, benchmark_evaluation_command,
-)  # fmt: skip
-
-
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: command.__name__)
-def test_a_command_prints_every_figure_in_full(command, width, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    words, wanted = command(monkeypatch, tmp_path)
-    long_text = command in (validate_command, benchmark_accuracy_command)  # wider than any terminal by itself
-    assert_whole(printed_by(*words), wanted, None if long_text else width)
+def test_a_frame_is_printed_with_every_figure_in_full(width, capsys):
+    table = frame_of(["wind_[m/s]", "period_[s]", "damping_ratio_[-]", *"abcdefgh"], 3)
+    table.insert(1, "mode", ["surge", "platform_pitch", "heave"])
+    table["runs"] = [1234567, 3, 4]
+    console.show(table, "modes")
+    wanted = [f"{value:.4g}" for value in table.select_dtypes(float).to_numpy().ravel()]
+    assert_whole(capsys.readouterr().out, [*wanted, "1234567", *table["mode"]], width)
 
 
 def test_evaluate_prints_every_figure_of_what_it_shows_in_full(width, capsys):
@@ -295,5 +158,7 @@ def test_whole_numbers_are_whole_and_others_have_four_digits():
 
 
 def test_no_module_makes_tables_of_its_own():
-    sources = Path(fowt_env.__file__).parent.rglob("*.py")
-    assert not [path.name for path in sources if "rich.table" in path.read_text(encoding="utf-8")]
+    sources = [path for folder in (PACKAGE, *FOLDERS.values()) for path in folder.rglob("*.py")]
+    texts = {path: path.read_text(encoding="utf-8") for path in sources}
+    assert not [path for path, text in texts.items() if "rich.table" in text]
+    assert not [path for path, text in texts.items() if ".to_string(" in text and path.parent.name == "cli"]

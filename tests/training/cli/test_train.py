@@ -64,10 +64,8 @@ def test_a_run_is_validated_at_its_end_and_the_command_that_it_prints_works(tmp_
     result = call(*shlex.split(command)[1:], *short)
     assert result.exit_code == 0, result.output
     scored = pd.read_csv(tmp_path / "results" / "run of mine" / "results.csv")
-    assert (scored["status"] == "ok").all() and set(scored["controller"]) == {
-        "policy:run of mine/best.npz",
-        "lqr",
-    }
+    assert (scored["status"] == "ok").all()
+    assert set(scored["controller"]) == {"policy:run of mine/best.npz", "lqr"}
 
 
 def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on(tmp_path, monkeypatch):

@@ -158,13 +158,6 @@ def test_ray_takes_controllers_of_every_kind(cluster, turbine):
     assert table.loc["compiled", "BldPitch1_mean_[deg]"] == table.loc["name", "BldPitch1_mean_[deg]"]
 
 
-@pytest.mark.slow
-def test_a_ray_worker_killed_half_way_costs_its_task_a_retry(cluster, tmp_path):
-    names = [str(tmp_path / name) for name in ("a", "b.dies", "c")]
-    assert dict(outcomes(dies_once, names, jobs=2, engine="ray")) == {0: "a", 1: "b.dies", 2: "c"}
-    assert (tmp_path / "b.dies").exists()
-
-
 class Slow:
     """Holds still, with a pause in every tenth command; says in a file which process it runs in."""
 

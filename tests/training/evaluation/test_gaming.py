@@ -62,10 +62,14 @@ def table(**controllers):
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 
-def ranks(runs):
-    """{controller: rank} on the leaderboard of the headline suite."""
+def entries(runs):
+    """{controller: entry} of the leaderboard of the headline suite."""
     board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
-    return {entry["controller"]: entry["rank"] for entry in board["controllers"]}
+    return {entry["controller"]: entry for entry in board["controllers"]}
+
+
+def ranks(runs):
+    return {name: entry["rank"] for name, entry in entries(runs).items()}
 
 
 def ratios(runs, agent):
@@ -73,9 +77,7 @@ def ratios(runs, agent):
 
 
 def scores(runs):
-    """{controller: score} on the leaderboard of the headline suite."""
-    board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
-    return {entry["controller"]: entry["score"]["mean"] for entry in board["controllers"]}
+    return {name: entry["score"]["mean"] for name, entry in entries(runs).items()}
 
 
 def good(wind, seed):
@@ -92,9 +94,7 @@ def test_a_run_that_is_given_up_where_it_goes_badly_gains_nothing(status):
     assert (ratios(runs, "gamer") >= ratios(runs, "honest") - 1e-12).drop("energy").all()
     assert ratios(runs, "gamer")["rotor-speed std"] > 0.9  # not the 0.8 of the runs that it likes
     assert scores(runs)["gamer"] > scores(runs)["gspi_oc3"] == 1.0 > scores(runs)["honest"]
-    entry = next(
-        each for each in leaderboard(runs)["controllers"] if each["controller"] == "gamer"
-    )  # what is shown is of the runs that it likes, and is not tested
+    entry = entries(runs)["gamer"]  # what is shown is of the runs that it likes, and is not tested
     assert entry["lost"] == 21 and entry["metrics"][SPEED]["mean"] < 1.3
     assert all(np.isnan(gap["p"]) for gap in entry["difference"].values())
     verdicts = agent_scores(runs, ["gspi_oc3"], agents=["gamer"])["verdict"]
@@ -108,9 +108,8 @@ def test_power_beyond_rated_is_no_energy():
     runs = table(honest=good, gamer=overproduces)
     assert ranks(runs)["honest"] < ranks(runs)["gamer"]
     verdicts = agent_scores(runs, ["gspi_oc3"]).set_index(["agent", "figure"])["verdict"]
-    assert verdicts["gamer", "energy"].startswith("missed") and not verdicts["honest", "energy"].startswith(
-        "mis"
-    )
+    assert verdicts["gamer", "energy"].startswith("missed")
+    assert not verdicts["honest", "energy"].startswith("missed")
 
 
 @pytest.mark.parametrize("spent", [{SHAFT: 1.4}, {TORQUE: 6.0}, {TRAVEL: 1.3}, {"GenPwr_max_[kW]": 1.2}])
@@ -120,32 +119,27 @@ def test_rotor_speed_that_is_bought_with_torque_or_pitch_or_power_is_beyond_a_li
 
     runs = table(honest=good, gamer=buys)
     assert ranks(runs)["honest"] < ranks(runs)["gamer"]
-    board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
-    beyond = {entry["controller"]: entry["beyond"] for entry in board["controllers"]}
+    beyond = {name: entry["beyond"] for name, entry in entries(runs).items()}
     assert len(beyond["gamer"]) == 1 and next(iter(spent)) in beyond["gamer"][0] and not beyond["honest"]
 
 
-def test_bad_winds_are_not_trimmed_away():
-    def only_calm(wind, seed):
-        return {SPEED: 3.0 if wind == 24.0 or seed == 6 else 0.8, LEAN: 0.7}
+CALM = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, SHAFT, "TwrBsMyt_DEL_[kN-m]", "FAIRTEN_DEL_[kN]"), 0.5)
 
-    runs = table(honest=good, gamer=only_calm)
+
+@pytest.mark.parametrize(
+    ("gamer", "figure", "least", "most"),
+    [
+        # only calm winds and seeds; an interquartile mean of these would be 0.8
+        (lambda wind, seed: {SPEED: 3.0 if wind == 24.0 or seed == 6 else 0.8, LEAN: 0.7},
+         "rotor-speed std", 1.3, 3.0),
+        (lambda wind, seed: good(wind, seed) | {SPEED: np.nan}, "rotor-speed std", PENALTY, PENALTY),
+        (lambda wind, seed: CALM | {ENERGY: 1e-3}, "energy", 0.0, 0.01),  # parked
+    ],
+)  # fmt: skip
+def test_what_is_left_out_or_given_up_counts(gamer, figure, least, most):
+    runs = table(honest=good, gamer=gamer)
     assert ranks(runs)["honest"] < ranks(runs)["gamer"]
-    assert ratios(runs, "gamer")["rotor-speed std"] > 1.3  # an interquartile mean of these would be 0.8
-
-
-def test_a_figure_that_only_the_gamer_lacks_counts_as_lost():
-    runs = table(honest=good, gamer=good)
-    runs.loc[runs["controller"] == "gamer", SPEED] = np.nan
-    assert ranks(runs)["honest"] < ranks(runs)["gamer"]
-    assert ratios(runs, "gamer")["rotor-speed std"] == pytest.approx(PENALTY)
-
-
-def test_a_parked_turbine_earns_its_calm_with_all_its_energy():
-    calm = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, SHAFT, "TwrBsMyt_DEL_[kN-m]", "FAIRTEN_DEL_[kN]"), 0.5)
-    runs = table(honest=good, parks=lambda wind, seed: calm | {ENERGY: 1e-3})
-    assert ranks(runs)["honest"] < ranks(runs)["parks"]
-    assert ratios(runs, "parks")["energy"] < 0.01
+    assert least * (1.0 - 1e-12) <= ratios(runs, "gamer")[figure] <= most * (1.0 + 1e-12)
 
 
 def gives_up_once(wind, seed):
@@ -154,11 +148,7 @@ def gives_up_once(wind, seed):
 
 def scored(runs, name):
     """Score of a controller, with its interval, as bytes: equal where they are equal to the last bit."""
-    (entry,) = (
-        each
-        for each in leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)["controllers"]
-        if each["controller"] == name
-    )
+    entry = entries(runs)[name]
     return np.array([entry["score"][key] for key in ("mean", "low", "high")]).tobytes(), entry["beyond"]
 
 
@@ -221,9 +211,8 @@ def test_a_reference_without_a_figure_counts_for_nobody_and_without_one_there_is
     assert found["gamer"] == found["honest"] and ranks(runs)["gamer"] == 3  # its run is lost all the same
     board = leaderboard(runs[runs["controller"] != REFERENCE], score=HEADLINE.score, limits=HEADLINE.limits)
     for entry in board["controllers"]:
-        assert (
-            entry["rank"] is None and entry["score"]["mean"] is None and "reference" in entry["score"]["why"]
-        )
+        assert entry["rank"] is None and entry["score"]["mean"] is None
+        assert "reference" in entry["score"]["why"]
     assert board["unchecked"] == list(HEADLINE.limits.relative)
 
 
@@ -247,13 +236,8 @@ def test_what_counts_in_place_of_a_lost_run_is_worse_whatever_the_sign():
         counted = penalised(runs, "gspi_oc3").groupby("controller")[[SPEED, ENERGY]].mean()
         assert counted.loc["gamer", SPEED] > counted.loc["gspi_oc3", SPEED] == sign * 2.0
         assert counted.loc["gamer", ENERGY] < counted.loc["gspi_oc3", ENERGY] == sign * 2.0
-    assert [better(name) for name in (SPEED, SHAFT, ENERGY, "energy_[kWh]", "GenPwr_max_[kW]")] == [
-        -1,
-        -1,
-        1,
-        1,
-        -1,
-    ]
+    names = (SPEED, SHAFT, ENERGY, "energy_[kWh]", "GenPwr_max_[kW]")
+    assert [better(name) for name in names] == [-1, -1, 1, 1, -1]
     assert better("Wind1VelX_std_[m/s]") == better("PtfmPitch_mean_[deg]") == better("GenTq_min_[kN-m]") == 0
     assert np.isnan(
         penalised(runs, "gspi_oc3").set_index("controller").loc["gamer", "PtfmPitch_mean_[deg]"]
@@ -318,14 +302,8 @@ class LowerSetPoint:
 def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_twin():
     case = Case("ntm_18", {"kind": "ntm", "speed": 18.0, "class": "B"}, None)
     turbine = read_turbine("nrel5mw")
-    runs = evaluate(
-        {"gspi_oc3": "gspi_oc3", "quitter": Quitter(turbine)},
-        [case],
-        duration=60.0,
-        skip=10.0,
-        seeds=(1001, 1002),
-        reference="gspi_oc3",
-    )
+    options = {"duration": 60.0, "skip": 10.0, "seeds": (1001, 1002), "reference": "gspi_oc3"}
+    runs = evaluate({"gspi_oc3": "gspi_oc3", "quitter": Quitter(turbine)}, [case], **options)
     lost = runs[runs["controller"] == "quitter"]
     assert (lost["status"] == "failed").any() and "enough of this" in " ".join(lost["reason"])
     board = leaderboard(runs, score=HEADLINE.score)

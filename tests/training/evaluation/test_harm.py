@@ -24,10 +24,18 @@ from fowt_env.training.cli import app as cli
 from fowt_env.training.cli.console import EXIT_STOPPED
 from fowt_env.training.evaluation import engines, guard, provenance, results
 from fowt_env.training.evaluation.cases import Case
-from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate, score
+from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.evaluation.results import LONGEST_NAME, check_name, read_row, run_file, write_run
-from fowt_env.training.reports.terminal import evaluation_plots, write_leaderboard
+from fowt_env.training.evaluation.results import (
+    LONGEST_NAME,
+    check_name,
+    read_row,
+    run_content,
+    run_file,
+    write_run,
+)
+from fowt_env.training.reports.terminal import evaluation_plots
 
 CALM = Case("calm", 16.0)
 SHORT = {"duration": 4.0, "skip": 1.0}
@@ -220,7 +228,11 @@ def test_names_that_no_table_can_hold_are_refused_before_anything_runs(plant, tm
     for label, case in ((name, "calm"), ("a", name)):
         with pytest.raises(InputError, match="must be a printable text of at most 500 characters"):
             evaluate({label: stub_plant.Still()}, [Case(case, 16.0)], folder=tmp_path, **SHORT)
+    with pytest.raises(InputError, match="two have the name 'Still'"):
+        evaluate([stub_plant.Still(), stub_plant.Still()], [CALM], **SHORT)
     assert not list(tmp_path.iterdir())
+    for name in ("pi", "policy:ppo_lqr", "mine:Mine", "größe", "a b"):
+        check_name("name", name)
 
 
 def test_a_hidden_case_and_a_long_label_are_run_once_and_no_file_but_a_leftover_is_deleted(plant, tmp_path):
@@ -244,11 +256,6 @@ def test_plots_of_a_case_lie_in_the_folder_whatever_its_name(plant, tmp_path):
     assert list(tmp_path.iterdir()) == [folder]
 
 
-def test_two_objects_of_one_class_need_names(plant):
-    with pytest.raises(InputError, match="two have the name 'Still'"):
-        evaluate([stub_plant.Still(), stub_plant.Still()], [CALM], **SHORT)
-
-
 # ------------------------------------------------------------------ rows and folders
 
 
@@ -257,7 +264,7 @@ def written_row(tmp_path, **changes):
     row = dict.fromkeys(COLUMNS, 1.5) | {"controller": "pi", "case": "calm", "seed": 1, "status": "ok"}
     row = row | {"reason": "", "events": "", "warning": ""} | changes
     row = {name: value for name, value in row.items() if value is not Ellipsis}
-    return write_run(None, row, tmp_path / "runs" / "pi" / "calm_seed1.parquet")
+    return write_run(run_content(None, row), tmp_path / "runs" / "pi" / "calm_seed1.parquet")
 
 
 @pytest.mark.parametrize(
@@ -280,7 +287,7 @@ def test_a_row_of_a_file_elsewhere_is_refused_and_a_strangers_reason_made_printa
     path = written_row(tmp_path, status="failed", reason="a\x1b[31m\nb" + "c" * 900)
     assert read_row(path)["reason"] == "a\\x1b[31m b" + "c" * 485 + " ..."
     path.rename(path.with_name("calm_seed2.parquet"))
-    with pytest.raises(InputError, match="calm_seed2.parquet' holds the run pi, calm, 1: remove it"):
+    with pytest.raises(InputError, match="calm_seed2.parquet' contains the run pi, calm, 1: remove it"):
         with results.open_results(tmp_path, SETTINGS, COLUMNS):
             pass
 
@@ -289,29 +296,25 @@ SETTINGS = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers
 
 
 @pytest.mark.parametrize("package", ["numpy", "numba", "machine", "rainflow"])
-def test_a_folder_of_other_versions_is_refused_with_both_of_them(tmp_path, package):
-    with results.open_results(tmp_path, SETTINGS, COLUMNS):
-        pass
-    path = tmp_path / "manifest.json"
-    manifest = json.loads(path.read_text())
-    assert manifest["versions"] == provenance.versions()
-    here = manifest["versions"][package]
-    path.write_text(json.dumps(manifest | {"versions": manifest["versions"] | {package: "0.1"}}))
-    with pytest.raises(InputError, match=f"made with {package} 0.1, this is {package} {here}: choose"):
+def test_a_folder_and_a_ray_worker_of_other_versions_are_refused_with_both_of_them(tmp_path, package):
+    def opened():
         with results.open_results(tmp_path, SETTINGS, COLUMNS):
             pass
-    less = {name: version for name, version in manifest["versions"].items() if name != package}
-    path.write_text(json.dumps(manifest | {"versions": less | {"pandas": "0.1"}}))  # shapes nothing
-    with results.open_results(tmp_path, SETTINGS, COLUMNS):
-        pass
-    assert json.loads(path.read_text())["versions"] == provenance.versions() | {"pandas": "0.1"}
 
-
-def test_a_ray_worker_of_other_versions_does_nothing(monkeypatch):
-    from fowt_env.training.evaluation.evaluate import score_and_send
-
-    with pytest.raises(InputError, match="numpy 0.1 here and numpy .* at the worker"):
-        score_and_send(None, here=provenance.versions() | {"numpy": "0.1"})
+    opened()
+    path, versions = tmp_path / "manifest.json", provenance.versions()
+    manifest, other = json.loads(path.read_text()), versions | {package: "0.1"}
+    assert manifest["versions"] == versions
+    path.write_text(json.dumps(manifest | {"versions": other}))
+    here = re.escape(f"{package} {versions[package]}")
+    with pytest.raises(InputError, match=f"made with {package} 0.1, this is {here}: choose"):
+        opened()
+    with pytest.raises(InputError, match=f"{package} 0.1 here and {here} at the worker"):
+        score(None, here=other)
+    less = {name: version for name, version in versions.items() if name != package}
+    path.write_text(json.dumps(manifest | {"versions": less | {"pandas": "0.1"}}))  # affects no metric
+    opened()
+    assert json.loads(path.read_text())["versions"] == versions | {"pandas": "0.1"}
 
 
 def test_rare_events_of_a_run_are_in_its_row(plant, tmp_path):
@@ -357,19 +360,23 @@ print(*{sys.modules[name].__file__ for name in {*names, "fowt_env.controllers.co
 """
 
 
-def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_is_not(tmp_path):
-    environment = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
-    done = subprocess.run(
-        [sys.executable, "-c", USED], env=environment, cwd=tmp_path, capture_output=True, text=True
-    )
+def printed(program, code, folder):
+    """Words that a program prints with the sources of a folder."""
+    options = {"env": os.environ | {"PYTHONPATH": str(code)}, "cwd": folder}
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, **options)
     assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_is_not(tmp_path):
+    words = printed(USED, PACKAGE.parent, tmp_path)
     files = {str(path) for path in provenance.plant_files()}
     # of the program above, of agents, and of controllers, whose own hash has it
     others = (
         "training.evaluation.cases", "training.evaluation.scaling", "envs.decisions",
         "analysis.reduced_model",
     )  # fmt: skip
-    used = set(done.stdout.split()) - {str(module_path(f"fowt_env.{name}")) + ".py" for name in others}
+    used = set(words) - {str(module_path(f"fowt_env.{name}")) + ".py" for name in others}
     assert used <= files and len(used) > 40
     names = {installed_path(path).relative_to(PACKAGE).as_posix() for path in provenance.plant_files()}
     data = "data/platforms/oc3_hywind.toml"
@@ -392,12 +399,7 @@ OWN = "from fowt_env.controllers.pi import pi as Law\nfrom fowt_env.envs import 
 
 def codes(code, folder):
     """{what is hashed in a manifest: its hash} of a copy of the sources."""
-    environment = os.environ | {"PYTHONPATH": str(code)}
-    done = subprocess.run(
-        [sys.executable, "-c", CODES], env=environment, cwd=folder, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    words = done.stdout.split()
+    words = printed(CODES, code, folder)
     return dict(zip(words[::2], words[1::2], strict=True))
 
 
@@ -471,8 +473,3 @@ def test_a_users_controller_depends_on_those_of_the_package_that_it_builds_on(tm
     law = {"controllers/lqr/law.py", "controllers/lqr/design.py"}
     assert law | {"analysis/linear_model.py"} <= names
     assert "controllers/rosco.py" not in names and "controllers/__init__.py" not in names
-
-
-def test_check_name_takes_what_the_package_ships():
-    for name in ("pi", "policy:ppo_lqr", "mine:Mine", "größe", "a b"):
-        check_name("name", name)

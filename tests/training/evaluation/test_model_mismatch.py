@@ -43,16 +43,6 @@ class Recorder:
         return 43093.55, 0.26
 
 
-class Deaf:
-    """Commands that no reading changes."""
-
-    def reset(self, measurement):
-        pass
-
-    def act(self, measurement):
-        return 43093.55, 0.26
-
-
 def readings(shift, seed=1, duration=20.0):
     """(calls, fields) that a controller reads in a run of the shifted case, the reset's first."""
     recorder = Recorder()
@@ -137,7 +127,7 @@ def test_a_delay_shows_what_was_measured_as_many_periods_ago():
 
 def test_noise_is_on_the_readings_and_not_in_the_metrics():
     noise = PlantPerturbation(noise=0.5)
-    plain, noisy = (short({"deaf": Deaf()}, windy(shift)).iloc[0] for shift in (None, noise))
+    plain, noisy = (short({"deaf": Recorder()}, windy(shift)).iloc[0] for shift in (None, noise))
     assert plain.equals(noisy)  # a controller that looks at nothing runs as without noise
     noise = PlantPerturbation(noise=0.05)
     felt, truth = (short(["gspi_oc3"], windy(shift)).iloc[0] for shift in (noise, None))

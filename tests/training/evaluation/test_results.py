@@ -19,8 +19,9 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation import provenance, results
 from fowt_env.training.evaluation.cases import Case, Suite
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
+from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.reports.terminal import leaderboard_rows, write_leaderboard
+from fowt_env.training.reports.terminal import leaderboard_rows
 
 CALM = Case("calm", 16.0)
 WINDY = Case("windy", 18.0)
@@ -47,12 +48,8 @@ class Misshapen(Broken):
 def went(folder, *arguments, **options):
     """(table, runs that were made) of an evaluation into a folder."""
     made = []
-    table = evaluate(
-        *arguments,
-        folder=folder,
-        progress=lambda done, total, row: row and made.append(row),
-        **SHORT | options,
-    )
+    progress = lambda done, total, row: row and made.append(row)  # noqa: E731
+    table = evaluate(*arguments, folder=folder, progress=progress, **SHORT | options)
     return table, [(row["controller"], row["case"], row["seed"]) for row in made]
 
 
@@ -130,6 +127,9 @@ def test_a_lost_run_is_made_again(tmp_path):
     assert not list(tmp_path.rglob(".*")) and (tmp_path / "results.csv").exists()
 
 
+SETTINGS = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
+
+
 def suite(version=1, wind=16.0):
     return Suite("mine", version, "d", "s", "rotor-averaged", (1,), 20.0, 5.0, (Case("calm", wind),))
 
@@ -148,18 +148,18 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
         with pytest.raises(InputError, match=message) as error:
             evaluate("pi", folder=tmp_path, **arguments)
         assert "--out" in str(error.value) and str(tmp_path) in str(error.value)
-    with monkeypatch.context() as patch:
-        patch.setattr(fowt_env, "__version__", "9.9")
-        with pytest.raises(InputError, match="was made by fowt_env .* this is 9.9"):
-            evaluate("pi", suite(), folder=tmp_path)
-    with monkeypatch.context() as patch:
-        patch.setattr(provenance, "plant_code", lambda: "other")
-        with pytest.raises(InputError, match="another state"):
-            evaluate("pi", suite(), folder=tmp_path)
-    with monkeypatch.context() as patch:
-        new = {"name": "pi", "code": "new"}
-        patch.setattr("fowt_env.training.evaluation.evaluate.controller_code", lambda controller: new)
-        with pytest.raises(InputError, match="controller 'pi' or its code has changed"):
+    new = {"name": "pi", "code": "new"}
+    for name, value, message in (
+        ("__version__", "9.9", "was made by fowt_env .* this is 9.9"),
+        ("training.evaluation.provenance.plant_code", lambda: "other", "another state"),
+        (
+            "training.evaluation.evaluate.controller_code",
+            lambda controller: new,
+            "'pi' or its code has changed",
+        ),
+    ):
+        with monkeypatch.context() as patch, pytest.raises(InputError, match=message):
+            patch.setattr(f"fowt_env.{name}", value)
             evaluate("pi", suite(), folder=tmp_path)
 
 
@@ -197,23 +197,20 @@ def test_a_manifest_of_another_format_is_refused(tmp_path, content):
     assert (tmp_path / "manifest.json").read_text() == content
 
 
-@pytest.mark.parametrize("key", results.MANIFEST)
-def test_a_manifest_that_lacks_a_key_is_refused_by_its_name(tmp_path, key):
-    settings = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
-    with results.open_results(tmp_path, settings, ["controller"]):
+def test_a_manifest_that_lacks_a_key_is_refused_by_its_name(tmp_path):
+    with results.open_results(tmp_path, SETTINGS, ["controller"]):
         pass
     path = tmp_path / "manifest.json"
     manifest = json.loads(path.read_text())
-    del manifest[key]
-    path.write_text(json.dumps(manifest))
-    with pytest.raises(InputError, match=f"without a sound '{key}'"):
-        with results.open_results(tmp_path, settings, ["controller"]):
-            pass
+    for key in results.MANIFEST:
+        path.write_text(json.dumps({name: value for name, value in manifest.items() if name != key}))
+        with pytest.raises(InputError, match=f"without a sound '{key}'"):
+            with results.open_results(tmp_path, SETTINGS, ["controller"]):
+                pass
 
 
 def test_a_folder_in_use_and_a_file_are_refused(tmp_path):
-    settings = {"suite": None, "options": {}, "cases": {}, "seeds": [], "controllers": {}}
-    with results.open_results(tmp_path / "a", settings, COLUMNS):
+    with results.open_results(tmp_path / "a", SETTINGS, COLUMNS):
         with pytest.raises(InputError, match="another evaluation"):
             evaluate("pi", suite(), folder=tmp_path / "a")
     (tmp_path / "b").write_text("")
@@ -282,25 +279,17 @@ def wait_for_runs(process, folder, count, delay):
     time.sleep(delay)
 
 
-def uninterrupted(tmp_path):
-    cases = [Case("calm", 16.0), Case("windy", 18.0)]
-    folder = tmp_path / "whole"
-    evaluate("pi,pi_land", cases, folder=folder, seeds=(1, 2, 3), duration=60.0, skip=5.0)
-    return pd.read_csv(folder / "results.csv")
-
-
-def test_an_evaluation_that_was_killed_goes_on_where_it_was(tmp_path):
-    pd.testing.assert_frame_equal(
-        killed_evaluation(tmp_path, 1, [0.05]), uninterrupted(tmp_path), check_exact=True
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_kills_at_random_moments_lose_and_repeat_nothing(tmp_path, jobs):
+@pytest.mark.parametrize(
+    ("jobs", "kills"),
+    [
+        (1, 1),
+        pytest.param(1, 5, marks=[pytest.mark.slow, pytest.mark.nightly]),
+        pytest.param(2, 5, marks=[pytest.mark.slow, pytest.mark.nightly]),
+    ],
+)
+def test_an_evaluation_that_was_killed_goes_on_where_it_was(tmp_path, jobs, kills):
     rng = random.Random(jobs)
-    delays = [rng.uniform(0.0, 0.4) for _ in range(5)]
-    pd.testing.assert_frame_equal(
-        killed_evaluation(tmp_path, jobs, delays), uninterrupted(tmp_path), check_exact=True
-    )
+    delays = [0.05] if kills == 1 else [rng.uniform(0.0, 0.4) for _ in range(kills)]
+    table, folder = killed_evaluation(tmp_path, jobs, delays), tmp_path / "whole"
+    evaluate("pi,pi_land", [CALM, WINDY], folder=folder, seeds=(1, 2, 3), duration=60.0, skip=5.0)
+    pd.testing.assert_frame_equal(table, pd.read_csv(folder / "results.csv"), check_exact=True)

@@ -39,7 +39,7 @@ def test_a_figure_without_a_number_is_nan_and_a_column_of_words_is_left_out(tmp_
     table = read_results(tmp_path)
     assert np.isnan(table["a"][0]) and np.isnan(table["b"][0]) and list(table.loc[1, ["a", "b"]]) == [2.5, 1]
     assert "c" not in table
-    with pytest.raises(InputError, match="column c must hold numbers"):
+    with pytest.raises(InputError, match="column c must contain numbers"):
         read_results(tmp_path, ["c"])
 
 
@@ -84,7 +84,7 @@ def test_the_share_of_a_case_is_its_weight_however_many_runs_of_it_there_are():
         ("", "cannot be read"),
         ("a,b\n1,2\n", "lacks the columns controller, case, seed, status"),
         ("controller,case,seed,status\n", "has no runs"),
-        ("controller,case,seed,status\npi,a,first,ok\n", "seed must hold whole numbers"),
+        ("controller,case,seed,status\npi,a,first,ok\n", "seed must contain whole numbers"),
         ("controller,case,seed,status\npi,a,1,ok\npi,a,1,ok\n", "a controller, case and seed occur twice"),
     ],
 )
@@ -95,7 +95,7 @@ def test_a_table_that_is_none_is_refused_with_its_file(tmp_path, text, message):
 
 
 def test_where_there_is_no_table_the_message_says_how_to_make_one(tmp_path):
-    with pytest.raises(InputError, match="holds no results.csv: make it with fowt evaluate"):
+    with pytest.raises(InputError, match="contains no results.csv: make it with fowt evaluate"):
         read_results(tmp_path)
     with pytest.raises(InputError, match="none' is no such file or folder: make it with fowt evaluate"):
         read_results(tmp_path / "none")

@@ -42,15 +42,10 @@ def runs(controllers, cases=("ntm_18",), seeds=(1, 2)):
     for case in cases:
         for seed in seeds:
             for name, ratios in ({"gspi_oc3": (1.0,) * 4} | controllers).items():
-                row = dict.fromkeys(COLUMNS, 1.0 if name == "gspi_oc3" else 5.0) | {
-                    "controller": name,
-                    "case": case,
-                    "seed": seed,
-                }
-                row |= {"status": "ok"} | dict(
-                    zip((SPEED, LEAN, TRAVEL, POWER), (seed * ratio for ratio in ratios), strict=True)
-                )
-                rows.append(row)
+                row = dict.fromkeys(COLUMNS, 1.0 if name == "gspi_oc3" else 5.0) | {"status": "ok"}
+                row |= {"controller": name, "case": case, "seed": seed}
+                figures = zip((SPEED, LEAN, TRAVEL, POWER), (seed * ratio for ratio in ratios), strict=True)
+                rows.append(row | dict(figures))
     return pd.DataFrame(rows, columns=list(COLUMNS))
 
 

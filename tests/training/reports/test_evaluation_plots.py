@@ -13,15 +13,9 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def test_evaluation_plot_leaves_lost_runs_out_and_says_so(tmp_path):
-    table = pd.DataFrame(
-        {
-            "controller": ["a", "a", "b", "b"],
-            "case": ["x", "y", "x", "y"],
-            "seed": 1,
-            "status": ["ok", "ok", "ok", "failed"],
-            "PtfmPitch_std_[deg]": [1.0, 2.0, 3.0, np.nan],
-        }
-    )
+    columns = {"controller": list("aabb"), "case": list("xyxy"), "seed": 1}
+    columns |= {"status": ["ok", "ok", "ok", "failed"], "PtfmPitch_std_[deg]": [1.0, 2.0, 3.0, np.nan]}
+    table = pd.DataFrame(columns)
     figure = evaluation_plots.plot_evaluation(table, ["PtfmPitch_std_[deg]"], tmp_path / "metrics.png")
     assert (tmp_path / "metrics.png").read_bytes().startswith(PNG)
     assert "1 of 4 runs were lost and are left out" in figure.legends[0].get_title().get_text()
@@ -106,10 +100,8 @@ def test_a_pareto_plot_has_bars_for_intervals_and_the_range_of_the_seeds_where_t
 
 
 def test_pareto_ratios_are_paired_with_the_baseline_and_never_negative():
-    board = pareto_board({"base": (1.0, 0.9, 0.1), "x": (0.5, 0.45, 0.2)}) | {
-        "baseline": "base",
-        "seeds": [1, 2],
-    }
+    board = pareto_board({"base": (1.0, 0.9, 0.1), "x": (0.5, 0.45, 0.2)})
+    board |= {"baseline": "base", "seeds": [1, 2]}
     for entry in board["controllers"]:
         half = {"mean": -0.5, "percent": -40.0, "low": -2.0, "high": 0.1}  # of the runs that both finished
         entry["difference"] = dict.fromkeys(evaluation_plots.PARETO_METRICS, half)
@@ -129,15 +121,8 @@ def test_pareto_ratios_are_paired_with_the_baseline_and_never_negative():
 
 
 def test_evaluation_plot_joins_no_cases_and_says_metrics_in_words():
-    table = pd.DataFrame(
-        {
-            "controller": ["a", "b"] * 3,
-            "case": list("xxyyzz"),
-            "seed": 1,
-            "status": "ok",
-            "RotSpeed_std_[rpm]": 1.0,
-        }
-    )
+    columns = {"controller": ["a", "b"] * 3, "case": list("xxyyzz"), "seed": 1, "status": "ok"}
+    table = pd.DataFrame(columns | {"RotSpeed_std_[rpm]": 1.0})
     figure = evaluation_plots.plot_evaluation(table, ["RotSpeed_std_[rpm]"])
     (axes,) = figure.axes
     assert axes.get_title(loc="left") == "rotor speed, std (rpm)"

@@ -29,19 +29,8 @@ CASE = {
 
 
 def table(cases=("a", "b"), status="ok", reason=""):
-    rows = [
-        {
-            "controller": "pi",
-            "case": case,
-            "seed": seed,
-            "status": status,
-            "reason": reason,
-            "stopped_[s]": 41.25,
-        }
-        for case in cases
-        for seed in (1, 2, 4)
-    ]
-    return pd.DataFrame(rows)
+    row = {"controller": "pi", "status": status, "reason": reason, "stopped_[s]": 41.25}
+    return pd.DataFrame([row | {"case": case, "seed": seed} for case in cases for seed in (1, 2, 4)])
 
 
 @pytest.mark.parametrize(
@@ -51,11 +40,7 @@ def table(cases=("a", "b"), status="ok", reason=""):
         ({"cases": {"a": CASE}}, list("abcd"), "Controllers on oc3_hywind: 4 load cases"),
         ({"cases": {"a": {"platform": "/home/x/mine.toml"}}}, ["a"], "Controllers on mine: a"),
         ({"suite": {"name": "dlc", "version": 3}}, ["a"], "Controllers: suite dlc, version 3"),
-        (
-            {"cases": {"a": CASE, "b": {"platform": "iea15"}}},
-            ["a", "b"],
-            "Controllers on 2 platforms: a, b",
-        ),
+        ({"cases": {"a": CASE, "b": {"platform": "iea15"}}}, ["a", "b"], "Controllers on 2 platforms: a, b"),
     ],
 )
 def test_the_title_is_what_was_evaluated(manifest, cases, title):

@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.cases import chosen_cases
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
@@ -15,7 +16,6 @@ from fowt_env.training.reports.terminal import (
     LEADERBOARD,
     LEADERBOARD_DROPS,
     PRINTED_METRICS,
-    chosen_cases,
     evaluation_plots,
     leaderboard_rows,
     summary_rows,
@@ -73,12 +73,12 @@ def board(seeds, pi="ok", x="failed", factor=1.0, lost=None, baseline=None):
 def test_the_leaderboard_says_how_many_runs_went_well_and_of_which_seeds():
     title, headings, rows, remarks = leaderboard_rows(board([1, 2, 3, 6, 8, 9]))
     assert title == (
-        "1 case, seeds 1-3, 6, 8-9: means [95 % interval], paired difference from pi (* no chance finding)"
+        "1 case, seeds 1 to 3, 6, 8, 9: means [95 % interval], paired difference from pi (* significant)"
     )
     (pi, x) = (dict(zip(headings, row, strict=True)) for row in rows)
     assert (pi["runs"], x["runs"]) == ("6/6", "0/6, 6 failed")
     assert set(row for heading, row in x.items() if "\n" in heading) == {"-"}  # nothing made up
-    assert remarks == ["runs lost by x: 6 failed: without figures here; listed last"]
+    assert remarks == ["runs lost by x: 6 failed: not in these means; ranked last"]
 
 
 def test_a_row_has_means_with_intervals_and_differences_to_the_baseline():
@@ -108,7 +108,7 @@ def test_one_name_has_one_figure_and_one_unit_in_all_tables():
 
 
 def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
-    for seeds, words in (([1], "seed 1:"), ([1, 2, 4], "seeds 1-2, 4:")):
+    for seeds, words in (([1], "seed 1:"), ([1, 2, 4], "seeds 1, 2, 4:")):
         title, _, rows, remarks = leaderboard_rows(board(seeds, x="ok"))
         assert words in title and "[" not in title and "*" not in title
         assert not any("[" in text or "*" in text for row in rows for text in row)
@@ -125,12 +125,12 @@ def test_a_controller_that_failed_in_bad_weather_is_not_said_to_be_better_and_it
     _, headings, (_, row), remarks = leaderboard_rows(lost)
     assert row[headings.index("runs")] == "4/5, 1 failed"
     assert not any("*" in text for text in row) and sum("-50.0% " in text for text in row) == 7
-    assert remarks[0] == "runs lost by x: 1 failed: without figures here; listed last"
+    assert remarks[0] == "runs lost by x: 1 failed: not in these means; ranked last"
 
 
 def test_a_baseline_that_failed_is_said_to_have():
     _, _, _, remarks = leaderboard_rows(board([1, 2, 3, 4, 5], x="ok", lost=5, baseline="x"))
-    assert remarks[-1] == "differences from x are of the runs that it did not lose"
+    assert remarks[-1] == "differences from x are over the runs that it did not lose"
     title, _, _, remarks = leaderboard_rows(board([1, 2], pi="failed"))
     assert "difference" not in title
     assert remarks[-1] == "no paired differences: every controller has runs that failed or lost power"
