@@ -10,7 +10,7 @@ stands first in the function that takes the part. compile/variants.py is for par
 
 from typing import NamedTuple
 
-from fowt_env.plant.aero.bem_rotor import RotorLoad
+from fowt_env.plant.aero.blade_sweep import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel

@@ -188,9 +188,7 @@ class Scene:
         """Words for the load of the user's that made a run not finite with this data; None where none did."""
         return first_nonfinite_load(self.loads, data.user)
 
-    def with_weather(
-        self, wind: Wind = UNCHANGED, sea: Sea = UNCHANGED, seed: int | None = None
-    ) -> "Scene":
+    def with_weather(self, wind: Wind = UNCHANGED, sea: Sea = UNCHANGED, seed: int | None = None) -> "Scene":
         """Return the scene in another wind, sea or seed, with a model of the same types: nothing is compiled.
 
         What is left out stays as it is. sea None is still water. In a scene that was built with a sea it is a

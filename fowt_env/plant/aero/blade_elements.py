@@ -424,7 +424,9 @@ def airload(v_normal, v_tangential, element, polars):
 
 @kernel
 def pitching_moment(v_normal, v_tangential, j, element, shape, polars):
-    """Pitching moment per length of station j in the given local flow, N m/m, nose up."""
+    """Return the pitching moment per length of station j in a local flow, N m/m, nose up."""
+    if shape is None:
+        return 0.0
     square = v_normal * v_normal + v_tangential * v_tangential
     if square == 0.0:
         return 0.0

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.caches import Cache
-from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
 from fowt_env.plant.aero.blade_elements import (
     blade_section,
     element_of,
@@ -26,7 +25,8 @@ from fowt_env.plant.aero.blade_elements import (
     pitching_moment,
     smoothstep,
 )
-from fowt_env.plant.aero.blade_shape import effective_pitch, lever_of, station_at
+from fowt_env.plant.aero.blade_shape import curved_station, effective_pitch, lever_of, turn_of
+from fowt_env.plant.aero.blade_sweep import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
@@ -256,9 +256,9 @@ def _fill_curved(theta, blade_pitch, load, lean, rotor, shape):
         induction = smoothstep(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
         for k in range(blade_pitch.shape[0]):
             c, d = load[i, k], lean[i, k]
-            cosine, sine = cos(blade_pitch[k]), sin(blade_pitch[k])
             for j in range(rotor.radius.shape[0]):
-                at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
+                turn = turn_of(blade_pitch[k])
+                at, lever = curved_station(j, turn, None, shape), lever_of(j, turn, shape)
                 turned = effective_pitch(j, blade_pitch[k], shape)
                 r, nx, nr = at.r / big, at.nx, at.nr
                 arm, turn, x = lever.r / big, -lever.turn / big, lever.x / big
