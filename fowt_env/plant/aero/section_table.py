@@ -164,7 +164,7 @@ def rows_of(blade_pitch, table):
 
 
 @inlined_kernel
-def _turn_and_response(blade_pitch, table):
+def turn_and_response(blade_pitch, table):
     """Return (Turn, Tabled) of a blade pitch (rad) within the table."""
     return turn_of(blade_pitch), Tabled(rows_of(blade_pitch, table.load), table.arm, table.elements.shape)
 
@@ -174,18 +174,18 @@ def _own_response(number, first, x, table, pitches):
     """Return (Turn, Tabled) of a blade; first: those of the first blade."""
     if pitches is None:
         return first
-    return _turn_and_response(pitch_of(number, x, pitches), table)
+    return turn_and_response(pitch_of(number, x, pitches), table)
 
 
 @inlined_kernel
-def _blade(number, first, x, flow, table, pitches):
+def tabled_blade(number, first, x, flow, table, pitches):
     """Return the Blade of a number; first: (Turn, Tabled) of the first blade."""
     turn, response = _own_response(number, first, x, table, pitches)
     return Blade(number, motion_of(number, x, table.elements, flow), turn, response)
 
 
 @inlined_kernel
-def _box_force(blade, flow, field, elements):
+def box_force(blade, flow, field, elements):
     """Return the BladeForce in a box of wind; without a box one that is not known."""
     if field is None:
         return UNKNOWN_FORCE
@@ -229,19 +229,19 @@ def section_table_load(t, pose, x, now, series, field, table, counters, pitches,
     induction = faded_induction(x[State.ROTOR_SPEED], flow.hub.speed, elements)
     if not (induction == 1.0 and pitches_in_table(x, pitches)):
         return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters, pitches, blades)
-    first, reach = _turn_and_response(x[State.BLADE_PITCH], table), rotor_reach(elements.tip_radius, shape)
+    first, reach = turn_and_response(x[State.BLADE_PITCH], table), rotor_reach(elements.tip_radius, shape)
     total = NO_LOAD
     if elements.blades == BLADES and is_sheared(flow.hub, reach, field):
-        p = _blade(0, first, x, flow, table, None)
-        q = _blade(1, first, x, flow, table, pitches)
-        r = _blade(2, first, x, flow, table, pitches)
+        p = tabled_blade(0, first, x, flow, table, None)
+        q = tabled_blade(1, first, x, flow, table, pitches)
+        r = tabled_blade(2, first, x, flow, table, pitches)
         a, b, c = sheared_forces(p, q, r, flow, reach, elements.radius, shape)
         total = _add_valid(total, p, a, flow, elements, counters, pitches, blades)
         total = _add_valid(total, q, b, flow, elements, counters, pitches, blades)
         total = _add_valid(total, r, c, flow, elements, counters, pitches, blades)
     else:
         for number in range(elements.blades):
-            blade = _blade(number, first, x, flow, table, pitches)
-            force = _box_force(blade, flow, field, elements)
+            blade = tabled_blade(number, first, x, flow, table, pitches)
+            force = box_force(blade, flow, field, elements)
             total = _add_valid(total, blade, force, flow, elements, counters, pitches, blades)
     return rotor_axes_load(total, elements.air_density, elements)

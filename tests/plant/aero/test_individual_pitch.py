@@ -6,7 +6,7 @@ from numba import config, njit
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.blade_shape import BladeLoad, blade_wind, with_blade
+from fowt_env.plant.aero.blade_shape import BladeLoad, blade_motion, with_blade
 from fowt_env.plant.aero.section_table import build_section_table, section_table_load
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.aero.wind_field import WindField
@@ -156,7 +156,7 @@ def test_loads_of_the_blades_add_up_to_those_of_the_rotor(name, field, tables):
             about_centre = NO_LOAD
             for number, part in enumerate(blades):
                 psi = x[State.AZIMUTH] + 2.0 * np.pi * number / BLADES
-                at = blade_wind(-np.sin(psi), np.cos(psi), 0.0, pose_of(x), pose_of(x))
+                at = blade_motion(psi, 0.0, pose_of(x), pose_of(x))
                 about_centre = with_blade(about_centre, BladeLoad(*part), at)
             force, moment = np.array(about_centre[:3]), np.array(about_centre[3:])
             expected = [*force, *(moment + np.cross(hub, force)), force[0], moment[0]]

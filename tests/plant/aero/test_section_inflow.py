@@ -9,11 +9,8 @@ from numba import config, njit
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.section_inflow import (
-    build_dynamic_sections,
-    dynamic_sections_equilibrium,
-    dynamic_sections_load,
-)
+from fowt_env.plant.aero.load import Aero, settled_wake
+from fowt_env.plant.aero.section_inflow import build_dynamic_sections, dynamic_sections_load
 from fowt_env.plant.aero.section_table import build_section_table, section_table_load
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.wake import PER_ELEMENT, build_dynamic_inflow, n_wake_states, time_constants
@@ -59,20 +56,9 @@ def _many(states, winds, series, field, rotor, counters, pitches, out, rates, bl
         series.value[0] = winds[i]
         now, pose = wind_now(0.0, series), pose_of(x)
         a = rotor_load(
-            0.0,
-            pose,
-            x,
-            now,
-            series,
-            field,
-            elements,
-            None,
-            wake,
-            rates[0, i],
-            counters,
-            pitches,
+            0.0, pose, x, now, series, field, elements, None, wake, rates[0, i], counters, pitches,
             blades[0, i],
-        )
+        )  # fmt: skip
         b = dynamic_sections_load(
             0.0, pose, x, now, series, field, rotor, rates[1, i], counters, pitches, blades[1, i]
         )
@@ -99,8 +85,8 @@ def settled(x, wind, rotor, shear=0.14):
     """The state with its wake at rest."""
     series = series_of(wind, shear)
     x, now = x.copy(), wind_now(0.0, series)
-    arguments = (rotor, np.zeros_like(x), np.zeros(N_COUNTERS), None, np.zeros((3, 6)))
-    count = dynamic_sections_equilibrium(0.0, pose_of(x), x, now, series, None, *arguments)
+    aero, end = Aero(series, None, rotor, None, None), (np.zeros(N_COUNTERS), None, np.zeros((3, 6)))
+    count = settled_wake(0.0, pose_of(x), x, now, aero, rotor, np.zeros_like(x), *end)
     assert count == n_wake_states(rotor.elements, rotor.wake)
     return x
 
@@ -310,7 +296,6 @@ def test_absent_rotor_or_wind_gives_exactly_zero():
     assert dynamic_sections_load(*start, series, None, None, *end) == NO_ROTOR_LOAD
     rotor = build_dynamic_sections(STRAIGHT, WAKE)
     assert dynamic_sections_load(*start, None, None, rotor, *end) == NO_ROTOR_LOAD
-    assert dynamic_sections_equilibrium(*start, None, None, rotor, *end) == 0
 
 
 def test_no_time_constant_is_shorter_than_the_least():
