@@ -8,13 +8,8 @@ from typing import NamedTuple
 
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.drivetrain import (
-    PitchActuator,
-    advance_torque,
-    followed_pitch,
-    pitch_after,
-    pitch_rate,
-)
+from fowt_env.plant.drivetrain import advance_torque
+from fowt_env.plant.pitch_actuator import PitchActuator, followed_pitch, pitch_after, pitch_rate
 from fowt_env.plant.pitch_drive import PitchDrive, advance_drive, fill_drive_rates, halt_drive, keep, stays
 from fowt_env.plant.state import BLADES, Command, State
 

@@ -1,4 +1,4 @@
-"""Torque law, shaft balance and blade-pitch actuator of a geared turbine (theory.md, section 3)."""
+"""Torque law, generator and shaft balance of a geared turbine (theory.md, section 3)."""
 
 from math import exp, isfinite, sqrt
 from typing import NamedTuple
@@ -43,15 +43,6 @@ class Shaft(NamedTuple):
     mesh_loss: float  # zeta_m
     bearing_loss_coefficient: float  # zeta_v tau_0 / w_b0, N m/(rad/s)
     generator_efficiency: float  # electrical over mechanical generator power
-
-
-class PitchActuator(NamedTuple):
-    """First-order collective blade-pitch actuator with rate and position limits."""
-
-    time_constant: float  # s; 0: the command is followed at once
-    rate_limit: float  # rad/s
-    minimum: float  # rad
-    maximum: float  # rad
 
 
 class TorqueLimits(NamedTuple):
@@ -122,16 +113,6 @@ class TorqueLag(NamedTuple):
 
     time_constant: float  # s
     torque: int  # index in the state of the torque in force
-
-
-def build_pitch_actuator(pitch_drive):
-    """PitchActuator of a descriptions.turbine.PitchDrive without inertia."""
-    return PitchActuator(
-        time_constant=float(pitch_drive.time_constant),
-        rate_limit=float(pitch_drive.rate_limit),
-        minimum=float(pitch_drive.minimum),
-        maximum=float(pitch_drive.maximum),
-    )
 
 
 def build_torque_limits(torque_law):
@@ -245,45 +226,3 @@ def shaft_torque(aerodynamic_torque, torque, rotor_speed, drivetrain):
     else:
         gearbox /= 1.0 + drivetrain.mesh_loss
     return aerodynamic_torque - gearbox - drivetrain.bearing_loss_coefficient * rotor_speed
-
-
-@kernel
-def pitch_rate(blade_pitch, command, actuator):
-    """Rate of change of the blade pitch, rad/s (theory.md Eq. (8)); 0 without lag, see followed_pitch."""
-    if actuator.time_constant <= 0.0:
-        return 0.0
-    target = clamp(command, actuator.minimum, actuator.maximum)
-    rate = (target - blade_pitch) / actuator.time_constant
-    return clamp(rate, -actuator.rate_limit, actuator.rate_limit)
-
-
-@kernel
-def followed_pitch(blade_pitch, command, dt, actuator):
-    """Blade pitch to start a step of dt with, rad: an actuator without lag has no rate to integrate.
-
-    With lag: unchanged. Without: the command, within the position limits and the change that the rate
-    limit allows in dt.
-    """
-    if actuator.time_constant > 0.0:
-        return blade_pitch
-    target = clamp(command, actuator.minimum, actuator.maximum)
-    return rate_limit(blade_pitch, target, actuator.rate_limit * dt)
-
-
-@kernel
-def pitch_after(blade_pitch, command, dt, actuator):
-    """Blade pitch after dt under a constant command: exact solution of lag and rate limit."""
-    if actuator.time_constant <= 0.0:
-        return blade_pitch
-    lag, fastest = actuator.time_constant, actuator.rate_limit
-    target = clamp(command, actuator.minimum, actuator.maximum)
-    error = target - blade_pitch
-    sign = 1.0 if error > 0.0 else -1.0
-    size = abs(error)
-    band = fastest * lag  # inside it the lag alone limits the rate
-    if size > band:
-        slewing = (size - band) / fastest
-        if slewing >= dt:
-            return blade_pitch + sign * fastest * dt
-        return target - sign * band * exp(-(dt - slewing) / lag)
-    return target - error * exp(-dt / lag)

@@ -10,6 +10,7 @@ stands first in the function that takes the part. compile/variants.py is for par
 
 from typing import NamedTuple
 
+from fowt_env.plant.accelerations import accelerate_turbine, fill_tower_rates
 from fowt_env.plant.aero.blade_sweep import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
@@ -20,17 +21,8 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import attitude_rate, gravity_load
 from fowt_env.plant.state import State, Wrench, add, pose_in
-from fowt_env.plant.tower_modes import (
-    accelerate_turbine,
-    add_bent_weight,
-    add_modal,
-    add_modal_weight,
-    begin_modal,
-    bend_of,
-    carried,
-    fill_tower_rates,
-    turned_pose,
-)
+from fowt_env.plant.tower.loads import add_bent_weight, add_modal, add_modal_weight, begin_modal, carried
+from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.user_loads import add_modal_user_loads, add_user_loads, evaluate_user_loads
 
 

@@ -15,7 +15,7 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import NO_LOAD, State, Wrench
 from fowt_env.plant.tilt import rotor_pose, to_body_axes
-from fowt_env.plant.tower_modes import TowerModes
+from fowt_env.plant.tower.modes import TowerModes
 
 
 class BemRotor(NamedTuple):

@@ -62,7 +62,7 @@ def tower_load(t, pose, now, series, field, tower):
 def bent_tower_load(t, pose, x, now, series, field, tower, modes, modal):
     """tower_load of a tower that bends: at its displaced points, relative to their own velocity.
 
-    modes: tower_modes.TowerModes. The generalised forces on its deflections are added to modal (n,).
+    modes: tower.modes.TowerModes. The generalised forces on its deflections are added to modal (n,).
     """
     if tower is None:
         return NO_LOAD
