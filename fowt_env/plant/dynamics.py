@@ -19,7 +19,7 @@ from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rigid_body import attitude_rate, gravity_load
+from fowt_env.plant.rigid_body import attitude_rate_at, gravity_load
 from fowt_env.plant.state import State, Wrench, add, pose_in
 from fowt_env.plant.tower.loads import add_bent_weight, add_modal, add_modal_weight, begin_modal, carried
 from fowt_env.plant.tower.modes import bend_of, turned_pose
@@ -82,7 +82,7 @@ def respond(x, u, model, data, dx):
         x[State.ROTOR_SPEED],
         model.drivetrain,
     )
-    attitude_rate(x, dx, body.plane)
+    attitude_rate_at(pose, x, dx, body.plane)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
     fill_pitch_rates(x, u, model.actuator, model.pitches, dx)
     fill_torque_rate(x, u, model.converter, dx)

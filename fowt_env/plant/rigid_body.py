@@ -3,7 +3,7 @@
 from math import cos, sin
 
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.state import State, Wrench, pose_in, pose_of
+from fowt_env.plant.state import State, Wrench, pose_in
 from fowt_env.plant.tilt import across_shaft, along_shaft
 
 
@@ -69,15 +69,22 @@ def momentum_rate(pose, rotor_speed, mass_matrix, coupling, tilt):
 
 @kernel
 def attitude_rate(x, dx, plane):
-    """Position and Euler-angle rates: r' = R v, phi' = J^-1 w (singular at 90 deg of platform pitch)."""
+    """Put the rates of position and Euler angles into dx: r' = R v, phi' = J^-1 w.
+
+    Singular at 90 deg of platform pitch.
+    """
+    attitude_rate_at(pose_in(x, plane), x, dx, plane)
+
+
+@kernel
+def attitude_rate_at(pose, x, dx, plane):
+    """attitude_rate for the Pose of x."""
     if plane is not None:
-        pose = pose_in(x, plane)
         dx[State.SURGE] = pose.r11 * pose.vx + pose.r13 * pose.vz
         dx[State.HEAVE] = pose.r31 * pose.vx + pose.r33 * pose.vz
         dx[State.PLATFORM_PITCH] = pose.wy
         dx[State.SWAY] = dx[State.ROLL] = dx[State.YAW] = 0.0
         return
-    pose = pose_of(x)
     dx[State.SURGE] = pose.r11 * pose.vx + pose.r12 * pose.vy + pose.r13 * pose.vz
     dx[State.SWAY] = pose.r21 * pose.vx + pose.r22 * pose.vy + pose.r23 * pose.vz
     dx[State.HEAVE] = pose.r31 * pose.vx + pose.r32 * pose.vy + pose.r33 * pose.vz

@@ -25,12 +25,12 @@ from fowt_env.plant.aero.blade_shape import (
 )
 from fowt_env.plant.aero.station_response import station_load
 from fowt_env.plant.aero.wind import (
-    LOWEST_HEIGHT,
     Profile,
     WindNow,
     WindSeries,
     power_profile,
     profile_at,
+    profile_spans,
     wind_at,
 )
 from fowt_env.plant.aero.wind_field import GridPlace, cell_wind
@@ -39,7 +39,6 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import NO_LOAD, Pose, State, Wrench
 
 SLOW_ROTOR, FAST_ROTOR = 1.0, 2.0  # tip-speed ratios between which the induction fades in
-LARGEST_RATIO = 12.0  # highest over lowest point of the rotor for a Profile, else wind_at: see power_profile
 
 
 class RotorLoad(NamedTuple):
@@ -180,7 +179,7 @@ def is_sheared(hub, reach, field):
     """Return whether a Profile describes the wind of the whole rotor: no box, not near the sea."""
     if field is not None:
         return False
-    return hub.Z - reach > LOWEST_HEIGHT and hub.Z + reach < LARGEST_RATIO * (hub.Z - reach)
+    return profile_spans(hub.Z - reach, hub.Z + reach)
 
 
 # ---------------------------------------------------------------------------- winds of a blade
@@ -367,3 +366,19 @@ def rotor_axes_load(about_centre, factor, rotor):
         fx,
         torque,
     )
+
+
+@kernel
+def stations_outside(forces):
+    """Return how many stations of three BladeForces lie outside a table or a box."""
+    return forces[0].outside + forces[1].outside + forces[2].outside
+
+
+@inlined_kernel
+def load_of_three(p, q, r, forces, elements, pitches, blades):
+    """Return the RotorLoad of three Blades and their BladeForces over the air density."""
+    density = elements.air_density
+    total = add_blade(NO_LOAD, p, forces[0].load, density, pitches, blades)
+    total = add_blade(total, q, forces[1].load, density, pitches, blades)
+    total = add_blade(total, r, forces[2].load, density, pitches, blades)
+    return rotor_axes_load(total, density, elements)

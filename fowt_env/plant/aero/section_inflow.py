@@ -25,14 +25,14 @@ from fowt_env.plant.aero.blade_sweep import (
     NO_ROTOR_LOAD,
     Blade,
     SampledWind,
-    add_blade,
     faded_induction,
     is_sheared,
+    load_of_three,
     motion_of,
-    rotor_axes_load,
     rotor_flow,
     rotor_reach,
     sheared_forces,
+    stations_outside,
     swept,
 )
 from fowt_env.plant.aero.section_table import (
@@ -48,7 +48,7 @@ from fowt_env.plant.aero.station_response import AHEAD, BEHIND, REVERSED, Laggin
 from fowt_env.plant.aero.wake import PER_ELEMENT, DynamicInflow, time_constants
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
-from fowt_env.plant.state import BLADES, NO_LOAD, State
+from fowt_env.plant.state import BLADES, State
 
 LEAST_LAG = 1e-6  # s, of a wake without a least one
 
@@ -162,16 +162,14 @@ def _tabled_load(flow, x, rotor, dx, pitches, blades):
     q = _blade(1, first, x, flow, rate, rotor, dx, pitches)
     r = _blade(2, first, x, flow, rate, rotor, dx, pitches)
     if is_sheared(flow.hub, reach, flow.field):
-        a, b, c = sheared_forces(p, q, r, flow, reach, radius, shape)
+        forces = sheared_forces(p, q, r, flow, reach, radius, shape)
     else:
-        a = _sampled_force(p, flow, radius, shape)
-        b = _sampled_force(q, flow, radius, shape)
-        c = _sampled_force(r, flow, radius, shape)
-    density = elements.air_density
-    total = add_blade(NO_LOAD, p, a.load, density, pitches, blades)
-    total = add_blade(total, q, b.load, density, pitches, blades)
-    total = add_blade(total, r, c.load, density, pitches, blades)
-    return a.outside + b.outside + c.outside, rotor_axes_load(total, density, elements)
+        forces = (
+            _sampled_force(p, flow, radius, shape),
+            _sampled_force(q, flow, radius, shape),
+            _sampled_force(r, flow, radius, shape),
+        )
+    return stations_outside(forces), load_of_three(p, q, r, forces, elements, pitches, blades)
 
 
 @kernel

@@ -39,11 +39,13 @@ from fowt_env.plant.aero.blade_sweep import (
     box_wind,
     faded_induction,
     is_sheared,
+    load_of_three,
     motion_of,
     rotor_axes_load,
     rotor_flow,
     rotor_reach,
     sheared_forces,
+    stations_outside,
     swept,
 )
 from fowt_env.plant.aero.station_response import AHEAD, BEHIND, Rows, Tabled, TabledOrSolved
@@ -200,14 +202,6 @@ def sampled_force(blade, flow, elements, counters):
     return swept(SampledWind(flow, blade.motion), blade, elements.radius, elements.shape)
 
 
-@inlined_kernel
-def _add_valid(total, blade, force, flow, elements, counters, pitches, blades):
-    """Add a BladeForce to the Wrench about the rotor centre; sampled where a station lies outside."""
-    if force.outside > 0:
-        force = sampled_force(blade, flow, elements, counters)
-    return add_blade(total, blade, force.load, elements.air_density, pitches, blades)
-
-
 @kernel
 def section_table_load(t, pose, x, now, series, field, table, counters, pitches, blades):
     """Return the RotorLoad of the state x at time t from the tables of the stations, in rotor axes.
@@ -230,18 +224,19 @@ def section_table_load(t, pose, x, now, series, field, table, counters, pitches,
     if not (induction == 1.0 and pitches_in_table(x, pitches)):
         return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters, pitches, blades)
     first, reach = turn_and_response(x[State.BLADE_PITCH], table), rotor_reach(elements.tip_radius, shape)
-    total = NO_LOAD
+    density = elements.air_density
     if elements.blades == BLADES and is_sheared(flow.hub, reach, field):
         p = tabled_blade(0, first, x, flow, table, None)
         q = tabled_blade(1, first, x, flow, table, pitches)
         r = tabled_blade(2, first, x, flow, table, pitches)
-        a, b, c = sheared_forces(p, q, r, flow, reach, elements.radius, shape)
-        total = _add_valid(total, p, a, flow, elements, counters, pitches, blades)
-        total = _add_valid(total, q, b, flow, elements, counters, pitches, blades)
-        total = _add_valid(total, r, c, flow, elements, counters, pitches, blades)
-    else:
-        for number in range(elements.blades):
-            blade = tabled_blade(number, first, x, flow, table, pitches)
-            force = box_force(blade, flow, field, elements)
-            total = _add_valid(total, blade, force, flow, elements, counters, pitches, blades)
-    return rotor_axes_load(total, elements.air_density, elements)
+        forces = sheared_forces(p, q, r, flow, reach, elements.radius, shape)
+        if stations_outside(forces) == 0:
+            return load_of_three(p, q, r, forces, elements, pitches, blades)
+    total = NO_LOAD
+    for number in range(elements.blades):
+        blade = tabled_blade(number, first, x, flow, table, pitches)
+        force = box_force(blade, flow, field, elements)
+        if force.outside > 0:
+            force = sampled_force(blade, flow, elements, counters)
+        total = add_blade(total, blade, force.load, density, pitches, blades)
+    return rotor_axes_load(total, density, elements)

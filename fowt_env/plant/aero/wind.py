@@ -8,6 +8,7 @@ import numpy as np
 from fowt_env.plant.aero.wind_field import field_at
 from fowt_env.plant.compile.decorators import kernel
 
+LARGEST_RATIO = 12.0  # highest over lowest point of a Profile
 LOWEST_HEIGHT = 1.0  # m; points below it (waves, rotor at sea level) see the wind of this height
 
 
@@ -120,6 +121,12 @@ def _series_at(Y, Z, now, series):
     profile = 1.0
     if series.shear_exponent != 0.0:
         profile = (height / series.reference_height) ** series.shear_exponent
+    return scaled_wind(Y, height, profile, now, series)
+
+
+@kernel
+def scaled_wind(Y, height, profile, now, series):
+    """Return (u, v, w) of a series, m/s, at a distance to the left and a height (m) of this power law."""
     linear = (
         now.vertical_shear * (height - series.reference_height) + now.horizontal_shear * Y
     ) / series.reference_length
@@ -127,11 +134,17 @@ def _series_at(Y, Z, now, series):
 
 
 @kernel
+def profile_spans(low, high):
+    """Return whether a Profile is accurate for heights from low to high (m)."""
+    return low > LOWEST_HEIGHT and high < LARGEST_RATIO * low
+
+
+@kernel
 def power_profile(low, high, series):
     """Return the Profile for heights from low to high (m): the diagonal Pade approximant of order 5.
 
     Relative error 2 sin(pi exponent) ((r - 1)/(r + 1))**11 at the ends, r = (high/low)**(1/4): with an
-    exponent of 0.14 it is 4e-8 from 27 to 153 m, and 2e-6 where high is 12 times low.
+    exponent of 0.14 it is 4e-8 from 27 to 153 m, and 2e-6 at LARGEST_RATIO.
     """
     a = series.shear_exponent
     centre = sqrt(low * high)

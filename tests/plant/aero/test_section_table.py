@@ -280,7 +280,7 @@ def blades(states, times, series, field, table, counters, quick, plain):
         b = sampled_force(blade, flow, elements, counters)
         for out, force in ((quick, a), (plain, b)):
             out[i, 0], out[i, 1] = force.load.fx, force.load.ft
-            out[i, 2], out[i, 3], out[i, 4] = force.load.mx, force.load.mt, float(force.outside == 0)
+            out[i, 2], out[i, 3], out[i, 4] = force.load.mx, force.load.mt, 1.0 if force.outside == 0 else 0.0
 
 
 @pytest.mark.parametrize("periodic", [False, True])
