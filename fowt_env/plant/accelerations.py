@@ -63,7 +63,7 @@ def substitute_spd(a, b):
 
 @kernel
 def accelerate_in_plane(pose, load, torque, added, body, dx):
-    """As accelerate with sway, roll and yaw held: the rotor then turns apart from the platform."""
+    """Put the accelerations with sway, roll and yaw at zero into dx: rotor and platform are not coupled."""
     m, vx, vz, wy = body.mass_matrix, pose.vx, pose.vz, pose.wy
     px = m[0, 0] * vx + m[0, 2] * vz + m[0, 4] * wy
     pz = m[2, 0] * vx + m[2, 2] * vz + m[2, 4] * wy
@@ -311,7 +311,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
 
 @inlined_kernel
 def rotation_along_shaft(bx, by, bz, b, modal, bend, tower, nx, ny, nz):
-    """Rate of the nacelle's rotation along the shaft (n), of its bias (b) and the accelerations."""
+    """Return the rate of the nacelle's rotation along the shaft (n), by its bias (b) and accelerations."""
     for i in range(0, len(tower.count), 2):
         by += tower.slope[i] * modal[i]
         rolling = tower.slope[i + 1] * modal[i + 1]

@@ -56,7 +56,7 @@ SLACK = 1e-9  # relative, by which a command may miss a limit in rounding
 
 
 def build_torque_curve(torque_law, region3="constant_torque"):
-    """TorqueCurve of a descriptions.turbine.TorqueLaw; region3 is "constant_torque" or "constant_power".
+    """Return the TorqueCurve of a TorqueLaw; region3 is "constant_torque" or "constant_power".
 
     The slip line of region 2.5 rises from the synchronous speed, region3_start/(1 + slip), to the
     region-3 torque at region3_start; it takes over from the parabola where the two meet.
@@ -94,7 +94,7 @@ def build_torque_curve(torque_law, region3="constant_torque"):
 
 
 def build_drivetrain(turbine):
-    """Shaft of a descriptions.turbine.Turbine."""
+    """Return the Shaft of a descriptions.turbine.Turbine."""
     shaft, rotor_inertia = turbine.drivetrain, turbine.rotor.inertia
     ratio = shaft.gear_ratio
     rated_torque = ratio * turbine.torque_law.rated_torque  # tau_0, low-speed shaft
@@ -116,25 +116,25 @@ class TorqueLag(NamedTuple):
 
 
 def build_torque_limits(torque_law):
-    """TorqueLimits of a descriptions.turbine.TorqueLaw."""
+    """Return the TorqueLimits of a descriptions.turbine.TorqueLaw."""
     return TorqueLimits(maximum=float(torque_law.max_torque), rate_limit=float(torque_law.max_torque_rate))
 
 
 @kernel
 def clamp(value, low, high):
-    """The value, or the limit that it passes."""
+    """Return the value, or the limit that it passes."""
     return min(max(value, low), high)
 
 
 @kernel
 def rate_limit(value, target, step):
-    """The target, or the value moved towards it by a step, the most that it may change."""
+    """Return the target, or the value moved towards it by at most a step."""
     return value + clamp(target - value, -step, step)
 
 
 @kernel
 def generator_torque(generator_speed, blade_pitch, curve):
-    """Generator torque of the static curve, N m on the high-speed shaft (theory.md, section 3).
+    """Return the generator torque of the static curve, N m on the high-speed shaft (theory.md, section 3).
 
     Region 3 is tested first, so a blade pitch of region3_min_pitch and above forces it at any
     forward speed, as published. A shaft that stands or turns backwards gives no torque: it brakes
@@ -157,7 +157,7 @@ def generator_torque(generator_speed, blade_pitch, curve):
 
 @kernel
 def followed_torque(torque, command, period, limits):
-    """Generator torque (N m) of a control period that begins at a torque, under a command.
+    """Return the generator torque (N m) of a control period: the command within limits and rate.
 
     The command within [0, maximum], and not further from the torque before than the rate limit allows in a
     period (s). It acts from the period's beginning, as a torque that is set by a Bladed-style DLL does.
@@ -174,7 +174,7 @@ def followed_torque(torque, command, period, limits):
 
 @kernel
 def torque_in_force(x, u, converter):
-    """Generator torque now, N m: the command, or where it lags (converter not None) a state."""
+    """Return the present generator torque, N m: the command, or a state where it lags."""
     if converter is None:
         return u[Command.GENERATOR_TORQUE]
     return x[converter.torque]
@@ -208,13 +208,13 @@ def lose_torque(x, converter):
 
 @kernel
 def torque_was_limited(torque, command, limits):
-    """Whether a torque in force differs from its command by more than rounding."""
+    """Return whether a torque in force differs from its command by more than rounding."""
     return abs(torque - command) > SLACK * limits.maximum
 
 
 @kernel
 def shaft_torque(aerodynamic_torque, torque, rotor_speed, drivetrain):
-    """Torque Q_b that accelerates the rotor, N m on the low-speed shaft (theory.md Eq. (7)).
+    """Return the torque Q_b that accelerates the rotor, N m on the low-speed shaft (theory.md Eq. (7)).
 
     torque is the generator's, on the high-speed shaft, positive against positive rotation. The mesh
     loss always takes power: it adds to the torque where the rotor drives the generator, and lessens

@@ -37,7 +37,7 @@ class Loads(NamedTuple):
 
 @kernel
 def evaluate_loads(t, x, model, data, dx):
-    """Every load at a state, into data; writes only the rates of internal states into dx. No command."""
+    """Put every load at a state into data; of dx the rates of internal states alone are written."""
     pose, modal = pose_in(x, model.rigid_body.plane), data.cache[LoadCache.MODAL :]
     bend = bend_of(x, model.tower)
     nacelle = turned_pose(pose, bend)
@@ -73,7 +73,7 @@ def evaluate_loads(t, x, model, data, dx):
 
 @inlined_kernel
 def respond(x, u, model, data, dx):
-    """Rates of the state under the command u with the loads of the last evaluate at this state."""
+    """Put the rates of the state under the command u into dx, with the loads of the last evaluation."""
     cache, body = data.cache, model.rigid_body
     pose = pose_in(x, body.plane)
     torque = shaft_torque(
@@ -93,7 +93,7 @@ def respond(x, u, model, data, dx):
 
 @inlined_kernel
 def derivative(t, x, u, model, data, dx):
-    """dx = f(t, x, u); u is a Command."""
+    """Put f(t, x, u) into dx; u is a Command."""
     data.cache[LoadCache.VALID] = 0.0
     evaluate_loads(t, x, model, data, dx)
     respond(x, u, model, data, dx)
@@ -112,7 +112,7 @@ def store(cache, start, wrench):
 
 @kernel
 def stored(cache, start):
-    """The wrench that store has put there."""
+    """Return the wrench that store has put there."""
     return Wrench(
         cache[start], cache[start + 1], cache[start + 2], cache[start + 3], cache[start + 4], cache[start + 5]
     )
@@ -120,7 +120,7 @@ def stored(cache, start):
 
 @kernel
 def loads_of(data, dx):
-    """Loads of the last evaluate and the accelerations dx that followed from them."""
+    """Return the loads of the last evaluate and the accelerations dx that followed from them."""
     cache = data.cache
     hydro = add(stored(cache, LoadCache.HYDRO), added_mass_load(data.added_mass, dx))
     rotor = RotorLoad(stored(cache, LoadCache.ROTOR), cache[LoadCache.THRUST], cache[LoadCache.TORQUE])
@@ -129,7 +129,7 @@ def loads_of(data, dx):
 
 @kernel
 def added_mass_load(added, dx):
-    """-A nu': the part of the water's load that went to the left-hand side."""
+    """Return -A nu': the part of the water's load that is on the left-hand side."""
     return Wrench(
         -_row(added, 0, dx), -_row(added, 1, dx), -_row(added, 2, dx),
         -_row(added, 3, dx), -_row(added, 4, dx), -_row(added, 5, dx),
@@ -138,7 +138,7 @@ def added_mass_load(added, dx):
 
 @kernel
 def _row(added, i, dx):
-    """One row of added mass times the acceleration."""
+    """Return one row of added mass times the acceleration."""
     total = added[i, 0] * dx[State.VX]
     for j in range(1, 6):
         total += added[i, j] * dx[State.VX + j]

@@ -20,7 +20,7 @@ class PitchActuator(NamedTuple):
 
 
 def build_pitch_actuator(pitch_drive):
-    """PitchActuator of a descriptions.turbine.PitchDrive without inertia."""
+    """Return the PitchActuator of a descriptions.turbine.PitchDrive without inertia."""
     return PitchActuator(
         time_constant=float(pitch_drive.time_constant),
         rate_limit=float(pitch_drive.rate_limit),
@@ -31,7 +31,7 @@ def build_pitch_actuator(pitch_drive):
 
 @kernel
 def pitch_rate(blade_pitch, command, actuator):
-    """Rate of change of the blade pitch, rad/s (theory.md Eq. (8)); 0 without lag, see followed_pitch."""
+    """Return the rate of the blade pitch, rad/s (theory.md Eq. (8)); 0 without lag, see followed_pitch."""
     if actuator.time_constant <= 0.0:
         return 0.0
     target = clamp(command, actuator.minimum, actuator.maximum)
@@ -41,7 +41,7 @@ def pitch_rate(blade_pitch, command, actuator):
 
 @kernel
 def followed_pitch(blade_pitch, command, dt, actuator):
-    """Blade pitch to start a step of dt with, rad: an actuator without lag has no rate to integrate.
+    """Return the blade pitch at the start of a step of dt, rad: an actuator without lag has no rate.
 
     With lag: unchanged. Without: the command, within the position limits and the change that the rate
     limit allows in dt.
@@ -54,7 +54,7 @@ def followed_pitch(blade_pitch, command, dt, actuator):
 
 @kernel
 def pitch_after(blade_pitch, command, dt, actuator):
-    """Blade pitch after dt under a constant command: exact solution of lag and rate limit."""
+    """Return the blade pitch after dt under a constant command: exact solution of lag and rate limit."""
     if actuator.time_constant <= 0.0:
         return blade_pitch
     lag, fastest = actuator.time_constant, actuator.rate_limit

@@ -9,7 +9,7 @@ from fowt_env.plant.tilt import across_shaft, along_shaft
 
 @kernel
 def gravity_load(pose, body):
-    """Weight of the whole turbine, Eq. (13)."""
+    """Return the weight of the whole turbine, Eq. (13)."""
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     mg = -body.mass * body.gravity
     g = body.gravity
@@ -26,7 +26,7 @@ def gravity_load(pose, body):
 
 @kernel
 def _off_centre(weight, pose, gravity, s_y):
-    """The weight with the moment of a centre of mass beside the plane of symmetry."""
+    """Add to the weight the moment of a centre of mass beside the plane of symmetry."""
     if s_y is None:
         return weight
     moment = gravity * s_y
@@ -42,7 +42,7 @@ def _off_centre(weight, pose, gravity, s_y):
 
 @kernel
 def momentum_rate(pose, rotor_speed, mass_matrix, coupling, tilt):
-    """C1 nu + C2 w_b: velocity-dependent part of the momentum rate, Eqs (9)-(10).
+    """Return C1 nu + C2 w_b: velocity-dependent part of the momentum rate, Eqs (9)-(10).
 
     coupling: H of the rotor, whose angular momentum lies along the shaft; tilt of the shaft, or None.
     """
@@ -78,7 +78,7 @@ def attitude_rate(x, dx, plane):
 
 @kernel
 def attitude_rate_at(pose, x, dx, plane):
-    """attitude_rate for the Pose of x."""
+    """Put the rates of attitude_rate into dx; pose: that of x."""
     if plane is not None:
         dx[State.SURGE] = pose.r11 * pose.vx + pose.r13 * pose.vz
         dx[State.HEAVE] = pose.r31 * pose.vx + pose.r33 * pose.vz

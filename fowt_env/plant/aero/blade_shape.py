@@ -129,7 +129,7 @@ NO_BLADE_LOAD = BladeLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def effective_pitch(j, blade_pitch, shape):
-    """Angle by which the blade pitch turns the section of station j about its own axis, rad."""
+    """Return the angle by which the blade pitch turns the section of station j about its own axis, rad."""
     if shape is None:
         return blade_pitch
     s = shape.slope[j]
@@ -273,7 +273,7 @@ def with_blade(total, load, blade):
 
 
 def _ends(values, distance, low, high):
-    """values (n,) at the stations, with those at the hub and the tip on the lines through the last two."""
+    """Return values (n,) at the stations with those at hub and tip, on the lines through the last two."""
     first = values[0] + (low - distance[0]) * (values[1] - values[0]) / (distance[1] - distance[0])
     last = values[-1] + (high - distance[-1]) * (values[-1] - values[-2]) / (distance[-1] - distance[-2])
     return np.concatenate(([first], values, [last]))
@@ -287,7 +287,7 @@ class BladeLine(NamedTuple):
 
 
 def blade_line(blade, hub_radius, tip_radius):
-    """BladeLine of a descriptions.turbine.Blade."""
+    """Return the BladeLine of a descriptions.turbine.Blade."""
     distance = np.asarray(blade.radius, dtype=float)
     offsets = [
         np.zeros_like(distance) if values is None else np.asarray(values, dtype=float)
@@ -301,13 +301,13 @@ def blade_line(blade, hub_radius, tip_radius):
 
 
 def is_curved(turbine):
-    """Whether blades leave the plane through their pitch axes' foot points, or bend."""
+    """Return whether blades leave the plane through their pitch axes' foot points, or bend."""
     offsets = (turbine.blade.prebend, turbine.blade.sweep)
     return turbine.rotor.cone != 0.0 or any(v is not None and np.any(np.asarray(v) != 0.0) for v in offsets)
 
 
 def line_integrals(line, weights):
-    """((m,), (m, 3)): integral and first moments along a BladeLine of line loads (m, n + 2) at its points."""
+    """Return ((m,), (m, 3)): integral and first moments along a BladeLine of line loads (m, n + 2)."""
     steps = np.diff(line.length)[:, None]
     low, high = weights[:, :-1], weights[:, 1:]
     force = 0.5 * (low + high) @ steps[:, 0]
@@ -317,7 +317,7 @@ def line_integrals(line, weights):
 
 
 def build_blade_shape(turbine, line, chosen, arm, moment):
-    """BladeShape of the stations chosen of a BladeLine; arm (n, 3) and moment: see BladeShape."""
+    """Return the BladeShape of chosen stations of a BladeLine; arm (n, 3) and moment: see BladeShape."""
     inner = line.points[1:-1]
     slope = np.gradient(inner[:, 0], inner[:, 2], edge_order=2 if len(inner) > 2 else 1)
     place = inner[chosen]

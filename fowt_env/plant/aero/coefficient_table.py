@@ -162,7 +162,7 @@ class DiskInflow(NamedTuple):
 
 
 def _axis(steps, end):
-    """TableAxis from the list of (start, step), with the last point at end (deg); rad."""
+    """Return the TableAxis from the list of (start, step), with the last point at end (deg); rad."""
     edges = [start for start, _ in steps] + [end]
     parts = [
         np.linspace(low, high, max(1, round((high - low) / step)), endpoint=False)
@@ -322,7 +322,7 @@ _tables = Cache(8)  # one per set of blade elements: building takes about two se
 
 
 def build_coefficient_table(rotor):
-    """CoefficientTable of a BladeElements; the same elements give the table built before."""
+    """Return the CoefficientTable of a BladeElements; equal elements share their table."""
     return _tables.get(elements_key(rotor), lambda: _filled_table(rotor))
 
 
@@ -335,7 +335,7 @@ def _filled_loads(theta, blade_pitch, rotor):
 
 
 def _filled_table(rotor):
-    """CoefficientTable of BladeElements, computed."""
+    """Return the computed CoefficientTable of BladeElements."""
     theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
     load, lean = _filled_loads(theta.point, blade_pitch.point, rotor)
     return CoefficientTable(
@@ -352,7 +352,7 @@ def _filled_table(rotor):
 
 @kernel
 def _interval(x, axis):
-    """(i, weight): x lies between points i and i + 1; outside, the ends are held."""
+    """Return (i, weight): x lies between points i and i + 1; outside, the values of the ends apply."""
     point = axis.point
     last = point.shape[0] - 1
     if not x > point[0]:
@@ -411,7 +411,7 @@ def _leaning(cell, c):
 
 @kernel
 def _inflow(pose, now, series, table):
-    """DiskInflow of the rotor in a wind series.
+    """Return the DiskInflow of the rotor in a wind series.
 
     A power law (1 + z)^a = 1 + a z + a (a - 1)/2 z^2 + ... has, on a ring of z = r cos(psi), even powers that
     give a mean and a second harmonic, and odd ones that give a first harmonic.
@@ -520,9 +520,10 @@ def coefficient_table_load(pose, x, now, series, table, counters):
 
 
 def performance(rotor, tip_speed_ratio, blade_pitch):
-    """(cp, ct, cq), each (n, m): power, thrust and torque coefficients of a BladeElements in axial wind.
+    """Return (cp, ct, cq), each (n, m): coefficients of power, thrust and torque in axial wind.
 
-    tip_speed_ratio (n,); blade_pitch (m,) rad. The usual ones: on rho V^2/2 times the area (and the radius).
+    rotor: BladeElements; tip_speed_ratio (n,); blade_pitch (m,) rad. The usual ones: on rho V^2/2 times the
+    area (and the radius).
     """
     ratio = np.ascontiguousarray(tip_speed_ratio, dtype=np.float64)
     blade_pitch = np.ascontiguousarray(blade_pitch, dtype=np.float64)

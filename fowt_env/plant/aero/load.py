@@ -107,7 +107,7 @@ def settled_wake(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
 
 @inlined_kernel
 def rotor_part(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
-    """RotorLoad by the rotor model that rotor is, body axes; of dx the wake's rates alone are written.
+    """Return the RotorLoad of a rotor model in body axes; of dx the wake's rates alone are written.
 
     pitches, blades: blades with pitches of their own, and where the load of each is put, as in rotor_load.
     """
@@ -131,7 +131,7 @@ _drag = chosen_by_class("modes", {type(None): _straight_drag, TowerModes: _bent_
 
 @inlined_kernel
 def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
-    """AeroLoad at a state; writes the wake's rates into dx and adds to the forces on a tower's deflections.
+    """Return the AeroLoad at a state; put the wake's rates into dx, add to the forces on tower deflections.
 
     nacelle: nacelle_pose, whose axes and origin the rotor's load has. modes: TowerModes or None.
     """
@@ -144,7 +144,7 @@ def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
 
 @kernel
 def wind_of(t, X, Y, Z, aero):
-    """(u, v, w) m/s, inertial components, at an inertial point (m); zero without aerodynamics."""
+    """Return (u, v, w) m/s, inertial components, at an inertial point (m); zero without aerodynamics."""
     if aero is None:
         return 0.0, 0.0, 0.0
     return wind_at(t, X, Y, Z, wind_now(t, aero.wind), aero.wind, aero.field)

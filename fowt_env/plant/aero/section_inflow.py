@@ -98,7 +98,7 @@ _tables = Cache(8)  # two per blade, 37 MB together: building takes about a seco
 
 
 def build_dynamic_sections(elements, wake):
-    """DynamicSections of a BladeElements and a DynamicInflow; the same blade shares its tables in any air.
+    """Return the DynamicSections of a BladeElements; the same blade shares its tables in any air.
 
     19 stations: 37 MB, 1 s compiled; without the compiler many minutes (use rotor_load there).
     """
@@ -110,7 +110,7 @@ def build_dynamic_sections(elements, wake):
 
 
 def _filled_tables(elements):
-    """(induced, load) of DynamicSections."""
+    """Return (induced, load) of DynamicSections."""
     blade_pitch = table_pitches()
     stations, directions = (len(blade_pitch), len(elements.radius)), AHEAD + BEHIND + 1
     induced = np.zeros((*stations, directions, 2), dtype=np.float32)

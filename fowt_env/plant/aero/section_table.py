@@ -100,7 +100,7 @@ _tables = Cache(8)  # one per blade, 18 MB each: building takes about a second
 
 
 def build_section_table(elements):
-    """SectionTable of a BladeElements; the same blade, in whatever air, gives the table built before.
+    """Return the SectionTable of a BladeElements; the same blade shares its table in any air.
 
     19 stations: 18 MB, 0.8 s compiled; without the compiler many minutes (use rotor_load there).
     """
@@ -110,24 +110,24 @@ def build_section_table(elements):
 
 
 def station_arms(elements):
-    """(n,) m, radius at which each station's part of a straight blade's force acts."""
+    """Return the (n,) radii (m) at which each station's part of a straight blade's force acts."""
     return np.ascontiguousarray(elements.moment_weight / elements.weight, dtype=np.float64)
 
 
 def table_pitches():
-    """Blade pitches of the rows of a table, rad."""
+    """Return the blade pitches of the rows of a table, rad."""
     dense = np.linspace(DENSE_START, DENSE_END, DENSE_ROWS, endpoint=False)
     coarse = np.linspace(DENSE_END, COARSE_END, COARSE_ROWS + 1)
     return np.radians(np.concatenate((dense, coarse)))
 
 
 def load_components(elements):
-    """Number of components of a table of loads: normal, tangential and, of curved blades, the moment."""
+    """Return the number of components of a table of loads: 2, or 3 with the moment of curved blades."""
     return 2 if elements.shape is None else 3
 
 
 def _filled_table(elements):
-    """The loads of a SectionTable."""
+    """Return the loads of a SectionTable."""
     blade_pitch = table_pitches()
     size = (len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1, load_components(elements))
     load = np.zeros(size, dtype=np.float32)

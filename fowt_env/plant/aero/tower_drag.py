@@ -20,7 +20,7 @@ class TowerDrag(NamedTuple):
 
 
 def build_tower_drag(tower, air_density, points=POINTS):
-    """TowerDrag of a tower description, the diameter linear from base to top."""
+    """Return the TowerDrag of a tower description, the diameter linear from base to top."""
     node, weight = np.polynomial.legendre.leggauss(points)
     height = tower.top_height - tower.base_height
     up = 0.5 * (node + 1.0)
@@ -66,7 +66,7 @@ def tower_load(t, pose, now, series, field, tower):
 
 @kernel
 def bent_tower_load(t, pose, x, now, series, field, tower, modes, modal):
-    """tower_load of a tower that bends: at its displaced points, relative to their own velocity.
+    """Return tower_load of a tower that bends: at its displaced points, relative to their velocity.
 
     modes: tower.modes.TowerModes. The generalised forces on its deflections are added to modal (n,).
     """

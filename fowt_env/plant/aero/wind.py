@@ -57,7 +57,7 @@ NO_WIND = WindNow(0.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def _row(series, i, weight):
-    """WindNow at the fraction `weight` from row i to row i + 1."""
+    """Return the WindNow at the fraction `weight` from row i to row i + 1."""
     value = series.value
     rest = 1.0 - weight
     return WindNow(
@@ -71,7 +71,7 @@ def _row(series, i, weight):
 
 @kernel
 def wind_now(t, series):
-    """WindNow at time t (s): linear between samples, repeated with the period or held at the ends."""
+    """Return the WindNow at time t (s): linear between samples, periodic, or constant beyond the ends."""
     if series is None:
         return NO_WIND
     time = series.time
@@ -100,7 +100,7 @@ def wind_now(t, series):
 
 @kernel
 def wind_at(t, X, Y, Z, now, series, field):
-    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
+    """Return (u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
 
     The horizontal wind follows the power law (Z/reference_height)**shear_exponent; the linear shears
     add to u, m/s per reference_length above and to the left (+y) of the reference point. Points below
@@ -116,7 +116,7 @@ def wind_at(t, X, Y, Z, now, series, field):
 
 @kernel
 def _series_at(Y, Z, now, series):
-    """(u, v, w) of a series at a height and a distance to the left."""
+    """Return (u, v, w) of a series at a height and a distance to the left."""
     height = max(Z, LOWEST_HEIGHT)
     profile = 1.0
     if series.shear_exponent != 0.0:

@@ -24,7 +24,7 @@ class WindField(NamedTuple):
 
 @kernel
 def field_at(t, X, Y, Z, field):
-    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s)."""
+    """Return (u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s)."""
     velocity = field.velocity
     slices, n_z, n_y = velocity.shape[0], velocity.shape[1], velocity.shape[2]
     s = (t + field.shift - X * field.slowness) * field.rate

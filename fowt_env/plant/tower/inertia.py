@@ -46,7 +46,7 @@ class Upper(NamedTuple):
 
 @inlined_kernel
 def masses_of(x, tower):
-    """Masses of a state."""
+    """Return the Masses of a state."""
     n = len(tower.count)
     q, v = tower.first, tower.first + n
     dx = dy = ex = ey = gxx = gxy = gyy = vx = vy = wx = wy = hxx = hxy = hyx = hyy = 0.0
@@ -76,7 +76,7 @@ def masses_of(x, tower):
 
 @inlined_kernel
 def upper_of(bend, tower):
-    """Upper of a bent tower."""
+    """Return the Upper of a bent tower."""
     s, m, t = tower.upper_moment, tower.upper_inertia, tower.shaft
     sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
     nx, ny, nz = from_nacelle(bend, t[0], t[1], t[2])
@@ -91,7 +91,7 @@ def upper_of(bend, tower):
 
 @inlined_kernel
 def with_free_rotor(upper, inertia):
-    """Upper without an inertia (kg m2) about the shaft."""
+    """Return Upper without an inertia (kg m2) about the shaft."""
     u = upper
     nx, ny, nz = inertia * u.nx, inertia * u.ny, inertia * u.nz
     return Upper(
@@ -104,20 +104,20 @@ def with_free_rotor(upper, inertia):
 
 @kernel
 def turn(upper, x, y, z):
-    """Inertia of Upper times a vector."""
+    """Return the inertia of Upper times a vector."""
     u = upper
     return u.xx * x + u.xy * y + u.xz * z, u.xy * x + u.yy * y + u.yz * z, u.xz * x + u.yz * y + u.zz * z
 
 
 @kernel
 def cross(ax, ay, az, bx, by, bz):
-    """Cross product a x b."""
+    """Return the cross product a x b."""
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @inlined_kernel
 def top_bias(pose, bend):
-    """Acceleration of the tower top and of the nacelle's rotation, and the nacelle's angular velocity.
+    """Return the accelerations of tower top and nacelle rotation, and the nacelle's angular velocity.
 
     Platform axes, with no rate of any velocity: (ax, ay, az, alpha_x, alpha_y, alpha_z, wx, wy, wz).
     """
@@ -136,7 +136,7 @@ def top_bias(pose, bend):
 
 @inlined_kernel
 def upper_rate(upper, mass, spin, ax, ay, az, bx, by, bz, wx, wy, wz):
-    """Rate of momentum of nacelle and rotor about the tower top, platform axes: (force, moment), six numbers.
+    """Return the rate of momentum of nacelle and rotor about the tower top, platform axes: (force, moment).
 
     a: acceleration of the top; b: of the nacelle's rotation; w: its angular velocity. spin: angular momentum
     of the rotor against the nacelle, N m s, which is constant along the shaft.
@@ -157,8 +157,9 @@ def upper_rate(upper, mass, spin, ax, ay, az, bx, by, bz, wx, wy, wz):
 
 @inlined_kernel
 def deflection_rate(pose, d):
-    """Wrench about the body origin: what velocities and deflections d (Masses) add to the straight tower's
-    rate of momentum, with no rate of any velocity.
+    """Return the Wrench about the body origin by velocities and deflections d (Masses).
+
+    It is what bending adds to the straight tower's rate of momentum, without the rates of velocities.
     """
     vx, vy, vz, wx, wy, wz = pose.vx, pose.vy, pose.vz, pose.wx, pose.wy, pose.wz
     px, py, pz = cross(wx, wy, wz, d.dx, d.dy, 0.0)

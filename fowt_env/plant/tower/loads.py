@@ -7,7 +7,7 @@ from fowt_env.plant.tower.modes import from_nacelle
 
 @kernel
 def carried(load, bend):
-    """A wrench in nacelle axes about the nacelle frame's origin as one about the body origin, body axes."""
+    """Return a wrench in nacelle axes about their origin as one in body axes about the body origin."""
     if bend is None:
         return load
     fx, fy, fz = from_nacelle(bend, load.fx, load.fy, load.fz)
@@ -49,7 +49,7 @@ def begin_modal(x, tower, modal):
 
 @inlined_kernel
 def shortening(x, tower):
-    """First moment of mass (kg m) by which bending brings the masses nearer to the tower base."""
+    """Return the first moment of mass (kg m) by which bending lowers the masses towards the tower base."""
     n, q = len(tower.count), tower.first
     total = 0.0
     for i in range(n):
@@ -60,7 +60,7 @@ def shortening(x, tower):
 
 @inlined_kernel
 def displaced_moment(x, bend, tower):
-    """(x, y, z) kg m: how far bending moves the whole turbine's first moment of mass, platform axes."""
+    """Return (x, y, z), kg m: change of the turbine's first moment of mass by bending, platform axes."""
     n, q = len(tower.count), tower.first
     dx = dy = 0.0
     for i in range(0, n, 2):
@@ -73,7 +73,7 @@ def displaced_moment(x, bend, tower):
 
 @kernel
 def add_bent_weight(load, pose, x, bend, tower, gravity):
-    """The load with the moment that bending adds to the weight of a straight turbine."""
+    """Add to the load the moment by bending of the weight of a straight turbine."""
     if bend is None:
         return load
     sx, sy, sz = displaced_moment(x, bend, tower)

@@ -65,7 +65,7 @@ def _straight(x, tower):
 
 @inlined_kernel
 def bend_by_modes(x, tower):
-    """Bend of a state."""
+    """Return the Bend of a state."""
     n = len(tower.count)
     q, v = tower.first, tower.first + n
     ux = uy = vx = vy = a = b = da = db = 0.0
@@ -87,21 +87,21 @@ bend_of = chosen_by_class("tower", {type(None): _straight, TowerModes: bend_by_m
 
 @kernel
 def from_nacelle(bend, x, y, z):
-    """Platform components of a vector in nacelle axes."""
+    """Return the platform components of a vector in nacelle axes."""
     along = bend.sb * y + bend.cb * z
     return bend.ca * x + bend.sa * along, bend.cb * y - bend.sb * z, bend.ca * along - bend.sa * x
 
 
 @kernel
 def to_nacelle(bend, x, y, z):
-    """Nacelle components of a vector in platform axes."""
+    """Return the nacelle components of a vector in platform axes."""
     along = bend.sa * x + bend.ca * z
     return bend.ca * x - bend.sa * z, bend.sb * along + bend.cb * y, bend.cb * along - bend.sb * y
 
 
 @kernel
 def turned_pose(pose, bend):
-    """Pose of the frame that is fixed in the nacelle and is the body frame where the tower is straight."""
+    """Return the Pose of the nacelle frame: the body frame where the tower is straight."""
     if bend is None:
         return pose
     z = bend.z
@@ -127,7 +127,7 @@ def turned_pose(pose, bend):
 
 @kernel
 def nacelle_pose(pose, x, tower):
-    """Pose of the frame fixed in the nacelle that is the body frame where the tower is straight.
+    """Return the Pose of the frame fixed in the nacelle that is the body frame where the tower is straight.
 
     Its origin is where the body origin would be, were that fixed to the nacelle: every point of nacelle and
     rotor has in it the coordinates that it has in the body frame of a rigid tower. Rigid (None): pose.

@@ -28,7 +28,7 @@ def _platform_rates(pose, bend, dx, tower):
 
 @kernel
 def _top_rates(pose, bend, dx, tower):
-    """Absolute acceleration of the tower top and of the nacelle's rotation, platform axes: Twist."""
+    """Return the Twist of tower top and nacelle rotation, absolute, platform axes."""
     v = tower.first + len(tower.count)
     ax, ay, az, bx, by, bz, _, _, _ = top_bias(pose, bend)
     for i in range(0, len(tower.count), 2):
@@ -66,7 +66,7 @@ nacelle_rates = chosen_by_class("tower", {type(None): _platform_rates, TowerMode
 
 @kernel
 def above_base_rate(pose, x, dx, bend, body, tower):
-    """Wrench about the body origin, body axes: rate of momentum of the bent tower, nacelle and rotor."""
+    """Return the rate of momentum of bent tower, nacelle and rotor, about the body origin, body axes."""
     n, mass = len(tower.count), tower.upper_mass
     q, v = tower.first, tower.first + n
     top, upper, d = _top_rates(pose, bend, dx, tower), upper_of(bend, tower), masses_of(x, tower)
