@@ -5,6 +5,7 @@ import pytest
 from naive import inflow
 from naive.rigid_body import rotation
 from numba import config, njit
+from rotor_helpers import move_platform, put_load, series_of
 
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
@@ -19,7 +20,6 @@ from fowt_env.plant.aero.wind_field import WindField
 from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.weather.wind import make_series
 
 if config.DISABLE_JIT:
     pytest.skip("the tables take minutes to build without the compiler", allow_module_level=True)
@@ -33,10 +33,6 @@ SCHEDULE = np.array(
     [(5, 9.0, 0), (8, 8.3, 0), (11.4, 7.0, 0), (14, 5.7, 8.7), (18, 4.4, 14.9), (24, 3.3, 22.5)]
 )
 GRID = np.linspace(-150.0, 150.0, 31), np.linspace(5.0, 305.0, 31)
-
-
-def series_of(row, shear=0.14):
-    return make_series([0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=shear)
 
 
 def rough_field():
@@ -62,11 +58,8 @@ def _many(states, winds, series, field, rotor, counters, pitches, out, rates, bl
         b = dynamic_sections_load(
             0.0, pose, x, now, series, field, rotor, rates[1, i], counters, pitches, blades[1, i]
         )
-        for k, load in enumerate((a, b)):
-            w = load.wrench
-            out[k, i, 0], out[k, i, 1], out[k, i, 2] = w.fx, w.fy, w.fz
-            out[k, i, 3], out[k, i, 4], out[k, i, 5] = w.mx, w.my, w.mz
-            out[k, i, 6], out[k, i, 7] = load.thrust, load.torque
+        put_load(a, out[0, i])
+        put_load(b, out[1, i])
 
 
 def both(states, winds, rotor, field=None, pitches=None):
@@ -101,10 +94,7 @@ def operating(n, rotor, seed=1, more=0):
     states[:, State.ROTOR_SPEED] = ratio * speed / tip * rng.uniform(0.9, 1.1, n)
     states[:, State.BLADE_PITCH] = np.radians(pitch + rng.uniform(0.0, 3.0, n))
     states[:, State.AZIMUTH] = rng.uniform(0.0, 2.0 * np.pi, n)
-    states[:, 0:3] = rng.uniform(-1.0, 1.0, (n, 3)) * [20.0, 5.0, 3.0]
-    states[:, 3:6] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)) * [2.0, 6.0, 6.0])
-    states[:, 7:10] = rng.uniform(-1.0, 1.0, (n, 3))
-    states[:, 10:13] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)))
+    move_platform(states, rng, pitch=6.0)
     winds[:, 0] = speed
     winds[:, 1:] = speed[:, None] * rng.uniform(-1.0, 1.0, (n, 4)) * [0.1, 0.05, 0.1, 0.1]
     wake = slice(N_RIGID, N_RIGID + wakes)

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 from numba import config, njit
+from rotor_helpers import move_platform, put_load, series_of
 
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import rotor_load
@@ -25,7 +26,6 @@ from fowt_env.plant.aero.wind import power_profile, profile_at, wind_now
 from fowt_env.plant.aero.wind_field import WindField
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.weather.wind import make_series
 
 pytestmark = pytest.mark.installation
 
@@ -47,10 +47,6 @@ SCHEDULE = np.array(
 )  # fmt: skip
 
 
-def series_of(row, shear=0.14):
-    return make_series([0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=shear)
-
-
 @njit
 def loads(states, winds, series, field, rotor, table, counters, exact, quick):
     """Both loads of many states, each with its own row of wind."""
@@ -60,11 +56,8 @@ def loads(states, winds, series, field, rotor, table, counters, exact, quick):
         now, pose = wind_now(0.0, series), pose_of(x)
         a = rotor_load(0.0, pose, x, now, series, field, rotor, None, None, x, counters, None, None)
         b = section_table_load(0.0, pose, x, now, series, field, table, counters, None, None)
-        for out, load in ((exact, a), (quick, b)):
-            w = load.wrench
-            out[i, 0], out[i, 1], out[i, 2] = w.fx, w.fy, w.fz
-            out[i, 3], out[i, 4], out[i, 5] = w.mx, w.my, w.mz
-            out[i, 6], out[i, 7] = load.thrust, load.torque
+        put_load(a, exact[i])
+        put_load(b, quick[i])
 
 
 def both(states, winds, rotor=ROTOR, table=TABLE, field=None):
@@ -85,10 +78,7 @@ def operating(n, seed=1):
     states[:, State.ROTOR_SPEED] = RPM * rpm * rng.uniform(0.8, 1.2, n)
     states[:, State.BLADE_PITCH] = np.radians(np.clip(pitch + rng.uniform(-5.0, 5.0, n), -4.0, None))
     states[:, State.AZIMUTH] = rng.uniform(0.0, 2.0 * np.pi, n)
-    states[:, 0:3] = rng.uniform(-1.0, 1.0, (n, 3)) * [20.0, 5.0, 3.0]
-    states[:, 3:6] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)) * [2.0, 8.0, 8.0])
-    states[:, 7:10] = rng.uniform(-1.0, 1.0, (n, 3))
-    states[:, 10:13] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)))
+    move_platform(states, rng)
     winds[:, 0] = speed
     winds[:, 1:] = speed[:, None] * rng.uniform(-1.0, 1.0, (n, 4)) * [0.15, 0.08, 0.1, 0.1]
     return states, winds

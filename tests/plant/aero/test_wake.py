@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from rotor_helpers import wind_series
 
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import rotor_load
@@ -18,20 +19,12 @@ from fowt_env.plant.aero.wake import (
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.weather.wind import make_series
 
 pytestmark = pytest.mark.installation
 
 ROTOR = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 WAKE, SKEW = build_dynamic_inflow(), build_skewed_wake()
 N_WAKE = n_wake_states(ROTOR, WAKE)
-
-
-def wind_series(u, v=0.0, w=0.0, shear=0.0):
-    return make_series(
-        [0.0], [[u, v, w, 0.0, 0.0]],
-        reference_height=90.0, reference_length=126.0, shear_exponent=shear,
-    )  # fmt: skip
 
 
 def state(speed=1.267, blade_pitch=0.05, azimuth=0.4, platform_pitch=0.0):
