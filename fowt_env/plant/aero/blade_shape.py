@@ -111,6 +111,7 @@ class StationLoad(NamedTuple):
     length: float  # factor on the three
     first_moment: float  # factor on the forces of a straight blade for their moments about the rotor centre
     outside: int  # 1 where a table does not contain the inflow, else 0
+    rates: object  # station_response.WakeRates of states that the response has, or None
 
 
 class BladeLoad(NamedTuple):

@@ -15,6 +15,7 @@ from fowt_env.plant.aero.blade_shape import (
     BladeLoad,
     BladeMotion,
     Plane,
+    StationLoad,
     Turn,
     add_station,
     blade_motion,
@@ -23,7 +24,7 @@ from fowt_env.plant.aero.blade_shape import (
     value_at,
     with_blade,
 )
-from fowt_env.plant.aero.station_response import station_load
+from fowt_env.plant.aero.station_response import put_rates, station_load
 from fowt_env.plant.aero.wind import (
     Profile,
     WindNow,
@@ -282,13 +283,20 @@ relative_wind = chosen_by_class(
 
 
 @inlined_kernel
-def _with_station(force, j, wind, blade, radius, shape):
-    """Add station j of a Blade to a BladeForce."""
-    at = station_at(j, blade.turn, radius, shape)
-    v_normal, v_tangential, unknown = relative_wind(wind, at)
+def _station(j, wind, blade, radius, shape):
+    """Return the StationLoad of station j of a Blade; outside counts that its wind is not known, too."""
+    v_normal, v_tangential, unknown = relative_wind(wind, station_at(j, blade.turn, radius, shape))
     found = station_load(blade.response, v_normal, v_tangential, j)
-    load = add_station(force.load, found, j, blade.turn, shape)
-    return BladeForce(load, force.outside + found.outside + unknown)
+    outside = found.outside + unknown
+    return StationLoad(
+        found.normal, found.tangential, found.moment, found.length, found.first_moment, outside, found.rates
+    )
+
+
+@inlined_kernel
+def _with_station(force, found, j, blade, shape):
+    """Add the StationLoad of station j to a BladeForce."""
+    return BladeForce(add_station(force.load, found, j, blade.turn, shape), force.outside + found.outside)
 
 
 @inlined_kernel
@@ -301,7 +309,9 @@ def swept(wind, blade, radius, shape):
     """
     force = NO_FORCE
     for j in range(radius.shape[0]):
-        force = _with_station(force, j, wind, blade, radius, shape)
+        found = _station(j, wind, blade, radius, shape)
+        force = _with_station(force, found, j, blade, shape)
+        put_rates(found.rates, blade.response)
     return force
 
 
@@ -309,14 +319,20 @@ def swept(wind, blade, radius, shape):
 def swept_together(winds, blades, radius, shape):
     """Return the BladeForce of each of three Blades.
 
-    A station of all three at a time keeps the processor busier than one blade after the other, and what does
-    not differ between blades is computed once.
+    A station of all three at a time keeps the processor busier than one blade after the other. What does not
+    differ between blades is computed once, so long as nothing is written in between: hence rates come last.
     """
     a = b = c = NO_FORCE
     for j in range(radius.shape[0]):
-        a = _with_station(a, j, winds[0], blades[0], radius, shape)
-        b = _with_station(b, j, winds[1], blades[1], radius, shape)
-        c = _with_station(c, j, winds[2], blades[2], radius, shape)
+        p = _station(j, winds[0], blades[0], radius, shape)
+        q = _station(j, winds[1], blades[1], radius, shape)
+        r = _station(j, winds[2], blades[2], radius, shape)
+        a = _with_station(a, p, j, blades[0], shape)
+        b = _with_station(b, q, j, blades[1], shape)
+        c = _with_station(c, r, j, blades[2], shape)
+        put_rates(p.rates, blades[0].response)
+        put_rates(q.rates, blades[1].response)
+        put_rates(r.rates, blades[2].response)
     return a, b, c
 
 

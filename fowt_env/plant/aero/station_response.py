@@ -86,6 +86,16 @@ class WakeRate(NamedTuple):
     most: float  # largest of both filters
 
 
+class WakeRates(NamedTuple):
+    """Rates of the four wake states of a station, m/s2."""
+
+    first: int  # index of the first of the states
+    normal_0: float
+    normal_1: float
+    tangential_0: float
+    tangential_1: float
+
+
 class Lagging(NamedTuple):
     """Response of a blade by the tables of dynamic inflow, loads over the air density."""
 
@@ -124,7 +134,7 @@ def _solved_load(response, v_normal, v_tangential, j):
     v_normal, v_tangential = v_normal + normal, v_tangential + tangential
     fn, ft = _induced_load(section, v_normal, v_tangential, element, elements, response.skew, response.wake)
     moment = pitching_moment(v_normal, v_tangential, j, element, elements.shape, elements.polars)
-    return StationLoad(fn, ft, moment, elements.weight[j], elements.moment_weight[j], 0)
+    return StationLoad(fn, ft, moment, elements.weight[j], elements.moment_weight[j], 0, None)
 
 
 @inlined_kernel
@@ -196,6 +206,7 @@ def _tabled_load(response, v_normal, v_tangential, j):
         1.0,
         response.arm[j],
         outside,
+        None,
     )
 
 
@@ -222,16 +233,16 @@ def _exact_load(response, v_normal, v_tangential, j):
     )  # fmt: skip
     # without air there is no load here either: the sums are multiplied by the density afterwards
     weight = elements.weight[j] / elements.air_density if elements.air_density > 0.0 else 0.0
-    return StationLoad(weight * section.fn, weight * section.ft, weight * moment, 1.0, arm[j], 0)
+    return StationLoad(weight * section.fn, weight * section.ft, weight * moment, 1.0, arm[j], 0, None)
 
 
 @inlined_kernel
 def _lagging_load(response, v_normal, v_tangential, j):
-    """Return the StationLoad of station j over the air density, and put the rates of its wake into dx.
+    """Return the StationLoad of station j over the air density, with WakeRates.
 
     The filter is that of wake.filtered_induction.
     """
-    x, dx, rate = response.x, response.dx, response.rate
+    x, rate = response.x, response.rate
     total = abs(v_normal) + abs(v_tangential)
     cell = cell_of(v_normal, v_tangential, total, 0)
     steady_normal = total * looked_up(cell, j, 0, response.induced)
@@ -247,19 +258,31 @@ def _lagging_load(response, v_normal, v_tangential, j):
     outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1
     local = abs(through) + abs(along)
     cell, square = cell_of(through, along, local, REVERSED), local * local
-    found = StationLoad(
+    return StationLoad(
         square * looked_up(cell, j, 0, response.load),
         square * looked_up(cell, j, 1, response.load),
         square * _tabled_moment(cell, j, response.load, response.shape),
         1.0,
         response.arm[j],
         outside,
+        WakeRates(
+            i,
+            (0.4 * steady_normal - first_normal) * slow,
+            (first_normal + 0.6 * steady_normal - normal) * fast,
+            (0.4 * steady_tangential - first_tangential) * slow,
+            (first_tangential + 0.6 * steady_tangential - tangential) * fast,
+        ),
     )
-    dx[a] = (0.4 * steady_normal - first_normal) * slow
-    dx[b] = (first_normal + 0.6 * steady_normal - normal) * fast
-    dx[c] = (0.4 * steady_tangential - first_tangential) * slow
-    dx[d] = (first_tangential + 0.6 * steady_tangential - tangential) * fast
-    return found
+
+
+@inlined_kernel
+def put_rates(rates, response):
+    """Put the WakeRates of a station into dx; nothing without any."""
+    if rates is None:
+        return
+    i, dx = rates.first, response.dx
+    dx[np.uintp(i)], dx[np.uintp(i + 1)] = rates.normal_0, rates.normal_1
+    dx[np.uintp(i + 2)], dx[np.uintp(i + 3)] = rates.tangential_0, rates.tangential_1
 
 
 # (response, v_normal, v_tangential, j) -> StationLoad of station j in this relative wind, m/s

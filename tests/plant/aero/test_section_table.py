@@ -24,6 +24,7 @@ from fowt_env.plant.aero.section_table import (
 from fowt_env.plant.aero.station_response import AHEAD, BEHIND, Rows, Tabled, station_load
 from fowt_env.plant.aero.wind import power_profile, profile_at, wind_now
 from fowt_env.plant.aero.wind_field import WindField
+from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
 
@@ -257,20 +258,24 @@ def test_full_field_wind_is_sampled_at_every_station():
     assert np.abs(uniform - exact)[:, 6].mean() > 0.1 * exact[:, 6].std()  # the box does replace the series
 
 
+@kernel  # whose callers count no references: what it makes holds arrays
+def blade_sums(t, x, series, field, table, counters, quick, plain):
+    """Put into quick and plain (5,) the sums over a blade in a box, and one station at a time; last: valid."""
+    elements = table.elements
+    flow = rotor_flow(t, pose_of(x), wind_now(t, series), series, field, elements)
+    blade = tabled_blade(0, turn_and_response(x[State.BLADE_PITCH], table), x, flow, table, None)
+    a = box_force(blade, flow, field, elements)
+    b = sampled_force(blade, flow, elements, counters)
+    for out, force in ((quick, a), (plain, b)):
+        out[0], out[1], out[2], out[3] = force.load.fx, force.load.ft, force.load.mx, force.load.mt
+        out[4] = 1.0 if force.outside == 0 else 0.0
+
+
 @njit
 def blades(states, times, series, field, table, counters, quick, plain):
-    """(n, 5) each: the sums over a blade without branches and one station at a time; the last: valid."""
-    elements = table.elements
+    """blade_sums of many states."""
     for i in range(states.shape[0]):
-        x, t = states[i], times[i]
-        now, pose = wind_now(t, series), pose_of(x)
-        flow = rotor_flow(t, pose, now, series, field, elements)
-        blade = tabled_blade(0, turn_and_response(x[State.BLADE_PITCH], table), x, flow, table, None)
-        a = box_force(blade, flow, field, elements)
-        b = sampled_force(blade, flow, elements, counters)
-        for out, force in ((quick, a), (plain, b)):
-            out[i, 0], out[i, 1] = force.load.fx, force.load.ft
-            out[i, 2], out[i, 3], out[i, 4] = force.load.mx, force.load.mt, 1.0 if force.outside == 0 else 0.0
+        blade_sums(times[i], states[i], series, field, table, counters, quick[i], plain[i])
 
 
 @pytest.mark.parametrize("periodic", [False, True])
