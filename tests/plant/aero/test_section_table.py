@@ -260,7 +260,7 @@ def test_full_field_wind_is_sampled_at_every_station():
 
 @kernel  # whose callers count no references: what it makes holds arrays
 def blade_sums(t, x, series, field, table, counters, quick, plain):
-    """Put into quick and plain (5,) the sums over a blade in a box, and one station at a time; last: valid."""
+    """Put into quick and plain (5,) the sums over a blade in a box and station by station; last: valid."""
     elements = table.elements
     flow = rotor_flow(t, pose_of(x), wind_now(t, series), series, field, elements)
     blade = tabled_blade(0, turn_and_response(x[State.BLADE_PITCH], table), x, flow, table, None)
