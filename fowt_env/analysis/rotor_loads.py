@@ -5,11 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError
-from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, SLOW_ROTOR, curved_blade_load, hub_flow
-from fowt_env.plant.aero.blade_elements import build_blade_elements, smoothstep
-from fowt_env.plant.aero.blade_shape import blade_wind
-from fowt_env.plant.aero.wake import build_skewed_wake, skew_of
+from fowt_env.plant.aero.bem_rotor import rotor_load
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.wake import build_skewed_wake
 from fowt_env.plant.aero.wind import wind_now
+from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.plant.tilt import build_tilt, rotor_pose
@@ -41,28 +41,25 @@ def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
     if rotor.shape is None:
         rotor = build_blade_elements(turbine, density, chosen_stations(count, turbine), shaped=True)
     skew = build_skewed_wake() if scene.options["skewed_wake"] else None
-    x = np.zeros(N_RIGID)
-    x[State.ROTOR_SPEED], x[State.BLADE_PITCH], x[State.AZIMUTH] = rotor_speed, blade_pitch, azimuth
+    pitches = BladePitches(N_RIGID)  # which has the load of every blade written
+    x = np.zeros(N_RIGID + rotor.blades - 1)
+    x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH :] = rotor_speed, azimuth, blade_pitch
     pose = rotor_pose(pose_of(x), build_tilt(turbine.rotor.shaft_tilt))
-    now, field = wind_now(time, aero.wind), aero.field
-    hub = hub_flow(time, pose, now, aero.wind, field, rotor.overhang, rotor.hub_height)
-    induction = smoothstep(rotor_speed * rotor.tip_radius, SLOW_ROTOR * hub.speed, FAST_ROTOR * hub.speed)
+    blades = np.zeros((rotor.blades, 6))
+    rotor_load(
+        time, pose, x, wind_now(time, aero.wind), aero.wind, aero.field, rotor, skew, None, np.zeros_like(x),
+        np.zeros(N_COUNTERS), pitches, blades,
+    )  # fmt: skip
     force, moment = np.zeros(3), np.zeros(3)
     roots = np.zeros((rotor.blades, 2))
     cosine, sine = np.cos(turbine.rotor.cone), np.sin(turbine.rotor.cone)
     root = turbine.rotor.hub_radius * np.array([-sine, cosine, 0.0])
-    for number in range(rotor.blades):
+    for number, load in enumerate(blades):
         psi = azimuth + 2.0 * np.pi * number / rotor.blades
         out, turning = np.array([0.0, -np.sin(psi), np.cos(psi)]), np.array([0.0, -np.cos(psi), -np.sin(psi)])
-        load = curved_blade_load(
-            number, time, pose, hub, blade_wind(out[1], out[2], rotor_speed, pose, hub), induction, x, now,
-            aero.wind, field, rotor, rotor.shape, skew_of(hub, skew), skew, None, np.zeros_like(x),
-            np.zeros(N_COUNTERS), None,
-        )  # fmt: skip
         axes = np.array([[1.0, 0.0, 0.0], out, turning])
-        own_force, own_moment = np.array(load[:3]), np.array(load[3:])
-        force += own_force @ axes
-        moment += own_moment @ axes
-        about_root = own_moment - np.cross(root, own_force)
+        force += load[:3] @ axes
+        moment += load[3:] @ axes
+        about_root = load[3:] - np.cross(root, load[:3])
         roots[number] = about_root @ np.array([cosine, sine, 0.0]), -about_root[2]
     return RotorLoads(force, moment, roots[:, 0], roots[:, 1])

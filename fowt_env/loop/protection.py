@@ -17,7 +17,8 @@ from fowt_env.plant.compile.handle import by_reference
 from fowt_env.plant.drivetrain import clamp
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.state import BLADES, Command, State, pose_of
-from fowt_env.plant.tower_modes import bend_of, nacelle_rates, turned_pose
+from fowt_env.plant.tower.modes import bend_of, turned_pose
+from fowt_env.plant.tower.rates import nacelle_rates
 
 ROUNDING = 1e-9  # s, by which a control instant may miss a time
 

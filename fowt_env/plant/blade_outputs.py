@@ -2,7 +2,7 @@
 
 As ElastoDyn has them: with what the outer part loads the inner one, by the air, its weight and its inertia
 (theory.md, 6.6). Blades are rigid and, as masses, straight along their pitch axes. Pose and rates that
-kernels take are those of the frame that is fixed in the nacelle (tower_modes.nacelle_pose, nacelle_rates).
+kernels take are those of the frame that is fixed in the nacelle (nacelle_pose and nacelle_rates in tower/).
 """
 
 from math import cos, pi, sin

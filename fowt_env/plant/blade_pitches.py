@@ -8,13 +8,8 @@ from typing import NamedTuple
 
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.drivetrain import (
-    PitchActuator,
-    advance_torque,
-    followed_pitch,
-    pitch_after,
-    pitch_rate,
-)
+from fowt_env.plant.drivetrain import advance_torque
+from fowt_env.plant.pitch_actuator import PitchActuator, followed_pitch, pitch_after, pitch_rate
 from fowt_env.plant.pitch_drive import PitchDrive, advance_drive, fill_drive_rates, halt_drive, keep, stays
 from fowt_env.plant.state import BLADES, Command, State
 
@@ -29,7 +24,7 @@ class BladePitches(NamedTuple):
 
 @kernel
 def pitch_of(blade, x, pitches):
-    """Pitch of a blade (0, 1, 2), rad."""
+    """Return the pitch of a blade (0, 1, 2), rad."""
     if pitches is None:
         return x[State.BLADE_PITCH]
     return x[State.BLADE_PITCH] if blade == 0 else x[pitches.first + blade - 1]
@@ -37,7 +32,7 @@ def pitch_of(blade, x, pitches):
 
 @kernel
 def mean_pitch(x, pitches):
-    """Mean of the blades' pitches, rad."""
+    """Return the mean of the blades' pitches, rad."""
     if pitches is None:
         return x[State.BLADE_PITCH]
     return (x[State.BLADE_PITCH] + x[pitches.first] + x[pitches.first + 1]) / BLADES
@@ -115,7 +110,7 @@ def _fill_other_rates(x, u, actuator, pitches, dx):
 
 @kernel
 def pitches_jump(x, u, dt, actuator, pitches):
-    """Whether an actuator without lag moves a blade at the beginning of a step of dt (s)."""
+    """Return whether an actuator without lag moves a blade at the beginning of a step of dt (s)."""
     return jumps(0, State.BLADE_PITCH, x, u, dt, actuator) or _others_jump(x, u, dt, actuator, pitches)
 
 
@@ -155,7 +150,7 @@ def halt_blade(blade, x, actuator, pitches):
 
 @kernel
 def spread_command(u, pitches):
-    """Give the first blade's command to all; nothing with one pitch for all blades."""
+    """Set the commands of all blades to that of the first; nothing with one pitch for all blades."""
     if pitches is None:
         return
     for blade in range(1, BLADES):

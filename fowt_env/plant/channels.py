@@ -17,7 +17,8 @@ from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State, pose_of, to_inertial
 from fowt_env.plant.tilt import along_shaft, rotor_pose
-from fowt_env.plant.tower_modes import Twist, bend_of, nacelle_rates, turned_pose
+from fowt_env.plant.tower.modes import bend_of, turned_pose
+from fowt_env.plant.tower.rates import Twist, nacelle_rates
 from fowt_env.plant.tower_outputs import carried_at_base, record_tower
 from fowt_env.plant.user_loads import record_user_loads, user_channels
 

@@ -1,4 +1,4 @@
-"""Torque law, shaft balance and blade-pitch actuator of a geared turbine (theory.md, section 3)."""
+"""Torque law, generator and shaft balance of a geared turbine (theory.md, section 3)."""
 
 from math import exp, isfinite, sqrt
 from typing import NamedTuple
@@ -45,15 +45,6 @@ class Shaft(NamedTuple):
     generator_efficiency: float  # electrical over mechanical generator power
 
 
-class PitchActuator(NamedTuple):
-    """First-order collective blade-pitch actuator with rate and position limits."""
-
-    time_constant: float  # s; 0: the command is followed at once
-    rate_limit: float  # rad/s
-    minimum: float  # rad
-    maximum: float  # rad
-
-
 class TorqueLimits(NamedTuple):
     """What generator and converter can do, on the high-speed shaft. They never drive the rotor."""
 
@@ -65,7 +56,7 @@ SLACK = 1e-9  # relative, by which a command may miss a limit in rounding
 
 
 def build_torque_curve(torque_law, region3="constant_torque"):
-    """TorqueCurve of a descriptions.turbine.TorqueLaw; region3 is "constant_torque" or "constant_power".
+    """Return the TorqueCurve of a TorqueLaw; region3 is "constant_torque" or "constant_power".
 
     The slip line of region 2.5 rises from the synchronous speed, region3_start/(1 + slip), to the
     region-3 torque at region3_start; it takes over from the parabola where the two meet.
@@ -103,7 +94,7 @@ def build_torque_curve(torque_law, region3="constant_torque"):
 
 
 def build_drivetrain(turbine):
-    """Shaft of a descriptions.turbine.Turbine."""
+    """Return the Shaft of a descriptions.turbine.Turbine."""
     shaft, rotor_inertia = turbine.drivetrain, turbine.rotor.inertia
     ratio = shaft.gear_ratio
     rated_torque = ratio * turbine.torque_law.rated_torque  # tau_0, low-speed shaft
@@ -124,36 +115,26 @@ class TorqueLag(NamedTuple):
     torque: int  # index in the state of the torque in force
 
 
-def build_pitch_actuator(pitch_drive):
-    """PitchActuator of a descriptions.turbine.PitchDrive without inertia."""
-    return PitchActuator(
-        time_constant=float(pitch_drive.time_constant),
-        rate_limit=float(pitch_drive.rate_limit),
-        minimum=float(pitch_drive.minimum),
-        maximum=float(pitch_drive.maximum),
-    )
-
-
 def build_torque_limits(torque_law):
-    """TorqueLimits of a descriptions.turbine.TorqueLaw."""
+    """Return the TorqueLimits of a descriptions.turbine.TorqueLaw."""
     return TorqueLimits(maximum=float(torque_law.max_torque), rate_limit=float(torque_law.max_torque_rate))
 
 
 @kernel
 def clamp(value, low, high):
-    """The value, or the limit that it passes."""
+    """Return the value, or the limit that it passes."""
     return min(max(value, low), high)
 
 
 @kernel
 def rate_limit(value, target, step):
-    """The target, or the value moved towards it by a step, the most that it may change."""
+    """Return the target, or the value moved towards it by at most a step."""
     return value + clamp(target - value, -step, step)
 
 
 @kernel
 def generator_torque(generator_speed, blade_pitch, curve):
-    """Generator torque of the static curve, N m on the high-speed shaft (theory.md, section 3).
+    """Return the generator torque of the static curve, N m on the high-speed shaft (theory.md, section 3).
 
     Region 3 is tested first, so a blade pitch of region3_min_pitch and above forces it at any
     forward speed, as published. A shaft that stands or turns backwards gives no torque: it brakes
@@ -176,7 +157,7 @@ def generator_torque(generator_speed, blade_pitch, curve):
 
 @kernel
 def followed_torque(torque, command, period, limits):
-    """Generator torque (N m) of a control period that begins at a torque, under a command.
+    """Return the generator torque (N m) of a control period: the command within limits and rate.
 
     The command within [0, maximum], and not further from the torque before than the rate limit allows in a
     period (s). It acts from the period's beginning, as a torque that is set by a Bladed-style DLL does.
@@ -193,7 +174,7 @@ def followed_torque(torque, command, period, limits):
 
 @kernel
 def torque_in_force(x, u, converter):
-    """Generator torque now, N m: the command, or where it lags (converter not None) a state."""
+    """Return the present generator torque, N m: the command, or a state where it lags."""
     if converter is None:
         return u[Command.GENERATOR_TORQUE]
     return x[converter.torque]
@@ -227,13 +208,13 @@ def lose_torque(x, converter):
 
 @kernel
 def torque_was_limited(torque, command, limits):
-    """Whether a torque in force differs from its command by more than rounding."""
+    """Return whether a torque in force differs from its command by more than rounding."""
     return abs(torque - command) > SLACK * limits.maximum
 
 
 @kernel
 def shaft_torque(aerodynamic_torque, torque, rotor_speed, drivetrain):
-    """Torque Q_b that accelerates the rotor, N m on the low-speed shaft (theory.md Eq. (7)).
+    """Return the torque Q_b that accelerates the rotor, N m on the low-speed shaft (theory.md Eq. (7)).
 
     torque is the generator's, on the high-speed shaft, positive against positive rotation. The mesh
     loss always takes power: it adds to the torque where the rotor drives the generator, and lessens
@@ -245,45 +226,3 @@ def shaft_torque(aerodynamic_torque, torque, rotor_speed, drivetrain):
     else:
         gearbox /= 1.0 + drivetrain.mesh_loss
     return aerodynamic_torque - gearbox - drivetrain.bearing_loss_coefficient * rotor_speed
-
-
-@kernel
-def pitch_rate(blade_pitch, command, actuator):
-    """Rate of change of the blade pitch, rad/s (theory.md Eq. (8)); 0 without lag, see followed_pitch."""
-    if actuator.time_constant <= 0.0:
-        return 0.0
-    target = clamp(command, actuator.minimum, actuator.maximum)
-    rate = (target - blade_pitch) / actuator.time_constant
-    return clamp(rate, -actuator.rate_limit, actuator.rate_limit)
-
-
-@kernel
-def followed_pitch(blade_pitch, command, dt, actuator):
-    """Blade pitch to start a step of dt with, rad: an actuator without lag has no rate to integrate.
-
-    With lag: unchanged. Without: the command, within the position limits and the change that the rate
-    limit allows in dt.
-    """
-    if actuator.time_constant > 0.0:
-        return blade_pitch
-    target = clamp(command, actuator.minimum, actuator.maximum)
-    return rate_limit(blade_pitch, target, actuator.rate_limit * dt)
-
-
-@kernel
-def pitch_after(blade_pitch, command, dt, actuator):
-    """Blade pitch after dt under a constant command: exact solution of lag and rate limit."""
-    if actuator.time_constant <= 0.0:
-        return blade_pitch
-    lag, fastest = actuator.time_constant, actuator.rate_limit
-    target = clamp(command, actuator.minimum, actuator.maximum)
-    error = target - blade_pitch
-    sign = 1.0 if error > 0.0 else -1.0
-    size = abs(error)
-    band = fastest * lag  # inside it the lag alone limits the rate
-    if size > band:
-        slewing = (size - band) / fastest
-        if slewing >= dt:
-            return blade_pitch + sign * fastest * dt
-        return target - sign * band * exp(-(dt - slewing) / lag)
-    return target - error * exp(-dt / lag)

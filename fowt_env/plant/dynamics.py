@@ -10,7 +10,8 @@ stands first in the function that takes the part. compile/variants.py is for par
 
 from typing import NamedTuple
 
-from fowt_env.plant.aero.bem_rotor import RotorLoad
+from fowt_env.plant.accelerations import accelerate_turbine, fill_tower_rates
+from fowt_env.plant.aero.blade_sweep import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
@@ -18,19 +19,10 @@ from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rigid_body import attitude_rate, gravity_load
+from fowt_env.plant.rigid_body import attitude_rate_at, gravity_load
 from fowt_env.plant.state import State, Wrench, add, pose_in
-from fowt_env.plant.tower_modes import (
-    accelerate_turbine,
-    add_bent_weight,
-    add_modal,
-    add_modal_weight,
-    begin_modal,
-    bend_of,
-    carried,
-    fill_tower_rates,
-    turned_pose,
-)
+from fowt_env.plant.tower.loads import add_bent_weight, add_modal, add_modal_weight, begin_modal, carried
+from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.user_loads import add_modal_user_loads, add_user_loads, evaluate_user_loads
 
 
@@ -45,7 +37,7 @@ class Loads(NamedTuple):
 
 @kernel
 def evaluate_loads(t, x, model, data, dx):
-    """Every load at a state, into data; writes only the rates of internal states into dx. No command."""
+    """Put every load at a state into data; of dx the rates of internal states alone are written."""
     pose, modal = pose_in(x, model.rigid_body.plane), data.cache[LoadCache.MODAL :]
     bend = bend_of(x, model.tower)
     nacelle = turned_pose(pose, bend)
@@ -81,7 +73,7 @@ def evaluate_loads(t, x, model, data, dx):
 
 @inlined_kernel
 def respond(x, u, model, data, dx):
-    """Rates of the state under the command u with the loads of the last evaluate at this state."""
+    """Put the rates of the state under the command u into dx, with the loads of the last evaluation."""
     cache, body = data.cache, model.rigid_body
     pose = pose_in(x, body.plane)
     torque = shaft_torque(
@@ -90,7 +82,7 @@ def respond(x, u, model, data, dx):
         x[State.ROTOR_SPEED],
         model.drivetrain,
     )
-    attitude_rate(x, dx, body.plane)
+    attitude_rate_at(pose, x, dx, body.plane)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
     fill_pitch_rates(x, u, model.actuator, model.pitches, dx)
     fill_torque_rate(x, u, model.converter, dx)
@@ -101,7 +93,7 @@ def respond(x, u, model, data, dx):
 
 @inlined_kernel
 def derivative(t, x, u, model, data, dx):
-    """dx = f(t, x, u); u is a Command."""
+    """Put f(t, x, u) into dx; u is a Command."""
     data.cache[LoadCache.VALID] = 0.0
     evaluate_loads(t, x, model, data, dx)
     respond(x, u, model, data, dx)
@@ -120,7 +112,7 @@ def store(cache, start, wrench):
 
 @kernel
 def stored(cache, start):
-    """The wrench that store has put there."""
+    """Return the wrench that store has put there."""
     return Wrench(
         cache[start], cache[start + 1], cache[start + 2], cache[start + 3], cache[start + 4], cache[start + 5]
     )
@@ -128,7 +120,7 @@ def stored(cache, start):
 
 @kernel
 def loads_of(data, dx):
-    """Loads of the last evaluate and the accelerations dx that followed from them."""
+    """Return the loads of the last evaluate and the accelerations dx that followed from them."""
     cache = data.cache
     hydro = add(stored(cache, LoadCache.HYDRO), added_mass_load(data.added_mass, dx))
     rotor = RotorLoad(stored(cache, LoadCache.ROTOR), cache[LoadCache.THRUST], cache[LoadCache.TORQUE])
@@ -137,7 +129,7 @@ def loads_of(data, dx):
 
 @kernel
 def added_mass_load(added, dx):
-    """-A nu': the part of the water's load that went to the left-hand side."""
+    """Return -A nu': the part of the water's load that is on the left-hand side."""
     return Wrench(
         -_row(added, 0, dx), -_row(added, 1, dx), -_row(added, 2, dx),
         -_row(added, 3, dx), -_row(added, 4, dx), -_row(added, 5, dx),
@@ -146,7 +138,7 @@ def added_mass_load(added, dx):
 
 @kernel
 def _row(added, i, dx):
-    """One row of added mass times the acceleration."""
+    """Return one row of added mass times the acceleration."""
     total = added[i, 0] * dx[State.VX]
     for j in range(1, 6):
         total += added[i, j] * dx[State.VX + j]

@@ -21,14 +21,9 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import State, Wrench, add, pose_in
-from fowt_env.plant.tower_modes import (
-    add_modal,
-    bend_of,
-    carried,
-    correct_elastic,
-    keep_elastic,
-    turned_pose,
-)
+from fowt_env.plant.tower.loads import add_modal, carried
+from fowt_env.plant.tower.modes import bend_of, turned_pose
+from fowt_env.plant.tower.steps import correct_elastic, keep_elastic
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to

@@ -36,7 +36,7 @@ class Model(NamedTuple):
     rigid_body: RigidBody
     layout: object  # channels.Layout
     drivetrain: object  # drivetrain.Shaft
-    actuator: object  # drivetrain.PitchActuator or pitch_drive.PitchDrive
+    actuator: object  # pitch_actuator.PitchActuator or pitch_drive.PitchDrive
     generator: object  # drivetrain.TorqueLimits
     hydro: object  # hydro.load.Hydro or None
     mooring: object  # mooring.Mooring or None
@@ -45,7 +45,7 @@ class Model(NamedTuple):
     user: object = None  # user_loads.UserLoads or None
     pitches: object = None  # blade_pitches.BladePitches, or None: one pitch for all blades
     converter: object = None  # drivetrain.TorqueLag, or None: the torque follows its command at once
-    tower: object = None  # tower_modes.TowerModes, or None: a rigid tower
+    tower: object = None  # tower.modes.TowerModes, or None: a rigid tower
 
 
 class LoadCache(IntEnum):
@@ -68,7 +68,7 @@ class LoadCache(IntEnum):
     ELEVATED = 35  # 1 while ELEVATION, of the surface at the origin, is of TIME
     ELEVATION = 36
     TORQUE_LIMITED = 37  # 1 in a control period whose torque command the generator could not follow
-    MODAL = 38  # tower_modes.MOST_MODES entries: generalised forces on the deflections of a tower that bends
+    MODAL = 38  # tower.modes.MOST_MODES entries: generalised forces on the deflections of a tower that bends
 
 
 N_CACHE = 42

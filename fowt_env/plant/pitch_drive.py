@@ -41,7 +41,7 @@ class PitchDrive(NamedTuple):
 
 @kernel
 def propagator(t, drive):
-    """(a, b, c, d): distance from rest and rate after t (s) are a e + b r and c e + d r, without limits."""
+    """Return (a, b, c, d): distance from rest a e + b r and rate c e + d r after t (s), without limits."""
     w, decay = drive.natural_frequency, drive.damping * drive.natural_frequency
     square = (1.0 - drive.damping * drive.damping) * w * w
     fade = exp(-decay * t)
@@ -58,14 +58,14 @@ def propagator(t, drive):
 
 @kernel
 def pull(pitch, rate, rest, drive):
-    """Acceleration that the drive gives without limits towards a place of rest, rad/s2."""
+    """Return the acceleration of the drive towards a place of rest without limits, rad/s2."""
     w = drive.natural_frequency
     return w * w * (rest - pitch) - 2.0 * drive.damping * w * rate
 
 
 @kernel
 def drive_after(pitch, rate, target, after, drive):
-    """(pitch, rate) a time `after` (s) later with the target held, which lies within the position limits."""
+    """Return (pitch, rate) a time `after` (s) later for a constant target within the position limits."""
     w = drive.natural_frequency
     error = pitch - target
     reach = sqrt((w * error) ** 2 + rate * rate)  # never grows: it bounds rate, distance and acceleration
@@ -82,7 +82,7 @@ def drive_after(pitch, rate, target, after, drive):
 
 @kernel
 def _limited_after(pitch, rate, target, after, drive):
-    """drive_after where a limit or friction may act: piece by piece, each of one law of motion."""
+    """Return drive_after where a limit or friction may act: in pieces, each of one law of motion."""
     w, fastest, strongest = drive.natural_frequency, drive.rate_limit, drive.acceleration_limit
     pitch = clamp(pitch, drive.minimum, drive.maximum)
     rate = clamp(rate, -fastest, fastest)
@@ -137,7 +137,7 @@ def _limited_after(pitch, rate, target, after, drive):
 
 @kernel
 def _piece(pitch, rate, rest, law, saturated, length, motion):
-    """(pitch, rate) after a piece of motion: at a constant acceleration, or of the drive alone."""
+    """Return (pitch, rate) after a piece of motion: at a constant acceleration, or of the drive alone."""
     if saturated:
         return pitch + length * (rate + 0.5 * length * law), rate + length * law
     a, b, c, d = motion
@@ -147,7 +147,7 @@ def _piece(pitch, rate, rest, law, saturated, length, motion):
 
 @kernel
 def _over(pitch, rate, way, rest, before, saturated, drive):
-    """Whether a piece of motion with this end is over before it: turned, at a limit or off one."""
+    """Return whether a piece of motion ends before this end of it: turned, at a limit or off one."""
     if way * rate < 0.0 or abs(rate) > drive.rate_limit:
         return True
     if pitch < drive.minimum or pitch > drive.maximum:
@@ -160,7 +160,7 @@ def _over(pitch, rate, way, rest, before, saturated, drive):
 
 @kernel
 def drive_acceleration(pitch, rate, target, drive):
-    """Acceleration of the pitch now, rad/s2."""
+    """Return the acceleration of the pitch now, rad/s2."""
     if rate == 0.0:
         if abs(target - pitch) <= drive.friction:
             return 0.0
@@ -175,7 +175,7 @@ def drive_acceleration(pitch, rate, target, drive):
 
 @kernel
 def followed_command(held, command, drive):
-    """The command that is followed, within the position limits: the held one where the new one is near it."""
+    """Return the command that is followed, within the position limits: the former one within the deadband."""
     if abs(command - held) <= drive.deadband:
         command = held
     return clamp(command, drive.minimum, drive.maximum)
@@ -183,7 +183,7 @@ def followed_command(held, command, drive):
 
 @kernel
 def target_of(blade, x, u, drive, held):
-    """Where a blade is to go, rad."""
+    """Return the target of a blade, rad."""
     command = u[Command.BLADE_PITCH + blade]
     if held is None:
         return clamp(command, drive.minimum, drive.maximum)
@@ -225,10 +225,10 @@ def halt_drive(blade, i, x, actuator):
 
 @kernel
 def stays(blade, i, x, u, dt, actuator):
-    """False: a drive with inertia moves no blade at once."""
+    """Return False: a drive with inertia moves no blade at once."""
     return False
 
 
 @kernel
 def keep(blade, i, x, u, dt, actuator):
-    """Nothing: a drive with inertia moves no blade at once."""
+    """Do nothing: a drive with inertia moves no blade at once."""

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.accelerations import accelerate_turbine
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.blade_pitches import advance_actuators
@@ -11,14 +12,9 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.hydro.radiation import integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State, Wrench, pose_in
-from fowt_env.plant.tower_modes import (
-    accelerate_turbine,
-    add_tower_steps,
-    bend_of,
-    carried,
-    fill_impulse,
-    nacelle_pose,
-)
+from fowt_env.plant.tower.loads import carried
+from fowt_env.plant.tower.modes import bend_of, nacelle_pose
+from fowt_env.plant.tower.steps import add_tower_steps, fill_impulse
 
 BASHFORTH = (55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0)  # Adams-Bashforth 4, latest first
 N_SAMPLE = 7  # of a sample of the rotor's load: its wrench and its torque

@@ -5,7 +5,9 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.rigid_body import momentum_rate
 from fowt_env.plant.state import State, Wrench
 from fowt_env.plant.tilt import across_shaft, along_shaft
-from fowt_env.plant.tower_modes import TowerModes, above_base_rate, carried, displaced_moment
+from fowt_env.plant.tower.loads import carried, displaced_moment
+from fowt_env.plant.tower.modes import TowerModes
+from fowt_env.plant.tower.rates import above_base_rate
 
 
 @kernel

@@ -14,7 +14,7 @@ from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.hydro.load import surface_at_origin, water_at
 from fowt_env.plant.state import State, Wrench, add, to_body, to_inertial
-from fowt_env.plant.tower_modes import add_modal, carried
+from fowt_env.plant.tower.loads import add_modal, carried
 
 MOST_LOADS = 8
 

@@ -2,7 +2,8 @@
 
 from math import inf
 
-from fowt_env.plant.drivetrain import TorqueLag, build_pitch_actuator
+from fowt_env.plant.drivetrain import TorqueLag
+from fowt_env.plant.pitch_actuator import build_pitch_actuator
 from fowt_env.plant.pitch_drive import PitchDrive
 from fowt_env.plant.state import BLADES, Command
 

@@ -111,7 +111,7 @@ LOADS = {
     ),
     "rotor": LoadFacts(
         "thrust, torque and the other loads of the blades",
-        "aero/bem_rotor.py, aero/section_table.py, aero/section_inflow.py, aero/coefficient_table.py",
+        "aero/blade_sweep.py, aero/station_response.py, aero/coefficient_table.py",
         "5.1", "aero", "ROTOR",
         {"wind": None},
         strength=("aero.rotor.elements.air_density", "aero.rotor.density"),

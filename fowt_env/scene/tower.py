@@ -5,7 +5,7 @@ import numpy as np
 from fowt_env.descriptions.tower_modes import POWERS
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.tower_drag import POINTS
-from fowt_env.plant.tower_modes import TowerModes
+from fowt_env.plant.tower.modes import TowerModes
 
 MODES = {"rigid": 0, "modes": 1, "modes2": 2}  # option tower: modes in each direction
 

@@ -6,16 +6,8 @@ from naive.pi import oc3_torque
 from naive.turbine import torque_law, turbine
 
 from fowt_env.errors import InputError
-from fowt_env.plant.drivetrain import (
-    PitchActuator,
-    build_drivetrain,
-    build_pitch_actuator,
-    build_torque_curve,
-    followed_pitch,
-    generator_torque,
-    pitch_rate,
-    shaft_torque,
-)
+from fowt_env.plant.drivetrain import build_drivetrain, build_torque_curve, generator_torque, shaft_torque
+from fowt_env.plant.pitch_actuator import PitchActuator, build_pitch_actuator, followed_pitch, pitch_rate
 
 pytestmark = pytest.mark.installation
 

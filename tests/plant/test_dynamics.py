@@ -7,10 +7,11 @@ from plant_helpers import integrate, leaning, make_pose, random_state, rates, st
 from scipy.integrate import solve_ivp
 
 from fowt_env.errors import InputError
+from fowt_env.plant.accelerations import accelerate, solve_spd
 from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
 from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.mooring import mooring_load
-from fowt_env.plant.rigid_body import accelerate, gravity_load, momentum_rate, solve_spd
+from fowt_env.plant.rigid_body import gravity_load, momentum_rate
 from fowt_env.plant.state import N_RIGID, State, Wrench, add, pose_of
 from fowt_env.scene.mass import build_rigid_body
 

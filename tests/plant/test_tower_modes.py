@@ -4,20 +4,16 @@ from naive import flexible_tower
 from plant_helpers import leaning, random_state, rates, state
 
 from fowt_env import Load, build_scene, load_kernel, simulate
+from fowt_env.plant.accelerations import accelerate_bending
 from fowt_env.plant.advance import advance, forget, observe, output_row
 from fowt_env.plant.channels import Out
 from fowt_env.plant.integrators import START_STEPS
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
-from fowt_env.plant.tower_modes import (
-    TowerModes,
-    accelerate_bending,
-    bend_by_modes,
-    carried,
-    fill_impulse,
-    nacelle_pose,
-)
+from fowt_env.plant.tower.loads import carried
+from fowt_env.plant.tower.modes import TowerModes, bend_by_modes, nacelle_pose
+from fowt_env.plant.tower.steps import fill_impulse
 from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.mass import with_masses
 from fowt_env.scene.tower import tower_frequency

@@ -135,7 +135,7 @@ class Momentum(NamedTuple):
 
 @kernel
 def element_of(j, blade_pitch, rotor):
-    """Element of station j."""
+    """Return the Element of station j."""
     return Element(
         rotor.twist[j] + blade_pitch,
         rotor.solidity[j],
@@ -149,7 +149,7 @@ def element_of(j, blade_pitch, rotor):
 
 @inlined_kernel
 def segment_of(alpha, foil, polars):
-    """(row of polars.segment, alpha beyond its start) of a foil at alpha (rad, wrapped to +-pi)."""
+    """Return (row of polars.segment, alpha beyond its start) of a foil at alpha (rad, wrapped to +-pi)."""
     if alpha > pi or alpha < -pi:
         alpha -= 2.0 * pi * floor((alpha + pi) / (2.0 * pi))
     cell = int((alpha + pi) * (CELLS / (2.0 * pi)))
@@ -162,7 +162,7 @@ def segment_of(alpha, foil, polars):
 
 @kernel
 def lift_drag(alpha, foil, polars):
-    """(cl, cd, dcl/dalpha, dcd/dalpha) of a foil at alpha (rad, wrapped to +-pi).
+    """Return (cl, cd, dcl/dalpha, dcd/dalpha) of a foil at alpha (rad, wrapped to +-pi).
 
     Linear between the published points, which are not evenly spaced: a table gives the first segment
     of each half degree, at most a few steps before the right one.
@@ -179,7 +179,7 @@ def lift_drag(alpha, foil, polars):
 
 @kernel
 def _loss(exponent, h, dh):
-    """acos(exp(-exponent/h)) and its derivative with the inflow angle; Prandtl's factor is 2/pi of it.
+    """Return acos(exp(-exponent/h)) and its derivative with the inflow angle; Prandtl's factor is 2/pi of it.
 
     h, dh: absolute value of the sine of the inflow angle, and its derivative.
     """
@@ -197,7 +197,7 @@ def _loss(exponent, h, dh):
 
 @kernel
 def _momentum(f, side, v_normal, v_tangential, element, polars):
-    """Momentum terms of one station at -pi/2 <= f < pi, v_normal >= 0.
+    """Return the Momentum terms of one station at -pi/2 <= f < pi, v_normal >= 0.
 
     side -1 is the mirrored problem of reversed flow: the foil turned upside down. Buhl's
     a = (g1 -+ sqrt(g2))/g3 is, without its singularity at g3 = 0,
@@ -269,7 +269,7 @@ def _momentum(f, side, v_normal, v_tangential, element, polars):
 
 @kernel
 def _shifted(at, step):
-    """Momentum terms a tiny step further, to first order."""
+    """Return the Momentum terms a tiny step further, to first order."""
     return Momentum(
         at.s + step * at.c,
         at.c - step * at.s,
@@ -290,7 +290,7 @@ def _shifted(at, step):
 
 @kernel
 def bem_residual(phi, v_normal, v_tangential, blade_pitch, station, rotor):
-    """sin f/(1-a) - (V_x/V_y) cos f (1-k') of one station at the inflow angle phi = f; v_tangential > 0.
+    """Return sin f/(1-a) - (V_x/V_y) cos f (1-k') of a station at the inflow angle phi = f; v_tangential > 0.
 
     For v_normal < 0 of the mirrored problem, with f = -phi and the foil turned upside down.
     """
@@ -302,7 +302,7 @@ def bem_residual(phi, v_normal, v_tangential, blade_pitch, station, rotor):
 
 @kernel
 def _bracketed(low, high, side, v_normal, v_tangential, element, polars):
-    """(found, f): root of the residual in [low, high] by bisection with secant steps (Illinois)."""
+    """Return (found, f): root of the residual in [low, high] by bisection with secant steps (Illinois)."""
     at = _momentum(low, side, v_normal, v_tangential, element, polars)
     r_low = v_tangential * at.qs - v_normal * at.swirl
     at = _momentum(high, side, v_normal, v_tangential, element, polars)
@@ -329,7 +329,7 @@ def _bracketed(low, high, side, v_normal, v_tangential, element, polars):
 
 @kernel
 def _solve_bracketed(side, v_normal, v_tangential, element, polars):
-    """(found, f) bracket by bracket, the wind turbine states first; rarely needed."""
+    """Return (found, f) bracket by bracket, the wind turbine states first; rarely needed."""
     low = SMALLEST_ANGLE
     found, f = _bracketed(low, LARGEST_ANGLE, side, v_normal, v_tangential, element, polars)
     if not found:
@@ -339,7 +339,7 @@ def _solve_bracketed(side, v_normal, v_tangential, element, polars):
 
 @kernel
 def _rough_guess(v_normal, v_tangential, side, element):
-    """Inflow angle with a linear lift and neither drag nor losses, small angles (f > 0)."""
+    """Return the inflow angle with a linear lift and neither drag nor losses, small angles (f > 0)."""
     x = v_normal / v_tangential
     pull = 0.25 * element.solidity * LIFT_SLOPE
     b = x - pull
@@ -349,7 +349,7 @@ def _rough_guess(v_normal, v_tangential, side, element):
 
 @kernel
 def first_guess(v_normal, v_tangential, blade_pitch, j, rotor):
-    """Inflow angle to start Newton's method from, bilinear in a table over inflow and blade pitch.
+    """Return the inflow angle to start Newton's method from, bilinear in a table over inflow and blade pitch.
 
     Only the number of steps depends on it, and, where the balance has several roots (deep stall), which of
     them is found: a function of the inflow of this station alone, so no history enters. Zero where there is
@@ -370,7 +370,7 @@ def first_guess(v_normal, v_tangential, blade_pitch, j, rotor):
 
 @kernel
 def _solve(guess, side, v_normal, v_tangential, element, polars):
-    """(found, f, momentum terms there) of one station, v_normal >= 0 and v_tangential > 0.
+    """Return (found, f, momentum terms there) of one station, v_normal >= 0 and v_tangential > 0.
 
     Newton's method inside [-pi/2, LARGEST_ANGLE], where the residual goes from minus to plus; if that does
     not converge, the brackets one by one.
@@ -401,7 +401,7 @@ def _solve(guess, side, v_normal, v_tangential, element, polars):
 
 @kernel
 def smoothstep(x, low, high):
-    """0 below low, 1 above high, smooth between (third order)."""
+    """Return 0 below low, 1 above high, smooth between (third order)."""
     if x >= high:
         return 1.0
     if x <= low:
@@ -412,7 +412,7 @@ def smoothstep(x, low, high):
 
 @kernel
 def airload(v_normal, v_tangential, element, polars):
-    """(cn, ct, square of the speed) of one station in the given local flow, without any induction."""
+    """Return (cn, ct, square of the speed) of one station in a local flow, without any induction."""
     square = v_normal * v_normal + v_tangential * v_tangential
     if square == 0.0:
         return 0.0, 0.0, 0.0
@@ -424,7 +424,9 @@ def airload(v_normal, v_tangential, element, polars):
 
 @kernel
 def pitching_moment(v_normal, v_tangential, j, element, shape, polars):
-    """Pitching moment per length of station j in the given local flow, N m/m, nose up."""
+    """Return the pitching moment per length of station j in a local flow, N m/m, nose up."""
+    if shape is None:
+        return 0.0
     square = v_normal * v_normal + v_tangential * v_tangential
     if square == 0.0:
         return 0.0
@@ -436,7 +438,7 @@ def pitching_moment(v_normal, v_tangential, j, element, shape, polars):
 
 @kernel
 def blade_section(v_normal, v_tangential, blade_pitch, station, induction, rotor):
-    """Section: loads and induced flow of one station.
+    """Return the Section of one station: its loads and induced flow.
 
     v_normal, v_tangential  relative wind along the shaft (downwind) and against the motion, m/s
     induction               1: momentum balance, 0: none (parked rotor), between: faded
@@ -448,7 +450,7 @@ def blade_section(v_normal, v_tangential, blade_pitch, station, induction, rotor
 
 @kernel
 def solve_section(v_normal, v_tangential, induction, guess, element, polars):
-    """Section of one element; blade_section says the rest."""
+    """Return the Section of one element; arguments as in blade_section."""
     theta = element.theta
     if not (abs(v_normal) < LARGEST_SPEED and abs(v_tangential) < LARGEST_SPEED and abs(theta) < 100.0):
         return Section(nan, nan, nan, nan, nan, nan, nan, nan, nan, nan, True)
@@ -513,13 +515,13 @@ _guesses = Cache(32)  # one table per blade: filling one takes a fifth of a seco
 
 
 def elements_key(elements):
-    """What identifies the aerodynamics of BladeElements, hashable."""
+    """Return a hashable key of the aerodynamics of BladeElements."""
     parts = (*elements[: elements._fields.index("polars")], *elements.polars, *(elements.shape or ()))
     return tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in parts)
 
 
 def _guess_table(elements):
-    """The filled guess table of BladeElements; left at zero (the rough guess) without the compiler."""
+    """Return the filled guess table of BladeElements; left at zero (the rough guess) without the compiler."""
     if numba.config.DISABLE_JIT:
         return elements.guess
     key = elements_key(elements._replace(air_density=0.0))
@@ -532,7 +534,7 @@ def _filled_guess(elements):
 
 
 def _hat_weights(radius, hub_radius, tip_radius):
-    """((n,), (n,)): integrals of each station's hat function and of radius times it (m, m2).
+    """Return ((n,), (n,)): integrals of each station's hat function and of radius times it (m, m2).
 
     The line load is linear between stations and zero at the hub and the tip.
     """
@@ -543,7 +545,7 @@ def _hat_weights(radius, hub_radius, tip_radius):
 
 
 def station_weights(length, chosen):
-    """(n chosen, n + 2): the line load at all points of a blade per unit of that at each chosen station.
+    """Return (n chosen, n + 2): the line load at all points of a blade per unit at each chosen station.
 
     length (n + 2,) of hub, stations and tip along the blade. The load is linear between the chosen ones, and
     zero at hub and tip.
@@ -554,13 +556,13 @@ def station_weights(length, chosen):
 
 
 def _cm_segments(polar):
-    """(m+1, 2): cm at the start of each segment of a polar, and its slope."""
+    """Return (m+1, 2): cm at the start of each segment of a polar, and its slope."""
     step, moment = np.diff(polar[:, 0]), polar[:, 3]
     return np.column_stack([moment, np.append(np.diff(moment) / step, 0.0)])
 
 
 def _polar_segments(polar):
-    """((m+1, 5), (CELLS,)): segments of one polar, and the first segment of each half degree."""
+    """Return ((m+1, 5), (CELLS,)): segments of one polar, and the first segment of each half degree."""
     alpha, lift, drag = polar[:, 0], polar[:, 1], polar[:, 2]
     step = np.diff(alpha)
     segments = np.zeros((len(step) + 1, 5))
@@ -573,14 +575,14 @@ def _polar_segments(polar):
 
 
 def _zero_lift(polar):
-    """Angle by which the lift line through -2 and 6 deg crosses zero below 0, rad (first guess only)."""
+    """Return the angle by which the lift line through -2 and 6 deg crosses zero below 0, rad (guess only)."""
     low, high = np.interp(np.radians([-2.0, 6.0]), polar[:, 0], polar[:, 1])
     rise = (high - low) / np.radians(8.0)
     return high / rise - np.radians(6.0) if rise > 1.0 else 0.0
 
 
 def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=None):
-    """BladeElements of a turbine description; stations: indices of a subset, default all.
+    """Return the BladeElements of a turbine description; stations: indices of a subset, default all.
 
     shaped: with a BladeShape even where blades are straight and lie in the rotor plane.
     fit: of curved blades, a function from what the stations stand for (station_choice.Fit) to another.

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import Wrench
 
 
@@ -34,8 +35,14 @@ class BladeShape(NamedTuple):
     reach: float  # m, largest distance of a station from the rotor centre
 
 
+class OnAxis(NamedTuple):
+    """Place of a station of a straight blade in the rotor plane."""
+
+    r: float  # m, from the rotor centre
+
+
 class Station(NamedTuple):
-    """Place and direction of a station at a blade pitch, directions of the blade."""
+    """Place and direction of a station of a curved blade at a blade pitch, in directions of the blade."""
 
     x: float  # m
     r: float
@@ -44,13 +51,30 @@ class Station(NamedTuple):
     nr: float
 
 
-class Lever(NamedTuple):
-    """What the forces normal to the blade axis (n) and along t, and the pitching moment, of a station make.
+class Plane(NamedTuple):
+    """A quantity that is linear in the place of a station: one + x, r and t times these."""
 
-    They act at the point (x, r, t), not quite the station's own.
+    one: float
+    x: float
+    r: float
+    t: float
+
+
+class Turn(NamedTuple):
+    """Blade pitch."""
+
+    pitch: float  # rad
+    cosine: float
+    sine: float
+
+
+class Lever(NamedTuple):
+    """Moments per force of a station, of the forces normal to the blade axis (n) and along t.
+
+    The forces act at the point (x, r, t), not exactly at the station.
     """
 
-    nx: float  # directions of the normal, as those of the Station
+    nx: float  # directions of the normal, as in Station
     nr: float
     turn: float  # m, moment about t by n: x nr - r nx
     t_nx: float  # m, moment about r by n
@@ -59,8 +83,8 @@ class Lever(NamedTuple):
     r: float  # m, moment about x by the force along t
 
 
-class BladeWind(NamedTuple):
-    """Directions of a blade in inertial components, and its motion in its own directions."""
+class BladeMotion(NamedTuple):
+    """Directions of a blade in inertial components, and its motion in directions of the blade."""
 
     ey: float  # e_r = (0, ey, ez) in rotor axes, e_t = (0, -ez, ey)
     ez: float
@@ -76,6 +100,18 @@ class BladeWind(NamedTuple):
     wx: float  # angular velocity with the rotor's, rad/s
     wr: float
     wt: float
+
+
+class StationLoad(NamedTuple):
+    """Load of a station, before it is multiplied by the length that the station represents."""
+
+    normal: float  # force normal to the blade axis, downwind
+    tangential: float  # force in the direction of rotation
+    moment: float  # pitching moment, nose up; counts for curved blades alone
+    length: float  # factor on the three
+    first_moment: float  # factor on the forces of a straight blade for their moments about the rotor centre
+    outside: int  # 1 where a table does not contain the inflow, else 0
+    rates: object  # station_response.WakeRates of states that the response has, or None
 
 
 class BladeLoad(NamedTuple):
@@ -94,44 +130,119 @@ NO_BLADE_LOAD = BladeLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def effective_pitch(j, blade_pitch, shape):
-    """Angle by which the blade pitch turns the section of station j about its own axis, rad."""
+    """Return the angle by which the blade pitch turns the section of station j about its own axis, rad."""
     if shape is None:
         return blade_pitch
     s = shape.slope[j]
     return atan2(sin(blade_pitch), sqrt(1.0 - s * s) * cos(blade_pitch))
 
 
+@kernel
+def turn_of(blade_pitch):
+    """Return the Turn of a blade pitch (rad)."""
+    return Turn(blade_pitch, cos(blade_pitch), sin(blade_pitch))
+
+
+# -------------------------------------------------- what differs between straight and curved blades
+
+
 @inlined_kernel
-def station_at(j, cosine, sine, shape):
-    """Station j; cosine and sine of the blade pitch."""
-    out = cosine * shape.prebend[j] + sine * shape.sweep[j]
-    z, s = shape.distance[j], shape.slope[j] * cosine
+def _station_on_axis(j, turn, radius, shape):
+    return OnAxis(radius[j])
+
+
+@inlined_kernel
+def curved_station(j, turn, radius, shape):
+    """Return the Station j of a curved blade."""
+    out = turn.cosine * shape.prebend[j] + turn.sine * shape.sweep[j]
+    z, s = shape.distance[j], shape.slope[j] * turn.cosine
     c = sqrt(1.0 - s * s)
     return Station(
         shape.cone_cosine * out - shape.cone_sine * z,
         shape.cone_cosine * z + shape.cone_sine * out,
-        sine * shape.prebend[j] - cosine * shape.sweep[j],
+        turn.sine * shape.prebend[j] - turn.cosine * shape.sweep[j],
         c * shape.cone_cosine + s * shape.cone_sine,
         c * shape.cone_sine - s * shape.cone_cosine,
     )
 
 
 @inlined_kernel
-def lever_of(j, cosine, sine, shape):
-    """Lever of station j; cosine and sine of the blade pitch."""
-    at = station_at(j, cosine, sine, shape)
-    out = cosine * shape.arm_prebend[j] + sine * shape.arm_sweep[j]
+def lever_of(j, turn, shape):
+    """Return the Lever of station j of a curved blade."""
+    at = curved_station(j, turn, None, shape)
+    out = turn.cosine * shape.arm_prebend[j] + turn.sine * shape.arm_sweep[j]
     z = shape.arm_distance[j]
     x = shape.cone_cosine * out - shape.cone_sine * z
     r = shape.cone_cosine * z + shape.cone_sine * out
-    t = sine * shape.arm_prebend[j] - cosine * shape.arm_sweep[j]
+    t = turn.sine * shape.arm_prebend[j] - turn.cosine * shape.arm_sweep[j]
     return Lever(at.nx, at.nr, x * at.nr - r * at.nx, t * at.nx, t * at.nr, x, r)
 
 
+@inlined_kernel
+def _value_on_axis(plane, at):
+    return plane.one + plane.r * at.r
+
+
+@inlined_kernel
+def _value_at_station(plane, at):
+    return plane.one + plane.x * at.x + plane.r * at.r + plane.t * at.t
+
+
+@inlined_kernel
+def _along_shaft(along, out, at):
+    return along
+
+
+@inlined_kernel
+def _along_normal(along, out, at):
+    return at.nx * along + at.nr * out
+
+
+@inlined_kernel
+def _add_to_straight(load, found, j, turn, shape):
+    length, first = found.length, found.first_moment
+    fn, ft = found.normal, found.tangential
+    return BladeLoad(
+        load.fx + length * fn, 0.0, load.ft + length * ft, load.mx + first * ft, 0.0, load.mt - first * fn
+    )
+
+
+@inlined_kernel
+def _add_to_curved(load, found, j, turn, shape):
+    lever = lever_of(j, turn, shape)
+    fn, ft, moment = found.length * found.normal, found.length * found.tangential, found.length * found.moment
+    return BladeLoad(
+        load.fx + fn * lever.nx,
+        load.fr + fn * lever.nr,
+        load.ft + ft,
+        load.mx + lever.r * ft - lever.t_nr * fn - moment * lever.nr,
+        load.mr + lever.t_nx * fn - lever.x * ft + moment * lever.nx,
+        load.mt + lever.turn * fn,
+    )
+
+
+# (j, turn, radius, shape) -> place of station j: OnAxis or Station
+station_at = chosen_by_class(
+    "shape", {type(None): _station_on_axis, BladeShape: curved_station}, inlined=True
+)
+# (plane, at) -> value of a Plane at the place of a station
+value_at = chosen_by_class("at", {OnAxis: _value_on_axis, Station: _value_at_station}, inlined=True)
+# (along, out, at) -> part normal to the blade axis of a vector with these components along x and r
+normal_part = chosen_by_class("at", {OnAxis: _along_shaft, Station: _along_normal}, inlined=True)
+# (load, found, j, turn, shape) -> BladeLoad with the StationLoad of station j added
+add_station = chosen_by_class(
+    "shape", {type(None): _add_to_straight, BladeShape: _add_to_curved}, inlined=True
+)
+
+
+# ------------------------------------------------------------------------------------ whole blades
+
+
 @kernel
-def blade_wind(ey, ez, rotor_speed, pose, hub):
-    """BladeWind of the blade in the direction (0, ey, ez); pose and hub in rotor axes."""
-    return BladeWind(
+def blade_motion(psi, rotor_speed, pose, hub):
+    """Return the BladeMotion of the blade at azimuth psi (rad); pose and hub in rotor axes."""
+    ey, ez = -sin(psi), cos(psi)
+    return BladeMotion(
         ey,
         ez,
         pose.r12 * ey + pose.r13 * ez,
@@ -149,34 +260,9 @@ def blade_wind(ey, ez, rotor_speed, pose, hub):
     )
 
 
-@inlined_kernel
-def station_inflow(u, v, w, at, pose, blade):
-    """(v_normal, v_tangential) m/s of a station in the wind (u, v, w), inertial components."""
-    wind_x = pose.r11 * u + pose.r21 * v + pose.r31 * w
-    wind_r = blade.rx * u + blade.ry * v + blade.rz * w
-    wind_t = blade.tx * u + blade.ty * v + blade.tz * w
-    own_x = blade.vx + blade.wr * at.t - blade.wt * at.r
-    own_r = blade.vr + blade.wt * at.x - blade.wx * at.t
-    own_t = blade.vt + blade.wx * at.r - blade.wr * at.x
-    return at.nx * (wind_x - own_x) + at.nr * (wind_r - own_r), own_t - wind_t
-
-
-@inlined_kernel
-def with_station(load, fn, ft, moment, lever):
-    """The BladeLoad with that of a station: forces normal to the axis and along t, pitching moment."""
-    return BladeLoad(
-        load.fx + fn * lever.nx,
-        load.fr + fn * lever.nr,
-        load.ft + ft,
-        load.mx + lever.r * ft - lever.t_nr * fn - moment * lever.nr,
-        load.mr + lever.t_nx * fn - lever.x * ft + moment * lever.nx,
-        load.mt + lever.turn * fn,
-    )
-
-
 @kernel
 def with_blade(total, load, blade):
-    """The Wrench about the rotor centre, in rotor axes, with the BladeLoad of a blade."""
+    """Add the BladeLoad of a blade to a Wrench about the rotor centre in rotor axes."""
     return Wrench(
         total.fx + load.fx,
         total.fy + load.fr * blade.ey - load.ft * blade.ez,
@@ -188,7 +274,7 @@ def with_blade(total, load, blade):
 
 
 def _ends(values, distance, low, high):
-    """values (n,) at the stations, with those at the hub and the tip on the lines through the last two."""
+    """Return values (n,) at the stations with those at hub and tip, on the lines through the last two."""
     first = values[0] + (low - distance[0]) * (values[1] - values[0]) / (distance[1] - distance[0])
     last = values[-1] + (high - distance[-1]) * (values[-1] - values[-2]) / (distance[-1] - distance[-2])
     return np.concatenate(([first], values, [last]))
@@ -202,7 +288,7 @@ class BladeLine(NamedTuple):
 
 
 def blade_line(blade, hub_radius, tip_radius):
-    """BladeLine of a descriptions.turbine.Blade."""
+    """Return the BladeLine of a descriptions.turbine.Blade."""
     distance = np.asarray(blade.radius, dtype=float)
     offsets = [
         np.zeros_like(distance) if values is None else np.asarray(values, dtype=float)
@@ -216,13 +302,13 @@ def blade_line(blade, hub_radius, tip_radius):
 
 
 def is_curved(turbine):
-    """Whether blades leave the plane through their pitch axes' foot points, or bend."""
+    """Return whether blades leave the plane through their pitch axes' foot points, or bend."""
     offsets = (turbine.blade.prebend, turbine.blade.sweep)
     return turbine.rotor.cone != 0.0 or any(v is not None and np.any(np.asarray(v) != 0.0) for v in offsets)
 
 
 def line_integrals(line, weights):
-    """((m,), (m, 3)): integral and first moments along a BladeLine of line loads (m, n + 2) at its points."""
+    """Return ((m,), (m, 3)): integral and first moments along a BladeLine of line loads (m, n + 2)."""
     steps = np.diff(line.length)[:, None]
     low, high = weights[:, :-1], weights[:, 1:]
     force = 0.5 * (low + high) @ steps[:, 0]
@@ -232,7 +318,7 @@ def line_integrals(line, weights):
 
 
 def build_blade_shape(turbine, line, chosen, arm, moment):
-    """BladeShape of the stations chosen of a BladeLine; arm (n, 3) and moment: see BladeShape."""
+    """Return the BladeShape of chosen stations of a BladeLine; arm (n, 3) and moment: see BladeShape."""
     inner = line.points[1:-1]
     slope = np.gradient(inner[:, 0], inner[:, 2], edge_order=2 if len(inner) > 2 else 1)
     place = inner[chosen]

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.caches import Cache
-from fowt_env.plant.aero.bem_rotor import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, RotorLoad, hub_flow
 from fowt_env.plant.aero.blade_elements import (
     blade_section,
     element_of,
@@ -26,8 +25,18 @@ from fowt_env.plant.aero.blade_elements import (
     pitching_moment,
     smoothstep,
 )
-from fowt_env.plant.aero.blade_shape import effective_pitch, lever_of, station_at
-from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.aero.blade_shape import (
+    BladeShape,
+    Lever,
+    Station,
+    curved_station,
+    effective_pitch,
+    lever_of,
+    turn_of,
+)
+from fowt_env.plant.aero.blade_sweep import FAST_ROTOR, NO_ROTOR_LOAD, SLOW_ROTOR, hub_flow, rotor_axes_load
+from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
 
@@ -55,7 +64,7 @@ class Coefficients(NamedTuple):
     """Loads over the air density and powers of the tip radius R and s = sqrt(V^2 + (speed R)^2).
 
     With n, t the normal and tangential line load, subscripts their derivatives with the inflow, B blades
-    and all lengths over R: integrals of ...
+    and all lengths over R: integrals of ... Terms of leaning blades: see _fill.
     """
 
     thrust: float  # B n, on s^2 R^2
@@ -80,9 +89,6 @@ class Coefficients(NamedTuple):
     force_bend_cross: float  # B/4 r^2 t_nt
 
 
-N_COEFFICIENTS = len(Coefficients._fields)
-
-
 class Leaning(NamedTuple):
     """What cone and prebend add: cross wind along the blades, forces along their radius, moments about it.
 
@@ -104,9 +110,6 @@ class Leaning(NamedTuple):
     torque_both: float  # B/2 (nr nx r Q_nn - nx t Q_nt), on R^3
 
 
-N_LEANING = len(Leaning._fields)
-
-
 class TableAxis(NamedTuple):
     """Points of one variable, and a table that finds the interval a value lies in."""
 
@@ -116,16 +119,27 @@ class TableAxis(NamedTuple):
 
 
 class CoefficientTable(NamedTuple):
-    """Coefficients over inflow angle (n,) and blade pitch (m,), rad."""
+    """Coefficients of the rotor over inflow angle (n,) and blade pitch (m,), rad."""
 
     theta: TableAxis
     blade_pitch: TableAxis
-    load: np.ndarray  # (n, m, N_COEFFICIENTS) in the order of Coefficients
-    lean: object  # (n, m, N_LEANING) in the order of Leaning; None: straight blades in the rotor plane
+    load: np.ndarray  # (n, m, len(Coefficients._fields)) in their order
+    lean: object  # (n, m, len(Leaning._fields)); None: straight blades in the rotor plane
     tip_radius: float
     overhang: float  # in rotor axes, as the hub height (tilt.py)
     hub_height: float
     density: float  # of the air, kg/m3
+
+
+class TableCell(NamedTuple):
+    """Cell of a CoefficientTable and the weights of its corners."""
+
+    i: int  # of the inflow angle
+    k: int  # of the blade pitch
+    w00: float
+    w01: float
+    w10: float
+    w11: float
 
 
 class DiskInflow(NamedTuple):
@@ -148,7 +162,7 @@ class DiskInflow(NamedTuple):
 
 
 def _axis(steps, end):
-    """TableAxis from the list of (start, step), with the last point at end (deg); rad."""
+    """Return the TableAxis from the list of (start, step), with the last point at end (deg); rad."""
     edges = [start for start, _ in steps] + [end]
     parts = [
         np.linspace(low, high, max(1, round((high - low) / step)), endpoint=False)
@@ -161,75 +175,13 @@ def _axis(steps, end):
     return TableAxis(point, cell.astype(np.int64), float(scale))
 
 
-@entry
-def _fill(theta, blade_pitch, load, rotor):
-    """Put the coefficients of the blade element momentum solution into load; rotor in air of density 1.
-
-    The load of a station is the square of its inflow times a function p of its direction, so that three
-    directions give the first and second derivatives.
-    """
-    radius_of_tip = rotor.tip_radius
-    for i in range(theta.shape[0]):
-        wind, tip_speed = cos(theta[i]), sin(theta[i])
-        induction = smoothstep(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
-        for k in range(blade_pitch.shape[0]):
-            c = load[i, k]
-            for j in range(rotor.radius.shape[0]):
-                r = rotor.radius[j] / radius_of_tip
-                v_tangential = tip_speed * r
-                square = wind * wind + v_tangential * v_tangential
-                size, angle = sqrt(square), atan2(v_tangential, wind)
-                here = blade_section(wind, v_tangential, blade_pitch[k], j, induction, rotor)
-                n, t = here.fn, here.ft
-                less = blade_section(
-                    size * cos(angle - TURN), size * sin(angle - TURN), blade_pitch[k], j, induction, rotor
-                )
-                more = blade_section(
-                    size * cos(angle + TURN), size * sin(angle + TURN), blade_pitch[k], j, induction, rotor
-                )
-                n1, t1 = 0.5 * (more.fn - less.fn) / TURN, 0.5 * (more.ft - less.ft) / TURN
-                n2 = (more.fn - 2.0 * n + less.fn) / (TURN * TURN)
-                t2 = (more.ft - 2.0 * t + less.ft) / (TURN * TURN)
-                co, si = wind / size, v_tangential / size
-                n_n, t_n = (2.0 * co * n - si * n1) / size, (2.0 * co * t - si * t1) / size
-                n_t, t_t = (2.0 * si * n + co * n1) / size, (2.0 * si * t + co * t1) / size
-                weight = rotor.blades * rotor.weight[j] / radius_of_tip
-                arm = rotor.blades * rotor.moment_weight[j] / radius_of_tip**2
-                bend = r * r - MEAN_SQUARE
-                c[0] += weight * n / radius_of_tip
-                c[1] += arm * t / radius_of_tip
-                c[2] += weight * bend * n_n / radius_of_tip
-                c[3] += arm * bend * t_n / radius_of_tip
-                c[4] += 0.5 * arm * r * n_n / radius_of_tip
-                c[5] += 0.5 * arm * n_t / radius_of_tip
-                c[6] += 0.5 * weight * r * t_n / radius_of_tip
-                c[7] += 0.5 * weight * t_t / radius_of_tip
-                c[14] += 0.5 * arm * r**3 * n_n / radius_of_tip
-                c[15] += 0.5 * weight * r**3 * t_n / radius_of_tip
-                weight, arm = weight / (square * radius_of_tip), arm / (square * radius_of_tip)
-                n_nn, t_nn = 2.0 * (n - co * si * n1) + si * si * n2, 2.0 * (t - co * si * t1) + si * si * t2
-                n_tt, t_tt = 2.0 * (n + co * si * n1) + co * co * n2, 2.0 * (t + co * si * t1) + co * co * t2
-                cosine, half_sine = co * co - si * si, co * si
-                n_nt, t_nt = cosine * n1 - half_sine * n2, cosine * t1 - half_sine * t2
-                c[8] += 0.25 * weight * r * r * n_nn
-                c[9] += 0.5 * weight * r * n_nt
-                c[10] += 0.25 * weight * n_tt
-                c[11] += 0.25 * arm * r * r * t_nn
-                c[12] += 0.5 * arm * r * t_nt
-                c[13] += 0.25 * arm * t_tt
-                c[16] += 0.25 * arm * r**3 * n_nn
-                c[17] += 0.25 * arm * r * r * n_nt
-                c[18] += 0.25 * weight * r**3 * t_nn
-                c[19] += 0.25 * weight * r * r * t_nt
-
-
 @kernel
-def _loads_at(v_normal, v_tangential, j, blade_pitch, induction, rotor, shape):
-    """(fn, ft, pitching moment) of station j per length."""
+def _loads_at(v_normal, v_tangential, j, blade_pitch, induction, rotor):
+    """Return (fn, ft, pitching moment) of station j per length."""
     section = blade_section(v_normal, v_tangential, blade_pitch, j, induction, rotor)
     element = element_of(j, blade_pitch, rotor)
     moment = pitching_moment(
-        v_normal + section.induced_normal, v_tangential + section.induced_tangential, j, element, shape,
+        v_normal + section.induced_normal, v_tangential + section.induced_tangential, j, element, rotor.shape,
         rotor.polars,
     )  # fmt: skip
     return section.fn, section.ft, moment
@@ -237,7 +189,7 @@ def _loads_at(v_normal, v_tangential, j, blade_pitch, induction, rotor, shape):
 
 @kernel
 def _slopes(less, middle, more, co, si, size):
-    """Derivatives with v_normal and v_tangential, and the three second ones times the square of the speed."""
+    """Return the derivatives with v_normal and v_tangential, and the second ones times the squared speed."""
     first = 0.5 * (more - less) / TURN
     second = (more - 2.0 * middle + less) / (TURN * TURN)
     normal, tangential = (2.0 * co * middle - si * first) / size, (2.0 * si * middle + co * first) / size
@@ -247,98 +199,143 @@ def _slopes(less, middle, more, co, si, size):
     return normal, tangential, nn, nt, tt
 
 
+@kernel
+def _straight_place(j, turn, rotor, shape):
+    arm = rotor.moment_weight[j] / rotor.weight[j]
+    return Station(0.0, rotor.radius[j], 0.0, 1.0, 0.0), Lever(1.0, 0.0, -arm, 0.0, 0.0, 0.0, arm)
+
+
+@kernel
+def _curved_place(j, turn, rotor, shape):
+    return curved_station(j, turn, rotor.radius, shape), lever_of(j, turn, shape)
+
+
+# (j, turn, rotor, shape) -> (Station, Lever) of station j
+_place = chosen_by_class("shape", {type(None): _straight_place, BladeShape: _curved_place})
+
+
 @entry
-def _fill_curved(theta, blade_pitch, load, lean, rotor, shape):
-    """As _fill for curved blades; lean: see Leaning."""
+def _fill(theta, blade_pitch, load, lean, rotor, shape):
+    """Add the coefficients of a rotor in air of density 1 to load and lean, by blade element momentum.
+
+    The load of a station is the square of its inflow times a function of its direction, so that three
+    directions give the first and second derivatives.
+    """
     big = rotor.tip_radius
     for i in range(theta.shape[0]):
         wind, tip_speed = cos(theta[i]), sin(theta[i])
         induction = smoothstep(tip_speed, SLOW_ROTOR * abs(wind), FAST_ROTOR * abs(wind))
         for k in range(blade_pitch.shape[0]):
-            c, d = load[i, k], lean[i, k]
-            cosine, sine = cos(blade_pitch[k]), sin(blade_pitch[k])
+            turned = turn_of(blade_pitch[k])
             for j in range(rotor.radius.shape[0]):
-                at, lever = station_at(j, cosine, sine, shape), lever_of(j, cosine, sine, shape)
-                turned = effective_pitch(j, blade_pitch[k], shape)
+                at, lever = _place(j, turned, rotor, shape)
+                pitch = effective_pitch(j, blade_pitch[k], shape)
                 r, nx, nr = at.r / big, at.nx, at.nr
-                arm, turn, x = lever.r / big, -lever.turn / big, lever.x / big
-                t_nx, t_nr = lever.t_nx / big, lever.t_nr / big
+                arm, turn, t_nr = lever.r / big, -lever.turn / big, lever.t_nr / big
                 v_normal, v_tangential = nx * wind + nr * tip_speed * at.t / big, tip_speed * r
                 square = v_normal * v_normal + v_tangential * v_tangential
                 size, angle = sqrt(square), atan2(v_tangential, v_normal)
-                n, t, m = _loads_at(v_normal, v_tangential, j, turned, induction, rotor, shape)
+                n, t, m = _loads_at(v_normal, v_tangential, j, pitch, induction, rotor)
                 low_n, low_t, low_m = _loads_at(
-                    size * cos(angle - TURN), size * sin(angle - TURN), j, turned, induction, rotor, shape
+                    size * cos(angle - TURN), size * sin(angle - TURN), j, pitch, induction, rotor
                 )
                 top_n, top_t, top_m = _loads_at(
-                    size * cos(angle + TURN), size * sin(angle + TURN), j, turned, induction, rotor, shape
+                    size * cos(angle + TURN), size * sin(angle + TURN), j, pitch, induction, rotor
                 )
                 co, si = v_normal / size, v_tangential / size
-                n_n, n_t, n_nn, n_nt, n_tt = _slopes(low_n, n, top_n, co, si, size)
-                t_n, t_t, t_nn, t_nt, t_tt = _slopes(low_t, t, top_t, co, si, size)
-                m_n, m_t, _, _, _ = _slopes(low_m / big, m / big, top_m / big, co, si, size)
+                of_n = _slopes(low_n, n, top_n, co, si, size)
+                of_t = _slopes(low_t, t, top_t, co, si, size)
+                of_m = _slopes(low_m / big, m / big, top_m / big, co, si, size)
+                n_n, n_t, n_nn, n_nt, n_tt = of_n
+                t_n, t_t, t_nn, t_nt, t_tt = of_t
                 weight = rotor.blades * rotor.weight[j] / (big * big)
                 half, quarter = 0.5 * weight, 0.25 * weight / square
-                # of a gradient, in v_normal: along the radius, and across it
-                q, aside = nx * r, nx * at.t / big
+                q = nx * r  # of a gradient in v_normal, along the radius
                 bend = nx * (r * r - MEAN_SQUARE)
-                c[0] += weight * nx * n
-                c[1] += weight * (arm * t - t_nr * n - nr * m / big)
-                c[2] += weight * bend * nx * n_n
-                c[3] += weight * bend * (arm * t_n - t_nr * n_n - nr * m_n)
-                c[4] += half * turn * q * n_n
-                c[5] += half * turn * n_t
-                c[6] += half * q * t_n
-                c[7] += half * t_t
-                c[8] += quarter * nx * q * q * n_nn
-                c[9] += 2.0 * quarter * nx * q * n_nt
-                c[10] += quarter * nx * (n_tt + nr * nr * n_nn)
-                c[11] += quarter * arm * q * q * t_nn
-                c[12] += 2.0 * quarter * arm * q * t_nt
-                c[13] += quarter * arm * (t_tt + nr * nr * t_nn)
-                c[14] += half * turn * q * r * r * n_n
-                c[15] += half * q * r * r * t_n
-                c[16] += quarter * turn * nx * q * r * r * n_nn
-                c[17] += quarter * turn * nx * r * r * n_nt
-                c[18] += quarter * nx * q * r * r * t_nn
-                c[19] += quarter * nx * r * r * t_nt
-                d[0] += half * turn * nr * n_n
-                d[1] += half * nr * t_n
-                d[2] += half * (nr * q * n_n + aside * t_n)
-                d[3] += half * nr * n_t
-                d[4] += half * nr * nr * n_n
-                about_n, about_t = t_nx * n_n - x * t_n + nx * m_n, t_nx * n_t - x * t_t + nx * m_t
-                d[5] += half * (q * about_n - aside * turn * n_n)
-                d[6] += half * about_t
-                d[7] += half * nr * about_n
-                d[8] += weight * nr * r * nx * n_n
-                d[9] += weight * nr * r * (arm * t_n - t_nr * n_n - nr * m_n)
-                d[10] += 2.0 * quarter * nx * (nr * q * n_nn - aside * n_nt)
-                d[11] += 2.0 * quarter * arm * (nr * q * t_nn - aside * t_nt)
+                add_row(
+                    load[i, k],
+                    Coefficients(
+                        thrust=weight * nx * n,
+                        torque=weight * (arm * t - t_nr * n - nr * m / big),
+                        thrust_bend=weight * bend * nx * n_n,
+                        torque_bend=weight * bend * (arm * t_n - t_nr * n_n - nr * of_m[0]),
+                        moment_gradient=half * turn * q * n_n,
+                        moment_cross=half * turn * n_t,
+                        force_gradient=half * q * t_n,
+                        force_cross=half * t_t,
+                        thrust_nn=quarter * nx * q * q * n_nn,
+                        thrust_nt=2.0 * quarter * nx * q * n_nt,
+                        thrust_tt=quarter * nx * (n_tt + nr * nr * n_nn),
+                        torque_nn=quarter * arm * q * q * t_nn,
+                        torque_nt=2.0 * quarter * arm * q * t_nt,
+                        torque_tt=quarter * arm * (t_tt + nr * nr * t_nn),
+                        moment_cubic=half * turn * q * r * r * n_n,
+                        force_cubic=half * q * r * r * t_n,
+                        moment_bend_gradient=quarter * turn * nx * q * r * r * n_nn,
+                        moment_bend_cross=quarter * turn * nx * r * r * n_nt,
+                        force_bend_gradient=quarter * nx * q * r * r * t_nn,
+                        force_bend_cross=quarter * nx * r * r * t_nt,
+                    ),
+                )
+                _fill_lean(at, lever, of_n, of_t, of_m, half, quarter, big, lean[i, k], shape)
+
+
+@kernel
+def add_row(row, values):
+    """Add the values of a tuple of numbers to a row."""
+    for i in range(len(values)):
+        row[i] += values[i]
+
+
+@kernel
+def _fill_lean(at, lever, of_n, of_t, of_m, half, quarter, big, d, shape):
+    """Add to d what a station of a curved blade adds to Leaning; of_n, of_t, of_m: _slopes of its loads."""
+    if shape is None:
+        return
+    n_n, n_t, n_nn, n_nt, _ = of_n
+    t_n, t_t, t_nn, t_nt, _ = of_t
+    r, nx, nr = at.r / big, at.nx, at.nr
+    arm, turn, x = lever.r / big, -lever.turn / big, lever.x / big
+    t_nx, t_nr = lever.t_nx / big, lever.t_nr / big
+    q, aside = nx * r, nx * at.t / big  # of a gradient in v_normal: along the radius, and across it
+    about_n, about_t = t_nx * n_n - x * t_n + nx * of_m[0], t_nx * n_t - x * t_t + nx * of_m[1]
+    add_row(
+        d,
+        Leaning(
+            moment_lean=half * turn * nr * n_n,
+            force_lean=half * nr * t_n,
+            out_gradient=half * (nr * q * n_n + aside * t_n),
+            out_cross=half * nr * n_t,
+            out_lean=half * nr * nr * n_n,
+            roll_gradient=half * (q * about_n - aside * turn * n_n),
+            roll_cross=half * about_t,
+            roll_lean=half * nr * about_n,
+            thrust_spread=2.0 * half * nr * r * nx * n_n,
+            torque_spread=2.0 * half * nr * r * (arm * t_n - t_nr * n_n - nr * of_m[0]),
+            thrust_both=2.0 * quarter * nx * (nr * q * n_nn - aside * n_nt),
+            torque_both=2.0 * quarter * arm * (nr * q * t_nn - aside * t_nt),
+        ),
+    )
 
 
 _tables = Cache(8)  # one per set of blade elements: building takes about two seconds
 
 
 def build_coefficient_table(rotor):
-    """CoefficientTable of a BladeElements; the same elements give the table built before."""
+    """Return the CoefficientTable of a BladeElements; equal elements share their table."""
     return _tables.get(elements_key(rotor), lambda: _filled_table(rotor))
 
 
 def _filled_loads(theta, blade_pitch, rotor):
-    """(load, lean) of a CoefficientTable at these points."""
-    load = np.zeros((len(theta), len(blade_pitch), N_COEFFICIENTS))
-    unit = rotor._replace(air_density=1.0)
-    if rotor.shape is None:
-        _fill(theta, blade_pitch, load, unit)
-        return load, None
-    lean = np.zeros((len(theta), len(blade_pitch), N_LEANING))
-    _fill_curved(theta, blade_pitch, load, lean, unit, rotor.shape)
-    return load, lean
+    """Return (load, lean) of a CoefficientTable at these points."""
+    load = np.zeros((len(theta), len(blade_pitch), len(Coefficients._fields)))
+    lean = np.zeros((*load.shape[:2], 0 if rotor.shape is None else len(Leaning._fields)))
+    _fill(theta, blade_pitch, load, lean, rotor._replace(air_density=1.0), rotor.shape)
+    return load, None if rotor.shape is None else lean
 
 
 def _filled_table(rotor):
-    """CoefficientTable of BladeElements, computed."""
+    """Return the computed CoefficientTable of BladeElements."""
     theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
     load, lean = _filled_loads(theta.point, blade_pitch.point, rotor)
     return CoefficientTable(
@@ -355,7 +352,7 @@ def _filled_table(rotor):
 
 @kernel
 def _interval(x, axis):
-    """(i, weight): x lies between points i and i + 1; outside, the ends are held."""
+    """Return (i, weight): x lies between points i and i + 1; outside, the values of the ends apply."""
     point = axis.point
     last = point.shape[0] - 1
     if not x > point[0]:
@@ -368,41 +365,53 @@ def _interval(x, axis):
     return i, (x - point[i]) / (point[i + 1] - point[i])
 
 
-@kernel
-def table_coefficients(wind, tip_speed, blade_pitch, table):
-    """Coefficients, bilinear in the table."""
+@inlined_kernel
+def _cell(wind, tip_speed, blade_pitch, table):
+    """Return the TableCell of an axial wind and a tip speed (m/s) at a blade pitch (rad)."""
     i, p = _interval(atan2(tip_speed, wind), table.theta)
     k, b = _interval(blade_pitch, table.blade_pitch)
-    w00, w01, w10, w11 = (1.0 - p) * (1.0 - b), (1.0 - p) * b, p * (1.0 - b), p * b
-    c00, c01 = table.load[i, k], table.load[i, k + 1]
-    c10, c11 = table.load[i + 1, k], table.load[i + 1, k + 1]
-    return Coefficients(
-        w00 * c00[0] + w01 * c01[0] + w10 * c10[0] + w11 * c11[0],
-        w00 * c00[1] + w01 * c01[1] + w10 * c10[1] + w11 * c11[1],
-        w00 * c00[2] + w01 * c01[2] + w10 * c10[2] + w11 * c11[2],
-        w00 * c00[3] + w01 * c01[3] + w10 * c10[3] + w11 * c11[3],
-        w00 * c00[4] + w01 * c01[4] + w10 * c10[4] + w11 * c11[4],
-        w00 * c00[5] + w01 * c01[5] + w10 * c10[5] + w11 * c11[5],
-        w00 * c00[6] + w01 * c01[6] + w10 * c10[6] + w11 * c11[6],
-        w00 * c00[7] + w01 * c01[7] + w10 * c10[7] + w11 * c11[7],
-        w00 * c00[8] + w01 * c01[8] + w10 * c10[8] + w11 * c11[8],
-        w00 * c00[9] + w01 * c01[9] + w10 * c10[9] + w11 * c11[9],
-        w00 * c00[10] + w01 * c01[10] + w10 * c10[10] + w11 * c11[10],
-        w00 * c00[11] + w01 * c01[11] + w10 * c10[11] + w11 * c11[11],
-        w00 * c00[12] + w01 * c01[12] + w10 * c10[12] + w11 * c11[12],
-        w00 * c00[13] + w01 * c01[13] + w10 * c10[13] + w11 * c11[13],
-        w00 * c00[14] + w01 * c01[14] + w10 * c10[14] + w11 * c11[14],
-        w00 * c00[15] + w01 * c01[15] + w10 * c10[15] + w11 * c11[15],
-        w00 * c00[16] + w01 * c01[16] + w10 * c10[16] + w11 * c11[16],
-        w00 * c00[17] + w01 * c01[17] + w10 * c10[17] + w11 * c11[17],
-        w00 * c00[18] + w01 * c01[18] + w10 * c10[18] + w11 * c11[18],
-        w00 * c00[19] + w01 * c01[19] + w10 * c10[19] + w11 * c11[19],
+    # indices without sign are not tested for counting from the end
+    return TableCell(np.uintp(i), np.uintp(k), (1.0 - p) * (1.0 - b), (1.0 - p) * b, p * (1.0 - b), p * b)
+
+
+@inlined_kernel
+def _value(column, cell, values):
+    """Return a column of values (n, m, columns), bilinear in a TableCell."""
+    i, k = cell.i, cell.k
+    after, above = i + np.uintp(1), k + np.uintp(1)
+    return (
+        cell.w00 * values[i, k, column]
+        + cell.w01 * values[i, above, column]
+        + cell.w10 * values[after, k, column]
+        + cell.w11 * values[after, above, column]
     )
 
 
 @kernel
+def _coefficients(cell, c):
+    """Return the Coefficients in a TableCell of CoefficientTable.load."""
+    return Coefficients(
+        _value(0, cell, c), _value(1, cell, c), _value(2, cell, c), _value(3, cell, c),
+        _value(4, cell, c), _value(5, cell, c), _value(6, cell, c), _value(7, cell, c),
+        _value(8, cell, c), _value(9, cell, c), _value(10, cell, c), _value(11, cell, c),
+        _value(12, cell, c), _value(13, cell, c), _value(14, cell, c), _value(15, cell, c),
+        _value(16, cell, c), _value(17, cell, c), _value(18, cell, c), _value(19, cell, c),
+    )  # fmt: skip
+
+
+@kernel
+def _leaning(cell, c):
+    """Return the Leaning in a TableCell of CoefficientTable.lean."""
+    return Leaning(
+        _value(0, cell, c), _value(1, cell, c), _value(2, cell, c), _value(3, cell, c),
+        _value(4, cell, c), _value(5, cell, c), _value(6, cell, c), _value(7, cell, c),
+        _value(8, cell, c), _value(9, cell, c), _value(10, cell, c), _value(11, cell, c),
+    )  # fmt: skip
+
+
+@kernel
 def _inflow(pose, now, series, table):
-    """DiskInflow of the rotor in a wind series.
+    """Return the DiskInflow of the rotor in a wind series.
 
     A power law (1 + z)^a = 1 + a z + a (a - 1)/2 z^2 + ... has, on a ring of z = r cos(psi), even powers that
     give a mean and a second harmonic, and odd ones that give a first harmonic.
@@ -441,28 +450,11 @@ def _inflow(pose, now, series, table):
 
 
 @kernel
-def _with_lean(plain, flow, tip_speed, blade_pitch, s, gy, gz, table, lean):
-    """The Wrench about the rotor centre with what cone and prebend add."""
+def _add_lean(plain, flow, cell, s, gy, gz, table, lean):
+    """Add to a Wrench about the rotor centre the loads by cone and prebend."""
     if lean is None:
         return plain
-    i, p = _interval(atan2(tip_speed, flow.axial), table.theta)
-    k, b = _interval(blade_pitch, table.blade_pitch)
-    w00, w01, w10, w11 = (1.0 - p) * (1.0 - b), (1.0 - p) * b, p * (1.0 - b), p * b
-    c00, c01, c10, c11 = lean[i, k], lean[i, k + 1], lean[i + 1, k], lean[i + 1, k + 1]
-    at = Leaning(
-        w00 * c00[0] + w01 * c01[0] + w10 * c10[0] + w11 * c11[0],
-        w00 * c00[1] + w01 * c01[1] + w10 * c10[1] + w11 * c11[1],
-        w00 * c00[2] + w01 * c01[2] + w10 * c10[2] + w11 * c11[2],
-        w00 * c00[3] + w01 * c01[3] + w10 * c10[3] + w11 * c11[3],
-        w00 * c00[4] + w01 * c01[4] + w10 * c10[4] + w11 * c11[4],
-        w00 * c00[5] + w01 * c01[5] + w10 * c10[5] + w11 * c11[5],
-        w00 * c00[6] + w01 * c01[6] + w10 * c10[6] + w11 * c11[6],
-        w00 * c00[7] + w01 * c01[7] + w10 * c10[7] + w11 * c11[7],
-        w00 * c00[8] + w01 * c01[8] + w10 * c10[8] + w11 * c11[8],
-        w00 * c00[9] + w01 * c01[9] + w10 * c10[9] + w11 * c11[9],
-        w00 * c00[10] + w01 * c01[10] + w10 * c10[10] + w11 * c11[10],
-        w00 * c00[11] + w01 * c01[11] + w10 * c10[11] + w11 * c11[11],
-    )
+    at = _leaning(cell, lean)
     cy, cz = flow.cross_y, flow.cross_z
     area = table.density * table.tip_radius * table.tip_radius
     volume, along = area * table.tip_radius, gy * cy + gz * cz
@@ -481,8 +473,9 @@ def _with_lean(plain, flow, tip_speed, blade_pitch, s, gy, gz, table, lean):
 
 @kernel
 def coefficient_table_load(pose, x, now, series, table, counters):
-    """RotorLoad of the state x, averaged over a turn of the rotor. No table or no wind series: zero.
+    """Return the RotorLoad of the state x, averaged over a turn of the rotor.
 
+    No table or no wind series: zero.
     now, series  wind (weather/wind.py), taken where the moving rotor is
     counters     counters[Counter.ROTOR_TABLE_CLAMPED] grows by one where the wind is steeper than STEEPEST
     """
@@ -492,7 +485,8 @@ def coefficient_table_load(pose, x, now, series, table, counters):
         return NO_ROTOR_LOAD
     flow = _inflow(pose, now, series, table)
     tip_speed = (x[State.ROTOR_SPEED] + pose.wx) * table.tip_radius + flow.turning
-    at = table_coefficients(flow.axial, tip_speed, x[State.BLADE_PITCH], table)
+    cell = _cell(flow.axial, tip_speed, x[State.BLADE_PITCH], table)
+    at = _coefficients(cell, table.load)
     s = sqrt(flow.axial * flow.axial + tip_speed * tip_speed)
     gy, gz, qy, qz, bend = flow.gradient_y, flow.gradient_z, flow.cubic_y, flow.cubic_z, flow.bend
     cy, cz = flow.cross_y, flow.cross_z
@@ -522,27 +516,14 @@ def coefficient_table_load(pose, x, now, series, table, counters):
     z = s * (gz * at.force_gradient + qz * at.force_cubic + cy * at.force_cross)
     z += bend * (mz * at.force_bend_gradient + cy * at.force_bend_cross)
     plain = Wrench(thrust, -force * z, force * y, torque, tilt_y, tilt_z)
-    load = _with_lean(plain, flow, tip_speed, x[State.BLADE_PITCH], s, my, mz, table, table.lean)
-    fy, fz = load.fy, load.fz
-    height, overhang = table.hub_height, table.overhang
-    return RotorLoad(
-        Wrench(
-            load.fx,
-            fy,
-            fz,
-            load.mx - height * fy,
-            load.my + height * load.fx + overhang * fz,
-            load.mz - overhang * fy,
-        ),
-        load.fx,
-        load.mx,
-    )
+    return rotor_axes_load(_add_lean(plain, flow, cell, s, my, mz, table, table.lean), 1.0, table)
 
 
 def performance(rotor, tip_speed_ratio, blade_pitch):
-    """(cp, ct, cq), each (n, m): power, thrust and torque coefficients of a BladeElements in axial wind.
+    """Return (cp, ct, cq), each (n, m): coefficients of power, thrust and torque in axial wind.
 
-    tip_speed_ratio (n,); blade_pitch (m,) rad. The usual ones: on rho V^2/2 times the area (and the radius).
+    rotor: BladeElements; tip_speed_ratio (n,); blade_pitch (m,) rad. The usual ones: on rho V^2/2 times the
+    area (and the radius).
     """
     ratio = np.ascontiguousarray(tip_speed_ratio, dtype=np.float64)
     blade_pitch = np.ascontiguousarray(blade_pitch, dtype=np.float64)

@@ -2,22 +2,20 @@
 
 from typing import NamedTuple
 
-from fowt_env.plant.aero.bem_rotor import RotorLoad, rotor_load, wake_equilibrium
+from fowt_env.plant.aero.bem_rotor import rotor_load
+from fowt_env.plant.aero.blade_sweep import RotorLoad
 from fowt_env.plant.aero.coefficient_table import CoefficientTable, coefficient_table_load
-from fowt_env.plant.aero.section_inflow import (
-    DynamicSections,
-    dynamic_sections_equilibrium,
-    dynamic_sections_load,
-)
+from fowt_env.plant.aero.section_inflow import DynamicSections, dynamic_sections_load
 from fowt_env.plant.aero.section_table import SectionTable, section_table_load
 from fowt_env.plant.aero.tower_drag import bent_tower_load, tower_load
+from fowt_env.plant.aero.wake import PER_ELEMENT
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import NO_LOAD, Wrench
+from fowt_env.plant.state import NO_LOAD, State, Wrench
 from fowt_env.plant.tilt import rotor_pose, to_body_axes
-from fowt_env.plant.tower_modes import TowerModes
+from fowt_env.plant.tower.modes import TowerModes
 
 
 class BemRotor(NamedTuple):
@@ -85,27 +83,31 @@ _rotor_model = chosen_by_class(
 
 
 @kernel
-def _settled_elements(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
-    return wake_equilibrium(
-        t, pose, x, now, aero.wind, aero.field, rotor.elements, rotor.skew, rotor.wake, dx, counters, pitches,
-        blades,
-    )  # fmt: skip
+def settled_wake(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
+    """Set the wake states of x to their steady values for the other states; return their number.
 
-
-@kernel
-def _settled_sections(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
-    return dynamic_sections_equilibrium(
-        t, pose, x, now, aero.wind, aero.field, rotor, dx, counters, pitches, blades
-    )
-
-
-# (t, pose in rotor axes, x, now, aero, rotor, ...) -> number of wake states, which are now steady in x
-settled_wake = chosen_by_class("rotor", {BemRotor: _settled_elements, DynamicSections: _settled_sections})
+    The filter is linear in its states: the rates at two values of the first stage, 0 and 1, give its
+    steady value 0.4 W_qs, whatever the time constants. pose: in rotor axes; rotor: DynamicSections, or
+    BemRotor with dynamic inflow; dx: scratch, (n_state,).
+    """
+    count = PER_ELEMENT * rotor.elements.blades * rotor.elements.radius.shape[0]
+    for i in range(State.INTERNAL, State.INTERNAL + count):
+        x[i] = 0.0
+    _rotor_model(t, pose, x, now, aero, rotor, dx, counters, pitches, blades)
+    for i in range(State.INTERNAL, State.INTERNAL + count, 2):
+        x[i + 1] = dx[i]
+        x[i] = 1.0
+    _rotor_model(t, pose, x, now, aero, rotor, dx, counters, pitches, blades)
+    for i in range(State.INTERNAL, State.INTERNAL + count, 2):
+        x[i] = x[i + 1] / (x[i + 1] - dx[i])
+        x[i + 1] = x[i] / 0.4
+        dx[i] = dx[i + 1] = 0.0
+    return count
 
 
 @inlined_kernel
 def rotor_part(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
-    """RotorLoad by the rotor model that rotor is, body axes; of dx the wake's rates alone are written.
+    """Return the RotorLoad of a rotor model in body axes; of dx the wake's rates alone are written.
 
     pitches, blades: blades with pitches of their own, and where the load of each is put, as in rotor_load.
     """
@@ -129,7 +131,7 @@ _drag = chosen_by_class("modes", {type(None): _straight_drag, TowerModes: _bent_
 
 @inlined_kernel
 def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
-    """AeroLoad at a state; writes the wake's rates into dx and adds to the forces on a tower's deflections.
+    """Return the AeroLoad at a state; put the wake's rates into dx, add to the forces on tower deflections.
 
     nacelle: nacelle_pose, whose axes and origin the rotor's load has. modes: TowerModes or None.
     """
@@ -142,7 +144,7 @@ def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
 
 @kernel
 def wind_of(t, X, Y, Z, aero):
-    """(u, v, w) m/s, inertial components, at an inertial point (m); zero without aerodynamics."""
+    """Return (u, v, w) m/s, inertial components, at an inertial point (m); zero without aerodynamics."""
     if aero is None:
         return 0.0, 0.0, 0.0
     return wind_at(t, X, Y, Z, wind_now(t, aero.wind), aero.wind, aero.field)

@@ -42,7 +42,7 @@ def _fill(ratio, blade_pitch, elements, shape, normal, tangential):
 
 
 def line_loads(elements):
-    """(normal, tangential), (states, n) each: line loads of BladeElements over the thrust or torque."""
+    """Return (normal, tangential), (states, n) each: line loads over the thrust or the torque."""
     size = (len(RATIOS), len(PITCHES), len(elements.radius))
     normal, tangential = np.zeros(size), np.zeros(size)
     _fill(RATIOS, PITCHES, elements, elements.shape, normal, tangential)
@@ -54,21 +54,21 @@ def line_loads(elements):
 
 
 def stands_for(elements):
-    """Fit that BladeElements of a curved blade have."""
+    """Return the Fit of the BladeElements of a curved blade."""
     shape, force = elements.shape, elements.weight
     arms = np.column_stack([shape.arm_prebend, shape.arm_sweep, shape.arm_distance])
     return Fit(force, force[:, None] * arms)
 
 
 def pick_stations(loads, elements, count):
-    """(count,) sorted indices of the stations to keep, of line_loads of all of BladeElements."""
+    """Return the (count,) sorted indices of the stations to keep; loads: line_loads of all stations."""
     normal, tangential = loads
     parts = np.vstack([normal * elements.weight, tangential * elements.moment_weight])
     return np.sort(qr(parts, mode="r", pivoting=True)[1][:count])
 
 
 def fit_stations(loads, chosen, full, prior):
-    """Fit of the chosen stations; full: that of all, which have line_loads; prior: by interpolation."""
+    """Return the Fit of the chosen stations; full: that of all stations; prior: by interpolation."""
     states = np.vstack(loads)
     few = states[:, chosen]
     columns = []
@@ -90,7 +90,7 @@ _choices = Cache(16)  # (indices, Fit) by blade and count: half a second each
 
 
 def build_fewer_elements(turbine, air_density, count):
-    """BladeElements of count stations of a curved blade, chosen and weighted so that loads are those of all.
+    """Return BladeElements of count stations of a curved blade with nearly the loads of all stations.
 
     Thrust and torque of the IEA 15 MW rotor keep 0.2 % over the operating states with 18 of its 50 stations.
     Without the compiler minutes.

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.aero.wind import wind_at
+from fowt_env.plant.aero.wind import power_profile, profile_at, profile_spans, scaled_wind, wind_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.state import NO_LOAD, Wrench, to_inertial
 
@@ -20,7 +20,7 @@ class TowerDrag(NamedTuple):
 
 
 def build_tower_drag(tower, air_density, points=POINTS):
-    """TowerDrag of a tower description, the diameter linear from base to top."""
+    """Return the TowerDrag of a tower description, the diameter linear from base to top."""
     node, weight = np.polynomial.legendre.leggauss(points)
     height = tower.top_height - tower.base_height
     up = 0.5 * (node + 1.0)
@@ -34,7 +34,7 @@ def build_tower_drag(tower, air_density, points=POINTS):
 
 @kernel
 def tower_load(t, pose, now, series, field, tower):
-    """Wrench of the wind on the tower, with the relative wind normal to its axis; theory.md Eq. (14).
+    """Return the Wrench of the relative wind normal to the tower's axis; theory.md Eq. (14).
 
     No tower or no wind series: zero. In still air (a series of zero wind) it always takes energy.
     """
@@ -42,12 +42,18 @@ def tower_load(t, pose, now, series, field, tower):
         return NO_LOAD
     if series is None:
         return NO_LOAD
+    low, high = pose.z + tower.z[0] * pose.r33, pose.z + tower.z[tower.z.shape[0] - 1] * pose.r33
+    profiled = field is None and profile_spans(low, high)
+    profile = power_profile(low, high, series) if profiled else power_profile(1.0, 1.0, series)
     fx = fy = mx = my = 0.0
     for i in range(tower.z.shape[0]):
         z = tower.z[i]
-        u, v, w = wind_at(
-            t, pose.x + z * pose.r13, pose.y + z * pose.r23, pose.z + z * pose.r33, now, series, field
-        )
+        X, Y, Z = pose.x + z * pose.r13, pose.y + z * pose.r23, pose.z + z * pose.r33
+        if profiled:  # a power at every point is a tenth of the time of a step
+            shear = profile.scale * profile_at(Z / profile.centre - 1.0, profile)
+            u, v, w = scaled_wind(Y, Z, shear, now, series)
+        else:
+            u, v, w = wind_at(t, X, Y, Z, now, series, field)
         wx = pose.r11 * u + pose.r21 * v + pose.r31 * w - pose.vx - pose.wy * z
         wy = pose.r12 * u + pose.r22 * v + pose.r32 * w - pose.vy + pose.wx * z
         pressure = tower.factor[i] * sqrt(wx * wx + wy * wy)
@@ -60,9 +66,9 @@ def tower_load(t, pose, now, series, field, tower):
 
 @kernel
 def bent_tower_load(t, pose, x, now, series, field, tower, modes, modal):
-    """tower_load of a tower that bends: at its displaced points, relative to their own velocity.
+    """Return tower_load of a tower that bends: at its displaced points, relative to their velocity.
 
-    modes: tower_modes.TowerModes. The generalised forces on its deflections are added to modal (n,).
+    modes: tower.modes.TowerModes. The generalised forces on its deflections are added to modal (n,).
     """
     if tower is None:
         return NO_LOAD

@@ -45,17 +45,17 @@ class Skew(NamedTuple):
 
 
 def build_skewed_wake(strength=15.0 * pi / 32.0):
-    """SkewedWake with the given strength."""
+    """Return the SkewedWake with the given strength."""
     return SkewedWake(float(strength))
 
 
 def build_dynamic_inflow(scale=1.0, least=0.0):
-    """DynamicInflow with its time constants scaled, and none below least (s)."""
+    """Return the DynamicInflow with its time constants scaled, and none below least (s)."""
     return DynamicInflow(float(scale), float(least))
 
 
 def n_wake_states(elements, wake):
-    """Number of states of dynamic inflow, the first block of internal ones; 0 without rotor or wake."""
+    """Return the number of states of dynamic inflow; 0 without rotor or wake."""
     if elements is None or wake is None:
         return 0
     return PER_ELEMENT * elements.blades * len(elements.radius)
@@ -63,7 +63,7 @@ def n_wake_states(elements, wake):
 
 @kernel
 def skew_of(hub, skew):
-    """Skew of the relative wind at the hub; none where no skew model is used."""
+    """Return the Skew of the relative wind at the hub; none where no skew model is used."""
     if skew is None:
         return Skew(0.0, 0.0, 0.0)
     across = sqrt(hub.wy * hub.wy + hub.wz * hub.wz)
@@ -74,7 +74,7 @@ def skew_of(hub, skew):
 
 @kernel
 def skew_factor(induced_normal, v_normal, ey, ez, span, skewed, skew):
-    """Factor on the axial induced velocity of an element at azimuth direction (0, ey, ez)."""
+    """Return the factor on the axial induced velocity of an element at azimuth direction (0, ey, ez)."""
     if skew is None:
         return 1.0
     a = -induced_normal / v_normal if v_normal != 0.0 else 0.0
@@ -84,13 +84,13 @@ def skew_factor(induced_normal, v_normal, ey, ez, span, skewed, skew):
 
 @kernel
 def pace(a):
-    """Factor on 1/tau_1 and 1/tau_2 at axial induction a, 1 without."""
+    """Return the factor on 1/tau_1 and 1/tau_2 at axial induction a, 1 without."""
     return 1.0 - 1.3 * min(max(a, 0.0), 0.5)
 
 
 @kernel
 def time_constants(a, wind_speed, radius, tip_radius, wake):
-    """(tau_1, tau_2) s of a blade element with axial induction a."""
+    """Return (tau_1, tau_2) s of a blade element with axial induction a."""
     slow = 1.1 / pace(a) * tip_radius / max(wind_speed, LOWEST_WIND)
     span = radius / tip_radius
     slow *= wake.scale
@@ -99,7 +99,7 @@ def time_constants(a, wind_speed, radius, tip_radius, wake):
 
 @kernel
 def filtered_induction(section, v_normal, blade, j, wind_speed, wake, x, dx, radius, tip_radius):
-    """(normal, tangential) induced velocity of an element, m/s; quasi-steady without dynamic inflow.
+    """Return (normal, tangential) induced velocity of an element, m/s; quasi-steady without dynamic inflow.
 
     With it the velocities are states, and their derivatives are written to dx.
     """

@@ -1,5 +1,6 @@
 """Wind at any instant and point: a time series at the reference height, sheared over the height, or a box."""
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from fowt_env.plant.aero.wind_field import field_at
 from fowt_env.plant.compile.decorators import kernel
 
+LARGEST_RATIO = 12.0  # highest over lowest point of a Profile
 LOWEST_HEIGHT = 1.0  # m; points below it (waves, rotor at sea level) see the wind of this height
 
 
@@ -33,12 +35,29 @@ class WindNow(NamedTuple):
     horizontal_shear: float
 
 
+class Profile(NamedTuple):
+    """Power law over the height as scale P(z)/Q(z), z = height/centre - 1."""
+
+    centre: float  # m
+    scale: float  # power law at the centre
+    p1: float
+    p2: float
+    p3: float
+    p4: float
+    p5: float
+    q1: float
+    q2: float
+    q3: float
+    q4: float
+    q5: float
+
+
 NO_WIND = WindNow(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
 def _row(series, i, weight):
-    """WindNow at the fraction `weight` from row i to row i + 1."""
+    """Return the WindNow at the fraction `weight` from row i to row i + 1."""
     value = series.value
     rest = 1.0 - weight
     return WindNow(
@@ -52,7 +71,7 @@ def _row(series, i, weight):
 
 @kernel
 def wind_now(t, series):
-    """WindNow at time t (s): linear between samples, repeated with the period or held at the ends."""
+    """Return the WindNow at time t (s): linear between samples, periodic, or constant beyond the ends."""
     if series is None:
         return NO_WIND
     time = series.time
@@ -81,7 +100,7 @@ def wind_now(t, series):
 
 @kernel
 def wind_at(t, X, Y, Z, now, series, field):
-    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
+    """Return (u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
 
     The horizontal wind follows the power law (Z/reference_height)**shear_exponent; the linear shears
     add to u, m/s per reference_length above and to the left (+y) of the reference point. Points below
@@ -97,12 +116,55 @@ def wind_at(t, X, Y, Z, now, series, field):
 
 @kernel
 def _series_at(Y, Z, now, series):
-    """(u, v, w) of a series at a height and a distance to the left."""
+    """Return (u, v, w) of a series at a height and a distance to the left."""
     height = max(Z, LOWEST_HEIGHT)
     profile = 1.0
     if series.shear_exponent != 0.0:
         profile = (height / series.reference_height) ** series.shear_exponent
+    return scaled_wind(Y, height, profile, now, series)
+
+
+@kernel
+def scaled_wind(Y, height, profile, now, series):
+    """Return (u, v, w) of a series, m/s, at a distance to the left and a height (m) of this power law."""
     linear = (
         now.vertical_shear * (height - series.reference_height) + now.horizontal_shear * Y
     ) / series.reference_length
     return now.u * profile + linear, now.v * profile, now.w
+
+
+@kernel
+def profile_spans(low, high):
+    """Return whether a Profile is accurate for heights from low to high (m)."""
+    return low > LOWEST_HEIGHT and high < LARGEST_RATIO * low
+
+
+@kernel
+def power_profile(low, high, series):
+    """Return the Profile for heights from low to high (m): the diagonal Pade approximant of order 5.
+
+    Relative error 2 sin(pi exponent) ((r - 1)/(r + 1))**11 at the ends, r = (high/low)**(1/4): with an
+    exponent of 0.14 it is 4e-8 from 27 to 153 m, and 2e-6 at LARGEST_RATIO.
+    """
+    a = series.shear_exponent
+    centre = sqrt(low * high)
+    p1 = (5.0 + a) * (5.0 / 10.0)
+    p2 = p1 * (4.0 + a) * (4.0 / 18.0)
+    p3 = p2 * (3.0 + a) * (3.0 / 24.0)
+    p4 = p3 * (2.0 + a) * (2.0 / 28.0)
+    p5 = p4 * (1.0 + a) * (1.0 / 30.0)
+    q1 = (5.0 - a) * (5.0 / 10.0)
+    q2 = q1 * (4.0 - a) * (4.0 / 18.0)
+    q3 = q2 * (3.0 - a) * (3.0 / 24.0)
+    q4 = q3 * (2.0 - a) * (2.0 / 28.0)
+    q5 = q4 * (1.0 - a) * (1.0 / 30.0)
+    scale = (centre / series.reference_height) ** a
+    return Profile(centre, scale, p1, p2, p3, p4, p5, q1, q2, q3, q4, q5)
+
+
+@kernel
+def profile_at(z, profile):
+    """Return (1 + z)**exponent of a Profile."""
+    upper = profile.p1 + z * (profile.p2 + z * (profile.p3 + z * (profile.p4 + z * profile.p5)))
+    lower = profile.q1 + z * (profile.q2 + z * (profile.q3 + z * (profile.q4 + z * profile.q5)))
+    return (1.0 + z * upper) / (1.0 + z * lower)

@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.prefetch import prefetch
 
 
 class WindField(NamedTuple):
@@ -23,7 +24,7 @@ class WindField(NamedTuple):
 
 @kernel
 def field_at(t, X, Y, Z, field):
-    """(u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s)."""
+    """Return (u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s)."""
     velocity = field.velocity
     slices, n_z, n_y = velocity.shape[0], velocity.shape[1], velocity.shape[2]
     s = (t + field.shift - X * field.slowness) * field.rate
@@ -60,3 +61,49 @@ def field_at(t, X, Y, Z, field):
         v += p * cut[k, j, 1] + q * cut[k, j + 1, 1] + r * cut[k + 1, j, 1] + s * cut[k + 1, j + 1, 1]
         w += p * cut[k, j, 2] + q * cut[k, j + 1, 2] + r * cut[k + 1, j, 2] + s * cut[k + 1, j + 1, 2]
     return u, v, w
+
+
+class GridPlace(NamedTuple):
+    """Place on the grid of a box, in grid steps from its first slice, lowest row and rightmost column."""
+
+    slice: float
+    row: float
+    column: float
+
+
+@kernel
+def _across(velocity, cut, row, column, component, p, q, r, d):
+    """Return a component of the wind within a slice, from the corners of a cell with their weights."""
+    above, beside = row + np.uintp(1), column + np.uintp(1)
+    return (
+        p * velocity[cut, row, column, component]
+        + q * velocity[cut, row, beside, component]
+        + r * velocity[cut, above, column, component]
+        + d * velocity[cut, above, beside, component]
+    )
+
+
+@inlined_kernel
+def cell_wind(place, velocity):
+    """Return (inside, u, v, w): wind of a box at a GridPlace, m/s, valid where inside is True."""
+    s, y, z = place.slice, place.column, place.row
+    slices, rows, columns = velocity.shape[0] - 1.0, velocity.shape[1] - 1.0, velocity.shape[2] - 1.0
+    inside = 0.0 <= s < slices and 0.0 <= y < columns and 0.0 <= z < rows
+    s, y, z = (s, y, z) if inside else (0.0, 0.0, 0.0)
+    # indices without sign are not tested for counting from the end
+    now, row, column = np.uintp(s), np.uintp(z), np.uintp(y)
+    late, up, left = s - float(now), z - float(row), y - float(column)
+    after = now + np.uintp(1)
+    # in a long box every new slice lies in memory that the processor does not expect to be read
+    prefetch(velocity, after + np.uintp(1), row, column)
+    prefetch(velocity, after + np.uintp(1), row + np.uintp(1), column)
+    p, q = (1.0 - up) * (1.0 - left), (1.0 - up) * left
+    r, d = up * (1.0 - left), up * left
+    rest = 1.0 - late
+    u = rest * _across(velocity, now, row, column, 0, p, q, r, d)
+    v = rest * _across(velocity, now, row, column, 1, p, q, r, d)
+    w = rest * _across(velocity, now, row, column, 2, p, q, r, d)
+    u += late * _across(velocity, after, row, column, 0, p, q, r, d)
+    v += late * _across(velocity, after, row, column, 1, p, q, r, d)
+    w += late * _across(velocity, after, row, column, 2, p, q, r, d)
+    return inside, u, v, w

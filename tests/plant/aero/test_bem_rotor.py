@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from naive import rotor as naive
 from numba import njit
+from rotor_helpers import state, wind_series
 
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
@@ -15,7 +16,6 @@ from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.events import N_COUNTERS, Counter
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.training.validation.openfast_cases import steady_reference
-from fowt_env.weather.wind import make_series
 
 pytestmark = pytest.mark.installation
 
@@ -33,20 +33,6 @@ REFERENCE = [
     (18.0, 12.1, 14.92, 0.1197, 0.1418, 350.9, 4.2074),
     (25.0, 12.1, 23.47, 0.0401, 0.0530, 253.0, 3.7801),
 ]
-
-
-def wind_series(u, v=0.0, w=0.0, vertical=0.0, horizontal=0.0, shear=0.0):
-    return make_series(
-        [0.0], [[u, v, w, vertical, horizontal]],
-        reference_height=90.0, reference_length=126.0, shear_exponent=shear,
-    )  # fmt: skip
-
-
-def state(speed=0.0, blade_pitch=0.0, azimuth=0.0, position=(0,) * 6, velocity=(0,) * 6):
-    x = np.zeros(N_RIGID)
-    x[:6], x[7:13] = position, velocity
-    x[State.AZIMUTH], x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = azimuth, speed, blade_pitch
-    return x
 
 
 def load(x, series, rotor=ROTOR, counters=None):

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from rotor_helpers import series_of, state, wind_series
 
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
@@ -7,8 +8,7 @@ from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import build_coefficient_table, coefficient_table_load
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.events import N_COUNTERS, Counter
-from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.weather.wind import make_series
+from fowt_env.plant.state import State, pose_of
 
 pytestmark = pytest.mark.installation
 
@@ -24,20 +24,6 @@ OPERATION = [  # wind m/s, rotor speed rad/s, blade pitch rad: operating points 
     (18.0, 1.267, 0.2609),
     (24.0, 1.267, 0.3864),
 ]
-
-
-def wind_series(u, v=0.0, vertical=0.0, shear=0.0):
-    return make_series(
-        [0.0], [[u, v, 0.0, vertical, 0.0]],
-        reference_height=90.0, reference_length=126.0, shear_exponent=shear,
-    )  # fmt: skip
-
-
-def state(speed, blade_pitch, azimuth=0.0, velocity=(0,) * 6):
-    x = np.zeros(N_RIGID)
-    x[7:13] = velocity
-    x[State.AZIMUTH], x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = azimuth, speed, blade_pitch
-    return x
 
 
 def from_table(x, series, table=TABLE, counters=None):
@@ -168,10 +154,7 @@ def test_random_gusts_and_motions_give_the_loads_of_the_sections_over_a_turn():
     table, sections = [], []
     for _ in range(200):
         gust = rng.normal(size=5) * [1.8, 1.2, 0.5, 2.8, 2.8]
-        series = make_series(
-            [0.0], [gust + [18.0, 0.0, 0.0, 0.0, 0.0]],
-            reference_height=90.0, reference_length=126.0, shear_exponent=0.14,
-        )  # fmt: skip
+        series = series_of(gust + [18.0, 0.0, 0.0, 0.0, 0.0])
         x = state(1.267 + 0.1 * rng.normal(), 0.26 + 0.012 * gust[0] + 0.01 * rng.normal())
         attitude = rng.normal(size=3) * [0.004, 0.015, 0.015] + [0.0, 0.05, 0.0]
         x[[State.ROLL, State.PLATFORM_PITCH, State.YAW]] = attitude
@@ -193,20 +176,13 @@ def test_cross_wind_pushes_and_tilts_as_by_the_sections(U, speed, beta):
 
 def test_turning_the_disturbance_about_the_shaft_turns_the_loads():
     """Horizontal shear and vertical wind are vertical shear and cross wind a quarter of a turn on."""
-
-    def series(v, w, vertical, horizontal):
-        return make_series(
-            [0.0], [[15.0, v, w, vertical, horizontal]],
-            reference_height=90.0, reference_length=126.0, shear_exponent=0.0,
-        )  # fmt: skip
-
     x = state(1.267, 0.18)
-    a = hub_loads(from_table(x, series(1.0, 0.0, 0.0, 3.0)).wrench)
-    b = hub_loads(from_table(x, series(0.0, 1.0, 3.0, 0.0)).wrench)
-    c = hub_loads(from_table(x, series(0.0, 1.0, -3.0, 0.0)).wrench)
-    d = hub_loads(from_table(x, series(-1.0, 0.0, 0.0, -3.0)).wrench)
+    a = hub_loads(from_table(x, wind_series(15.0, 1.0, 0.0, 0.0, 3.0)).wrench)
+    b = hub_loads(from_table(x, wind_series(15.0, 0.0, 1.0, 3.0, 0.0)).wrench)
+    c = hub_loads(from_table(x, wind_series(15.0, 0.0, 1.0, -3.0, 0.0)).wrench)
+    d = hub_loads(from_table(x, wind_series(15.0, -1.0, 0.0, 0.0, -3.0)).wrench)
     # y of the disk goes to z, z to -y
-    turned = hub_loads(from_table(x, series(-1.0, 0.0, 0.0, 3.0)).wrench)
+    turned = hub_loads(from_table(x, wind_series(15.0, -1.0, 0.0, 0.0, 3.0)).wrench)
     assert np.allclose(a[[0, 3]], d[[0, 3]], rtol=1e-12)
     assert np.allclose(a[[1, 2, 4, 5]], -d[[1, 2, 4, 5]], atol=1e-6)
     assert np.allclose(b, [a[0], -a[2], a[1], a[3], -a[5], a[4]], atol=1e-6)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from naive import curved_rotor
 from numba import config, njit
+from rotor_helpers import curved, move_platform, series_of
 
 from fowt_env.analysis.rotor_loads import rotor_loads
 from fowt_env.descriptions.turbine import read_turbine
@@ -18,22 +19,13 @@ from fowt_env.plant.tilt import build_tilt, rotor_pose, to_body_axes
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import ROTORS, chosen_stations
 from fowt_env.training.validation.openfast_cases import table
-from fowt_env.weather.wind import make_series
 
 STRAIGHT = read_turbine("nrel5mw")
 TILT = 0.11
 compiled = pytest.mark.skipif(config.DISABLE_JIT, reason="tables take minutes without the compiler")
 
 
-def curved(turbine=STRAIGHT, tilt=TILT, cone=0.07, bend=-3.0, blades=3):
-    """The turbine with tilt, cone, a prebend of `bend` at the tip and a sweep to and fro."""
-    x = (turbine.blade.radius - 1.5) / 61.5
-    blade = turbine.blade.model_copy(update={"prebend": bend * x**2, "sweep": 0.3 * bend * x * (0.8 - x)})
-    rotor = turbine.rotor.model_copy(update={"shaft_tilt": tilt, "cone": cone, "blades": blades})
-    return turbine.model_copy(update={"rotor": rotor, "blade": blade})
-
-
-CURVED = curved()
+CURVED = curved(STRAIGHT, TILT)
 ELEMENTS = build_blade_elements(CURVED, 1.225)
 
 
@@ -43,18 +35,11 @@ def without_moment(turbine):
     return turbine.model_copy(update={"blade": turbine.blade.model_copy(update={"polars": polars})})
 
 
-def series_of(row, shear=0.14):
-    return make_series([0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=shear)
-
-
 def moving(n, seed=1):
     """n states of a moving platform about 16 m/s, and their rows of wind."""
     rng = np.random.default_rng(seed)
     states, winds = np.zeros((n, N_RIGID)), np.zeros((n, 5))
-    states[:, :3] = rng.uniform(-1.0, 1.0, (n, 3)) * [20.0, 5.0, 3.0]
-    states[:, 3:6] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)) * [2.0, 8.0, 8.0])
-    states[:, 7:10] = rng.uniform(-1.0, 1.0, (n, 3))
-    states[:, 10:13] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)))
+    move_platform(states, rng)
     states[:, State.AZIMUTH] = rng.uniform(0.0, 2.0 * np.pi, n)
     states[:, State.ROTOR_SPEED] = 1.267 * rng.uniform(0.9, 1.1, n)
     states[:, State.BLADE_PITCH] = np.radians(rng.uniform(6.0, 18.0, n))
@@ -136,7 +121,7 @@ def test_straight_blades_in_the_rotor_plane_have_the_same_loads_either_way():
 
 
 def test_a_tilted_shaft_is_a_pitched_platform():
-    upright, tilted = curved(tilt=0.0), CURVED
+    upright, tilted = curved(STRAIGHT, tilt=0.0), CURVED
     states, winds = moving(3)
     states[:, [State.ROLL, State.YAW]] = 0.0
     load = by(_solved, states, winds, build_blade_elements(tilted, 1.225), tilted)
@@ -168,7 +153,7 @@ def box():
     [("sheared", 3), ("sheared", 2), ("box", 3), ("still lower edge", 3)],
 )
 def test_the_table_of_stations_gives_what_is_solved(kind, blades):
-    turbine = curved(blades=blades)
+    turbine = curved(STRAIGHT, blades=blades)
     elements = build_blade_elements(turbine, 1.225)
     states, winds = moving(200)
     if kind == "still lower edge":  # a blade's tip below the lowest height: sampled station by station
@@ -261,7 +246,7 @@ def test_the_table_of_the_rotor_has_the_derivatives_of_the_mean_load(about, foun
     harmonic, with its stations brought to the plane of the hub along the shaft: that the wind differs there
     is left out of the table.
     """
-    turbine = smooth(curved(tilt=0.0))
+    turbine = smooth(curved(STRAIGHT, tilt=0.0))
     elements = build_blade_elements(turbine, 1.225)
     table = build_coefficient_table(elements)
 

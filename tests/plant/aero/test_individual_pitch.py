@@ -2,11 +2,12 @@ import numpy as np
 import pytest
 from naive import curved_rotor
 from numba import config, njit
+from rotor_helpers import curved, move_platform, series_of
 
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.blade_shape import BladeLoad, blade_wind, with_blade
+from fowt_env.plant.aero.blade_shape import BladeLoad, blade_motion, with_blade
 from fowt_env.plant.aero.section_table import build_section_table, section_table_load
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.aero.wind_field import WindField
@@ -14,18 +15,9 @@ from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import BLADES, N_RIGID, NO_LOAD, State, pose_of
 from fowt_env.plant.tilt import build_tilt, rotor_pose, to_body_axes
-from fowt_env.weather.wind import make_series
 
 compiled = pytest.mark.skipif(config.DISABLE_JIT, reason="tables take minutes without the compiler")
 PITCHES = BladePitches(N_RIGID)
-
-
-def curved(turbine):
-    """The turbine with tilt, cone, prebend and sweep."""
-    x = (turbine.blade.radius - 1.5) / 61.5
-    blade = turbine.blade.model_copy(update={"prebend": -3.0 * x**2, "sweep": -0.9 * x * (0.8 - x)})
-    rotor = turbine.rotor.model_copy(update={"shaft_tilt": 0.11, "cone": 0.07})
-    return turbine.model_copy(update={"rotor": rotor, "blade": blade})
 
 
 STRAIGHT = read_turbine("nrel5mw")
@@ -36,10 +28,6 @@ ELEMENTS = {name: build_blade_elements(turbine, 1.225) for name, turbine in TURB
 @pytest.fixture(scope="module")
 def tables():
     return {name: build_section_table(elements) for name, elements in ELEMENTS.items()}
-
-
-def series_of(row):
-    return make_series([0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=0.14)
 
 
 @njit
@@ -81,10 +69,7 @@ def moving(n, seed=1, spread=6.0):
     """n states of a moving platform about 16 m/s whose pitches differ by up to `spread` deg, and the wind."""
     rng = np.random.default_rng(seed)
     states, winds = np.zeros((n, N_RIGID + 2)), np.zeros((n, 5))
-    states[:, :3] = rng.uniform(-1.0, 1.0, (n, 3)) * [20.0, 5.0, 3.0]
-    states[:, 3:6] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)) * [2.0, 8.0, 8.0])
-    states[:, 7:10] = rng.uniform(-1.0, 1.0, (n, 3))
-    states[:, 10:13] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)))
+    move_platform(states, rng)
     states[:, State.AZIMUTH] = rng.uniform(0.0, 2.0 * np.pi, n)
     states[:, State.ROTOR_SPEED] = 1.267 * rng.uniform(0.9, 1.1, n)
     mean, change = rng.uniform(8.0, 16.0, (n, 1)), 0.5 * spread * rng.uniform(-1.0, 1.0, (n, 3))
@@ -156,7 +141,7 @@ def test_loads_of_the_blades_add_up_to_those_of_the_rotor(name, field, tables):
             about_centre = NO_LOAD
             for number, part in enumerate(blades):
                 psi = x[State.AZIMUTH] + 2.0 * np.pi * number / BLADES
-                at = blade_wind(-np.sin(psi), np.cos(psi), 0.0, pose_of(x), pose_of(x))
+                at = blade_motion(psi, 0.0, pose_of(x), pose_of(x))
                 about_centre = with_blade(about_centre, BladeLoad(*part), at)
             force, moment = np.array(about_centre[:3]), np.array(about_centre[3:])
             expected = [*force, *(moment + np.cross(hub, force)), force[0], moment[0]]

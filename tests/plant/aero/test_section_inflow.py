@@ -5,15 +5,13 @@ import pytest
 from naive import inflow
 from naive.rigid_body import rotation
 from numba import config, njit
+from rotor_helpers import move_platform, put_load, series_of
 
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
-from fowt_env.plant.aero.section_inflow import (
-    build_dynamic_sections,
-    dynamic_sections_equilibrium,
-    dynamic_sections_load,
-)
+from fowt_env.plant.aero.load import Aero, settled_wake
+from fowt_env.plant.aero.section_inflow import build_dynamic_sections, dynamic_sections_load
 from fowt_env.plant.aero.section_table import build_section_table, section_table_load
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.wake import PER_ELEMENT, build_dynamic_inflow, n_wake_states, time_constants
@@ -22,7 +20,6 @@ from fowt_env.plant.aero.wind_field import WindField
 from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.weather.wind import make_series
 
 if config.DISABLE_JIT:
     pytest.skip("the tables take minutes to build without the compiler", allow_module_level=True)
@@ -36,10 +33,6 @@ SCHEDULE = np.array(
     [(5, 9.0, 0), (8, 8.3, 0), (11.4, 7.0, 0), (14, 5.7, 8.7), (18, 4.4, 14.9), (24, 3.3, 22.5)]
 )
 GRID = np.linspace(-150.0, 150.0, 31), np.linspace(5.0, 305.0, 31)
-
-
-def series_of(row, shear=0.14):
-    return make_series([0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=shear)
 
 
 def rough_field():
@@ -59,28 +52,14 @@ def _many(states, winds, series, field, rotor, counters, pitches, out, rates, bl
         series.value[0] = winds[i]
         now, pose = wind_now(0.0, series), pose_of(x)
         a = rotor_load(
-            0.0,
-            pose,
-            x,
-            now,
-            series,
-            field,
-            elements,
-            None,
-            wake,
-            rates[0, i],
-            counters,
-            pitches,
+            0.0, pose, x, now, series, field, elements, None, wake, rates[0, i], counters, pitches,
             blades[0, i],
-        )
+        )  # fmt: skip
         b = dynamic_sections_load(
             0.0, pose, x, now, series, field, rotor, rates[1, i], counters, pitches, blades[1, i]
         )
-        for k, load in enumerate((a, b)):
-            w = load.wrench
-            out[k, i, 0], out[k, i, 1], out[k, i, 2] = w.fx, w.fy, w.fz
-            out[k, i, 3], out[k, i, 4], out[k, i, 5] = w.mx, w.my, w.mz
-            out[k, i, 6], out[k, i, 7] = load.thrust, load.torque
+        put_load(a, out[0, i])
+        put_load(b, out[1, i])
 
 
 def both(states, winds, rotor, field=None, pitches=None):
@@ -99,8 +78,8 @@ def settled(x, wind, rotor, shear=0.14):
     """The state with its wake at rest."""
     series = series_of(wind, shear)
     x, now = x.copy(), wind_now(0.0, series)
-    arguments = (rotor, np.zeros_like(x), np.zeros(N_COUNTERS), None, np.zeros((3, 6)))
-    count = dynamic_sections_equilibrium(0.0, pose_of(x), x, now, series, None, *arguments)
+    aero, end = Aero(series, None, rotor, None, None), (np.zeros(N_COUNTERS), None, np.zeros((3, 6)))
+    count = settled_wake(0.0, pose_of(x), x, now, aero, rotor, np.zeros_like(x), *end)
     assert count == n_wake_states(rotor.elements, rotor.wake)
     return x
 
@@ -115,10 +94,7 @@ def operating(n, rotor, seed=1, more=0):
     states[:, State.ROTOR_SPEED] = ratio * speed / tip * rng.uniform(0.9, 1.1, n)
     states[:, State.BLADE_PITCH] = np.radians(pitch + rng.uniform(0.0, 3.0, n))
     states[:, State.AZIMUTH] = rng.uniform(0.0, 2.0 * np.pi, n)
-    states[:, 0:3] = rng.uniform(-1.0, 1.0, (n, 3)) * [20.0, 5.0, 3.0]
-    states[:, 3:6] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)) * [2.0, 6.0, 6.0])
-    states[:, 7:10] = rng.uniform(-1.0, 1.0, (n, 3))
-    states[:, 10:13] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)))
+    move_platform(states, rng, pitch=6.0)
     winds[:, 0] = speed
     winds[:, 1:] = speed[:, None] * rng.uniform(-1.0, 1.0, (n, 4)) * [0.1, 0.05, 0.1, 0.1]
     wake = slice(N_RIGID, N_RIGID + wakes)
@@ -310,7 +286,6 @@ def test_absent_rotor_or_wind_gives_exactly_zero():
     assert dynamic_sections_load(*start, series, None, None, *end) == NO_ROTOR_LOAD
     rotor = build_dynamic_sections(STRAIGHT, WAKE)
     assert dynamic_sections_load(*start, None, None, rotor, *end) == NO_ROTOR_LOAD
-    assert dynamic_sections_equilibrium(*start, None, None, rotor, *end) == 0
 
 
 def test_no_time_constant_is_shorter_than_the_least():

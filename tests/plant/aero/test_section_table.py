@@ -5,30 +5,28 @@ import sys
 import numpy as np
 import pytest
 from numba import config, njit
+from rotor_helpers import move_platform, put_load, series_of
 
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, hub_flow, rotor_load
+from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
+from fowt_env.plant.aero.blade_sweep import NO_ROTOR_LOAD, rotor_flow
 from fowt_env.plant.aero.section_table import (
-    AHEAD,
-    BEHIND,
     COARSE_END,
     DENSE_START,
-    _blade,
-    _field_force,
-    _pitch_row,
-    _profile,
-    _sampled_force,
-    _shear,
-    _station_force,
+    box_force,
     build_section_table,
+    sampled_force,
     section_table_load,
+    tabled_blade,
+    turn_and_response,
 )
-from fowt_env.plant.aero.wind import wind_now
+from fowt_env.plant.aero.station_response import AHEAD, BEHIND, Rows, Tabled, station_load
+from fowt_env.plant.aero.wind import power_profile, profile_at, wind_now
 from fowt_env.plant.aero.wind_field import WindField
+from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.weather.wind import make_series
 
 pytestmark = pytest.mark.installation
 
@@ -50,10 +48,6 @@ SCHEDULE = np.array(
 )  # fmt: skip
 
 
-def series_of(row, shear=0.14):
-    return make_series([0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=shear)
-
-
 @njit
 def loads(states, winds, series, field, rotor, table, counters, exact, quick):
     """Both loads of many states, each with its own row of wind."""
@@ -63,11 +57,8 @@ def loads(states, winds, series, field, rotor, table, counters, exact, quick):
         now, pose = wind_now(0.0, series), pose_of(x)
         a = rotor_load(0.0, pose, x, now, series, field, rotor, None, None, x, counters, None, None)
         b = section_table_load(0.0, pose, x, now, series, field, table, counters, None, None)
-        for out, load in ((exact, a), (quick, b)):
-            w = load.wrench
-            out[i, 0], out[i, 1], out[i, 2] = w.fx, w.fy, w.fz
-            out[i, 3], out[i, 4], out[i, 5] = w.mx, w.my, w.mz
-            out[i, 6], out[i, 7] = load.thrust, load.torque
+        put_load(a, exact[i])
+        put_load(b, quick[i])
 
 
 def both(states, winds, rotor=ROTOR, table=TABLE, field=None):
@@ -88,10 +79,7 @@ def operating(n, seed=1):
     states[:, State.ROTOR_SPEED] = RPM * rpm * rng.uniform(0.8, 1.2, n)
     states[:, State.BLADE_PITCH] = np.radians(np.clip(pitch + rng.uniform(-5.0, 5.0, n), -4.0, None))
     states[:, State.AZIMUTH] = rng.uniform(0.0, 2.0 * np.pi, n)
-    states[:, 0:3] = rng.uniform(-1.0, 1.0, (n, 3)) * [20.0, 5.0, 3.0]
-    states[:, 3:6] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)) * [2.0, 8.0, 8.0])
-    states[:, 7:10] = rng.uniform(-1.0, 1.0, (n, 3))
-    states[:, 10:13] = np.radians(rng.uniform(-1.0, 1.0, (n, 3)))
+    move_platform(states, rng)
     winds[:, 0] = speed
     winds[:, 1:] = speed[:, None] * rng.uniform(-1.0, 1.0, (n, 4)) * [0.15, 0.08, 0.1, 0.1]
     return states, winds
@@ -115,9 +103,9 @@ def stations(v_normal, v_tangential, blade_pitch, station, table, out):
         degrees = np.degrees(blade_pitch[i])
         row = (degrees + 5.0) * 4.0 if degrees < 30.0 else 140.0 + degrees - 30.0
         k = int(row)
-        out[i, 0], out[i, 1] = _station_force(
-            v_normal[i], v_tangential[i], j, table.load[k], table.load[k + 1], row - k
-        )
+        response = Tabled(Rows(table.load[k], table.load[k + 1], row - k), table.arm, None)
+        found = station_load(response, v_normal[i], v_tangential[i], j)
+        out[i, 0], out[i, 1] = found.normal, found.tangential
         section = blade_section(v_normal[i], v_tangential[i], blade_pitch[i], j, 1.0, rotor)
         share = rotor.weight[j] / rotor.air_density
         out[i, 2], out[i, 3] = share * section.fn, share * section.ft
@@ -195,11 +183,11 @@ def test_table_is_exact_at_its_nodes():
 @pytest.mark.parametrize("low, high", [(27.0, 153.0), (13.0, 155.0)])
 def test_height_profile_follows_the_power_law(exponent, low, high):
     """Within the error of the Pade approximant: 4e-8 over the rotor at rest, 2e-6 at its limit (0.14)."""
-    profile = _profile(low, high, series_of([1.0, 0.0, 0.0, 0.0, 0.0], exponent))
+    profile = power_profile(low, high, series_of([1.0, 0.0, 0.0, 0.0, 0.0], exponent))
     root = np.sqrt(np.sqrt(high / low))
     bound = 2.0 * abs(np.sin(np.pi * exponent)) * ((root - 1.0) / (root + 1.0)) ** 11
     for height in np.linspace(low, high, 201):
-        got = profile.scale * _shear(height / profile.centre - 1.0, profile)
+        got = profile.scale * profile_at(height / profile.centre - 1.0, profile)
         assert got == pytest.approx((height / 90.0) ** exponent, rel=1.1 * bound + 1e-14)
 
 
@@ -270,25 +258,24 @@ def test_full_field_wind_is_sampled_at_every_station():
     assert np.abs(uniform - exact)[:, 6].mean() > 0.1 * exact[:, 6].std()  # the box does replace the series
 
 
+@kernel  # whose callers count no references: what it makes holds arrays
+def blade_sums(t, x, series, field, table, counters, quick, plain):
+    """Put into quick and plain (5,) the sums over a blade in a box and station by station; last: valid."""
+    elements = table.elements
+    flow = rotor_flow(t, pose_of(x), wind_now(t, series), series, field, elements)
+    blade = tabled_blade(0, turn_and_response(x[State.BLADE_PITCH], table), x, flow, table, None)
+    a = box_force(blade, flow, field, elements)
+    b = sampled_force(blade, flow, elements, counters)
+    for out, force in ((quick, a), (plain, b)):
+        out[0], out[1], out[2], out[3] = force.load.fx, force.load.ft, force.load.mx, force.load.mt
+        out[4] = 1.0 if force.outside == 0 else 0.0
+
+
 @njit
 def blades(states, times, series, field, table, counters, quick, plain):
-    """(n, 5) each: the sums over a blade without branches and one station at a time; the last: valid."""
-    elements = table.elements
+    """blade_sums of many states."""
     for i in range(states.shape[0]):
-        x, t = states[i], times[i]
-        now, pose = wind_now(t, series), pose_of(x)
-        hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
-        blade = _blade(x[State.AZIMUTH], x[State.ROTOR_SPEED], pose, hub)
-        row = _pitch_row(x[State.BLADE_PITCH])
-        k = int(row)
-        low, high, share = table.load[k], table.load[k + 1], row - k
-        a = _field_force(t, pose, hub, blade, field, low, high, share, table.radius, table.arm)
-        b = _sampled_force(
-            t, pose, hub, blade, now, series, field, x[State.BLADE_PITCH], low, high, share, table, counters
-        )
-        for out, force in ((quick, a), (plain, b)):
-            out[i, 0], out[i, 1] = force.force_n, force.force_t
-            out[i, 2], out[i, 3], out[i, 4] = force.moment_n, force.moment_t, 1.0 if force.valid else 0.0
+        blade_sums(times[i], states[i], series, field, table, counters, quick[i], plain[i])
 
 
 @pytest.mark.parametrize("periodic", [False, True])
@@ -358,7 +345,7 @@ from fowt_env.plant.aero.wind_field import WindField
 given = np.load(sys.argv[1])
 field = WindField(given["velocity"], 2.0, 10.0, 1.0 / 15.0, -90.0, 10.0, 0.1, 0.1, True)
 rotor = build_blade_elements(read_turbine("nrel5mw"), 1.225)
-table = SectionTable(given["load"], rotor.radius, rotor.moment_weight / rotor.weight, rotor)
+table = SectionTable(given["load"], rotor.moment_weight / rotor.weight, rotor)
 for x, row in zip(given["states"], given["winds"]):
     series = make_series(
         [0.0], [row], reference_height=90.0, reference_length=126.0, shear_exponent=0.14

@@ -1,26 +1,19 @@
 import numpy as np
 import pytest
 from naive import rotor as naive
+from rotor_helpers import wind_series
 
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.plant.aero.tower_drag import bent_tower_load, build_tower_drag, tower_load
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.state import N_RIGID, NO_LOAD, pose_of
 from fowt_env.scene.tower import build_tower_modes
-from fowt_env.weather.wind import make_series
 
 pytestmark = pytest.mark.installation
 
 PLATFORM = read_platform("oc3_hywind")
 TOWER = PLATFORM.tower
 PART = build_tower_drag(TOWER, 1.225)
-
-
-def wind_series(u, v=0.0, w=0.0, vertical=0.0, shear=0.0):
-    return make_series(
-        [0.0], [[u, v, w, vertical, 0.0]],
-        reference_height=90.0, reference_length=126.0, shear_exponent=shear,
-    )  # fmt: skip
 
 
 def load(x, series, part=PART):

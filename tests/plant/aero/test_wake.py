@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
+from rotor_helpers import wind_series
 
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.plant.aero.bem_rotor import hub_flow, rotor_load, wake_equilibrium
+from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
+from fowt_env.plant.aero.blade_sweep import hub_flow
+from fowt_env.plant.aero.load import Aero, BemRotor, settled_wake
 from fowt_env.plant.aero.wake import (
     PER_ELEMENT,
     build_dynamic_inflow,
@@ -16,20 +19,12 @@ from fowt_env.plant.aero.wake import (
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
-from fowt_env.weather.wind import make_series
 
 pytestmark = pytest.mark.installation
 
 ROTOR = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 WAKE, SKEW = build_dynamic_inflow(), build_skewed_wake()
 N_WAKE = n_wake_states(ROTOR, WAKE)
-
-
-def wind_series(u, v=0.0, w=0.0, shear=0.0):
-    return make_series(
-        [0.0], [[u, v, w, 0.0, 0.0]],
-        reference_height=90.0, reference_length=126.0, shear_exponent=shear,
-    )  # fmt: skip
 
 
 def state(speed=1.267, blade_pitch=0.05, azimuth=0.4, platform_pitch=0.0):
@@ -39,42 +34,23 @@ def state(speed=1.267, blade_pitch=0.05, azimuth=0.4, platform_pitch=0.0):
     return x
 
 
-def arguments(x, series, skew=None, wake=None):
-    dx = np.zeros_like(x)
-    now = wind_now(0.0, series)
-    return (
-        0.0,
-        pose_of(x),
-        x,
-        now,
-        series,
-        None,
-        ROTOR,
-        skew,
-        wake,
-        dx,
-        np.zeros(N_COUNTERS),
-        None,
-        None,
-    ), dx
-
-
 def load(x, series, skew=None, wake=None):
-    args, dx = arguments(x, series, skew, wake)
-    return rotor_load(*args), dx
+    dx, now, counters = np.zeros_like(x), wind_now(0.0, series), np.zeros(N_COUNTERS)
+    found = rotor_load(0.0, pose_of(x), x, now, series, None, ROTOR, skew, wake, dx, counters, None, None)
+    return found, dx
 
 
 def settle(x, series, skew=None):
-    args, _ = arguments(x, series, skew, WAKE)
-    assert wake_equilibrium(*args) == N_WAKE
+    rotor, now, counters = BemRotor(ROTOR, skew, WAKE), wind_now(0.0, series), np.zeros(N_COUNTERS)
+    aero = Aero(series, None, rotor, None, None)
+    found = settled_wake(0.0, pose_of(x), x, now, aero, rotor, np.zeros_like(x), counters, None, None)
+    assert found == N_WAKE
 
 
 def test_no_dynamic_inflow_has_no_states():
     assert n_wake_states(ROTOR, None) == 0
     assert n_wake_states(None, WAKE) == 0
     assert N_WAKE == PER_ELEMENT * 3 * 19
-    args, _ = arguments(state(), wind_series(12.0))
-    assert wake_equilibrium(*args) == 0
 
 
 def test_skew_vanishes_in_axial_flow():

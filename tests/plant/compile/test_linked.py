@@ -5,7 +5,10 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
+from copied_code import copied_code
 
+from fowt_env.layout import PACKAGE
 from fowt_env.plant.compile.decorators import entry, kernel
 from fowt_env.plant.compile.linked import LinkedLibrary
 
@@ -74,3 +77,39 @@ def test_a_kernel_may_print_for_whoever_looks_for_a_fault(tmp_path):
         [sys.executable, "loud.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True
     )
     assert done.stdout.split("\n")[:2] == ["at 1.5", "3.0"], done.stderr
+
+
+RUN = """
+from fowt_env import build_scene, simulate
+scene = build_scene(wind=14.0, sea="jonswap:4:9:2", seed=1, duration=5.0)
+print(simulate(scene, "pi", duration=5.0).to_numpy().tobytes().hex())
+"""
+
+
+def simulated(root, cache=None):
+    """Bits of a short run in a fresh process, by the package in a folder."""
+    environment = os.environ | {"PYTHONPATH": str(root)} | ({"FOWT_CACHE_DIR": str(cache)} if cache else {})
+    command = [sys.executable, "-c", RUN]
+    done = subprocess.run(
+        command, env=environment, cwd=root, capture_output=True, text=True, timeout=1800, check=True
+    )
+    return done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    "changes",
+    [{"linked=True": "linked=False"}, {"_nrt=False": "_nrt=True", '"_nrt": False': '"_nrt": True'}],
+    ids=["not linked", "with counted references"],
+)
+def test_a_scene_compiled_otherwise_has_the_same_bits(changes, tmp_path):
+    """Without what this project adds to numba's compiling: the way out of it if a new version breaks it."""
+    code = copied_code(tmp_path)
+    sources = {path: path.read_text() for path in (code / "fowt_env" / "plant" / "compile").glob("*.py")}
+    for old, new in changes.items():
+        assert any(old in text for text in sources.values())
+        sources = {path: text.replace(old, new) for path, text in sources.items()}
+    for path, text in sources.items():
+        path.write_text(text)
+    assert simulated(code, tmp_path / "cache") == simulated(PACKAGE.parent)

@@ -1,0 +1,400 @@
+"""The sweep over blades and stations that all rotor models but the coefficient table share.
+
+A station is placed (blade_shape.py), meets a wind, responds to it (station_response.py), and its load is
+added to that of its blade. The wind of a blade is one of three: sampled at every station; in a sheared
+series, where it is linear in the place but for the power law; in a box, one cell lookup per station.
+"""
+
+from math import pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.aero.blade_elements import smoothstep
+from fowt_env.plant.aero.blade_shape import (
+    BladeLoad,
+    BladeMotion,
+    Plane,
+    StationLoad,
+    Turn,
+    add_station,
+    blade_motion,
+    normal_part,
+    station_at,
+    value_at,
+    with_blade,
+)
+from fowt_env.plant.aero.station_response import put_rates, station_load
+from fowt_env.plant.aero.wind import (
+    Profile,
+    WindNow,
+    WindSeries,
+    power_profile,
+    profile_at,
+    profile_spans,
+    wind_at,
+)
+from fowt_env.plant.aero.wind_field import GridPlace, cell_wind
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.state import NO_LOAD, Pose, State, Wrench
+
+SLOW_ROTOR, FAST_ROTOR = 1.0, 2.0  # tip-speed ratios between which the induction fades in
+
+
+class RotorLoad(NamedTuple):
+    """Aerodynamic load of the rotor."""
+
+    wrench: Wrench  # about the body origin, body components; contains the torque
+    thrust: float  # N, along the shaft, downwind
+    torque: float  # N m, about the shaft
+
+
+class HubFlow(NamedTuple):
+    """Hub position in O, velocity of the hub and the wind relative to it in body components."""
+
+    X: float
+    Y: float
+    Z: float
+    vx: float
+    vy: float
+    vz: float
+    wx: float
+    wy: float
+    wz: float
+    speed: float  # of the relative wind, m/s
+
+
+class BladeForce(NamedTuple):
+    """Sum over a blade."""
+
+    load: BladeLoad
+    outside: int  # stations outside a table or a box: the sum is valid where it is 0
+
+
+class RotorFlow(NamedTuple):
+    """Wind about a rotor and its motion at an instant."""
+
+    t: float  # s
+    pose: Pose  # in rotor axes
+    hub: HubFlow
+    now: WindNow
+    series: WindSeries
+    field: object  # wind_field.WindField or None
+
+
+class Blade(NamedTuple):
+    """A blade at an instant."""
+
+    number: int  # 0, 1, ...
+    motion: BladeMotion
+    turn: Turn
+    response: object  # of station_response.py
+
+
+class SampledWind(NamedTuple):
+    """Wind of a blade, sampled at the place of every station."""
+
+    flow: RotorFlow
+    motion: BladeMotion
+
+
+class ShearedWind(NamedTuple):
+    """Wind relative to a blade in a series: Planes and factors on the Profile, in directions of the blade.
+
+    The tangential component is against the motion, as v_tangential.
+    """
+
+    height: Plane  # over that of the profile's centre, less 1
+    along: Plane
+    out: Plane
+    tangential: Plane
+    scaled_along: float
+    scaled_out: float
+    scaled_tangential: float
+    profile: Profile
+
+
+class BoxWind(NamedTuple):
+    """Wind of a blade in a box, with the place of a station on its grid."""
+
+    slice: Plane
+    column: Plane
+    row: Plane
+    pose: Pose  # in rotor axes
+    motion: BladeMotion
+    velocity: np.ndarray  # of the WindField
+
+
+NO_ROTOR_LOAD = RotorLoad(NO_LOAD, 0.0, 0.0)
+NO_FORCE = BladeForce(BladeLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0)
+UNKNOWN_FORCE = BladeForce(BladeLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 1)
+
+
+@kernel
+def hub_flow(t, pose, now, series, field, overhang, hub_height):
+    """Return the HubFlow at the rotor centre (-overhang, 0, hub_height)."""
+    X = pose.x - overhang * pose.r11 + hub_height * pose.r13
+    Y = pose.y - overhang * pose.r21 + hub_height * pose.r23
+    Z = pose.z - overhang * pose.r31 + hub_height * pose.r33
+    vx = pose.vx + pose.wy * hub_height
+    vy = pose.vy - pose.wx * hub_height - pose.wz * overhang
+    vz = pose.vz + pose.wy * overhang
+    u, v, w = wind_at(t, X, Y, Z, now, series, field)
+    wx = pose.r11 * u + pose.r21 * v + pose.r31 * w - vx
+    wy = pose.r12 * u + pose.r22 * v + pose.r32 * w - vy
+    wz = pose.r13 * u + pose.r23 * v + pose.r33 * w - vz
+    return HubFlow(X, Y, Z, vx, vy, vz, wx, wy, wz, sqrt(wx * wx + wy * wy + wz * wz))
+
+
+@inlined_kernel
+def rotor_flow(t, pose, now, series, field, elements):
+    """Return the RotorFlow at time t; pose in rotor axes (tilt.py), wind as in wind.wind_at."""
+    hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
+    return RotorFlow(t, pose, hub, now, series, field)
+
+
+@kernel
+def faded_induction(rotor_speed, wind_speed, elements):
+    """Return the fraction of the induction in a relative wind (m/s): 0 parked, 1 from FAST_ROTOR on."""
+    return smoothstep(rotor_speed * elements.tip_radius, SLOW_ROTOR * wind_speed, FAST_ROTOR * wind_speed)
+
+
+@inlined_kernel
+def motion_of(number, x, elements, flow):
+    """Return the BladeMotion of a blade (0, 1, ...)."""
+    psi = x[State.AZIMUTH] + 2.0 * pi * number / elements.blades
+    return blade_motion(psi, x[State.ROTOR_SPEED], flow.pose, flow.hub)
+
+
+@kernel
+def rotor_reach(tip_radius, shape):
+    """Return the largest distance of a station from the rotor centre, m."""
+    if shape is None:
+        return tip_radius
+    return shape.reach
+
+
+@kernel
+def is_sheared(hub, reach, field):
+    """Return whether a Profile describes the wind of the whole rotor: no box, not near the sea."""
+    if field is not None:
+        return False
+    return profile_spans(hub.Z - reach, hub.Z + reach)
+
+
+# ---------------------------------------------------------------------------- winds of a blade
+
+
+@inlined_kernel
+def sheared_wind(flow, motion, profile):
+    """Return the ShearedWind of a blade."""
+    pose, hub, now, series = flow.pose, flow.hub, flow.now, flow.series
+    height, left, length = hub.Z - series.reference_height, hub.Y, series.reference_length
+    vertical, horizontal = now.vertical_shear, now.horizontal_shear
+    one = (vertical * height + horizontal * left) / length
+    x = (vertical * pose.r31 + horizontal * pose.r21) / length
+    r = (vertical * motion.rz + horizontal * motion.ry) / length
+    t = (vertical * motion.tz + horizontal * motion.ty) / length
+    m, centre, scale = motion, profile.centre, profile.scale
+    return ShearedWind(
+        Plane(hub.Z / centre - 1.0, pose.r31 / centre, m.rz / centre, m.tz / centre),
+        Plane(
+            pose.r11 * one + pose.r31 * now.w - m.vx, pose.r11 * x, pose.r11 * r + m.wt, pose.r11 * t - m.wr
+        ),
+        Plane(m.rx * one + m.rz * now.w - m.vr, m.rx * x - m.wt, m.rx * r, m.rx * t + m.wx),
+        Plane(m.vt - m.tx * one - m.tz * now.w, -m.tx * x - m.wr, m.wx - m.tx * r, -m.tx * t),
+        scale * (pose.r11 * now.u + pose.r21 * now.v),
+        scale * (m.rx * now.u + m.ry * now.v),
+        -scale * (m.tx * now.u + m.ty * now.v),
+        profile,
+    )
+
+
+@inlined_kernel
+def box_wind(flow, motion, field):
+    """Return the BoxWind of a blade in a WindField."""
+    pose, hub = flow.pose, flow.hub
+    pace, slices = field.slowness * field.rate, field.velocity.shape[0]
+    place = (flow.t + field.shift - hub.X * field.slowness) * field.rate
+    if field.periodic:
+        place = place % slices
+    dy, dz = field.inverse_dy, field.inverse_dz
+    return BoxWind(
+        Plane(place, -pose.r11 * pace, -motion.rx * field.slowness * field.rate, -motion.tx * pace),
+        Plane((hub.Y - field.low_y) * dy, pose.r21 * dy, motion.ry * dy, motion.ty * dy),
+        Plane((hub.Z - field.low_z) * dz, pose.r31 * dz, motion.rz * dz, motion.tz * dz),
+        pose,
+        motion,
+        field.velocity,
+    )
+
+
+@inlined_kernel
+def _relative(u, v, w, at, pose, motion):
+    """Return (v_normal, v_tangential) of a station in the wind (u, v, w), inertial components, m/s."""
+    m = motion
+    along = value_at(Plane(pose.r11 * u + pose.r21 * v + pose.r31 * w - m.vx, 0.0, m.wt, -m.wr), at)
+    out = value_at(Plane(m.rx * u + m.ry * v + m.rz * w - m.vr, -m.wt, 0.0, m.wx), at)
+    own = value_at(Plane(m.vt, -m.wr, m.wx, 0.0), at)
+    return normal_part(along, out, at), own - (m.tx * u + m.ty * v + m.tz * w)
+
+
+@inlined_kernel
+def _sampled(wind, at):
+    flow, motion = wind.flow, wind.motion
+    pose, hub = flow.pose, flow.hub
+    u, v, w = wind_at(
+        flow.t,
+        value_at(Plane(hub.X, pose.r11, motion.rx, motion.tx), at),
+        value_at(Plane(hub.Y, pose.r21, motion.ry, motion.ty), at),
+        value_at(Plane(hub.Z, pose.r31, motion.rz, motion.tz), at),
+        flow.now,
+        flow.series,
+        flow.field,
+    )
+    v_normal, v_tangential = _relative(u, v, w, at, pose, motion)
+    return v_normal, v_tangential, 0
+
+
+@inlined_kernel
+def _sheared(wind, at):
+    shear = profile_at(value_at(wind.height, at), wind.profile)
+    along = value_at(wind.along, at) + wind.scaled_along * shear
+    out = value_at(wind.out, at) + wind.scaled_out * shear
+    return normal_part(along, out, at), value_at(wind.tangential, at) + wind.scaled_tangential * shear, 0
+
+
+@inlined_kernel
+def _boxed(wind, at):
+    place = GridPlace(value_at(wind.slice, at), value_at(wind.row, at), value_at(wind.column, at))
+    inside, u, v, w = cell_wind(place, wind.velocity)
+    v_normal, v_tangential = _relative(u, v, w, at, wind.pose, wind.motion)
+    return v_normal, v_tangential, 0 if inside else 1
+
+
+# (wind, at) -> (v_normal, v_tangential, 1 where the wind is not known there, else 0)
+relative_wind = chosen_by_class(
+    "wind", {SampledWind: _sampled, ShearedWind: _sheared, BoxWind: _boxed}, inlined=True
+)
+
+
+# --------------------------------------------------------------------------------- the sweep
+
+
+@inlined_kernel
+def _station(j, wind, blade, radius, shape):
+    """Return the StationLoad of station j of a Blade; outside counts that its wind is not known, too."""
+    v_normal, v_tangential, unknown = relative_wind(wind, station_at(j, blade.turn, radius, shape))
+    found = station_load(blade.response, v_normal, v_tangential, j)
+    outside = found.outside + unknown
+    return StationLoad(
+        found.normal, found.tangential, found.moment, found.length, found.first_moment, outside, found.rates
+    )
+
+
+@inlined_kernel
+def _with_station(force, found, j, blade, shape):
+    """Add the StationLoad of station j to a BladeForce."""
+    return BladeForce(add_station(force.load, found, j, blade.turn, shape), force.outside + found.outside)
+
+
+@inlined_kernel
+def swept(wind, blade, radius, shape):
+    """Return the BladeForce of a Blade.
+
+    wind    SampledWind, ShearedWind or BoxWind
+    radius  (n,) m, of the stations
+    shape   BladeShape, or None: straight blades in the rotor plane
+    """
+    force = NO_FORCE
+    for j in range(radius.shape[0]):
+        found = _station(j, wind, blade, radius, shape)
+        force = _with_station(force, found, j, blade, shape)
+        put_rates(found.rates, blade.response)
+    return force
+
+
+@inlined_kernel
+def swept_together(winds, blades, radius, shape):
+    """Return the BladeForce of each of three Blades.
+
+    A station of all three at a time keeps the processor busier than one blade after the other. What does not
+    differ between blades is computed once, so long as nothing is written in between: hence rates come last.
+    """
+    a = b = c = NO_FORCE
+    for j in range(radius.shape[0]):
+        p = _station(j, winds[0], blades[0], radius, shape)
+        q = _station(j, winds[1], blades[1], radius, shape)
+        r = _station(j, winds[2], blades[2], radius, shape)
+        a = _with_station(a, p, j, blades[0], shape)
+        b = _with_station(b, q, j, blades[1], shape)
+        c = _with_station(c, r, j, blades[2], shape)
+        put_rates(p.rates, blades[0].response)
+        put_rates(q.rates, blades[1].response)
+        put_rates(r.rates, blades[2].response)
+    return a, b, c
+
+
+@inlined_kernel
+def sheared_forces(p, q, r, flow, reach, radius, shape):
+    """Return the BladeForce of each of three Blades in a sheared wind; reach: rotor_reach."""
+    profile = power_profile(flow.hub.Z - reach, flow.hub.Z + reach, flow.series)
+    winds = (
+        sheared_wind(flow, p.motion, profile),
+        sheared_wind(flow, q.motion, profile),
+        sheared_wind(flow, r.motion, profile),
+    )
+    return swept_together(winds, (p, q, r), radius, shape)
+
+
+@kernel
+def store_blade_load(number, load, factor, pitches, blades):
+    """Put a factor times the BladeLoad of a blade into blades; nothing with one pitch for all blades."""
+    if pitches is None:
+        return
+    row = blades[number]
+    row[0], row[1], row[2] = factor * load.fx, factor * load.fr, factor * load.ft
+    row[3], row[4], row[5] = factor * load.mx, factor * load.mr, factor * load.mt
+
+
+@inlined_kernel
+def add_blade(total, blade, load, factor, pitches, blades):
+    """Add a BladeLoad to a Wrench about the rotor centre, and put factor times it into blades."""
+    store_blade_load(blade.number, load, factor, pitches, blades)
+    return with_blade(total, load, blade.motion)
+
+
+@kernel
+def rotor_axes_load(about_centre, factor, rotor):
+    """Return the RotorLoad of a Wrench about the rotor centre times a factor, in rotor axes."""
+    fx, fy, fz = factor * about_centre.fx, factor * about_centre.fy, factor * about_centre.fz
+    torque, height, overhang = factor * about_centre.mx, rotor.hub_height, rotor.overhang
+    return RotorLoad(
+        Wrench(
+            fx,
+            fy,
+            fz,
+            torque - height * fy,
+            factor * about_centre.my + height * fx + overhang * fz,
+            factor * about_centre.mz - overhang * fy,
+        ),
+        fx,
+        torque,
+    )
+
+
+@kernel
+def stations_outside(forces):
+    """Return how many stations of three BladeForces lie outside a table or a box."""
+    return forces[0].outside + forces[1].outside + forces[2].outside
+
+
+@inlined_kernel
+def load_of_three(p, q, r, forces, elements, pitches, blades):
+    """Return the RotorLoad of three Blades and their BladeForces over the air density."""
+    density = elements.air_density
+    total = add_blade(NO_LOAD, p, forces[0].load, density, pitches, blades)
+    total = add_blade(total, q, forces[1].load, density, pitches, blades)
+    total = add_blade(total, r, forces[2].load, density, pitches, blades)
+    return rotor_axes_load(total, density, elements)

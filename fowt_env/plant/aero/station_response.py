@@ -1,0 +1,298 @@
+"""Load of one blade station in a relative wind, by each of the rotor models that sweep over stations.
+
+A response is a NamedTuple that holds what a model needs for one blade. `station_load` finds the kernel by the
+class of the response:
+
+* Solved: blade element momentum, with the optional models of the wake (bem_rotor.py);
+* Tabled: the table of quasi-steady loads (section_table.py);
+* TabledOrSolved: the same, and blade element momentum for inflows outside the table;
+* Lagging: the tables of induced velocity and of load, with the states of dynamic inflow (section_inflow.py).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.aero.blade_elements import (
+    LARGEST_SPEED,
+    BladeElements,
+    airload,
+    blade_section,
+    element_of,
+    first_guess,
+    pitching_moment,
+    solve_section,
+)
+from fowt_env.plant.aero.blade_shape import BladeMotion, StationLoad, Turn, effective_pitch
+from fowt_env.plant.aero.wake import PER_ELEMENT, Skew, filtered_induction, pace, skew_factor
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.events import Counter
+
+# Directions: v_normal/(v_normal + |v_tangential|) in AHEAD cells, from the rotor plane to the shaft (where
+# this has a kink), then on in BEHIND cells to an inflow in the plane from behind (roots in cross wind).
+# Halving the cells of both variables divides the error by three, at four times the memory.
+AHEAD, BEHIND = 512, 64
+# further cells of the loads before the first: a wake that lags a lull may blow back through the rotor plane
+REVERSED = 64
+
+
+class Solved(NamedTuple):
+    """Response of a blade by blade element momentum."""
+
+    number: int  # of the blade
+    turn: Turn
+    motion: BladeMotion
+    induction: float  # 1: momentum balance, 0: none (parked rotor), between: faded
+    wind_speed: float  # m/s, relative to the hub
+    skewed: Skew
+    skew: object  # wake.SkewedWake or None
+    wake: object  # wake.DynamicInflow or None
+    x: np.ndarray  # state
+    dx: np.ndarray  # its rates, of which those of the wake are written
+    counters: np.ndarray
+    elements: BladeElements
+
+
+class Rows(NamedTuple):
+    """Two neighbouring rows of a table over blade pitch, and the place between them."""
+
+    low: np.ndarray  # (n, directions, components) float32
+    high: np.ndarray
+    fraction: float
+
+
+class Tabled(NamedTuple):
+    """Response of a blade by the table of quasi-steady loads over the air density."""
+
+    rows: Rows
+    arm: np.ndarray  # (n,) m, see section_table.SectionTable
+    shape: object  # BladeShape or None
+
+
+class TabledOrSolved(NamedTuple):
+    """As Tabled; blade element momentum where the table does not contain the inflow."""
+
+    tabled: Tabled
+    turn: Turn
+    elements: BladeElements
+    counters: np.ndarray
+
+
+class WakeRate(NamedTuple):
+    """Rates of the filters of dynamic inflow, 1/s."""
+
+    slow: float  # 1/tau_1 without induction
+    most: float  # largest of both filters
+
+
+class WakeRates(NamedTuple):
+    """Rates of the four wake states of a station, m/s2."""
+
+    first: int  # index of the first of the states
+    normal_0: float
+    normal_1: float
+    tangential_0: float
+    tangential_1: float
+
+
+class Lagging(NamedTuple):
+    """Response of a blade by the tables of dynamic inflow, loads over the air density."""
+
+    first: int  # index in the state of the blade's first wake state
+    induced: Rows  # of the quasi-steady induced velocity
+    load: Rows  # of the load
+    rate: WakeRate
+    ratio: np.ndarray  # (n,) tau_1 over tau_2
+    arm: np.ndarray  # (n,) m
+    shape: object  # BladeShape or None
+    x: np.ndarray  # state
+    dx: np.ndarray  # its rates, of which those of the wake are written
+
+
+class Cell(NamedTuple):
+    """Cell of an inflow direction, and the place in it."""
+
+    k: int
+    part: float
+
+
+# ------------------------------------------------------------------------- blade element momentum
+
+
+@inlined_kernel
+def _solved_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j, N/m."""
+    elements = response.elements
+    turned = effective_pitch(j, response.turn.pitch, elements.shape)
+    element = element_of(j, turned, elements)
+    guess = first_guess(v_normal, v_tangential, turned, j, elements)
+    section = solve_section(v_normal, v_tangential, response.induction, guess, element, elements.polars)
+    if not section.solved:
+        response.counters[Counter.BEM_FALLBACK] += 1.0
+    normal, tangential = _induced(section, v_normal, j, response, response.skew, response.wake)
+    v_normal, v_tangential = v_normal + normal, v_tangential + tangential
+    fn, ft = _induced_load(section, v_normal, v_tangential, element, elements, response.skew, response.wake)
+    moment = pitching_moment(v_normal, v_tangential, j, element, elements.shape, elements.polars)
+    return StationLoad(fn, ft, moment, elements.weight[j], elements.moment_weight[j], 0, None)
+
+
+@inlined_kernel
+def _induced(section, v_normal, j, response, skew, wake):
+    """Return the (normal, tangential) induced velocity of a station with the optional wake models, m/s."""
+    elements, motion = response.elements, response.motion
+    normal, tangential = filtered_induction(
+        section, v_normal, response.number, j, response.wind_speed, wake, response.x, response.dx,
+        elements.radius, elements.tip_radius,
+    )  # fmt: skip
+    span = elements.radius[j] / elements.tip_radius
+    normal *= skew_factor(normal, v_normal, motion.ey, motion.ez, span, response.skewed, skew)
+    return normal, tangential
+
+
+@kernel
+def _induced_load(section, v_normal, v_tangential, element, elements, skew, wake):
+    """Return (fn, ft), N/m, of a section in this local flow; those of the balance without wake models."""
+    if wake is None and skew is None:
+        return section.fn, section.ft
+    cn, ct, square = airload(v_normal, v_tangential, element, elements.polars)
+    return element.half_density_chord * square * cn, element.half_density_chord * square * ct
+
+
+# -------------------------------------------------------------------------------------- tables
+
+
+@inlined_kernel
+def cell_of(v_normal, v_tangential, total, first):
+    """Return the Cell of a direction in a table whose direction within the rotor plane has the index first.
+
+    total: |v_normal| + |v_tangential|. Any input is safe.
+    """
+    ahead = AHEAD * v_normal
+    place = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total + first
+    place = place if place > 0.0 else 0.0  # not a number too
+    k = min(int(place), first + AHEAD + BEHIND - 1)
+    return Cell(np.uintp(k), place - k)  # indices without sign are not tested for counting from the end
+
+
+@inlined_kernel
+def looked_up(cell, j, component, rows):
+    """Return a component of a table at a Cell of station j, bilinear between rows and directions."""
+    k, low, high, fraction = cell.k, rows.low, rows.high, rows.fraction
+    after = k + np.uintp(1)
+    here = (1.0 - fraction) * float(low[j, k, component]) + fraction * float(high[j, k, component])
+    there = (1.0 - fraction) * float(low[j, after, component]) + fraction * float(high[j, after, component])
+    return here + cell.part * (there - here)
+
+
+@inlined_kernel
+def _tabled_moment(cell, j, rows, shape):
+    """Return the pitching moment in a table; zero for straight blades, whose tables have none."""
+    if shape is None:
+        return 0.0
+    return looked_up(cell, j, 2, rows)
+
+
+@inlined_kernel
+def _tabled_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j over the air density."""
+    total = abs(v_normal) + abs(v_tangential)
+    cell, square = cell_of(v_normal, v_tangential, total, 0), total * total
+    outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED else 1
+    return StationLoad(
+        square * looked_up(cell, j, 0, response.rows),
+        square * looked_up(cell, j, 1, response.rows),
+        square * _tabled_moment(cell, j, response.rows, response.shape),
+        1.0,
+        response.arm[j],
+        outside,
+        None,
+    )
+
+
+@inlined_kernel
+def _tabled_or_solved_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j over the air density."""
+    found = _tabled_load(response.tabled, v_normal, v_tangential, j)
+    if found.outside == 0:
+        return found
+    return _exact_load(response, v_normal, v_tangential, j)
+
+
+@kernel
+def _exact_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j over the air density, by blade element momentum."""
+    elements, arm = response.elements, response.tabled.arm
+    turned = effective_pitch(j, response.turn.pitch, elements.shape)
+    section = blade_section(v_normal, v_tangential, turned, j, 1.0, elements)
+    if not section.solved:
+        response.counters[Counter.BEM_FALLBACK] += 1.0
+    moment = pitching_moment(
+        v_normal + section.induced_normal, v_tangential + section.induced_tangential, j,
+        element_of(j, turned, elements), elements.shape, elements.polars,
+    )  # fmt: skip
+    # without air there is no load here either: the sums are multiplied by the density afterwards
+    weight = elements.weight[j] / elements.air_density if elements.air_density > 0.0 else 0.0
+    return StationLoad(weight * section.fn, weight * section.ft, weight * moment, 1.0, arm[j], 0, None)
+
+
+@inlined_kernel
+def _lagging_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j over the air density, with WakeRates.
+
+    The filter is that of wake.filtered_induction.
+    """
+    x, rate = response.x, response.rate
+    total = abs(v_normal) + abs(v_tangential)
+    cell = cell_of(v_normal, v_tangential, total, 0)
+    steady_normal = total * looked_up(cell, j, 0, response.induced)
+    steady_tangential = total * looked_up(cell, j, 1, response.induced)
+    slow = pace(-steady_normal / v_normal) * rate.slow
+    fast = min(slow * response.ratio[j], rate.most)
+    slow = min(slow, rate.most)
+    i = response.first + PER_ELEMENT * j
+    a, b, c, d = np.uintp(i), np.uintp(i + 1), np.uintp(i + 2), np.uintp(i + 3)
+    first_normal, normal, first_tangential, tangential = x[a], x[b], x[c], x[d]
+    through, along = v_normal + normal, v_tangential + tangential
+    known = through > 0.0 or REVERSED * v_tangential >= -AHEAD * through
+    outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1
+    local = abs(through) + abs(along)
+    cell, square = cell_of(through, along, local, REVERSED), local * local
+    return StationLoad(
+        square * looked_up(cell, j, 0, response.load),
+        square * looked_up(cell, j, 1, response.load),
+        square * _tabled_moment(cell, j, response.load, response.shape),
+        1.0,
+        response.arm[j],
+        outside,
+        WakeRates(
+            i,
+            (0.4 * steady_normal - first_normal) * slow,
+            (first_normal + 0.6 * steady_normal - normal) * fast,
+            (0.4 * steady_tangential - first_tangential) * slow,
+            (first_tangential + 0.6 * steady_tangential - tangential) * fast,
+        ),
+    )
+
+
+@inlined_kernel
+def put_rates(rates, response):
+    """Put the WakeRates of a station into dx; nothing without any."""
+    if rates is None:
+        return
+    i, dx = rates.first, response.dx
+    dx[np.uintp(i)], dx[np.uintp(i + 1)] = rates.normal_0, rates.normal_1
+    dx[np.uintp(i + 2)], dx[np.uintp(i + 3)] = rates.tangential_0, rates.tangential_1
+
+
+# (response, v_normal, v_tangential, j) -> StationLoad of station j in this relative wind, m/s
+station_load = chosen_by_class(
+    "response",
+    {
+        Solved: _solved_load,
+        Tabled: _tabled_load,
+        TabledOrSolved: _tabled_or_solved_load,
+        Lagging: _lagging_load,
+    },
+    inlined=True,
+)

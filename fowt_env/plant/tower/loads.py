@@ -1,0 +1,107 @@
+"""Loads on a tower that bends: of nacelle and rotor, of its structure and of the weight (theory.md, 2.5)."""
+
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.state import Wrench
+from fowt_env.plant.tower.modes import from_nacelle
+
+
+@kernel
+def carried(load, bend):
+    """Return a wrench in nacelle axes about their origin as one in body axes about the body origin."""
+    if bend is None:
+        return load
+    fx, fy, fz = from_nacelle(bend, load.fx, load.fy, load.fz)
+    mx, my, mz = from_nacelle(bend, load.mx + bend.z * load.fy, load.my - bend.z * load.fx, load.mz)
+    return Wrench(
+        fx, fy, fz,
+        mx + bend.y * fz - bend.z * fy,
+        my + bend.z * fx - bend.x * fz,
+        mz + bend.x * fy - bend.y * fx,
+    )  # fmt: skip
+
+
+@kernel
+def add_modal(load, bend, tower, modal):
+    """Add to modal (n,) the generalised forces of a wrench of the nacelle; nothing with a rigid tower."""
+    if bend is None:
+        return
+    fx, fy, _ = from_nacelle(bend, load.fx, load.fy, load.fz)
+    turning = bend.cb * (load.my - bend.z * load.fx) - bend.sb * load.mz
+    rolling = load.mx + bend.z * load.fy
+    for i in range(0, len(tower.count), 2):
+        modal[i] += fx + tower.slope[i] * turning
+        modal[i + 1] += fy - tower.slope[i + 1] * rolling
+
+
+@inlined_kernel
+def begin_modal(x, tower, modal):
+    """Set modal (n,) to the generalised forces of the tower's structure; nothing with a rigid tower."""
+    if tower is None:
+        return
+    n = len(tower.count)
+    q, v = tower.first, tower.first + n
+    for i in range(n):
+        force = 0.0
+        for j in range(n):
+            force -= tower.stiffness[i, j] * x[q + j] + tower.damping[i, j] * x[v + j]
+        modal[i] = force
+
+
+@inlined_kernel
+def shortening(x, tower):
+    """Return the first moment of mass (kg m) by which bending lowers the masses towards the tower base."""
+    n, q = len(tower.count), tower.first
+    total = 0.0
+    for i in range(n):
+        for j in range(n):
+            total += 0.5 * x[q + i] * tower.weight_stiffness[i, j] * x[q + j]
+    return total
+
+
+@inlined_kernel
+def displaced_moment(x, bend, tower):
+    """Return (x, y, z), kg m: change of the turbine's first moment of mass by bending, platform axes."""
+    n, q = len(tower.count), tower.first
+    dx = dy = 0.0
+    for i in range(0, n, 2):
+        dx += tower.first_moment[i] * x[q + i]
+        dy += tower.first_moment[i + 1] * x[q + i + 1]
+    s, m = tower.upper_moment, tower.upper_mass
+    sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
+    return dx + m * bend.x + sx - s[0], dy + m * bend.y + sy - s[1], sz - s[2] - shortening(x, tower)
+
+
+@kernel
+def add_bent_weight(load, pose, x, bend, tower, gravity):
+    """Add to the load the moment by bending of the weight of a straight turbine."""
+    if bend is None:
+        return load
+    sx, sy, sz = displaced_moment(x, bend, tower)
+    g, nx, ny, nz = gravity, pose.r31, pose.r32, pose.r33
+    return Wrench(
+        load.fx, load.fy, load.fz,
+        load.mx + g * (sz * ny - sy * nz),
+        load.my + g * (sx * nz - sz * nx),
+        load.mz + g * (sy * nx - sx * ny),
+    )  # fmt: skip
+
+
+@kernel
+def add_modal_weight(pose, x, bend, tower, gravity, modal):
+    """Add to modal (n,) the generalised forces of the weight; nothing with a rigid tower."""
+    if bend is None:
+        return
+    n, q, g = len(tower.count), tower.first, gravity
+    s, m = tower.upper_moment, tower.upper_mass
+    nx, ny, nz = pose.r31, pose.r32, pose.r33
+    sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
+    turning = sx * nz - sz * nx  # moment about the top over g, along y
+    rolling = bend.ca * (sz * ny - sy * nz) - bend.sa * (sy * nx - sx * ny)  # along the turned x axis
+    for i in range(n):
+        raised = 0.0
+        for j in range(n):
+            raised += tower.weight_stiffness[i, j] * x[q + j]
+        modal[i] += g * nz * raised
+    for i in range(0, n, 2):
+        modal[i] += g * (tower.slope[i] * turning - (m + tower.first_moment[i]) * nx)
+        modal[i + 1] -= g * (tower.slope[i + 1] * rolling + (m + tower.first_moment[i + 1]) * ny)
