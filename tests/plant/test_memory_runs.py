@@ -6,7 +6,7 @@ import pytest
 from fowt_env import build_scene
 from fowt_env.analysis.linear_model import linearize, natural_periods
 from fowt_env.descriptions.platform import read_platform
-from fowt_env.envs.snapshot import DATA_CARRIED
+from fowt_env.envs.snapshot import CARRIED
 from fowt_env.plant.advance import advance
 from fowt_env.plant.state import STATES, State, pose_of
 from fowt_env.scene.radiation_fit import fit_radiation
@@ -140,7 +140,7 @@ def test_a_snapshot_carries_the_memory(platform, form):
     x[State.HEAVE], x[State.YAW] = 3.0, 0.1
     advance(scene.handle(data), x, u, 0, 60, scene.dt)
     y, copy = x.copy(), scene.data()
-    for name in DATA_CARRIED:
+    for name in CARRIED["data"]:
         getattr(copy, name)[:] = getattr(data, name)
     for state, arrays in ((x, data), (y, copy)):
         advance(scene.handle(arrays), state, u, 60, 60, scene.dt)

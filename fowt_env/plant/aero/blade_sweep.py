@@ -15,7 +15,6 @@ from fowt_env.plant.aero.blade_shape import (
     BladeLoad,
     BladeMotion,
     Plane,
-    StationLoad,
     Turn,
     add_station,
     blade_motion,
@@ -69,7 +68,7 @@ class BladeForce(NamedTuple):
     """Sum over a blade."""
 
     load: BladeLoad
-    outside: int  # stations outside a table or a box: the sum is valid where it is 0
+    outside: int  # stations outside a table: the sum is valid where it is 0
 
 
 class RotorFlow(NamedTuple):
@@ -211,6 +210,30 @@ def sheared_wind(flow, motion, profile):
     )
 
 
+@kernel
+def rotor_depth(pose, reach, shape):
+    """Return the largest distance of a station from the rotor centre along the mean wind, m."""
+    if shape is None:
+        return reach * sqrt(pose.r12 * pose.r12 + pose.r13 * pose.r13)
+    return reach
+
+
+@kernel
+def is_boxed(flow, reach, shape, field):
+    """Return whether the grid of a box holds the whole rotor; field None: no."""
+    if field is None:
+        return False
+    size, hub = field.velocity.shape, flow.hub
+    late = rotor_depth(flow.pose, reach, shape) * field.slowness * field.rate
+    place = (flow.t + field.shift - hub.X * field.slowness) * field.rate
+    if field.periodic:
+        place = place % size[0]
+    y, z = (hub.Y - field.low_y) * field.inverse_dy, (hub.Z - field.low_z) * field.inverse_dz
+    dy, dz = reach * field.inverse_dy, reach * field.inverse_dz
+    timely = late <= place < size[0] - 1.0 - late
+    return timely and dy <= y < size[2] - 1.0 - dy and dz <= z < size[1] - 1.0 - dz
+
+
 @inlined_kernel
 def box_wind(flow, motion, field):
     """Return the BoxWind of a blade in a WindField."""
@@ -253,8 +276,7 @@ def _sampled(wind, at):
         flow.series,
         flow.field,
     )
-    v_normal, v_tangential = _relative(u, v, w, at, pose, motion)
-    return v_normal, v_tangential, 0
+    return _relative(u, v, w, at, pose, motion)
 
 
 @inlined_kernel
@@ -262,18 +284,17 @@ def _sheared(wind, at):
     shear = profile_at(value_at(wind.height, at), wind.profile)
     along = value_at(wind.along, at) + wind.scaled_along * shear
     out = value_at(wind.out, at) + wind.scaled_out * shear
-    return normal_part(along, out, at), value_at(wind.tangential, at) + wind.scaled_tangential * shear, 0
+    return normal_part(along, out, at), value_at(wind.tangential, at) + wind.scaled_tangential * shear
 
 
 @inlined_kernel
 def _boxed(wind, at):
     place = GridPlace(value_at(wind.slice, at), value_at(wind.row, at), value_at(wind.column, at))
-    inside, u, v, w = cell_wind(place, wind.velocity)
-    v_normal, v_tangential = _relative(u, v, w, at, wind.pose, wind.motion)
-    return v_normal, v_tangential, 0 if inside else 1
+    u, v, w = cell_wind(place, wind.velocity)
+    return _relative(u, v, w, at, wind.pose, wind.motion)
 
 
-# (wind, at) -> (v_normal, v_tangential, 1 where the wind is not known there, else 0)
+# (wind, at) -> (v_normal, v_tangential)
 relative_wind = chosen_by_class(
     "wind", {SampledWind: _sampled, ShearedWind: _sheared, BoxWind: _boxed}, inlined=True
 )
@@ -284,13 +305,9 @@ relative_wind = chosen_by_class(
 
 @inlined_kernel
 def _station(j, wind, blade, radius, shape):
-    """Return the StationLoad of station j of a Blade; outside counts that its wind is not known, too."""
-    v_normal, v_tangential, unknown = relative_wind(wind, station_at(j, blade.turn, radius, shape))
-    found = station_load(blade.response, v_normal, v_tangential, j)
-    outside = found.outside + unknown
-    return StationLoad(
-        found.normal, found.tangential, found.moment, found.length, found.first_moment, outside, found.rates
-    )
+    """Return the StationLoad of station j of a Blade."""
+    v_normal, v_tangential = relative_wind(wind, station_at(j, blade.turn, radius, shape))
+    return station_load(blade.response, v_normal, v_tangential, j)
 
 
 @inlined_kernel
@@ -386,7 +403,7 @@ def rotor_axes_load(about_centre, factor, rotor):
 
 @kernel
 def stations_outside(forces):
-    """Return how many stations of three BladeForces lie outside a table or a box."""
+    """Return how many stations of three BladeForces lie outside a table."""
     return forces[0].outside + forces[1].outside + forces[2].outside
 
 

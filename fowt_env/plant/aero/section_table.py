@@ -38,6 +38,7 @@ from fowt_env.plant.aero.blade_sweep import (
     add_blade,
     box_wind,
     faded_induction,
+    is_boxed,
     is_sheared,
     load_of_three,
     motion_of,
@@ -187,9 +188,11 @@ def tabled_blade(number, first, x, flow, table, pitches):
 
 
 @inlined_kernel
-def box_force(blade, flow, field, elements):
-    """Return the BladeForce in a box of wind; without a box one that is not known."""
+def box_force(blade, flow, field, boxed, elements):
+    """Return the BladeForce in a box of wind that holds the rotor (boxed); else one that is not known."""
     if field is None:
+        return UNKNOWN_FORCE
+    if not boxed:
         return UNKNOWN_FORCE
     return swept(box_wind(flow, blade.motion, field), blade, elements.radius, elements.shape)
 
@@ -232,10 +235,10 @@ def section_table_load(t, pose, x, now, series, field, table, counters, pitches,
         forces = sheared_forces(p, q, r, flow, reach, elements.radius, shape)
         if stations_outside(forces) == 0:
             return load_of_three(p, q, r, forces, elements, pitches, blades)
-    total = NO_LOAD
+    total, boxed = NO_LOAD, is_boxed(flow, reach, shape, field)
     for number in range(elements.blades):
         blade = tabled_blade(number, first, x, flow, table, pitches)
-        force = box_force(blade, flow, field, elements)
+        force = box_force(blade, flow, field, boxed, elements)
         if force.outside > 0:
             force = sampled_force(blade, flow, elements, counters)
         total = add_blade(total, blade, force.load, density, pitches, blades)

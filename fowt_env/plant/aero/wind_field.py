@@ -85,11 +85,8 @@ def _across(velocity, cut, row, column, component, p, q, r, d):
 
 @inlined_kernel
 def cell_wind(place, velocity):
-    """Return (inside, u, v, w): wind of a box at a GridPlace, m/s, valid where inside is True."""
+    """Return (u, v, w) of a box at a GridPlace within its grid, m/s."""
     s, y, z = place.slice, place.column, place.row
-    slices, rows, columns = velocity.shape[0] - 1.0, velocity.shape[1] - 1.0, velocity.shape[2] - 1.0
-    inside = 0.0 <= s < slices and 0.0 <= y < columns and 0.0 <= z < rows
-    s, y, z = (s, y, z) if inside else (0.0, 0.0, 0.0)
     # indices without sign are not tested for counting from the end
     now, row, column = np.uintp(s), np.uintp(z), np.uintp(y)
     late, up, left = s - float(now), z - float(row), y - float(column)
@@ -106,4 +103,4 @@ def cell_wind(place, velocity):
     u += late * _across(velocity, after, row, column, 0, p, q, r, d)
     v += late * _across(velocity, after, row, column, 1, p, q, r, d)
     w += late * _across(velocity, after, row, column, 2, p, q, r, d)
-    return inside, u, v, w
+    return u, v, w

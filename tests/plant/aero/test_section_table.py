@@ -10,7 +10,7 @@ from rotor_helpers import move_platform, put_load, series_of
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.plant.aero.blade_elements import blade_section, build_blade_elements
-from fowt_env.plant.aero.blade_sweep import NO_ROTOR_LOAD, rotor_flow
+from fowt_env.plant.aero.blade_sweep import NO_ROTOR_LOAD, is_boxed, rotor_flow
 from fowt_env.plant.aero.section_table import (
     COARSE_END,
     DENSE_START,
@@ -264,7 +264,8 @@ def blade_sums(t, x, series, field, table, counters, quick, plain):
     elements = table.elements
     flow = rotor_flow(t, pose_of(x), wind_now(t, series), series, field, elements)
     blade = tabled_blade(0, turn_and_response(x[State.BLADE_PITCH], table), x, flow, table, None)
-    a = box_force(blade, flow, field, elements)
+    boxed = is_boxed(flow, elements.tip_radius, None, field)
+    a = box_force(blade, flow, field, boxed, elements)
     b = sampled_force(blade, flow, elements, counters)
     for out, force in ((quick, a), (plain, b)):
         out[0], out[1], out[2], out[3] = force.load.fx, force.load.ft, force.load.mx, force.load.mt
