@@ -139,7 +139,7 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
     "wind nan": (built(wind=np.nan), InputError, "wind = nan"),
     "wind in a list": (built(wind=[18]), InputError, "wind = [18]: KIND:SPEED[:CLASS]"),
     "wind without kind": (built(wind={"speed": 18}), InputError, "wind.kind " + " ".join(ALL_KINDS)),
-    "turbulence class D": (built(wind="ntm:18:D"), InputError, "wind.class 'D' A, A+, B, C"),
+    "turbulence class D": (built(wind="ntm:18:D"), InputError, "wind.class 'D' A+, A, B, C"),
     "kind of others": (built(wind={"kind": "turbsim"}), InputError, "'turbsim' called 'bts' .bts file"),
     "kind as a text": (built(wind="turbsim"), InputError, "ntm:18:B .bts .wnd .csv box of TurbSim"),
     "no such box": (built(wind="x.bts"), InputError, "'x.bts': no such file"),
