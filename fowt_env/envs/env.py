@@ -764,10 +764,19 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def view(self) -> "View":
         """Return copies of the arrays of the present instant."""
         run = self._episode
-        found = {"state": run.x, "in_force": run.u, "baseline_memory": run.memory, "estimate": run.estimate}
-        found |= {name: getattr(run.link, name) for name in ("command", "measurement", "reading")}
-        found |= {name: getattr(run, name) for name in ("action", "ahead", "terms")}
-        return View(**{name: None if a is None else a.copy() for name, a in found.items()})
+        link, estimate = run.link, run.estimate
+        return View(
+            run.x.copy(),
+            run.u.copy(),
+            link.command.copy(),
+            link.measurement.copy(),
+            link.reading.copy(),
+            run.action.copy(),
+            run.ahead.copy(),
+            run.terms.copy(),
+            run.memory.copy(),
+            None if estimate is None else estimate.copy(),
+        )
 
     def render(self) -> np.ndarray | None:
         """Picture of the present instant, (height, width, 3) uint8; None in mode "human", which shows it.

@@ -92,7 +92,7 @@ def read_settings(records: Mapping[str, Any], keywords: Mapping[str, Any]) -> Se
 
     Keywords that no record has are options of build_scene. Raises: InputError for unknown ones.
     """
-    found = {}
+    found: dict[str, Any] = {}
     for name, kind in RECORDS.items():
         record = records.get(name)
         if record is not None and not isinstance(record, kind):

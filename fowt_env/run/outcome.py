@@ -39,7 +39,8 @@ def run_frame(
     values = scene.values(rows, overwrite=True)
     frame = pd.DataFrame(values, columns=[c.column for c in scene.channels])
     frame.attrs["events"] = counted(counters)
-    frame.attrs["torque_limited"] = float(np.count_nonzero(values[:-1, Out.GENTQLIM]) * period)
+    limited = values[:-1, int(Out["GENTQLIM"])]
+    frame.attrs["torque_limited"] = float(np.count_nonzero(limited) * period)
     frame.attrs["doubtful_commands"] = ""
     facts = dict.fromkeys(("tripped", "trip", "stop")) if watch is None else stop_facts(watch)
     frame.attrs |= facts

@@ -34,7 +34,7 @@ from fowt_env.errors import (
     level_outside,
     unknown_keyword,
 )
-from fowt_env.loop.interface import Interface, interface_data
+from fowt_env.loop.interface import interface_data
 from fowt_env.loop.rollout import Schedule, begin_command, rollout
 from fowt_env.plant.advance import RUNNING, STOP_REASONS, TRIPPED
 from fowt_env.plant.channels import Out
@@ -289,7 +289,7 @@ def _controllers_own():
 class Run:
     """One run of a scene in chunks, with the control law inside the compiled loop if it is compiled."""
 
-    def __init__(self, scene, controller, x, u, schedule: Schedule, interface: Interface):
+    def __init__(self, scene, controller, x, u, schedule, interface):
         self.scene = scene
         self.controller = controller
         self.data = scene.data()
