@@ -7,7 +7,7 @@ import pytest
 
 from fowt_env import build_scene, simulate
 from fowt_env.errors import InputError
-from fowt_env.plant.advance import rollout
+from fowt_env.loop.rollout import rollout
 from fowt_env.plant.aero.load import BemRotor
 from fowt_env.plant.hydro.load import ExactStrips
 from fowt_env.scene.options import ARGUMENTS
