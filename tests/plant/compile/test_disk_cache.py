@@ -407,7 +407,7 @@ def keys(code, cache):
 def test_an_edit_of_a_text_or_a_plot_compiles_nothing(tmp_path):
     code, cache = copied_code(tmp_path), tmp_path / "cache"
     before = keys(code, cache)
-    assert {"envs/episode.py", "envs/rewards.py", "simulation.py"} < set(before) and before["loaded"] == "0"
+    assert {"envs/episode.py", "envs/rewards.py", "run/simulation.py"} < set(before) and before["loaded"] == "0"
     for folder in LOOKS:
         edit(code / folder)
     rewards = code / "fowt_env" / "envs" / "rewards.py"
@@ -419,7 +419,7 @@ def test_an_edit_of_a_text_or_a_plot_compiles_nothing(tmp_path):
     after = keys(code, cache)
     changed = {name for name in before if after[name] != before[name]} - {"loaded"}
     assert {"envs/rewards.py", "envs/episode.py"} <= changed
-    assert not {"folder", "simulation.py", "controllers/pi.py"} & changed
+    assert not {"folder", "run/simulation.py", "controllers/pi.py"} & changed
 
 
 @pytest.mark.parametrize(
