@@ -107,7 +107,7 @@ def test_lists_of_a_series_are_data_and_not_ranges():
     [
         ({"name": ""}, "task.name"),
         ({"wind": None}, "needs a wind"),
-        ({"wind": {"kind": "ntm", "speed": (12.0, 240.0)}}, "240.0: must be in"),
+        ({"wind": {"kind": "ntm", "speed": (12.0, 240.0)}}, "240.0: must be a number in"),
         ({"wind": {"kind": "ntm", "speed": (24.0, 12.0)}}, "low end must not exceed"),
         ({"wind": {"kind": "ntmm", "speed": 12.0}}, "Did you mean 'ntm'"),
         ({"sea": {"kind": "joint", "table": "gulf_of_main_normal"}}, "Did you mean 'gulf_of_maine_normal'"),
