@@ -335,7 +335,7 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLA
     row["simulate_x"] = float("nan")
     if not kind.parked:  # simulate starts from the running rotor
         law = "pi" if kind.controlled else None
-        run = partial(simulate, scene, law, duration=seconds, start=kind.begin)
+        run = partial(simulate, scene, law, duration=seconds, initial=kind.begin)
         row["simulate_x"] = seconds / median_time(run, repeats)
     return row | {f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()}
 

@@ -456,7 +456,7 @@ def test_an_edit_of_what_a_controllers_module_imports_from_its_project_changes_i
     for name in PROJECT:
         path = tmp_path / name
         before = path.read_text()
-        path.write_text(before + "# edited\n")
+        path.write_text(before + "EDITED = True\n")
         assert (provenance.controller_code(controller)["code"] != known) == (name != "other.py"), name
         path.write_text(before)
     assert provenance.controller_code(controller)["code"] == known
