@@ -221,9 +221,9 @@ assert fowt_env.__file__.startswith({folder!r})
 scene = build_scene(integrator="midpoint", hydrodynamics=False)
 assert scene.dt == 0.05
 fine = build_scene(integrator="rk4", hydrodynamics=False)
-start = {{"PtfmSurge": 1.0, "PtfmHeave": -20.0}}
+start = {{"start": "zero", "PtfmSurge": 1.0, "PtfmHeave": -20.0}}
 ends = [
-    simulate(of, None, duration=0.4, dt=dt, control_dt=0.4, output_dt=0.4, initial={{"start": "zero"}} | start)
+    simulate(of, None, duration=0.4, dt=dt, control_dt=0.4, output_dt=0.4, initial=start)
     for of, dt in ((fine, 0.0125), (scene, 0.1), (scene, 0.05))
 ]
 exact, coarse, half = (frame["PtfmHeave_[m]"].iloc[-1] for frame in ends)

@@ -407,7 +407,8 @@ def keys(code, cache):
 def test_an_edit_of_a_text_or_a_plot_compiles_nothing(tmp_path):
     code, cache = copied_code(tmp_path), tmp_path / "cache"
     before = keys(code, cache)
-    assert {"envs/episode.py", "envs/rewards.py", "run/simulation.py"} < set(before) and before["loaded"] == "0"
+    assert {"envs/episode.py", "envs/rewards.py", "run/simulation.py"} < set(before)
+    assert before["loaded"] == "0"
     for folder in LOOKS:
         edit(code / folder)
     rewards = code / "fowt_env" / "envs" / "rewards.py"
