@@ -348,7 +348,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         baseline_law = None
         parameters, memory = np.zeros(1), np.zeros(1)
         if mode == ActionMode.RESIDUAL:
-            self._baseline = named_baseline(self.baseline, self.design_scene.turbine, self.control_dt)
+            own = deepcopy(self.baseline)  # environments of a batch do not share the memory of an object
+            self._baseline = named_baseline(own, self.design_scene.turbine, self.control_dt)
             baseline_law = self._baseline.law
             parameters, memory = self._baseline.parameters, self._baseline.memory
         self._estimator = estimator_law = None

@@ -62,6 +62,12 @@ def test_the_baseline_of_an_environment_reads_nan_where_it_does_not_declare(prot
         assert np.isfinite(read).tolist() == [declared, declared, True, False]
 
 
+def test_environments_of_a_batch_do_not_share_the_memory_of_a_baseline():
+    batch = FowtVectorEnv(2, **STILL, action_mode="residual", baseline=RotorSpeedLaw())
+    memories = [env._episode.memory for env in batch.envs]
+    assert not np.shares_memory(*memories)
+
+
 def test_a_law_reads_its_last_command_and_not_what_a_fault_made_of_it():
     """lqr predicts with the command in force; a drive that runs away does not show it another one."""
     law, scene = CommandLaw(), fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="fast")
