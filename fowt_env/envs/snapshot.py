@@ -12,7 +12,7 @@ CARRIED = {
     ),
     "link": ("measurement", "reading", "law_reading", "command", "past", "motion", "watch", "held"),
     "data": (
-        "lines", "counters", "stages", "cache", "added_mass", "user", "history", "samples", "radiation",
+        "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples", "radiation",
         "blades", "elastic",
     ),
 }  # fmt: skip

@@ -9,6 +9,7 @@ from math import sqrt
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
 from fowt_env.plant.state import State
 from fowt_env.plant.tilt import along_shaft
@@ -26,8 +27,8 @@ from fowt_env.plant.tower.modes import TowerModes, bend_by_modes
 
 
 @kernel
-def solve_spd(a, b):
-    """Solve a b = b in place; a is (6, 6) symmetric positive definite and is overwritten.
+def factor_spd(a):
+    """Put the factors of a symmetric positive definite matrix a (6, 6) in its place.
 
     L D L^T with the reciprocals of D kept on the diagonal: six divisions and no root.
     """
@@ -43,12 +44,11 @@ def solve_spd(a, b):
             pivot -= scaled * a[i, j]
             a[i, j] = scaled  # L
         a[i, i] = 1.0 / pivot
-    substitute_spd(a, b)
 
 
 @kernel
 def substitute_spd(a, b):
-    """Solve for another right-hand side b in place, with what solve_spd has left of the matrix."""
+    """Solve for a right-hand side b (6,) in place, with the factors of factor_spd."""
     for i in range(6):
         total = b[i]
         for k in range(i):
@@ -86,8 +86,12 @@ def accelerate_in_plane(pose, load, torque, added, body, dx):
 
 
 @kernel
-def accelerate(pose, x, load, torque, added, body, matrix, dx):
-    """Solve (M1 + A_a, M2; M2^T, I_rx) (nu', w_b') = loads - C1 nu - C2 w_b into dx."""
+def accelerate(pose, x, load, torque, added, body, matrix, cache, dx):
+    """Solve (M1 + A_a, M2; M2^T, I_rx) (nu', w_b') = loads - C1 nu - C2 w_b into dx.
+
+    The mass matrix depends on the state alone: its factors stay in matrix (6, 6) until the loads are
+    evaluated at another state, which clears the entry FACTORED of the cache.
+    """
     b = dx[State.VX : State.WZ + 1]
     if body.platform_fixed:
         b[:] = 0.0
@@ -103,34 +107,44 @@ def accelerate(pose, x, load, torque, added, body, matrix, dx):
     b[3] = load.mx - c.mx
     b[4] = load.my - c.my
     b[5] = load.mz - c.mz
-    for i in range(6):
-        for j in range(6):
-            matrix[i, j] = body.mass_matrix[i, j] + added[i, j]
+    ratio = 0.0 if body.rotor_fixed else body.coupling / body.rotor_row
+    if cache[LoadCache.FACTORED] < 0.5:
+        for i in range(6):
+            for j in range(6):
+                matrix[i, j] = body.mass_matrix[i, j] + added[i, j]
+        _take_rotor_row(ratio * body.coupling, matrix, body.tilt)
+        factor_spd(matrix)
+        cache[LoadCache.FACTORED] = 1.0
+    _take_rotor_moment(ratio * torque, b, body.tilt)
+    substitute_spd(matrix, b)
     if body.rotor_fixed:
-        solve_spd(matrix, b)
         dx[State.ROTOR_SPEED] = 0.0
         return
-    ratio = body.coupling / body.rotor_row
-    _eliminate(ratio * body.coupling, ratio * torque, matrix, b, body.tilt)
-    solve_spd(matrix, b)
     turning = along_shaft(b[3], b[5], body.tilt)
     dx[State.ROTOR_SPEED] = (torque - body.coupling * turning) / body.rotor_row
 
 
 @kernel
-def _eliminate(inertia, moment, matrix, b, tilt):
-    """Take the rotor row out of the matrix and the right-hand side: both lie along the shaft."""
+def _take_rotor_row(inertia, matrix, tilt):
+    """Take the rotor's row out of the matrix: its inertia lies along the shaft."""
     if tilt is None:
         matrix[3, 3] -= inertia
-        b[3] -= moment
         return
     c, s = tilt.cosine, tilt.sine
     matrix[3, 3] -= c * c * inertia
     matrix[3, 5] += c * s * inertia
     matrix[5, 3] += c * s * inertia
     matrix[5, 5] -= s * s * inertia
-    b[3] -= c * moment
-    b[5] += s * moment
+
+
+@kernel
+def _take_rotor_moment(moment, b, tilt):
+    """Take the rotor's row out of the right-hand side: its moment lies along the shaft."""
+    if tilt is None:
+        b[3] -= moment
+        return
+    b[3] -= tilt.cosine * moment
+    b[5] += tilt.sine * moment
 
 
 @inlined_kernel
@@ -262,11 +276,11 @@ def find_modes(matrix, b, modal, n):
 
 
 @kernel
-def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
+def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache, dx):
     """Put the accelerations of platform, deflections and rotor into dx.
 
     load: on the whole turbine, about the body origin. dx comes with the generalised forces on the deflections
-    where it has the rates of their velocities. matrix (6 + n, 6 + n) is scratch.
+    where it has the rates of their velocities. matrix (6 + n, 6 + n) keeps its factors as in accelerate.
     """
     n = len(tower.count)
     b, modal = dx[State.VX : State.WZ + 1], dx[tower.first + n : tower.first + 2 * n]
@@ -290,17 +304,21 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, dx):
     b[5] = load.mz - c.mz - e.mz - mz - bend.x * fy + bend.y * fx
     _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
 
-    for i in range(6):
-        for j in range(i + 1):
-            matrix[i, j] = tower.lower[i, j] + added[i, j]
-    _add_body(matrix, d, free, mass, bend)
-    _add_modes(x, free, mass, bend, tower, matrix)
-    _factor_modes(matrix, n)
+    if cache[LoadCache.FACTORED] < 0.5:
+        for i in range(6):
+            for j in range(i + 1):
+                matrix[i, j] = tower.lower[i, j] + added[i, j]
+        _add_body(matrix, d, free, mass, bend)
+        _add_modes(x, free, mass, bend, tower, matrix)
+        _factor_modes(matrix, n)
+        if not body.platform_fixed:
+            factor_spd(matrix)
+        cache[LoadCache.FACTORED] = 1.0
     without_modes(matrix, b, modal, n)
     if body.platform_fixed:
         b[:] = 0.0
     else:
-        solve_spd(matrix, b)
+        substitute_spd(matrix, b)
     find_modes(matrix, b, modal, n)
     if body.rotor_fixed:
         dx[State.ROTOR_SPEED] = 0.0
@@ -321,11 +339,11 @@ def rotation_along_shaft(bx, by, bz, b, modal, bend, tower, nx, ny, nz):
 
 
 @inlined_kernel
-def _accelerate_rigid(pose, x, load, torque, added, body, tower, matrix, dx):
-    accelerate(pose, x, load, torque, added, body, matrix, dx)
+def _accelerate_rigid(pose, x, load, torque, added, body, tower, matrix, cache, dx):
+    accelerate(pose, x, load, torque, added, body, matrix, cache, dx)
 
 
-# (pose, x, load, torque, added, body, tower, matrix, dx): accelerations into dx
+# (pose, x, load, torque, added, body, tower, matrix, cache, dx): accelerations into dx
 accelerate_turbine = chosen_by_class(
     "tower", {type(None): _accelerate_rigid, TowerModes: accelerate_bending}, inlined=True
 )

@@ -15,7 +15,7 @@ from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import State, pose_of, to_inertial
+from fowt_env.plant.state import State, pose_by_sines, to_inertial
 from fowt_env.plant.tilt import along_shaft, rotor_pose
 from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.tower.rates import Twist, nacelle_rates
@@ -184,9 +184,9 @@ def elevation_now(t, hydro, data):
 
 @inlined_kernel
 def measure(model, data, x, dx, u, t, m):
-    """Fill the measurement array m (Scene.n_measurements,) from a state and its derivative."""
-    layout = model.layout
-    pose, bend = pose_of(x), bend_of(x, model.tower)
+    """Fill the measurement array m (Scene.n_measurements,) from a state, its loads in data and its rates."""
+    layout, sines = model.layout, data.cache[LoadCache.SINES :]
+    pose, bend = pose_by_sines(x, sines, model.rigid_body.plane), bend_of(x, model.tower)
     nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
     wind = wind_of(t, 0.0, 0.0, layout.hub[2], model.aero)
     top = layout.tower_top
@@ -211,8 +211,8 @@ def measure(model, data, x, dx, u, t, m):
 def record(model, data, x, dx, u, t, loads, row):
     """Fill one output row (n_channels,), SI, in the order of channels()."""
     layout = model.layout
-    body = model.rigid_body
-    pose, bend = pose_of(x), bend_of(x, model.tower)
+    body, sines = model.rigid_body, data.cache[LoadCache.SINES :]
+    pose, bend = pose_by_sines(x, sines, body.plane), bend_of(x, model.tower)
     nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
     row[Out.TIME] = t
     for i in range(6):

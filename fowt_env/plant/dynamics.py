@@ -20,7 +20,7 @@ from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import attitude_rate_at, gravity_load
-from fowt_env.plant.state import State, Wrench, add, pose_in
+from fowt_env.plant.state import State, Wrench, add, fill_sines, pose_by_sines
 from fowt_env.plant.tower.loads import add_bent_weight, add_modal, add_modal_weight, begin_modal, carried
 from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.user_loads import add_modal_user_loads, add_user_loads, evaluate_user_loads
@@ -38,7 +38,9 @@ class Loads(NamedTuple):
 @kernel
 def evaluate_loads(t, x, model, data, dx):
     """Put every load at a state into data; of dx the rates of internal states alone are written."""
-    pose, modal = pose_in(x, model.rigid_body.plane), data.cache[LoadCache.MODAL :]
+    cache, plane = data.cache, model.rigid_body.plane
+    fill_sines(x, plane, cache[LoadCache.SINES :])
+    pose, modal = pose_by_sines(x, cache[LoadCache.SINES :], plane), cache[LoadCache.MODAL :]
     bend = bend_of(x, model.tower)
     nacelle = turned_pose(pose, bend)
     begin_modal(x, model.tower, modal)
@@ -61,7 +63,7 @@ def evaluate_loads(t, x, model, data, dx):
     add_modal_user_loads(bend, model.tower, model.user, data, modal)
     add_modal_weight(pose, x, bend, model.tower, model.rigid_body.gravity, modal)
 
-    cache = data.cache
+    cache[LoadCache.FACTORED] = 0.0
     store(cache, LoadCache.TOTAL, load)
     store(cache, LoadCache.ROTOR, aero.rotor.wrench)
     store(cache, LoadCache.TOWER, tower)
@@ -75,20 +77,20 @@ def evaluate_loads(t, x, model, data, dx):
 def respond(x, u, model, data, dx):
     """Put the rates of the state under the command u into dx, with the loads of the last evaluation."""
     cache, body = data.cache, model.rigid_body
-    pose = pose_in(x, body.plane)
+    pose = pose_by_sines(x, cache[LoadCache.SINES :], body.plane)
     torque = shaft_torque(
         cache[LoadCache.TORQUE],
         torque_in_force(x, u, model.converter),
         x[State.ROTOR_SPEED],
         model.drivetrain,
     )
-    attitude_rate_at(pose, x, dx, body.plane)
+    attitude_rate_at(pose, cache[LoadCache.SINES :], dx, body.plane)
     dx[State.AZIMUTH] = x[State.ROTOR_SPEED]
     fill_pitch_rates(x, u, model.actuator, model.pitches, dx)
     fill_torque_rate(x, u, model.converter, dx)
     fill_tower_rates(x, cache[LoadCache.MODAL :], model.tower, dx)
     load = stored(cache, LoadCache.TOTAL)
-    accelerate_turbine(pose, x, load, torque, data.added_mass, body, model.tower, data.matrix, dx)
+    accelerate_turbine(pose, x, load, torque, data.added_mass, body, model.tower, data.matrix, cache, dx)
 
 
 @inlined_kernel

@@ -69,16 +69,18 @@ class LoadCache(IntEnum):
     ELEVATION = 36
     TORQUE_LIMITED = 37  # 1 in a control period whose torque command the generator could not follow
     MODAL = 38  # tower.modes.MOST_MODES entries: generalised forces on the deflections of a tower that bends
+    SINES = 42  # six entries, state.fill_sines
+    FACTORED = 48  # 1 while Data.matrix holds the factors of the state's mass matrix
 
 
-N_CACHE = 42
+N_CACHE = 49
 
 
 @by_reference
 class Data(NamedTuple):
     """What changes: scratch of one plant.
 
-    lines, counters, cache, history, elastic, samples, radiation and blades last between calls.
+    lines, counters, cache, matrix, history, elastic, samples, radiation and blades last between calls.
     """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
@@ -89,14 +91,13 @@ class Data(NamedTuple):
     member_nodes: np.ndarray  # (n, hydro.members.N_NODE) nodes of members that are laid at each evaluation
     member_water: np.ndarray  # (n * N_WATER,) the water's motion at the members' nodes
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
-    matrix: np.ndarray  # (6 + n, 6 + n) mass with added mass, solved in place; n: modes of the tower
+    matrix: np.ndarray  # (6 + n, 6 + n) factors of mass with added mass; n: modes of the tower
     stages: np.ndarray  # (5, n_state) derivatives and states within a step
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
-    elastic: (
-        np.ndarray
-    )  # (4, n) forces of the tower's structure on its deflections at past steps, latest first
+    # (4, n) forces of the tower's structure on its deflections at past steps, latest first
+    elastic: np.ndarray
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data: of the memory, empty without one
     # (blades, 6) BladeLoad of each: as the cache while this is VALID; empty with one pitch for all blades

@@ -3,7 +3,7 @@
 from math import cos, sin
 
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.state import State, Wrench, pose_in
+from fowt_env.plant.state import State, Wrench, pose_by_sines
 from fowt_env.plant.tilt import across_shaft, along_shaft
 
 
@@ -73,12 +73,16 @@ def attitude_rate(x, dx, plane):
 
     Singular at 90 deg of platform pitch.
     """
-    attitude_rate_at(pose_in(x, plane), x, dx, plane)
+    sines = (
+        sin(x[State.ROLL]), cos(x[State.ROLL]), sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH]),
+        sin(x[State.YAW]), cos(x[State.YAW]),
+    )  # fmt: skip
+    attitude_rate_at(pose_by_sines(x, sines, plane), sines, dx, plane)
 
 
 @kernel
-def attitude_rate_at(pose, x, dx, plane):
-    """Put the rates of attitude_rate into dx; pose: that of x."""
+def attitude_rate_at(pose, sines, dx, plane):
+    """Put the rates of attitude_rate into dx, by the pose and the sines (state.fill_sines) of the state."""
     if plane is not None:
         dx[State.SURGE] = pose.r11 * pose.vx + pose.r13 * pose.vz
         dx[State.HEAVE] = pose.r31 * pose.vx + pose.r33 * pose.vz
@@ -88,8 +92,7 @@ def attitude_rate_at(pose, x, dx, plane):
     dx[State.SURGE] = pose.r11 * pose.vx + pose.r12 * pose.vy + pose.r13 * pose.vz
     dx[State.SWAY] = pose.r21 * pose.vx + pose.r22 * pose.vy + pose.r23 * pose.vz
     dx[State.HEAVE] = pose.r31 * pose.vx + pose.r32 * pose.vy + pose.r33 * pose.vz
-    s1, c1 = sin(x[State.ROLL]), cos(x[State.ROLL])
-    s2, c2 = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
+    s1, c1, s2, c2 = sines[0], sines[1], sines[2], sines[3]
     swing = (s1 * pose.wy + c1 * pose.wz) / c2
     dx[State.ROLL] = pose.wx + swing * s2
     dx[State.PLATFORM_PITCH] = c1 * pose.wy - s1 * pose.wz

@@ -122,10 +122,10 @@ def follow_rotor(dt, model, substeps, data, y):
         still[i] = 0.0  # without velocities the equation of motion has no terms but the load
     body, load = model.rigid_body, Wrench(fx, fy, fz, mx, my, mz)
     bend = bend_of(y, model.tower)
-    fill_impulse(load, y, bend, model.tower, still, extra)
+    fill_impulse(load, y, bend, model.tower, still, extra, data.cache)
     accelerate_turbine(
         pose_in(still, body.plane), still, carried(load, bend), torque, data.added_mass, body, model.tower,
-        data.matrix, extra,
+        data.matrix, data.cache, extra,
     )  # fmt: skip
     for i in range(State.VX, State.ROTOR_SPEED + 1):
         y[i] += dt * extra[i]

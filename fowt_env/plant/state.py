@@ -146,10 +146,34 @@ OUT_OF_PLANE = (State.SWAY, State.ROLL, State.YAW, State.VY, State.WX, State.WZ)
 
 @kernel
 def pose_in(x, plane):
-    """pose_of a state; with a plane (not None) that of a platform whose OUT_OF_PLANE states are zero."""
+    """Return pose_of a state; with a plane (not None) of a platform whose OUT_OF_PLANE states are zero."""
     if plane is None:
         return pose_of(x)
-    s, c = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
+    return _pose_in_plane(x, sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH]))
+
+
+@kernel
+def fill_sines(x, plane, sines):
+    """Fill sines (6,) with sine and cosine of roll, platform pitch and yaw."""
+    sines[0] = sines[4] = 0.0
+    sines[1] = sines[5] = 1.0
+    sines[2], sines[3] = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
+    if plane is None:
+        sines[0], sines[1] = sin(x[State.ROLL]), cos(x[State.ROLL])
+        sines[4], sines[5] = sin(x[State.YAW]), cos(x[State.YAW])
+
+
+@kernel
+def pose_by_sines(x, sines, plane):
+    """Return pose_in of a state whose fill_sines is known."""
+    if plane is None:
+        return _pose(x, sines[0], sines[1], sines[2], sines[3], sines[4], sines[5])
+    return _pose_in_plane(x, sines[2], sines[3])
+
+
+@kernel
+def _pose_in_plane(x, s, c):
+    """Return the Pose of a platform in its plane by sine and cosine of its pitch."""
     vx, vz, wy = x[State.VX], x[State.VZ], x[State.WY]
     return Pose(
         x[State.SURGE], 0.0, x[State.HEAVE], c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c, vx, 0.0, vz, 0.0, wy, 0.0
@@ -162,6 +186,12 @@ def pose_of(x):
     s1, c1 = sin(x[State.ROLL]), cos(x[State.ROLL])
     s2, c2 = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
     s3, c3 = sin(x[State.YAW]), cos(x[State.YAW])
+    return _pose(x, s1, c1, s2, c2, s3, c3)
+
+
+@kernel
+def _pose(x, s1, c1, s2, c2, s3, c3):
+    """Return the Pose of a state by sines and cosines of roll, platform pitch and yaw."""
     return Pose(
         x[State.SURGE],
         x[State.SWAY],

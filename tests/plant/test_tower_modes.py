@@ -9,7 +9,7 @@ from fowt_env.plant.advance import advance, forget, observe, output_row
 from fowt_env.plant.channels import Out
 from fowt_env.plant.integrators import START_STEPS
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
-from fowt_env.plant.model import LoadCache
+from fowt_env.plant.model import N_CACHE, LoadCache
 from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
 from fowt_env.plant.tower.loads import carried
 from fowt_env.plant.tower.modes import TowerModes, bend_by_modes, nacelle_pose
@@ -274,7 +274,8 @@ def test_an_impulse_of_the_rotor_is_that_of_a_short_push(platform, turbine):
     x = case.random(rng)
     load, torque = Wrench(*(1e6 * rng.normal(size=6))), 3e5
     bend, still, rates_of = bend_by_modes(x, tower), np.zeros_like(x), np.full(len(x), 7.0)
-    fill_impulse(load, x, bend, tower, still, rates_of)
+    cache = np.zeros(N_CACHE)
+    fill_impulse(load, x, bend, tower, still, rates_of, cache)
     accelerate_bending(
         pose_of(still),
         still,
@@ -284,6 +285,7 @@ def test_an_impulse_of_the_rotor_is_that_of_a_short_push(platform, turbine):
         body,
         tower,
         np.zeros((8, 8)),
+        cache,
         rates_of,
     )
     x[7:14] = x[N_RIGID + 2 :] = 0.0  # at rest the twin knows no other forces of velocity

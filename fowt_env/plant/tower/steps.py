@@ -2,6 +2,7 @@
 
 from fowt_env.plant.accelerations import find_modes, rotation_along_shaft, substitute_spd, without_modes
 from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State
 from fowt_env.plant.tower.loads import add_modal, begin_modal
 from fowt_env.plant.tower.modes import bend_by_modes, from_nacelle
@@ -9,16 +10,19 @@ from fowt_env.plant.tower.modes import bend_by_modes, from_nacelle
 # of the fourth difference of the structure's force: the error of Adams-Bashforth 4 (251/720) less that with
 # which Adams-Moulton 4 moves the deflections (19/720), so that those of velocity and position cancel
 ELASTIC_WEIGHT = 232.0 / 720.0
-ELASTIC_ROUNDS = (
-    2  # of the correction with its own new force: one is stable to 0.7 over the frequency, two to 1.29
-)
+# of the correction with its own new force: one is stable to 0.7 over the frequency, two to 1.29
+ELASTIC_ROUNDS = 2
 
 
 @kernel
-def fill_impulse(load, x, bend, tower, still, dx):
-    """Put into `still` the deflections of x, and into dx the forces on them of a wrench of the nacelle."""
+def fill_impulse(load, x, bend, tower, still, dx, cache):
+    """Put into `still` the deflections of x, and into dx the forces on them of a wrench of the nacelle.
+
+    The mass matrix is that of x then, not that of the last evaluation.
+    """
     if bend is None:
         return
+    cache[LoadCache.FACTORED] = 0.0
     n, q = len(tower.count), tower.first
     for i in range(n):
         still[q + i] = x[q + i]
