@@ -12,8 +12,8 @@ CARRIED = {
     ),
     "link": ("measurement", "reading", "law_reading", "command", "past", "motion", "watch", "held"),
     "data": (
-        "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples", "radiation",
-        "blades", "elastic",
+        "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples",
+        "radiation", "blades", "elastic",
     ),
 }  # fmt: skip
 
