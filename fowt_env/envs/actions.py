@@ -9,13 +9,9 @@ from math import isfinite, pi
 from typing import NamedTuple
 
 from fowt_env.errors import InputError
+from fowt_env.plant.blade_pitches import FIRST_PITCH, spread_command
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.drivetrain import (
-    TorqueLimits,
-    build_drivetrain,
-    build_torque_limits,
-    clamp,
-)
+from fowt_env.plant.drivetrain import TorqueLimits, build_drivetrain, build_torque_limits, clamp
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command
 
@@ -23,7 +19,6 @@ from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command
 # rigid rotor. Fast beside the platform's pitch (0.21 rad/s), slow beside the torque rate limit.
 TRACKING_FREQUENCY = 0.5  # rad/s
 TRACKING_DAMPING = 1.0
-FIRST_PITCH = int(Command.BLADE_PITCH)  # numba has no int() of an enum
 
 
 class ActionMode(IntEnum):
@@ -149,7 +144,7 @@ def command_of(action, actions, baseline_law, parameters, memory, reading, comma
     if actions.mode == ActionMode.RESIDUAL:
         call_baseline(baseline_law, parameters, memory, reading, command)
         if not actions.individual:
-            spread(command)
+            spread_command(command)
         command[0] += action[0] * actions.residual_torque
         for i in range(FIRST_PITCH, command.shape[0]):
             command[i] += action[1] * actions.residual_pitch
@@ -158,16 +153,9 @@ def command_of(action, actions, baseline_law, parameters, memory, reading, comma
         for i in range(FIRST_PITCH, action.shape[0]):
             command[i] = unscale(action[i], actions.pitch_low, actions.pitch_high)
         if actions.mode != ActionMode.INDIVIDUAL:
-            spread(command)
+            spread_command(command)
         if actions.mode == ActionMode.SETPOINT:
             command[0] = tracking_torque(reading[Measure.ROTOR_SPEED], command[0], memory, actions)
-
-
-@kernel
-def spread(command):
-    """Give the first blade's pitch to all whose pitch is commanded."""
-    for i in range(FIRST_PITCH + 1, command.shape[0]):
-        command[i] = command[Command.BLADE_PITCH]
 
 
 @kernel

@@ -1,10 +1,7 @@
 """The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
 
-from collections.abc import Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from copy import deepcopy
-from dataclasses import replace
-from math import inf, pi
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,91 +15,63 @@ from fowt_env.analysis.trim_cache import cached_trim, interpolated_trim, plant_k
 from fowt_env.control import (
     EXACT,
     CommandUnits,
-    CompiledController,
     catalogue,
     hidden,
     known_scene,
-    make,
     preview_leads,
     view_of,
     whole_view,
 )
-from fowt_env.descriptions.checks import short
 from fowt_env.descriptions.platform import Platform, turbine_of
 from fowt_env.descriptions.protection import read_protection
-from fowt_env.descriptions.sea_state import sea_of, sea_state_of
+from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.sensors import SensorChain
-from fowt_env.descriptions.wind import wind_of
-from fowt_env.envs.actions import ACTION_MODES, ActionMode, build_action_map, n_actions, start_tracking
+from fowt_env.envs.actions import ACTION_MODES, ActionMode, n_actions, start_tracking
+from fowt_env.envs.assembly import (
+    adapted_task,
+    allocate_episode,
+    build_config,
+    check_shown,
+    named_baseline,
+    nominal_parts,
+)
 from fowt_env.envs.episode import (
     BAD_ACTION,
-    N_COUNTS,
     RUNNING,
     SHOWN_COUNTS,
     STEP,
-    EpisodeConfig,
-    EpisodeData,
     act,
     act_physical,
     record_last,
     rewrite_observation,
     start_episode,
 )
-from fowt_env.envs.observations import (
-    BLADE_CHANNELS,
-    ESTIMATE_CHANNELS,
-    PREVIEW,
-    build_observation_map,
-    check_channels,
-    entries,
-)
-from fowt_env.envs.rewards import (
-    N_TERMS,
-    REWARD_TERMS,
-    Reference,
-    build_scales,
-    check_own_reward,
-    check_weights,
-    paid,
-    weight_array,
-)
+from fowt_env.envs.observations import ESTIMATE_CHANNELS, entries
+from fowt_env.envs.reset import Start, kept_if_refused, moved_state, with_options
+from fowt_env.envs.rewards import REWARD_TERMS, Reference, check_own_reward, paid
 from fowt_env.envs.sensors import check_sensors, draw_sensors, reading_scales
 from fowt_env.envs.settings import (
     ControlSettings,
     EpisodeSettings,
     InterfaceSettings,
     PlantSettings,
-    Settings,
     read_settings,
 )
 from fowt_env.envs.snapshot import CARRIED, Snapshot, carried, fill_carried
 from fowt_env.envs.tables import task_tables
-from fowt_env.envs.tasks import (
-    TASKS,
-    Episode,
-    Task,
-    draw_faults,
-    draw_offsets,
-    draw_weather,
-    is_mixture,
-    task_of,
-    varies,
-)
+from fowt_env.envs.tasks import TASKS, Task, draw_faults, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.loop.interface import Interface, interface_data
 from fowt_env.loop.protection import Watch
 from fowt_env.loop.sensing import open_sensors
 from fowt_env.plant.advance import STOP_REASONS, TRIPPED, output
-from fowt_env.plant.channels import DEG_PER_RAD
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import Measurement
-from fowt_env.plant.state import N_COMMANDS, Command, State
-from fowt_env.run.initial_conditions import INITIAL
+from fowt_env.plant.state import N_COMMANDS, State
 from fowt_env.run.interface import guard_of, wind_ahead_of
 from fowt_env.run.outcome import run_frame, stop_facts, trip_name
 from fowt_env.run.simulation import check_duration, steps_in
-from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.preview import exact_preview
@@ -230,7 +199,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         turbine = turbine_of(platform, options.get("turbine"))
         reward = settings.episode.reward
         self._own_reward = check_own_reward("reward", reward) if callable(reward) else None
-        task = self.task = _adapted(task_of(task, turbine), settings)
+        task = self.task = adapted_task(task_of(task, turbine), settings)
         self.action_mode, self.baseline = control.action_mode, control.baseline
         control_dt = control.control_dt
         steps_in("duration", task.duration, control_dt, "control_dt")
@@ -249,7 +218,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         check_duration(self.scene, task.duration)
         self._nominal = None  # the scene of the nominal plant, where it differs from the true one
         if control.nominal_plant is not None:
-            parts = _nominal_parts(control.nominal_plant)
+            parts = nominal_parts(control.nominal_plant)
             self._nominal = build_scene(
                 parts["platform"], **common, **options | {"turbine": parts["turbine"]}
             )
@@ -262,7 +231,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 self._sensors.name,
                 self._sensors.available + (self._sensors.available_of_blades if self.individual else ()),
             )
-            _check_shown(task.observation, self._chain)
+            check_shown(task.observation, self._chain)
         self._limits = None  # Protection, where there are trips or faults
         if settings.interface.protection is not None or settings.interface.faults is not None:
             ratio = turbine.overspeed / turbine.rated_rotor_speed
@@ -341,78 +310,46 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _build(self, mode, per_control):
         """Allocate the arrays of a run and fill what never changes."""
-        scene, turbine, task = self.scene, self.scene.turbine, self.task
-        individual, actions = self.individual, n_actions(mode)
-        observed = self.observed = entries(task.observation, turbine, task.wind_preview, actions, individual)
+        scene, task, individual = self.scene, self.task, self.individual
+        observed = self.observed = entries(
+            task.observation, scene.turbine, task.wind_preview, n_actions(mode), individual
+        )
         self._baseline = None
-        baseline_law = None
-        parameters, memory = np.zeros(1), np.zeros(1)
+        self._hidden = None  # of what is measured, for the baseline's law
         if mode == ActionMode.RESIDUAL:
             own = deepcopy(self.baseline)  # environments of a batch do not share the memory of an object
             self._baseline = named_baseline(own, self.design_scene.turbine, self.control_dt)
-            baseline_law = self._baseline.law
-            parameters, memory = self._baseline.parameters, self._baseline.memory
-        self._estimator = estimator_law = None
-        if set(ESTIMATE_CHANNELS) & set(task.observation):
-            self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
-            estimator_law = self._estimator.law
-            hidden(self._estimator, self._chain, individual)  # refuses what the sensors do not show
-        self._hidden = None  # of what is measured, for the baseline's law
-        if self._baseline is not None:
             preview_leads(self._baseline)
             self._hidden = hidden(self._baseline, self._chain, individual)
-        estimating = self._estimator is not None
-        self._baseline_law = Handle(None, baseline_law)
-        self._estimator_law = Handle(None, estimator_law)
+        self._estimator = None
+        if set(ESTIMATE_CHANNELS) & set(task.observation):
+            self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
+            hidden(self._estimator, self._chain, individual)  # refuses what the sensors do not show
+        laws = (self._baseline, self._estimator)
+        self._baseline_law, self._estimator_law = (Handle(None, law and law.law) for law in laws)
         self._per_control = per_control
         # a range is drawn at each reset: these are faults of the same kinds and number
         self._faults = draw_faults(self._interface.faults, np.random.default_rng(0))
-        interface, ahead = self._connect(scene)
-        self._config = EpisodeConfig(
-            model=scene.model,
-            actions=build_action_map(
-                mode, task, turbine, self.control_dt, self._baseline is not None and self._baseline.individual
-            ),
-            parameters=parameters,
-            estimator=self._estimator.parameters if estimating else None,
-            observation_map=build_observation_map(observed, task.wind_preview),
-            scales=build_scales(turbine, self.control_dt),
-            weights=weight_array(task.weights),
-            overspeed=float(turbine.overspeed) if interface.guard is None else inf,
-            dt=self.dt,
-            per_control=per_control,
-            interface=interface,
-            ahead=ahead,
-        )
-        n, size = scene.n_state, scene.n_measurements
-        rows = None
-        if self._interface.record:
-            rows = np.zeros((self._last // per_control + 1, len(scene.channels)))
-        self._episode = EpisodeData(
-            data=scene.data(),
-            x=np.zeros(n),
-            u=np.zeros(scene.n_commands),
-            memory=memory,
-            estimate=self._estimator.memory if estimating else None,
-            action=np.zeros(actions),
-            link=interface_data(interface, n, scene.n_commands, size),
-            ahead=np.zeros(len(task.wind_preview)),
-            motion=None if ahead is None else ahead.new_memory(),
-            observation=np.zeros(len(observed), dtype=np.float32),
-            counts=np.zeros(N_COUNTS, dtype=np.int64),
-            reference=np.zeros(len(Reference._fields)),
-            previous_measurement=np.zeros(size),
-            signals=np.zeros(PREVIEW + len(task.wind_preview)),
-            terms=np.zeros(N_TERMS),
-            rows=rows,
-        )
+        interface, ahead = self._connect(scene, self._guard(scene, self._faults))
+        timing = (self.dt, per_control, self.control_dt)
+        self._config = build_config(scene, task, mode, observed, timing, laws, interface, ahead)
+        periods = self._last // per_control + 1 if self._interface.record else 0
+        self._episode = allocate_episode(scene, self._config, laws, periods)
         self._handle = None
 
-    def _connect(self, scene):
+    def _guard(self, scene, faults):
+        """Return the Guard of an episode, None without trips and faults.
+
+        Raises: InputError for faults of parts that the scene lacks.
+        """
+        if self._limits is None:
+            return None
+        return guard_of(scene, self._limits, faults, self._per_control * self.dt)
+
+    def _connect(self, scene, guard):
         """Return (Interface, WindAhead of the observation or None) of an episode in a scene's weather."""
-        control_dt, guard, sensors = self._per_control * self.dt, None, None
-        if self._limits is not None:
-            guard = guard_of(scene, self._limits, self._faults, control_dt)
+        control_dt, sensors = self._per_control * self.dt, None
+        if guard is not None:
             sensors = open_sensors(scene.n_measurements)
         if self._sensors is not None:
             readings = self._last // self._per_control + 1
@@ -453,7 +390,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _plan(self, seed, options):
         """Start of a new episode, drawn with the generator; nothing else changes. Raises as reset."""
         super().reset(seed=seed)
-        episode = _with_options(self.task.draw(self.np_random), options, self.np_random)
+        episode = with_options(self.task.draw(self.np_random), options, self.np_random)
         faults = self._interface.faults if (options or {}).get("faults") is None else options["faults"]
         episode = episode._replace(faults=draw_faults(faults, self.np_random))
         if episode.faults and self._limits is None:
@@ -463,15 +400,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
-        state, command = _moved(scene, state, command, episode.offsets)
-        if self._limits is not None:
-            guard_of(scene, self._limits, episode.faults, self.control_dt)  # refuses what the scene lacks
-        return Start(episode, scene, self._nominal_in(scene), state, command, reference)
+        state, command = moved_state(scene, state, command, episode.offsets)
+        guard = self._guard(scene, episode.faults)
+        return Start(episode, scene, self._nominal_in(scene), state, command, reference, guard)
 
     def _begin(self, planned):
         """(observation, info) at the start of the episode that was planned."""
         self._running, self._end = False, ""  # until all of it has worked
-        self._enter(planned.scene, planned.nominal, planned.episode.faults)
+        self._enter(planned.scene, planned.nominal, planned.episode.faults, planned.guard)
         run = self._episode
         run.x[:] = planned.state
         run.u[:] = planned.command
@@ -649,7 +585,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def _restore(self, snapshot):
         """Go on from a Snapshot of these settings."""
         if (snapshot.scene, snapshot.faults) != (self.scene, self._faults) or self._handle is None:
-            self._enter(snapshot.scene, self._nominal_in(snapshot.scene), snapshot.faults)
+            scene, faults = snapshot.scene, snapshot.faults
+            self._enter(scene, self._nominal_in(scene), faults, self._guard(scene, faults))
         fill_carried(self._episode, snapshot.arrays)
         self._running, self._end = snapshot.running and not self._closed, snapshot.end
         if snapshot.generator is None:
@@ -674,11 +611,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             return self._nominal
         return self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
 
-    def _enter(self, scene, nominal, faults):
+    def _enter(self, scene, nominal, faults, guard):
         """Run in the scene's weather from now on, with new data: their size follows the wave components."""
         self.scene, self._nominal, self._faults = scene, nominal, faults
         config = self._config._replace(model=scene.model)
-        interface, ahead = self._connect(scene)
+        interface, ahead = self._connect(scene, guard)
         if self._baseline is not None:
             self._baseline.prepare(known_scene(self.design_scene, self._baseline))
             config = config._replace(parameters=self._baseline.parameters)
@@ -833,128 +770,4 @@ class View(NamedTuple):
     estimate: np.ndarray | None  # memory of the estimator
 
 
-class Start(NamedTuple):
-    """A new episode with all of it done that may be refused, so that it can be begun without fail."""
-
-    episode: Episode
-    scene: Scene
-    nominal: Scene | None
-    state: np.ndarray  # (n_state,) operating point with the offsets
-    command: np.ndarray  # (2,)
-    reference: Reference
-
-
-@contextmanager
-def kept_if_refused(envs):
-    """Whatever is raised in the block puts the environments' random generators back as they were."""
-    before = [
-        (env._np_random, env._np_random_seed, env._np_random and env._np_random.bit_generator.state)
-        for env in envs
-    ]
-    try:
-        yield
-    except BaseException:
-        for env, (generator, seed, state) in zip(envs, before, strict=True):
-            env._np_random, env._np_random_seed = generator, seed
-            if generator is not None:
-                generator.bit_generator.state = state
-        raise
-
-
 FowtEnv.__doc__ = f"{FowtEnv.__doc__}\n{task_tables(TASKS['above_rated'])}"
-
-
-def _adapted(task: Task, settings: Settings) -> Task:
-    """Return the task with the settings that replace its own."""
-    own = settings.episode
-    replaced = {"rotor": settings.plant.rotor} | {
-        name: getattr(own, name) for name in ("duration", "wind", "sea", "wind_preview")
-    }
-    changes = {name: value for name, value in replaced.items() if value is not None}
-    if own.observation is not None:
-        changes["observation"] = check_channels("observation", own.observation, default=task.observation)
-    if own.reward is not None and not callable(own.reward):
-        changes["weights"] = task.weights | check_weights("reward", own.reward)
-    return replace(task, **changes)
-
-
-def _check_shown(names, chain):
-    """Refuse observation channels that a chain (name, fields) of sensors does not show."""
-    for name in names:
-        if name in (*Measurement._fields, *BLADE_CHANNELS) and name not in chain[1]:
-            raise InputError(
-                f"observation: {name!r}: the sensor chain {chain[0]!r} does not have it; it has"
-                f" {', '.join(chain[1])}"
-            )
-
-
-def named_baseline(name, turbine, control_dt):
-    """Compiled controller of a name, as controllers.make takes it.
-
-    Raises: InputError for unknown ones and those written in Python.
-    """
-    names = catalogue().CONTROLLERS
-    if isinstance(name, str) and ":" not in name and name not in names:
-        raise unknown("baseline", name, names)
-    baseline = make(name, turbine, control_dt)
-    if not isinstance(baseline, CompiledController):
-        raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")
-    return baseline
-
-
-def _nominal_parts(given):
-    """{"platform", "turbine"} of what an environment is given as nominal_plant. Raises: InputError."""
-    if not isinstance(given, Mapping) or "platform" not in given:
-        raise InputError(f"nominal_plant = {given!r}: must be a dict with a platform, and a turbine or not")
-    for key in given:
-        if key not in ("platform", "turbine"):
-            raise unknown("key of nominal_plant", key, ("platform", "turbine"))
-    return {"turbine": None} | dict(given)
-
-
-def _moved(scene, state, command, offsets):
-    """(state, command) moved by {channel: offset in its unit}, the blade pitch within its drive's range.
-
-    BldPitch1 stands for all blades, whose pitches are the same at an operating point.
-    """
-    x, u, drive = state.copy(), command.copy(), scene.turbine.pitch_drive
-    for name, value in offsets.items():
-        index, factor = INITIAL[name]
-        x[index] += value * factor
-    if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
-        raise InputError(
-            f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
-            f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must stay inside (-90, 90) deg"
-        )
-    x[list(scene.pitch_states)] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
-    u[Command.BLADE_PITCH :] = x[State.BLADE_PITCH]
-    rest_actuators(scene.model, x, u)
-    return x, u
-
-
-def _with_options(drawn, options, rng):
-    """The drawn Episode with what reset's options give in place of it, ranges drawn with rng."""
-    if not isinstance(options, Mapping | None):
-        raise InputError(f"options = {short(options)}: must be a mapping of reset's options, or None")
-    changes = {}
-    for key, value in (options or {}).items():
-        if key not in Episode._fields:
-            raise unknown("option of reset", key, Episode._fields)
-        if key == "faults":
-            continue  # drawn after everything else
-        if key == "offsets":
-            value = draw_offsets(value, rng)
-        if key == "wind":
-            value = wind_of(value)
-            if value is None:
-                raise InputError("options['wind'] = None: an episode needs a wind (0.0 for still air)")
-        if key == "sea":
-            value = sea_of(value)
-        changes[key] = value
-    if "wind" in changes:
-        changes.setdefault("exact_start", not varies(changes["wind"]))
-    if any(varies(changes.get(key)) for key in ("wind", "sea")):
-        wind = changes.get("wind", drawn.wind)
-        sea = changes.get("sea", None if is_mixture(wind) else drawn.sea)
-        changes["wind"], changes["sea"] = draw_weather("options", wind, sea, rng)
-    return drawn._replace(**changes)

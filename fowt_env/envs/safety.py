@@ -7,6 +7,7 @@ import gymnasium
 
 from fowt_env.control import check_pitches, known_scene
 from fowt_env.descriptions.checks import is_number
+from fowt_env.envs.assembly import named_baseline
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measure, Measurement
 
@@ -70,8 +71,6 @@ class SafetyLayer(gymnasium.Wrapper):
 
     def __init__(self, env, overspeed=1.2, platform_rate=1.2, calm=10.0, release=0.5, baseline="gspi_oc3"):
         super().__init__(env)
-        from fowt_env.envs.env import named_baseline
-
         for name, value, low in (("overspeed", overspeed, 1.0), ("platform_rate", platform_rate, 0.0)):
             if not (isfinite(value) and value > low):
                 raise InputError(f"{name} = {value!r}: must be finite and above {low:g}")

@@ -19,9 +19,7 @@ class EpisodeSettings:
     # reward, from the info of the step, with each named term, and the Measurement at its end (true motions)
     reward: Mapping[str, float] | Callable[..., float] | None = None
     duration: float | None = None  # s
-    weather_duration: float | None = (
-        None  # s of random wind and sea drawn; None: 600, or the duration if longer
-    )
+    weather_duration: float | None = None  # s of random wind and sea; None: 600, or the duration if longer
     wind: Any = None  # as build_scene takes it, ranges included
     sea: Any = None
     wind_preview: Sequence[float] | None = None  # look-ahead times (s) of the channel wind_preview
@@ -34,9 +32,8 @@ class PlantSettings:
     rotor: str | None = None  # "bem", "lookup" or "table"; None: the task's, or else that of the fidelity
     fidelity: str = "standard"  # level of build_scene: "reference", "standard" or "fast"
     dt: float | None = None  # physics step, s; None: that of the scene's integrator
-    options: Mapping[str, Any] = field(
-        default_factory=dict
-    )  # further ones of build_scene, `loads` among them
+    # further ones of build_scene, `loads` among them
+    options: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

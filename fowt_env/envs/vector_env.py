@@ -14,9 +14,10 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from fowt_env.descriptions.checks import short
-from fowt_env.envs.env import CLOSED, REWARD_KEYS, FowtEnv, kept_if_refused
+from fowt_env.envs.env import CLOSED, REWARD_KEYS, FowtEnv
 from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
+from fowt_env.envs.reset import kept_if_refused
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown

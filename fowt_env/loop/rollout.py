@@ -74,7 +74,7 @@ def rollout(handle, x, u, law, parameters, memory, linked, schedule, first, end,
                     show_command(u, interface, schedule.individual, model.pitches, link)
                     law(parameters, memory, link.law_reading, link.command)
                 if not schedule.individual:
-                    spread_command(link.command, model.pitches)
+                    spread_command(link.command)
                 if not all_finite(link.command):
                     return BAD_COMMAND, step, rows
             apply_command(t, x, u, model, data, interface, link)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.wind import interval_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 
@@ -138,13 +139,8 @@ def read_wind_ahead(ahead, t, period, velocity, motion, values, first):
     if ahead.values.shape[0] == 0:
         return
     time, last = ahead.time, ahead.time.shape[0] - 1
-    low, high = 0, last
-    while high - low > 1:
-        middle = (low + high) // 2
-        if time[middle] <= t:
-            low = middle
-        else:
-            high = middle
+    low = interval_at(time, t)
+    high = min(low + 1, last)
     fraction = 0.0
     if t >= time[high]:
         fraction = 1.0

@@ -14,6 +14,7 @@ from fowt_env.plant.pitch_drive import PitchDrive, advance_drive, fill_drive_rat
 from fowt_env.plant.state import BLADES, Command, State
 
 N_BLADE_LOAD = 6  # entries of a blade_shape.BladeLoad
+FIRST_PITCH = int(Command.BLADE_PITCH)  # numba has no int() of an enum
 
 
 class BladePitches(NamedTuple):
@@ -149,9 +150,7 @@ def halt_blade(blade, x, actuator, pitches):
 
 
 @kernel
-def spread_command(u, pitches):
-    """Set the commands of all blades to that of the first; nothing with one pitch for all blades."""
-    if pitches is None:
-        return
-    for blade in range(1, BLADES):
-        u[Command.BLADE_PITCH + blade] = u[Command.BLADE_PITCH]
+def spread_command(command):
+    """Set the pitch commands of all blades that have one to that of the first."""
+    for i in range(FIRST_PITCH + 1, command.shape[0]):
+        command[i] = command[Command.BLADE_PITCH]

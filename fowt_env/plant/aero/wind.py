@@ -88,14 +88,21 @@ def wind_now(t, series):
     if series.inverse_step > 0.0:
         i = min(int((t - time[0]) * series.inverse_step), last - 1)
     else:
-        i, above = 0, last
-        while above - i > 1:
-            middle = (i + above) // 2
-            if time[middle] <= t:
-                i = middle
-            else:
-                above = middle
+        i = interval_at(time, t)
     return _row(series, i, (t - time[i]) / (time[i + 1] - time[i]))
+
+
+@kernel
+def interval_at(time, t):
+    """Return the index of the last of increasing times (n,) that is not above t, within 0 to n - 2."""
+    low, high = 0, time.shape[0] - 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if time[middle] <= t:
+            low = middle
+        else:
+            high = middle
+    return low
 
 
 @kernel
