@@ -1,4 +1,4 @@
-"""Between the plant and its users where every blade has a pitch of its own."""
+"""Individual pitch between the plant and its users."""
 
 import warnings
 from math import cos, pi, radians, sin
@@ -182,7 +182,7 @@ def test_what_needs_single_blades_is_refused_where_there_is_one_pitch(collective
         individual = False
         information = ("rotor_speed", "root_in_plane_2")
 
-    with pytest.raises(InputError, match="declares 'root_in_plane_2', which is measured where every blade"):
+    with pytest.raises(InputError, match="declares 'root_in_plane_2', which is measured with individual"):
         run(collective_scene, Curious(TORQUE, PITCH))
     with pytest.raises(InputError, match="unknown channel of initial 'BldPitch2'"):
         run(collective_scene, None, initial={"BldPitch2": 10.0})
@@ -390,7 +390,7 @@ def test_the_guard_feathers_all_blades():
     ("settings", "message"),
     [
         ({"pitch": "collective", "action_mode": "individual"}, "pitch = 'collective': action_mode"),
-        ({"pitch": "collective", "observation": ("hub_yaw_moment",)}, "'hub_yaw_moment': is measured where"),
+        ({"pitch": "collective", "observation": ("hub_yaw_moment",)}, "'hub_yaw_moment': is measured with"),
         ({"observation": ("hub_yaw_moment",), "sensors": "standard"}, "the sensor chain 'standard' does not"),
     ],
 )

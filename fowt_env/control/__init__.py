@@ -1,4 +1,4 @@
-"""What a controller is, what it reads, and from its name to a controller (protocol.py has the contract)."""
+"""The protocol of controllers, the information that they read, and controllers by name (protocol.py)."""
 
 from fowt_env.control.information import (
     EXACT,

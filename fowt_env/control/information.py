@@ -16,9 +16,9 @@ from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Preview, check_times, exact_preview
 from fowt_env.weather.wind_field import profile_field
 
-PRIVILEGED_INPUTS = {  # what a controller may be given beyond Measurement
+PRIVILEGED_INPUTS = {  # what a controller may read beside Measurement
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
-    "plant_model": "the plant's own equations: trims, linear models or performance tables of the scene",
+    "plant_model": "the equations of the plant: trims, linear models or performance tables of the scene",
 }
 EXACT = "exact"  # preview, and sensors
 
@@ -29,7 +29,7 @@ def declares_blades(controller: Any) -> bool:
 
 
 def check_pitches(controller: Any, individual: bool) -> None:
-    """Refuse what needs blades with pitches of their own in a scene that has one pitch for all.
+    """Refuse what needs individual pitch in a scene with one pitch for all blades.
 
     Raises: InputError.
     """
@@ -40,7 +40,7 @@ def check_pitches(controller: Any, individual: bool) -> None:
         lacking = "commands the pitch of each blade"
     elif declares_blades(controller):
         name = next(name for name in controller.information if name in BladeMeasurement._fields)
-        lacking = f"declares {name!r}, which is measured where every blade has a pitch of its own"
+        lacking = f"declares {name!r}, which is measured with individual pitch"
     if lacking:
         raise InputError(
             f"controller {controller.name!r}: {lacking}, and the scene has one pitch for all: build it with"
@@ -71,7 +71,7 @@ def hidden(
 ) -> np.ndarray:
     """mask of a run: what the controller declares, and the sensor chain (name, fields that it has) shows.
 
-    individual: whether the scene's blades have pitches of their own; else it is of the N_MEASUREMENTS fields.
+    individual: whether the scene has individual pitch; else it is of the N_MEASUREMENTS fields.
     Raises: InputError where it declares a field that the chain does not have, or the scene (check_pitches).
     """
     check_pitches(controller, individual)
@@ -104,7 +104,7 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
     if not times:
         raise InputError(
             f"controller {controller.name!r}: declares 'wind_preview' and has no preview_times: how far ahead"
-            " it is to be given the wind (s, increasing)"
+            " it reads the wind (s, increasing)"
         )
     if not declared:
         raise InputError(
@@ -118,7 +118,7 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
 
 
 def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float) -> Preview:
-    """Preview of a run of `duration` (s) from what simulate is given: "exact", a lidar, a Preview, ...
+    """Preview of a run of `duration` (s) from the argument of simulate: "exact", a lidar, a Preview, ...
 
     Raises: InputError for anything else, and for a Preview of other leads or shapes.
     """
@@ -150,7 +150,7 @@ def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float
 
 
 class Known:
-    """What prepare is given of a run by a controller that does not declare "plant_model": the turbine."""
+    """Known part of a run for a controller that does not declare "plant_model": the turbine."""
 
     def __init__(self, turbine: Any, controller: str) -> None:
         self.turbine = turbine
@@ -169,10 +169,10 @@ class Known:
 
 
 def known_scene(scene: Any, controller: Any) -> Any:
-    """What a controller's prepare is given of a scene: its plant in steady rated wind, or its turbine alone.
+    """Return the known part of a scene for prepare: its plant in steady rated wind, or its turbine alone.
 
-    The plant is in still water, with the seed 0; nothing of the run's weather can be read from it. In place
-    of a box of wind, whose mean over time is the seed's, stands the power law of the site.
+    The plant is in still water, with the seed 0; nothing of the run's weather can be read from it. A box
+    of wind, whose mean over time is the seed's, is replaced by the power law of the site.
     """
     if "plant_model" not in controller.information:
         return Known(scene.turbine, controller.name)

@@ -17,7 +17,7 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError, unknown
 
 CATALOGUE = "fowt_env.controllers"
-LONGEST_CONTROL_DT = 1.0  # s; beyond it the sampled loop no longer resembles the design
+LONGEST_CONTROL_DT = 1.0  # s; above it the sampled loop differs from the design
 
 
 def check_control_dt(control_dt: float) -> float:
@@ -49,8 +49,8 @@ def make(controller: Any, turbine: Any, control_dt: float) -> Any:
     name = None
     if isinstance(controller, str):
         name = controller
-        own = ":" in name and not name.startswith(tuple(catalogue().PREFIXES))
-        controller = _imported(name) if own else catalogue().named(name)
+        imported = ":" in name and not name.startswith(tuple(catalogue().PREFIXES))
+        controller = _imported(name) if imported else catalogue().named(name)
     if isinstance(controller, type) or not isinstance(controller, Controller):
         if not _is_law(controller):
             controller = _called(controller, name, turbine, control_dt)
@@ -72,7 +72,7 @@ def _imported(path):
     module_name, _, attribute = path.partition(":")
     if not module_name or not attribute:
         raise InputError(f"controller {path!r}: an import path is 'module:Name'")
-    sys.path.insert(0, "")  # a console script has its own folder on the path, not the user's
+    sys.path.insert(0, "")  # a console script has its folder on the path, not the user's
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:
@@ -89,12 +89,12 @@ def _imported(path):
     return getattr(module, attribute)
 
 
-def _is_law(given):
+def _is_law(function):
     """Whether something is a function of the measurement (FunctionController) and no factory or object."""
-    if not callable(given) or isinstance(given, type) or hasattr(given, "act"):
+    if not callable(function) or isinstance(function, type) or hasattr(function, "act"):
         return False
     try:
-        parameters = inspect.signature(given).parameters.values()
+        parameters = inspect.signature(function).parameters.values()
     except ValueError:  # some built-in callables have none
         return False
     free = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)

@@ -1,4 +1,4 @@
-"""What a controller is, and the one place that turns a name into one.
+"""The protocol of controllers, and the controller of a name.
 
 A controller has reset(measurement) and act(measurement). So has a plain function of the measurement, which is
 act by itself: f(measurement) -> (generator torque, blade pitch). A function counts as one where a single
@@ -7,21 +7,21 @@ it is a factory, which makes the controller of a run, or the function that is on
 function remembers: a factory makes it afresh for every run. The attributes below may be set on a function
 too, as f.information = ("wind_speed",). Beside its methods a controller may have
 
-- information, a tuple of the Measurement fields that it uses and of its PRIVILEGED_INPUTS. It is given these
+- information, a tuple of the Measurement fields that it uses and of its PRIVILEGED_INPUTS. It reads these
   and nothing else. A compiled law reads NaN in every other field, and so it does as the torque or the blade
-  pitch in force where it does not declare generator_torque or blade_pitch. A controller in Python is given a
-  Measurement whose other fields raise a ControllerError. The time is always given. A Python
-  controller that declares nothing is given what a turbine's own sensors show (SENSOR_FIELDS of
+  pitch in force where it does not declare generator_torque or blade_pitch. A controller in Python receives a
+  Measurement whose other fields raise a ControllerError. The time is always there. A Python
+  controller that declares nothing reads what a turbine's sensors measure (SENSOR_FIELDS of
   fowt_env/plant/measurement.py);
-- prepare(scene), called once per run before reset. Where "plant_model" is declared it is given the scene of
+- prepare(scene), called once per run before reset. Where "plant_model" is declared it receives the scene of
   the run in steady wind (rated) and still water: the plant's equations, and nothing of the weather that is
   coming. Where it is not, the scene has a `turbine` and nothing else;
-- preview_times, where "wind_preview" is declared: how far ahead (s, increasing) it is given the
+- preview_times, where "wind_preview" is declared: how far ahead (s, increasing) it reads the
   rotor-averaged wind, as `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's
   array;
 - individual = True where it commands the pitch of each blade: act returns (generator torque, pitch of blade
   1, of blade 2, of blade 3), and a compiled law writes these four. It needs a scene with pitch="individual".
-  In such a scene other controllers have their one pitch given to all blades, blade_pitch is the mean of the
+  In such a scene the pitch of other controllers goes to all blades, blade_pitch is the mean of the
   blades', and any controller may declare fields of BladeMeasurement: `measurement.blades` has them, a
   compiled law's array behind the wind ahead. Of the pitches in force a law that commands each blade sees
   those that it declares (blade_pitch_1 ...).
@@ -63,7 +63,7 @@ class Controller(Protocol):
         """Start afresh from a Measurement, so that the first command does not bump the plant."""
 
     def act(self, measurement: Measurement) -> tuple[float, ...]:
-        """(generator torque N m on the high-speed shaft, blade pitch rad) held until the next call.
+        """(generator torque N m on the high-speed shaft, blade pitch rad) constant until the next call.
 
         With individual = True the pitch of each of the three blades.
         """
@@ -90,7 +90,7 @@ class CompiledController:
 
     kernel: Callable[..., None] | None = None
     information: tuple[str, ...] = ()  # what the law uses: Measurement fields and PRIVILEGED_INPUTS
-    preview_times: tuple[float, ...] = ()  # s ahead that it is given the wind
+    preview_times: tuple[float, ...] = ()  # s ahead of the wind that it reads
     individual: bool = False  # whether the law commands the pitch of each blade, else one for all
 
     def __init__(self, name: str, parameters: npt.ArrayLike, n_memory: int) -> None:
@@ -141,8 +141,8 @@ class CheckedController:
         self.controller = controller
         self.name = str(name or getattr(controller, "name", type(controller).__name__))
         self.individual = bool(getattr(controller, "individual", False))
-        own = SENSOR_FIELDS + (BLADE_SENSOR_FIELDS if self.individual else ())
-        self.information = tuple(getattr(controller, "information", own))
+        default = SENSOR_FIELDS + (BLADE_SENSOR_FIELDS if self.individual else ())
+        self.information = tuple(getattr(controller, "information", default))
         self.declared = hasattr(controller, "information")
         self.preview_times = tuple(getattr(controller, "preview_times", ()))
 
@@ -157,11 +157,11 @@ class CheckedController:
 
     def reset(self, measurement: Measurement) -> None:
         """Reset the controller inside. Raises: ControllerError for whatever that raises."""
-        given = self._given(measurement)
+        shown = self._shown(measurement)
         with named_failure(self.name, "in reset()", float(measurement.time)):
-            self.controller.reset(given)
+            self.controller.reset(shown)
 
-    def _given(self, measurement):
+    def _shown(self, measurement):
         """The part of a Measurement that the controller declares."""
         view = view_class(self.name, self.information, len(self.preview_times))
         return measurement if isinstance(measurement, view) else view.of(measurement)
@@ -171,9 +171,9 @@ class CheckedController:
 
         Raises: ControllerError naming the controller, the time and what it returned or raised.
         """
-        given = self._given(measurement)
+        shown = self._shown(measurement)
         try:  # no context manager: this is called at every control period
-            returned = self.controller.act(given)
+            returned = self.controller.act(shown)
         except (ControllerError, InputError, SimulationStopped):
             raise
         except Exception as error:
@@ -187,17 +187,17 @@ class CheckedController:
         if good and all(map(isfinite, values)):
             return tuple(float(value) for value in values)
         time = float(measurement.time)
-        wanted = (
+        allowed = (
             "four finite numbers, (generator torque in N m on the high-speed shaft, pitch of each blade in"
             " rad)"
             if self.individual
             else "two finite numbers, (generator torque in N m on the high-speed shaft, blade pitch in rad)"
         )
         if hasattr(returned, "act"):
-            wanted += "; a function that makes a controller takes two arguments, (turbine, control_dt)"
+            allowed += "; a function that makes a controller takes two arguments, (turbine, control_dt)"
         raise ControllerError(
             f"controller {self.name!r} returned {_shown(returned)} at t = {time:.3f} s: act() must return"
-            f" {wanted}",
+            f" {allowed}",
             controller=self.name,
             time=time,
             returned=returned,
@@ -205,7 +205,7 @@ class CheckedController:
 
 
 class FunctionController:
-    """A function of the measurement as a controller: it is asked as act, and there is nothing to reset.
+    """A function of the measurement as a controller: called as act, without reset.
 
     information, preview_times, individual and prepare are the function's attributes, where it has them.
     """
@@ -227,7 +227,7 @@ class FunctionController:
 
 @contextmanager
 def named_failure(controller, what, time=None):
-    """Context in which what a controller in Python raises becomes a ControllerError that says where."""
+    """Return a context that turns errors of a controller into a ControllerError with their place."""
     try:
         yield
     except (ControllerError, InputError, SimulationStopped):
@@ -237,11 +237,11 @@ def named_failure(controller, what, time=None):
 
 
 def failure_of(controller, what, error, time):
-    """ControllerError that says where and when (None: before the run) a controller raised an error.
+    """Return the ControllerError of a controller's error, with place and time (None: before the run).
 
     what: what it was doing, as "in act()".
     """
-    frames = traceback.extract_tb(error.__traceback__)[1:]  # the first is the caller's own
+    frames = traceback.extract_tb(error.__traceback__)[1:]  # the first is the caller's
     own = [
         frame
         for frame in frames

@@ -9,7 +9,7 @@ import numpy as np
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import PlantWarning, level_outside
 
-# A command beyond these for a second is one in other units: kN m, MW or degrees. Of rated torque, and of
+# A command above these for a second is in other units: kN m, MW or degrees. Of rated torque, and of
 # rated rotor speed: close to it a law that means N m has more than a hundredth of rated torque, or none.
 LITTLE_TORQUE, MUCH_TORQUE, TURNING = 0.01, 2.0, 0.9
 

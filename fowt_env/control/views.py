@@ -11,7 +11,7 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measure
 
 
 class MeasurementView(Measurement):
-    """A Measurement that holds what a controller declares and NaN for the rest, which raises when asked for.
+    """Measurement of the fields that a controller declares; the other ones are NaN and raise when read.
 
     view[i] raises as the attribute does; np.array(view), slices and loops have NaN there.
     """
@@ -57,7 +57,7 @@ class MeasurementView(Measurement):
 
     @property
     def blades(self) -> "BladeView":
-        """BladeMeasurement of a scene whose blades have pitches of their own."""
+        """BladeMeasurement of a scene with individual pitch."""
         if self._blades is None:
             raise ControllerError(
                 f"controller {self._controller!r} reads 'blades': the scene has one pitch for all blades;"
@@ -123,7 +123,7 @@ class BladeView(BladeMeasurement):
 
 
 def _refuse(controller, name, time):
-    """Raise ControllerError: a controller asks at a time (s) for what it does not declare."""
+    """Raise ControllerError: a controller reads at a time (s) what it does not declare."""
     also = " and give preview_times" if name == "wind_preview" else ""
     raise ControllerError(
         f"controller {controller!r} reads {name!r} at t = {time:.3f} s and does not declare it: add"
@@ -166,7 +166,7 @@ def _blades_again(name, information, values, time):
 
 
 def view_of(controller: Any) -> Callable[[Sequence[float]], MeasurementView]:
-    """What makes the view that a controller is given from its array of readings."""
+    """Return the function that makes the view of a controller from its array of readings."""
     return view_class(controller.name, tuple(controller.information), len(controller.preview_times)).take
 
 

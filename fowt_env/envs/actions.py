@@ -59,7 +59,7 @@ def build_action_map(mode, task, turbine, control_dt, individual=False):
     """ActionMap of a ActionMode, a Task and a descriptions.turbine.Turbine.
 
     individual: whether the baseline of the residual mode commands each blade.
-    Raises: InputError where the pitch action reaches beyond the actuator.
+    Raises: InputError where the pitch action exceeds the range of the actuator.
     """
     law, drive = turbine.torque_law, turbine.pitch_drive
     reach = tuple(angle * pi / 180.0 for angle in task.blade_pitch)

@@ -19,16 +19,16 @@ from fowt_env.plant.measurement import Measurement
 
 
 def adapted_task(task: Task, settings: Settings) -> Task:
-    """Return the task with the settings that replace its own."""
-    own = settings.episode
+    """Return the task with its values replaced by those of the settings."""
+    episode = settings.episode
     replaced = {"rotor": settings.plant.rotor} | {
-        name: getattr(own, name) for name in ("duration", "wind", "sea", "wind_preview")
+        name: getattr(episode, name) for name in ("duration", "wind", "sea", "wind_preview")
     }
     changes = {name: value for name, value in replaced.items() if value is not None}
-    if own.observation is not None:
-        changes["observation"] = check_channels("observation", own.observation, default=task.observation)
-    if own.reward is not None and not callable(own.reward):
-        changes["weights"] = task.weights | check_weights("reward", own.reward)
+    if episode.observation is not None:
+        changes["observation"] = check_channels("observation", episode.observation, default=task.observation)
+    if episode.reward is not None and not callable(episode.reward):
+        changes["weights"] = task.weights | check_weights("reward", episode.reward)
     return replace(task, **changes)
 
 
@@ -56,14 +56,14 @@ def named_baseline(name, turbine, control_dt):
     return baseline
 
 
-def nominal_parts(given):
+def nominal_parts(setting):
     """Return {"platform", "turbine"} of the setting nominal_plant. Raises: InputError."""
-    if not isinstance(given, Mapping) or "platform" not in given:
-        raise InputError(f"nominal_plant = {given!r}: must be a dict with a platform, and a turbine or not")
-    for key in given:
+    if not isinstance(setting, Mapping) or "platform" not in setting:
+        raise InputError(f"nominal_plant = {setting!r}: must be a dict with a platform, and a turbine or not")
+    for key in setting:
         if key not in ("platform", "turbine"):
             raise unknown("key of nominal_plant", key, ("platform", "turbine"))
-    return {"turbine": None} | dict(given)
+    return {"turbine": None} | dict(setting)
 
 
 def build_config(scene, task, mode, observed, timing, laws, interface, ahead):

@@ -1,4 +1,4 @@
-"""Decisions of an agent: held for some control periods, smoothed, and made from a short history.
+"""Decisions of an agent: kept for some control periods, smoothed, and made from a short history.
 
 What an agent adds to a baseline (residual mode) can be made to leave the baseline's operating point alone,
 whatever the agent has learned. washout: a high pass, so that what is added sums to no more than a bounded

@@ -225,7 +225,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._interface = settings.interface
         sensors = settings.interface.sensors
         self._sensors = None if sensors is None else check_sensors(sensors, self.scene.turbine)
-        self._chain = None  # (name, fields) of a sensor chain, which may lack what is asked for
+        self._chain = None  # (name, fields) of a sensor chain, which may lack a requested channel
         if isinstance(self._sensors, SensorChain):
             self._chain = (
                 self._sensors.name,
@@ -259,7 +259,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def individual(self) -> bool:
-        """Whether every blade has a pitch of its own."""
+        """Whether each blade is pitched individually."""
         return self.scene.model.pitches is not None
 
     @property
@@ -273,7 +273,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self.is_protected and bool(self._episode.link.watch[Watch.STOP] >= 0.0)
 
     def twin(self) -> "FowtEnv":
-        """Another environment of the same settings, before its first reset; shares what is never written."""
+        """Return another environment of the same settings, not reset; constant parts are shared."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other._np_random = other._np_random_seed = None
@@ -283,7 +283,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return other
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made from: the attributes less the compiled ones, and a Snapshot."""
+        """Return the contents of a copy: the attributes less the compiled ones, and a Snapshot."""
         kept = {name: value for name, value in self.__dict__.items() if name not in COMPILED}
         return kept | {
             "_snapshot": None if self._handle is None else self.get_state(),
@@ -300,7 +300,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._restore(snapshot)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "FowtEnv":
-        """An independent environment in the same instant, which shares what is never written."""
+        """Return an independent environment at the same instant, which shares what is never written."""
         for shared in (self.scene, self._nominal, self.task, self._kind, self._sensors, self.observed):
             memo[id(shared)] = shared
         other = object.__new__(type(self))
@@ -317,8 +317,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._baseline = None
         self._hidden = None  # of what is measured, for the baseline's law
         if mode == ActionMode.RESIDUAL:
-            own = deepcopy(self.baseline)  # environments of a batch do not share the memory of an object
-            self._baseline = named_baseline(own, self.design_scene.turbine, self.control_dt)
+            copy = deepcopy(self.baseline)  # environments of a batch do not share the memory of an object
+            self._baseline = named_baseline(copy, self.design_scene.turbine, self.control_dt)
             preview_leads(self._baseline)
             self._hidden = hidden(self._baseline, self._chain, individual)
         self._estimator = None
@@ -370,13 +370,13 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """(observation, info) at the start of a new episode.
+        """Return (observation, info) at the start of a new episode.
 
         options: "wind", "sea", "weather_seed", "offsets" ({channel: added to the operating point}) in
-        place of what is drawn; "exact_start": whether the operating point is exact (it is where one wind
-        is given) or interpolated. wind, sea and offsets may be ranges (low, high), the wind a mixture and the
-        sea {"kind": "joint"}, as in a Task; drawn after what the task draws, with the same generator. A sea
-        that is not given is the task's, for the wind that the task drew.
+        place of what is drawn; "exact_start": whether the operating point is exact (the default
+        where the wind is one value) or interpolated. wind, sea and offsets may be ranges (low, high), the
+        wind a mixture and the sea {"kind": "joint"}, as in a Task; drawn after the task's draws, with the
+        same generator. The default sea is the task's, for the wind that the task drew.
 
         Raises: InputError for other keys and values that cannot be used; the environment is then as it was
         before. ClosedEnvironmentError after close().
@@ -388,7 +388,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._begin(planned)
 
     def _plan(self, seed, options):
-        """Start of a new episode, drawn with the generator; nothing else changes. Raises as reset."""
+        """Draw the Start of a new episode; nothing but the generator changes. Raises as reset."""
         super().reset(seed=seed)
         episode = with_options(self.task.draw(self.np_random), options, self.np_random)
         faults = self._interface.faults if (options or {}).get("faults") is None else options["faults"]
@@ -405,7 +405,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return Start(episode, scene, self._nominal_in(scene), state, command, reference, guard)
 
     def _begin(self, planned):
-        """(observation, info) at the start of the episode that was planned."""
+        """Return (observation, info) at the start of the planned episode."""
         self._running, self._end = False, ""  # until all of it has worked
         self._enter(planned.scene, planned.nominal, planned.episode.faults, planned.guard)
         run = self._episode
@@ -464,11 +464,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             start_tracking(self._episode.memory, self.measurement(), self._config.actions)
 
     def step(self, action: npt.ArrayLike) -> StepResult:
-        """(observation, reward, terminated, truncated, info) after one control period."""
+        """Advance one control period; return (observation, reward, terminated, truncated, info)."""
         if not self._running:
             raise self._standing()
         try:
-            requested = np.array(action, dtype=np.float64)  # a copy: steady types, whatever was given
+            requested = np.array(action, dtype=np.float64)  # a copy of one type
         except (TypeError, ValueError):
             raise InputError(f"action = {action!r}: must be {self._episode.action.size} numbers") from None
         if requested.shape != self._episode.action.shape:
@@ -479,7 +479,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._result(status, reward)
 
     def _standing(self):
-        """The error of a step without a running episode."""
+        """Return the error of a step without a running episode."""
         if self._closed:
             return ClosedEnvironmentError(CLOSED)
         if self._end:
@@ -487,9 +487,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return ResetNeeded("call reset() first: no episode is running")
 
     def step_physical(self, torque: float, *blade_pitch: float) -> StepResult:
-        """As step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
+        """Advance as step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
 
-        blade_pitch: one for all blades, or three where each has its own. The generator and the pitch actuator
+        blade_pitch: one for all blades, or three with individual pitch. The generator and the pitch actuator
         follow it as far as their limits allow.
         """
         if not self._running:
@@ -506,7 +506,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._result(*act_physical(self._handle, self._estimator_law, command))
 
     def _result(self, status, reward):
-        """What step returns, from the status and reward of a control period."""
+        """Return what step returns, from the status and reward of a control period."""
         run = self._episode
         step = int(run.counts[STEP])
         info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
@@ -538,7 +538,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._end = f"the episode ended ({why}) at {self._episode.counts[STEP] * self.dt:.1f} s"
 
     def _own(self, info):
-        """Reward of the user's function for the step of this info."""
+        """Return the reward of the user's function for the step of this info."""
         return paid(self._own_reward, info, self.true_measurement())
 
     def _reason(self, status):
@@ -555,7 +555,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return facts if self._limits is None else facts | stop_facts(self._episode.link.watch)
 
     def get_state(self) -> Snapshot:
-        """Snapshot of all that decides how the run goes on: plant, controller, counters, weather, draws.
+        """Return a Snapshot of all that determines the rest of the run: plant, controller, weather, draws.
 
         For what-if: set_state(get_state()) and the same actions give the same bits, in this environment
         or in another of the same settings. The weather is shared, not copied; a snapshot can be pickled.
@@ -576,14 +576,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         )
 
     def set_state(self, snapshot: Snapshot) -> None:
-        """Go on from a Snapshot. Raises: InputError for one from an environment of other settings."""
+        """Continue from a Snapshot. Raises: InputError for one from an environment of other settings."""
         if self._closed:
             raise ClosedEnvironmentError(CLOSED)
         self._check_snapshot(snapshot)
         self._restore(snapshot)
 
     def _restore(self, snapshot):
-        """Go on from a Snapshot of these settings."""
+        """Continue from a Snapshot of these settings."""
         if (snapshot.scene, snapshot.faults) != (self.scene, self._faults) or self._handle is None:
             scene, faults = snapshot.scene, snapshot.faults
             self._enter(scene, self._nominal_in(scene), faults, self._guard(scene, faults))
@@ -606,7 +606,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
 
     def _nominal_in(self, scene):
-        """Scene of the nominal plant in the weather of another scene, where anything is designed on it."""
+        """Return the nominal plant in the weather of another scene, where a controller is designed on it."""
         if self._nominal is None or (self._baseline is None and self._estimator is None):
             return self._nominal
         return self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
@@ -633,7 +633,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def measurement(self, preview_times: Sequence[float] = ()) -> Measurement:
         """Return the Measurement of all fields now (SI), as the sensors read them.
 
-        Where every blade has a pitch of its own it has blades, a BladeMeasurement.
+        With individual pitch it has blades, a BladeMeasurement.
         preview_times: increasing, s; with them it has wind_preview, the rotor-averaged wind that far ahead,
         exact: a lidar is read by the channel wind_preview and by the baseline alone.
         """
@@ -651,9 +651,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return whole_view(reading, [float(np.interp(reading[0], time, row)) for row in values])
 
     def true_measurement(self) -> Measurement:
-        """Measurement of all fields now (SI), of the true motions whatever the sensors show.
+        """Return the Measurement of all fields now (SI): true motions, without the sensors.
 
-        Where every blade has a pitch of its own it has blades, a BladeMeasurement.
+        With individual pitch it has blades, a BladeMeasurement.
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
@@ -662,7 +662,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def design_scene(self) -> Scene:
-        """Scene that controllers may be designed on: the nominal plant, else the true one."""
+        """Return the scene that controllers may be designed on: the nominal plant, else the true one."""
         return self.scene if self._nominal is None else self._nominal
 
     def channels(self) -> dict[str, float]:
@@ -717,7 +717,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         )
 
     def render(self) -> np.ndarray | None:
-        """Picture of the present instant, (height, width, 3) uint8; None in mode "human", which shows it.
+        """Return a picture of the present instant, (height, width, 3) uint8; mode "human" shows it: None.
 
         It has the last action and reward of the episode; render_size sets width and height.
 

@@ -1,7 +1,7 @@
 """One control period of an environment as one compiled call: command, physics, measurement, reward.
 
 Everything that a period reads is an EpisodeConfig, everything it writes EpisodeData: arrays of one
-environment, so that many environments are rows of larger ones. What stands between plant and laws, and its
+environment, so that many environments are rows of larger ones. Sensors, trips and faults, and their
 order, is that of simulate (fowt_env/loop/period.py).
 """
 

@@ -35,7 +35,7 @@ OF_BLADES = ESTIMATES + len(ESTIMATED)  # BladeMeasurement
 SINCE_SHUTDOWN = OF_BLADES + N_BLADE_MEASUREMENTS
 PREVIEW = SINCE_SHUTDOWN + 1
 N_ACTIONS = N_COMMANDS  # of every mode but "individual"
-DEFAULT = "default"  # in a list of channels: the task's own
+DEFAULT = "default"  # in a list of channels: the task's channels
 
 
 class Entry(NamedTuple):
@@ -111,7 +111,7 @@ STOP_CHANNELS = {  # of tasks in which the turbine is to be stopped
     ),
 }  # fmt: skip
 ORDINALS = ("first", "second", "third", "fourth")
-BLADE_CHANNELS = BladeMeasurement._fields[BladeMeasure.BLADE_PITCH_1 :]  # where blades have own pitches
+BLADE_CHANNELS = BladeMeasurement._fields[BladeMeasure.BLADE_PITCH_1 :]  # of individual pitch
 
 
 def _blade_channels(turbine):
@@ -208,14 +208,14 @@ KNOWN = (  # channels of every scene with wind
 
 
 def entries(names, turbine, preview, actions=N_ACTIONS, individual=False):
-    """Return the entries of an observation in order; individual: whether every blade has a pitch of its own.
+    """Return the entries of an observation in order; individual: whether each blade is pitched individually.
 
     Raises: InputError for a preview without times, and for channels of single blades where there are none.
     """
     for name in names:
         if name in BLADE_CHANNELS and not individual:
             raise InputError(
-                f"observation: {name!r}: is measured where every blade has a pitch of its own: needs"
+                f"observation: {name!r}: is measured with individual pitch: needs"
                 " pitch = 'individual'"
             )
     if "wind_preview" in names and not len(preview):

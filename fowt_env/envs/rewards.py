@@ -27,7 +27,7 @@ TILT_PERIOD = 30.0  # s, about that of platform pitch: turns its rate into an am
 
 
 class Scales(NamedTuple):
-    """Turbine figures that make terms dimensionless."""
+    """Values of the turbine that make terms dimensionless."""
 
     rated_power: float  # mechanical, at the generator, W
     rated_speed: float  # rotor, rad/s
@@ -71,7 +71,7 @@ REWARD_TERMS = {
     "pitch_travel": RewardTerm(
         -1.0,
         0.0,
-        "blade-pitch travel over the most that the rate limit allows; of blades with pitches of their own the"
+        "blade-pitch travel over the most that the rate limit allows; of blades with individual pitch the"
         " mean",
     ),
     "torque_travel": RewardTerm(-1.0, 0.0, "change of generator torque over the most its rate limit allows"),
@@ -160,7 +160,7 @@ def travel_term(previous, after, max_increment):
 
 @kernel
 def pitch_travel_term(previous, m, scales):
-    """travel_term of the blade pitch; the mean over blades with pitches of their own."""
+    """travel_term of the blade pitch; the mean over the blades with individual pitch."""
     if m.shape[0] == N_MEASUREMENTS:
         return travel_term(previous[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment)
     total = 0.0
@@ -243,7 +243,7 @@ def check_own_reward(where, function):
     """
     try:
         signature = inspect.signature(function)
-    except ValueError:  # a builtin that tells nobody what it takes
+    except ValueError:  # a builtin without a signature
         return function
     for taken, result in (({}, None), function), (({},), OfInfo(function)):
         try:
@@ -269,5 +269,5 @@ def paid(function, info, measurement):
 
 
 def weight_array(weights):
-    """(N_TERMS,) weights in the order of REWARD_TERMS; 0 where none is given."""
+    """Return the weights (N_TERMS,) in the order of REWARD_TERMS; the default is 0."""
     return np.array([weights.get(name, 0.0) for name in REWARD_TERMS])

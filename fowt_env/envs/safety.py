@@ -15,14 +15,14 @@ AHEAD = 1.0  # s: the rotor speed is checked where it will be, since feathering 
 
 
 class SafetyCosts(gymnasium.Wrapper):
-    """FowtEnv whose info says which limits each step passed, in the convention of Safety-Gymnasium.
+    """FowtEnv with costs of exceeded limits in its info, in the convention of Safety-Gymnasium.
 
     env       a FowtEnv, wrapped or not
     limits    {field of Measurement: the largest absolute value that costs nothing, SI}, as rotor_speed=1.4
               (rad/s), platform_pitch=0.1 (rad), nacelle_acceleration=2.0 (m/s2)
 
-    info of each step has "cost_<field>" of each limit, 1.0 where the true motion at the end of the step is
-    beyond it and else 0.0, and "cost", their sum. The reward is left as it is.
+    info of each step has "cost_<field>" of each limit, 1.0 where the true motion at the end of the step
+    exceeds it and else 0.0, and "cost", their sum. The reward is unchanged.
 
     Raises: InputError for unknown fields and limits that are not positive numbers.
     """
@@ -63,7 +63,7 @@ class SafetyLayer(gymnasium.Wrapper):
                     rated to the limit) before the agent has the turbine back
     baseline        name of the compiled controller that takes over
 
-    What an agent asks for meanwhile is ignored; observations and rewards go on. info of each step has
+    The agent's actions are ignored meanwhile; observations and rewards continue. info of each step has
     "guarded" (bool, whether this period was the guard's) and "guarded_periods" (of the episode so far).
 
     Raises: InputError for limits that cannot be used.
@@ -123,7 +123,7 @@ class SafetyLayer(gymnasium.Wrapper):
             if speed > self._fastest:
                 low = measured.blade_pitch + self._feather
                 pitches = [min(max(blade_pitch, low), self._highest) for blade_pitch in pitches]
-                self._baseline.reset(measured)  # goes on from where the blades are
+                self._baseline.reset(measured)  # continues from the present pitch
             self.guarded_periods += 1
             result = plant.step_physical(torque, *pitches)
         else:

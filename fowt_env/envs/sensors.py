@@ -1,6 +1,6 @@
-"""Sensors of an environment: what its setting stands for, and their figures and noise in one episode.
+"""Sensors of an environment: the setting, and the values and noise in one episode.
 
-One reading is made per control period, and observation, baseline, set-point loop and estimator are given that
+One reading is made per control period, and observation, baseline, set-point loop and estimator read that
 same one. Rewards, failures and outputs are of the true motions. The readings are made as those of simulate
 are, by fowt_env/plant/sensing.py.
 """
@@ -44,19 +44,19 @@ def reading_scales(turbine, individual=False):
     return np.array([known.get(name, in_unit.get(unit[name], 1.0)) for name in fields])
 
 
-def check_sensors(given, turbine=None):
-    """Return what an environment is given as sensors: {"noise", "delay"}, or a SensorChain; "exact" is None.
+def check_sensors(setting, turbine=None):
+    """Return the setting sensors of an environment: {"noise", "delay"}, or a SensorChain; "exact" is None.
 
     Raises: InputError.
     """
-    if isinstance(given, str | SensorChain):
-        return sensor_chain(given) if turbine is None else sensors_of(given, turbine)
-    if not isinstance(given, Mapping):
+    if isinstance(setting, str | SensorChain):
+        return sensor_chain(setting) if turbine is None else sensors_of(setting, turbine)
+    if not isinstance(setting, Mapping):
         raise InputError(
-            f"sensors = {given!r}: must be a dict with noise and delay, a SensorChain or the name of one"
+            f"sensors = {setting!r}: must be a dict with noise and delay, a SensorChain or the name of one"
         )
-    settings = {"noise": 0.0, "delay": 0} | dict(given)
-    for key in given:
+    settings = {"noise": 0.0, "delay": 0} | dict(setting)
+    for key in setting:
         if key not in ("noise", "delay"):
             raise unknown("key of sensors", key, ("noise", "delay"))
     noise = check_number("sensors.noise", settings["noise"], 0.0, allowed="a finite number >= 0")

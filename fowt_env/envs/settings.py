@@ -14,7 +14,7 @@ from fowt_env.scene.options import OPTIONS
 class EpisodeSettings:
     """What replaces parts of the task; None: the task's."""
 
-    observation: Sequence[str] | None = None  # channel names; "default" among them stands for the task's
+    observation: Sequence[str] | None = None  # channel names; "default" among them: those of the task
     # {term: weight} that replace single weights, or a function (info) or (info, measurement) that returns the
     # reward, from the info of the step, with each named term, and the Measurement at its end (true motions)
     reward: Mapping[str, float] | Callable[..., float] | None = None
@@ -49,7 +49,7 @@ class ControlSettings:
 
 @dataclass(frozen=True)
 class InterfaceSettings:
-    """What stands between the plant and its readers, with the meaning of the same arguments of simulate."""
+    """Sensors, wind ahead, trips and faults, with the meaning of the same arguments of simulate."""
 
     # name of a sensor chain, a SensorChain, or {"noise": standard deviation of white noise on every reading,
     # as a fraction of the channel's scale; "delay": control periods}; None: exact

@@ -47,12 +47,12 @@ class Episode(NamedTuple):
 class Task:
     """What an agent has to do.
 
-    wind, sea: as build_scene takes them, where a tuple (low, high) in place of a number is a range
+    wind, sea: as build_scene takes them, where a tuple (low, high) instead of a number is a range
     from which each episode draws uniformly. sea may also be {"kind": "joint", "table": name}: the
-    JONSWAP state that belongs to the mean wind at a site (its first and last row hold beyond them);
+    JONSWAP state that belongs to the mean wind at a site (constant outside its rows);
     None is still water.
 
-    A mixture of weathers is a list of (share, wind, sea) in place of the wind: each episode draws one of
+    A mixture of weathers is a list of (share, wind, sea) instead of the wind: each episode draws one of
     them, with a probability in proportion to its share, and then from its ranges. sea itself is then None.
     Raises: InputError naming the task, the key, the value and what is allowed.
     """
@@ -140,7 +140,7 @@ class Task:
 
     @property
     def fixed_wind(self):
-        """Whether every episode has the same mean wind (a box of wind always starts from its own)."""
+        """Whether every episode has the same mean wind (a box of wind always has its mean)."""
         if is_field(self.wind):
             return True
         ends = [_weather(wind, None, pick)[0] for _, wind, _ in self.weathers for pick in (_lowest, _highest)]
@@ -237,7 +237,7 @@ def is_mixture(wind):
 def _check_mixture(where, mixture, sea):
     """Tuple of (share, wind, sea). Raises: InputError."""
     if sea is not None:
-        raise InputError(f"{where}: sea = {sea!r}: must be None beside a mixture, which has its own")
+        raise InputError(f"{where}: sea = {sea!r}: must be None with a mixture, which has seas")
     checked = []
     for i, entry in enumerate(mixture):
         if not isinstance(entry, tuple | list) or len(entry) != 3:
@@ -283,7 +283,7 @@ def _picked(where, spec, pick):
 
 
 def _joint(table, speed):
-    """JONSWAP sea of a joint table at a wind speed, the speed held within the table."""
+    """Return the JONSWAP sea of a joint table at a wind speed, limited to the table's range."""
     if isinstance(table, str) and table not in joint_tables():
         raise unknown("joint sea-state table", table, joint_tables())
     rows = joint_tables()[table] if isinstance(table, str) else table
@@ -415,7 +415,7 @@ TASKS = {
 
 
 def task_of(task: str | Task, turbine: Turbine | None = None) -> Task:
-    """Task from a name, scaled to a turbine where one is given, or a Task. Raises: InputError for others."""
+    """Return the Task of a name, scaled to a turbine if any, or the Task itself. Raises: InputError."""
     if isinstance(task, Task):
         return task
     if not isinstance(task, str) or task not in TASKS:
@@ -427,7 +427,7 @@ def scaled_task(task: Task, turbine: Turbine) -> Task:
     """A task of the NREL 5 MW turbine for another: itself where winds, speed and pitch drive are the same.
 
     Winds above rated are as far from rated, others the same share of the way from cut-in to rated, none
-    beyond cut-out; the offset of the rotor speed goes with the rated one. The weight of pitch travel makes a
+    above cut-out; the offset of the rotor speed goes with the rated one. The weight of pitch travel makes a
     degree per turn of the rotor as dear, whatever the drive can do. Seas are those of the site at the wind.
     """
     winds = (turbine.cut_in_wind_speed, turbine.rated_wind_speed, turbine.cut_out_wind_speed)

@@ -56,11 +56,10 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     infos are those of Gymnasium's SyncVectorEnv, but infos["sampled"][i] is a dict, which replays the
     episode as options of a reset.
 
-    envs are the single environments; what moves one of them on its own must go through call().
+    envs are the single environments; step one of them alone through call() only.
 
     A reward that is a function is called in Python for one environment after the other, some 5 microseconds
-    each beside its own time. copy.deepcopy and pickle give an independent batch that goes on from here, as of
-    a FowtEnv.
+    each beside its own time. copy.deepcopy and pickle give an independent batch that continues from here.
 
     An action that is not finite is refused for all before any environment moves.
     """
@@ -192,7 +191,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return mask
 
     def _begin(self, i, start, infos):
-        """Begin a planned episode of one environment; returns the infos with its own added."""
+        """Begin a planned episode of one environment; returns the infos with its info added."""
         _, info = self.envs[i]._begin(start)
         self._ended[i] = False
         self._renew(i)
@@ -265,13 +264,13 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
 
     def _act(self, actions, active):
         """One control period of the active environments under checked actions."""
-        wanted = self.action_space.shape
+        shape = self.action_space.shape
         try:
-            requested = np.array(actions, dtype=np.float64)  # a copy: steady types, whatever was given
+            requested = np.array(actions, dtype=np.float64)  # a copy of one type
         except (TypeError, ValueError):
-            raise InputError(f"actions = {actions!r}: must be {wanted} numbers") from None
-        if requested.shape != wanted:
-            raise InputError(f"actions have shape {requested.shape}: must be {wanted}")
+            raise InputError(f"actions = {actions!r}: must be {shape} numbers") from None
+        if requested.shape != shape:
+            raise InputError(f"actions have shape {requested.shape}: must be {shape}")
         arguments = (
             self._handles, self._baseline_law, self._estimator_law, requested, active, self._statuses,
             self._rewards,
@@ -319,7 +318,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return infos
 
     def last_info(self, i: int) -> dict[str, Any]:
-        """Info of the last step of one environment, as its own step would give it."""
+        """Return the info of the last step of one environment, as FowtEnv.step returns it."""
         info = dict(zip(REWARD_KEYS, self._terms[i].tolist(), strict=True))
         info["time"] = float(self._counts[i, STEP] * self._dt[i])
         info |= {key: int(self._counts[i, entry]) for key, entry in SHOWN_COUNTS.items()}
@@ -384,26 +383,26 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
 
 
 def of_one(infos: dict[str, Any], i: int, but: Sequence[str] = ()) -> dict[str, Any]:
-    """The info of environment i, as its own step would give it, out of those of a vector environment."""
-    own = {}
+    """Return the info of environment i, as FowtEnv.step returns it, from those of a vector environment."""
+    info = {}
     for key, values in infos.items():
         if key in but or f"_{key}" not in infos or not infos[f"_{key}"][i]:
             continue
         if isinstance(values, dict):
-            own[key] = of_one(values, i)
+            info[key] = of_one(values, i)
         else:
-            own[key] = values[i].item() if isinstance(values[i], np.generic) else values[i]
-    return own
+            info[key] = values[i].item() if isinstance(values[i], np.generic) else values[i]
+    return info
 
 
-def _autoreset_mode(given):
+def _autoreset_mode(mode_or_name):
     """Return the AutoresetMode of a mode, its value or its name. Raises: InputError."""
-    if isinstance(given, AutoresetMode):
-        return given
+    if isinstance(mode_or_name, AutoresetMode):
+        return mode_or_name
     for mode in AutoresetMode:
-        if isinstance(given, str) and mode.value.lower() == given.lower().replace("_", ""):
+        if isinstance(mode_or_name, str) and mode.value.lower() == mode_or_name.lower().replace("_", ""):
             return mode
-    raise unknown("autoreset_mode", given, [mode.value for mode in AutoresetMode])
+    raise unknown("autoreset_mode", mode_or_name, [mode.value for mode in AutoresetMode])
 
 
 def _count(name, value, most):
@@ -423,15 +422,15 @@ def _environments(num_envs, per_env, settings):
     if isinstance(per_env, dict) or len(per_env) != num_envs:
         raise InputError(f"per_env: must be a list of {num_envs} dicts of settings")
     built, envs = [], []
-    for i, own in enumerate(per_env):
-        same = next((env for one, env in built if one is own or _equal(one, own)), None)
+    for i, changes in enumerate(per_env):
+        same = next((env for one, env in built if one is changes or _equal(one, changes)), None)
         if same is not None:
             envs.append(same.twin())
             continue
-        env = FowtEnv(**deepcopy(settings | own) if own else settings)
+        env = FowtEnv(**deepcopy(settings | changes) if changes else settings)
         if envs:
             _check_alike(i, env, envs[0])
-        built.append((own, env))
+        built.append((changes, env))
         envs.append(env)
     return envs
 

@@ -1,1 +1,1 @@
-"""What stands between the plant and whoever commands it, compiled: the control period and its parts."""
+"""The compiled control period between the plant and its controller or agent."""

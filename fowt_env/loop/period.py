@@ -1,4 +1,4 @@
-"""The control period, the only place that says in which order its parts come.
+"""The control period: the order of its parts is defined here alone.
 
 begin_period: watch the turbine, read the sensors, break them, inform the law.
 command of the law or of a stop, in InterfaceData.command.

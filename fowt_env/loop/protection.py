@@ -35,7 +35,7 @@ class Trip(IntEnum):
 class Limit(IntEnum):
     """Columns of Guard.trips."""
 
-    VALUE = 0  # beyond which it trips; infinite: never
+    VALUE = 0  # it trips above; infinite: never
     TIME = 1  # s for which it must be passed without a break
     STOP = 2  # what follows, of Stop
 
@@ -56,7 +56,7 @@ class Failure(IntEnum):
     RUNAWAY = 1  # it goes to an end of the drive's range as fast as the drive can
     OFFSET = 2  # its true pitch is its command and an angle; its encoder shows it without
     BIAS = 3  # a value is added to a reading
-    FREEZE = 4  # a reading stays what it is then
+    FREEZE = 4  # the reading keeps its value
     LOSS = 5  # a reading is zero
 
 
@@ -67,7 +67,7 @@ class Part(IntEnum):
     TIME = 1  # s from which it is there
     PLACE = 2  # blade (0, 1, 2), or field of the measurement
     VALUE = 3  # of an offset (rad) or bias (SI); a runaway's end: below zero fine, above feather
-    BACKUP = 4  # 1: in an emergency stop the blade feathers all the same, by a drive of its own
+    BACKUP = 4  # 1: in an emergency stop the blade feathers all the same, by its backup drive
 
 
 class Watch(IntEnum):
@@ -152,7 +152,7 @@ def kind_now(k, t, guard):
 
 @kernel
 def encoder_offset(blade, t, guard):
-    """Angle (rad) by which a blade's pitch is beyond what its encoder shows."""
+    """Angle (rad) by which a blade's pitch exceeds the reading of its encoder."""
     faults, offset = guard.faults, 0.0
     for k in range(faults.shape[0]):
         wrong = kind_now(k, t, guard) == Failure.OFFSET and int(faults[k, Part.PLACE]) == blade
@@ -166,8 +166,8 @@ def pitch_deviation(t, x, actuator, pitches, guard, command):
     """Greatest difference (rad) of encoder and command of a blade, and of that between two blades."""
     low = high = largest = 0.0
     for blade in range(pitches_of(pitches)):
-        wanted = clamp(command[Command.BLADE_PITCH + blade], actuator.minimum, actuator.maximum)
-        error = pitch_of(blade, x, pitches) - encoder_offset(blade, t, guard) - wanted
+        target = clamp(command[Command.BLADE_PITCH + blade], actuator.minimum, actuator.maximum)
+        error = pitch_of(blade, x, pitches) - encoder_offset(blade, t, guard) - target
         low, high = (error, error) if blade == 0 else (min(low, error), max(high, error))
         largest = max(largest, abs(error))
     return max(largest, high - low)

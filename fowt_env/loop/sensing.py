@@ -1,6 +1,6 @@
 """Sensors between plant and controller, the fields that a controller declares, and the wind ahead.
 
-A measurement has N_MEASUREMENTS fields and, where every blade has its own pitch, those of BladeMeasurement
+A measurement has N_MEASUREMENTS fields and, with individual pitch, those of BladeMeasurement
 after them. In what a law reads the wind ahead lies between the two.
 """
 

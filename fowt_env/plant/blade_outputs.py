@@ -1,4 +1,4 @@
-"""Bending moments of blade roots, hub and yaw bearing, where every blade has a pitch of its own.
+"""Bending moments of blade roots, hub and yaw bearing with individual pitch.
 
 As ElastoDyn has them: with what the outer part loads the inner one, by the air, its weight and its inertia
 (theory.md, 6.6). Blades are rigid and, as masses, straight along their pitch axes. Pose and rates that

@@ -18,7 +18,7 @@ FIRST_PITCH = int(Command.BLADE_PITCH)  # numba has no int() of an enum
 
 
 class BladePitches(NamedTuple):
-    """Blades with pitches of their own."""
+    """Individual pitch of the blades."""
 
     first: int  # index in the state of the second blade's pitch; the third's follows
 

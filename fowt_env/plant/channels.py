@@ -66,7 +66,7 @@ N_FIXED = len(FIXED_CHANNELS)
 LOAD_CHANNELS = tuple(
     channel[:2] for channel in _channels("Fxi_[N] Fyi_[N] Fzi_[N] Mxi_[N-m] Myi_[N-m] Mzi_[N-m]")
 )
-BLADE_CHANNELS = _channels(  # of a rotor whose blades have pitches of their own
+BLADE_CHANNELS = _channels(  # of a rotor with individual pitch
     "BldPitch2_[deg] BldPitch3_[deg] RootMxc1_[kN-m] RootMxc2_[kN-m] RootMxc3_[kN-m] RootMyc1_[kN-m]"
     " RootMyc2_[kN-m] RootMyc3_[kN-m] LSSTipMys_[kN-m] LSSTipMzs_[kN-m] YawBrMxp_[kN-m] YawBrMyp_[kN-m]"
     " YawBrMzp_[kN-m]"

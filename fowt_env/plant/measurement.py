@@ -40,7 +40,7 @@ class Measurement(NamedTuple):
         "rad/s", "in operation", "speed of the high-speed shaft: gear_ratio times the rotor's", True)]
     blade_pitch: Annotated[float, Measured(
         "rad", "towards feather",
-        "pitch angle that the blades have; the mean of blades with pitches of their own", True)]
+        "pitch angle that the blades have; the mean of the blades with individual pitch", True)]
     generator_torque: Annotated[float, Measured(
         "N m", "braking the rotor", "generator torque on the high-speed shaft, as applied until now", True)]
     surge: Annotated[float, Measured("m", "downwind", "position of the platform", False, 20.0, 200.0)]
@@ -78,7 +78,7 @@ class Measurement(NamedTuple):
 
 
 class BladeMeasurement(NamedTuple):
-    """What is measured beside a Measurement where every blade has a pitch of its own.
+    """Quantities measured beside a Measurement with individual pitch.
 
     Bending moments of the blade roots include weight and inertia: out of the rotor plane (RootMyc) and in it
     (RootMxc). Those of hub and yaw bearing are in axes that do not turn with the rotor: tilt about y, yaw

@@ -81,7 +81,7 @@ MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")  # of the 
 class Command(IntEnum):
     """Index of each command in the flat (N_COMMANDS,) float64 vector.
 
-    Where every blade has a pitch of its own the vector has N_INDIVIDUAL_COMMANDS entries, from BLADE_PITCH on
+    With individual pitch the vector has N_INDIVIDUAL_COMMANDS entries, from BLADE_PITCH on
     one for each blade.
     """
 
@@ -90,7 +90,7 @@ class Command(IntEnum):
 
 
 N_COMMANDS = len(Command)
-BLADES = 3  # of a rotor whose blades have pitches of their own
+BLADES = 3  # of a rotor with individual pitch
 N_INDIVIDUAL_COMMANDS = N_COMMANDS + BLADES - 1
 
 

@@ -29,7 +29,7 @@ INITIAL = {  # channel: (state, factor to SI)
     "PtfmYaw": (State.YAW, DEGREE),
     "Azimuth": (State.AZIMUTH, DEGREE),
     "RotSpeed": (State.ROTOR_SPEED, RPM),
-    "BldPitch1": (State.BLADE_PITCH, DEGREE),  # and BldPitch2 and 3 of blades with pitches of their own
+    "BldPitch1": (State.BLADE_PITCH, DEGREE),  # and BldPitch2 and 3 with individual pitch
     "PtfmTVxi": (State.VX, 1.0),
     "PtfmTVyi": (State.VY, 1.0),
     "PtfmTVzi": (State.VZ, 1.0),
@@ -48,8 +48,8 @@ def initial_state(
     tower zero, with the rotor speed and blade pitch of that wind on a fixed platform; or a mapping of
     absolute values of channels at the trim, or at {"start": "zero"}. Channels are named PtfmPitch or
     PtfmPitch_[deg]; BldPitch1 is that of all blades where they have one pitch, and of the
-    first where each has its own; TTDspFA and TTDspSS bend the tower in its first modes alone.
-    Raises: InputError for what is no channel or number, and for a place that the platform cannot have: below
+    first with individual pitch; TTDspFA and TTDspSS bend the tower in its first modes alone.
+    Raises: InputError for unknown channels, values that are no numbers, and impossible positions: below
     the sea bed; with wind also out of the water, with the tower base under water, or with the rotor's back to
     the wind.
     """
@@ -86,7 +86,7 @@ def initial_state(
         )
     if values:
         _check_place(scene, x)
-    if rates:  # given in inertial axes, kept in body axes
+    if rates:  # inertial axes to body axes
         inertial = np.zeros(6)
         for index, value in rates.items():
             inertial[index - State.VX] = value
@@ -107,7 +107,7 @@ def initial_state(
 
 
 def _check_place(scene, x):
-    """Raises: InputError where a platform cannot be at the place of a state, or no rotor can work there."""
+    """Refuse a state whose position a platform cannot have or in which no rotor can work: InputError."""
     blown = scene.model.aero is not None
     if scene.model.hydro is not None:
         upright = cos(x[State.PLATFORM_PITCH]) * cos(x[State.ROLL])

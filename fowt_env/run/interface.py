@@ -62,7 +62,7 @@ def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_
 
 
 def _failures(scene, fault):
-    """Return the rows of Guard.faults of a Fault: (kind, time, place, value, backup)."""
+    """Return the rows of Guard.faults of a Fault: (kind, time, index, value, backup)."""
     if fault.kind not in FAILURES:
         return []
     kind, time = FAILURES[fault.kind], fault.time

@@ -31,7 +31,7 @@ def stop_facts(watch: np.ndarray) -> dict[str, Any]:
 def run_frame(
     scene: Scene, rows: np.ndarray, counters: np.ndarray, watch: np.ndarray | None, period: float
 ) -> pd.DataFrame:
-    """Return the DataFrame of output rows (n, n_channels) in SI, which are converted in place.
+    """Return the DataFrame of output rows (n, n_channels) in SI, which are overwritten.
 
     counters: plant.model.Data.counters; watch: InterfaceData.watch, or None without a guard; period: s
     between rows. See simulate for attrs.

@@ -57,7 +57,7 @@ CHUNK_TIME = 0.05  # s of the clock
 GIB = 2.0**30
 MOST_MEMORY = 0.8  # of the machine's that a table may take
 LIMITED = 0.5  # of a run's time with the generator torque limited, where it is worth a warning
-REPLACED = {  # keywords of simulate before protection, faults and initial held all of it
+REPLACED = {  # former keywords of simulate
     "stop_overspeed": "protection='end_at_overspeed'",
     "trip": "protection={'overspeed': RATIO}, of rated rotor speed",
     "grid_loss": "faults={'kind': 'grid_loss', 'time': SECONDS}",
@@ -166,7 +166,7 @@ def simulate(
     """Simulate one run and return its DataFrame, with columns named as in OpenFAST (`PtfmPitch_[deg]`).
 
     scene       result of build_scene: a platform in its wind and sea
-    controller  None: the rotor is held at the trim's speed and blade pitch (at rest without wind); a
+    controller  None: rotor speed and blade pitch are kept at the trim (at rest without wind); a
                 name of a built-in one or "module:Class"; an object with
                 reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad), and
                 prepare(scene) where it needs more than measurements; or a function of the measurement
@@ -213,7 +213,7 @@ def simulate(
     rated wind speed of the turbine (descriptions.ratings), which plots mark.
 
     Warns (PlantWarning) once of commands that can hardly be in N m and rad; and at the end of a run whose
-    loads were less accurate for its events, whose rotor is beyond the overspeed, or whose torque was limited
+    loads were less accurate for its events, whose rotor exceeds the overspeed, or whose torque was limited
     for half of the time (these two where nothing stops the turbine and there are no faults).
 
     Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
@@ -238,20 +238,20 @@ def simulate(
     turbine = scene.turbine
     limits = read_protection(protection, turbine.protection, turbine.overspeed / turbine.rated_rotor_speed)
     chain = sensors_of(sensors, scene.turbine)
-    held = controller is None
+    without_controller = controller is None
     wrong = read_faults(faults)
-    if held and wrong:
+    if without_controller and wrong:
         raise InputError(
             f"faults: {wrong[0].kind}: faults need a controller; with controller=None rotor speed and blade"
             " pitch are constant"
         )
-    if not held:
+    if not without_controller:
         controller = make(controller, scene.turbine, control_dt)
         check_pitches(controller, scene.model.pitches is not None)
         with _controllers_own():
             controller.prepare(known_scene(scene if nominal is None else nominal, controller))
     x, u = initial_state(scene, initial)
-    if held:
+    if without_controller:
         scene = scene.with_model({"rigid_body.rotor_fixed": True})
         controller = HeldCommand(scene.model.pitches is not None)
         per_control = last  # no controller reads a measurement
@@ -267,7 +267,7 @@ def simulate(
         run.advance(report)
     frame = run.frame()
     sentences = [harm(frame.attrs["events"])]
-    if not (held or wrong):
+    if not (without_controller or wrong):
         sentences += run.out_of_bounds(frame.attrs)
     if found := ". ".join(f"{text[0].upper()}{text[1:]}" for text in sentences if text):
         warnings.warn(f"{scene.label}: {found}", PlantWarning, stacklevel=level_outside())
@@ -369,7 +369,7 @@ class Run:
         raise SimulationStopped(f"stopped at t = {time:.3f} s: {reason}", reason, time, self.frame())
 
     def frame(self):
-        """Return the rows so far in channel units, which are converted in place."""
+        """Return the rows so far in channel units, which are overwritten."""
         period = self.schedule.per_output * self.schedule.dt
         frame = run_frame(self.scene, self.rows[: self.filled], self.data.counters, self.link.watch, period)
         if not self.schedule.external and self.units.is_little(self.u[Command.GENERATOR_TORQUE]):
@@ -386,7 +386,7 @@ class Run:
         speed, duration = float(self.x[State.ROTOR_SPEED]), self.schedule.last * self.schedule.dt
         if speed > turbine.overspeed:
             found.append(
-                f"the rotor turns at {speed / RPM:.4g} rpm at the end, beyond the overspeed of"
+                f"the rotor turns at {speed / RPM:.4g} rpm at the end, above the overspeed of"
                 f" {turbine.overspeed / RPM:.4g} rpm in the turbine file (protection='end_at_overspeed' ends"
                 " the run there, protection='turbine' stops the turbine)"
             )
@@ -403,7 +403,7 @@ class Run:
 
 
 class _bar:
-    """Context that hands out a callable taking the fraction done: nothing, rich's bar, or the user's own."""
+    """Return a context with a callable of the fraction done: of no effect, rich's bar or the user's."""
 
     def __init__(self, progress):
         self.progress = progress

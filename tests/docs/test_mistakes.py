@@ -187,7 +187,7 @@ WARNED = {  # mistake: (what is done, what the warning has to say)
     "degrees": (answers(lambda m: (43093.0, 14.8)), "'Asked' blade pitch 14.8 rad = 848 deg commands are"),
     "kN m": (answers(lambda m: (43.09, 0.26)), "'Asked' torque 43.09 N m 0.1 % of the rated 43094 N m"),
     "torque of the slow shaft": (answers(lambda m: (4.18e6, 0.26)), "9.7e+03 % of the rated"),
-    "runaway": (run(lambda m: (0.0, 0.0), duration=20.0), "beyond the overspeed of 15.73 rpm protection="),
+    "runaway": (run(lambda m: (0.0, 0.0), duration=20.0), "above the overspeed of 15.73 rpm protection="),
     "negative torque": (
         run(lambda m: (-43e3, 0.3), duration=2.0),
         "torque was limited for 2 of 2 s 47.4 kN m",

@@ -122,7 +122,7 @@ def top_bias(pose, bend):
     Platform axes, with no rate of any velocity: (ax, ay, az, alpha_x, alpha_y, alpha_z, wx, wy, wz).
     """
     wx, wy, wz = pose.wx, pose.wy, pose.wz
-    # w x (v + w x p + p') + w x p', the top's own acceleration apart
+    # w x (v + w x p + p') + w x p', without the acceleration of the top
     ux = pose.vx + wy * bend.z - wz * bend.y + 2.0 * bend.vx
     uy = pose.vy + wz * bend.x - wx * bend.z + 2.0 * bend.vy
     uz = pose.vz + wx * bend.y - wy * bend.x

@@ -11,7 +11,7 @@ from fowt_env.plant.tower.modes import TowerModes, to_nacelle, turned_pose
 
 
 class Twist(NamedTuple):
-    """Rates of the velocity components (vx..wz) of a Pose, m/s2 and rad/s2, in its own axes."""
+    """Rates of the velocity components (vx..wz) of a Pose, m/s2 and rad/s2, in the pose's axes."""
 
     vx: float
     vy: float
