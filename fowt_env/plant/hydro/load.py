@@ -89,17 +89,17 @@ strip_load = chosen_by_class(
 )
 
 
-@kernel
+@inlined_kernel
 def _plain_elevation(t, waves, strips, excitation, data):
     return elevation(t, 0.0, 0.0, waves)
 
 
-@kernel
+@inlined_kernel
 def _banded_elevation(t, waves, strips, excitation, data):
     return surface_elevation(t, waves, strips.bands, data.bands)
 
 
-@kernel
+@inlined_kernel
 def _free_elevation(t, waves, strips, excitation, data):
     return elevation_beside(t, waves, excitation, data.excitation)
 
@@ -107,6 +107,7 @@ def _free_elevation(t, waves, strips, excitation, data):
 _elevation = chosen_by_class(
     "strips",
     {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation, type(None): _free_elevation},
+    inlined=True,
 )
 
 
