@@ -24,7 +24,7 @@ from fowt_env.descriptions.records import Positive, Record, validate
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measurement
 from fowt_env.training.board.files import digest_of
-from fowt_env.training.evaluation.faults import PARKED
+from fowt_env.training.evaluation.run_case import PARKED
 
 CARD = "card.toml"
 BUILT_IN, POLICY_FILE, PYTHON_FILE = "built-in", "policy file", "Python file"

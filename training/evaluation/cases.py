@@ -54,7 +54,7 @@ class Case:
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
     initial: absolute values of channels at the start, as in simulate.
     seeds, duration, skip: of this case if they differ from the suite's. shift: difference of the plant from
-    the nominal one that controllers are prepared for (training.evaluation.model_mismatch).
+    the nominal one that controllers are prepared for (training.evaluation.plant_perturbation).
     """
 
     name: str

@@ -20,10 +20,9 @@ from fowt_env.training.evaluation.bootstrap import (
     resample_weights,
 )
 from fowt_env.training.evaluation.failures import BASELINES, PENALTY, known_figures, lost_counts, penalties
-from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
 from fowt_env.training.evaluation.results_table import case_shares
-from fowt_env.training.evaluation.run_case import OK, REFERENCE, TRIPPED
+from fowt_env.training.evaluation.run_case import OK, PARKED, REFERENCE, TRIPPED
 
 POSITIVE = np.array([never_negative(name) for name in METRICS])
 SHOWN = {  # columns of a leaderboard in a notebook: {heading: metric}

@@ -1,4 +1,9 @@
-"""Perturbed plants: factors on masses, hydrodynamics, moorings and actuators of the files."""
+"""Perturbed plants: factors on the files' values and noise on readings, unknown to the controller.
+
+A controller is made for the nominal turbine and prepared with the nominal scene, so that model-based designs
+(lqr, rosco, preview) are based on a wrong model, as they would be at sea. Metrics are of the true motions:
+noise is only on the controller's readings.
+"""
 
 import dataclasses
 from typing import Annotated
@@ -8,8 +13,11 @@ from pydantic import Field
 from fowt_env.caches import cached
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.records import NonNegative, Positive, Record
+from fowt_env.descriptions.sensors import Sensor, SensorChain
 from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.envs.sensors import reading_scales
 from fowt_env.errors import InputError
+from fowt_env.plant.measurement import Measurement
 
 # name: (what is drawn, default distribution). Factors multiply the file's value.
 PLANT = {
@@ -125,3 +133,17 @@ class PlantPerturbation(Record):
 def perturbed_parts(perturbation, platform="oc3_hywind"):
     """Return {"platform", "turbine"} of a perturbed platform (a name or file), for build_scene."""
     return plant_settings(perturbation.factors, platform)
+
+
+def perturbed_sensors(perturbation, turbine, control_dt):
+    """Return the SensorChain of a PlantPerturbation's noise and delay on every reading; None without both."""
+    if perturbation.noise == 0.0 and perturbation.delay == 0:
+        return None
+    scales = dict(zip(Measurement._fields, reading_scales(turbine).tolist(), strict=True))
+    delay = perturbation.delay * control_dt
+    sensors = {
+        name: Sensor(noise=perturbation.noise * scale, delay=delay)
+        for name, scale in scales.items()
+        if name != "time"
+    }
+    return SensorChain("shifted", sensors, "equal relative noise and delay on every reading")

@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.evaluation.faults import PARKED
-from fowt_env.training.evaluation.run_case import REFERENCE
+from fowt_env.training.evaluation.run_case import PARKED, REFERENCE
 
 KEY = ["controller", "case", "seed"]  # of a run
 WORDS = ["status", "reason", "events", "warning"]  # columns of text beside those of KEY

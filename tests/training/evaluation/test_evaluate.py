@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.descriptions.faults import Fault
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError, PlantWarning
 from fowt_env.training.evaluation.cases import (
@@ -16,7 +17,6 @@ from fowt_env.training.evaluation.cases import (
     read_suite,
 )
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate, mean_ratios, summary
-from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
 

@@ -5,11 +5,10 @@ import pytest
 
 import fowt_env
 from fowt_env.controllers import make
+from fowt_env.descriptions.faults import Fault
 from fowt_env.errors import InputError
-from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation.cases import Case, read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.evaluation.faults import Fault, idling
 from fowt_env.training.evaluation.leaderboard import leaderboard
 
 SHORT = {"duration": 60.0, "skip": 5.0}
@@ -37,13 +36,6 @@ def test_a_fault_after_the_end_of_the_run_is_refused():
     case = Case("late", 16.0, fault=Fault(kind="grid_loss", time=100.0))
     with pytest.raises(InputError, match="comes at 100 s"):
         evaluate("pi", [case], duration=50.0, skip=5.0)
-
-
-def test_the_idling_controller_feathers_without_torque(turbine):
-    controller = idling(turbine)
-    measured = Measurement(**dict.fromkeys(Measurement._fields, 0.0))
-    controller.reset(measured)
-    assert controller.act(measured) == (0.0, turbine.pitch_drive.maximum)
 
 
 def test_a_stop_has_the_time_to_standstill_of_its_rows():

@@ -380,7 +380,7 @@ def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_
     assert used <= files and len(used) > 40
     names = {installed_path(path).relative_to(PACKAGE).as_posix() for path in provenance.plant_files()}
     data = "data/platforms/oc3_hywind.toml"
-    assert {data, "training/evaluation/metrics.py", "training/evaluation/faults.py"} <= names
+    assert {data, "training/evaluation/metrics.py", "training/evaluation/plant_perturbation.py"} <= names
     looks = ("visual", "training/cli", "training/reports", "controllers/pi")
     assert not [name for name in names if name.startswith(looks)]
 

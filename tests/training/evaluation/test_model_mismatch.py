@@ -14,8 +14,12 @@ from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 from fowt_env.training.evaluation.cases import Case, described, read_suite
 from fowt_env.training.evaluation.evaluate import evaluate, planned
-from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
-from fowt_env.training.evaluation.plant_perturbation import PLANT, PlantPerturbation, perturbed_parts
+from fowt_env.training.evaluation.plant_perturbation import (
+    PLANT,
+    PlantPerturbation,
+    perturbed_parts,
+    perturbed_sensors,
+)
 from fowt_env.training.evaluation.run_case import scored
 from fowt_env.training.rl.randomisation import SENSORS
 
