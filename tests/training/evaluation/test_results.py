@@ -202,9 +202,9 @@ def test_a_manifest_that_lacks_a_key_is_refused_by_its_name(tmp_path):
         pass
     path = tmp_path / "manifest.json"
     manifest = json.loads(path.read_text())
-    for key in results.MANIFEST:
+    for key in results._Manifest.model_fields:
         path.write_text(json.dumps({name: value for name, value in manifest.items() if name != key}))
-        with pytest.raises(InputError, match=f"without a sound '{key}'"):
+        with pytest.raises(InputError, match=f"cannot be used \\({key} is missing"):
             with results.open_results(tmp_path, SETTINGS, ["controller"]):
                 pass
 
