@@ -101,11 +101,6 @@ class Exits(Acting):
         sys.exit(0)
 
 
-class Closes(Acting):
-    def do(self):
-        raise GeneratorExit
-
-
 class Interrupts(Acting):
     def do(self):
         raise KeyboardInterrupt
@@ -157,10 +152,6 @@ class Forges(Acting):
 
     def do(self):
         raise fowt_env.SimulationStopped("x" * 2000, "y" * 2000, "late", self.rows)
-
-
-class ForgesMore(Forges):
-    rows = pd.DataFrame({"a": [1.0, 2.0]})
 
 
 class Unborn(Still):

@@ -26,8 +26,7 @@ from fowt_env.descriptions.records import Positive, Record, validate
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
-from fowt_env.training.board.files import copy_files
-from fowt_env.training.board.isolated import ProcessLimits
+from fowt_env.training.board.isolated import ProcessLimits, copy_files
 from fowt_env.training.board.submission import CARD, NAME, alike, read_submission
 from fowt_env.training.evaluation.cases import FOLDER as SUITES
 from fowt_env.training.evaluation.cases import Seeds, Suite, read_suite

@@ -23,7 +23,7 @@ from fowt_env.descriptions.lidar import lidars
 from fowt_env.descriptions.records import Positive, Record, validate
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measurement
-from fowt_env.training.board.files import digest_of
+from fowt_env.training.board.isolated import digest_of
 from fowt_env.training.evaluation.run_case import PARKED
 
 CARD = "card.toml"

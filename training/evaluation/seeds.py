@@ -71,10 +71,7 @@ def with_drawn_seeds(suite, source):
 
 def new_secret_seeds(count):
     """Return count different seeds of DRAWN from the system's source of randomness."""
-    found = set()
-    while len(found) < count:
-        found.add(DRAWN.start + secrets.randbelow(len(DRAWN)))
-    return tuple(found)
+    return tuple(secrets.SystemRandom().sample(DRAWN, count))
 
 
 def ranges(seeds):

@@ -17,8 +17,7 @@ import pytest
 
 import fowt_env
 from fowt_env.errors import ControllerError, InputError
-from fowt_env.training.board.files import digest_of
-from fowt_env.training.board.isolated import IsolatedFactory, ProcessLimits, warmed_up
+from fowt_env.training.board.isolated import IsolatedFactory, ProcessLimits, digest_of, warmed_up
 
 SOUND = """
 class Mine:

@@ -8,8 +8,8 @@ import pytest
 
 from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.errors import InputError
-from fowt_env.training.board.files import LARGEST_FOLDER, digest_of
 from fowt_env.training.board.folder import Board, new_board, read_seeds, write_secret_seeds
+from fowt_env.training.board.isolated import LARGEST_FOLDER, digest_of
 from fowt_env.training.board.submission import read_submission
 
 CARD = {

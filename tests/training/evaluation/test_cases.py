@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fowt_env.descriptions.sea_state import sea_state_of
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import (
     Case,
     Site,
@@ -64,12 +64,6 @@ def test_the_headline_is_what_the_brief_of_the_benchmark_says():
     assert other.wind == "full-field"
     same = zip(suite.cases, other.cases, strict=True)
     assert all(a.wind["speed"] == b.wind["speed"] and a.sea == b.sea for a, b in same)
-
-
-def test_the_faults_of_the_design_load_cases_come_within_their_runs():
-    cases = [case for case in read_suite("dlc").cases if case.fault is not None]
-    assert {case.fault.kind for case in cases} == {"grid_loss", "stuck_pitch", "emergency_stop"}
-    assert all(case.fault.time < case.duration for case in cases)
 
 
 def test_a_few_lines_make_a_suite_of_ones_own(tmp_path):
@@ -214,13 +208,6 @@ def test_an_unknown_case_has_the_five_nearest_and_the_command_that_lists_them():
     assert set(near.split(", ")) < set(known) and commands == "fowt list cases, fowt list suites"
     with pytest.raises(InputError, match=f"unknown case 'zzz'. Nearest of {len(known)}: .*,.*,.*,.*,.*;"):
         named_cases("zzz")  # near to none
-
-
-def test_of_up_to_thirty_names_all_are_listed():
-    names = [f"name{number:02d}" for number in range(31)]
-    assert str(unknown("key", "nam", names[:30])).endswith("Known: " + ", ".join(names[:30]))
-    text = str(unknown("key", "nam", names))
-    assert "Known" not in text and "31: name" in text
 
 
 def test_a_suite_without_seeds_has_the_first_and_one_that_cannot_be_read_is_named(tmp_path):

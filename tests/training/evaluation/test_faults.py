@@ -7,7 +7,7 @@ import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.faults import Fault
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation.cases import Case, read_suite
+from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.leaderboard import leaderboard
 
@@ -89,11 +89,3 @@ def test_the_reason_names_the_trip_and_its_limit():
         row["reason"]
         == f"pitch deviation trip at {at:.1f} s: a blade pitch off its command by more than 4 deg"
     )
-
-
-def test_the_cases_of_the_suite_name_their_sources_and_keep_their_protection():
-    suite = read_suite("faults")
-    assert all(case.source.startswith("DLC ") and case.protection == "turbine" for case in suite.cases)
-    assert {case.trip for case in suite.cases} == {None}
-    kinds = {case.fault.kind for case in suite.cases if case.fault is not None}
-    assert {"grid_loss", "normal_stop", "emergency_stop", "sensor_bias"} <= kinds

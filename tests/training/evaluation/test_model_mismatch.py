@@ -139,13 +139,6 @@ def test_noise_is_on_the_readings_and_not_in_the_metrics():
     assert felt["RotSpeed_std_[rpm]"] == pytest.approx(truth["RotSpeed_std_[rpm]"], rel=0.1)
 
 
-def test_the_same_seed_gives_the_same_bits_and_another_other_noise():
-    rows = [short(["gspi_oc3"], windy(PlantPerturbation(noise=0.02))).iloc[0] for _ in range(2)]
-    assert rows[0].equals(rows[1])
-    first = [readings(PlantPerturbation(noise=0.02), seed, 1.0)[0] for seed in (1, 1, 2)]
-    assert np.array_equal(first[0], first[1]) and not np.array_equal(first[0], first[2])
-
-
 def test_a_suite_may_carry_shifts_and_names_wrong_ones(tmp_path):
     suite = read_suite("shifted")
     shifts = {case.name.rpartition("_")[0]: case.shift for case in suite.cases}
