@@ -145,15 +145,6 @@ class Nameless(Acting):
         return Odd()
 
 
-class Forges(Acting):
-    """Raises a simulator's error that holds what the simulator's would not."""
-
-    rows = pd.DataFrame({"Time_[s]": [[1], "b"]})
-
-    def do(self):
-        raise fowt_env.SimulationStopped("x" * 2000, "y" * 2000, "late", self.rows)
-
-
 class Unborn(Still):
     def __init__(self):
         sys.exit(3)

@@ -33,7 +33,7 @@ from fowt_env.training.evaluation.provenance import controller_code, plant_code
 from fowt_env.training.evaluation.results import run_file
 from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import CONTROL_DT, REFERENCE, SHORTEST_CASE_WEATHER, run_metrics
-from fowt_env.training.evaluation.seeds import with_drawn_seeds
+from fowt_env.training.evaluation.seeds import reseeded, with_drawn_seeds
 from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
@@ -120,14 +120,9 @@ def judge(
 
 def _unordered(suite, seeds):
     """Return a Suite of secret seeds with its runs in random order."""
-    order = list(seeds)
-    cases = [
-        case if case.seeds is None else replace(case, seeds=tuple(seeds[: len(case.seeds)]))
-        for case in suite.cases
-    ]
-    for part in (order, cases):
-        secrets.SystemRandom().shuffle(part)
-    return replace(suite, seeds=tuple(order), cases=tuple(cases))
+    suite, shuffled = reseeded(suite, seeds), secrets.SystemRandom().sample
+    order = {"seeds": seeds, "cases": suite.cases}
+    return replace(suite, **{key: tuple(shuffled(part, len(part))) for key, part in order.items()})
 
 
 def _factories(submissions, limits, within, suites):

@@ -288,16 +288,10 @@ def read_suite(name_or_path, platform=None):
         return name_or_path
     platform = None if platform is None else str(platform)
     if isinstance(name_or_path, str) and name_or_path in suite_names():
-        if platform is None or platform in platform_names():
-            return _built_in(name_or_path, platform)
-        return _read(FOLDER / f"{name_or_path}.toml", platform)
+        known = platform is None or platform in platform_names()
+        return (_kept if known else _read)(FOLDER / f"{name_or_path}.toml", platform)
     path = Path(locate("suite", name_or_path, suite_names(), listed="fowt list suites"))
     return _read(path, platform)
-
-
-@cached(64)
-def _built_in(name, platform):
-    return _read(FOLDER / f"{name}.toml", platform)
 
 
 def _read(path, platform=None):
@@ -345,6 +339,9 @@ def _read(path, platform=None):
     shared = {field.name for field in fields(Suite)} & set(SuiteFile.model_fields)
     given = {key: getattr(file, key) for key in shared}
     return Suite(path.stem, cases=tuple(cases), weights=weights, **given)
+
+
+_kept = cached(64)(_read)  # of built-in suites and platforms
 
 
 def _spread(entry, file, folder):

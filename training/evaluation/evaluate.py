@@ -17,9 +17,9 @@ from pathlib import Path
 
 import pandas as pd
 
-import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import check_number, check_whole_number, plain_number
+from fowt_env.descriptions.platform import turbine_of
 from fowt_env.errors import InputError, PlantWarning, level_outside
 from fowt_env.files.tables import table_path, write_table
 from fowt_env.training.evaluation.cases import Case, Suite, check_sensors, described, named_cases
@@ -275,7 +275,7 @@ def _first(*values):
 
 def _check_controllers(controllers, runs):
     """Make each controller once before anything runs. Raises: InputError if one cannot be made."""
-    turbine = fowt_env.build_scene(runs[0].case.platform).turbine
+    turbine = turbine_of(runs[0].case.platform)
     control_dt = runs[0].options.get("control_dt", CONTROL_DT)
     for controller in controllers.values():
         _, error = attempt(lambda each=controller: make(each, turbine, control_dt), runs[0].time_limit)

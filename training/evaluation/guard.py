@@ -61,7 +61,6 @@ def _noted_signals():
     raised, handlers = [], {}
     if threading.current_thread() is threading.main_thread():
         handlers = {number: signal.getsignal(number) for number in SIGNALS}
-        handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
 
     def note(number, frame):
         try:
@@ -70,6 +69,7 @@ def _noted_signals():
             raised.append(error)
             raise
 
+    handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
     for number in handlers:
         signal.signal(number, note)
     try:

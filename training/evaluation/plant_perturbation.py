@@ -49,56 +49,44 @@ def plant_settings(factors, platform=PLATFORM):
             raise InputError(f"randomise.{name}: drew {value:g}: factors must be positive")
         return value
 
-    def scaled(part, by, *names):
-        values = {name: getattr(part, name) for name in names}
-        return part.model_copy(update={name: times(by, value) for name, value in values.items()})
-
     def times(by, value):  # None: none
         if isinstance(value, tuple):
             return tuple(times(by, each) for each in value)
         return None if value is None else by * value
 
-    hydro, potential, additional = base.hydro, base.potential_flow, base.additional
-    mass, drag = factor("added_mass"), factor("drag")
-    if hydro is not None:
-        hydro = scaled(hydro, mass, "added_mass_coefficient", "heave_added_mass")
-        hydro = scaled(hydro, drag, "drag_coefficient", "linear_damping")
-    if potential is not None and mass != 1.0:
-        names = ("added_mass", "added_mass_infinite", "added_mass_zero")
-        scaled_mass = {name: times(mass, getattr(potential, name)) for name in names}
-        potential = dataclasses.replace(potential, **scaled_mass)
-    if additional is not None and drag != 1.0:
-        additional = scaled(additional, drag, "linear_damping", "quadratic_damping")
-    upper, tau = factor("upper_mass"), factor("actuator_lag")
-    tower = scaled(base.tower, upper, "mass", "inertia")
-    if tower.modes is not None and upper != 1.0:
-        tower = tower.model_copy(update={"modes": scaled(tower.modes, upper, "mass_density", "top_mass")})
+    def scaled(part, **factors):
+        if part is None or set(factors.values()) == {1.0}:
+            return part
+        values = {name: times(by, getattr(part, name)) for name, by in factors.items()}
+        if dataclasses.is_dataclass(part):
+            return dataclasses.replace(part, **values)
+        return part.model_copy(update=values)
+
+    mass, drag, upper = factor("added_mass"), factor("drag"), factor("upper_mass")
+    ballast, stiffness, air = factor("ballast_mass"), factor("mooring_stiffness"), factor("air_density")
+    masses = ("added_mass", "added_mass_infinite", "added_mass_zero")
+    member = {"added_mass_coefficient": mass, "axial_added_mass_coefficient": mass}
+    member |= {"drag_coefficient": drag, "axial_drag_coefficient": drag}
+    hydro = {"added_mass_coefficient": mass, "heave_added_mass": mass}
+    hydro |= {"drag_coefficient": drag, "linear_damping": drag}
+    tower = scaled(base.tower, mass=upper, inertia=upper)
+    tower = tower.model_copy(update={"modes": scaled(tower.modes, mass_density=upper, top_mass=upper)})
     base = base.model_copy(
         update={
-            "environment": scaled(base.environment, factor("air_density"), "air_density"),
-            "ballast": scaled(base.ballast, factor("ballast_mass"), "mass", "inertia"),
-            "hydro": hydro,
-            "potential_flow": potential,
-            "additional": additional,
-            "members": tuple(
-                scaled(
-                    scaled(member, mass, "added_mass_coefficient", "axial_added_mass_coefficient"),
-                    drag,
-                    "drag_coefficient",
-                    "axial_drag_coefficient",
-                )
-                for member in base.members
-            ),
+            "environment": scaled(base.environment, air_density=air),
+            "ballast": scaled(base.ballast, mass=ballast, inertia=ballast),
+            "hydro": scaled(base.hydro, **hydro),
+            "potential_flow": scaled(base.potential_flow, **dict.fromkeys(masses, mass)),
+            "additional": scaled(base.additional, linear_damping=drag, quadratic_damping=drag),
+            "members": tuple(scaled(each, **member) for each in base.members),
             "tower": tower,
-            "lines": tuple(
-                scaled(line, factor("mooring_stiffness"), "wet_weight", "EA") for line in base.lines
-            ),
+            "lines": tuple(scaled(line, wet_weight=stiffness, EA=stiffness) for line in base.lines),
         }
     )
     turbine = turbine.model_copy(
         update={
-            "nacelle": scaled(turbine.nacelle, upper, "mass", "inertia"),
-            "pitch_drive": turbine.pitch_drive.slowed(tau),
+            "nacelle": scaled(turbine.nacelle, mass=upper, inertia=upper),
+            "pitch_drive": turbine.pitch_drive.slowed(factor("actuator_lag")),
         }
     )
     return {"platform": base, "turbine": turbine}

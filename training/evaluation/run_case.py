@@ -18,11 +18,9 @@ from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import (
-    ControllerError,
     ControllerInputError,
     InputError,
     PlantWarning,
-    SimulationStopped,
     muted,
 )
 from fowt_env.training.evaluation.guard import attempt, reason_of
@@ -173,14 +171,9 @@ def _row(run, status, frame):
 
 
 def _end(error):
-    """Return (rows so far or None, time of the end in s or NaN) of the exception that ended a run.
-
-    Only an exception of simulate has them; the attributes are read without calling a controller's code.
-    """
-    held = vars(error) if isinstance(error, SimulationStopped | ControllerError | KeyboardInterrupt) else {}
-    frame, stopped = held.get("frame"), held.get("time")
-    if not isinstance(frame, pd.DataFrame) or TIME not in frame or not (frame.dtypes == "float64").all():
-        frame = None
+    """Return (rows so far or None, time of the end in s or NaN) that simulate attached to an exception."""
+    frame, stopped = getattr(error, "frame", None), getattr(error, "time", None)
+    frame = frame if isinstance(frame, pd.DataFrame) and TIME in frame else None
     if not is_number(stopped):
         stopped = float("nan") if frame is None or frame.empty else frame[TIME].iloc[-1]
     return frame, float(stopped)

@@ -64,23 +64,10 @@ class Unusable(Frozen):
     """Raises an InputError when prepared, reset or asked, as one does whose library is missing."""
 
     def __init__(self, moment):
-        self.moment = moment
-
-    def prepare(self, scene):
-        self.fail_in("prepare")
-
-    def reset(self, measurement):
-        self.fail_in("reset")
-        super().reset(measurement)
-
-    def act(self, measurement):
-        if measurement.time > 5.0:
-            self.fail_in("act")
-        return self.command
-
-    def fail_in(self, moment):
-        if moment == self.moment:
+        def fail(given):
             raise InputError(f"no library in {moment}")
+
+        setattr(self, moment, fail)
 
 
 class Degrees(Frozen):
@@ -258,6 +245,7 @@ def test_named_suites_hold_their_cases_once():
         ({"cases": [CALM, CALM]}, "differ"),
         ({"jobs": 0}, "jobs = 0"),
         ({"duration": 10.0, "skip": 10.0}, "skip = 10"),
+        ({"cases": [Case("late", 16.0, fault=Fault(kind="grid_loss", time=100.0))]}, "comes at 100 s"),
         ({"out": "table.xlsx"}, "csv"),
         ({"dt": 0.03}, "dt = 0.03"),
         ({"cases": [Case("squall", {"kind": "squall", "speed": 12.0})]}, "squall"),

@@ -6,7 +6,6 @@ import pytest
 import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.faults import Fault
-from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.leaderboard import leaderboard
@@ -30,12 +29,6 @@ def test_a_parked_turbine_idles_and_is_run_once_for_all_controllers():
     storm = table.iloc[0]
     assert storm["status"] == "ok" and storm["BldPitch1_min_[deg]"] == pytest.approx(90.0)
     assert storm["GenPwr_max_[kW]"] == 0.0 and abs(storm["RotSpeed_mean_[rpm]"]) < 2.0
-
-
-def test_a_fault_after_the_end_of_the_run_is_refused():
-    case = Case("late", 16.0, fault=Fault(kind="grid_loss", time=100.0))
-    with pytest.raises(InputError, match="comes at 100 s"):
-        evaluate("pi", [case], duration=50.0, skip=5.0)
 
 
 def test_a_stop_has_the_time_to_standstill_of_its_rows():

@@ -69,12 +69,6 @@ def test_ramp_travels_at_its_slope_whatever_the_output_step():
         assert result["torque_travel_[kN-m/s]"] == pytest.approx(0.02, rel=1e-9)
 
 
-def test_rms_keeps_the_mean_and_std_does_not():
-    result = metrics(synthetic_run(**{"NcIMUTAxs_[m/s^2]": 0.5, "TwrBsMyt_[kN-m]": 7e4}))
-    assert result["NcIMUTAxs_rms_[m/s^2]"] == pytest.approx(0.5, rel=1e-12)
-    assert result["TwrBsMyt_std_[kN-m]"] == pytest.approx(0.0, abs=1e-6)
-
-
 def test_the_time_at_the_generator_s_limits_is_that_of_the_scored_rows():
     at_limit = synthetic_run(**{"GenTqLim_[-]": lambda t: 1.0 * ((t > 19.95) & (t < 40.05))})
     assert metrics(at_limit)["torque_limited_[s]"] == pytest.approx(20.1)
