@@ -103,7 +103,11 @@ def _part(table, name, base):
     statuses = of(name, ["status"])[..., 0]
     runs = ~pd.isna(statuses)
     statuses = np.where(runs, statuses, OK)
-    arrays = (of(who or "", list(METRICS)).astype(np.float64) for who in (name, base, REFERENCE))
+    # in rows, on whose order in memory the last bit of a weighted sum depends
+    arrays = (
+        np.ascontiguousarray(of(who or "", list(METRICS)), dtype=np.float64)
+        for who in (name, base, REFERENCE)
+    )
     return _Part(cases, *arrays, runs, statuses, case_shares(own.reset_index(), cases))
 
 
