@@ -101,11 +101,6 @@ class Exits(Acting):
         sys.exit(0)
 
 
-class Closes(Acting):
-    def do(self):
-        raise GeneratorExit
-
-
 class Interrupts(Acting):
     def do(self):
         raise KeyboardInterrupt
@@ -148,19 +143,6 @@ class Nameless(Acting):
                 raise RuntimeError("no repr")
 
         return Odd()
-
-
-class Forges(Acting):
-    """Raises a simulator's error that holds what the simulator's would not."""
-
-    rows = pd.DataFrame({"Time_[s]": [[1], "b"]})
-
-    def do(self):
-        raise fowt_env.SimulationStopped("x" * 2000, "y" * 2000, "late", self.rows)
-
-
-class ForgesMore(Forges):
-    rows = pd.DataFrame({"a": [1.0, 2.0]})
 
 
 class Unborn(Still):

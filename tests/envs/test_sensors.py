@@ -15,8 +15,11 @@ from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.sensors import draw_sensors, reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import MEASURED, N_MEASUREMENTS, Measure, Measured, Measurement
-from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
-from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation, plant_settings
+from fowt_env.training.evaluation.plant_perturbation import (
+    PlantPerturbation,
+    perturbed_sensors,
+    plant_settings,
+)
 
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")

@@ -16,22 +16,22 @@ import secrets
 import shutil
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import BeforeValidator, Field
 
 from fowt_env.descriptions.files import raise_problems, read_toml
-from fowt_env.descriptions.records import Positive, Record, validate
+from fowt_env.descriptions.platform import turbine_of
+from fowt_env.descriptions.records import Positive, Record, checked_record
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
-from fowt_env.training.board.files import copy_files
-from fowt_env.training.board.isolated import ProcessLimits
+from fowt_env.training.board.isolated import ProcessLimits, copy_files
 from fowt_env.training.board.submission import CARD, NAME, alike, read_submission
 from fowt_env.training.evaluation.cases import FOLDER as SUITES
 from fowt_env.training.evaluation.cases import Seeds, Suite, read_suite
-from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.evaluation.seeds import DRAWN, LEAST_SECRET, new_secret_seeds
 
 SETTINGS = "board.toml"
@@ -76,15 +76,12 @@ class Board:
                 f"board {str(folder)!r}: has no {SETTINGS}: make one with fowt leaderboard add, or choose"
                 " another --board"
             )
-        self.settings, problems = validate(BoardFile, read_toml(path, "board"))
-        raise_problems(f"board {str(folder)!r}", problems)
-        names = [name for regime in self.settings.regime for name in regime.suites]
-        for name in names:
-            if names.count(name) > 1:
-                problems.append(f"regime: suite {name!r} is named twice")
-            elif not self._suite_path(name).is_file():
-                problems.append(f"regime: there is no suites/{name}.toml")
-        raise_problems(f"board {str(folder)!r}", sorted(set(problems)))
+        where = f"board {str(folder)!r}"
+        self.settings = checked_record(BoardFile, read_toml(path, "board"), where)
+        count = Counter(name for regime in self.settings.regime for name in regime.suites)
+        problems = [f"regime: suite {name!r} is named twice" for name in count if count[name] > 1]
+        lacking = [name for name in count if not self._suite_path(name).is_file()]
+        raise_problems(where, [*problems, *(f"regime: there is no suites/{name}.toml" for name in lacking)])
 
     def _suite_path(self, name):
         return self.folder / "suites" / f"{name}.toml"
@@ -142,12 +139,12 @@ class Board:
                 f"submission {submission.name!r}: the board has a different one of this name: change the name"
                 f" in {CARD}"
             )
-        for other in self.submissions():
-            if alike(other.name) == alike(submission.name):
-                raise InputError(
-                    f"submission {submission.name!r}: the board has {other.name!r}, which readers would"
-                    f" confuse with it: change the name in {CARD}"
-                )
+        others = [each.name for each in self.submissions() if alike(each.name) == alike(submission.name)]
+        if others:
+            raise InputError(
+                f"submission {submission.name!r}: the board has {others[0]!r}, which readers would"
+                f" confuse with it: change the name in {CARD}"
+            )
         place.parent.mkdir(parents=True, exist_ok=True)
         waiting = place.with_name(f".{submission.name}-{time.monotonic_ns()}")
         try:
@@ -174,14 +171,9 @@ def new_board(
         raise InputError(f"board {str(folder)!r}: is there already")
     seeds = read_suite(REGIMES[0][1][0]).seeds
     (folder / "suites").mkdir(parents=True, exist_ok=True)
-    lines = [
-        f"title = {json.dumps(title)}",
-        'baseline = "gspi_oc3"',
-        f"seeds = {list(seeds)} # public",
-        "call_limit = 0.1 # s",
-    ]
-    if platform is not None:
-        lines.insert(1, f"platform = {json.dumps(str(platform))}")
+    lines = [f"title = {json.dumps(title)}"]
+    lines += [] if platform is None else [f"platform = {json.dumps(str(platform))}"]
+    lines += ['baseline = "gspi_oc3"', f"seeds = {list(seeds)} # public", "call_limit = 0.1 # s"]
     for name, suites in REGIMES:
         lines += ["", "[[regime]]", f'name = "{name}"', f"suites = {list(suites)}".replace("'", '"')]
         for suite in suites:
@@ -189,9 +181,8 @@ def new_board(
     with replacing(folder / SETTINGS) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
     board = Board(folder)
-    for entry in sorted(ENTRIES.iterdir()):
-        if entry.is_dir():
-            board.add(entry)
+    for card in sorted(ENTRIES.glob(f"*/{CARD}")):
+        board.add(card.parent)
     return board
 
 

@@ -29,8 +29,9 @@ from fowt_env.control import CheckedController
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.folders import cache_root, make_private
 from fowt_env.training.board import supervisor
-from fowt_env.training.board.files import copy_files, digest_of
 
+LARGEST_FOLDER = 50e6  # bytes of a submission
+COMPILED = "__pycache__"  # of its files: neither hashed nor copied
 KEPT = ("PATH", "LANG", "LC_ALL", "PYTHONPATH", "NUMBA_DISABLE_JIT")
 LENGTH = struct.Struct("<q")
 COMMAND = struct.Struct("<dd")
@@ -45,6 +46,37 @@ WARM_UP = 1.0  # s of simulated time in which a submission compiles its kernels
 KNOWN_ERRORS = {name for name, kind in vars(builtins).items() if isinstance(kind, type)} | {
     "ControllerError", "InputError", "LinAlgError",
 }  # fmt: skip
+
+
+def files_of(folder: Path | str) -> list[Path]:
+    """Return the sorted files of a submission's folder. Raises: InputError for links and large folders."""
+    folder, found = Path(folder), []
+    for path in sorted(folder.rglob("*")):
+        if path.is_symlink() or not (path.is_file() or path.is_dir()):
+            raise InputError(f"submission {str(folder)!r}: {str(path)!r} is a link or no plain file")
+        if path.is_file() and COMPILED not in path.relative_to(folder).parts:
+            found.append(path)
+    size = sum(path.stat().st_size for path in found)
+    if size > LARGEST_FOLDER:
+        raise InputError(
+            f"submission {str(folder)!r}: {size / 1e6:.0f} MB: must be at most {LARGEST_FOLDER / 1e6:.0f} MB"
+        )
+    return found
+
+
+def digest_of(folder: Path | str) -> str:
+    """Return the SHA-256 of the names, lengths and contents of a submission's files."""
+    digest = hashlib.sha256()
+    for path in files_of(folder):
+        content = path.read_bytes()
+        name = path.relative_to(folder).as_posix().encode("utf-8", "surrogateescape")
+        digest.update(b"%d %d " % (len(name), len(content)) + name + content)
+    return digest.hexdigest()
+
+
+def copy_files(folder: Path | str, place: Path | str) -> None:
+    """Copy a submission's folder to a new folder; links stay links."""
+    shutil.copytree(folder, place, symlinks=True, ignore=shutil.ignore_patterns(COMPILED))
 
 
 @dataclass(frozen=True)
@@ -90,7 +122,7 @@ class IsolatedFactory:
 
 
 class IsolatedController:
-    """The simulator's side of a controller that runs in another process.
+    """The simulator's side of a controller that runs in another process, started anew by each reset().
 
     Raises: ControllerError if the process ends, fails, or exceeds its limits; InputError if the submission's
     files do not match its digest.
@@ -102,7 +134,8 @@ class IsolatedController:
         self.preview_times = factory.preview_times
         self.slowest = 0.0  # s, of the calls of act()
         self.known: Any = None
-        self.process: _Process | None = None
+        self.folder: Path | None = None  # of the process
+        self.process: Any = None
 
     def prepare(self, scene: Any) -> None:
         """Store the nominal scene for the process, which starts at reset()."""
@@ -112,7 +145,13 @@ class IsolatedController:
         """Start a new process, and prepare and reset its controller."""
         self.close()
         factory, limits = self.factory, self.factory.limits
-        self.process = _Process(factory)
+        supervisor.prctl(supervisor.DUMPABLE, 0)  # hide the weather in this process's memory from others
+        self.folder = Path(tempfile.mkdtemp(prefix="fowt-submission-"))
+        try:
+            self._start(self.folder)
+        except BaseException:
+            self.close()
+            raise
         self._ask(START, (factory.file, factory.attribute, self.turbine, self.control_dt), limits.start)
         self._ask(PREPARE, self.known, limits.prepare)
         self._ask(RESET, measurement, limits.prepare)
@@ -126,41 +165,108 @@ class IsolatedController:
             raise self._fault("its process sent no pair of numbers", moment)
         return COMMAND.unpack(answer)
 
-    def _ask(self, what, content, limit, moment=0.0):
-        assert self.process is not None
-        began = time.perf_counter()
-        try:
-            try:
-                kind, answer = self.process.ask(pickle.dumps((what, content)), limit)
-            finally:
-                if what == ACT:
-                    self.slowest = max(self.slowest, time.perf_counter() - began)
-        except TimeoutError:
-            self.close()
-            raise self._fault(f"{what}() took longer than {limit:g} s", moment) from None
-        except (OSError, EOFError):
-            self.close()
-            raise self._fault(f"its process ended in {what}()", moment) from None
-        if kind != OK:
-            self.close()
-            name = answer.decode("ascii", "replace")
-            name = name if name in KNOWN_ERRORS else "an exception of its own"
-            raise self._fault(f"{what}() raised {name}", moment)
-        return answer
+    def _start(self, folder):
+        factory, work, kernels = self.factory, folder / "work", folder / "cache"
+        copy_files(factory.folder, work)
+        if factory.digest and digest_of(work) != factory.digest:
+            raise InputError(f"submission {factory.name!r}: its files have changed since it was read")
+        if factory.kernels and os.path.isdir(factory.kernels):
+            shutil.copytree(factory.kernels, kernels, symlinks=True)
+        kernels.mkdir(mode=0o700, exist_ok=True)
+        environment = {key: os.environ[key] for key in KEPT if key in os.environ}
+        environment |= {"HOME": str(folder), "TMPDIR": str(folder), "FOWT_CACHE_DIR": str(kernels)}
+        environment |= {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
+        limits = LIMITS | {"AS": int(factory.limits.memory), "CPU": int(factory.limits.processor)}
+        within = [part.replace(FOLDER, str(folder)) for part in factory.within]
+        watched = [str(os.getpid()), str(folder), json.dumps(limits), *within]
+        self.process = subprocess.Popen(
+            [sys.executable, "-I", "-S", supervisor.__file__, *watched, sys.executable, "-m", __name__],
+            bufsize=0,
+            cwd=work,
+            env=environment,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        os.set_blocking(self.process.stdin.fileno(), False)
 
-    def _fault(self, why, moment=0.0):
+    def _ask(self, what, content, limit, moment=0.0):
+        """Return the answer of the process, as bytes. Raises: ControllerError, once the process is ended."""
+        content, began = pickle.dumps((what, content)), time.perf_counter()
+        try:
+            kind, answer = self._exchange(LENGTH.pack(len(content)) + content, time.monotonic() + limit)
+        except TimeoutError:
+            why = f"{what}() took longer than {limit:g} s"
+        except (OSError, EOFError):
+            why = f"its process ended in {what}()"
+        else:
+            name = answer.decode("ascii", "replace")
+            why = f"{what}() raised {name if name in KNOWN_ERRORS else 'an exception of its own'}"
+            why = None if kind == OK else why
+        if what == ACT:
+            self.slowest = max(self.slowest, time.perf_counter() - began)
+        if why is None:
+            return answer
+        self.close()
+        raise self._fault(why, moment)
+
+    def _exchange(self, content, deadline):
+        """Return (OK or ERROR, answer) to a request. Raises: TimeoutError, OSError, EOFError."""
+        to, back = self.process.stdin.fileno(), self.process.stdout.fileno()
+
+        def wait(*handles):
+            left = deadline - time.monotonic()
+            if left <= 0.0 or not any(select.select(*handles, [], left)):
+                raise TimeoutError
+
+        def read(count):
+            found = b""
+            while len(found) < count:
+                wait([back], [])
+                part = os.read(back, count - len(found))
+                if not part:
+                    raise EOFError
+                found += part
+            return found
+
+        content = memoryview(content)
+        while content:
+            wait([], [to])
+            with suppress(BlockingIOError):
+                content = content[os.write(to, content) :]
+        kind, (length,) = read(1), LENGTH.unpack(read(LENGTH.size))
+        if not 0 <= length <= LONGEST_ANSWER or kind not in (OK, ERROR):
+            raise EOFError
+        return kind, read(length)
+
+    def _fault(self, why, moment):
         return ControllerError(f"controller {self.name!r}: {why}", self.name, moment, None)
 
     def close(self) -> None:
-        """End the process, if there is one, and log its slowest call."""
-        process, self.process = self.process, None
-        if process is None:
-            return
-        process.close()
-        if self.factory.log and self.slowest:
-            with open(self.factory.log, "a", encoding="utf-8") as file:
-                file.write(f"{self.name},{self.factory.content_key},{self.slowest:.6f}\n")
-        self.slowest = 0.0
+        """End the process and its children, if there are any, keep its kernels, and log its slowest call."""
+        process, folder, factory = self.process, self.folder, self.factory
+        self.process = self.folder = None
+        if process is not None:
+            with suppress(OSError):
+                process.stdin.close()
+            process.stdout.close()
+            process.terminate()
+            try:
+                process.wait(PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            if factory.keeps:
+                shutil.rmtree(factory.kernels, ignore_errors=True)
+                with suppress(OSError):
+                    shutil.move(folder / "cache", factory.kernels)
+            if factory.log and self.slowest:
+                with open(factory.log, "a", encoding="utf-8") as file:
+                    file.write(f"{self.name},{factory.content_key},{self.slowest:.6f}\n")
+            self.slowest = 0.0
+        if folder is not None:
+            shutil.rmtree(folder, ignore_errors=True)
 
     def __del__(self) -> None:
         with suppress(Exception):
@@ -196,95 +302,6 @@ def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactor
     return replace(factory, kernels=str(place))
 
 
-class _Process:
-    """A running process that answers requests through its standard input and output."""
-
-    def __init__(self, factory):
-        supervisor.prctl(supervisor.DUMPABLE, 0)  # hide the weather in this process's memory from others
-        self.factory = factory
-        self.folder = Path(tempfile.mkdtemp(prefix="fowt-submission-"))
-        try:
-            self._start(factory)
-        except BaseException:
-            shutil.rmtree(self.folder, ignore_errors=True)
-            raise
-
-    def _start(self, factory):
-        work, kernels = self.folder / "work", self.folder / "cache"
-        copy_files(factory.folder, work)
-        if factory.digest and digest_of(work) != factory.digest:
-            raise InputError(f"submission {factory.name!r}: its files have changed since it was read")
-        if factory.kernels and os.path.isdir(factory.kernels):
-            shutil.copytree(factory.kernels, kernels, symlinks=True)
-        kernels.mkdir(mode=0o700, exist_ok=True)
-        environment = {key: os.environ[key] for key in KEPT if key in os.environ}
-        environment |= {"HOME": str(self.folder), "TMPDIR": str(self.folder), "FOWT_CACHE_DIR": str(kernels)}
-        environment |= {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-        limits = LIMITS | {"AS": int(factory.limits.memory), "CPU": int(factory.limits.processor)}
-        within = [part.replace(FOLDER, str(self.folder)) for part in factory.within]
-        watched = [str(os.getpid()), str(self.folder), json.dumps(limits), *within]
-        self.process = subprocess.Popen(
-            [sys.executable, "-I", "-S", supervisor.__file__, *watched, sys.executable, "-m", __name__],
-            bufsize=0,
-            cwd=work,
-            env=environment,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        self.to, self.back = self.process.stdin.fileno(), self.process.stdout.fileno()
-        os.set_blocking(self.to, False)
-
-    def ask(self, content, limit):
-        """Return (OK or ERROR, answer as bytes). Raises: TimeoutError after `limit` s, OSError, EOFError."""
-        deadline = time.monotonic() + limit
-        self._write(LENGTH.pack(len(content)) + content, deadline)
-        head = self._read(1 + LENGTH.size, deadline)
-        (length,) = LENGTH.unpack(head[1:])
-        if not 0 <= length <= LONGEST_ANSWER or head[:1] not in (OK, ERROR):
-            raise EOFError
-        return head[:1], self._read(length, deadline)
-
-    def _write(self, content, deadline):
-        content = memoryview(content)
-        while content:
-            left = deadline - time.monotonic()
-            if left <= 0.0 or not select.select([], [self.to], [], left)[1]:
-                raise TimeoutError
-            with suppress(BlockingIOError):
-                content = content[os.write(self.to, content) :]
-
-    def _read(self, count, deadline):
-        found = b""
-        while len(found) < count:
-            left = deadline - time.monotonic()
-            if left <= 0.0 or not select.select([self.back], [], [], left)[0]:
-                raise TimeoutError
-            part = os.read(self.back, count - len(found))
-            if not part:
-                raise EOFError
-            found += part
-        return found
-
-    def close(self):
-        """End the process and its children, keep its kernels if requested, and remove its folder."""
-        with suppress(OSError):
-            self.process.stdin.close()
-        self.process.stdout.close()
-        self.process.terminate()
-        try:
-            self.process.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        if self.factory.keeps:
-            shutil.rmtree(self.factory.kernels, ignore_errors=True)
-            with suppress(OSError):
-                shutil.move(self.folder / "cache", self.factory.kernels)
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-
 def serve() -> None:
     """Answer requests from standard input until it is closed: the main loop of the other process.
 
@@ -311,22 +328,15 @@ def serve() -> None:
 def _done(what, content, controller):
     """Return (controller, answer) of one request."""
     if what == START:
-        return _made(*content), b""
-    if what == PREPARE:
-        controller.prepare(content)
-    elif what == RESET:
-        controller.reset(content)
-    else:
+        from fowt_env.control import make
+
+        file, attribute, turbine, control_dt = content
+        sys.path.insert(0, os.getcwd())
+        return make(f"{file.removesuffix('.py')}:{attribute}", turbine, control_dt), b""
+    if what == ACT:
         return controller, COMMAND.pack(*controller.act(content))
+    getattr(controller, what)(content)  # prepare or reset
     return controller, b""
-
-
-def _made(file, attribute, turbine, control_dt):
-    """Return the controller of a file in the working folder."""
-    from fowt_env.control import make
-
-    sys.path.insert(0, os.getcwd())
-    return make(f"{file.removesuffix('.py')}:{attribute}", turbine, control_dt)
 
 
 if __name__ == "__main__":

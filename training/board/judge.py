@@ -13,18 +13,17 @@ import secrets
 import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 
-import fowt_env
 from fowt_env.control import EXACT, known_scene, make
 from fowt_env.errors import InputError, muted, unknown
 from fowt_env.files.tables import read_table
 from fowt_env.scene.build import build_scene
-from fowt_env.training.board.files import digest_of
 from fowt_env.training.board.folder import Board, read_seeds
-from fowt_env.training.board.isolated import warmed_up
+from fowt_env.training.board.isolated import digest_of, warmed_up
 from fowt_env.training.board.submission import PYTHON_FILE
 from fowt_env.training.evaluation.cases import described
 from fowt_env.training.evaluation.evaluate import evaluate
@@ -34,7 +33,7 @@ from fowt_env.training.evaluation.provenance import controller_code, plant_code
 from fowt_env.training.evaluation.results import run_file
 from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import CONTROL_DT, REFERENCE, SHORTEST_CASE_WEATHER, run_metrics
-from fowt_env.training.evaluation.seeds import with_drawn_seeds
+from fowt_env.training.evaluation.seeds import reseeded, with_drawn_seeds
 from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind_field import is_field
 
@@ -121,14 +120,9 @@ def judge(
 
 def _unordered(suite, seeds):
     """Return a Suite of secret seeds with its runs in random order."""
-    order = list(seeds)
-    cases = [
-        case if case.seeds is None else replace(case, seeds=tuple(seeds[: len(case.seeds)]))
-        for case in suite.cases
-    ]
-    for part in (order, cases):
-        secrets.SystemRandom().shuffle(part)
-    return replace(suite, seeds=tuple(order), cases=tuple(cases))
+    suite, shuffled = reseeded(suite, seeds), secrets.SystemRandom().sample
+    order = {"seeds": seeds, "cases": suite.cases}
+    return replace(suite, **{key: tuple(shuffled(part, len(part))) for key, part in order.items()})
 
 
 def _factories(submissions, limits, within, suites):
@@ -148,26 +142,21 @@ def _kinds(suites):
     found = {}
     for suite in suites:
         for case in suite.cases:
+            weather = case.wind is None, is_field(case.wind), case.sea is None
+            kind = json.dumps([described(case)[key] for key in ("platform", "options")] + [weather],
+                              sort_keys=True)  # fmt: skip
             if not case.parked:
-                about = described(case)
-                weather = case.wind is None, is_field(case.wind), case.sea is None
-                kind = json.dumps([about["platform"], about["options"], weather], sort_keys=True)
                 found.setdefault(kind, (case, suite.seeds[0]))
     return list(found.values())
-
-
-class _Asking:
-    """A controller whose known_scene is built."""
-
-    name, information = "board", ("plant_model",)
 
 
 def _quiet(case, seed):
     """Return the nominal scene of a Case for `prepare`, without the weather of a run."""
     options = {"duration": SHORTEST_CASE_WEATHER, **case.options}
     wind = cached_box(case.wind, case.platform, seed, options) if is_field(case.wind) else case.wind
+    asking = SimpleNamespace(name="board", information=("plant_model",))
     with muted():
-        return known_scene(build_scene(case.platform, wind=wind, sea=case.sea, **options), _Asking)
+        return known_scene(build_scene(case.platform, wind=wind, sea=case.sea, **options), asking)
 
 
 def _suite_table(made, factories, suite, folder, jobs, progress):
@@ -200,7 +189,12 @@ def _suite_table(made, factories, suite, folder, jobs, progress):
         if table is not None:
             shown = table["controller"].map(names | {REFERENCE: REFERENCE})
             parts.append(table.assign(controller=shown))
-            _note_slowest(made, suite, place / CALLS, labelled, names)
+            if (place / CALLS).is_file():
+                calls = pd.read_csv(place / CALLS, header=None).groupby(1)[2].max()
+                for label, controller in labelled.items():
+                    if (key := getattr(controller, "content_key", None)) in calls:
+                        here = suite.name, names[label]
+                        made.slowest[here] = max(made.slowest.get(here, 0.0), calls[key])
     return pd.concat(parts, ignore_index=True).drop_duplicates(KEY)  # each kind of preview has a reference
 
 
@@ -214,7 +208,8 @@ def _run(labelled, suite, place, **options):
     """Return (table of evaluate or None, {label: why it cannot be run}) of {label: controller}."""
     try:
         table = evaluate(labelled, suite, folder=place, **options)
-        table = table[table["controller"].isin([*labelled, REFERENCE]) & table["seed"].isin(_seeds(suite))]
+        seeds = {*suite.seeds, *(seed for case in suite.cases for seed in case.seeds or ())}
+        table = table[table["controller"].isin([*labelled, REFERENCE]) & table["seed"].isin(seeds)]
         check_figures(table, place, suite)
         return table, {}
     except InputError as error:
@@ -226,23 +221,6 @@ def _run(labelled, suite, place, **options):
         parts += [] if table is None else [table]
         refused |= why
     return (pd.concat(parts, ignore_index=True) if parts else None), refused
-
-
-def _seeds(suite):
-    return {*suite.seeds, *(seed for case in suite.cases for seed in case.seeds or ())}
-
-
-def _note_slowest(made, suite, path, labelled, names):
-    """Add the slowest call of each Python file of a results folder to made.slowest."""
-    if not path.is_file():
-        return
-    calls = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()]
-    for label, controller in labelled.items():
-        key = getattr(controller, "content_key", None)
-        found = [float(seconds) for _, other, seconds in calls if other == key]
-        if found:
-            place = suite.name, names[label]
-            made.slowest[place] = max(made.slowest.get(place, 0.0), *found)
 
 
 def check_figures(table, folder, suite):
@@ -258,14 +236,15 @@ def check_figures(table, folder, suite):
         frame = read_table(run_file(Path(folder) / "runs", *row[list(KEY)]))
         skip = suite.skip if case.skip is None else case.skip
         figures = run_metrics(frame, case, scenes[case.name], skip)
-        for metric in METRICS:
-            old, new = float(row[metric]), float(figures[metric])
-            if not np.isclose(old, new, rtol=RELATIVE, atol=1e-12, equal_nan=True):
-                raise InputError(
-                    f"results {str(folder)!r}: {metric} of {', '.join(map(str, row[list(KEY)]))} is"
-                    f" {old:.10g} in the table and {new:.10g} from its series: remove the folder and judge"
-                    " again"
-                )
+        old, new = row[list(METRICS)].to_numpy(np.float64), np.array([figures[name] for name in METRICS])
+        far = ~np.isclose(old, new, rtol=RELATIVE, atol=1e-12, equal_nan=True)
+        if far.any():
+            i = int(far.argmax())
+            raise InputError(
+                f"results {str(folder)!r}: {METRICS[i]} of {', '.join(map(str, row[list(KEY)]))} is"
+                f" {old[i]:.10g} in the table and {new[i]:.10g} from its series: remove the folder and judge"
+                " again"
+            )
 
 
 def inputs_of(submission, turbine):
@@ -273,8 +252,3 @@ def inputs_of(submission, turbine):
     if submission.kind == PYTHON_FILE:
         return tuple(submission.card.information)
     return tuple(make(submission.controller(None), turbine, CONTROL_DT).information)
-
-
-def package_version():
-    """Return the version of the package."""
-    return f"fowt_env {fowt_env.__version__}"

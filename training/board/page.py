@@ -10,11 +10,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+import fowt_env
 from fowt_env.control import PRIVILEGED_INPUTS
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table, write_table
-from fowt_env.training.board.judge import inputs_of, package_version
+from fowt_env.training.board.judge import inputs_of
 from fowt_env.training.evaluation.bootstrap import LEVEL, holm
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import better
@@ -30,6 +31,7 @@ FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "shaft DEL": "RotTorq_DEL_[kN-m]",
     "tower DEL": "TwrBsMyt_DEL_[kN-m]",
 }
+VERSION = f"fowt_env {fowt_env.__version__}"
 LISTED = "listed"  # seeds of a judging without drawn ones
 PER_WIND = ("rotor speed", "platform pitch", "travel")
 MODEL, PREVIEW = "plant_model", "wind_preview"
@@ -109,8 +111,7 @@ def board_frame(judged):
             suite = board.suite(name)
             public = _compared(judged.public[name], suite, board)
             secret = _compared(judged.secret[name], suite, board) if judged.secret else {}
-            for entry in public.values():
-                who = entry["controller"]
+            for who, entry in public.items():
                 row = {"regime": regime.name, "suite": name, "version": suite.version, "rank": entry["rank"]}
                 row |= {"name": who, "author": cell(cards[who].author), "licence": cell(cards[who].licence)}
                 row |= {"information": classes[who], "runs": entry["runs"]}
@@ -118,25 +119,20 @@ def board_frame(judged):
                 for heading, metric in FIGURES.items():
                     gap = entry["difference"][metric]
                     row |= {heading: 1.0 + gap["percent"] / 100.0, f"p({heading})": gap["p"]}
-                row |= _score_columns(entry)
-                row["score_secret"] = _score_columns(secret[who])["score"] if who in secret else np.nan
+                for key, part in (("score", "mean"), ("score_low", "low"), ("score_high", "high")):
+                    row[key] = (entry["score"] or {}).get(part)
+                row["score_secret"] = (secret.get(who, {}).get("score") or {}).get("mean")
                 row["beyond"] = "; ".join(entry["beyond"])
-                row["slowest_call_[s]"] = judged.slowest.get((name, who), np.nan)
+                row["slowest_call_[s]"] = judged.slowest.get((name, who))
                 rows.append(row)
-    return pd.DataFrame(rows)
+    numbers = ["score", "score_low", "score_high", "score_secret", "slowest_call_[s]"]
+    return pd.DataFrame(rows).astype(dict.fromkeys(numbers, float))
 
 
 def _compared(table, suite, board):
     """Return {name: entry of the leaderboard} of a suite's table, in the order of the ranks."""
     found = leaderboard(table, board.settings.baseline, suite.score, limits=suite.limits)
     return {entry["controller"]: entry for entry in found["controllers"]}
-
-
-def _score_columns(entry):
-    score = entry["score"]
-    if score is None or score["mean"] is None:
-        return dict.fromkeys(("score", "score_low", "score_high"), np.nan)
-    return {"score": score["mean"], "score_low": score["low"], "score_high": score["high"]}
 
 
 def write_board(judged):
@@ -157,7 +153,7 @@ def _history(path, frame, judged):
     digests = {each.name: each.digest for each in judged.shown}
     here = frame[["suite", "version", "name", "rank", "score", "failed", "tripped"]].assign(
         date=judged.when,
-        package=package_version(),
+        package=VERSION,
         digest=frame["name"].map(digests),
         seeds=judged.drawn or LISTED,
     )
@@ -205,16 +201,24 @@ def _number(value, digits=3):
 
 def _page(judged, frame, history):
     """Return the HTML text of the page."""
-    board = judged.board
-    title, baseline = html.escape(board.settings.title), html.escape(board.settings.baseline)
-    policy = content_policy(styles=[STYLE])
+    board, settings = judged.board, judged.board.settings
+    title, baseline = html.escape(settings.title), html.escape(settings.baseline)
+    count = len(settings.seeds)
+    public = f"{count} public seeds of each suite, drawn from <code>{judged.drawn}</code>"
+    if not judged.drawn:
+        seeds = ", ".join(map(str, settings.seeds))
+        public = f"public seeds {seeds}, which are for development and which a controller may recognise"
+    secret = "No secret seeds were used."
+    if judged.secret:
+        count = next(iter(judged.secret.values()))["seed"].nunique()
+        secret = f"{count} secret seeds of a file with SHA-256 <code>{judged.seeds_hash}</code>."
     parts = [
         '<!doctype html><html lang="en"><head><meta charset="utf-8">',
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
+        f'<meta http-equiv="Content-Security-Policy" content="{content_policy(styles=[STYLE])}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>",
-        f"<p>Judged {judged.when} with {html.escape(package_version())}; baseline"
-        f" <b>{baseline}</b>; {_public(judged)}. {_secret(judged)}</p>",
+        f"<p>Judged {judged.when} with {html.escape(VERSION)}; baseline"
+        f" <b>{baseline}</b>; {public}. {secret}</p>",
         "<details open><summary>How to read it</summary><p class=small>Ratios are of lifetime means to the"
         " baseline's in the same wind and waves; less is better except for energy (power up to rated). In"
         " brackets: 95 % interval of the score; * significant: the p-value, after Holm's correction over the"
@@ -223,69 +227,38 @@ def _page(judged, frame, history):
         " those that lost runs (failed, tripped, or with less than half of the reference's energy); within"
         " each by the score, in which a lost run counts ten times the reference's metrics. A heading explains"
         " its metric. Wide tables scroll sideways.</p></details>",
-        *_explanations(),
-        *_left_out(judged),
     ]
-    for regime in board.settings.regime:
+    for number, (heading, metric) in enumerate(FIGURES.items()):  # popovers open without a script
+        parts.append(
+            f'<div popover id="metric-{number}"><b>{heading}</b>, ratio to the baseline.'
+            f" {html.escape(about_metric(metric))}</div>"
+        )
+    parts += _list("<p class=lost>Left out:</p>", judged.left_out.items())
+    for regime in settings.regime:
         parts.append(f"<h2>{html.escape(regime.name)}</h2>")
         for name in regime.suites:
-            suite = board.suite(name)
-            rows = frame[frame["suite"] == name]
+            suite, rows = board.suite(name), frame[frame["suite"] == name]
             parts.append(f"<h3>{html.escape(name)}, version {suite.version}</h3>")
             parts.append(f"<p class=small>{html.escape(suite.description)}.</p>")
             parts.append(_ranking(rows, judged))
-            parts += [_beyond(rows), _per_wind(judged, name)]
+            beyond = [pair for pair in zip(rows["name"], rows["beyond"], strict=True) if pair[1]]
+            parts += _list("<p class=small>Exceeded limits of the suite:</p>", beyond)
+            parts += _per_wind(_compared(judged.public[name], suite, board))
     parts += [_submissions(judged), _history_table(history)]
     listed = "".join(f"<li>{line}</li>" for line in CANNOT)
     parts.append(f"<h2>What this board cannot detect</h2><ul>{listed}</ul></body></html>")
     return "\n".join(parts)
 
 
-def _public(judged):
-    """Return the text on the public seeds."""
-    if not judged.drawn:
-        seeds = ", ".join(map(str, judged.board.settings.seeds))
-        return f"public seeds {seeds}, which are for development and which a controller may recognise"
-    count = len(judged.board.settings.seeds)
-    return f"{count} public seeds of each suite, drawn from <code>{judged.drawn}</code>"
-
-
-def _left_out(judged):
-    """Return the list of the submissions that were not run, and why."""
-    if not judged.left_out:
-        return []
-    lines = (f"<li><b>{escaped(who)}</b>: {escaped(why)}</li>" for who, why in judged.left_out.items())
-    return [f"<p class=lost>Left out:</p><ul class=small>{''.join(lines)}</ul>"]
-
-
-def _secret(judged):
-    if not judged.secret:
-        return "No secret seeds were used."
-    count = next(iter(judged.secret.values()))["seed"].nunique()
-    return f"{count} secret seeds of a file with SHA-256 <code>{judged.seeds_hash}</code>."
+def _list(heading, pairs):
+    """Return [HTML of a list of (name, text) under a heading]; [] without a pair."""
+    lines = "".join(f"<li><b>{escaped(name)}</b>: {escaped(text)}</li>" for name, text in pairs)
+    return [f"{heading}<ul class=small>{lines}</ul>"] if lines else []
 
 
 def _table(headings, rows, texts=()):
     """Return HTML of a table that scrolls; texts: numbers of the left-aligned columns."""
     return f'<div class="scroll" tabindex="0"><table>{table_rows(headings, rows, texts)}</table></div>'
-
-
-def _explanations():
-    """Return popovers that explain the metrics and open from their headings without a script."""
-    return [
-        f'<div popover id="metric-{number}"><b>{heading}</b>, ratio to the baseline.'
-        f" {html.escape(about_metric(metric))}</div>"
-        for number, (heading, metric) in enumerate(FIGURES.items())
-    ]
-
-
-def _explained_headings():
-    """Return the headings of FIGURES as buttons that open the explanations."""
-    return [
-        f'<button popovertarget="metric-{number}" title="{html.escape(about_metric(metric))}">'
-        f"{heading}</button>"
-        for number, (heading, metric) in enumerate(FIGURES.items())
-    ]
 
 
 def ratio_text(ratio, metric, significant):
@@ -300,7 +273,6 @@ def _ranking(rows, judged):
     shown = []
     for row in rows.to_dict("records"):
         corrected = holm([row[f"p({figure})"] for figure in FIGURES])
-        sure = dict(zip(FIGURES, corrected, strict=True))
         lost = int(row["failed"] + row["tripped"])
         score = _number(row["score"])
         if np.isfinite(row["score_low"]):
@@ -308,29 +280,25 @@ def _ranking(rows, judged):
         shown.append([
             _rank_text(row["rank"]), html.escape(row["name"]), html.escape(row["information"]),
             f'<span class="lost">{lost} of {row["runs"]}</span>' if lost else f"0 of {row['runs']}",
-            *(ratio_text(row[figure], FIGURES[figure], sure[figure] <= 1.0 - LEVEL) for figure in FIGURES),
+            *(
+                ratio_text(row[figure], metric, p <= 1.0 - LEVEL)
+                for (figure, metric), p in zip(FIGURES.items(), corrected, strict=True)
+            ),
             score, _number(row["slowest_call_[s]"], 4),
             *([_number(row["score_secret"])] if judged.secret else []),
         ])  # fmt: skip
+    explained = [
+        f'<button popovertarget="metric-{number}" title="{html.escape(about_metric(metric))}">'
+        f"{heading}</button>"
+        for number, (heading, metric) in enumerate(FIGURES.items())
+    ]
     calls = f"slowest call, s (limit {judged.board.settings.call_limit:g})"
     last = ["score", calls, *(["score, secret seeds"] if judged.secret else [])]
-    first = ["rank", "controller", "inputs", "lost runs"]
-    return _table([*first, *_explained_headings(), *last], shown, (1, 2))
+    return _table(["rank", "controller", "inputs", "lost runs", *explained, *last], shown, (1, 2))
 
 
-def _beyond(rows):
-    """Return the list of exceeded limits."""
-    found = [(row["name"], row["beyond"]) for row in rows.to_dict("records") if row["beyond"]]
-    if not found:
-        return ""
-    lines = "".join(f"<li><b>{html.escape(name)}</b>: {html.escape(text)}</li>" for name, text in found)
-    return f"<p class=small>Exceeded limits of the suite:</p><ul class=small>{lines}</ul>"
-
-
-def _per_wind(judged, name):
+def _per_wind(entries):
     """Return a table for each of PER_WIND: ratios case by case."""
-    board = judged.board
-    entries = _compared(judged.public[name], board.suite(name), board)
     cases = list(next(iter(entries.values()))["cases"])
     parts = []
     for heading in PER_WIND:
@@ -338,17 +306,16 @@ def _per_wind(judged, name):
         for who, entry in entries.items():
             found = (entry["cases"][case]["difference"][FIGURES[heading]]["percent"] for case in cases)
             rows.append([html.escape(who), *(_number(1.0 + percent / 100.0, 2) for percent in found)])
-        parts.append(f"<details><summary>{heading}, case by case</summary>")
-        parts.append(_table(["controller", *map(html.escape, cases)], rows, (0,)) + "</details>")
-    return "".join(parts)
+        table = _table(["controller", *map(html.escape, cases)], rows, (0,))
+        parts.append(f"<details><summary>{heading}, case by case</summary>{table}</details>")
+    return parts
 
 
 def _submissions(judged):
     """Return the table of the cards."""
     rows = []
     for each in judged.shown:
-        card = each.card
-        name = escaped(card.name)
+        card, name = each.card, escaped(each.card.name)
         if card.url.startswith(("https://", "http://")):
             name = f'<a href="{escaped(card.url)}" rel="nofollow noreferrer">{name}</a>'
         inputs = ", ".join(inputs_of(each, judged.board.turbine))
@@ -363,9 +330,8 @@ def _history_table(history):
     rows = []
     for row in history.sort_values("date", ascending=False, kind="stable").to_dict("records"):
         words = [row[key] for key in ("date", "suite", "version", "seeds", "name", "package")]
-        words.append(_rank_text(row["rank"]))
-        lost = int(row["failed"] + row["tripped"])
-        rows.append([*(html.escape(str(word)) for word in words), _number(row["score"]), str(lost)])
+        words += [_rank_text(row["rank"]), _number(row["score"]), int(row["failed"] + row["tripped"])]
+        rows.append([html.escape(str(word)) for word in words])
     headings = "date,suite,version,seeds,controller,judged with,rank,score,lost runs".split(",")
     table = _table(headings, rows, (0, 1, 3, 4, 5))
     return f"<h2>History</h2><details><summary>all judgings</summary>{table}</details>"

@@ -20,11 +20,11 @@ from fowt_env.controllers import CONTROLLERS
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.descriptions.files import raise_problems, read_toml
 from fowt_env.descriptions.lidar import lidars
-from fowt_env.descriptions.records import Positive, Record, validate
+from fowt_env.descriptions.records import Positive, Record, checked_record
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measurement
-from fowt_env.training.board.files import digest_of
-from fowt_env.training.evaluation.faults import PARKED
+from fowt_env.training.board.isolated import digest_of
+from fowt_env.training.evaluation.run_case import PARKED
 
 CARD = "card.toml"
 BUILT_IN, POLICY_FILE, PYTHON_FILE = "built-in", "policy file", "Python file"
@@ -110,12 +110,10 @@ def read_submission(folder: Path | str) -> Submission:
     folder = Path(folder)
     if not folder.is_dir():
         raise InputError(f"submission {str(folder)!r}: is no folder (one with {CARD} in it is needed)")
-    path = folder / CARD
-    if not path.is_file():
-        raise InputError(f"submission {str(folder)!r}: has no {CARD}")
     where = f"submission {str(folder)!r}"
-    card, problems = validate(Card, read_toml(path, "card"))
-    raise_problems(where, problems)
+    if not (folder / CARD).is_file():
+        raise InputError(f"{where}: has no {CARD}")
+    card, problems = checked_record(Card, read_toml(folder / CARD, "card"), where), []
     if not NAME.fullmatch(card.name):
         problems.append(
             f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', a letter or"
@@ -123,12 +121,10 @@ def read_submission(folder: Path | str) -> Submission:
         )
     if card.name in RESERVED:
         problems.append(f"name = {card.name!r}: is reserved")
-    for key in ("author", "licence"):
-        if not getattr(card, key).strip():
-            problems.append(f"{key} = '': must not be empty")
-    for key in ("author", "licence", "controller", "description", "tuning", "url"):
-        if len(getattr(card, key)) > LONGEST_TEXT:
-            problems.append(f"{key}: has more than {LONGEST_TEXT} characters")
+    texts = ("author", "licence", "controller", "description", "tuning", "url")
+    problems += [f"{key} = '': must not be empty" for key in texts[:2] if not getattr(card, key).strip()]
+    long = [key for key in texts if len(getattr(card, key)) > LONGEST_TEXT]
+    problems += [f"{key}: has more than {LONGEST_TEXT} characters" for key in long]
     if card.preview not in (EXACT, *lidars()):
         problems.append(f"preview: {unknown('preview', card.preview, (EXACT, *lidars()))}")
     kind = _kind(card, folder, problems)
@@ -177,9 +173,8 @@ def _check_information(card, kind, problems):
     if card.information is None:
         problems.append("information is missing: the inputs of the controller")
         return
-    for name in card.information:
-        if name not in INPUTS:
-            problems.append(f"information: {unknown('input', name, INPUTS)}")
+    strange = [name for name in card.information if name not in INPUTS]
+    problems += [f"information: {unknown('input', name, INPUTS)}" for name in strange]
     times = f"preview_times = [{', '.join(f'{time:g}' for time in card.preview_times[:9])}]"
     if bool(card.preview_times) != ("wind_preview" in card.information):
         problems.append(f"{times}: must be set if and only if 'wind_preview' is in information")

@@ -67,9 +67,8 @@ def _names(files):
 
 def _draw(kind, frames, path, title, skip, platform):
     """Write the picture of a kind; platform: of its ratings and pitch period, or "none"."""
-    from fowt_env.descriptions.platform import read_platform
+    from fowt_env.descriptions.platform import read_platform, turbine_of
     from fowt_env.descriptions.ratings import ratings
-    from fowt_env.training.evaluation.scaling import turbine_of
     from fowt_env.visual import response, time_series
 
     known = None if platform.lower() == "none" else read_platform(platform)

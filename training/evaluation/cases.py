@@ -4,8 +4,9 @@ One `[[case]]` may define several: with `speed = [12, 14]` and `name = "ntm_{spe
 wind speed, which is filled into its wind and selects the row of its sea's table.
 """
 
+import json
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from math import exp
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -18,7 +19,7 @@ from fowt_env.descriptions.faults import Fault
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
 from fowt_env.descriptions.platform import platform_names, read_platform
 from fowt_env.descriptions.protection import Protection, read_protection
-from fowt_env.descriptions.records import NonNegative, Positive, Record, validate
+from fowt_env.descriptions.records import NonNegative, Positive, Record, checked_record
 from fowt_env.descriptions.sea_state import SeaState, joint_sea_state, sea_state_of
 from fowt_env.descriptions.sensors import EXACT, sensor_chain
 from fowt_env.descriptions.wind import FORMS, checked_keys, is_wind_file, read_wind, wind_of
@@ -33,18 +34,8 @@ FOLDER = Path(__file__).parent / "suites"
 WIND_KINDS = ("rotor-averaged", "full-field")
 TRIP = 1.3  # fraction of rated rotor speed of the default overspeed trip
 DESCRIBED = (
-    "name",
-    "wind",
-    "sea",
-    "platform",
-    "options",
-    "fault",
-    "parked",
-    "initial",
-    "shift",
-    "trip",
-    "sensors",
-)
+    "name", "wind", "sea", "platform", "options", "fault", "parked", "initial", "shift", "trip", "sensors",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -54,7 +45,7 @@ class Case:
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
     initial: absolute values of channels at the start, as in simulate.
     seeds, duration, skip: of this case if they differ from the suite's. shift: difference of the plant from
-    the nominal one that controllers are prepared for (training.evaluation.model_mismatch).
+    the nominal one that controllers are prepared for (training.evaluation.plant_perturbation).
     """
 
     name: str
@@ -95,20 +86,21 @@ def described(case):
     if case.shift is not None:
         values["shift"] = case.shift.model_dump(exclude_defaults=True)
     further = {key: getattr(case, key) for key in ("displaced", "protection", "source")}
-    return _plain(values | {key: value for key, value in further.items() if value not in (None, "")})
+    values |= {key: value for key, value in further.items() if value not in (None, "")}
+    return json.loads(json.dumps(values, default=_plain))
 
 
 def _plain(value):
-    if isinstance(value, dict):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
-    if value is None or isinstance(value, bool | str):
-        return value
-    value = plain_number(value)
-    if isinstance(value, int | float):
-        return value
-    return _plain(value.tolist()) if hasattr(value, "tolist") else repr(value)
+    """Return a value that JSON can hold of one that it cannot."""
+    number = plain_number(value)
+    if isinstance(number, int | float):
+        return number
+    return value.tolist() if hasattr(value, "tolist") else repr(value)
+
+
+def _names(text):
+    """Return the list of names in a text with commas, or of a sequence of names."""
+    return [name.strip() for name in text.split(",") if name.strip()] if isinstance(text, str) else list(text)
 
 
 def _many(value):
@@ -120,8 +112,7 @@ Seeds = Annotated[tuple[Annotated[int, Field(ge=0, strict=True)], ...], BeforeVa
 
 
 def _unless_false(value):
-    """Return None for false, as a TOML file writes it, else the value."""
-    return None if value is False else value
+    return None if value is False else value  # as a TOML file writes it
 
 
 # of rated rotor speed; false: none
@@ -130,10 +121,9 @@ Trip = Annotated[Annotated[float, Field(gt=1.0, le=3.0, strict=True)] | None, Be
 
 def _checked_protection(value):
     """Return the protection of a case, once it is read without an error; None for false."""
-    if _unless_false(value) is None:
-        return None
-    read_protection(value, Protection())
-    return value
+    if _unless_false(value) is not None:
+        read_protection(value, Protection())
+    return _unless_false(value)
 
 
 Protected = Annotated[Any, BeforeValidator(_checked_protection)]
@@ -298,90 +288,66 @@ def read_suite(name_or_path, platform=None):
         return name_or_path
     platform = None if platform is None else str(platform)
     if isinstance(name_or_path, str) and name_or_path in suite_names():
-        if platform is None or platform in platform_names():
-            return _built_in(name_or_path, platform)
-        return _read(FOLDER / f"{name_or_path}.toml", platform)
+        known = platform is None or platform in platform_names()
+        return (_kept if known else _read)(FOLDER / f"{name_or_path}.toml", platform)
     path = Path(locate("suite", name_or_path, suite_names(), listed="fowt list suites"))
     return _read(path, platform)
-
-
-@cached(64)
-def _built_in(name, platform):
-    return _read(FOLDER / f"{name}.toml", platform)
 
 
 def _read(path, platform=None):
     """Return the Suite of a file, scaled to a platform if one is named."""
     where = f"suite file {str(path)!r}"
-    file, problems = validate(SuiteFile, read_toml(path, "suite"))
-    raise_problems(where, problems)
+    file = checked_record(SuiteFile, read_toml(path, "suite"), where)
     try:
         file = scaled_file(file, platform)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    cases = []
+    cases, problems, weights = [], [], {}
     for number, entry in enumerate(file.case, 1):
         try:
             cases += _spread(entry, file, path.parent)
         except InputError as error:
             problems.append(f"case.{number} ({entry.name}): {error}")
-    names = [case.name for case in cases]
-    problems += [f"case {name!r}: named twice" for name in sorted(set(names)) if names.count(name) > 1]
+    count = Counter(case.name for case in cases)
+    problems += [f"case {name!r}: named twice" for name in sorted(count) if count[name] > 1]
     if not file.case:
         problems.append("case is missing: at least one [[case]] is needed")
-    problems += _metric_problems(file)
-    if file.score is not None and file.limits.relative and file.limits.baseline != file.score.baseline:
-        names = file.limits.baseline, file.score.baseline
+    score, limits = file.score, file.limits
+    terms = [] if score is None else [*(term.metric for term in score.term), *filter(None, [score.power])]
+    for key, names in (("limits", [*limits.run, *limits.lifetime, *limits.relative]), ("score", terms)):
+        wrong = [name for name in names if name not in METRICS]
+        problems += [f"{key}: {unknown('metric', name, METRICS)}" for name in wrong]
+    if score is not None and limits.relative and limits.baseline != score.baseline:
+        names = limits.baseline, score.baseline
         problems.append("limits.baseline = {!r}: must be that of the score, {!r}".format(*names))
     for case in cases:
         duration, skip = case.duration or file.duration, file.skip if case.skip is None else case.skip
+        below = f"must be below duration = {duration:g} s"
         if not duration > skip:
-            problems.append(f"case {case.name!r}: skip = {skip:g} s: must be below duration = {duration:g} s")
+            problems.append(f"case {case.name!r}: skip = {skip:g} s: {below}")
         if case.fault is not None and not case.fault.time < duration:
-            problems.append(
-                f"case {case.name!r}: fault.time = {case.fault.time:g} s:"
-                f" must be below duration = {duration:g} s"
-            )
+            problems.append(f"case {case.name!r}: fault.time = {case.fault.time:g} s: {below}")
         if is_field(case.wind) != (file.wind == "full-field") and case.wind is not None:
             problems.append(
                 f"case {case.name!r}: wind = {file.wind!r} of the suite does not fit its kind of wind"
             )
-    weights = {}
     try:
         weights = lifetime_weights(cases, file.site)
     except InputError as error:
         problems.append(str(error))
     raise_problems(where, problems)
-    fields = {key: getattr(file, key) for key in ("version", "description", "source", "wind", "left_out")}
-    rest = {key: getattr(file, key) for key in ("seeds", "duration", "skip", "score", "site", "limits")}
-    return Suite(path.stem, cases=tuple(cases), weights=weights, **fields, **rest)
+    shared = {field.name for field in fields(Suite)} & set(SuiteFile.model_fields)
+    given = {key: getattr(file, key) for key in shared}
+    return Suite(path.stem, cases=tuple(cases), weights=weights, **given)
 
 
-def _metric_problems(file):
-    """Return one line per unknown metric of a file's score and limits."""
-    score, named = file.score, {"limits": [*file.limits.run, *file.limits.lifetime, *file.limits.relative]}
-    if score is not None:
-        named["score"] = [term.metric for term in score.term] + ([score.power] if score.power else [])
-    return [
-        f"{where}: {unknown('metric', name, METRICS)}"
-        for where, names in named.items()
-        for name in names
-        if name not in METRICS
-    ]
+_kept = cached(64)(_read)  # of built-in suites and platforms
 
 
 def _spread(entry, file, folder):
     """Return the Cases of a CaseEntry: one, or one per speed. Raises: InputError."""
-    if entry.speed is None:
-        return [_case(entry, None, file, folder)]
-    if "{speed}" not in entry.name and len(entry.speed) > 1:
+    if entry.speed is not None and "{speed}" not in entry.name and len(entry.speed) > 1:
         raise InputError("name: needs {speed} in it, for its several speeds")
-    return [_case(entry, speed, file, folder) for speed in entry.speed]
-
-
-def _case(entry, speed, file, folder):
-    """Return the Case of a CaseEntry at a mean wind speed (None: none to fill in)."""
-    label = "" if speed is None else f"{speed:g}".replace(".", "_")
     if entry.parked and entry.fault is not None:
         raise InputError("parked: a parked turbine has no controller that a fault could act on")
     options = {**file.options, **entry.options}
@@ -390,23 +356,26 @@ def _case(entry, speed, file, folder):
             raise unknown("option", key, (*OPTIONS, "fidelity", "rotor"))
     if entry.shift is not None and options.get("turbine") is not None:
         raise InputError("shift: a case with one takes the turbine of its platform, not that of an option")
-    if entry.platform is not None or file.platform != "oc3_hywind":
-        read_platform(entry.platform or file.platform)
+    platform = entry.platform or file.platform
+    if entry.platform is not None or platform != "oc3_hywind":
+        read_platform(platform)
     same = ("fault", "parked", "initial", "seeds", "duration", "skip", "shift", "source")
-    stops = {
-        key: getattr(entry if key in entry.model_fields_set else file, key) for key in ("trip", "protection")
-    }
-    return Case(
-        entry.name.replace("{speed}", label),
-        _wind(entry.wind, speed, folder),
-        _sea(entry.sea, speed, file),
-        entry.platform or file.platform,
-        options,
-        sensors=check_sensors(file.sensors if entry.sensors is None else entry.sensors),
-        displaced=entry.displaced if entry.initial is None else None,
-        **stops,
-        **{key: getattr(entry, key) for key in same},
-    )
+    settings = {key: getattr(entry, key) for key in same}
+    for key in ("trip", "protection"):
+        settings[key] = getattr(entry if key in entry.model_fields_set else file, key)
+    settings["sensors"] = check_sensors(file.sensors if entry.sensors is None else entry.sensors)
+    settings["displaced"] = entry.displaced if entry.initial is None else None
+    return [
+        Case(
+            entry.name.replace("{speed}", "" if speed is None else f"{speed:g}".replace(".", "_")),
+            _wind(entry.wind, speed, folder),
+            _sea(entry.sea, speed, file),
+            platform,
+            options,
+            **settings,
+        )
+        for speed in (entry.speed or (None,))
+    ]
 
 
 def check_sensors(name):
@@ -478,7 +447,7 @@ def chosen_cases(suite, cases, platform=None):
     if cases is None:
         return whole
     known = {case.name: case for case in whole.cases}
-    names = [name.strip() for name in cases.split(",") if name.strip()]
+    names = _names(cases)
     for name in names:
         if name not in known:
             raise unknown(f"case of suite {whole.name!r}", name, known)
@@ -492,11 +461,9 @@ def named_cases(names, platform=None):
     in read_suite.
     Raises: InputError for an unknown name.
     """
-    if isinstance(names, str):
-        names = [name.strip() for name in names.split(",") if name.strip()]
     wanted = {}
     known = all_cases(platform)
-    for name in names:
+    for name in _names(names):
         if name in known:
             found = [known[name]]
         elif name in suite_names() or str(name).endswith(".toml"):

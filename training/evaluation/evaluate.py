@@ -10,22 +10,21 @@ guard, since worker processes import it.
 
 import socket
 import warnings
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
-import fowt_env
 from fowt_env.controllers import make
 from fowt_env.descriptions.checks import check_number, check_whole_number, plain_number
+from fowt_env.descriptions.platform import turbine_of
 from fowt_env.errors import InputError, PlantWarning, level_outside
 from fowt_env.files.tables import table_path, write_table
 from fowt_env.training.evaluation.cases import Case, Suite, check_sensors, described, named_cases
 from fowt_env.training.evaluation.engines import outcomes
 from fowt_env.training.evaluation.failures import KINDS, known_figures, lost_counts, with_lost_power
-from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
 from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
@@ -34,6 +33,7 @@ from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.evaluation.run_case import (
     COLUMNS,
     CONTROL_DT,
+    PARKED,
     REFERENCE,
     SHORTEST_CASE_WEATHER,
     Run,
@@ -45,7 +45,8 @@ __all__ = [
     "COLUMNS", "SHORTEST_CASE_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary",
 ]  # fmt: skip
 
-DURATION, SKIP, SEEDS = 660.0, 60.0, (1,)  # defaults where neither the caller nor a suite sets them
+# cases of no suite file, with the defaults of their runs
+AD_HOC = Suite("", 0, "", "", "", seeds=(1,), duration=660.0, skip=60.0, cases=())
 LARGEST_RUN_SEED = 2**63 - 1  # of a column of whole numbers
 # s of wall clock: a run of eleven minutes takes 0.05 s with compiled laws and some minutes with slow Python
 TIME_LIMIT = 3600.0
@@ -104,61 +105,48 @@ def evaluate(
         if out is not None or runs_folder is not None:
             raise InputError("folder: contains the table and the runs, so out and runs_folder must be None")
         runs_folder = Path(folder) / "runs"
+    suite = _suite(cases, sensors)
     controllers = _labelled(controllers)
-    suite = cases if isinstance(cases, Suite) else None
-    if reference is True:
-        reference = suite.reference if suite is not None else None
-    if reference:
+    if reference := suite.reference if reference is True else reference:
         controllers = {REFERENCE: reference, **controllers}  # first: an interrupted evaluation needs it
-    given = (duration, skip, seeds, runs_folder, time_limit)
-    runs = _plan(controllers, _sensed(_case_list(cases), sensors), suite, *given, options)
+    runs = _plan(controllers, suite, duration, skip, seeds, runs_folder, time_limit, options)
     _check_controllers(controllers, runs)
+    report = progress or (lambda done, total, row: None)
     if folder is not None:
         again = {run.key for run in runs} if retry_failed else ()
         with open_results(folder, _settings(controllers, runs, suite, options), COLUMNS, again) as results:
             pending = [run for run in runs if run.key not in results.rows]
-            _go(pending, len(runs), jobs, progress, engine, address, results.add)
+            _go(pending, len(runs), jobs, report, engine, address, results.add)
             table = results.table()
-        _warn(table, controllers)
-        return table
-    with _growing_table(out) as append:
-        rows = _go(runs, len(runs), jobs, progress, engine, address, append)
-    table = pd.DataFrame([rows[run.key] for run in runs], columns=list(COLUMNS))
-    table = with_lost_power(table, {run.case.name for run in runs if run.case.fault is not None})
-    _warn(table, controllers)
-    if out is not None:
-        write_table(table, out)
-    return table
-
-
-def _warn(table, controllers):
-    """Warn (PlantWarning) once of each controller whose rows have a warning."""
+    else:
+        rows = _go(runs, len(runs), jobs, report, engine, address, _appending(out))
+        table = pd.DataFrame([rows[run.key] for run in runs], columns=list(COLUMNS))
+        table = with_lost_power(table, {run.case.name for run in runs if run.case.fault is not None})
+        if out is not None:
+            write_table(table, out)
     warned = table[(table["warning"] != "") & table["controller"].isin(list(controllers))]
     for text in warned.groupby("controller", sort=False)["warning"].first():
         warnings.warn(text, PlantWarning, stacklevel=level_outside())
+    return table
 
 
 def planned(
     controllers, cases, duration=None, skip=None, seeds=None, runs_folder=None, sensors=None, **options
 ):
     """Return the list of Runs of an evaluation with these arguments, for `score`."""
-    suite = cases if isinstance(cases, Suite) else None
-    given = (duration, skip, seeds, runs_folder, TIME_LIMIT)
-    return _plan(_labelled(controllers), _sensed(_case_list(cases), sensors), suite, *given, options)
+    suite = _suite(cases, sensors)
+    return _plan(_labelled(controllers), suite, duration, skip, seeds, runs_folder, TIME_LIMIT, options)
 
 
-def _go(runs, total, jobs, progress, engine, address, keep):
-    """Return {run key: row} of the runs; keep(row) and progress are called when each ends."""
-    report = progress or (lambda done, total, row: None)
-    before = total - len(runs)
+def _go(runs, total, jobs, report, engine, address, keep):
+    """Return {run key: row} of the runs; keep(row) and report are called when each ends."""
+    before, rows = total - len(runs), {}
     report(before, total, None)
-    rows = {}
     function = partial(score, here=versions()) if engine == "ray" else score
     limit = runs[0].time_limit if runs else None
     with closing(outcomes(function, runs, jobs, engine, address, limit, _lost)) as ended:
         for index, outcome in ended:
-            row = stored(runs[index], outcome)
-            rows[runs[index].key] = row
+            row = rows[runs[index].key] = stored(runs[index], outcome)
             keep(row)
             report(before + len(rows), total, row)
     return rows
@@ -210,43 +198,42 @@ def _labelled(controllers):
     return controllers
 
 
-def _case_list(cases):
-    """Return the list of Cases of the argument of evaluate."""
-    if isinstance(cases, Suite):
-        return list(cases.cases)
+def _suite(cases, sensors):
+    """Return the Suite of the arguments of evaluate, with AD_HOC settings for cases of none."""
     if isinstance(cases, Case):
-        return [cases]
-    if isinstance(cases, str) or all(isinstance(case, str) for case in cases):
-        return named_cases(cases)
-    if not all(isinstance(case, Case) for case in cases):
+        cases = [cases]
+    if isinstance(cases, Suite):
+        suite = cases
+    elif isinstance(cases, str) or all(isinstance(case, str) for case in cases):
+        suite = replace(AD_HOC, cases=tuple(named_cases(cases)))
+    elif all(isinstance(case, Case) for case in cases):
+        suite = replace(AD_HOC, cases=tuple(cases))
+    else:
         raise InputError("cases: must be names or Case objects, not a mixture with anything else")
-    return list(cases)
+    if sensors is None:
+        return suite
+    sensors = check_sensors(sensors)
+    return replace(suite, cases=tuple(replace(case, sensors=sensors) for case in suite.cases))
 
 
-def _sensed(cases, sensors):
-    """Return the Cases with the named sensor chain (None: as they are). Raises: InputError."""
-    return cases if sensors is None else [replace(case, sensors=check_sensors(sensors)) for case in cases]
-
-
-def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_limit, options):
+def _plan(controllers, suite, duration, skip, seeds, runs_folder, time_limit, options):
     """Return the Runs of an evaluation, case by case, so that an interrupted one has comparable runs."""
     if seeds is not None:
         seeds = [_seed(seed) for seed in seeds]
     if time_limit is not None:
         allowed = "a positive number of seconds, or None"
         time_limit = check_number("time_limit", time_limit, 0.0, low_open=True, allowed=allowed)
-    if runs_folder is not None:
-        runs_folder = Path(runs_folder).absolute()  # a controller or worker may change the working folder
-    for what, values in {"controllers": controllers, "cases": cases, "seeds": seeds}.items():
+    for what, values in {"controllers": controllers, "cases": suite.cases, "seeds": seeds}.items():
         if values is not None and not values:
             raise InputError(f"{what}: at least one is needed")
-    if len(set(seeds or ())) < len(seeds or ()) or len({case.name for case in cases}) < len(cases):
-        raise InputError("seeds and names of cases must differ from each other")
-    runs, places, weights = [], {}, (suite and suite.weights) or {}
-    for case in cases:
+    for values in (seeds or (), [case.name for case in suite.cases]):
+        if len(set(values)) < len(values):
+            raise InputError("seeds and names of cases must differ from each other")
+    runs, places = [], {}
+    for case in suite.cases:
         check_name("cases: the name", case.name)
-        length = float(_first(duration, case.duration, suite and suite.duration, DURATION))
-        start = float(_first(skip, case.skip, suite and suite.skip, SKIP))
+        length = float(_first(duration, case.duration, suite.duration))
+        start = float(_first(skip, case.skip, suite.skip))
         if not length > start >= 0.0:
             raise InputError(f"skip = {start} s: must be at least 0 and below duration = {length} s")
         if case.fault is not None and not case.fault.time < length:
@@ -255,19 +242,21 @@ def _plan(controllers, cases, suite, duration, skip, seeds, runs_folder, time_li
             )
         # a case with a single seed has nothing random: further seeds would repeat the run
         chosen = case.seeds if case.seeds is not None and len(case.seeds) == 1 else None
-        for seed in _first(chosen, seeds, case.seeds, suite and suite.seeds, SEEDS):
+        weight = suite.weights.get(case.name, float("nan"))
+        for seed in _first(chosen, seeds, case.seeds, suite.seeds):
             for label, controller in ({PARKED: None} if case.parked else controllers).items():
-                path = None if runs_folder is None else run_file(runs_folder, label, case.name, seed)
-                weight = weights.get(case.name, float("nan"))
+                path = None
+                if runs_folder is not None:
+                    # a controller or worker may change the working folder
+                    path = run_file(Path(runs_folder).absolute(), label, case.name, seed)
+                    name, other = places.setdefault(str(path).casefold(), (label, case.name))
+                    if (name, other) != (label, case.name):
+                        raise InputError(
+                            f"controller {name!r} in case {other!r} and controller {label!r} in case"
+                            f" {case.name!r} would have one file, {path.name!r}: rename one"
+                        )
                 settings = (label, controller, case, seed, length, start, dict(options), path, time_limit)
-                run = Run(*settings, weight)
-                other = places.setdefault(str(path).casefold(), run)
-                if path is not None and other is not run:
-                    raise InputError(
-                        f"controller {other.label!r} in case {other.case.name!r} and controller {label!r} in"
-                        f" case {case.name!r} would have one file, {path.name!r}: rename one"
-                    )
-                runs.append(run)
+                runs.append(Run(*settings, weight))
     return runs
 
 
@@ -286,7 +275,7 @@ def _first(*values):
 
 def _check_controllers(controllers, runs):
     """Make each controller once before anything runs. Raises: InputError if one cannot be made."""
-    turbine = fowt_env.build_scene(runs[0].case.platform).turbine
+    turbine = turbine_of(runs[0].case.platform)
     control_dt = runs[0].options.get("control_dt", CONTROL_DT)
     for controller in controllers.values():
         _, error = attempt(lambda each=controller: make(each, turbine, control_dt), runs[0].time_limit)
@@ -297,49 +286,40 @@ def _check_controllers(controllers, runs):
 
 def _settings(controllers, runs, suite, options):
     """Return the settings of an evaluation for its results folder."""
-    cases, labels = {}, {}
-    for run in runs:
-        cases[run.case.name] = described(run.case) | {"duration": run.duration, "skip": run.skip}
-        labels[run.label] = None
     about = None
-    if suite is not None:
+    if suite.name:
         keys = ("name", "version", "description", "source", "wind", "left_out")
         about = {key: getattr(suite, key) for key in keys}
         for key in ("score", "site", "limits"):
             part = getattr(suite, key)
             about[key] = None if part is None else part.model_dump()
         about["weights"] = dict(suite.weights)
-        if suite.drawn is not None:
-            about["drawn"] = dict(suite.drawn)
+        about |= {} if suite.drawn is None else {"drawn": dict(suite.drawn)}
+    used = dict.fromkeys(run.label for run in runs)
     return {
         "suite": about,
         "options": options,
-        "cases": cases,
+        "cases": {
+            run.case.name: described(run.case) | {"duration": run.duration, "skip": run.skip} for run in runs
+        },
         "seeds": sorted({run.seed for run in runs}),
         "controllers": {
             label: {"name": PARKED, "code": ""} if label == PARKED else controller_code(controllers[label])
-            for label in labels
+            for label in used
         },
     }
 
 
-@contextmanager
-def _growing_table(path):
-    """Yield append(row), which adds a line to a CSV file as soon as a run ends (None: does nothing)."""
+def _appending(path):
+    """Return append(row), which adds a line to a new CSV file (None: does nothing) when a run ends."""
     if path is None:
-        yield lambda row: None
-        return
-    path = table_path(path, (".csv",), "evaluation table")
+        return lambda row: None
+    path = table_path(path, (".csv",), "evaluation table").absolute()
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
-        pd.DataFrame(columns=list(COLUMNS)).to_csv(file, index=False)
-
-        def append(row):
-            line = pd.DataFrame([row], columns=list(COLUMNS))
-            line.to_csv(file, header=False, index=False, float_format="%.10g")
-            file.flush()
-
-        yield append
+    pd.DataFrame(columns=list(COLUMNS)).to_csv(path, index=False)
+    return lambda row: pd.DataFrame([row], columns=list(COLUMNS)).to_csv(
+        path, mode="a", header=False, index=False, float_format="%.10g"
+    )
 
 
 def mean_ratios(table, over, columns):

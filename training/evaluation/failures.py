@@ -58,14 +58,11 @@ def penalised(table, base, metrics=METRICS):
     """
     metrics = [name for name in metrics if name in table.columns]
     result = known_figures(table, metrics)
-    where = ["case", "seed"]
-    theirs = result[result["controller"] == base].set_index(where)[metrics]
-    places = table.set_index(where).index
-    figures = theirs.reindex(places).to_numpy(dtype=np.float64)
+    theirs = result[result["controller"] == base].set_index(["case", "seed"])[metrics]
+    figures = theirs.reindex(table.set_index(["case", "seed"]).index).to_numpy(dtype=np.float64)
     own = result[metrics].to_numpy(dtype=np.float64)
     counted = (table["controller"] != base).to_numpy()[:, None] & ~np.isfinite(own)
-    worse = penalties(figures, [better(name) for name in metrics])
-    result[metrics] = np.where(counted, worse, own)
+    result[metrics] = np.where(counted, penalties(figures, [better(name) for name in metrics]), own)
     return result
 
 

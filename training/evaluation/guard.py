@@ -14,7 +14,6 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # from outside: they e
 AGAIN = 1.0  # s between repetitions of TimeLimit, for code that catches it
 GRACE = 5.0  # s after the limit at which a worker in C code is ended
 LIMIT_CODE = 1  # exit code of such a worker
-REASON_LIMIT = 5.0  # s that the making of a message may take
 
 _last_words = None  # in a worker: file for the output of faulthandler
 
@@ -62,7 +61,6 @@ def _noted_signals():
     raised, handlers = [], {}
     if threading.current_thread() is threading.main_thread():
         handlers = {number: signal.getsignal(number) for number in SIGNALS}
-        handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
 
     def note(number, frame):
         try:
@@ -71,6 +69,7 @@ def _noted_signals():
             raised.append(error)
             raise
 
+    handlers = {number: handler for number, handler in handlers.items() if callable(handler)}
     for number in handlers:
         signal.signal(number, note)
     try:
@@ -121,17 +120,13 @@ def reason_of(error):
     """Return the reason of a failed run, in a printable line of at most LONGEST_REASON characters."""
 
     def said():
-        if isinstance(error, SimulationStopped):
-            return printable(str(error.reason))
-        text = str(error)
-        if isinstance(error, TimeLimit | ControllerError | ControllerInputError):
+        text = str(error.reason if isinstance(error, SimulationStopped) else error)
+        if isinstance(error, SimulationStopped | TimeLimit | ControllerError | ControllerInputError):
             return printable(text)
         return printable(f"{type(error).__name__}: {text}" if text else type(error).__name__)
 
-    text, failure = attempt(said, REASON_LIMIT)
-    if failure is None:
-        return text
-    return printable(f"{type(error).__name__}, whose message cannot be read ({type(failure).__name__})")
+    text, failure = attempt(said)
+    return text if failure is None else f"{type(error).__name__}: its message cannot be read"
 
 
 def printable(text):

@@ -7,6 +7,7 @@ the wind climate of the suite's site, or equally without a site.
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from fowt_env.display import html_table
 from fowt_env.errors import unknown
@@ -20,10 +21,9 @@ from fowt_env.training.evaluation.bootstrap import (
     resample_weights,
 )
 from fowt_env.training.evaluation.failures import BASELINES, PENALTY, known_figures, lost_counts, penalties
-from fowt_env.training.evaluation.faults import PARKED
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
-from fowt_env.training.evaluation.results_table import case_shares
-from fowt_env.training.evaluation.run_case import OK, REFERENCE, TRIPPED
+from fowt_env.training.evaluation.results_table import KEY, case_shares
+from fowt_env.training.evaluation.run_case import OK, PARKED, REFERENCE, TRIPPED
 
 POSITIVE = np.array([never_negative(name) for name in METRICS])
 SHOWN = {  # columns of a leaderboard in a notebook: {heading: metric}
@@ -58,42 +58,11 @@ def default_baseline(controllers, baseline=None, failed=()):
     return next((name for name in BASELINES if name in able), next(iter(able), None))
 
 
-class _Runs:
-    """The runs of a table by controller, case and seed; those of the reference apart.
-
-    The results of a controller depend on its runs, the reference's and the baseline's, on its cases and
-    seeds, and on no other controller of the table.
-    """
-
-    def __init__(self, table):
-        self.table = table.reset_index(drop=True)
-        self.controllers = [name for name in dict.fromkeys(table["controller"]) if name != REFERENCE]
-        self.has_reference = bool((table["controller"] == REFERENCE).any())
-        figures = known_figures(self.table)[list(METRICS)].to_numpy(dtype=np.float64)
-        self.figures = np.vstack([figures, np.full(len(METRICS), np.nan)])  # the last one: of no run
-        keys = zip(table["controller"], table["case"], table["seed"], strict=True)
-        self.places = {key: number for number, key in enumerate(keys)}
-
-    def part(self, name, base=None):
-        """Return the _Part of a controller, with the runs of a baseline (None: none)."""
-        own = self.table[self.table["controller"] == name]
-        cases, seeds = list(dict.fromkeys(own["case"])), sorted(set(own["seed"]))
-        index = {
-            who: np.array([[self.places.get((who, case, seed), -1) for seed in seeds] for case in cases])
-            for who in (name, base, REFERENCE)
-        }
-        values, other, reference = (self.figures[index[who]] for who in (name, base, REFERENCE))
-        statuses = np.append(self.table["status"].to_numpy(dtype=object), OK)[index[name]]
-        runs = index[name] >= 0
-        if base is None:
-            other = np.full_like(values, np.nan)
-        return _Part(cases, values, other, reference, runs, statuses, case_shares(own, cases))
-
-
 class _Part(NamedTuple):
     """The runs of a controller over some cases; arrays (cases, seeds[, metrics]), shares (cases,).
 
-    values and base are NaN for a lost or missing run.
+    values and base are NaN for a lost or missing run. The results of a controller depend on its runs, the
+    reference's and the baseline's, on its cases and seeds, and on no other controller of the table.
     """
 
     cases: list
@@ -106,9 +75,7 @@ class _Part(NamedTuple):
 
     def case(self, number):
         """Return the _Part of one of its cases."""
-        chosen = slice(number, number + 1)
-        parts = (each[chosen] for each in self[:-1])
-        return _Part(*parts, np.ones(1))
+        return _Part(*(each[number : number + 1] for each in self[:-1]), np.ones(1))
 
     @property
     def lost(self):
@@ -122,17 +89,31 @@ class _Part(NamedTuple):
         return bool((whole & (self.shares > 0.0)).any())
 
 
+def _part(table, name, base):
+    """Return the _Part of a controller of a table by KEY, with the runs of a baseline (None: none)."""
+    own = table.loc[[name]]
+    cases = list(dict.fromkeys(own.index.get_level_values("case")))
+    seeds = sorted(set(own.index.get_level_values("seed")))
+    shape = len(cases), len(seeds)
+
+    def of(who, columns):
+        keys = pd.MultiIndex.from_product([[who], cases, seeds])
+        return table[columns].reindex(keys).to_numpy().reshape(*shape, -1)
+
+    statuses = of(name, ["status"])[..., 0]
+    runs = ~pd.isna(statuses)
+    statuses = np.where(runs, statuses, OK)
+    # in rows, on whose order in memory the last bit of a weighted sum depends
+    arrays = (
+        np.ascontiguousarray(of(who or "", list(METRICS)), dtype=np.float64)
+        for who in (name, base, REFERENCE)
+    )
+    return _Part(cases, *arrays, runs, statuses, case_shares(own.reset_index(), cases))
+
+
 def _means(values, weights, shares, chosen=slice(None)):
     """Return lifetime_means of METRICS, or of some of them."""
     return lifetime_means(values[..., chosen], weights, shares, EXPONENTS[chosen])
-
-
-def _figures(part, resampled):
-    """Return (estimate, low, high), each (metrics,), of the lifetime means of a _Part."""
-    estimate = _means(part.values, np.ones((1, part.values.shape[1])), part.shares)[0]
-    estimate[:] = np.nan if part.nothing else estimate
-    seeds = int(np.isfinite(part.values).any(axis=(0, 2)).sum())
-    return estimate, *interval(estimate, resampled, seeds, POSITIVE)
 
 
 def _differences(part, weights, own_resampled, tested):
@@ -234,18 +215,16 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     """
     if cases is not None:
         table = table[table["case"].isin(cases)]
-    runs = _Runs(table)
     own = table[table["controller"] != REFERENCE]
+    names = list(dict.fromkeys(own["controller"]))
     unusable = own[~own["status"].isin((OK, TRIPPED))]
-    baseline = default_baseline(
-        [name for name in runs.controllers if name != PARKED] or runs.controllers,
-        baseline,
-        set(unusable["controller"]),
-    )
+    able = [name for name in names if name != PARKED] or names
+    baseline = default_baseline(able, baseline, set(unusable["controller"]))
+    runs = known_figures(table).set_index(KEY)
     drawn = {}  # weights of resamples, by number of seeds
     entries = []
-    for name in runs.controllers:
-        part = runs.part(name, baseline)
+    for name in names:
+        part = _part(runs, name, baseline)
         count = part.values.shape[1]
         if count not in drawn:
             drawn[count] = resample_weights(count)
@@ -257,14 +236,14 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
         entries.append(entry)
     entries.sort(key=_rank_key)
     ranked = any(_known_score(entry) for entry in entries)
-    names = list(dict.fromkeys(own["case"]))
+    cases = list(dict.fromkeys(own["case"]))
     return Leaderboard(
         baseline=baseline,
         interval={"level": LEVEL, "method": METHOD, "resamples": RESAMPLES, "least_seeds": LEAST_SEEDS},
         penalty=PENALTY,
-        unchecked=[] if limits is None or runs.has_reference else list(limits.relative),
-        cases=names,
-        shares=dict(zip(names, map(float, case_shares(own, names)), strict=True)),
+        unchecked=[] if limits is None or len(own) < len(table) else list(limits.relative),
+        cases=cases,
+        shares=dict(zip(cases, map(float, case_shares(own, cases)), strict=True)),
         seeds=sorted({int(seed) for seed in own["seed"]}),
         controllers=[{"rank": rank if ranked else None} | entry for rank, entry in enumerate(entries, 1)],
     )
@@ -285,7 +264,10 @@ def _rank_key(entry):
 def _entry(part, weights, tested=False):
     """Return runs, metrics and differences of one controller over the cases of a _Part."""
     resampled = _means(part.values, weights, part.shares)
-    estimate, low, high = _figures(part, resampled)
+    estimate = _means(part.values, np.ones((1, part.values.shape[1])), part.shares)[0]
+    estimate[:] = np.nan if part.nothing else estimate
+    seeds = int(np.isfinite(part.values).any(axis=(0, 2)).sum())
+    low, high = interval(estimate, resampled, seeds, POSITIVE)
     least, greatest = _seed_range(part)
     filled = np.where(np.isfinite(part.values), part.values, -np.inf).max(axis=(0, 1))
     worst = np.where(np.isfinite(filled), filled, np.nan)
@@ -303,8 +285,7 @@ def _beyond(limits, part):
 
     A metric that all runs lack is not checked; one that some lack exceeds its limit.
     """
-    found = []
-    one = np.ones((1, part.values.shape[1]))
+    found, one = [], np.ones((1, part.values.shape[1]))
 
     def check(name, value, limit, what=""):
         if not value <= limit:

@@ -105,10 +105,11 @@ def write_leaderboard(table, folder, baseline=None):
     Raises: InputError for a baseline that was not evaluated.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    rules = {}
-    for key, kind in (("score", Score), ("limits", Limits)):
-        values = (manifest["suite"] or {}).get(key)
-        rules[key] = None if values is None else kind(**values)
+    suite = manifest["suite"] or {}
+    rules = {
+        key: None if suite.get(key) is None else kind(**suite[key])
+        for key, kind in (("score", Score), ("limits", Limits))
+    }
     board = {key: manifest[key] for key in COPIED} | leaderboard(table, baseline, **rules)
     write_json(board, folder / "leaderboard.json")
     return board

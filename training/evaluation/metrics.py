@@ -17,12 +17,7 @@ TIME = "Time_[s]"
 # Glass-fibre laminate of blades: 10, as in IEC 61400-1 practice.
 TOWER_EXPONENT, CHAIN_EXPONENT, BLADE_EXPONENT = 4.0, 3.0, 10.0
 BLADE_ROOTS = ("RootMyc", "RootMxc")  # channels of each blade, of which the greatest figure counts
-HUB_LOADS = (
-    "LSSTipMys",
-    "LSSTipMzs",
-    "YawBrMyp",
-    "YawBrMzp",
-)  # in axes that do not turn
+HUB_LOADS = ("LSSTipMys", "LSSTipMzs", "YawBrMyp", "YawBrMzp")  # in axes that do not turn
 BLADES = (1, 2, 3)
 # The constraints of the ATLAS Offshore contest (ARPA-E, 2019).
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
@@ -33,42 +28,28 @@ STANDSTILL = 10.0  # % of rated rotor speed, below which a rotor that was stoppe
 SETTLED_BAND = 5.0  # % of rated rotor speed about its final mean, beyond which it has not
 FINAL = 100.0  # s at the end, of that mean and of what still oscillates: some periods of the platform's pitch
 REQUIRED_CHANNELS = (
-    TIME,
-    "RotSpeed_[rpm]",
-    "GenPwr_[kW]",
-    "PtfmPitch_[deg]",
-    "PtfmSurge_[m]",
-    "BldPitch1_[deg]",
+    TIME, "RotSpeed_[rpm]", "GenPwr_[kW]", "PtfmPitch_[deg]", "PtfmSurge_[m]", "BldPitch1_[deg]",
     "GenTq_[kN-m]",
-)
+)  # fmt: skip
 
 
 class Metric(NamedTuple):
-    """What a metric is, and how its figures are compared and averaged."""
+    """What a metric or a statistic of a channel is, and how its figures are compared and averaged."""
 
     meaning: str
     better: int = 0  # -1: less is better, 1: more is, 0: neither can be said
     never_negative: bool = False
     exponent: float = 1.0  # p of its mean over winds and seeds, see mean_exponent
-
-
-class Statistic(NamedTuple):
-    """A statistic of a channel."""
-
-    meaning: str
-    of: Callable  # of values over time, the first axis
-    better: int = 0
-    never_negative: bool = False
-    exponent: float = 1.0
+    of: Callable | None = None  # of a statistic: function of values over time, the first axis
 
 
 STATISTICS = {
-    "mean": Statistic("mean", lambda x: np.mean(x, axis=0)),
+    "mean": Metric("mean", of=lambda x: np.mean(x, axis=0)),
     # about the run's own mean, N in the denominator
-    "std": Statistic("standard deviation", lambda x: np.std(x, axis=0), -1, True, 2.0),
-    "min": Statistic("least value", lambda x: np.min(x, axis=0)),
-    "max": Statistic("greatest value", lambda x: np.max(x, axis=0), -1),
-    "rms": Statistic("root mean square", lambda x: np.sqrt(np.mean(x**2, axis=0)), -1, True, 2.0),
+    "std": Metric("standard deviation", -1, True, 2.0, lambda x: np.std(x, axis=0)),
+    "min": Metric("least value", of=lambda x: np.min(x, axis=0)),
+    "max": Metric("greatest value", -1, of=lambda x: np.max(x, axis=0)),
+    "rms": Metric("root mean square", -1, True, 2.0, lambda x: np.sqrt(np.mean(x**2, axis=0))),
 }
 # channel -> its statistics; a channel that a run lacks (mooring without lines) gives NaN
 ALL = ("mean", "std", "min", "max")
@@ -80,6 +61,10 @@ CHANNELS = dict.fromkeys(
     ),
     ALL,
 ) | {"NcIMUTAxs_[m/s^2]": (*ALL, "rms")}  # fmt: skip
+FURTHER_CHANNELS = (  # of which a run may lack some, as those of CHANNELS
+    "GenTqLim_[-]", "PtfmSway_[m]", *(f"{name}_[kN-m]" for name in HUB_LOADS),
+    *(f"{name}{i}_[kN-m]" for name in BLADE_ROOTS for i in BLADES), *(f"BldPitch{i}_[deg]" for i in BLADES),
+)  # fmt: skip
 WEATHER = ("Wind1VelX_[m/s]", "Wave1Elev_[m]")  # of which neither less nor more is better
 
 
@@ -93,12 +78,8 @@ def _of_channel(channel, statistic):
     """Return the Metric of a statistic of a channel; of the power alone more is better of the mean."""
     row = STATISTICS[statistic]
     better = 1 if (channel, statistic) == ("GenPwr_[kW]", "mean") else row.better
-    return Metric(
-        f"{channel_meaning(channel)}: {row.meaning}",
-        0 if channel in WEATHER else better,
-        row.never_negative,
-        row.exponent,
-    )
+    meaning = f"{channel_meaning(channel)}: {row.meaning}"
+    return row._replace(meaning=meaning, better=0 if channel in WEATHER else better, of=None)
 
 
 def _size(meaning):
@@ -213,7 +194,7 @@ def damage_equivalent_load(values, duration, exponent):
 
 def beyond(time, value, limit):
     """Return (seconds that evenly spaced values spend above a limit, times they pass it); NaN of NaN."""
-    if not np.isfinite(value).all():
+    if len(value) < 2 or not np.isfinite(value).all():
         return float("nan"), float("nan")
     above = value > limit
     rises = int(np.sum(above[1:] & ~above[:-1])) + int(above[0])
@@ -241,60 +222,48 @@ def metrics(
                       offset and an oscillation, else NaN
     gust_start        time (s) of a gust after which the rotor has to settle; None: no settling time (NaN)
     stop              time (s) of what the rotor is to be stopped for; None: no standstill time (NaN)
-    Standard deviations are about the run's own mean (N in the denominator). Travel is the sum of
-    absolute steps per second. DEL: 1 Hz damage-equivalent load, exponent 4 (tower base fore-aft, shaft
-    torque, hub, yaw bearing), 10 (blade roots, of the worst blade) or 3 (fairlead). Those of
-    blades, hub and yaw bearing, and the mean travel of each blade, are NaN where all have one pitch.
-    torque_limited: seconds in which the generator could not follow its command, being at the end of its range
-    or its rate. FAIRTEN: the line for which the figure is greatest.
-    beyond: seconds past a constraint (blade-pitch rate 10 deg/s, tower-top acceleration 3.3 m/s2, rotor
-    speed 1.3 times rated), violations: how often it was passed. RotSpeed_offset: size of the mean rotor
-    speed's distance from rated over the last 300 s, in percent of it; BldPitch_oscillation: greatest minus
-    least blade pitch of the last 100 s. settling_time: from the gust's start to the last instant at which the
-    rotor speed is further than 5 % of rated from its mean over the last 100 s.
+    TABLE has the meaning of each metric; a channel that the run lacks gives NaN.
     Raises: InputError for missing columns or if skip leaves fewer than two rows.
     """
     kept = _kept(df, skip)
-    time = kept[TIME].to_numpy()
+    lines = kept[[name for name in kept.columns if name.startswith("FAIRTEN")]].to_numpy()
+    axes = ("NcIMUTAxs_[m/s^2]", "NcIMUTAys_[m/s^2]")
+    accelerations = [kept[name].to_numpy() for name in axes if name in kept.columns]
+    lacking = [name for name in (*CHANNELS, *FURTHER_CHANNELS) if name not in kept.columns]
+    kept = kept.assign(**dict.fromkeys(lacking, np.nan))
+    time, blade_pitch = kept[TIME].to_numpy(), kept["BldPitch1_[deg]"].to_numpy()
     length = time[-1] - time[0]
-    result = {}
-    for channel, statistics in CHANNELS.items():
-        values = kept[channel].to_numpy() if channel in kept.columns else None
-        for statistic in statistics:
-            value = np.nan if values is None else STATISTICS[statistic].of(values)
-            result[_metric_name(channel, statistic)] = float(value)
+
+    def fatigue(channel, exponent=TOWER_EXPONENT):
+        return damage_equivalent_load(kept[f"{channel}_[kN-m]"], length, exponent)
+
+    result = {
+        _metric_name(channel, statistic): float(STATISTICS[statistic].of(kept[channel].to_numpy()))
+        for channel, statistics in CHANNELS.items()
+        for statistic in statistics
+    }
     result["overspeed_[%]"] = float(overspeed(result["RotSpeed_max_[rpm]"], rated_speed_rpm))
     capped = np.minimum(kept["GenPwr_[kW]"].to_numpy(), rated_power_kW)
     result["energy_[kWh]"] = float(np.trapezoid(capped, time) / 3600.0)
     result["GenPwr_capped_mean_[kW]"] = float(np.mean(capped))
-    blade_pitch = kept["BldPitch1_[deg]"].to_numpy()
     result["blade_pitch_travel_[deg/s]"] = float(travel(time, blade_pitch))
     result["actuator_duty_[%]"] = 100.0 * result["blade_pitch_travel_[deg/s]"] / pitch_rate_limit
     result["torque_travel_[kN-m/s]"] = float(travel(time, kept["GenTq_[kN-m]"].to_numpy()))
-    at_limit = kept.get("GenTqLim_[-]")
-    limited = np.nan if at_limit is None else float(np.mean(at_limit.to_numpy()[:-1]) * length)
-    result["torque_limited_[s]"] = limited
-    lines = kept[[name for name in kept.columns if name.startswith("FAIRTEN")]].to_numpy()
+    result["torque_limited_[s]"] = float(np.mean(kept["GenTqLim_[-]"].to_numpy()[:-1]) * length)
     result["FAIRTEN_std_[kN]"] = float(lines.std(axis=0).max()) if lines.size else np.nan
     result["FAIRTEN_max_[kN]"] = float(lines.max()) if lines.size else np.nan
     loads = [damage_equivalent_load(line, length, CHAIN_EXPONENT) for line in lines.T]
     result["FAIRTEN_DEL_[kN]"] = float(np.max(loads)) if loads else np.nan
     for name in ("TwrBsMyt", "RotTorq", *HUB_LOADS):
-        load = kept.get(f"{name}_[kN-m]")
-        value = np.nan if load is None else damage_equivalent_load(load, length, TOWER_EXPONENT)
-        result[f"{name}_DEL_[kN-m]"] = value
+        result[f"{name}_DEL_[kN-m]"] = fatigue(name)
     for name in BLADE_ROOTS:
-        roots = [kept.get(f"{name}{i}_[kN-m]") for i in BLADES]
-        loads = [np.nan if m is None else damage_equivalent_load(m, length, BLADE_EXPONENT) for m in roots]
-        result[f"{name}_DEL_[kN-m]"] = float(np.max(loads))
-    pitches = [kept.get(f"BldPitch{i}_[deg]") for i in BLADES]
-    known = all(pitch is not None for pitch in pitches)
-    mean = np.mean([travel(time, pitch.to_numpy()) for pitch in pitches]) if known else np.nan
-    result["each_blade_travel_[deg/s]"] = float(mean)
-    sway = kept.get("PtfmSway_[m]")
-    result["PtfmSway_std_[m]"] = np.nan if sway is None else float(np.std(sway))
-    result |= _violations(kept, time, blade_pitch, rated_speed_rpm)
+        worst = np.max([fatigue(f"{name}{i}", BLADE_EXPONENT) for i in BLADES])
+        result[f"{name}_DEL_[kN-m]"] = float(worst)
+    blades = [travel(time, kept[f"BldPitch{i}_[deg]"].to_numpy()) for i in BLADES]
+    result["each_blade_travel_[deg/s]"] = float(np.mean(blades))
+    result["PtfmSway_std_[m]"] = float(np.std(kept["PtfmSway_[m]"]))
     speed = kept["RotSpeed_[rpm]"].to_numpy()
+    result |= _violations(time, speed, accelerations, blade_pitch, rated_speed_rpm)
     result |= _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start)
     result["standstill_time_[s]"] = _standstill(time, speed, rated_speed_rpm, stop)
     return {name: result[name] for name in METRICS}
@@ -323,11 +292,8 @@ def _kept(df, skip):
 
 def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
     """Return the metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
-    result = {
-        "RotSpeed_offset_[%]": np.nan,
-        "BldPitch_oscillation_[deg]": np.nan,
-        "settling_time_[s]": np.nan,
-    }
+    names = ("RotSpeed_offset_[%]", "BldPitch_oscillation_[deg]", "settling_time_[s]")
+    result = dict.fromkeys(names, np.nan)
     if steady:
         end = time >= time[-1] - SETTLED_END - 1e-9
         offset = 100.0 * abs(np.mean(speed[end]) / rated_speed_rpm - 1.0)
@@ -349,22 +315,15 @@ def _standstill(time, speed, rated_speed_rpm, stop):
     return max(float(time[fast][-1]) - stop, 0.0) if fast.any() else 0.0
 
 
-def _violations(kept, time, blade_pitch, rated_speed_rpm):
-    """Return the metrics of the constraints; the acceleration is horizontal, fore-aft and side to side."""
+def _violations(time, speed, axes, blade_pitch, rated_speed_rpm):
+    """Return the metrics of the constraints; axes: horizontal accelerations, fore-aft and side to side."""
     rate = np.abs(np.diff(blade_pitch) / np.diff(time))
-    axes = [
-        kept[name].to_numpy() for name in ("NcIMUTAxs_[m/s^2]", "NcIMUTAys_[m/s^2]") if name in kept.columns
-    ]
-    found = {
-        "blade_pitch_rate": (time[1:], rate, BLADE_PITCH_RATE_LIMIT) if len(rate) > 1 else None,
-        "tower_top_acceleration": (time, np.hypot.reduce(axes), TOWER_TOP_ACCELERATION_LIMIT)
-        if axes
-        else None,
-        "rotor_speed": (time, kept["RotSpeed_[rpm]"].to_numpy(), ROTOR_SPEED_LIMIT * rated_speed_rpm),
-    }
+    acceleration = np.hypot.reduce(axes) if axes else np.full(time.shape, np.nan)
     result = {}
-    for name, series in found.items():
-        seconds, count = (np.nan, np.nan) if series is None else beyond(*series)
-        result[f"{name}_beyond_[s]"] = seconds
-        result[f"{name}_violations_[-]"] = count
+    for name, times, values, limit in (
+        ("blade_pitch_rate", time[1:], rate, BLADE_PITCH_RATE_LIMIT),
+        ("tower_top_acceleration", time, acceleration, TOWER_TOP_ACCELERATION_LIMIT),
+        ("rotor_speed", time, speed, ROTOR_SPEED_LIMIT * rated_speed_rpm),
+    ):
+        result[f"{name}_beyond_[s]"], result[f"{name}_violations_[-]"] = beyond(times, values, limit)
     return result

@@ -1,4 +1,9 @@
-"""Perturbed plants: factors on masses, hydrodynamics, moorings and actuators of the files."""
+"""Perturbed plants: factors on the files' values and noise on readings, unknown to the controller.
+
+A controller is made for the nominal turbine and prepared with the nominal scene, so that model-based designs
+(lqr, rosco, preview) are based on a wrong model, as they would be at sea. Metrics are of the true motions:
+noise is only on the controller's readings.
+"""
 
 import dataclasses
 from typing import Annotated
@@ -8,8 +13,11 @@ from pydantic import Field
 from fowt_env.caches import cached
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.records import NonNegative, Positive, Record
+from fowt_env.descriptions.sensors import Sensor, SensorChain
 from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.envs.sensors import reading_scales
 from fowt_env.errors import InputError
+from fowt_env.plant.measurement import Measurement
 
 # name: (what is drawn, default distribution). Factors multiply the file's value.
 PLANT = {
@@ -41,56 +49,44 @@ def plant_settings(factors, platform=PLATFORM):
             raise InputError(f"randomise.{name}: drew {value:g}: factors must be positive")
         return value
 
-    def scaled(part, by, *names):
-        values = {name: getattr(part, name) for name in names}
-        return part.model_copy(update={name: times(by, value) for name, value in values.items()})
-
     def times(by, value):  # None: none
         if isinstance(value, tuple):
             return tuple(times(by, each) for each in value)
         return None if value is None else by * value
 
-    hydro, potential, additional = base.hydro, base.potential_flow, base.additional
-    mass, drag = factor("added_mass"), factor("drag")
-    if hydro is not None:
-        hydro = scaled(hydro, mass, "added_mass_coefficient", "heave_added_mass")
-        hydro = scaled(hydro, drag, "drag_coefficient", "linear_damping")
-    if potential is not None and mass != 1.0:
-        names = ("added_mass", "added_mass_infinite", "added_mass_zero")
-        scaled_mass = {name: times(mass, getattr(potential, name)) for name in names}
-        potential = dataclasses.replace(potential, **scaled_mass)
-    if additional is not None and drag != 1.0:
-        additional = scaled(additional, drag, "linear_damping", "quadratic_damping")
-    upper, tau = factor("upper_mass"), factor("actuator_lag")
-    tower = scaled(base.tower, upper, "mass", "inertia")
-    if tower.modes is not None and upper != 1.0:
-        tower = tower.model_copy(update={"modes": scaled(tower.modes, upper, "mass_density", "top_mass")})
+    def scaled(part, **factors):
+        if part is None or set(factors.values()) == {1.0}:
+            return part
+        values = {name: times(by, getattr(part, name)) for name, by in factors.items()}
+        if dataclasses.is_dataclass(part):
+            return dataclasses.replace(part, **values)
+        return part.model_copy(update=values)
+
+    mass, drag, upper = factor("added_mass"), factor("drag"), factor("upper_mass")
+    ballast, stiffness, air = factor("ballast_mass"), factor("mooring_stiffness"), factor("air_density")
+    masses = ("added_mass", "added_mass_infinite", "added_mass_zero")
+    member = {"added_mass_coefficient": mass, "axial_added_mass_coefficient": mass}
+    member |= {"drag_coefficient": drag, "axial_drag_coefficient": drag}
+    hydro = {"added_mass_coefficient": mass, "heave_added_mass": mass}
+    hydro |= {"drag_coefficient": drag, "linear_damping": drag}
+    tower = scaled(base.tower, mass=upper, inertia=upper)
+    tower = tower.model_copy(update={"modes": scaled(tower.modes, mass_density=upper, top_mass=upper)})
     base = base.model_copy(
         update={
-            "environment": scaled(base.environment, factor("air_density"), "air_density"),
-            "ballast": scaled(base.ballast, factor("ballast_mass"), "mass", "inertia"),
-            "hydro": hydro,
-            "potential_flow": potential,
-            "additional": additional,
-            "members": tuple(
-                scaled(
-                    scaled(member, mass, "added_mass_coefficient", "axial_added_mass_coefficient"),
-                    drag,
-                    "drag_coefficient",
-                    "axial_drag_coefficient",
-                )
-                for member in base.members
-            ),
+            "environment": scaled(base.environment, air_density=air),
+            "ballast": scaled(base.ballast, mass=ballast, inertia=ballast),
+            "hydro": scaled(base.hydro, **hydro),
+            "potential_flow": scaled(base.potential_flow, **dict.fromkeys(masses, mass)),
+            "additional": scaled(base.additional, linear_damping=drag, quadratic_damping=drag),
+            "members": tuple(scaled(each, **member) for each in base.members),
             "tower": tower,
-            "lines": tuple(
-                scaled(line, factor("mooring_stiffness"), "wet_weight", "EA") for line in base.lines
-            ),
+            "lines": tuple(scaled(line, wet_weight=stiffness, EA=stiffness) for line in base.lines),
         }
     )
     turbine = turbine.model_copy(
         update={
-            "nacelle": scaled(turbine.nacelle, upper, "mass", "inertia"),
-            "pitch_drive": turbine.pitch_drive.slowed(tau),
+            "nacelle": scaled(turbine.nacelle, mass=upper, inertia=upper),
+            "pitch_drive": turbine.pitch_drive.slowed(factor("actuator_lag")),
         }
     )
     return {"platform": base, "turbine": turbine}
@@ -125,3 +121,17 @@ class PlantPerturbation(Record):
 def perturbed_parts(perturbation, platform="oc3_hywind"):
     """Return {"platform", "turbine"} of a perturbed platform (a name or file), for build_scene."""
     return plant_settings(perturbation.factors, platform)
+
+
+def perturbed_sensors(perturbation, turbine, control_dt):
+    """Return the SensorChain of a PlantPerturbation's noise and delay on every reading; None without both."""
+    if perturbation.noise == 0.0 and perturbation.delay == 0:
+        return None
+    scales = dict(zip(Measurement._fields, reading_scales(turbine).tolist(), strict=True))
+    delay = perturbation.delay * control_dt
+    sensors = {
+        name: Sensor(noise=perturbation.noise * scale, delay=delay)
+        for name, scale in scales.items()
+        if name != "time"
+    }
+    return SensorChain("shifted", sensors, "equal relative noise and delay on every reading")

@@ -1,10 +1,11 @@
 """What shaped a run: hashes of the sources it imports and of its controller's, versions of packages."""
 
 import hashlib
-import importlib.util
+import importlib
 import inspect
 import platform as machine
 import sys
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -45,11 +46,8 @@ def plant_code():
 
 def _data(folder):
     """Return the files beneath a folder that are no sources."""
-    return [
-        path
-        for path in folder.rglob("*")
-        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
-    ]
+    found = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".py")
+    return [path for path in found if "__pycache__" not in path.parts]
 
 
 def controller_code(controller):
@@ -65,9 +63,8 @@ def controller_code(controller):
     from fowt_env.controllers.policy.controller import POLICY_PREFIX, policy_path
 
     if not isinstance(controller, str):
-        kind = (
-            controller if inspect.isroutine(controller) or inspect.isclass(controller) else type(controller)
-        )
+        named = inspect.isroutine(controller) or inspect.isclass(controller)
+        kind = controller if named else type(controller)
         name = f"{kind.__module__}:{kind.__qualname__}"
         key = getattr(controller, "content_key", "")
         code = _digest(_user_files(kind.__module__), key if isinstance(key, str) else "")
@@ -110,24 +107,17 @@ def _user_files(module):
 
 
 def _module_file(name):
-    """Return the file of a module, which is not run for it; None where there is none."""
-    if name in sys.modules:
-        file = getattr(sys.modules[name], "__file__", None)
-        return None if file is None else _located(Path(file))
-    top, *rest = name.split(".")
-    sys.path.insert(0, "")
-    try:
-        spec = importlib.util.find_spec(top)
-    except (ImportError, ValueError):
-        spec = None
-    finally:
-        sys.path.remove("")
-    if spec is None or not spec.has_location:
-        return None
-    place = _located(Path(spec.origin))
-    place = place.parent if rest or place.name == "__init__.py" else place.with_suffix("")
-    found = (place.joinpath(*rest, "__init__.py"), place.joinpath(*rest).with_suffix(".py"))
-    return next((path for path in found if path.is_file()), None)
+    """Return the file of a module, which is imported for it; None where there is none."""
+    if name not in sys.modules:
+        sys.path.insert(0, "")
+        try:
+            importlib.import_module(name)
+        except Exception:
+            return None
+        finally:
+            sys.path.remove("")
+    file = getattr(sys.modules[name], "__file__", None)
+    return None if file is None else _located(Path(file))
 
 
 def _with_own(files, roots):
@@ -161,16 +151,11 @@ def _package_of(path):
 
 def versions():
     """Return {package: version} of what shapes the figures, Python and processor included."""
-    found = {
-        "fowt_env": fowt_env.__version__,
-        "python": machine.python_version(),
-        "machine": machine.machine(),
-    }
+    found = {"fowt_env": fowt_env.__version__, "python": machine.python_version()}
+    found["machine"] = machine.machine()
     for name in PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            continue
     return found
 
 
@@ -179,5 +164,7 @@ def version_gap(old, new):
 
     One that is missing in a mapping shaped no figure there: its controllers failed.
     """
-    differing = (name for name in sorted(set(old) & set(new) - set(NO_FIGURES)) if old[name] != new[name])
-    return next(((f"{name} {old[name]}", f"{name} {new[name]}") for name in differing), None)
+    for name in sorted(set(old) & set(new) - set(NO_FIGURES)):
+        if old[name] != new[name]:
+            return f"{name} {old[name]}", f"{name} {new[name]}"
+    return None

@@ -16,14 +16,16 @@ import re
 import time
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Annotated, Literal
 
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 import fowt_env
-from fowt_env.descriptions.checks import is_number, is_whole
 from fowt_env.descriptions.files import parse_json
+from fowt_env.descriptions.records import validate
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import remove_leftovers, replacing
 from fowt_env.files.tables import write_table
@@ -34,15 +36,10 @@ from fowt_env.training.evaluation.locks import locked
 from fowt_env.training.evaluation.run_case import FAILED, STATUSES
 
 FORMAT = 4  # version of the folder's files
-MANIFEST = {  # types of the keys of manifest.json, beside its format
-    "fowt_env": str, "plant": str, "versions": dict, "created": str, "suite": dict | None, "options": dict,
-    "cases": dict, "seeds": list, "controllers": dict,
-}  # fmt: skip
 ROW_KEY = b"fowt_env.row"
 TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
 PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # distinct on every file system
 LONGEST_NAME = 500
-TEXTS = ("controller", "case", "status", "reason", "events", "warning")  # of a row; the others are numbers
 
 
 def run_file(folder, label, case, seed):
@@ -59,10 +56,11 @@ def file_name(text):
 
 
 def check_name(what, name):
-    """Check the name of a controller or case. Raises: InputError."""
+    """Return the name of a controller or case. Raises: InputError."""
     if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
         shown = printable(name) if isinstance(name, str) else type(name).__name__
         raise InputError(f"{what} {shown!r} must be a printable text of at most {LONGEST_NAME} characters")
+    return name
 
 
 def run_content(frame, row):
@@ -84,37 +82,50 @@ def write_run(content, path):
     return path
 
 
+class _Row(BaseModel):
+    """The row of a run; its further columns are numbers."""
+
+    model_config = ConfigDict(strict=True, extra="allow")
+    __pydantic_extra__: dict[str, float | None]
+    controller: Annotated[str, AfterValidator(lambda name: check_name("the name", name))]
+    case: Annotated[str, AfterValidator(lambda name: check_name("the name", name))]
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
+    status: Literal[STATUSES]
+    reason: str
+    events: str
+    warning: str
+
+
+class _Manifest(BaseModel):
+    """manifest.json, beside its format."""
+
+    model_config = ConfigDict(strict=True)
+    fowt_env: str
+    plant: str
+    versions: dict
+    created: str
+    suite: dict | None
+    options: dict
+    cases: dict[str, dict]
+    seeds: list[int]
+    controllers: dict
+
+
 def read_row(path):
     """Return the row {column: value} of a run's file. Raises: InputError for any other file."""
     try:
         metadata = pq.read_schema(path).metadata or {}
         row = parse_json(metadata[ROW_KEY].decode("utf-8"))
-        _check_row(row)
+        problems = validate(_Row, row)[1]
     except (KeyError, ValueError, RecursionError, OSError, MemoryError, pa.ArrowException) as error:
+        problems = [str(error)]
+    if problems:
         raise InputError(
-            f"{str(path)!r} is no run of an evaluation ({error!s:.300}); remove it to run it again"
-        ) from None
+            f"{str(path)!r} is no run of an evaluation ({printable(problems[0]):.300}); remove it to run it"
+            " again"
+        )
     row |= {name: printable(row[name]) for name in ("reason", "warning")}
     return {key: float("nan") if value is None else value for key, value in row.items()}
-
-
-def _check_row(row):
-    """Check the row of a run. Raises: ValueError."""
-    if not isinstance(row, dict) or {*TEXTS, "seed"} - set(row):
-        raise ValueError(f"its row lacks one of {', '.join((*TEXTS, 'seed'))}")
-    for name, value in row.items():
-        if name in TEXTS:
-            sound = isinstance(value, str)
-        elif name == "seed":
-            sound = is_whole(value) and 0 <= value < 2**63
-        else:
-            sound = value is None or is_number(value)
-        if not sound:
-            raise ValueError(f"its row has {name} = {printable(repr(value))}")
-    for name in ("controller", "case"):
-        check_name(f"its row's {name}", row[name])
-    if row["status"] not in STATUSES:
-        raise ValueError(f"its row has status = {printable(row['status'])!r}, none of {', '.join(STATUSES)}")
 
 
 def _json(value, **options):
@@ -148,50 +159,38 @@ class ResultsFolder:
     again: keys (controller, case, seed) of runs to repeat if they failed.
     """
 
-    def __init__(self, folder, settings, columns, again=()):
+    def __init__(self, folder, settings, columns, again):
         self.name = Path(folder)  # for messages
         self.folder = self.name.absolute()  # a controller may change the working folder
         self.columns = list(columns)
-        self.again = frozenset(again)
-        self.settings = settings
         self.rows = {}  # (controller, case, seed) -> row
         self.written = 0.0
-
-    def _open(self):
-        """Check the folder, join the settings and read the rows of finished runs."""
-        wanted = {
-            "format": FORMAT,
-            "fowt_env": fowt_env.__version__,
-            "plant": provenance.plant_code(),
-            **{key: self.settings[key] for key in ("suite", "options")},
-        }
-        wanted = json.loads(_json(wanted))
+        fixed = {"fowt_env": fowt_env.__version__, "plant": provenance.plant_code()}
+        fixed |= {key: settings[key] for key in ("suite", "options")}
         old = self._manifest()
-        for folder in (self.folder, *self.folder.glob("runs/*/")):
-            remove_leftovers(folder)
+        for place in (self.folder, *self.folder.glob("runs/*/")):
+            remove_leftovers(place)
         for path in sorted(self.folder.glob("runs/*/[!.]*.parquet")):
             row = read_row(path)
             key = row["controller"], row["case"], row["seed"]
             if run_file(self.folder / "runs", *key) != path:
                 raise InputError(f"{str(path)!r} contains the run {', '.join(map(str, key))}: remove it")
-            if row["status"] != FAILED or key not in self.again:
+            if row["status"] != FAILED or key not in again:
                 self.rows[key] = row
-        parts = {key: dict(self.settings[key]) for key in ("cases", "controllers")}
-        seeds = list(self.settings["seeds"])
         if old is not None:
-            self._compare(old, wanted)
-            for key in parts:
-                parts[key] = old[key] | parts[key]
-            seeds = sorted({*old["seeds"], *seeds})
+            self._compare(old, fixed, settings)
         elif self.rows or (self.folder / "results.csv").exists():
             raise self._refused("contains runs but no manifest.json")
-        created = time.strftime("%Y-%m-%dT%H:%M:%S%z") if old is None else old["created"]
+        else:
+            old = {"versions": {}, "seeds": [], "cases": {}, "controllers": {}}
+            old["created"] = time.strftime("%Y-%m-%dT%H:%M:%S%z")
         self.manifest = {
-            **wanted,
-            "versions": provenance.versions() | ({} if old is None else old["versions"]),
-            "created": created,
-            "seeds": seeds,
-            **parts,
+            "format": FORMAT,
+            **json.loads(_json(fixed)),
+            "versions": provenance.versions() | old["versions"],
+            "created": old["created"],
+            "seeds": sorted({*old["seeds"], *settings["seeds"]}),
+            **{key: old[key] | dict(settings[key]) for key in ("cases", "controllers")},
         }
         write_json(self.manifest, self.folder / "manifest.json")
 
@@ -203,43 +202,37 @@ class ResultsFolder:
             old = parse_json(path.read_text(encoding="utf-8"))
         except ValueError:
             raise self._refused("has a manifest.json that is not valid JSON") from None
-        if not isinstance(old, dict) or old.get("format") != FORMAT:
-            raise self._refused(
-                f"has format {old.get('format') if isinstance(old, dict) else None}, not {FORMAT}"
-            )
-        for key, kind in MANIFEST.items():
-            if key not in old or not isinstance(old[key], kind):  # a suite may be null, not absent
-                raise self._refused(f"has a manifest.json without a sound {key!r}")
-        sound = all(type(seed) is int for seed in old["seeds"])
-        if not sound or not all(isinstance(case, dict) for case in old["cases"].values()):
-            raise self._refused("has a manifest.json with wrong seeds or cases")
+        found = old.get("format") if isinstance(old, dict) else None
+        if found != FORMAT:
+            raise self._refused(f"has format {found}, not {FORMAT}")
+        if problems := validate(_Manifest, old)[1]:
+            raise self._refused(f"has a manifest.json that cannot be used ({problems[0]})")
         return old
 
-    def _compare(self, old, wanted):
+    def _compare(self, old, fixed, settings):
         """Compare the settings with those of the manifest. Raises: InputError if they do not match."""
-        if old["fowt_env"] != wanted["fowt_env"]:
-            raise self._refused(f"was made by fowt_env {old['fowt_env']}, this is {wanted['fowt_env']}")
-        if old["plant"] != wanted["plant"]:
+        if old["fowt_env"] != fixed["fowt_env"]:
+            raise self._refused(f"was made by fowt_env {old['fowt_env']}, this is {fixed['fowt_env']}")
+        if old["plant"] != fixed["plant"]:
             raise self._refused("was made by another state of this package's sources")
         if gap := provenance.version_gap(old["versions"], provenance.versions()):
             raise self._refused(f"was made with {gap[0]}, this is {gap[1]}")
+        now = json.loads(_json(settings))
         for key in ("suite", "options"):
-            if old[key] != wanted[key]:
-                raise self._refused(f"was made with {key} {_short(old[key])}, not {_short(wanted[key])}")
-        for name, case in json.loads(_json(self.settings["cases"])).items():
+            if old[key] != now[key]:
+                raise self._refused(f"was made with {key} {_short(old[key])}, not {_short(now[key])}")
+        for name, case in now["cases"].items():
             before = old["cases"].get(name, case)
-            changed = [key for key in {*before, *case} if before.get(key) != case.get(key)]
-            if changed:
-                key = sorted(changed)[0]
-                raise self._refused(
-                    f"was made with another case {name!r}: {key} = {before.get(key)}, now {case.get(key)}"
-                )
-        for label, code in self.settings["controllers"].items():
-            before = old["controllers"].get(label, code)
-            done = [row["status"] for key, row in self.rows.items() if key[0] == label]
-            if before != code and done:
+            for key in sorted({*before, *case}):
+                if before.get(key) != case.get(key):
+                    raise self._refused(
+                        f"was made with another case {name!r}: {key} = {before.get(key)}, now {case.get(key)}"
+                    )
+        for label, code in now["controllers"].items():
+            done = {row["status"] for key, row in self.rows.items() if key[0] == label}
+            if old["controllers"].get(label, code) != code and done:
                 place = run_file(self.name / "runs", label, "", 0).parent
-                failed = ", or use --retry-failed" if set(done) == {FAILED} else ""
+                failed = ", or use --retry-failed" if done == {FAILED} else ""
                 raise InputError(
                     f"results folder {str(self.name)!r}: controller {label!r} or its code has changed since"
                     f" its runs there; remove {str(place)!r} to run them again, or choose another"
@@ -259,16 +252,16 @@ class ResultsFolder:
 
     def table(self):
         """Return a DataFrame of all runs, by case, seed and controller in the manifest's order."""
-        cases, controllers = (
-            {name: number for number, name in enumerate(self.manifest[key])}
-            for key in ("cases", "controllers")
+        table = pd.DataFrame(list(self.rows.values()), columns=self.columns)
+        order = table[["seed"]].assign(  # names that the manifest lacks stand last
+            **{
+                key: table[key].map({name: place for place, name in enumerate(self.manifest[f"{key}s"])})
+                for key in ("case", "controller")
+            }
         )
-        order = sorted(
-            self.rows, key=lambda key: (cases.get(key[1], 1e9), key[2], controllers.get(key[0], 1e9), key)
-        )
-        table = pd.DataFrame([self.rows[key] for key in order], columns=self.columns)
+        table = table.loc[order.sort_values(["case", "seed", "controller"]).index].reset_index(drop=True)
         faulty = {name for name, case in self.manifest["cases"].items() if case.get("fault") is not None}
-        return with_lost_power(table, faulty) if len(table) else table
+        return with_lost_power(table, faulty)
 
     def write(self):
         """Write results.csv."""
@@ -291,9 +284,9 @@ def open_results(folder, settings, columns, again=()):
 
     Raises: InputError if the folder is in use, or has runs of another version or other settings.
     """
-    results = ResultsFolder(folder, settings, columns, again)
-    with locked(results.folder, f"results folder {str(folder)!r}", "another evaluation is writing to it"):
-        results._open()
+    what = f"results folder {str(folder)!r}"
+    with locked(Path(folder).absolute(), what, "another evaluation is writing to it"):
+        results = ResultsFolder(folder, settings, columns, again)
         try:
             yield results
         finally:

@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.evaluation.faults import PARKED
-from fowt_env.training.evaluation.run_case import REFERENCE
+from fowt_env.training.evaluation.run_case import PARKED, REFERENCE
 
 KEY = ["controller", "case", "seed"]  # of a run
 WORDS = ["status", "reason", "events", "warning"]  # columns of text beside those of KEY
@@ -41,8 +40,8 @@ def read_results(paths, needed=(), cases=None, parked=True):
         table = table[table["controller"] != PARKED]
     if cases is not None:
         known = list(dict.fromkeys(table["case"]))
-        for name in (name for name in cases if name not in known):
-            raise unknown("case of the evaluation", name, known)
+        if wrong := [name for name in cases if name not in known]:
+            raise unknown("case of the evaluation", wrong[0], known)
         table = table[table["case"].isin(cases)]
     return table.reset_index(drop=True)
 
@@ -55,20 +54,14 @@ def case_shares(table, cases):
     return share / share.sum() if share.sum() > 0.0 else np.full(len(cases), 1.0 / len(cases))
 
 
-def _table_file(path):
-    """Return the file of the table of a folder, or the file itself. Raises: InputError."""
+def _read_one(path, needed):
+    """Return the checked table of one folder or file. Raises: InputError."""
     files = [path / name for name in TABLES] if path.is_dir() else [path]
-    found = next((file for file in files if file.is_file()), None)
-    if found is None:
+    file = next((file for file in files if file.is_file()), None)
+    where = f"table {str(file)!r}"
+    if file is None:
         lack = "contains no results.csv" if path.is_dir() else "is no such file or folder"
         raise InputError(f"results {str(path)!r} {lack}: make it with fowt evaluate --out FOLDER")
-    return found
-
-
-def _read_one(path, needed):
-    """Return the checked table of one folder or file."""
-    file = _table_file(path)
-    where = f"table {str(file)!r}"
     try:
         texts = pd.read_csv(file, dtype=str, keep_default_na=False, encoding="utf-8")
     except (ValueError, pd.errors.ParserError) as error:
@@ -78,21 +71,20 @@ def _read_one(path, needed):
         raise InputError(f"{where} lacks the columns {', '.join(missing)}")
     if texts.empty:
         raise InputError(f"{where} has no runs")
-    table = texts[["controller", "case", "status"]].copy()
-    table["reason"] = texts["reason"] if "reason" in texts.columns else ""
+    columns = {name: texts[name] for name in ("controller", "case", "status")}
+    columns["reason"] = texts.get("reason", "")
     try:
-        table["seed"] = pd.to_numeric(texts["seed"]).astype(int)
+        columns["seed"] = pd.to_numeric(texts["seed"]).astype(int)
     except (ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{where}: column seed must contain whole numbers ({error})") from None
-    figures = {}
-    for name in texts.columns.drop([n for n in (*KEY, *WORDS) if n in texts.columns]):
+    for name in texts.columns.difference([*KEY, *WORDS], sort=False):
         numbers = pd.to_numeric(texts[name].replace("", "nan"), errors="coerce")
         filled = ~texts[name].str.lower().isin(["", "nan"])
         if numbers.notna().sum() == filled.sum():  # else a column of text
-            figures[name] = numbers.astype(float).replace([np.inf, -np.inf], np.nan)
+            columns[name] = numbers.astype(float).replace([np.inf, -np.inf], np.nan)
         elif name in needed:
             raise InputError(f"{where}: column {name} must contain numbers")
-    table = pd.concat([table, pd.DataFrame(figures, index=table.index)], axis=1)
+    table = pd.DataFrame(columns)
     if table.duplicated(KEY).any():
         raise InputError(f"{where}: a controller, case and seed occur twice")
     return table

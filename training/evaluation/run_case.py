@@ -10,6 +10,7 @@ import pandas as pd
 import fowt_env
 from fowt_env.analysis.trim import trim
 from fowt_env.controllers import make
+from fowt_env.controllers.constant import Constant
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.faults import Fault
 from fowt_env.descriptions.protection import END_AT_OVERSPEED, TripLimit, read_protection
@@ -17,23 +18,20 @@ from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import (
-    ControllerError,
     ControllerInputError,
     InputError,
     PlantWarning,
-    SimulationStopped,
     muted,
 )
-from fowt_env.training.evaluation.faults import idling
 from fowt_env.training.evaluation.guard import attempt, reason_of
 from fowt_env.training.evaluation.metrics import METRICS, TIME, turbine_metrics
-from fowt_env.training.evaluation.model_mismatch import perturbed_sensors
-from fowt_env.training.evaluation.plant_perturbation import perturbed_parts
+from fowt_env.training.evaluation.plant_perturbation import perturbed_parts, perturbed_sensors
 from fowt_env.training.evaluation.wind_boxes import cached_box
 from fowt_env.weather.wind import GUSTS
 from fowt_env.weather.wind_field import is_field
 
 STATUSES = OK, TRIPPED, FAILED, LOST_POWER = ("ok", "tripped", "failed", "lost power")
+PARKED = "parked"  # what stands for the controller of a parked turbine
 REFERENCE = "reference"  # name of the runs of the suite's baseline without trip and protection
 CONTROL_DT = 0.1  # s, simulate's own
 SHORTEST_CASE_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
@@ -64,11 +62,6 @@ class Run:
         """Key of the run within its evaluation."""
         return self.label, self.case.name, self.seed
 
-    @property
-    def protected(self):
-        """Whether trips may stop the turbine; not for the reference, which needs metrics."""
-        return not (self.case.parked or self.label == REFERENCE)
-
 
 def scored(run):
     """Return (row, time series or None) of one run; a failed one has its reason instead of metrics.
@@ -81,28 +74,35 @@ def scored(run):
     wind = case.wind
     if is_field(wind):
         wind = cached_box(wind, case.platform, run.seed, options)
+    weather = {"wind": wind, "sea": case.sea, "seed": run.seed, **options}
     with muted():  # extreme weather is the purpose of a case
-        nominal = scene = fowt_env.build_scene(
-            case.platform, wind=wind, sea=case.sea, seed=run.seed, **options
-        )
-    if case.shift is not None and case.shift.factors:
-        parts = perturbed_parts(case.shift, case.platform)
-        scene = fowt_env.build_scene(wind=wind, sea=case.sea, seed=run.seed, **options | parts)
-
+        nominal = scene = fowt_env.build_scene(case.platform, **weather)
+    settings = {"sensors": case.sensors, **run.options}
+    if case.shift is not None:
+        if case.shift.factors:
+            scene = fowt_env.build_scene(**weather | perturbed_parts(case.shift, case.platform))
+        control_dt = run.options.get("control_dt", CONTROL_DT)
+        chain = perturbed_sensors(case.shift, nominal.turbine, control_dt)
+        settings |= {} if chain is None else {"sensors": chain}
+    protected = not case.parked and run.label != REFERENCE  # the reference needs metrics
     ends = run.label != REFERENCE and case.fault is None
 
     def work():
+        initial = case.initial
+        if case.displaced is not None:
+            point = trim(scene)
+            initial = {name: point[name] + change for name, change in case.displaced.items()}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlantWarning)  # in the row's events and warning
             frame = fowt_env.simulate(
                 scene,
                 controller=run_controller(run, nominal),
                 duration=run.duration,
-                initial=_start(case, scene),
-                protection=protection_of(case, scene.turbine, run.protected, ends),
+                initial=initial,
+                protection=protection_of(case, scene.turbine, protected, ends),
                 faults=faults_of(case),
                 nominal=nominal,
-                **{"sensors": case.sensors} | run.options | _degraded(run, nominal.turbine),
+                **settings,
             )
         return frame, run_metrics(frame, case, nominal, run.skip)
 
@@ -113,9 +113,12 @@ def scored(run):
         ended = frame.attrs["tripped"]
         if ended is None:
             return _row(run, OK, frame) | figures, frame
-        status = OK if _expected(case, ended) else TRIPPED
+        # a trip after a fault that ends operation follows from the case, not from the controller
+        fault = case.fault
+        expected = fault is not None and fault.ends_operation and ended >= fault.time - 1e-9
         reason = _trip_reason(frame.attrs["trip"], ended, case, nominal.turbine)
-        return _row(run, status, frame) | figures | {"reason": reason, "stopped_[s]": ended}, frame
+        about = {"reason": reason, "stopped_[s]": ended}
+        return _row(run, OK if expected else TRIPPED, frame) | figures | about, frame
     if isinstance(error, InputError) and not isinstance(error, ControllerInputError):
         raise error  # the run's settings
     frame, stopped = _end(error)
@@ -147,31 +150,13 @@ def run_metrics(frame, case, scene, skip):
     """Return {metric: value} of the time series of a run of a Case in its nominal scene, after `skip` s."""
     fault = case.fault
     stop = fault.time if fault is not None and fault.ends_operation else None
-    return turbine_metrics(frame, scene.turbine, skip, _is_steady(case, scene), _gust_start(case), stop)
-
-
-def _is_steady(case, scene):
-    """Return whether a Case has steady wind above rated and still water, so that a controller must settle."""
     kind = case.wind.get("kind") if isinstance(case.wind, dict) else "steady"
-    if kind != "steady" or case.wind is None or case.parked or case.fault is not None:
-        return False
-    above = scene.wind_speed > scene.turbine.rated_wind_speed
-    return above and sea_state_of(case.sea).height == 0.0
-
-
-def _start(case, scene):
-    """Return the absolute values of channels at the start of a Case; None: its operating point."""
-    if case.displaced is None:
-        return case.initial
-    point = trim(scene)
-    return {name: point[name] + change for name, change in case.displaced.items()}
-
-
-def _gust_start(case):
-    """Return the time (s) at which the gust of a Case begins; None without one."""
-    if case.parked or not isinstance(case.wind, dict) or case.wind.get("kind") not in GUSTS:
-        return None
-    return read_wind(case.wind)["start"]
+    gust = read_wind(case.wind)["start"] if kind in GUSTS and not case.parked else None
+    # in steady wind above rated and still water a controller must settle
+    steady = kind == "steady" and case.wind is not None and not case.parked and fault is None
+    steady = steady and scene.wind_speed > scene.turbine.rated_wind_speed
+    steady = steady and sea_state_of(case.sea).height == 0.0
+    return turbine_metrics(frame, scene.turbine, skip, steady, gust, stop)
 
 
 def _row(run, status, frame):
@@ -186,23 +171,12 @@ def _row(run, status, frame):
 
 
 def _end(error):
-    """Return (rows so far or None, time of the end in s or NaN) of the exception that ended a run.
-
-    Only an exception of simulate has them; the attributes are read without calling a controller's code.
-    """
-    held = vars(error) if isinstance(error, SimulationStopped | ControllerError | KeyboardInterrupt) else {}
-    frame, stopped = held.get("frame"), held.get("time")
-    if not isinstance(frame, pd.DataFrame) or TIME not in frame or not (frame.dtypes == "float64").all():
-        frame = None
+    """Return (rows so far or None, time of the end in s or NaN) that simulate attached to an exception."""
+    frame, stopped = getattr(error, "frame", None), getattr(error, "time", None)
+    frame = frame if isinstance(frame, pd.DataFrame) and TIME in frame else None
     if not is_number(stopped):
         stopped = float("nan") if frame is None or frame.empty else frame[TIME].iloc[-1]
     return frame, float(stopped)
-
-
-def _expected(case, time):
-    """Return whether a trip at a time (s) follows from the fault of a Case, not from the controller."""
-    fault = case.fault
-    return fault is not None and fault.ends_operation and time >= fault.time - 1e-9
 
 
 TRIPS = {  # reason of each, with its limit
@@ -223,14 +197,6 @@ def _trip_reason(trip, time, case, turbine):
     return f"{trip.replace('_', ' ')} trip at {time:.1f} s: {TRIPS[trip].format(limit)}"
 
 
-def _degraded(run, turbine):
-    """Return {"sensors": SensorChain} of a case that degrades them, else {}."""
-    shift = run.case.shift
-    control_dt = run.options.get("control_dt", CONTROL_DT)
-    chain = None if shift is None else perturbed_sensors(shift, turbine, control_dt)
-    return {} if chain is None else {"sensors": chain}
-
-
 def run_controller(run, nominal):
     """Return the controller of a run for simulate, or that of a parked turbine.
 
@@ -239,7 +205,9 @@ def run_controller(run, nominal):
     """
     case = run.case
     if case.parked:
-        return idling(nominal.turbine) if nominal.wind_speed else None
+        # no generator torque, blades feathered, rotor free to turn
+        feather = nominal.turbine.pitch_drive.maximum
+        return Constant(torque=0.0, blade_pitch=feather, name=PARKED) if nominal.wind_speed else None
     control_dt = run.options.get("control_dt", CONTROL_DT)
     try:
         return make(run.controller, nominal.turbine, control_dt)

@@ -16,20 +16,16 @@ from dataclasses import dataclass
 from math import ceil
 
 from fowt_env.descriptions.checks import is_number
-from fowt_env.descriptions.platform import Platform, read_platform
+from fowt_env.descriptions.platform import turbine_of
 from fowt_env.descriptions.sea_state import joint_tables
 from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.errors import InputError
 
-BY_POWER = ("GenPwr", "energy")  # prefixes of metrics that scale with the quantity
-BY_TORQUE = ("GenTq", "torque_travel", "RotTorq")
-BY_SPEED = ("RotSpeed",)
-
-
-def turbine_of(platform):
-    """Return the turbine of a platform: a name, a path or a descriptions.platform.Platform."""
-    found = platform if isinstance(platform, Platform) else read_platform(platform)
-    return read_turbine(found.turbine)
+FIGURES = {  # prefixes of metrics, and the figure of a turbine that they are scaled by
+    ("GenPwr", "energy"): lambda t: t.torque_law.rated_power * t.drivetrain.generator_efficiency,
+    ("GenTq", "torque_travel", "RotTorq"): lambda t: t.torque_law.rated_torque,
+    ("RotSpeed",): lambda t: t.rated_rotor_speed,
+}
 
 
 @dataclass(frozen=True)
@@ -68,29 +64,24 @@ class Scaling:
 
     def limit(self, metric, value):
         """Return the scaled limit of a metric."""
-        if "[%]" in metric:
-            return value
-        for names, figure in ((BY_POWER, _power), (BY_TORQUE, _torque), (BY_SPEED, _speed)):
-            if metric.startswith(names):
+        for names, figure in FIGURES.items():
+            if metric.startswith(names) and "[%]" not in metric:
                 return value * (figure(self.new) / figure(self.old))
         return value
 
-    def sea(self, spec):
-        """Return the sea of a case; the row of a table is that of the scaled wind, within the table."""
-        if not isinstance(spec, dict) or "table" not in spec or "speed" not in spec:
-            return spec
-        return spec | {"speed": within_table(spec["table"], self.wind(spec["speed"]))}
-
     def entry(self, entry):
         """Return the scaled CaseEntry of a case."""
-        changes = {"sea": self.sea(entry.sea)}
+        changes = {}
+        if isinstance(entry.sea, dict) and {"table", "speed"} <= set(entry.sea):
+            speed = within_table(entry.sea["table"], self.wind(entry.sea["speed"]))
+            changes["sea"] = entry.sea | {"speed": speed}
         if entry.speed is not None:
             changes["speed"] = tuple(dict.fromkeys(map(self.wind, entry.speed)))
         if is_number(entry.wind):
             changes["wind"] = self.wind(entry.wind)
-        elif isinstance(entry.wind, dict) and is_number(entry.wind.get("speed")):
-            changes["wind"] = entry.wind | {"speed": self.wind(entry.wind["speed"])}
-            before, after = entry.wind["speed"], changes["wind"]["speed"]
+        elif isinstance(entry.wind, dict) and is_number(before := entry.wind.get("speed")):
+            after = self.wind(before)
+            changes["wind"] = entry.wind | {"speed": after}
             # a name that ends with its wind speed
             changes["name"] = re.sub(rf"_{before:g}$", f"_{after:g}".replace(".", "_"), entry.name)
         if entry.initial is not None:
@@ -104,18 +95,6 @@ def within_table(table, speed):
     """Return the wind speed (m/s), limited to a table of joint sea states."""
     winds = joint_tables()[table].wind if table in joint_tables() else (speed,)
     return float(min(max(speed, winds[0]), winds[-1]))
-
-
-def _power(turbine):
-    return turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
-
-
-def _torque(turbine):
-    return turbine.torque_law.rated_torque
-
-
-def _speed(turbine):
-    return turbine.rated_rotor_speed
 
 
 def scaled_file(file, platform):

@@ -62,19 +62,19 @@ def with_drawn_seeds(suite, source):
     """
     most = max(len(seeds) for seeds in (suite.seeds, *(case.seeds or () for case in suite.cases)))
     drawn = drawn_seeds(source, suite.name, suite.version, most)
-    cases = (
-        case if case.seeds is None else replace(case, seeds=drawn[: len(case.seeds)]) for case in suite.cases
-    )
     about = {"hash": str(source).lower(), "rule": DRAWING_RULE}
-    return replace(suite, seeds=drawn[: len(suite.seeds)], cases=tuple(cases), drawn=about)
+    return replace(reseeded(suite, drawn), seeds=drawn[: len(suite.seeds)], drawn=about)
+
+
+def reseeded(suite, seeds):
+    """Return the Suite with other seeds, of which a case with seeds of its own gets as many as it has."""
+    cases = (replace(case, seeds=case.seeds and seeds[: len(case.seeds)]) for case in suite.cases)
+    return replace(suite, seeds=seeds, cases=tuple(cases))
 
 
 def new_secret_seeds(count):
     """Return count different seeds of DRAWN from the system's source of randomness."""
-    found = set()
-    while len(found) < count:
-        found.add(DRAWN.start + secrets.randbelow(len(DRAWN)))
-    return tuple(found)
+    return tuple(secrets.SystemRandom().sample(DRAWN, count))
 
 
 def ranges(seeds):

@@ -6,8 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from fowt_env.descriptions.platform import Platform, read_platform
-from fowt_env.descriptions.turbine import Turbine, read_turbine
+from fowt_env.descriptions.platform import Platform, read_platform, turbine_of
 from fowt_env.files.atomic import replacing
 from fowt_env.folders import cache_root, distrust, make_private
 from fowt_env.weather.wind_field import WindBox, read_box
@@ -22,8 +21,7 @@ def cached_box(spec, platform, seed, options):
     Only generated boxes (kind "mann") are cached; files and arrays are read directly.
     """
     description = platform if isinstance(platform, Platform) else read_platform(platform)
-    turbine = options.get("turbine") or description.turbine
-    rotor = (turbine if isinstance(turbine, Turbine) else read_turbine(turbine)).rotor
+    rotor = turbine_of(description, options.get("turbine")).rotor
     shear = options.get("shear_exponent")
     arguments = {
         "hub_height": rotor.hub_height,
@@ -34,19 +32,16 @@ def cached_box(spec, platform, seed, options):
     }
     if isinstance(spec, WindBox) or spec["kind"] != "mann":
         return read_box(spec, **arguments)
-    text = json.dumps([FORMAT, spec, arguments], sort_keys=True)
-    name = hashlib.sha256(text.encode()).hexdigest()[:24]
     folder = _folder()
     if folder is None:
         return read_box(spec, **arguments)
+    text = json.dumps([FORMAT, spec, arguments], sort_keys=True)
+    name = hashlib.sha256(text.encode()).hexdigest()[:24]
     path = folder / f"{name}.npz"
-    if path.exists():
-        try:
-            with path.open("rb") as content, np.load(content, allow_pickle=False) as file:
-                values = {key: file[key] for key in ARRAYS}
-                return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
-        except Exception:  # a broken file can raise anything: the box is generated again
-            pass
+    # a broken file can raise anything: the box is then generated again
+    with suppress(Exception), path.open("rb") as content, np.load(content, allow_pickle=False) as file:
+        values = {key: file[key] for key in ARRAYS}
+        return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
     box = read_box(spec, **arguments)
     with suppress(OSError), replacing(path) as temporary:  # e.g. no space on the disk
         np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})
@@ -56,11 +51,8 @@ def cached_box(spec, platform, seed, options):
 def _folder():
     """Return the folder of the boxes, beside that of the kernels; None if the user has no private one."""
     root = cache_root()
-    if root is None:
-        return None
-    folder = root / "wind_boxes"
-    try:
-        make_private(folder)
-        return None if distrust(folder) else folder
-    except OSError:
-        return None
+    if root is not None:
+        with suppress(OSError):
+            make_private(root / "wind_boxes")
+            return None if distrust(root / "wind_boxes") else root / "wind_boxes"
+    return None

@@ -2,7 +2,7 @@
 
 import json
 
-from fowt_env.descriptions.platform import Platform, read_platform
+from fowt_env.descriptions.platform import Platform, read_platform, turbine_of
 from fowt_env.descriptions.ratings import ratings
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import holm
@@ -11,7 +11,6 @@ from fowt_env.training.evaluation.failures import KINDS, lost_text
 from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
 from fowt_env.training.evaluation.results import file_name, run_file
 from fowt_env.training.evaluation.run_case import OK, REFERENCE
-from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.reports.evaluation_plots import plot_evaluation, plot_pareto
 from fowt_env.training.reports.metric_words import counted, seeds_text
 from fowt_env.visual.response import BOXES, plot_boxes

@@ -32,13 +32,13 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.descriptions.checks import check_whole_number
+from fowt_env.descriptions.platform import turbine_of
 from fowt_env.descriptions.sea_state import joint_sea_state
 from fowt_env.envs.decisions import DecisionSettings
 from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import process_lives, remove_leftovers, replacing
 from fowt_env.training.evaluation.locks import locked
-from fowt_env.training.evaluation.scaling import turbine_of
 from fowt_env.training.evaluation.seeds import TRAINING, seeds_for
 from fowt_env.training.rl.checkpoint_signature import is_own, seal
 from fowt_env.training.rl.settings import (

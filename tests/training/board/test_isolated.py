@@ -17,8 +17,7 @@ import pytest
 
 import fowt_env
 from fowt_env.errors import ControllerError, InputError
-from fowt_env.training.board.files import digest_of
-from fowt_env.training.board.isolated import IsolatedFactory, ProcessLimits, warmed_up
+from fowt_env.training.board.isolated import IsolatedFactory, ProcessLimits, digest_of, warmed_up
 
 SOUND = """
 class Mine:
@@ -38,6 +37,7 @@ LINE, RESET = "error = measurement.generator_speed - self.rated", "self.integral
 
 
 def factory(folder, source, information=("generator_speed", "blade_pitch"), within=(), **limits):
+    folder.mkdir(exist_ok=True)
     (folder / "mine.py").write_text(source)
     limits = ProcessLimits(**{"call": 2.0, **limits})  # a machine that is busy answers late
     return IsolatedFactory(str(folder), "mine.py", "Mine", "mine", information, (), limits, within=within)
@@ -106,7 +106,6 @@ def test_a_process_starts_anew_for_each_run_and_leaves_nothing(tmp_path, tempora
     source = SOUND.replace(RESET, f"{RESET}; {left}        assert not any(map(os.path.exists, left))\n"
                            "        for path in left: open(path, 'w').close()")  # fmt: skip
     submission = tmp_path / "submission"
-    submission.mkdir()
     made = factory(submission, source)
     run(made, 2.0)
     run(made, 2.0)
@@ -123,7 +122,6 @@ def test_kernels_come_from_a_run_without_weather_and_are_those_of_each_run(tmp_p
         open(path, "a").write("x")
         assert count == self.expected""")  # fmt: skip
     submission = tmp_path / "submission"
-    submission.mkdir()
     quiet = fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="reference")
     made = warmed_up(factory(submission, source.replace("self.expected", "0")), lambda: [quiet], "a")
     kept = Path(made.kernels)
@@ -147,7 +145,6 @@ def test_kernels_may_take_long_to_compile_in_the_first_call_of_act(tmp_path, mon
         {LINE}""",
     )
     submission = tmp_path / "submission"
-    submission.mkdir()
     made = factory(submission, source, call=2.0)
     with pytest.raises(ControllerError, match="took longer than 2 s"):
         run(made, 1.0)
@@ -267,7 +264,6 @@ def test_a_process_is_started_by_the_command_of_a_container(tmp_path):
     script.write_text('#!/bin/sh\necho "$1" > "$(dirname "$0")/told"\nshift\nexec "$@"\n')
     script.chmod(0o700)
     submission = tmp_path / "submission"
-    submission.mkdir()
     run(factory(submission, SOUND, within=(str(script), "in {folder}")), 1.0)
     assert (tmp_path / "told").read_text().startswith("in /") and "fowt-sub" in (
         tmp_path / "told"
@@ -304,7 +300,6 @@ def test_the_described_container_hides_files_processes_and_the_network(tmp_path)
     secret = tmp_path / "seeds.txt"
     secret.write_text("4611686018427387905")
     submission = tmp_path / "submission"
-    submission.mkdir()
     probe = f"""
         import os, socket
         numbers = [name for name in os.listdir("/proc") if name.isdigit()]

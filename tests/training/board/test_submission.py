@@ -8,8 +8,8 @@ import pytest
 
 from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.errors import InputError
-from fowt_env.training.board.files import LARGEST_FOLDER, digest_of
 from fowt_env.training.board.folder import Board, new_board, read_seeds, write_secret_seeds
+from fowt_env.training.board.isolated import LARGEST_FOLDER, digest_of
 from fowt_env.training.board.submission import read_submission
 
 CARD = {
@@ -52,13 +52,9 @@ def test_a_sound_card_is_read_and_nothing_is_run(tmp_path):
         ({"information": None}, "information is missing"),
         ({"information": ["wind"]}, "unknown input 'wind'"),
         ({"information": ["wind_preview"]}, "preview_times = ..: must be set if and only if"),
-        ({"preview_times": [2.0]}, "must be set if and only if"),
         ({"information": ["wind_preview"], "preview_times": [2.0, 1.0]}, "must rise"),
-        ({"information": ["wind_preview"], "preview_times": [-1.0]}, "preview_times"),
-        ({"colour": "red"}, "colour"),
         ({"name": "parked"}, "name = 'parked': is reserved"),
         ({"preview": "../../../../escaped"}, "unknown preview '../../../../escaped'"),
-        ({"preview": "nonsense"}, "unknown preview 'nonsense'"),
         (FAR | {"preview_times": [0.5 * i for i in range(1, 102)]}, "at most 100 times of at most 60 s"),
         (FAR | {"preview_times": [60.5]}, "at most 100 times of at most 60 s"),
         ({"description": "x" * 2001}, "description: has more than 2000"),

@@ -1,10 +1,7 @@
 """Engines: the same outcomes wherever the tasks run, and a dead worker costs a retry."""
 
 import os
-import signal
 import sys
-import threading
-import time
 from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
@@ -58,16 +55,14 @@ def test_every_engine_refuses_what_it_cannot_do():
     assert list(outcomes(square, [], jobs=3)) == []
 
 
-def test_ray_that_is_not_installed_is_named_with_its_extra(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "ray", None)
-    with pytest.raises(InputError, match=r"fowt-env\[ray\]"):
-        list(outcomes(square, [1], engine="ray"))
-
-
 @pytest.mark.slow
-def test_a_killed_worker_process_costs_its_task_a_retry(tmp_path):
+@pytest.mark.parametrize("engine", ["processes", "ray"])
+def test_a_killed_worker_process_costs_its_task_a_retry(tmp_path, engine):
+    if engine == "ray":
+        pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
     names = [str(tmp_path / name) for name in ("a", "b.dies", "c", "d.dies", "e")]
-    assert dict(outcomes(dies_once, names, jobs=2)) == dict(enumerate(["a", "b.dies", "c", "d.dies", "e"]))
+    expected = dict(enumerate(["a", "b.dies", "c", "d.dies", "e"]))
+    assert dict(outcomes(dies_once, names, jobs=2, engine=engine)) == expected
 
 
 @pytest.mark.slow
@@ -78,20 +73,7 @@ def test_a_task_on_which_workers_always_die_is_given_up_alone_and_with_its_exit_
     assert found == {0: (1, "exit code 9"), 1: 4, 2: (3, "exit code 9"), 3: 16}
 
 
-@pytest.mark.slow
-def test_rosco_in_worker_processes_gives_the_bits_of_one_process():
-    pytest.importorskip("rosco", reason="needs the ROSCO library: pip install --no-deps rosco")
-    serial = evaluate("rosco,rosco_float", [GUSTY], seeds=(3, 4), **SHORT)
-    spread = evaluate("rosco,rosco_float", [GUSTY], seeds=(3, 4), jobs=2, **SHORT)
-    assert (serial["status"] == "ok").all()
-    pd.testing.assert_frame_equal(serial, spread, check_exact=True)
-
-
 # ------------------------------------------------------------------ Ray
-
-
-def niceness(task):
-    return os.nice(0)
 
 
 @pytest.mark.parametrize(
@@ -112,19 +94,6 @@ def test_a_ray_that_does_not_start_is_one_line_with_its_reason(address, what, mo
     assert "timed out during startup. This could" in message and "engine 'processes'" in message
     assert "\n" not in message and len(message) < 400 and ended == [1]
     assert caught.value.__suppress_context__
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("asked", "more"), [(None, 0), ("3", 3)])
-def test_workers_of_a_ray_of_ours_are_as_nice_as_this_process_unless_ray_is_told_otherwise(
-    asked, more, monkeypatch
-):
-    pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
-    monkeypatch.delenv("RAY_worker_niceness", raising=False)
-    if asked is not None:
-        monkeypatch.setenv("RAY_worker_niceness", asked)
-    found = dict(outcomes(niceness, [1], engine="ray"))
-    assert found == {0: min(19, os.nice(0) + more)}
 
 
 @pytest.fixture(scope="module")
@@ -156,43 +125,3 @@ def test_ray_takes_controllers_of_every_kind(cluster, turbine):
     table = evaluate(laws, [CALM], engine="ray", jobs=2, **SHORT).set_index("controller")
     assert table["reason"].tolist() == [""] * len(laws)
     assert table.loc["compiled", "BldPitch1_mean_[deg]"] == table.loc["name", "BldPitch1_mean_[deg]"]
-
-
-class Slow:
-    """Holds still, with a pause in every tenth command; says in a file which process it runs in."""
-
-    def __init__(self, mark):
-        self.mark = mark
-
-    def reset(self, measurement):
-        self.command, self.calls = (measurement.generator_torque, measurement.blade_pitch), 0
-        if not self.mark.exists():
-            self.mark.write_text(str(os.getpid()))
-
-    def act(self, measurement):
-        self.calls += 1
-        if self.calls % 10 == 0:
-            time.sleep(0.1)
-        return self.command
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-def test_an_evaluation_whose_ray_worker_is_killed_has_the_bits_of_one_that_was_not(cluster, tmp_path):
-    mark = tmp_path / "process"
-
-    def kill_at_work():
-        deadline = time.monotonic() + 120.0
-        while time.monotonic() < deadline and not (mark.exists() and mark.read_text()):
-            time.sleep(0.02)
-        time.sleep(0.3)
-        os.kill(int(mark.read_text()), signal.SIGKILL)
-
-    hunter = threading.Thread(target=kill_at_work)
-    hunter.start()
-    options = {"seeds": (1, 2), **SHORT}
-    table = evaluate({"slow": Slow(mark)}, [CALM], folder=tmp_path / "out", engine="ray", jobs=2, **options)
-    hunter.join()
-    assert not Path(f"/proc/{mark.read_text()}").exists() and (table["status"] == "ok").all()
-    whole = evaluate({"slow": Slow(mark)}, [CALM], **options)
-    pd.testing.assert_frame_equal(table, whole, check_exact=True)

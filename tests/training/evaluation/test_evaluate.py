@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.descriptions.faults import Fault
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError, PlantWarning
 from fowt_env.training.evaluation.cases import (
@@ -16,7 +17,6 @@ from fowt_env.training.evaluation.cases import (
     read_suite,
 )
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate, mean_ratios, summary
-from fowt_env.training.evaluation.faults import Fault
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
 
@@ -46,13 +46,6 @@ class Runaway(Frozen):
         return 0.0, 0.0
 
 
-class HeldByTorque(Frozen):
-    """Holds the rotor speed by torque alone, as no generator of this size could."""
-
-    def act(self, measurement):
-        return 43093.0 + 3000.0 * (measurement.generator_speed - 122.9), self.command[1]
-
-
 class Broken(Frozen):
     """Returns NaN after ten seconds."""
 
@@ -71,23 +64,10 @@ class Unusable(Frozen):
     """Raises an InputError when prepared, reset or asked, as one does whose library is missing."""
 
     def __init__(self, moment):
-        self.moment = moment
-
-    def prepare(self, scene):
-        self.fail_in("prepare")
-
-    def reset(self, measurement):
-        self.fail_in("reset")
-        super().reset(measurement)
-
-    def act(self, measurement):
-        if measurement.time > 5.0:
-            self.fail_in("act")
-        return self.command
-
-    def fail_in(self, moment):
-        if moment == self.moment:
+        def fail(given):
             raise InputError(f"no library in {moment}")
+
+        setattr(self, moment, fail)
 
 
 class Degrees(Frozen):
@@ -132,21 +112,6 @@ def test_a_rotor_beyond_the_trip_is_no_good_run_and_says_when_and_why():
     later = evaluate({"runaway": Runaway()}, [replace(CALM, trip=1.6)], **options).iloc[0]
     assert later["stopped_[s]"] > row["stopped_[s]"]
     assert evaluate("pi", [CALM], **options).iloc[0]["status"] == "ok"
-
-
-def test_a_controller_that_wants_more_than_the_generator_can_give_is_seen_to():
-    table = evaluate({"held": HeldByTorque(), "pi": "pi"}, [GUSTY], **SHORT).set_index("controller")
-    assert table.loc["held", "GenPwr_max_[kW]"] < 7000.0  # 47.4 kN m at 15.7 rpm
-    assert table.loc["held", "torque_limited_[s]"] > 1.0 and table.loc["pi", "torque_limited_[s]"] == 0.0
-
-
-def test_a_function_of_the_measurement_is_compared_like_any_controller():
-    def held(measurement):
-        return 43093.0, 0.26
-
-    rows = evaluate([held, "pi"], [CALM], **SHORT).set_index("controller")
-    assert rows.loc["held", "status"] == rows.loc["pi", "status"] == "ok"
-    assert rows.loc["held", "BldPitch1_std_[deg]"] < 1e-9 < rows.loc["pi", "BldPitch1_std_[deg]"]
 
 
 def test_a_failing_run_is_a_row_with_its_reason_and_the_others_go_on():
@@ -280,6 +245,7 @@ def test_named_suites_hold_their_cases_once():
         ({"cases": [CALM, CALM]}, "differ"),
         ({"jobs": 0}, "jobs = 0"),
         ({"duration": 10.0, "skip": 10.0}, "skip = 10"),
+        ({"cases": [Case("late", 16.0, fault=Fault(kind="grid_loss", time=100.0))]}, "comes at 100 s"),
         ({"out": "table.xlsx"}, "csv"),
         ({"dt": 0.03}, "dt = 0.03"),
         ({"cases": [Case("squall", {"kind": "squall", "speed": 12.0})]}, "squall"),

@@ -5,11 +5,9 @@ import pytest
 
 import fowt_env
 from fowt_env.controllers import make
-from fowt_env.errors import InputError
-from fowt_env.plant.measurement import Measurement
-from fowt_env.training.evaluation.cases import Case, read_suite
+from fowt_env.descriptions.faults import Fault
+from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.evaluate import evaluate
-from fowt_env.training.evaluation.faults import Fault, idling
 from fowt_env.training.evaluation.leaderboard import leaderboard
 
 SHORT = {"duration": 60.0, "skip": 5.0}
@@ -31,19 +29,6 @@ def test_a_parked_turbine_idles_and_is_run_once_for_all_controllers():
     storm = table.iloc[0]
     assert storm["status"] == "ok" and storm["BldPitch1_min_[deg]"] == pytest.approx(90.0)
     assert storm["GenPwr_max_[kW]"] == 0.0 and abs(storm["RotSpeed_mean_[rpm]"]) < 2.0
-
-
-def test_a_fault_after_the_end_of_the_run_is_refused():
-    case = Case("late", 16.0, fault=Fault(kind="grid_loss", time=100.0))
-    with pytest.raises(InputError, match="comes at 100 s"):
-        evaluate("pi", [case], duration=50.0, skip=5.0)
-
-
-def test_the_idling_controller_feathers_without_torque(turbine):
-    controller = idling(turbine)
-    measured = Measurement(**dict.fromkeys(Measurement._fields, 0.0))
-    controller.reset(measured)
-    assert controller.act(measured) == (0.0, turbine.pitch_drive.maximum)
 
 
 def test_a_stop_has_the_time_to_standstill_of_its_rows():
@@ -97,11 +82,3 @@ def test_the_reason_names_the_trip_and_its_limit():
         row["reason"]
         == f"pitch deviation trip at {at:.1f} s: a blade pitch off its command by more than 4 deg"
     )
-
-
-def test_the_cases_of_the_suite_name_their_sources_and_keep_their_protection():
-    suite = read_suite("faults")
-    assert all(case.source.startswith("DLC ") and case.protection == "turbine" for case in suite.cases)
-    assert {case.trip for case in suite.cases} == {None}
-    kinds = {case.fault.kind for case in suite.cases if case.fault is not None}
-    assert {"grid_loss", "normal_stop", "emergency_stop", "sensor_bias"} <= kinds

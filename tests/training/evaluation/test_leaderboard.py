@@ -5,7 +5,6 @@ import pandas as pd
 import pytest
 
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation.bootstrap import case_means, interval, resample_weights
 from fowt_env.training.evaluation.cases import Limits, Score, ScoreTerm
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.failures import PENALTY
@@ -81,26 +80,6 @@ def test_paired_differences_are_sharper_than_the_means_they_come_from():
     assert own["mean"] == own["low"] == own["high"] == 0.0
 
 
-def covered(values, truth, positive):
-    """Shares of the columns of values (seeds, trials) whose interval holds the truth, is above, below it."""
-    seeds = len(values)
-    resampled = case_means(values, resample_weights(seeds, 1000))
-    low, high = interval(values.mean(axis=0), resampled, seeds, positive)
-    assert not positive or (low > 0.0).all()
-    return np.mean((low <= truth) & (high >= truth)), np.mean(low > truth), np.mean(high < truth)
-
-
-@pytest.mark.parametrize("seeds", [4, 6, 20])
-def test_intervals_cover_the_truth_about_as_often_as_they_say(seeds):
-    normal = np.random.default_rng(seeds).normal(size=(seeds, 2000))
-    share, above, below = covered(normal, 0.0, False)
-    assert 0.92 <= share <= 0.97 and abs(above - below) < 0.015  # either side as often
-    # deviations of seeds scatter by 5 to 15 %; 30 % is more than any published one
-    for spread in (0.1, 0.3):
-        lognormal = np.exp(spread * normal)
-        assert 0.92 <= covered(lognormal, np.exp(0.5 * spread**2), True)[0] <= 0.97
-
-
 def test_fewer_than_four_seeds_have_no_interval_and_no_verdict():
     for seeds, there in ((1, False), (2, False), (3, False), (4, True)):
         runs = table(noisy({"pi": 0.0, "x": 0.5}, 2, range(seeds)), "pi")
@@ -133,12 +112,6 @@ def test_whatever_is_not_ok_counts_as_failed():
     frame.loc[1, "status"] = "timeout"
     found = entry(leaderboard(frame), "pi")
     assert found["failed"] == 1 and found["metrics"][TRAVEL]["mean"] == 1.0  # of those that went well
-
-
-def test_a_count_that_is_mostly_zero_has_an_interval_from_zero_on():
-    figures = {("pi", "a", seed): value for seed, value in enumerate([0.0, 0.0, 0.0, 5.0])}
-    found = entry(leaderboard(table(figures)), "pi")["metrics"]["rotor_speed_violations_[-]"]
-    assert found["low"] == 0.0 and found["high"] > 1.25
 
 
 def test_the_range_over_the_seeds_is_that_of_the_means_over_all_cases():
@@ -195,18 +168,6 @@ def test_the_baseline_is_gspi_oc3_then_pi_then_the_first_that_did_not_fail_unles
     assert base(["x"], baseline="x") == "x"
     with pytest.raises(InputError, match="'pi'"):
         base([], ["x", "pi"], baseline="pie")
-
-
-def test_the_same_table_gives_the_same_intervals():
-    figures = noisy({"pi": 0.0, "x": 0.5}, 2, range(4))
-    assert leaderboard(table(figures)) == leaderboard(table(figures))
-
-
-def test_resamples_without_a_value_are_left_out():
-    values = np.array([[1.0], [np.nan], [3.0]])
-    means = case_means(values, np.array([[1.0, 1.0, 1.0], [0.0, 3.0, 0.0], [3.0, 0.0, 0.0]]))
-    assert means[0, 0] == 2.0 and np.isnan(means[1, 0]) and means[2, 0] == 1.0
-    assert resample_weights(3, 100).sum(axis=1).tolist() == [3.0] * 100
 
 
 def scored(x, power=None):

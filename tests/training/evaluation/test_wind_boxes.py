@@ -1,6 +1,5 @@
 """Boxes of wind that are kept: made once, and again where their file is broken."""
 
-import os
 
 import numpy as np
 import pytest
@@ -62,22 +61,3 @@ def test_without_a_folder_of_ones_own_boxes_are_made_each_time(given, made, tmp_
     box(), box()
     assert len(made) == 2
     assert not list(tmp_path.rglob("*.npz"))
-
-
-def test_a_box_for_which_there_is_no_space_is_used_all_the_same(made, tmp_path, monkeypatch):
-    def full(file, **arrays):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(wind_boxes.np, "savez", full)
-    np.testing.assert_array_equal(box().velocity, made[0].velocity)
-    assert not list((tmp_path / "wind_boxes").iterdir())
-
-
-def test_the_folder_of_boxes_is_private_whatever_the_umask(made, tmp_path, monkeypatch):
-    monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "new"))
-    before = os.umask(0)
-    try:
-        box()
-    finally:
-        os.umask(before)
-    assert (tmp_path / "new" / "wind_boxes").stat().st_mode & 0o777 == 0o700
