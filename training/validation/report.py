@@ -56,30 +56,19 @@ PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra ar
 }
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
-    "costs_rotor": (
-        "rotor models, 18 m/s uniform turbulence and Hs 7.5 m",
-        {
-            "BEM": "uniform wind, no skewed wake",
-            "table": "uniform wind, rotor table",
-            "BEM, skewed wake, dynamic inflow": "uniform wind, dynamic inflow",
-        },
-    ),
-    "costs_wind": (
-        "wind over the rotor, 18 m/s turbulence and Hs 7.5 m",
-        {
-            "full field": "full-field wind",
-            "rotor-averaged": "rotor-averaged wind",
-            "hub wind blown uniformly": "uniform wind",
-        },
-    ),
-    "costs_waves": (
-        "wave kinematics, 18 m/s uniform turbulence and Hs 7.5 m",
-        {
-            "instantaneous, Wheeler": "uniform wind, instantaneous wave kinematics",
-            "fixed, still water": "uniform wind",
-        },
-    ),
-}
+    "costs_rotor": ("rotor models, 18 m/s uniform turbulence and Hs 7.5 m", {
+        "BEM": "uniform wind, no skewed wake", "table": "uniform wind, rotor table",
+        "BEM, skewed wake, dynamic inflow": "uniform wind, dynamic inflow",
+    }),
+    "costs_wind": ("wind over the rotor, 18 m/s turbulence and Hs 7.5 m", {
+        "full field": "full-field wind", "rotor-averaged": "rotor-averaged wind",
+        "hub wind blown uniformly": "uniform wind",
+    }),
+    "costs_waves": ("wave kinematics, 18 m/s uniform turbulence and Hs 7.5 m", {
+        "instantaneous, Wheeler": "uniform wind, instantaneous wave kinematics",
+        "fixed, still water": "uniform wind",
+    }),
+}  # fmt: skip
 
 
 def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=False):

@@ -10,10 +10,7 @@ import series_figures as figures
 from fowt_env.training.validation import linear_cases
 from fowt_env.training.validation.openfast_cases import FOLDER, ReferenceRun, without_rosco
 from fowt_env.training.validation.validate import validate_cases
-from fowt_env.training.validation.volturnus import (
-    PLATFORM,
-    _structural_flap,
-)
+from fowt_env.training.validation.volturnus import PLATFORM, _structural_flap
 
 REFERENCES = FOLDER / PLATFORM
 # group, part of the case, part of the quantity, what is allowed (%, None: nothing is); the first that fits
