@@ -108,9 +108,8 @@ class Study:
     def series(self, case, channel, start=None, end=np.inf):
         """Return (name, unit, times, OpenFAST's series, this project's) of a channel of a case, as pair."""
         ours, theirs = self.pair(case, start, end)
-        return *name_and_unit(channel), *(
-            x.to_numpy() for x in (theirs[TIME], theirs[channel], ours[channel])
-        )
+        arrays = (x.to_numpy() for x in (theirs[TIME], theirs[channel], ours[channel]))
+        return *name_and_unit(channel), *arrays
 
     def add_statistics(
         self, case, channels, kinds=tuple(STATISTICS), start=SETTLED, *, pair=None, words="", note="",
