@@ -43,13 +43,16 @@ def _shown(figure_class):
     return NotebookFigure
 
 
-def style_axes(axes):
-    """Set a light grid, no box and grey ticks."""
+def style_axes(axes, xlabel=None, ylabel=None, title=None):
+    """Set a light grid, no box, grey ticks, and the texts that are given."""
     axes.grid(True, color=FAINT, linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(INK)
     axes.tick_params(colors=INK, labelsize=8)
+    for write, text in ((axes.set_xlabel, xlabel), (axes.set_ylabel, ylabel), (axes.set_title, title)):
+        if text is not None:
+            write(text, fontsize=9, color=INK)
 
 
 def line_style(number):

@@ -1,7 +1,6 @@
 """How long a session's scenes take to compile: six kinds one after the other, with an empty cache of kernels.
 
-The session runs in a process of its own and uses public names alone, so that another version of this project
-can be timed by `python compile_time.py` in its environment.
+The session uses public names alone, so that `python compile_time.py` times another version of this project.
 """
 
 import os
@@ -63,20 +62,20 @@ def session(code=SESSION, folder=None, progress=None):
     if folder is None:
         with tempfile.TemporaryDirectory() as empty:
             return session(code, empty, progress)
-    rows = []
     process = subprocess.Popen(
         [sys.executable, "-W", "ignore", "-c", REPORT + code], env={**os.environ, "FOWT_CACHE_DIR": folder},
         cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
+    rows = []
     for line in process.stdout:
-        name, seconds, processor = line.split("|")
-        rows.append((name, float(seconds), float(processor)))
+        rows.append(line.strip().split("|"))
         if progress is not None:
-            progress(name, len(rows), len(NAMES))
+            progress(rows[-1][0], len(rows), len(NAMES))
     errors = process.communicate()[1]
     if process.returncode != 0:
         raise InputError(f"the session in a new process failed: {errors[-600:]}")
-    return pd.DataFrame(rows, columns=["scene", "seconds", "processor_seconds"])
+    types = {"seconds": float, "processor_seconds": float}
+    return pd.DataFrame(rows, columns=["scene", *types]).astype(types)
 
 
 if __name__ == "__main__":

@@ -2,7 +2,8 @@
 
 import time
 from collections import Counter
-from itertools import count
+from functools import partial
+from itertools import cycle
 
 import numba
 import numpy as np
@@ -21,10 +22,7 @@ ROUND = 1e-3  # s
 
 
 def timed(action, seconds):
-    """Return the time of a call (s) in the fastest of many rounds of ROUND seconds, within some seconds.
-
-    Rounds as short as that fall between the turns of other programs even on a busy machine.
-    """
+    """Return the time of a call (s), fastest of short rounds, which fall between turns of others."""
     action()
     begin = time.perf_counter()
     action()
@@ -48,12 +46,11 @@ def multiply_adds_side_by_side(parts, n, results):
 
 def ceiling(threads, seconds):
     """Return the work of so many threads over that of one in the same time, where nothing is shared."""
-    n, results = 300_000, np.zeros(threads)
-    with thread_limit(1):
-        one = timed(lambda: multiply_adds_side_by_side(1, n, results), seconds)
-    with thread_limit(threads):
-        many = timed(lambda: multiply_adds_side_by_side(threads, n, results), seconds)
-    return threads * one / many
+    results, times = np.zeros(threads), []
+    for number in (1, threads):
+        with thread_limit(number):
+            times.append(timed(partial(multiply_adds_side_by_side, number, 300_000, results), seconds))
+    return threads * times[0] / times[1]
 
 
 def arrays_of(part):
@@ -75,17 +72,15 @@ def own_bytes(envs):
 def single_costs(env, seconds):
     """Return {step_us, physics_us, overhead_us, get_state_us, set_state_us, reset_ms} of one environment.
 
-    The physics are those of the compiled call for a batch of 16 such environments, over 16; the overhead is
-    the rest of a step. The resets draw new wind, sea and offsets, with all trims known.
+    physics: the compiled call for a batch of 16, over 16; overhead: the rest of a step; resets draw new
+    weather and offsets, with all trims known.
     """
     few = 16
     batch = FowtVectorEnv(few, threads=1, **env)
     batch.reset(seed=0)
-    actions = np.zeros((few, 2))
-    active = np.ones(few, dtype=bool)
     arguments = (
-        batch._handles, batch._baseline_law, batch._estimator_law, actions, active, batch._statuses,
-        batch._rewards,
+        batch._handles, batch._baseline_law, batch._estimator_law, np.zeros((few, 2)),
+        np.ones(few, dtype=bool), batch._statuses, batch._rewards,
     )  # fmt: skip
     physics = timed(lambda: act_all(*arguments), seconds) / few
     single = batch.envs[0].twin()
@@ -99,10 +94,10 @@ def single_costs(env, seconds):
             single.step(HOLD)
 
     step = timed(replay, seconds) / 100
-    seeds = count()
     for seed in range(60):  # the trims of the winds that are drawn, once per process
         single.reset(seed=seed)
-    reset = timed(lambda: single.reset(seed=next(seeds) % 60), seconds)
+    seeds = cycle(range(60))
+    reset = timed(lambda: single.reset(seed=next(seeds)), seconds)
     return {
         "step_us": step * 1e6, "physics_us": physics * 1e6, "overhead_us": (step - physics) * 1e6,
         "get_state_us": get * 1e6, "set_state_us": put * 1e6, "reset_ms": reset * 1e3,
@@ -110,10 +105,7 @@ def single_costs(env, seconds):
 
 
 def row_of(kind, n, threads, per_step, memory=np.nan, reset=np.nan, one=np.nan, most=np.nan):
-    """Return one row of the table from the time of a step of all n environments (s).
-
-    one: that time on one thread; most: ceiling of so many threads.
-    """
+    """Return one row from the time of a step of all n environments (s); one: on one thread, most: ceiling."""
     return {
         "kind": kind, "envs": n, "threads": threads, "env_steps_per_s": n / per_step,
         "us_per_env_step": per_step / n * 1e6, "times_one_thread": one / per_step, "ceiling": most,
@@ -130,29 +122,26 @@ def native_rows(settings, sizes, threads, seconds):
         batch.reset(seed=0)
         reset = (time.perf_counter() - begin) / n
         memory = own_bytes(batch.envs) / 1024.0 if n > 1 else np.nan
-        actions, one = np.zeros((n, 2)), np.nan
+        one = np.nan
         for number in sorted({min(number, n) for number in threads}):
             batch.threads = number
-            per_step = timed(lambda batch=batch, actions=actions: batch.step(actions), seconds)
+            per_step = timed(partial(batch.step, np.zeros((n, 2))), seconds)
             one = per_step if number == 1 else one
             most = ceiling(number, 0.2 * seconds)
             rows.append(row_of("FowtVectorEnv", n, number, per_step, memory, reset, one, most))
-        del batch
     return rows
 
 
 def gymnasium_rows(settings, n, seconds):
     """Return rows of Gymnasium's vector environments of n single ones."""
-    model = FowtEnv(**settings)
+    model, rows = FowtEnv(**settings), []
     model.reset(seed=0)
     model.step(HOLD)  # compiled before processes fork
-    rows = []
-    for kind in (AsyncVectorEnv, SyncVectorEnv):
+    for kind, threads in ((AsyncVectorEnv, "processes"), (SyncVectorEnv, 1)):
         envs = kind([model.twin] * n)
         envs.reset(seed=0)
-        actions = np.zeros((n, 2), dtype=np.float32)
-        per_step = timed(lambda envs=envs, actions=actions: envs.step(actions), seconds)
-        rows.append(row_of(kind.__name__, n, "processes" if kind is AsyncVectorEnv else 1, per_step))
+        per_step = timed(partial(envs.step, np.zeros((n, 2), dtype=np.float32)), seconds)
+        rows.append(row_of(kind.__name__, n, threads, per_step))
         envs.close()
     return rows
 
@@ -162,9 +151,8 @@ def benchmark_envs(
 ):
     """Return (table, single): a pandas table of env steps per second, and the costs of a single environment.
 
-    An env step is one control period (0.1 s) of the task above_rated in residual mode without residual:
-    turbulent wind, irregular sea, the PI, observation, reward and info included. seconds: per measurement.
-    The first reset of a size includes trims that are not known yet; single["reset_ms"] does not.
+    An env step is one control period (0.1 s) of the task above_rated in residual mode without residual.
+    seconds: per measurement. The first reset of a size includes trims that are not known yet.
     """
     settings = {"fidelity": fidelity, "action_mode": "residual"} | settings
     rows = gymnasium_rows(settings, gymnasium_envs, seconds)  # first: they fork, before threads are started

@@ -19,14 +19,11 @@ STAGES = ("whole run", "without its file", "reading its row")
 def evaluation_cost(count=21, suite="above_rated", controller="pi"):
     """Return a DataFrame (stage, ms per run, core seconds per 1,000 runs, MB per run) of one process.
 
-    count: runs that are timed, after one per case that compiles or loads the kernels. The times are CPU
-    times of this process, which other processes lengthen only by sharing caches and memory.
-    Raises: InputError for count < 1.
+    count: runs that are timed, after one per case that compiles. Raises: InputError for count < 1.
     """
     check_whole_number("count", count, 1)
     chosen = read_suite(suite)
-    seeds = range(1, 2 + count // len(chosen.cases))
-    spent = dict.fromkeys(STAGES, 0.0)
+    seeds, spent = range(1, 2 + count // len(chosen.cases)), dict.fromkeys(STAGES, 0.0)
 
     def timed(stage, call, argument):
         start = time.process_time()
@@ -45,16 +42,12 @@ def evaluation_cost(count=21, suite="above_rated", controller="pi"):
         for run in planned(controller, chosen, seeds=seeds)[:count]:
             timed("without its file", score, run)
     cost = [1e3 * spent[stage] / len(runs) for stage in STAGES]
-    sizes = [0.0 if stage == "without its file" else size for stage in STAGES]
-    columns = {"stage": STAGES, "ms per run": cost, "core seconds per 1,000 runs": cost, "MB per run": sizes}
-    return pd.DataFrame(columns)
+    columns = {"stage": STAGES, "ms per run": cost, "core seconds per 1,000 runs": cost}
+    return pd.DataFrame(columns | {"MB per run": [size, 0.0, size]})
 
 
 def ray_cost(count=200, controller="pi", suite="above_rated"):
-    """Return a DataFrame (what, ms per task) of a local Ray worker: tasks without a result, or with a file.
-
-    Wall time from one result to the next. Raises: InputError without Ray.
-    """
+    """Return a DataFrame (what, wall ms per task) of a local Ray worker. Raises: InputError without Ray."""
     chosen = read_suite(suite)
     with tempfile.TemporaryDirectory() as folder:
         _, content = score(planned(controller, chosen, seeds=(1,), runs_folder=folder)[0])

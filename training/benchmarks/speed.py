@@ -1,11 +1,12 @@
 """How fast a scene of each kind is stepped: end to end, by the kernel alone, and load by load.
 
-Times are CPU times of one thread, medians of several repeats, beside the time of a fixed calibration kernel
+Times are CPU times of one thread, medians of several repeats, beside that of a fixed calibration kernel
 measured in the same minute: figures of two machines compare through it.
 """
 
 import os
 import platform
+import re
 import subprocess
 import tempfile
 import time
@@ -73,28 +74,15 @@ class TimedScene:
     absent: str = ""  # what this kind leaves out of the compiled code
 
     @property
-    def begin(self):
-        """start of simulate: without lines no floating steady state withstands the wind."""
-        return "zero" if self.options.get("mooring", True) is False else "trim"
-
-    @property
     def controlled(self):
         return self.wind is not None and not self.parked
 
-    def scene(self, seed=1, duration=700.0, platform=PLATFORM):
+    def scene(self, platform=PLATFORM):
         """Return the scene of this kind, with its platform fixed where the kind says so."""
         wind = self.wind(platform) if callable(self.wind) else self.wind
-        options = {"fidelity": self.fidelity, "seed": seed, "duration": duration} | self.options
+        options = {"fidelity": self.fidelity, "seed": 1, "duration": 700.0} | self.options
         scene = build_scene(platform, wind=wind, sea=self.sea, **options)
         return scene.with_model({"rigid_body.platform_fixed": True}) if self.platform_fixed else scene
-
-    def start(self, scene):
-        """Return (state, command) at the start of runs of this kind."""
-        x, u = initial_state(scene, self.begin)
-        if self.parked:
-            x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
-            x[State.BLADE_PITCH] = u[Command.BLADE_PITCH] = scene.turbine.pitch_drive.maximum
-        return x, u
 
 
 def _box(platform):
@@ -107,27 +95,20 @@ def _box(platform):
 
 
 def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed=1):
-    """Return a box of wind for a Rotor: a sum of plane waves carried by the wind, for timing alone.
-
-    Only its deviation, that of class B, and its scales, those of gusts that the rotor slices, are realistic.
-    """
-    draw = np.random.default_rng(seed)
-    reach = 1.15 * rotor.tip_radius
+    """Return a box of wind for a Rotor, for timing alone: a sum of plane waves carried by the wind."""
+    draw, reach = np.random.default_rng(seed), 1.15 * rotor.tip_radius
     y = np.arange(-reach, reach + cell, cell)
     z = np.arange(5.0, rotor.hub_height + reach + cell, cell)
     time = np.arange(0.0, seconds, dt)
-    parts = []
-    for deviation in (2.7, 2.1, 1.4):
-        value = np.zeros((time.size, z.size, y.size), dtype=np.float32)
+    parts = np.zeros((3, time.size, z.size, y.size), dtype=np.float32)
+    for value, deviation in zip(parts, (2.7, 2.1, 1.4), strict=True):
         for _ in range(waves):
             frequency, phase = 10.0 ** draw.uniform(-2.3, 0.0), draw.uniform(0.0, 2.0 * np.pi)
             across, up = draw.normal(0.0, 2.0 * np.pi * frequency / speed, 2)
             angle = 2.0 * np.pi * frequency * time[:, None, None] + across * y + up * z[:, None] + phase
             value += deviation * np.sqrt(2.0 / waves) * np.cos(angle).astype(np.float32)
-        parts.append(value)
     parts[0] += np.float32(speed)
-    names = dict(zip("uvw", parts, strict=True))
-    return {"kind": "box", **names, "y": y, "z": z, "dt": dt, "speed": speed}
+    return {"kind": "box", **dict(zip("uvw", parts, strict=True)), "y": y, "z": z, "dt": dt, "speed": speed}
 
 
 TIMED_SCENES = {
@@ -256,8 +237,7 @@ def _of_water(part, t, pose, hydro, data):
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
     """Return {load: microseconds of one call} near a state, without those of the loop and the pose."""
     scene = scene.with_step(0.1)
-    handle = scene.handle()
-    dx, m = np.zeros_like(x), np.zeros(scene.n_measurements)
+    handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(scene.n_measurements)
     row = np.zeros(len(scene.channels))
     forget(handle)
     output(handle, x, u, 0.0, dx, row)  # fills the cached loads that measure and record read
@@ -266,32 +246,26 @@ def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
         call = partial(_repeat, handle, part)
         time = median_time(lambda call=call: call(x.copy(), u, dx, m, row, calls, 0.1), repeats)
         micro[name] = 1e6 * time / calls
-    base = micro[LOADS[0]]
-    for name in LOADS[1:7]:
-        micro[name] = max(0.0, micro[name] - base)
-    return micro
+    return micro | {name: max(0.0, micro[name] - micro[LOADS[0]]) for name in LOADS[1:7]}
 
 
 def step_time(scene, x, u, dt, steps=CHUNK, repeats=REPEATS):
     """Return the microseconds of one physics step under a constant command."""
-    scene = scene.with_step(dt)
-    handle = scene.handle()
+    handle = scene.with_step(dt).handle()
 
     def go():
-        y = x.copy()
         forget(handle)
-        advance(handle, y, u, 0, steps, dt)
+        advance(handle, x.copy(), u, 0, steps, dt)
 
     return 1e6 * median_time(go, repeats) / steps
 
 
-def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
+def loop_time(scene, controlled, x, u, dt, seconds, repeats=REPEATS):
     """Return the CPU seconds of the compiled closed loop, controller at 10 Hz, with one row of output."""
     scene = scene.with_step(dt)
-    controller = make("pi", scene.turbine, 0.1) if kind.controlled else HeldCommand()
-    handle = scene.handle()
+    controller = make("pi", scene.turbine, 0.1) if controlled else HeldCommand()
+    handle, last = scene.handle(), round(seconds / dt)
     rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant
-    last = round(seconds / dt)
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last)
     interface = build_interface(scene, controller, build_guard(), None, EXACT, 0.1, round(10.0 * seconds))
     link = interface_data(interface, len(x), len(u), scene.n_measurements)
@@ -303,25 +277,24 @@ def loop_time(scene, kind, x, u, dt, seconds, repeats=REPEATS):
         observe(handle, y, v, 0.0, link.dx, link.measurement)
         controller.reset(Measurement(*link.measurement[:N_MEASUREMENTS].tolist()))
         link.command[:] = v
-        rollout(
-            handle, y, v, controller.law, controller.parameters, controller.memory, linked, schedule, 0,
-            last, rows,
-        )  # fmt: skip
+        law = controller.law, controller.parameters, controller.memory
+        rollout(handle, y, v, *law, linked, schedule, 0, last, rows)
 
     return median_time(go, repeats)
 
 
-def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLATFORM):
+def measure_kind(name, seconds, repeats, calls, platform):
     """Return the row (dict) of a kind of scene: times per step, real-time factors, microseconds per load."""
-    if name not in TIMED_SCENES:
-        raise unknown("kind of scene", name, TIMED_SCENES)
     kind = TIMED_SCENES[name]
-    scene = kind.scene(platform=platform)
+    held = scene = kind.scene(platform)
     if hasattr(scene.wind, "usable"):  # a handle of wind has an end
         seconds = min(seconds, 10.0 * int(scene.wind.usable // 10.0))
-    x, u = kind.start(scene)
-    dt = scene.dt
-    held = scene
+    # without lines no floating steady state withstands the wind
+    begin, dt = "zero" if kind.options.get("mooring", True) is False else "trim", scene.dt
+    x, u = initial_state(scene, begin)
+    if kind.parked:
+        x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
+        x[State.BLADE_PITCH] = u[Command.BLADE_PITCH] = scene.turbine.pitch_drive.maximum
     if not kind.controlled:
         held = scene.with_model({"rigid_body.rotor_fixed": True})
     waves = None if scene.model.hydro is None else scene.model.hydro.waves
@@ -331,30 +304,31 @@ def measure_kind(name, seconds=600.0, repeats=REPEATS, calls=CHUNK, platform=PLA
         "calibration_ms": calibration(), "step_us": step_time(held, x, u, dt, calls, repeats),
     }  # fmt: skip
     row["step_x"] = 1e6 * dt / row["step_us"]
-    row["loop_x"] = seconds / loop_time(held, kind, x, u, dt, seconds, repeats)
+    row["loop_x"] = seconds / loop_time(held, kind.controlled, x, u, dt, seconds, repeats)
     row["simulate_x"] = float("nan")
     if not kind.parked:  # simulate starts from the running rotor
         law = "pi" if kind.controlled else None
-        run = partial(simulate, scene, law, duration=seconds, initial=kind.begin)
+        run = partial(simulate, scene, law, duration=seconds, initial=begin)
         row["simulate_x"] = seconds / median_time(run, repeats)
     return row | {f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()}
 
 
-def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=None, platform=PLATFORM):
+def silent(text, done, total):
+    """Report no progress."""
+
+
+def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=silent, platform=PLATFORM):
     """Return a DataFrame with a row per kind of scene (all by default) of a platform.
 
-    seconds   simulated, for the real-time factors of the closed loop and of simulate
-    progress  called with (text, done, total)
+    seconds: simulated by the closed loop and by simulate; progress: called with (text, done, total).
     Raises: InputError for an unknown kind.
     """
-    names = list(kinds or TIMED_SCENES)
+    names, rows = list(kinds or TIMED_SCENES), []
     for name in names:
         if name not in TIMED_SCENES:
             raise unknown("kind of scene", name, TIMED_SCENES)
-    rows = []
     for done, name in enumerate(names):
-        if progress is not None:
-            progress(name, done, len(names))
+        progress(name, done, len(names))
         rows.append(measure_kind(name, seconds, repeats, calls, platform))
     return pd.DataFrame(rows)
 
@@ -382,7 +356,7 @@ def start_times(fidelity="standard"):
 
 def header():
     """Return lines (list of str) on machine, versions, commit and date of a measurement."""
-    root = Path(fowt_env.__file__).resolve().parents[1]
+    root, cpus = Path(fowt_env.__file__).resolve().parents[1], Path("/proc/cpuinfo")
 
     def git(*words):
         try:
@@ -393,23 +367,15 @@ def header():
 
     commit = git("rev-parse", "HEAD") + (" with changes" if git("status", "--porcelain") else "")
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
+    named = re.search(r"^model name\s*: *(.*)", cpus.read_text() if cpus.is_file() else "", re.M)
+    processor = named[1] if named else platform.processor() or platform.machine()
     return [
         f"date: {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
-        f"machine: {_processor()}, {os.cpu_count()} cores, {platform.system()}, load {load:.2f}",
+        f"machine: {processor}, {os.cpu_count()} cores, {platform.system()}, load {load:.2f}",
         f"versions: Python {platform.python_version()}, numba {numba.__version__}, numpy {np.__version__}",
         f"commit: {commit or 'unknown'}",
         f"calibration: {calibration():.2f} ms for {CALIBRATION_STEPS:g} dependent multiply-adds",
     ]
-
-
-def _processor():
-    """Return the name of the processor."""
-    info = Path("/proc/cpuinfo")
-    if info.is_file():
-        for line in info.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or platform.machine()
 
 
 def write_csv(table, path, remarks=()):

@@ -13,29 +13,18 @@ from fowt_env.training.rl.train import environment_settings, resolve
 EPISODE = 600.0  # s
 
 
-class Clock:
-    """Seconds spent inside wrapped calls; nested calls of wrapped functions count once, outermost."""
+def watch(spent, owner, name, label):
+    """Replace owner.name by itself, its seconds added to spent[label] less those of watched calls in it."""
+    call = getattr(owner, name)
 
-    def __init__(self):
-        self.seconds = {}
-        self._inside = False
+    def timed(*args, **kwargs):
+        begin, before = time.perf_counter(), sum(spent.values())
+        result = call(*args, **kwargs)
+        within = sum(spent.values()) - before
+        spent[label] = spent.get(label, 0.0) + time.perf_counter() - begin - within
+        return result
 
-    def watch(self, owner, name, label):
-        """Replace owner.name by itself, timed under the label."""
-        call = getattr(owner, name)
-
-        def timed(*args, **kwargs):
-            if self._inside:
-                return call(*args, **kwargs)
-            self._inside = True
-            begin = time.perf_counter()
-            try:
-                return call(*args, **kwargs)
-            finally:
-                self.seconds[label] = self.seconds.get(label, 0.0) + time.perf_counter() - begin
-                self._inside = False
-
-        setattr(owner, name, timed)
+    setattr(owner, name, timed)
 
 
 def nothing_env(env):
@@ -88,14 +77,11 @@ def subject(kind, n, settings, decisions):
         return SubprocVecEnv([first.twin] * n, start_method="fork"), 1, None
     if kind == "SyncVectorEnv":
         return sync_env(n, settings), 1, None
-    native = FowtSB3VecEnv(n, threads=1, **settings)
-    if kind in ("native", "torch alone"):
-        env, hold = native, 1
-    else:
+    env = native = FowtSB3VecEnv(n, threads=1, **settings)
+    hold = 1
+    if kind.endswith("decisions"):
         env, hold = DecisionVecEnv(native, decisions), decisions.hold
-    if kind.startswith("torch alone"):
-        return nothing_env(env), hold, None
-    return env, hold, native.env
+    return (nothing_env(env), hold, None) if kind.startswith("torch alone") else (env, hold, native.env)
 
 
 VECTOR_ENVS = (
@@ -111,32 +97,30 @@ def measured(kind, n, steps, settings, decisions, algorithm):
     model = PPO("MlpPolicy", env, seed=0, device="cpu", **algorithm)
     rollout = algorithm["n_steps"] * n
     model.learn(rollout)  # compiled, allocated
-    clock = Clock()
+    spent, rounds = {}, max(1, round(steps / rollout))
     if native is not None:
-        clock.watch(native, "_act", "physics")
-    clock.watch(model, "train", "torch")
-    clock.watch(model.policy, "forward", "torch")
-    rounds = max(1, round(steps / rollout))
+        watch(spent, native, "_act", "physics")
+    watch(spent, model, "train", "torch")
+    watch(spent, model.policy, "forward", "torch")
     begin = time.perf_counter()
     model.learn(rounds * rollout, reset_num_timesteps=False)
     wall = time.perf_counter() - begin
     env.close()
-    fractions = {label: seconds / wall for label, seconds in clock.seconds.items()}
-    physics, torch = fractions.get("physics", np.nan), fractions.get("torch", np.nan)
+    physics, torch = (spent.get(label, np.nan) / wall for label in ("physics", "torch"))
+    speed = rounds * rollout / wall
     return {
-        "kind": kind, "envs": n, "steps_per_s": rounds * rollout / wall,
-        "env_steps_per_s": rounds * rollout * hold / wall, "physics_share": physics, "torch_share": torch,
-        "python_share": 1.0 - physics - torch,
-        "minutes_for_10M_env_steps": 1e7 / (rounds * rollout * hold / wall) / 60.0,
+        "kind": kind, "envs": n, "steps_per_s": speed, "env_steps_per_s": speed * hold,
+        "physics_share": physics, "torch_share": torch, "python_share": 1.0 - physics - torch,
+        "minutes_for_10M_env_steps": 1e7 / (speed * hold) / 60.0,
     }  # fmt: skip
 
 
 def benchmark_training(n=64, steps=50_000, kinds=VECTOR_ENVS, progress=None):
     """Return a DataFrame with a row per kind of vector environment, PPO as shipped on one torch thread.
 
-    An env step is one control period (0.1 s) of the task above_rated at fidelity "standard", residual mode;
-    a step is what PPO learns from: the same, or a decision. physics: the compiled call; torch: PPO's update
-    and its forward pass during the rollout; Python: the rest. The slow kinds do a tenth of the steps.
+    An env step is one control period of the task above_rated in residual mode, a step what PPO learns from:
+    the same, or a decision. physics: the compiled call; torch: PPO's update and its forward pass during the
+    rollout; Python: the rest. The slow kinds do a tenth of the steps.
     """
     import torch
 

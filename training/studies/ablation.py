@@ -1,19 +1,16 @@
 """Effect of information, action mode and algorithm on agents: equal runs that differ in one thing each.
 
-    python -m fowt_env.training.studies.ablation --out runs/ablation         # all of ablation.yml
-    python -m fowt_env.training.studies.ablation --out runs/ablation --only direct,estimate
+    python -m fowt_env.training.studies.ablation --out runs/ablation [--only direct,estimate]
     python -m fowt_env.training.studies.ablation --out runs/ablation --report docs/figures/rl_ablation.png
 
-Each variant and seed is a run of training/rl/train.py in a folder of its own. The same command continues a
-stopped run and leaves a finished one as it is. The runs are far shorter than those of the shipped agents:
-they compare the variants and do not show the best that each can reach.
+The same command continues a stopped run. The runs are far shorter than those of the shipped agents: they
+compare the variants of ablation.yml and do not show the best that each can reach.
 """
 
 import argparse
 import sys
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import yaml
 from scipy.stats import t
@@ -36,37 +33,29 @@ COLUMNS = FIGURES | {"capped_power_mean_ratio": "power up to rated"}  # of the t
 
 
 def read_table(path=TABLE):
-    """Return {"steps", "seeds", "common", "variants"} of a file. Raises: InputError for unknown keys."""
-    with Path(path).open(encoding="utf-8") as file:
-        table = yaml.safe_load(file)
-    for key in table:
-        if key not in KEYS:
-            raise unknown(f"key of {path}", key, KEYS)
-    for name, variant in table["variants"].items():
-        for key in variant:
-            if key not in OWN_KEYS:
-                raise unknown(f"key of variant {name!r} of {path}", key, OWN_KEYS)
-    return table
+    """Return {variant: {OWN_KEYS: value}} of a file, shared values included. Raises: InputError."""
+    table = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    variants = table["variants"]
+    checks = {f"key of variant {name!r} of {path}": (own, OWN_KEYS) for name, own in variants.items()}
+    for what, (given, known) in {f"key of {path}": (table, KEYS), **checks}.items():
+        for key in given:
+            if key not in known:
+                raise unknown(what, key, known)
+    shared = {"algo": "ppo", "steps": table["steps"], "seeds": table["seeds"]}
+    return {n: shared | own | {"set": table["common"] | own.get("set", {})} for n, own in variants.items()}
 
 
 def variant_of(table, name):
     """Return the entry of a variant in the table. Raises: InputError for an unknown name."""
-    if name not in table["variants"]:
-        raise unknown("variant", name, table["variants"])
-    return table["variants"][name]
+    if name not in table:
+        raise unknown("variant", name, table)
+    return table[name]
 
 
 def settings_of(table, name, seed, steps=None):
     """Return the resolved settings of a variant and seed. Raises: InputError."""
     variant = variant_of(table, name)
-    changes = table["common"] | variant.get("set", {})
-    steps = steps or variant.get("steps", table["steps"])
-    return resolve(variant.get("algo", "ppo"), "above_rated", seed, steps, changes)
-
-
-def seeds_of(table, name):
-    """Return the training seeds of a variant, or those of all. Raises: InputError for an unknown name."""
-    return variant_of(table, name).get("seeds", table["seeds"])
+    return resolve(variant["algo"], "above_rated", seed, steps or variant["steps"], variant["set"])
 
 
 def folder_of(out, name, seed):
@@ -83,8 +72,7 @@ def decisions_done(folder):
 def run_variant(table, name, seed, out, steps=None, report=None):
     """Train the rest of the run of a variant and seed; return whether it has reached its end."""
     settings, folder = settings_of(table, name, seed, steps), folder_of(out, name, seed)
-    done = decisions_done(folder)
-    if done >= settings["steps"]:
+    if decisions_done(folder) >= settings["steps"]:
         return True
     return Training(settings, folder, resume=(folder / "settings.yml").exists()).run(report)
 
@@ -92,16 +80,14 @@ def run_variant(table, name, seed, out, steps=None, report=None):
 def ablation_rows(table, out):
     """Return a DataFrame: a row per validated variant and seed, with the figures of its best policy."""
     rows = []
-    for name, variant in table["variants"].items():
-        for seed in seeds_of(table, name):
-            path = folder_of(out, name, seed) / "validation.csv"
-            if not path.is_file():
-                continue
+    for name, seed in ((name, seed) for name, variant in table.items() for seed in variant["seeds"]):
+        path = folder_of(out, name, seed) / "validation.csv"
+        if path.is_file():
             validated = pd.read_csv(path)
-            best = validated.loc[validated["score"].idxmin()]
-            row = {"variant": name, "label": variant["label"], "seed": seed} | best.to_dict()
-            decisions, seconds = validated.iloc[-1][["decisions", "seconds"]]
-            rows.append(row | {"decisions_trained": int(decisions), "seconds_trained": float(seconds)})
+            last = validated.iloc[-1]
+            row = {"variant": name, "label": table[name]["label"], "seed": seed}
+            row |= validated.loc[validated["score"].idxmin()].to_dict()
+            rows.append(row | {f"{key}_trained": last[key] for key in ("decisions", "seconds")})
     if not rows:
         raise InputError(f"{out}: no variant has been validated yet")
     return pd.DataFrame(rows)
@@ -109,15 +95,13 @@ def ablation_rows(table, out):
 
 def plot_ablation(rows, path):
     """Plot the figures of ablation_rows, a line per variant, a dot per seed; return the path."""
-    labels = list(dict.fromkeys(rows["label"]))
+    place, labels = pd.factorize(rows["label"])
     figure = new_figure(10.0, 1.2 + 0.33 * len(labels))
     axes = figure.subplots(1, len(FIGURES), sharey=True)
     for axis, (name, title), colour in zip(axes, FIGURES.items(), COLOURS, strict=False):
-        place = np.array([labels.index(label) for label in rows["label"]])
         axis.plot(rows[name], place, "o", color=colour)
         axis.axvline(1.0, color="0.6", linewidth=0.8)
-        axis.set_title(title, fontsize=9)
-        style_axes(axis)
+        style_axes(axis, title=title)
     axes[0].set_yticks(range(len(labels)), labels, fontsize=8)
     axes[0].invert_yaxis()
     figure.supxlabel("ratio to gspi_oc3 on the validation episodes", fontsize=8)
@@ -127,18 +111,17 @@ def plot_ablation(rows, path):
 
 def markdown(rows):
     """Return ablation_rows as a markdown table: means over seeds, 95 % interval of the mean score."""
-    groups = rows.groupby("label", sort=False)
-    mean = groups[[*COLUMNS, "failed", "score", "decisions_trained", "seconds_trained"]].mean()
-    rows = []
-    for label, row in mean.iterrows():
-        scores = groups.get_group(label)["score"].to_numpy()
-        score, n = f"{row['score']:.3f}", len(scores)
+    cells = []
+    for label, group in rows.groupby("label", sort=False):
+        mean, n = group.mean(numeric_only=True), len(group)
+        score = f"{mean['score']:.3f}"
         if n > 1:
-            score += f" ± {t.ppf(0.975, n - 1) * scores.std(ddof=1) / np.sqrt(n):.3f}"
-        trained = f"{row['decisions_trained'] / 1e3:.0f} k", f"{row['seconds_trained']:.0f}"
-        ratios = (f"{row[name]:.3f}" for name in COLUMNS)
-        rows.append((label, *ratios, f"{row['failed']:.2f}", score, n, *trained))
-    return markdown_table(("", *COLUMNS.values(), "failed", "score", "seeds", "decisions", "s"), rows)
+            score += f" ± {t.ppf(0.975, n - 1) * group['score'].sem():.3f}"
+        trained = f"{mean['decisions_trained'] / 1e3:.0f} k", f"{mean['seconds_trained']:.0f}"
+        cells.append(
+            (label, *(f"{mean[c]:.3f}" for c in COLUMNS), f"{mean['failed']:.2f}", score, n, *trained)
+        )
+    return markdown_table(("", *COLUMNS.values(), "failed", "score", "seeds", "decisions", "s"), cells)
 
 
 def main(arguments=None):
@@ -156,8 +139,8 @@ def main(arguments=None):
         print(plot_ablation(rows, given.report))
         print(markdown(rows))
         return
-    for name in given.only.split(",") if given.only else table["variants"]:
-        for seed in seeds_of(table, name):
+    for name in given.only.split(",") if given.only else table:
+        for seed in variant_of(table, name)["seeds"]:
 
             def report(done, total, text, name=name, seed=seed):
                 print(f"\r{name} {seed}: {done}/{total}: {text}  ", end="", file=sys.stderr)

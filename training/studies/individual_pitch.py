@@ -1,16 +1,12 @@
 """Relief of the blades by individual pitch control, its cost in travel, and the motion of the platform.
 
-    python -m fowt_env.training.studies.individual_pitch --platform oc3_hywind
-
 Runs the suite `ipc` with the controllers of NAMES and with `ipc` behind the bounds of BOUNDS. Printed are
 figures over those of the same law with one pitch for all blades: means over winds and seeds, with the
-exponents of their S-N curves. The shares of a bound are those of `ipc` that it leaves: how much of what that
-takes off the blade roots, for how much of what it adds to the travel. controllers.md has the outcome.
+exponents of their S-N curves; and the shares of the relief and of the added travel of `ipc` at each bound.
 """
 
 import argparse
 
-import numpy as np
 import pandas as pd
 
 from fowt_env.controllers.ipc.law import IPC, IPCSettings
@@ -39,12 +35,6 @@ SHOWN = {
 }  # fmt: skip
 
 
-def bounded(turbine):
-    """Return {name: controller} of ipc behind each of BOUNDS."""
-    published = PISettings.published(turbine)
-    return {f"bound {b:g}": IPC(published, IPCSettings(bound=b), CONTROL_DT) for b in BOUNDS}
-
-
 def means(table):
     """Return a DataFrame of the means of SHOWN and the travel of each controller over its runs.
 
@@ -52,40 +42,29 @@ def means(table):
     """
     bad = table[table["status"] != "ok"]
     if len(bad):
-        raise ValueError(
-            f"runs that did not go to their end:\n{bad[['controller', 'case', 'seed', 'reason']]}"
-        )
-    groups = table.groupby("controller", sort=False)
-    columns = {}
-    for metric in (*SHOWN.values(), TRAVEL):
-        power = mean_exponent(metric)
-        columns[metric] = groups[metric].apply(lambda v, p=power: float(np.mean(v**p) ** (1.0 / p)))
-    return pd.DataFrame(columns)
+        bad = bad[["controller", "case", "seed", "reason"]]
+        raise ValueError(f"runs that did not go to their end:\n{bad}")
+    metrics = [*SHOWN.values(), TRAVEL]
+    powers = pd.Series({metric: mean_exponent(metric) for metric in metrics})
+    values = table.set_index("controller")[metrics] ** powers
+    return values.groupby("controller", sort=False).mean() ** (1.0 / powers)
 
 
 def ratios(figures):
     """Return a DataFrame of SHOWN over the collective law's, with the travel itself (deg/s), of means."""
-    rows = {}
-    for name, baseline in NAMES.items():
-        row = figures.loc[name] / figures.loc[baseline]
-        rows[name] = {"travel": figures.loc[name, TRAVEL]} | {k: row[metric] for k, metric in SHOWN.items()}
-    return pd.DataFrame.from_dict(rows, orient="index")
+    found = figures.loc[list(NAMES)] / figures.loc[list(NAMES.values())].to_numpy()
+    found = found.rename(columns={metric: name for name, metric in SHOWN.items()})[list(SHOWN)]
+    found.insert(0, "travel", figures[TRAVEL])
+    return found.rename_axis(None)
 
 
 def trade_off(figures):
     """Return a DataFrame of the shares of ipc's relief and added travel that each bound leaves."""
-    relief, travel = figures.loc["pi", ROOT] - figures[ROOT], figures[TRAVEL] - figures.loc["pi", TRAVEL]
-    rows = [name for name in figures.index if name == "ipc" or name.startswith("bound")]
-    shares = {"share of relief": relief / relief["ipc"], "share of travel": travel / travel["ipc"]}
-    return pd.DataFrame(shares).loc[rows]
-
-
-def study(platform=PLATFORM, seeds=None, jobs=1, folder=None):
-    """Return the means of every controller; seeds None: those of the suite."""
-    turbine = read_turbine(read_platform(platform).turbine)
-    laws = {name: name for name in NAMES} | bounded(turbine)
-    options = {} if seeds is None else {"seeds": seeds}
-    return means(evaluate(laws, read_suite(SUITE, platform), jobs=jobs, folder=folder, **options))
+    change = (figures[[ROOT, TRAVEL]] - figures.loc["pi", [ROOT, TRAVEL]]).filter(
+        regex="^ipc$|^bound", axis=0
+    )
+    shares = change / change.loc["ipc"]
+    return shares.set_axis(["share of relief", "share of travel"], axis=1).rename_axis(None)
 
 
 def main(arguments=None):
@@ -96,7 +75,11 @@ def main(arguments=None):
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", help="results folder, which a later run continues")
     given = parser.parse_args(arguments)
-    figures = study(given.platform, given.seeds, given.jobs, given.out)
+    published = PISettings.published(read_turbine(read_platform(given.platform).turbine))
+    laws = {name: name for name in NAMES}
+    laws |= {f"bound {b:g}": IPC(published, IPCSettings(bound=b), CONTROL_DT) for b in BOUNDS}
+    options = {"jobs": given.jobs, "folder": given.out} | ({"seeds": given.seeds} if given.seeds else {})
+    figures = means(evaluate(laws, read_suite(SUITE, given.platform), **options))
     print(ratios(figures).round(3).to_string())
     print(trade_off(figures).round(3).to_string())
 

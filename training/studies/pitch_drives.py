@@ -1,8 +1,5 @@
 """What the pitch drive does to a run: none, one of first order, one of second order.
 
-    python -m fowt_env.training.studies.pitch_drives              # the table of docs/results/model-choices.md
-    python -m fowt_env.training.studies.pitch_drives --speed      # time of a run with and without inertia
-
 18 m/s, class B turbulence, the sea of that wind at the site of the suites, three seeds, 600 s after 100 s, at
 fidelity standard. The drive of second order is that of the turbine file, the one of first order lags as long,
 or by the lag of the file where it has one.

@@ -1,10 +1,6 @@
-"""Ship the best policy of a training run: its .npz and a card that says where it is from, in
-controllers/policy/agents.
+"""Ship the best policy of a training run: its .npz and its card, in controllers/policy/agents.
 
-    python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two cores"
-
-The card has the command that makes the run again, its seed, wall time and machine, the agent's inputs,
-its figures on the validation episodes, and the versions that the run was made with.
+python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two cores"
 """
 
 import json
@@ -26,29 +22,25 @@ from fowt_env.training.rl.train import resolve
 LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
 
 
-def changes_of(settings):
-    """Return {dotted key: value} by which settings of a run differ from its algorithm's YAML now."""
-    now = resolve(settings["algo"], settings["name"], settings["seed"], settings["steps"])
+def changes_of(here, there, prefix=""):
+    """Return {dotted key: value} of nested settings that differ from others or that these lack."""
     changes = {}
-
-    def compare(here, there, prefix):
-        for key, value in here.items():
-            if isinstance(value, dict) and isinstance(there.get(key), dict):
-                compare(value, there[key], f"{prefix}{key}.")
-            elif key not in there or there[key] != value:
-                changes[prefix + key] = value
-
-    compare(settings, now, "")
+    for key, value in here.items():
+        if isinstance(value, dict) and isinstance(there.get(key), dict):
+            changes |= changes_of(value, there[key], f"{prefix}{key}.")
+        elif key not in there or there[key] != value:
+            changes[prefix + key] = value
     return changes
 
 
 def training_command(settings):
-    """Return the command line that makes the run again."""
-    given = "".join(f" --set '{key}={json.dumps(value)}'" for key, value in changes_of(settings).items())
+    """Return the command line that makes the run again, with what differs from its algorithm's YAML now."""
+    now = resolve(settings["algo"], settings["name"], settings["seed"], settings["steps"])
+    changes = changes_of(settings, now)
     return (
         f"fowt train --algo {settings['algo']} --task {settings['name']} --seed {settings['seed']}"
-        f" --steps {settings['steps']}{given}"
-    )
+        f" --steps {settings['steps']}"
+    ) + "".join(f" --set '{key}={json.dumps(value)}'" for key, value in changes.items())
 
 
 def publish(folder, name, machine):
@@ -59,8 +51,7 @@ def publish(folder, name, machine):
         raise InputError(f"{folder}: holds no best.npz and validation.csv of a run")
     if policy.stat().st_size > LARGEST_FILE:
         raise InputError(f"{policy}: {policy.stat().st_size} bytes: at most {LARGEST_FILE} are kept")
-    with (folder / "settings.yml").open(encoding="utf-8") as file:
-        settings = yaml.safe_load(file)
+    settings = yaml.safe_load((folder / "settings.yml").read_text(encoding="utf-8"))
     rows = pd.read_csv(table)
     about = read_policy(policy)[0]["about"]
     best = rows.loc[rows["score"].idxmin()]

@@ -1,10 +1,8 @@
 """What makes ROSCO with the OC3 gains differ from the published law with the same gains, one thing at a time.
 
-    python -m fowt_env.training.studies.rosco_differences --jobs 2
-
 From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
 From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of
-the schedule. Cases of normal turbulence at WINDS on validation seeds; controllers.md has the outcome.
+the schedule. Cases of normal turbulence at WINDS on validation seeds.
 """
 
 from math import exp
@@ -47,8 +45,7 @@ SHOWN = {
 class InsideIntegral:
     """The PI law with the gain schedule inside the integral, as ROSCO has it: I += GK KI e dt.
 
-    filtered: the schedule follows the measured blade pitch after the filter of the speed, as in ROSCO,
-    instead of the last command.
+    filtered: the schedule follows the filtered measured blade pitch, as in ROSCO, not the last command.
     """
 
     def __init__(self, settings, control_dt, filtered=False):
@@ -95,31 +92,25 @@ def variants(turbine):
     """Return {change: controller}, from the published law to ROSCO."""
     published = PISettings.published(turbine)
     kept = outside_factor(SCHEDULE, turbine.gains["oc3"].gain_schedule_pitch)
-    proportional, integral = pitch_gains(turbine)
-    outside = {"PC_GS_KP": kept * proportional, "PC_GS_KI": kept * integral}
-
-    def rosco(**changes):
-        return Rosco(RoscoSettings(), CONTROL_DT, changes=changes)
-
+    outside = dict(zip(("PC_GS_KP", "PC_GS_KI"), kept * np.array(pitch_gains(turbine)), strict=True))
+    rosco = {
+        "rosco": {}, "rosco, no set-point smoother": {"SS_Mode": 0},
+        "rosco, no smoother, torque K w^2": {"SS_Mode": 0, "VS_ControlMode": 1},
+        "rosco, gains of a schedule outside": outside,
+        "rosco, gains outside, no smoother": {"SS_Mode": 0, **outside},
+        "rosco, gains outside, no smoother, K w^2": {"SS_Mode": 0, "VS_ControlMode": 1, **outside},
+    }  # fmt: skip
     return {
         BASELINE: gspi_oc3(turbine, CONTROL_DT),
         "pi: the same in periods of 0.1 s": pi(turbine, CONTROL_DT),
         "pi, schedule inside the integral": InsideIntegral(published, CONTROL_DT),
         "pi, schedule inside, by filtered pitch": InsideIntegral(published, CONTROL_DT, filtered=True),
-        "rosco": rosco(),
-        "rosco, no set-point smoother": rosco(SS_Mode=0),
-        "rosco, no smoother, torque K w^2": rosco(SS_Mode=0, VS_ControlMode=1),
-        "rosco, gains of a schedule outside": rosco(**outside),
-        "rosco, gains outside, no smoother": rosco(SS_Mode=0, **outside),
-        "rosco, gains outside, no smoother, K w^2": rosco(SS_Mode=0, VS_ControlMode=1, **outside),
+        **{k: Rosco(RoscoSettings(), CONTROL_DT, changes=changes) for k, changes in rosco.items()},
     }
 
 
 def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
-    """Return a DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases.
-
-    names: of variants, gspi_oc3 aside; None: all.
-    """
+    """Return a DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases."""
     laws = variants(read_turbine("nrel5mw"))
     if names is not None:
         laws = {name: laws[name] for name in (BASELINE, *names)}

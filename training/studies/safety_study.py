@@ -1,9 +1,6 @@
-"""Agents with and without the safety layer on validation episodes.
+"""Agents with and without the safety layer on validation episodes, beside two careless ones.
 
-    python -m fowt_env.training.studies.safety_study --agents ppo_lqr --out results/safety.csv
-
-Beside the trained agents two careless ones with direct commands are run: one that commands new random
-torque and blade pitch every 5 s, and one that commands no torque and flat blades.
+Those command new random torque and blade pitch every 5 s, or no torque and flat blades.
 """
 
 from dataclasses import replace
@@ -30,7 +27,6 @@ class Trained:
 
     def __init__(self, name):
         self.settings, self.network = read_policy(policy_path(name))
-        self.decisions = None
 
     def env(self):
         """Return the environment of the agent's training."""
@@ -43,10 +39,10 @@ class Trained:
 
     def reset(self, env, observation):
         """Start an episode."""
-        settings = DecisionSettings(**self.settings["decisions"])
-        mode = ACTION_MODES[self.settings["action_mode"]]
-        wind = wind_entry(settings, mode, env.unwrapped.observed)
-        self.decisions = Decisions(1, len(observation), settings, self.settings["control_dt"], wind)
+        s = self.settings
+        settings = DecisionSettings(**s["decisions"])
+        wind = wind_entry(settings, ACTION_MODES[s["action_mode"]], env.unwrapped.observed)
+        self.decisions = Decisions(1, len(observation), settings, s["control_dt"], wind)
         self.decisions.restart(0, observation, env.unwrapped.last_action)
         self.periods = 0
 
@@ -72,9 +68,7 @@ class Careless:
 
     def reset(self, env, observation):
         """Start an episode, the same each time."""
-        self.rng = np.random.default_rng(0)
-        self.periods = 0
-        self.action = np.array([-1.0, -1.0])
+        self.rng, self.periods, self.action = np.random.default_rng(0), 0, np.array([-1.0, -1.0])
 
     def act(self, observation):
         """Return the action of the coming control period."""
@@ -105,20 +99,18 @@ def episode_figures(agent, env, options):
     }
 
 
-def safety_study(agents, progress=print):
+def safety_study(agents):
     """Return a DataFrame: a row per agent and layer; means over episodes, largest overspeed."""
-    episodes = validation_episodes(resolve("ppo", "above_rated", 0, 1))[0][::2]
-    rows = []
+    episodes, rows = validation_episodes(resolve("ppo", "above_rated", 0, 1))[0][::2], []
     judged = {name: Trained(name) for name in agents} | {kind: Careless(kind) for kind in CARELESS}
     for label, agent in judged.items():
         for layer in (False, True):
             env = SafetyLayer(agent.env()) if layer else agent.env()
             table = pd.DataFrame([episode_figures(agent, env, options) for options in episodes])
             row = {"agent": label, "safety_layer": layer, "episodes": len(table)} | table.mean().to_dict()
-            row["failed"] = int(table["failed"].sum())
-            row["overspeed_[%]"] = float(table["overspeed_[%]"].max())
+            row |= {"failed": int(table["failed"].sum()), "overspeed_[%]": table["overspeed_[%]"].max()}
             rows.append(row)
-            progress(f"{label}, {'with' if layer else 'without'} the layer: {row['failed']} failed")
+            print(f"{label}, {'with' if layer else 'without'} the layer: {row['failed']} failed")
     return pd.DataFrame(rows)
 
 

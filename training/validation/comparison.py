@@ -7,7 +7,12 @@ import pandas as pd
 
 from fowt_env.errors import InputError
 from fowt_env.training.validation.openfast_cases import RUNS
-from fowt_env.training.validation.signal_errors import decay_decrement, decay_period, normalised_rms
+from fowt_env.training.validation.signal_errors import (
+    decay_decrement,
+    decay_period,
+    harmonics,
+    normalised_rms,
+)
 
 TIME = "Time_[s]"
 
@@ -75,9 +80,11 @@ class Study:
         self.done += 1
 
     def add(self, case, quantity, unit, openfast, here, error=None, allowed=float("nan"), note=""):
-        """Add a row; without an error its error is the relative one in percent."""
-        if error is None:
-            error = relative(here, openfast)
+        """Add a row; without an error its error is the relative one in percent, 0 where both are zero."""
+        if error is None and openfast == 0.0:
+            error = 0.0 if here == 0.0 else float("inf")
+        elif error is None:
+            error = 100.0 * (here / openfast - 1.0)
         row = Row(case, quantity, unit, float(openfast), float(here), float(error), allowed, note)
         self.rows.append(row)
 
@@ -89,8 +96,7 @@ class Study:
         if case not in self.runs:
             self.say(case)
             run = self.cases[case]
-            theirs = run.theirs(self.folder)
-            ours = run.frame(self.folder, self.bts)
+            theirs, ours = run.theirs(self.folder), run.frame(self.folder, self.bts)
             if len(ours) != len(theirs) or not np.allclose(ours[TIME], theirs[TIME], atol=1e-6):
                 raise InputError(
                     f"reference run {case!r}: its times are not those of the run, every {run.output_dt:g} s"
@@ -99,55 +105,58 @@ class Study:
         pair = self.runs[case]
         return pair if start is None else since(pair, start, end)
 
+    def series(self, case, channel, start=None, end=np.inf):
+        """Return (name, unit, times, OpenFAST's series, this project's) of a channel of a case, as pair."""
+        ours, theirs = self.pair(case, start, end)
+        arrays = (x.to_numpy() for x in (theirs[TIME], theirs[channel], ours[channel]))
+        return *name_and_unit(channel), *arrays
+
     def add_statistics(
         self, case, channels, kinds=tuple(STATISTICS), start=SETTLED, *, pair=None, words="", note="",
         std=float("nan"), rms=float("nan"),
     ):  # fmt: skip
         """Add a row for each channel and kind of STATISTICS of a case from start (s) on.
 
-        pair: the frames to compare, in place of the case's; words: end of each quantity's name; std, rms:
-        allowed errors of these kinds, % (nan: reported). An rms error is shown beside both deviations.
+        pair: frames in place of the case's; words: end of each quantity's name; std, rms: allowed errors, %.
+        An rms error is shown beside both deviations.
         """
-        ours, theirs = self.pair(case, start) if pair is None else pair
-        allowed = {"std": std, "rms": rms}
+        ours, theirs = pair or self.pair(case, start)
+        allowed = {"std": std, "rms": rms, "mean": float("nan")}
         for channel in channels:
             name, unit = name_and_unit(channel)
             for kind in kinds:
                 both = [f[channel].mean() if kind == "mean" else f[channel].std() for f in (theirs, ours)]
                 error = 100.0 * normalised_rms(ours[channel], theirs[channel]) if kind == "rms" else None
-                quantity = f"{name}, {STATISTICS[kind]}{words}"
-                self.add(case, quantity, unit, *both, error, allowed.get(kind, float("nan")), note)
+                self.add(case, f"{name}, {STATISTICS[kind]}{words}", unit, *both, error, allowed[kind], note)
 
     def add_decay(self, case, channel, duration, period, decrement, rms, cycles=4, counted=(1, 3)):
-        """Add the rows of a free decay: period of its first cycles, decrements of some, and the rms error.
-
-        period, decrement, rms: allowed errors, %.
-        """
-        ours, theirs = self.pair(case)
-        time = theirs[TIME].to_numpy()
-        centre = theirs[channel][time > 0.5 * duration].mean()
-        both = [frame[channel].to_numpy() for frame in (theirs, ours)]
-        counts = "cycle" if cycles == 1 else f"{cycles} cycles"
+        """Add periods and decrements of cycles of a free decay and its rms error; allowed errors, %."""
+        name, unit, time, *both = self.series(case, channel)
+        centre = both[0][time > 0.5 * duration].mean()
         periods = [decay_period(time, value, centre, cycles) for value in both]
+        counts = "cycle" if cycles == 1 else f"{cycles} cycles"
         self.add(case, f"period, first {counts}", "s", *periods, allowed=period)
         for cycle in counted:
             decrements = [decay_decrement(time, value, centre, cycle) for value in both]
-            words = {1: "first", 2: "second", 3: "third"}[cycle]
-            self.add(case, f"logarithmic decrement, {words} cycle", "-", *decrements, allowed=decrement)
-        name, unit = name_and_unit(channel)
+            words = f"logarithmic decrement, {'first' if cycle == 1 else 'third'} cycle"
+            self.add(case, words, "-", *decrements, allowed=decrement)
         error = 100.0 * normalised_rms(both[1], both[0])
         self.add(case, f"{name}, {STATISTICS['rms']}", unit, both[0].std(), both[1].std(), error, rms)
+
+    def add_harmonics(self, case, channels, period, window, vector=False):
+        """Add first harmonics in a wave of a period (s), 1 %; vector: and reported errors with phase."""
+        for channel in channels:
+            name, unit, time, *both = self.series(case, channel, *window)
+            there, here = (harmonics(time, value, 2.0 * np.pi / period)[0] for value in both)
+            sizes, note = (abs(there), abs(here)), phase(here, there)
+            self.add(case, f"{name}, first harmonic", unit, *sizes, allowed=1.0, note=note)
+            if vector:
+                error = 100.0 * abs(here - there) / abs(there)
+                self.add(case, f"{name}, first harmonic as a vector", unit, *sizes, error)
 
     def table(self):
         """Return a DataFrame of all rows with their verdicts."""
         return pd.DataFrame([{**vars(row), "verdict": row.verdict} for row in self.rows])
-
-
-def relative(value, reference_value):
-    """Return the error in percent of the reference; 0 where both are zero."""
-    if reference_value == 0.0:
-        return 0.0 if value == 0.0 else float("inf")
-    return 100.0 * (value / reference_value - 1.0)
 
 
 def name_and_unit(channel):

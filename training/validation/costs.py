@@ -2,6 +2,7 @@
 
 import numpy as np
 import pandas as pd
+from scipy.signal import periodogram
 
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.platform import read_platform
@@ -18,15 +19,16 @@ INSTANTANEOUS = {
     "kinematics_position": "instantaneous", "surface": "instantaneous", "stretching": "wheeler",
 }  # fmt: skip
 UNIFORM, BOX = "turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"
+NO_SKEW = {"skewed_wake": False}
 RUN_CHANGES = {  # name of a run: (case, changes)
     "uniform wind": (UNIFORM, {}),
-    "uniform wind, no skewed wake": (UNIFORM, {"skewed_wake": False}),
-    "uniform wind, rotor table": (UNIFORM, {"skewed_wake": False, "rotor": "table"}),
+    "uniform wind, no skewed wake": (UNIFORM, NO_SKEW),
+    "uniform wind, rotor table": (UNIFORM, {**NO_SKEW, "rotor": "table"}),
     "uniform wind, instantaneous wave kinematics": (UNIFORM, INSTANTANEOUS),
     "uniform wind, dynamic inflow": (UNIFORM, {"dynamic_inflow": True}),
     "full-field wind": (BOX, {}),
     "rotor-averaged wind": (BOX, {}),  # with the wind of _disk
-    "rotor-averaged wind, rotor table": (BOX, {"rotor": "table", "skewed_wake": False}),
+    "rotor-averaged wind, rotor table": (BOX, {"rotor": "table", **NO_SKEW}),
 }
 CHOICES = {  # cheaper choice: (run with the costlier one, run with the cheaper one)
     "skewed wake off (against on)": ("uniform wind", "uniform wind, no skewed wake"),
@@ -76,10 +78,8 @@ def _disk(study):
 
 def _densities(step, values):
     """Return (frequency, mean density) of the columns of (n, m) values, mean removed, Hann window."""
-    window = np.hanning(len(values))[:, None]
-    transform = np.fft.rfft((values - values.mean(axis=0)) * window, axis=0)
-    density = 2.0 * step * np.abs(transform) ** 2 / np.sum(window**2)
-    return np.fft.rfftfreq(len(values), step), density.mean(axis=1)
+    frequency, density = periodogram(values, 1.0 / step, np.hanning(len(values)), axis=0)
+    return frequency, density.mean(axis=1)
 
 
 def _generator(study, disk):
@@ -89,38 +89,34 @@ def _generator(study, disk):
     """
     hub, diameter, box, step = disk["hub"], disk["diameter"], disk["box"], disk["box"].dt
     y, z = np.meshgrid(box.y, box.z)
-    inside = np.hypot(y, z - hub) <= 0.5 * diameter
-    points = box.velocity[:, inside, 0].astype(float)
+    points = box.velocity[:, np.hypot(y, z - hub) <= 0.5 * diameter, 0].astype(float)
     frequency, point = _densities(step, points)
-    _, mean = _densities(step, disk["value"][:, :1])
-    _, chord = _densities(step, disk["chord"][:, :1])
-    sigma = ntm_sigma(18.0, "B")
-    period, series = len(points) * step, {}
-    for average in ("rotor", "point"):
-        settings = {"height": hub, "diameter": diameter, "period": period, "average": average}
-        values = [turbulence(18.0, sigma, seed=seed, **settings)[1] for seed in range(GENERATOR_SEEDS)]
-        series[average] = [value[:-1] for value in values]
-    made_frequency, made_rotor = _densities(step, np.stack([v[:, 0] for v in series["rotor"]], axis=1))
-    _, made_point = _densities(step, np.stack([v[:, 0] for v in series["point"]], axis=1))
+    mean, chord = (_densities(step, disk[name][:, :1])[1] for name in ("value", "chord"))
+    sigma, made = ntm_sigma(18.0, "B"), {}
+    for average in ("rotor", "point"):  # (seed, time, component)
+        settings = {"height": hub, "diameter": diameter, "period": len(points) * step, "average": average}
+        seeds = range(GENERATOR_SEEDS)
+        made[average] = np.array([turbulence(18.0, sigma, seed=s, **settings)[1][:-1] for s in seeds])
+    spectra = {average: _densities(step, values[:, :, 0].T) for average, values in made.items()}
+    own, (made_frequency, made_rotor), (_, made_point) = made["rotor"].std(axis=1), *spectra.values()
     case = "generator of normal turbulence (against the rotor average of the TurbSim box)"
     deviation = np.sqrt(points.var(axis=0).mean())
-    theirs = disk["value"][:, 0].std() / deviation
-    ours = np.mean([r[:, 0].std() / p[:, 0].std() for r, p in zip(*series.values(), strict=True)])
-    study.add(case, "u: std of the rotor average over that of a point", "-", theirs, ours)
-    theirs = disk["chord"][:, 0].std() / deviation
-    study.add(case, "the same, box averaged with chord weights", "-", theirs, ours)
+    ours = np.mean(own[:, 0] / made["point"].std(axis=1)[:, 0])
+    theirs = disk["value"].std(axis=0) / deviation
+    study.add(case, "u: std of the rotor average over that of a point", "-", theirs[0], ours)
+    chorded = disk["chord"][:, 0].std() / deviation
+    study.add(case, "the same, box averaged with chord weights", "-", chorded, ours)
     study.add(case, "u at a point, std (the box: one seed; here sigma_1)", "m/s", deviation, sigma)
     for column, name in ((3, "vertical"), (4, "horizontal")):
-        theirs = disk["value"][:, column].std() / deviation
-        ours = np.mean([r[:, column].std() for r in series["rotor"]]) / sigma
-        study.add(case, f"u: std of the {name} gradient per diameter over that of a point", "-", theirs, ours)
+        quantity = f"u: std of the {name} gradient per diameter over that of a point"
+        study.add(case, quantity, "-", theirs[column], own[:, column].mean() / sigma)
     for low, high in zip(BANDS[:-1], BANDS[1:], strict=True):
         band = (frequency >= low) & (frequency < high)
-        made = (made_frequency >= low) & (made_frequency < high)
-        theirs = np.sqrt(mean[band].sum() / point[band].sum())
-        ours = np.sqrt(made_rotor[made].sum() / made_point[made].sum())
+        inside = (made_frequency >= low) & (made_frequency < high)
+        there = np.sqrt(mean[band].sum() / point[band].sum())
+        here = np.sqrt(made_rotor[inside].sum() / made_point[inside].sum())
         quantity = f"u: amplitude of the rotor average over that of a point, {low:g} to {high:g} Hz"
-        study.add(case, quantity, "-", theirs, ours)
+        study.add(case, quantity, "-", there, here)
     study.runs["spectra of the wind"] = (
         pd.DataFrame({"frequency": frequency, "point": point, "rotor": mean, "chord": chord}),
         pd.DataFrame({"frequency": made_frequency, "point": made_point, "rotor": made_rotor}),

@@ -1,4 +1,4 @@
-"""Natural periods and responses of a floating body in the frequency domain, by numpy alone.
+"""Natural periods and responses of a floating body in the frequency domain, by numpy and scipy alone.
 
 Nothing of the plant is used: coefficients come from the package's array file by the reader below, masses
 from the figures of the public decks, lines from the catenary below. Linear about the place where the body
@@ -12,6 +12,7 @@ C is the hydrostatic stiffness with that of the weight, K that of the lines, D a
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.optimize import root
 
 from fowt_env.errors import InputError
 
@@ -23,7 +24,7 @@ def read_arrays(path):
     """Return {name: array} of a coefficients file of the package. Raises: InputError if it does not exist."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: np.asarray(file[name]) for name in file.files}
+            return dict(file)
     except OSError as error:
         raise InputError(f"coefficients file {str(path)!r} cannot be read: {error}") from None
 
@@ -42,26 +43,23 @@ def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
 
 def tower_mass(stations, densities, base, top, slices=400):
     """Return the 6x6 mass matrix of a tower along z, densities (kg/m) at fractions of its height."""
-    fraction = (np.arange(slices) + 0.5) / slices
-    length = (top - base) / slices
-    matrix = np.zeros((6, 6))
-    for f, density in zip(fraction, np.interp(fraction, stations, densities), strict=True):
-        matrix += point_mass(density * length, (0.0, 0.0, base + f * (top - base)))
-    return matrix
+    fraction, height = (np.arange(slices) + 0.5) / slices, top - base
+    masses = np.interp(fraction, stations, densities) * height / slices
+    return sum(point_mass(m, (0.0, 0.0, base + f * height)) for f, m in zip(fraction, masses, strict=True))
 
 
-def weight_stiffness(mass, gravity=GRAVITY):
+def weight_stiffness(mass):
     """Return the 6x6 stiffness of the weight of a mass matrix about the displaced origin, fixed axes."""
     x, y, z = mass[1, 5], -mass[0, 5], mass[0, 4]  # moments of mass
     stiffness = np.zeros((6, 6))
-    stiffness[3, 3] = stiffness[4, 4] = -gravity * z
-    stiffness[3, 5], stiffness[4, 5] = gravity * x, gravity * y
+    stiffness[3, 3] = stiffness[4, 4] = -GRAVITY * z
+    stiffness[3, 5], stiffness[4, 5] = GRAVITY * x, GRAVITY * y
     return stiffness
 
 
-def weight(mass, gravity=GRAVITY):
+def weight(mass):
     """Return (6,) force and moment of the weight about the undisplaced origin."""
-    return gravity * np.array([0.0, 0.0, -mass[0, 0], mass[0, 5], mass[1, 5], 0.0])
+    return GRAVITY * np.array([0.0, 0.0, -mass[0, 0], mass[0, 5], mass[1, 5], 0.0])
 
 
 @dataclass(frozen=True)
@@ -79,41 +77,31 @@ class CatenaryLine:
 def catenary(span, rise, line):
     """Return (horizontal, vertical) tension (N) at the fairlead of a line with this span and rise (m).
 
-    Newton's method on the closed form of Jonkman (2007), with and without a part on the seabed.
+    The closed form of Jonkman (2007), with and without a part on the seabed, solved in the logarithms.
     """
     w, length, ea, cb = line.weight, line.length, line.stiffness, line.friction
 
-    def ends(h, v):
-        a = v / h
-        if v >= w * length:  # hangs freely
-            b = (v - w * length) / h
-            x = h / w * (np.arcsinh(a) - np.arcsinh(b)) + h * length / ea
-            z = h / w * (np.hypot(1.0, a) - np.hypot(1.0, b)) + (v * length - 0.5 * w * length**2) / ea
-            return x, z
-        rest = length - v / w
-        x = rest + h / w * np.arcsinh(a) + h * length / ea
-        slack = rest - h / (cb * w) if cb > 0.0 else 0.0
-        if cb > 0.0:
+    def misses(tensions):
+        h, v = np.exp(tensions)
+        free = v >= w * length  # hangs freely
+        lift = max(v - w * length, 0.0) / h
+        rest = 0.0 if free else length - v / w
+        x = rest + h / w * (np.arcsinh(v / h) - np.arcsinh(lift)) + h * length / ea
+        z = h / w * (np.hypot(1.0, v / h) - np.hypot(1.0, lift))
+        z += (v * length - 0.5 * w * length**2) / ea if free else 0.5 * v * v / (ea * w)
+        if cb > 0.0 and not free:
+            slack = rest - h / (cb * w)
             x += 0.5 * cb * w / ea * (-(rest**2) + slack * max(slack, 0.0))
-        z = h / w * (np.hypot(1.0, a) - 1.0) + 0.5 * v * v / (ea * w)
-        return x, z
+        return x - span, z - rise
 
     taut = 3.0 * ((length**2 - rise**2) / span**2 - 1.0) if span > 0.0 else 1e6
     guess = np.sqrt(taut) if length > np.hypot(span, rise) else 0.2
     h = max(0.5 * w * span / guess, 1e-3 * w * length)
     v = 0.5 * w * (rise / np.tanh(guess) + length)
-    for _ in range(200):
-        miss = np.array(ends(h, v)) - (span, rise)
-        if np.abs(miss).max() < 1e-10 * length:
-            return h, v
-        dh, dv = 1e-6 * h, 1e-6 * v
-        by_h = (np.array(ends(h + dh, v)) - ends(h - dh, v)) / (2.0 * dh)
-        by_v = (np.array(ends(h, v + dv)) - ends(h, v - dv)) / (2.0 * dv)
-        jacobian = np.column_stack([by_h, by_v])
-        step = np.linalg.solve(jacobian, miss)
-        share = min(1.0, 0.5 * h / max(abs(step[0]), 1e-300), 0.5 * v / max(abs(step[1]), 1e-300))
-        h, v = h - share * step[0], v - share * step[1]
-    raise InputError(f"catenary: no solution at span {span:g} m and rise {rise:g} m")
+    found = root(misses, np.log([h, v]), tol=1e-13)
+    if not np.abs(found.fun).max() < 1e-8 * length:
+        raise InputError(f"catenary: no solution at span {span:g} m and rise {rise:g} m")
+    return np.exp(found.x)
 
 
 def rotation(roll, pitch, yaw):
@@ -139,14 +127,9 @@ def line_forces(lines, q):
 
 def line_stiffness(lines, q):
     """Return (6, 6) stiffness of the lines at q, by central differences."""
-    steps = (0.05, 0.05, 0.05, 1e-3, 1e-3, 1e-3)
-    columns = []
-    for i, step in enumerate(steps):
-        ahead, behind = np.array(q, float), np.array(q, float)
-        ahead[i] += step
-        behind[i] -= step
-        columns.append(-(line_forces(lines, ahead) - line_forces(lines, behind)) / (2.0 * step))
-    return np.array(columns).T
+    steps = np.diag((0.05, 0.05, 0.05, 1e-3, 1e-3, 1e-3))
+    pairs = ((line_forces(lines, q + step), line_forces(lines, q - step)) for step in steps)
+    return np.array([(behind - ahead) for ahead, behind in pairs]).T / (2.0 * np.diag(steps))
 
 
 def interpolated(omega, grid, values, low=None, high=None):
@@ -163,22 +146,19 @@ def interpolated(omega, grid, values, low=None, high=None):
 
 @dataclass(frozen=True)
 class FloatingBody:
-    """A body as the frequency domain sees it: coefficients, mass, lines, volume and its centre."""
+    """A body as the frequency domain sees it: coefficients, mass, lines, volume below the origin."""
 
     coefficients: dict  # of read_arrays
     mass: np.ndarray  # (6, 6)
     lines: tuple
     volume: float
-    centre: tuple = (0.0, 0.0)  # of buoyancy, x and y
     added_stiffness: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
     added_damping: np.ndarray = field(default_factory=lambda: np.zeros((6, 6)))
-    gravity: float = GRAVITY
 
     @property
     def stiffness(self):
         """(6, 6) hydrostatic stiffness with that of the weight and what is added."""
-        weight = weight_stiffness(self.mass, self.gravity)
-        return self.coefficients["stiffness"] + weight + self.added_stiffness
+        return self.coefficients["stiffness"] + weight_stiffness(self.mass) + self.added_stiffness
 
     @property
     def rest_stiffness(self):
@@ -186,30 +166,27 @@ class FloatingBody:
         return self.stiffness + line_stiffness(self.lines, self.rest())
 
     def rest(self):
-        """Return the position of rest (6,), by Newton's method on lines, weight and buoyancy."""
-        lift = DENSITY * self.gravity * self.volume
-        buoyancy = lift * np.array([0.0, 0.0, 1.0, self.centre[1], -self.centre[0], 0.0])
-        q = np.zeros(6)
-        for _ in range(50):
-            held = weight(self.mass, self.gravity) + line_forces(self.lines, q)
-            left = buoyancy + held - self.stiffness @ q
-            step = np.linalg.solve(self.stiffness + line_stiffness(self.lines, q), left)
-            q = q + step
-            if np.abs(step).max() < 1e-9:
-                return q
-        raise InputError("frequency domain: the body finds no place to rest")
+        """Return the position of rest (6,), of lines, weight and buoyancy."""
+        lift, stiffness = DENSITY * GRAVITY * self.volume, self.stiffness
+        fixed = weight(self.mass) + lift * np.eye(6)[2]
+        found = root(
+            lambda q: fixed + line_forces(self.lines, q) - stiffness @ q, np.zeros(6), tol=1e-13,
+            jac=lambda q: -stiffness - line_stiffness(self.lines, q),
+        )  # fmt: skip
+        if not np.abs(found.fun).max() < 1e-6 * lift:
+            raise InputError("frequency domain: the body finds no place to rest")
+        return found.x
 
     def added_mass(self, omega):
         """Return the added mass (6, 6) at omega (rad/s)."""
         c = self.coefficients
-        zero = c.get("added_mass_zero")
-        return interpolated(omega, c["omega"], c["added_mass"], zero, c["added_mass_infinite"])
+        limits = c.get("added_mass_zero"), c["added_mass_infinite"]
+        return interpolated(omega, c["omega"], c["added_mass"], *limits)
 
     def damping(self, omega):
         """Return the damping (6, 6) of radiation, and added_damping."""
         c = self.coefficients
-        nothing = np.zeros((6, 6))
-        return interpolated(omega, c["omega"], c["damping"], nothing, nothing) + self.added_damping
+        return interpolated(omega, c["omega"], c["damping"], 0.0, 0.0) + self.added_damping
 
     def excitation(self, omega, heading=0.0):
         """Return the excitation (6,) per metre at omega (rad/s) and a heading (rad) of the file."""
@@ -222,11 +199,9 @@ class FloatingBody:
 
     def responses(self, omega, heading=0.0):
         """Return (n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
-        stiffness = self.rest_stiffness
-        found = []
+        stiffness, found = self.rest_stiffness, []
         for w in omega:
-            inertia = self.mass + self.added_mass(w)
-            matrix = -w * w * inertia + 1j * w * self.damping(w) + stiffness
+            matrix = -w * w * (self.mass + self.added_mass(w)) + 1j * w * self.damping(w) + stiffness
             found.append(np.linalg.solve(matrix, self.excitation(w, heading)))
         return np.array(found)
 
@@ -246,42 +221,32 @@ class FloatingBody:
         convolution by the midpoint rule at those.
         """
         inertia = np.linalg.inv(self.mass + self.coefficients["added_mass_infinite"])
-        stiffness = self.rest_stiffness
         kernel = step * self.retardation((np.arange(round(memory / step)) + 0.5) * step)
-        flat = np.ascontiguousarray(kernel.transpose(1, 0, 2).reshape(6, -1))  # latest velocity first
-        past = np.zeros((len(kernel), 6))
-        count = round(duration / step)
-        motion = np.zeros((count + 1, 6))
+        flat = kernel.transpose(1, 0, 2).reshape(6, -1)  # latest velocity first
+        past, velocity, stiffness = np.zeros((len(kernel), 6)), np.zeros(6), self.rest_stiffness
+        motion = np.zeros((round(duration / step) + 1, 6))
         motion[0] = offset
-        velocity = np.zeros(6)
-        for n in range(count):
+        for n in range(len(motion) - 1):
             force = -stiffness @ motion[n] - flat @ past.ravel() - self.added_damping @ velocity
             velocity = velocity + (0.5 if n == 0 else 1.0) * step * (inertia @ force)
-            past[1:] = past[:-1].copy()
-            past[0] = velocity
+            past = np.vstack([velocity, past[:-1]])
             motion[n + 1] = motion[n] + step * velocity
-        return step * np.arange(count + 1), motion
+        return step * np.arange(len(motion)), motion
 
     def natural_modes(self):
         """Return {motion: (rad/s, damping ratio)} of six modes, each with coefficients at its frequency."""
-        stiffness = self.rest_stiffness
-        length = self.volume ** (1.0 / 3.0)
-        scale = np.array([1.0, 1.0, 1.0, length, length, length])
-        found = {}
+        stiffness, found = self.rest_stiffness, {}
+        scale = np.array([1.0] * 3 + [self.volume ** (1.0 / 3.0)] * 3)[:, None]
         for i, name in enumerate(NAMES):
             omega = np.sqrt(stiffness[i, i] / (self.mass + self.added_mass(0.2))[i, i])
             for _ in range(100):
                 inverse = np.linalg.inv(self.mass + self.added_mass(omega))
-                system = np.block(
-                    [[np.zeros((6, 6)), np.eye(6)], [-inverse @ stiffness, -inverse @ self.damping(omega)]]
-                )
-                values, vectors = np.linalg.eig(system)
-                shapes = np.abs(vectors[:6]) * scale[:, None]
+                lower = [-inverse @ stiffness, -inverse @ self.damping(omega)]
+                values, vectors = np.linalg.eig(np.block([[np.zeros((6, 6)), np.eye(6)], lower]))
+                shapes = np.abs(vectors[:6]) * scale
                 share = shapes[i] / np.linalg.norm(shapes, axis=0)
-                mode = int(np.argmax(np.where(values.imag > 0.0, share, -1.0)))
-                value = values[mode]
-                done = abs(value.imag - omega) < 1e-10
-                omega = 0.5 * (omega + value.imag)
+                value = values[np.argmax(np.where(values.imag > 0.0, share, -1.0))]
+                done, omega = abs(value.imag - omega) < 1e-10, 0.5 * (omega + value.imag)
                 if done:
                     break
             found[name] = (float(value.imag), float(-value.real / abs(value)))
@@ -290,7 +255,6 @@ class FloatingBody:
 
 # --------------------------------------------------------------------------- figures of the public decks
 
-OFFSHORE_TOWER = tuple(np.linspace(0.0, 1.0, 11))
 FLOATING_TOWER = (
     4667.0, 4345.28, 4034.76, 3735.44, 3447.32, 3170.40, 2904.69, 2650.18, 2406.88, 2174.77, 1953.87,
 )  # fmt: skip
@@ -301,30 +265,23 @@ BARGE_TOWER = (
 
 def nrel5mw(tower, base):
     """Return the 6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk."""
-    tilt, cone = np.radians(5.0), np.radians(2.5)
+    tilt, cone, hub_radius = np.radians(5.0), np.radians(2.5), 1.5
     apex = np.array([-5.0191 * np.cos(tilt), 0.0, 87.6 + 1.96256 + 5.0191 * np.sin(tilt)])
     shaft = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])  # downwind
     blade, first, polar = 17740.0, 363231.0, 11776047.0  # kg, kg m, kg m2 about the blade root
-    hub_radius = 1.5
-    mass = 3.0 * blade
     along = (first + hub_radius * blade) / blade  # from the apex, along the blade
     square = polar + 2.0 * hub_radius * first + hub_radius**2 * blade  # about the apex
-    centre = apex - shaft * along * np.sin(cone)  # cone leans upwind
     turning = 3.0 * square * np.cos(cone) ** 2
-    rotor = point_mass(mass, centre, (turning, 0.5 * turning, 0.5 * turning))
-    hub = point_mass(56780.0, apex, (115926.0, 0.0, 0.0))
-    nacelle = point_mass(240000.0, (1.9, 0.0, 87.6 + 1.75), (0.0, 0.0, 2607890.0 - 240000.0 * 1.9**2))
+    centre = apex - shaft * along * np.sin(cone)  # cone leans upwind
     generator = np.zeros((6, 6))
     generator[3, 3] = 534.116 * 97.0**2
-    return tower_mass(OFFSHORE_TOWER, tower, base, 87.6) + rotor + hub + nacelle + generator
-
-
-def _ring(count, first, radius, depth, anchor_radius, anchor_depth, line):
-    """Return equal lines around the axis, the first in this direction (deg)."""
-    turns = [(np.cos(a), np.sin(a)) for a in np.radians(first + 360.0 / count * np.arange(count))]
-    anchors = [(anchor_radius * c, anchor_radius * s, -anchor_depth) for c, s in turns]
-    fairleads = [(radius * c, radius * s, -depth) for c, s in turns]
-    return tuple(CatenaryLine(*ends, **line) for ends in zip(anchors, fairleads, strict=True))
+    parts = (
+        (3.0 * blade, centre, (turning, 0.5 * turning, 0.5 * turning)),
+        (56780.0, apex, (115926.0, 0.0, 0.0)),  # hub
+        (240000.0, (1.9, 0.0, 87.6 + 1.75), (0.0, 0.0, 2607890.0 - 240000.0 * 1.9**2)),  # nacelle
+    )
+    fractions = np.linspace(0.0, 1.0, len(tower))
+    return tower_mass(fractions, tower, base, 87.6) + generator + sum(point_mass(*part) for part in parts)
 
 
 def oc4_semi(coefficients):
@@ -336,17 +293,18 @@ def oc4_semi(coefficients):
     mass = nrel5mw(FLOATING_TOWER, 10.0)
     mass = mass + point_mass(3.85218e6, (0.0, 0.0, -8.6588), (2.56193e9, 2.56193e9, 4.24265e9))
     for diameter, top, bottom in ((11.88, -6.17, -14.0), (23.88, -14.89, -19.94)):
-        height, area = top - bottom, 0.25 * np.pi * diameter**2
-        water = DENSITY * area * height
+        height = top - bottom
+        water = DENSITY * 0.25 * np.pi * diameter**2 * height
         across = water * height**2 / 12.0
         for x, y in ((14.43376, 25.0), (-28.86751, 0.0), (14.43376, -25.0)):
-            place = (x, y, 0.5 * (top + bottom))
-            mass = mass + point_mass(water, place, (across, across, 0.0))
-    line = {
-        "length": 835.35, "stiffness": 7.536e8,
-        "weight": (113.35 - DENSITY * 0.25 * np.pi * 0.0766**2) * GRAVITY,
-    }  # fmt: skip
-    return FloatingBody(coefficients, mass, _ring(3, 60.0, 40.868, 14.0, 837.6, 200.0, line), 13917.0)
+            mass = mass + point_mass(water, (x, y, 0.5 * (top + bottom)), (across, across, 0.0))
+    wet_weight = (113.35 - DENSITY * 0.25 * np.pi * 0.0766**2) * GRAVITY
+    lines = []
+    for turn in np.radians((60.0, 180.0, 300.0)):
+        c, s = np.cos(turn), np.sin(turn)
+        ends = (837.6 * c, 837.6 * s, -200.0), (40.868 * c, 40.868 * s, -14.0)
+        lines.append(CatenaryLine(*ends, 835.35, wet_weight, 7.536e8))
+    return FloatingBody(coefficients, mass, tuple(lines), 13917.0)
 
 
 def iti_barge(coefficients):
@@ -354,14 +312,9 @@ def iti_barge(coefficients):
     mass = nrel5mw(BARGE_TOWER, 0.0)
     mass = mass + point_mass(5.452e6, (0.0, 0.0, -0.281768), (7.269e8, 7.269e8, 1.4539e9))
     weight_in_water = (130.403 - DENSITY * 0.25 * np.pi * 0.0809**2) * GRAVITY
-    lines = []
-    for anchor in ((386.92, 171.985), (171.985, 386.95)):
-        for angle in np.radians((0.0, 90.0, 180.0, 270.0)):
-            c, s = np.cos(angle), np.sin(angle)
-
-            def turned(x, y, z, c=c, s=s):
-                return (c * x - s * y, s * x + c * y, z)
-
-            ends = turned(*anchor, -150.0), turned(20.0, 20.0, -4.0)
-            lines.append(CatenaryLine(*ends, 473.312, weight_in_water, 5.89e8))
+    lines, place = [], (20.0, 20.0, -4.0)
+    for x, y in ((386.92, 171.985), (171.985, 386.95)):
+        for c, s in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
+            turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            lines.append(CatenaryLine(turn @ (x, y, -150.0), turn @ place, 473.312, weight_in_water, 5.89e8))
     return FloatingBody(coefficients, mass, tuple(lines), 6000.0)

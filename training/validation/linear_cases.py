@@ -1,12 +1,11 @@
 """Linear models of this plant against OpenFAST's of the same turbine, above rated wind.
 
-OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S: a
-lighter tower, other nacelle and hub, blades whose radii are 0.97 m smaller, another generator, g =
-9.80665. `old_deck` builds that turbine from the deck's figures. HydroDyn linearises by steps of 0.02 deg
-times the depth in translation and 2 deg in rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic
-drag leaves the damping of such a velocity; the same is added here. What differs still: their radiation
-is the deck's state-space fit, their blades turn in the potential flow around the tower, and sway, roll
-and yaw are held.
+OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S, which
+`old_deck` builds from its figures: a lighter tower, other nacelle and hub, blades whose radii are 0.97 m
+smaller, another generator, g = 9.80665. HydroDyn linearises by steps of 0.02 deg times the depth in
+translation and 2 deg in rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic drag leaves the damping
+of such a velocity; the same is added here. What differs still: their radiation is the deck's state-space fit,
+their blades turn in the potential flow around the tower, and sway, roll and yaw are held.
 """
 
 from dataclasses import replace
@@ -24,7 +23,7 @@ from fowt_env.training.validation.openfast_cases import table
 PLATFORM = "iea15_volturnus_s"
 WINDS = (13.0, 15.0, 18.0, 21.0, 24.0)  # m/s, constant generator torque in OpenFAST's models
 SHEAR = 0.12
-MOTIONS = {"surge": "surge", "heave": "heave", "pitch": "platform_pitch"}
+OUTPUTS = {"rotor_speed": ("rotor_speed", "rad/s"), "pitch": ("platform_pitch", "rad")}
 SHOWN = (0.05, 0.1, 0.2, 0.3, 0.5)  # rad/s, of the responses
 # figures of the older deck, kg, m, kg m2
 TOWER = {
@@ -113,80 +112,68 @@ def _turbine(turbine):
 
 
 def named_poles(matrix, states):
-    """Return {motion: pole with positive imaginary part, rotor: real pole} by participation factors."""
+    """Return {motion: pole with positive imaginary part, rotor: real pole} by participation factors.
+
+    Those of a mode are its right times its left eigenvector; a motion's are those of place and velocity.
+    """
     value, right = np.linalg.eig(matrix)
-    share = np.abs(right.T * np.linalg.inv(right))
+    share = np.abs(right.T * np.linalg.inv(right))  # (mode, state)
     found, used = {}, set()
     pairs = {"surge": ("surge", "vx"), "heave": ("heave", "vz"), "pitch": ("platform_pitch", "wy")}
-    for name, motion in (("rotor", ("rotor_speed",)), *pairs.items()):
-        indices = [states.index(state) for state in motion]
-        for mode in np.argsort(-share[:, indices].sum(axis=1)):
-            fits = abs(value[mode].imag) < 1e-9 if name == "rotor" else value[mode].imag > 0.0
-            if fits and mode not in used:
-                found[name] = value[mode]
-                used.add(mode)
-                break
+    for name, motion in {"rotor": ("rotor_speed",), **pairs}.items():
+        fits = np.abs(value.imag) < 1e-9 if name == "rotor" else value.imag > 0.0
+        order = np.argsort(-share[:, [states.index(state) for state in motion]].sum(axis=1))
+        mode = next(m for m in order if fits[m] and m not in used)
+        found[name] = value[mode]
+        used.add(mode)
     return found
-
-
-def open_loop(model):
-    """Return (A, {input: column}, states) of a LinearModel with the blade pitch as input, no azimuth."""
-    states = list(model.states)
-    pitch = states.index("blade_pitch")
-    kept = [i for i, name in enumerate(states) if name not in ("blade_pitch", "azimuth")]
-    columns = {
-        "wind": model.B[kept, model.inputs.index("wind_speed")],
-        "blade_pitch": model.A[kept, pitch],
-    }
-    return model.A[np.ix_(kept, kept)], columns, [states[i] for i in kept]
 
 
 def linear(study):
     """Compare linear models above rated wind: frequencies 3 %, damping and rotor pole 10 %."""
     poles = table(f"{PLATFORM}/linear_poles.csv.gz", study.folder)
     gains = table(f"{PLATFORM}/linear_responses.csv.gz", study.folder)
+    gains = gains[gains["omega_rad_s"].isin(SHOWN)]
     platform, turbine = old_deck()
     for wind in WINDS:
         study.say(f"linear model at {wind:g} m/s")
         scene = build_scene(
             platform, wind={"kind": "steady", "speed": wind}, turbine=turbine, rotor="bem", skewed_wake=True,
-            shear_exponent=SHEAR, radiation="state_space",
-            fidelity="reference",
+            shear_exponent=SHEAR, radiation="state_space", fidelity="reference",
         )  # fmt: skip
         drag = scene.model.hydro.matrices  # with the damping that HydroDyn's differences make of it
         damping = drag.linear_damping + drag.quadratic_damping * DRAG_STEPS
         model = linearize(scene.with_model({"hydro.matrices.linear_damping": damping}))
         theirs = poles[np.isclose(poles["wind_mps"], wind)].iloc[0]
         case = f"linear model at {wind:g} m/s (against OpenFAST)"
-        for name, unit, there in (
-            ("BldPitch1", "deg", theirs["blade_pitch_rad"] * (1.0 / DEGREE)),
-            ("PtfmSurge", "m", theirs["surge_m"]),
-            ("PtfmHeave", "m", theirs["heave_m"]),
-            ("PtfmPitch", "deg", theirs["pitch_rad"] * (1.0 / DEGREE)),
-        ):
+        for name, unit, column in (
+            ("BldPitch1", "deg", "blade_pitch_rad"), ("PtfmSurge", "m", "surge_m"),
+            ("PtfmHeave", "m", "heave_m"), ("PtfmPitch", "deg", "pitch_rad"),
+        ):  # fmt: skip
+            there = theirs[column] / (DEGREE if unit == "deg" else 1.0)
             study.add(case, f"operating point, {name}", unit, there, model.point[name])
-        matrix, columns, states = open_loop(model)
+        # the blade pitch becomes an input, the azimuth has no part
+        states = [name for name in model.states if name not in ("blade_pitch", "azimuth")]
+        kept = [model.states.index(name) for name in states]
+        matrix = model.A[np.ix_(kept, kept)]
         ours = named_poles(matrix, states)
-        for name in MOTIONS:
+        for name in ("surge", "heave", "pitch"):
             there, here = complex(theirs[f"{name}_real"], theirs[f"{name}_imag"]), ours[name]
             study.add(case, f"{name} mode, frequency", "rad/s", there.imag, here.imag, allowed=3.0)
             ratios = [-pole.real / abs(pole) for pole in (there, here)]
             study.add(case, f"{name} mode, damping ratio", "-", *ratios, allowed=10.0)
         study.add(case, "rotor pole", "1/s", theirs["rotor_real"], ours["rotor"].real, allowed=10.0)
-        _responses(study, matrix, columns, states, gains[np.isclose(gains["wind_mps"], wind)], wind)
-
-
-def _responses(study, matrix, columns, states, gains, wind):
-    case = f"responses at {wind:g} m/s (against OpenFAST)"
-    outputs = {"rotor_speed": ("rotor_speed", "rad/s"), "pitch": ("platform_pitch", "rad")}
-    inputs = {"wind": ("hub wind", "m/s"), "blade_pitch": ("blade pitch", "rad")}
-    for row in gains.to_dict("records"):
-        omega = row["omega_rad_s"]
-        if omega not in SHOWN:
-            continue
-        there = complex(row["real"], row["imag"])
-        (state, unit), (source, per) = outputs[row["output"]], inputs[row["input"]]
-        solved = np.linalg.solve(1j * omega * np.eye(len(matrix)) - matrix, columns[row["input"]])
-        here = solved[states.index(state)]
-        quantity = f"{state.replace('_', ' ')} per {source} at {omega:g} rad/s"
-        study.add(case, quantity, f"{unit} per {per}", abs(there), abs(here), note=phase(here, there, 1))
+        inputs = {
+            "wind": ("hub wind", "m/s", model.B[kept, model.inputs.index("wind_speed")]),
+            "blade_pitch": ("blade pitch", "rad", model.A[kept, model.states.index("blade_pitch")]),
+        }
+        for row in gains[np.isclose(gains["wind_mps"], wind)].to_dict("records"):
+            omega, there = row["omega_rad_s"], complex(row["real"], row["imag"])
+            state, unit = OUTPUTS[row["output"]]
+            source, per, column = inputs[row["input"]]
+            solved = np.linalg.solve(1j * omega * np.eye(len(matrix)) - matrix, column)
+            here, what = solved[states.index(state)], state.replace("_", " ")
+            study.add(
+                f"responses at {wind:g} m/s (against OpenFAST)", f"{what} per {source} at {omega:g} rad/s",
+                f"{unit} per {per}", abs(there), abs(here), note=phase(here, there, 1),
+            )  # fmt: skip

@@ -25,14 +25,10 @@ NAMED = {  # channel as simulate names it: column of a reference file, in the sa
     "TTDspSS_[m]": "tower_top_ss_m", "TwrBsMyt_[kN-m]": "twr_base_My_kNm",
     "TwrBsMxt_[kN-m]": "twr_base_Mx_kNm", "NcIMUTAxs_[m/s^2]": "nacelle_acc_x_mps2",
 }  # fmt: skip
-THOUSANDS = {  # column in kN or kN m: channel in N or N m
+COLUMNS = {column: channel for channel, column in NAMED.items()} | {  # those in kN and kN m become N and N m
     "aero_thrust_kN": "RtFldFxh_[N]", "aero_torque_kNm": "RtFldMxh_[N-m]", "hydro_Fx_kN": "HydroFxi_[N]",
     "hydro_Fz_kN": "HydroFzi_[N]", "hydro_My_kNm": "HydroMyi_[N-m]",
 }  # fmt: skip
-COLUMNS = {  # column of a reference file: (channel, factor)
-    **{column: (channel, 1.0) for channel, column in NAMED.items()},
-    **{column: (channel, 1e3) for column, channel in THOUSANDS.items()},
-}
 REGULAR = {"kind": "regular", "H": 3.0, "T": 5.0}
 DECAYS = {  # case: (channel, start value, seconds)
     "decay_surge": ("PtfmSurge_[m]", 10.0, 600.0),
@@ -60,13 +56,11 @@ def table(name, folder=None):
 
 
 def reference(case, folder=None, place=""):
-    """Return a reference run as a DataFrame, columns named as simulate names them.
-
-    place: folder of the run in the folder of all references. Raises: InputError if absent.
-    """
+    """Return a reference run of a folder as a DataFrame, columns as of simulate. Raises: InputError."""
     frame = table(f"{place}/{case}.csv.gz" if place else f"{case}.csv.gz", folder)
-    named = ((*COLUMNS[name], name) for name in frame.columns)
-    return pd.DataFrame({channel: frame[name] * factor for channel, factor, name in named})
+    thousands = [name for name in frame if "kN" in name and "[N" in COLUMNS[name]]
+    frame[thousands] *= 1e3
+    return frame.rename(columns=COLUMNS)
 
 
 def steady_reference(folder=None):
@@ -74,7 +68,7 @@ def steady_reference(folder=None):
     return table("steady.csv.gz", folder)
 
 
-def hub_wind(folder=None):
+def hub_wind(folder=None, bts=None):
     """Return the wind specification of the recorded hub wind, uniform over the rotor."""
     frame = table("wind_hub_18mps.csv.gz", folder)
     return {"kind": "series", "time": frame["time_s"].to_numpy(), "speed": frame["u_mps"].to_numpy()}
@@ -94,7 +88,7 @@ def wave_components(folder=None):
 def box_wind(folder=None, bts=None):
     """Return the wind specification of the TurbSim box: the file bts, or without one the stored region.
 
-    The region is rounded to 0.04 m/s (u) and 0.08 m/s (v, w); training/validation/reference/make.py wrote it.
+    It is rounded to 0.04 m/s (u) and 0.08 m/s (v, w), see training/validation/reference/make.py.
     """
     if bts is not None:
         return {"kind": "bts", "path": str(bts)}
@@ -135,8 +129,7 @@ class ReferenceRun:
     def frame(self, folder=None, bts=None, dt=None, wind=None, rotor="bem", progress=False, **options):
         """Return this plant's run at the reference's times as a DataFrame.
 
-        wind None: the run's own, dt None: the deck's. controller and other arguments of build_scene may be
-        among the options.
+        wind, dt None: the run's own; options: of build_scene, and controller.
         """
         if wind is None:
             wind = self.wind(folder, bts) if callable(self.wind) else self.wind
@@ -182,7 +175,13 @@ def _run(case, duration, dt, start, **settings):
 
 
 WIND_STEPS = {"kind": "steps", "speeds": [float(v) for v in range(12, 25)], "every": 100.0, "ramp": 0.1}
-UNIFORM = {"wind": lambda folder, bts: hub_wind(folder)}
+
+
+def _turbulent(name, wind, **settings):
+    start = (12.1, 14.92)
+    return _run(f"turb_18mps_Hs7.5_{name}", 600.0, 0.0125, start, sea=wave_components, wind=wind, **settings)
+
+
 RUNS = {
     run.case: run
     for run in (
@@ -198,13 +197,8 @@ RUNS = {
             "regwave_H3T5_displaced", 600.0, 0.025, sea=REGULAR,
             options={"kinematics_position": "instantaneous"},
         ),
-        *(
-            _run(f"turb_18mps_Hs7.5_{name}", 600.0, 0.0125, (12.1, 14.92), sea=wave_components, **settings)
-            for name, settings in (
-                ("uniform", UNIFORM),
-                ("uniform_flex", {**UNIFORM, "options": {"tower": "modes"}}),
-                ("box", {"wind": box_wind}),
-            )
-        ),
+        _turbulent("uniform", hub_wind),
+        _turbulent("uniform_flex", hub_wind, options={"tower": "modes"}),
+        _turbulent("box", box_wind),
     )
 }  # fmt: skip

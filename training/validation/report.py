@@ -1,9 +1,11 @@
 """Reports of a validation: the table (CSV and Markdown) and plots of the compared series."""
 
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 import fowt_env
 from fowt_env.files.atomic import remove_leftovers, replacing
@@ -54,30 +56,19 @@ PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra ar
 }
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
-    "costs_rotor": (
-        "rotor models, 18 m/s uniform turbulence and Hs 7.5 m",
-        {
-            "BEM": "uniform wind, no skewed wake",
-            "table": "uniform wind, rotor table",
-            "BEM, skewed wake, dynamic inflow": "uniform wind, dynamic inflow",
-        },
-    ),
-    "costs_wind": (
-        "wind over the rotor, 18 m/s turbulence and Hs 7.5 m",
-        {
-            "full field": "full-field wind",
-            "rotor-averaged": "rotor-averaged wind",
-            "hub wind blown uniformly": "uniform wind",
-        },
-    ),
-    "costs_waves": (
-        "wave kinematics, 18 m/s uniform turbulence and Hs 7.5 m",
-        {
-            "instantaneous, Wheeler": "uniform wind, instantaneous wave kinematics",
-            "fixed, still water": "uniform wind",
-        },
-    ),
-}
+    "costs_rotor": ("rotor models, 18 m/s uniform turbulence and Hs 7.5 m", {
+        "BEM": "uniform wind, no skewed wake", "table": "uniform wind, rotor table",
+        "BEM, skewed wake, dynamic inflow": "uniform wind, dynamic inflow",
+    }),
+    "costs_wind": ("wind over the rotor, 18 m/s turbulence and Hs 7.5 m", {
+        "full field": "full-field wind", "rotor-averaged": "rotor-averaged wind",
+        "hub wind blown uniformly": "uniform wind",
+    }),
+    "costs_waves": ("wave kinematics, 18 m/s uniform turbulence and Hs 7.5 m", {
+        "instantaneous, Wheeler": "uniform wind, instantaneous wave kinematics",
+        "fixed, still water": "uniform wind",
+    }),
+}  # fmt: skip
 
 
 def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=False):
@@ -89,7 +80,7 @@ def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=Fal
     shared = all(frames is panels[0][1] for _, frames in panels)
     rows = figure.subplots(len(panels), 1, sharex=shared, squeeze=False)[:, 0]
     for axes, (channel, frames) in zip(rows, panels, strict=True):
-        style_axes(axes)
+        style_axes(axes, xlabel=xlabel if axes is rows[-1] else None)
         for number, (legend, frame) in enumerate(frames.items()):
             style = {"color": COLOURS[number], "linewidth": 1.0, "label": legend}
             draw(axes, frame, channel, linestyle=LINES[number and (number - 1) % 3 + 1], **style)
@@ -97,21 +88,20 @@ def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=Fal
         axes.set_ylabel(label.replace(")", "²/Hz)") if squared else label, fontsize=8, color=INK)
     ncols = len(panels[0][1])
     rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=ncols, fontsize=8, frameon=False)
-    rows[-1].set_xlabel(xlabel, fontsize=9, color=INK)
     figure.align_ylabels(rows)
     figure.suptitle(title, fontsize=10, color=INK, x=0.01, ha="left")
     return save_figure(figure, path)
 
 
+def _series(axes, frame, channel, window=(0.0, np.inf), **style):
+    part = frame[frame[TIME].between(*window)]
+    axes.plot(part[TIME], part[channel], **style)
+    axes.margins(x=0.0)
+
+
 def _overlay(frames, channels, window, path, title):
     """Draw stacked time series of {legend: frame} over each other."""
-
-    def draw(axes, frame, channel, **style):
-        part = frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
-        axes.plot(part[TIME], part[channel], **style)
-        axes.margins(x=0.0)
-
-    return _stack([(channel, frames) for channel in channels], draw, path, title)
+    return _stack([(c, frames) for c in channels], partial(_series, window=window), path, title)
 
 
 def _spectra(frames, channels, path, title, start=100.0):
@@ -131,32 +121,25 @@ def _spectra(frames, channels, path, title, start=100.0):
 
 def _decays(study, path):
     """Draw the decays, each in its own motion."""
-    cases = [case for case in study.cases if case in study.runs and case.startswith("decay_")]
     panels = []
-    for case in cases:
-        (channel,) = study.cases[case].initial
-        panels.append((channel, dict(zip((THERE, HERE), reversed(study.runs[case]), strict=True))))
-
-    def draw(axes, frame, channel, **style):
-        axes.plot(frame[TIME], frame[channel], **style)
-        axes.margins(x=0.0)
-
-    return _stack(panels, draw, path, "free decays", height=1.4)
+    for case, run in study.cases.items():
+        if case in study.runs and case.startswith("decay_"):
+            ours, theirs = study.runs[case]
+            panels.append((*run.initial, {THERE: theirs, HERE: ours}))
+    return _stack(panels, _series, path, "free decays", height=1.4)
 
 
 def _steady(study, path):
     """Draw errors of the steady curve over wind speed."""
-    rows = [row for row in study.rows if row.case.startswith("steady_")]
+    table = study.table()
+    rows = table[table["case"].str.startswith("steady_")]
     figure = new_figure(9.0, 3.2)
     axes = figure.subplots()
-    style_axes(axes)
-    for number, quantity in enumerate(dict.fromkeys(row.quantity for row in rows)):
-        chosen = [row for row in rows if row.quantity == quantity]
-        wind = [float(row.case.removeprefix("steady_").removesuffix("mps")) for row in chosen]
-        error = [row.error for row in chosen]
-        axes.plot(wind, error, "o-", color=COLOURS[number % len(COLOURS)], markersize=4, label=quantity)
-    axes.set_xlabel("wind (m/s)", fontsize=9, color=INK)
-    axes.set_ylabel("difference to OpenFAST (%)", fontsize=9, color=INK)
+    style_axes(axes, "wind (m/s)", "difference to OpenFAST (%)")
+    for number, (quantity, chosen) in enumerate(rows.groupby("quantity", sort=False)):
+        wind = chosen["case"].str.extract(r"steady_(.*)mps")[0].astype(float)
+        style = {"color": COLOURS[number % len(COLOURS)], "markersize": 4, "label": quantity}
+        axes.plot(wind, chosen["error"], "o-", **style)
     axes.legend(fontsize=8, frameon=False)
     return save_figure(figure, path)
 
@@ -169,86 +152,73 @@ def _responses(study, path):
     names = list(ours.columns[1:])
     figure = new_figure(9.0, 3.2)
     for axes, name in zip(figure.subplots(1, len(names)), names, strict=True):
-        style_axes(axes)
-        unit = "deg/m" if name == "PtfmPitch" else "m/m"
+        style_axes(axes, "rad/s", title=f"{name} ({'deg/m' if name == 'PtfmPitch' else 'm/m'})")
         axes.semilogy(smooth["omega"], smooth[name], "-", color=COLOURS[0], label="frequency domain")
         axes.semilogy(ours["omega"], ours[name], "o", color=COLOURS[1], markersize=4, label=HERE)
         axes.set_ylim(0.5 * ours[name].min(), 3.0 * ours[name].max())
         axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_title(f"{name} ({unit})", fontsize=9, color=INK)
-        axes.set_xlabel("rad/s", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False)
     return save_figure(figure, path)
 
 
 def _poles(study, path):
     """Draw frequencies and damping ratios of the linear models over wind speed."""
-    rows = [row for row in study.rows if "linear model" in row.case]
+    table = study.table()
+    table = table[table["case"].str.contains("linear model")]
+    wind = table["case"].str.extract(r" at (\S+) ")[0].astype(float)
     figure = new_figure(9.0, 3.6)
     panels = figure.subplots(1, 3)
     for axes, quantity in zip(panels, ("frequency", "damping ratio", "rotor pole"), strict=True):
-        style_axes(axes)
-        chosen = [row for row in rows if quantity in row.quantity]
-        for number, name in enumerate(dict.fromkeys(row.quantity for row in chosen)):
-            part = [row for row in chosen if row.quantity == name]
-            wind = [float(row.case.split(" at ")[1].split(" ")[0]) for row in part]
-            label = name.split(" mode")[0]
-            axes.plot(wind, [row.openfast for row in part], "-", color=COLOURS[number])
-            axes.plot(wind, [row.here for row in part], "o", color=COLOURS[number], markersize=4, label=label)
-        axes.set_title(f"{quantity} ({chosen[0].unit})", fontsize=9, color=INK)
-        axes.set_xlabel("wind (m/s)", fontsize=9, color=INK)
+        chosen = table[table["quantity"].str.contains(quantity)]
+        style_axes(axes, "wind (m/s)", title=f"{quantity} ({chosen['unit'].iloc[0]})")
+        for colour, (name, part) in zip(COLOURS, chosen.groupby("quantity", sort=False), strict=False):
+            x, label = wind[part.index], name.split(" mode")[0]
+            axes.plot(x, part["openfast"], "-", color=colour)
+            axes.plot(x, part["here"], "o", color=colour, markersize=4, label=label)
     panels[1].legend(fontsize=8, frameon=False)
     figure.suptitle(f"lines: {THERE}; points: {HERE}", fontsize=10, color=INK, x=0.01, ha="left")
     return save_figure(figure, path)
 
 
-def _generator(study, path):
-    """Draw spectra of the wind at a point and averaged over the rotor: box and generator."""
+def _generator(study, path, per_decade=12):
+    """Draw spectra of the wind at a point and averaged over the rotor: box and generator.
+
+    Means over bins of equal width in the logarithm of the frequency.
+    """
     box, made = study.runs["spectra of the wind"]
     figure = new_figure(9.0, 3.6)
     axes = figure.subplots()
-    style_axes(axes)
-    lines = (
-        (box, "point", "TurbSim box, mean over the points of the disk", 0, "-"),
-        (made, "point", "generator, a point", 1, "--"),
-        (box, "rotor", "TurbSim box, rotor average", 2, "-"),
-        (made, "rotor", "generator, rotor average", 3, "--"),
-    )
-    for frame, name, legend, colour, line in lines:
-        frequency, density = _smooth(frame["frequency"].to_numpy(), frame[name].to_numpy())
-        axes.loglog(frequency, density, line, color=COLOURS[colour], linewidth=1.2, label=legend)
+    style_axes(axes, "frequency (Hz)", "spectrum of u (m²/s²/Hz)")
+    edges = np.logspace(-3, 1, 4 * per_decade + 1)
+    for colour, (frame, name, line, legend) in enumerate((
+        (box, "point", "-", "TurbSim box, mean over the points of the disk"),
+        (made, "point", "--", "generator, a point"),
+        (box, "rotor", "-", "TurbSim box, rotor average"),
+        (made, "rotor", "--", "generator, rotor average"),
+    )):  # fmt: skip
+        mean = frame.groupby(pd.cut(frame["frequency"], edges, right=False), observed=True).mean()
+        style = {"color": COLOURS[colour], "linewidth": 1.2, "label": legend}
+        axes.loglog(mean["frequency"], mean[name], line, **style)
     axes.set_xlim(0.002, 2.0)
-    axes.set_xlabel("frequency (Hz)", fontsize=9, color=INK)
-    axes.set_ylabel("spectrum of u (m²/s²/Hz)", fontsize=9, color=INK)
     axes.legend(fontsize=8, frameon=False)
     return save_figure(figure, path)
 
 
-def _smooth(frequency, density, per_decade=12):
-    """Return means over bins of equal width in the logarithm of the frequency."""
-    edges = np.logspace(-3, 1, 4 * per_decade + 1)
-    which = np.digitize(frequency, edges)
-    bins = [which == k for k in range(1, len(edges)) if (which == k).any()]
-    return np.array([frequency[b].mean() for b in bins]), np.array([density[b].mean() for b in bins])
-
-
 def write_plots(study, folder):
     """Write the plots of the runs of the study; return their paths."""
-    folder = Path(folder)
-    paths = []
+    folder, paths = Path(folder), []
 
     def path(name):
         paths.append(folder / f"{name}.png")
         return paths[-1]
 
-    if any(case.startswith("decay_") for case in study.runs):
-        _decays(study, path("decays"))
-    if any(row.case.startswith("steady_") for row in study.rows):
-        _steady(study, path("steady"))
-    if "responses" in study.runs:
-        _responses(study, path("responses"))
-    if any("linear model" in row.case for row in study.rows):
-        _poles(study, path("linear"))
+    cases = [*study.runs, *(row.case for row in study.rows)]
+    for name, draw, words in (
+        ("decays", _decays, "decay_"), ("steady", _steady, "steady_"),
+        ("responses", _responses, "responses to small waves"), ("linear", _poles, "linear model at"),
+    ):  # fmt: skip
+        if any(case.startswith(words) for case in cases):
+            draw(study, path(name))
     for case, (channels, window, spectra) in PLOTS.get(study.platform, {}).items():
         if case in study.runs:
             ours, theirs = study.runs[case]
@@ -267,47 +237,41 @@ def write_plots(study, folder):
     return paths
 
 
-def _shown(value):
-    """Return a number as text, empty for NaN."""
-    return "" if not np.isfinite(value) else f"{value:.5g}"
-
-
-def markdown(study, plots=(), date=None):
+def markdown(study, plots=()):
     """Return Markdown of the tables, one per case, each with the plots of its name; other plots come first.
 
-    plots: names of files beside the text; date: as YYYY-MM-DD, default today
+    plots: names of files beside the text
     """
-    date = f"{datetime.now(UTC):%Y-%m-%d}" if date is None else date
     cases = list(dict.fromkeys(row.case for row in study.rows))
     owned = {case: [f"{case}.png", f"{case}_spectra.png"] for case in cases}
     others = [name for name in plots if not any(name in names for names in owned.values())]
+
+    def images(names):
+        found = [f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names]
+        return [*found, ""] if found else []
+
+    def shown(value, digits=5):
+        return "" if not np.isfinite(value) else f"{value:.{digits}g}"
+
     lines = [
         f"# Every figure of {study.platform}", "",
-        f"{date}, version {fowt_env.__version__}: `fowt validate --platform {study.platform}`. Without an"
-        " allowed error a figure is reported, not judged.", "",
-        *_images(others),
+        f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}: `fowt validate --platform"
+        f" {study.platform}`. Without an allowed error a figure is reported, not judged.", "",
+        *images(others),
     ]  # fmt: skip
     for case in cases:
-        rows = [row for row in study.rows if row.case == case]
+        cells = []
+        for row in (row for row in study.rows if row.case == case):
+            quantity = f"{row.quantity} ({row.note})" if row.note else row.quantity
+            error = shown(row.error, 3)
+            error = f"**{error}, missed**" if row.verdict == "MISSED" else error
+            values = shown(row.openfast), shown(row.here), error, shown(row.allowed, 6)
+            cells.append((quantity, row.unit, *values))
         against = "OpenFAST" if "against" not in case else "reference"
         header = ("figure", "unit", against, "here", "error %", "allowed %")
-        cells = []
-        for row in rows:
-            quantity = f"{row.quantity} ({row.note})" if row.note else row.quantity
-            error = "" if not np.isfinite(row.error) else f"{row.error:.3g}"
-            error = f"**{error}, missed**" if row.verdict == "MISSED" else error
-            allowed = "" if not np.isfinite(row.allowed) else f"{row.allowed:g}"
-            values = (_shown(row.openfast), _shown(row.here), error, allowed)
-            cells.append((quantity, row.unit, *values))
         lines += [f"## {case}", "", markdown_table(header, cells), ""]
-        lines += _images(name for name in owned[case] if name in plots)
+        lines += images(name for name in owned[case] if name in plots)
     return "\n".join(lines)
-
-
-def _images(names):
-    """Return lines of Markdown that show images."""
-    lines = [f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names]
-    return [*lines, ""] if lines else []
 
 
 def write_validation_report(study, folder, plots=True):

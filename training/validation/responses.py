@@ -1,7 +1,6 @@
 """Semi-submersible and barge against the frequency domain: natural periods, and responses to small waves.
 
-The plant runs in one sea of a few small components, with quadratic drag left out; the motion at each
-frequency is fitted. The other side is frequency_domain.py, which knows nothing of the plant.
+The plant runs in a sea of a few small components without quadratic drag; motions are fitted by frequency.
 """
 
 import tomllib
@@ -65,10 +64,7 @@ def _decaying(time, rates):
 
 
 def fitted(time, value, omega, slow):
-    """Return complex amplitudes (n,) of value ~ Re(sum c exp(i omega t)) beside decaying modes.
-
-    slow: complex rates (1/s) of the modes that the start has left, whose amplitudes are fitted too.
-    """
+    """Return complex amplitudes (n,) of value ~ Re(sum c exp(i omega t)) beside modes of rates slow."""
     waves = [wave for w in omega for wave in (np.cos(w * time), -np.sin(w * time))]
     one, *modes = _decaying(time, slow)
     solution = np.linalg.lstsq(np.column_stack([one, *waves, *modes]), value, rcond=None)[0]
@@ -87,8 +83,7 @@ def sea(omega):
 def modal_rates(time, values, guess):
     """Return complex rates (n,), 1/s and rad/s, of the decaying modes that (m, k) values consist of.
 
-    values ~ c + sum Re(a_j exp(s_j t)) with the same s_j = -rate.real + i rate.imag in all columns: nonlinear
-    least squares in the rates, linear in the rest.
+    values ~ c + sum Re(a_j exp(s_j t)), the same s_j = -rate.real + i rate.imag in all columns.
     """
     scale = values.std(axis=0)
 
@@ -106,27 +101,24 @@ def periods(name, study):
     """Compare damped natural periods of small free decays with those of Cummins' equation in numpy: 1 %."""
     study.say("natural periods")
     scene = without_drag(build_scene(name, fidelity="reference"))
-    point = trim(scene)
-    initial = {
-        channel: point[channel.split("_[")[0]] + OFFSET for group in DECAYING for channel in group.values()
-    }
+    point, channels = trim(scene), [channel for group in DECAYING for channel in group.values()]
+    initial = {channel: point[name_and_unit(channel)[0]] + OFFSET for channel in channels}
     frame = simulate(scene, None, duration=DECAY, dt=STEP, output_dt=0.1, initial=initial)
     body = body_of(name)
     modes = body.natural_modes()
     offset = OFFSET * np.array([1.0, 1.0, 1.0, *[DEGREE] * 3])
     _, motion = body.free_decay(offset, DECAY, STEP)
     kept = frame[frame[TIME] >= SETTLING]
-    time = kept[TIME].to_numpy()
-    theirs = motion[:: round(0.1 / STEP)][-len(kept) :]
+    time, theirs = kept[TIME].to_numpy(), motion[:: round(0.1 / STEP)][-len(kept) :]
     for group in DECAYING:
         guess = [complex(modes[m][1] * modes[m][0], modes[m][0]) for m in group]
         columns = [frequency_domain.NAMES.index(m) for m in group]
         here = modal_rates(time, kept[list(group.values())].to_numpy(), guess)
         there = modal_rates(time, theirs[:, columns], guess)
-        for label, ours, wanted in zip(group, here, there, strict=True):
-            ratios = [rate.real / abs(rate) for rate in (wanted, ours)]
+        for label, *pair in zip(group, there, here, strict=True):
+            ratios = [rate.real / abs(rate) for rate in pair]
             note = f"damping ratio {ratios[0]:.3g}, here {ratios[1]:.3g}"
-            both = 2.0 * np.pi / wanted.imag, 2.0 * np.pi / ours.imag
+            both = [2.0 * np.pi / rate.imag for rate in pair]
             case = "natural periods (against the frequency domain)"
             study.add(case, label, "s", *both, allowed=1.0, note=note)
 

@@ -43,9 +43,9 @@ def decay_decrement(time, value, centre, cycle=1):
 
 
 def ringing(time, value, low, high):
-    """Return (Hz, damping ratio) of a damped oscillation of a series between two frequencies (Hz).
+    """Return (Hz, damping ratio) of a damped oscillation between two frequencies (Hz), by least squares.
 
-    A least-squares fit beside a polynomial of eighth order, which takes slower motion.
+    A polynomial of eighth order takes slower motion.
     """
     at = (time - time.mean()) / (0.5 * (time[-1] - time[0]))
     slow = np.polynomial.chebyshev.chebvander(at, 8)
@@ -68,9 +68,8 @@ def ringing(time, value, low, high):
 def recovery(time, value, step, settled):
     """Return (level before, level after, overshoot, its time) of a series with a step at `step` s.
 
-    The level after is the mean from `settled` on. The overshoot is how far the series passes it, with
-    its sign, and its time (s) the integral of the deviation from there on over the overshoot: the time
-    constant of an exponential.
+    The level after is the mean from `settled` on, the overshoot how far the series passes it, with its sign,
+    its time (s) the integral of the deviation from there on over it: the time constant of an exponential.
     """
     before, after = value[time < step].mean(), value[time >= settled].mean()
     first = np.flatnonzero(time >= step)[0]

@@ -1,12 +1,11 @@
 """Towers that bend against OpenFAST: frequency, tower-base moment by bands, motions as of rigid ones.
 
-VolturnUS-S with the first tower modes alone, as here. OC3-Hywind with every degree of freedom of ElastoDyn:
-blades, drivetrain and second tower modes bend there and not here.
+VolturnUS-S with the first tower modes alone, as here; OC3-Hywind with every degree of freedom of ElastoDyn.
 """
 
 import numpy as np
 
-from fowt_env.training.validation.comparison import SETTLED, TIME, Channel, name_and_unit
+from fowt_env.training.validation.comparison import SETTLED, Channel
 from fowt_env.training.validation.openfast_cases import without_rosco
 from fowt_env.training.validation.signal_errors import band_energy, ringing
 
@@ -25,15 +24,13 @@ def _turbulent(study, case, channels):
     Base moment over the wind by bands 5 %, deflection 5 %; motions, rotor and lines as of the rigid turbine,
     deviations 3 %. The rest is reported.
     """
-    ours, theirs = study.pair(case, SETTLED)
-    time = theirs[TIME].to_numpy()
-    name, unit = name_and_unit(MOMENT)
+    name, unit, time, *both = study.series(case, MOMENT, SETTLED)
     for band, (low, high) in BANDS.items():
-        both = [np.sqrt(band_energy(time, f[MOMENT].to_numpy(), low, high)) for f in (theirs, ours)]
+        sizes = [np.sqrt(band_energy(time, value, low, high)) for value in both]
         quantity = f"{name}, standard deviation from {low:g} to {high:g} Hz ({band})"
-        study.add(case, quantity, unit, *both, allowed=5.0)
+        study.add(case, quantity, unit, *sizes, allowed=5.0)
     for channel in (MOMENT, FORE_AFT, NACELLE, ROLLING, SIDE_SIDE):
-        if channel in theirs:
+        if channel in study.pair(case)[1]:
             allowed = 5.0 if channel in (MOMENT, FORE_AFT) else float("nan")
             study.add_statistics(case, (channel,), std=allowed)
     study.add_statistics(case, channels, ("std", "rms"), std=3.0)
@@ -45,12 +42,10 @@ def volturnus(study):
     The tower rings in the decay: frequency 1 %, damping ratio 5 %.
     """
     case = "decay_pitch_tower"
-    ours, theirs = (
-        ringing(f[TIME].to_numpy(), f[FORE_AFT].to_numpy(), *RINGING)
-        for f in study.pair(case, *RINGING_WINDOW)
-    )
-    study.add(case, "tower, fore-aft frequency", "Hz", theirs[0], ours[0], allowed=1.0)
-    study.add(case, "tower, damping ratio", "-", theirs[1], ours[1], allowed=5.0)
+    _, _, time, *both = study.series(case, FORE_AFT, *RINGING_WINDOW)
+    frequencies, ratios = zip(*(ringing(time, value, *RINGING) for value in both), strict=True)
+    study.add(case, "tower, fore-aft frequency", "Hz", *frequencies, allowed=1.0)
+    study.add(case, "tower, damping ratio", "-", *ratios, allowed=5.0)
     study.add_decay(case, Channel.PITCH, 300.0, period=0.5, decrement=5.0, rms=4.0)
     if without_rosco():
         study.say("without ROSCO: its library is not installed")

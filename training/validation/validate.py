@@ -1,11 +1,8 @@
 """Validation of OC3-Hywind against OpenFAST, and the validations of all platforms.
 
-Windows: decays and the floating steady winds over the whole record from the common start, turbulent cases
-from 100 s on, regular waves over the last 200 s. An error is normalised by the standard deviation of the
-reference over the same window; relative errors are of the reference. Nothing here is adjusted to fit.
+Decays and floating steady winds count from the start, turbulence from 100 s on, regular waves over the last
+200 s. An error is normalised by the standard deviation of the reference. Nothing here is adjusted to fit.
 """
-
-from math import pi
 
 import numpy as np
 
@@ -20,7 +17,6 @@ from fowt_env.training.validation.comparison import (
     Channel,
     Study,
     name_and_unit,
-    phase,
     since,
 )
 from fowt_env.training.validation.openfast_cases import DECAYS, PLATFORM, RUNS, steady_reference
@@ -62,45 +58,34 @@ def floating(study):
 
 def waves(study):
     """Compare a regular wave H 3 m T 5 s: first harmonics 1 %; second ones reported for four kinematics."""
-    omega = 2.0 * pi / 5.0
-    for case in ("regwave_H3T5", "regwave_H3T5_displaced"):
-        ours, theirs = study.pair(case, *WAVE_WINDOW)
-        for channel in (Channel.SURGE, Channel.HEAVE, Channel.PITCH, *Channel.TENSIONS):
-            name, unit = name_and_unit(channel)
-            there, here = (
-                harmonics(f[TIME].to_numpy(), f[channel].to_numpy(), omega)[0] for f in (theirs, ours)
-            )
-            first = abs(there), abs(here)
-            error = 100.0 * abs(here - there) / abs(there)
-            study.add(case, f"{name}, first harmonic", unit, *first, allowed=1.0, note=phase(here, there))
-            study.add(case, f"{name}, first harmonic as a vector", unit, *first, error)
-    second = {"fixed": "regwave_H3T5", "instantaneous": "regwave_H3T5_displaced"}
+    cases = {"fixed": "regwave_H3T5", "instantaneous": "regwave_H3T5_displaced"}
+    for case in cases.values():
+        study.add_harmonics(case, (*Channel.PLANE, *Channel.TENSIONS), 5.0, WAVE_WINDOW, vector=True)
     for position, surface, stretching in COMBINATIONS:
         study.say(f"regular wave, position {position}, surface {surface}")
         options = {"kinematics_position": position, "surface": surface, "stretching": stretching}
         frames = [RUNS["regwave_H3T5"].frame(study.folder, **options)]
         if surface == "swl":
-            frames.append(study.pair(second[position])[1])
+            frames.append(study.pair(cases[position])[1])
         for channel in (Channel.SURGE, Channel.PITCH, Channel.TENSIONS[0]):
             ratio = []
             for part in since(frames, *WAVE_WINDOW):
-                c = np.abs(harmonics(part[TIME].to_numpy(), part[channel].to_numpy(), omega))
+                c = np.abs(harmonics(part[TIME].to_numpy(), part[channel].to_numpy(), 2.0 * np.pi / 5.0))
                 ratio.append(100.0 * c[1] / c[0])
+            here, there = (*ratio, float("nan"))[:2]
             case = f"second harmonic, position {position}, surface {surface}"
             quantity = f"{name_and_unit(channel)[0]}, second over first harmonic"
-            theirs = ratio[1] if len(ratio) > 1 else float("nan")
-            study.add(case, quantity, "%", theirs, ratio[0], float("nan"))
+            study.add(case, quantity, "%", there, here, float("nan"))
 
 
 def steps(study):
     """Compare wind steps 12 to 24 m/s: each step with its mean removed, normalised rms error 5 %."""
     case = "float_windsteps_12_24"
     for channel in (Channel.SPEED, Channel.BLADE, Channel.PITCH):
-        name, unit = name_and_unit(channel)
         for number in range(13):
-            pair = study.pair(case, 100.0 * number, 100.0 * (number + 1) - 0.05)
-            ours, theirs = (frame[channel].to_numpy() for frame in pair)
-            error = 100.0 * normalised_rms(ours - ours.mean(), theirs - theirs.mean())
+            name, unit, _, *both = study.series(case, channel, 100.0 * number, 100.0 * (number + 1) - 0.05)
+            theirs, ours = (value - value.mean() for value in both)
+            error = 100.0 * normalised_rms(ours, theirs)
             quantity = f"{name} at {12 + number} m/s, normalised rms error without mean"
             study.add(case, quantity, unit, theirs.std(), ours.std(), error, 5.0)
 
@@ -110,24 +95,15 @@ def turbulence(study):
 
     Standard deviations 3 %, energies of frequency bands 5 %, rms errors 10 %.
     """
+    operating = (Channel.SPEED, Channel.BLADE, Channel.POWER, Channel.THRUST)
     for case in ("turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"):
-        ours, theirs = study.pair(case, SETTLED)
-        channels = (
-            *Channel.MOTIONS,
-            Channel.SPEED,
-            Channel.BLADE,
-            Channel.POWER,
-            Channel.THRUST,
-            *Channel.TENSIONS,
-        )
-        study.add_statistics(case, channels, ("std",), std=3.0)
-        time = theirs[TIME].to_numpy()
+        study.add_statistics(case, (*Channel.MOTIONS, *operating, *Channel.TENSIONS), ("std",), std=3.0)
         for channel in (Channel.PITCH, Channel.SPEED):
-            name, unit = name_and_unit(channel)
+            name, unit, time, *both = study.series(case, channel, SETTLED)
             for band, (low, high) in BANDS.items():
-                both = [band_energy(time, f[channel].to_numpy(), low, high) for f in (theirs, ours)]
+                energies = [band_energy(time, value, low, high) for value in both]
                 quantity = f"{name}, energy in {low:g} to {high:g} Hz ({band})"
-                study.add(case, quantity, f"({unit})^2", *both, allowed=5.0)
+                study.add(case, quantity, f"({unit})^2", *energies, allowed=5.0)
         study.add_statistics(case, (Channel.PITCH, Channel.SPEED), ("rms",), rms=10.0)
 
 
@@ -153,8 +129,7 @@ def validate_cases(groups=None, folder=None, bts=None, report=None, platform="oc
     """Return a Study with every row of the groups (names of the platform's groups; None: all but costs).
 
     folder: reference series (None: training/validation/reference); bts: the full TurbSim box instead of the
-    stored region; report: called with (text, runs done, runs in all) before each run; platform: a name of
-    PLATFORMS.
+    stored region; report: called with (text, runs done, runs in all) before each run.
     Raises: InputError for an unknown platform or group or a missing reference.
     """
     if platform not in PLATFORMS:

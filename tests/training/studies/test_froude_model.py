@@ -5,7 +5,7 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from fowt_env import build_scene, natural_periods, simulate, trim
+from fowt_env import build_scene, simulate, trim
 from fowt_env.descriptions.platform import DATA, Line, read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
@@ -40,13 +40,6 @@ def test_the_built_in_files_are_those_that_the_script_writes():
     assert text == turbine_text(read_turbine("nrel5mw"), NAME, scale, "nrel5mw/polars")
 
 
-def test_the_files_say_that_they_are_scaled_and_not_real():
-    for path, what in ((f"platforms/{NAME}.toml", "PLATFORM"), (f"turbines/{NAME}/turbine.toml", "TURBINE")):
-        assert f"NOT A REAL {what}" in (DATA / path).read_text().splitlines()[0]
-    assert "not a real platform" in read_platform(NAME).source
-    assert "not a real turbine" in read_turbine(NAME).source
-
-
 def test_every_figure_of_a_description_has_its_power_of_the_scale():
     platform, turbine = read_platform("oc3_hywind"), read_turbine("nrel5mw")
     records = {name: getattr(platform, name) for name in ("environment", "ballast", "hull", "hydro", "tower")}
@@ -59,12 +52,6 @@ def test_every_figure_of_a_description_has_its_power_of_the_scale():
     assert set(EXPONENTS["lines"]) == set(Line.model_fields)
     apart = {"name", "source", "gains", "blade", "discon", *records}
     assert set(EXPONENTS["turbine"]) == set(type(turbine).model_fields) - apart
-
-
-def test_natural_periods_grow_with_the_root_of_the_scale():
-    small, large = (natural_periods(build_scene(name, fidelity="reference")) for name in ("oc3_hywind", NAME))
-    for motion, period in small.items():
-        assert large[motion] == pytest.approx(period * sqrt(SCALE), rel=1e-5), motion
 
 
 def test_the_operating_point_is_that_of_the_original_times_powers_of_the_scale(pair):

@@ -51,7 +51,7 @@ def test_the_six_computed_periods_of_table_1_are_met_within_half_a_percent():
     assert periods == pytest.approx(TABLE_1, rel=0.005)
 
 
-def test_only_lines_hold_the_model_and_all_of_their_parameters_are_positive(model):
+def test_only_lines_hold_the_model_which_floats_at_its_design_draft(model):
     assert model.hydro.yaw_stiffness == 0.0
     assert len(model.lines) == 6
     for line in model.lines:
@@ -59,12 +59,8 @@ def test_only_lines_hold_the_model_and_all_of_their_parameters_are_positive(mode
         rest = identify.pull_at_rest(line)
         assert rest.regime == 2 and rest.anchor_tension > 0.9 * rest.fairlead_tension  # taut, no touchdown
     assert min(model.ballast.mass, *model.ballast.inertia) > 0.0
-
-
-def test_the_model_floats_at_its_design_draft():
-    point = fowt_env.trim(fowt_env.build_scene(load_cases.PLATFORM, fidelity="reference"))
     # the nacelle's offset leans it by a tenth of a degree, which lowers it a little
-    assert abs(point["PtfmHeave"]) < 1e-4
+    assert abs(fowt_env.trim(fowt_env.build_scene(model, fidelity="reference"))["PtfmHeave"]) < 1e-4
 
 
 def test_the_model_is_oc3_hywind_by_froude_but_for_what_was_identified(model):
@@ -90,7 +86,7 @@ def test_rated_thrust_is_froude_scaled_in_lc2_with_the_one_polar_factor(model):
 
 @pytest.mark.slow
 def test_the_committed_model_is_what_the_identification_gives(model):
-    again, _ = identify.identify()
+    again = identify.identify()
     assert again.ballast.mass == pytest.approx(model.ballast.mass, rel=1e-6)
     assert again.ballast.inertia[0] == pytest.approx(model.ballast.inertia[0], rel=1e-6)
     for one, other in zip(again.lines, model.lines, strict=True):
@@ -131,13 +127,6 @@ def test_a_static_pull_is_zero_at_rest_and_grows_with_the_offset(platform, direc
 
 
 # Claims of the figures
-
-
-@study
-def test_every_load_case_runs_and_stays_finite(runs):
-    for frame in runs.values():
-        assert len(frame) == round(load_cases.DURATION / load_cases.OUTPUT) + 1
-        assert np.isfinite(frame.to_numpy()).all()
 
 
 @study

@@ -20,7 +20,7 @@ from fowt_env.training.validation.frequency_domain import (
     weight,
     weight_stiffness,
 )
-from fowt_env.training.validation.responses import BODIES, body_of
+from fowt_env.training.validation.responses import body_of
 
 LINE = CatenaryLine((-837.6, 0.0, -200.0), (-40.868, 0.0, -14.0), 835.35, 1065.7, 7.536e8)
 
@@ -146,4 +146,3 @@ def test_missing_arrays_and_headings_are_named(tmp_path):
         read_arrays(tmp_path / "none.npz")
     with pytest.raises(InputError, match="heading"):
         box().excitation(1.0, heading=0.5)
-    assert set(BODIES) == {"nrel5mw_iti_barge", "nrel5mw_oc4_semi"}

@@ -1,13 +1,10 @@
 """The paper's 1:50 model as description files: Froude-scaled OC3-Hywind with an identified mooring.
 
-The paper prints neither masses nor mooring. Hull, tower, rotor and hydrodynamic constants are OC3-Hywind by
-Froude's law. Identified, so that the six computed periods of Table 1 come out: stiffness EA, anchor radius
-and length of the taut lines (theory.md Eqs. (18)(19)), the floater's pitch inertia, and its mass, which
-keeps the weight, the pull of the lines and the buoyancy in balance at the design draft. One factor on
+The paper prints neither masses nor mooring. Identified, so that the six computed periods of Table 1 come out:
+stiffness EA, anchor radius and length of the taut lines (theory.md Eqs. (18)(19)), the floater's pitch
+inertia, and its mass, which keeps weight, lines and buoyancy in balance at the design draft. One factor on
 the polars gives the Froude-scaled rated thrust in the rated condition of the paper (LC2), whose wind is
 twice the Froude-scaled one: at the model's Reynolds number airfoils lift less.
-
-`python -m fowt_env.training.studies.froude_model.identify` writes the files anew.
 """
 
 from math import cos, hypot, pi, sin
@@ -66,36 +63,25 @@ def lines(EA, anchor_radius, stretch, fairlead_radius, fairlead_z):
 
     stretch: unstretched length over the straight distance at rest.
     """
+
+    def point(radius, azimuth, z):
+        return round(radius * cos(azimuth * DEGREE), 12), round(radius * sin(azimuth * DEGREE), 12), z
+
     result = []
     for azimuth in AZIMUTHS:
-        anchor = _point(anchor_radius, azimuth, -DEPTH)
+        anchor = point(anchor_radius, azimuth, -DEPTH)
         for side in (-BRIDLE, BRIDLE):
-            fairlead = _point(fairlead_radius, azimuth + side, fairlead_z)
-            span = float(np.linalg.norm(np.subtract(anchor, fairlead)))
-            result.append(
-                Line(anchor=anchor, fairlead=fairlead, length=stretch * span, wet_weight=WET_WEIGHT, EA=EA)
-            )
+            fairlead = point(fairlead_radius, azimuth + side, fairlead_z)
+            length = stretch * float(np.linalg.norm(np.subtract(anchor, fairlead)))
+            ends = {"anchor": anchor, "fairlead": fairlead}
+            result.append(Line(**ends, length=length, wet_weight=WET_WEIGHT, EA=EA))
     return tuple(result)
-
-
-def _point(radius, azimuth, z):
-    angle = azimuth * DEGREE
-    return (round(radius * cos(angle), 12), round(radius * sin(angle), 12), z)
 
 
 def pull_at_rest(line):
     """Return the catenary of a line with the platform at its design position."""
     dx, dy, dz = np.subtract(line.fairlead, line.anchor)
     return catenary(hypot(dx, dy), dz, line.length, line.wet_weight, line.EA, 0.0, 0.0)
-
-
-def displaced_volume(hull):
-    """Return the volume (m3) of a hull below still water."""
-    total = 0.0
-    tops = [*hull.z[1:-1], 0.0]
-    for low, high, a, b in zip(hull.z[:-1], tops, hull.diameter[:-1], hull.diameter[1:], strict=True):
-        total += (high - low) * pi / 12.0 * (a * a + a * b + b * b)
-    return total
 
 
 def model_turbine():
@@ -106,8 +92,6 @@ def model_turbine():
         values = model_scaled(record, name)
         return {k: v * full.drivetrain.gear_ratio ** GEARED.get(k, 0) for k, v in values.items()}
 
-    rate_limit = model_scaled(full.pitch_drive, "pitch_drive")["rate_limit"]
-    gains = {f"gains.{name}": on_rotor(record, "gains") for name, record in full.gains.items()}
     return {
         "name": TURBINE,
         **model_scaled(full, "turbine"),
@@ -115,10 +99,11 @@ def model_turbine():
         "nacelle": model_scaled(full.nacelle, "nacelle"),
         "drivetrain": {"gear_ratio": 1.0, "generator_inertia": 0.0, "generator_efficiency": 1.0},
         "pitch_drive": {
-            "time_constant": 0.0, "rate_limit": rate_limit, "minimum_deg": 0.0, "maximum_deg": 90.0,
+            "time_constant": 0.0, "rate_limit": model_scaled(full.pitch_drive, "pitch_drive")["rate_limit"],
+            "minimum_deg": 0.0, "maximum_deg": 90.0,
         },
         "torque_law": on_rotor(full.torque_law, "torque_law"),
-        **gains,
+        **{f"gains.{name}": on_rotor(record, "gains") for name, record in full.gains.items()},
         "blade": {"stations": "blade.csv", "polars": "polars"},
     }  # fmt: skip
 
@@ -131,53 +116,47 @@ def froude_platform(turbine):
         "hydro": {"yaw_stiffness": 0.0},
         "tower": {"modes": None},
     }
-    parts = {}
+    parts = {"name": NAME, "turbine": turbine, "lines": (), "published": {}}
     for name in PARTS:
         values = model_scaled(getattr(full, name), name)
         values = {key: tuple(value) if isinstance(value, list) else value for key, value in values.items()}
         parts[name] = getattr(full, name).model_copy(update=values | chosen.get(name, {}))
-    parts |= {"name": NAME, "turbine": turbine, "lines": (), "published": {}}
     return full.model_copy(update=parts)
 
 
 def candidate(base, above, unknowns):
-    """Return the Platform with the unknowns put in, ballast balancing buoyancy and lines.
-
-    above: mass (kg) above the hull; unknowns: as START.
-    """
+    """Return the Platform with unknowns as START put in, ballast balancing buoyancy and lines; above: kg."""
     EA, anchor_radius, stretch, inertia = unknowns
-    full = read_platform("oc3_hywind").lines[0].fairlead
+    full, hull, environment = read_platform("oc3_hywind").lines[0].fairlead, base.hull, base.environment
     moorings = lines(EA, anchor_radius, stretch, full[0] * SCALE, full[2] * SCALE)
     down = sum(pull_at_rest(line).V for line in moorings)
-    environment = base.environment
-    mass = environment.water_density * displaced_volume(base.hull) - down / environment.gravity - above
+    ends = zip(hull.z[:-1], [*hull.z[1:-1], 0.0], hull.diameter[:-1], hull.diameter[1:], strict=True)
+    volume = sum((high - low) * pi / 12.0 * (a * a + a * b + b * b) for low, high, a, b in ends)
+    mass = environment.water_density * volume - down / environment.gravity - above
     changes = {"mass": mass, "inertia": (inertia, inertia, base.ballast.inertia[2])}
     return base.model_copy(update={"lines": moorings, "ballast": base.ballast.model_copy(update=changes)})
 
 
 def identify(turbine=TURBINE):
-    """Return (Platform, {motion: period s}) with the four unknowns that give the periods of Table 1."""
-    base = froude_platform(turbine)
-    machine = read_turbine(turbine)
+    """Return the Platform with the four unknowns that give the periods of Table 1."""
+    base, machine = froude_platform(turbine), read_turbine(turbine)
     above = base.tower.mass + machine.nacelle.mass + machine.rotor.mass
-    wanted = ("surge", "heave", "yaw", "platform_pitch")
 
     def misses(logarithms):
         platform = candidate(base, above, np.exp(logarithms))
         periods = natural_periods(build_scene(platform, fidelity="reference"))
+        wanted = ("surge", "heave", "yaw", "platform_pitch")
         return [np.log(periods[name] / PERIODS[name]) for name in wanted]
 
     solution, _, found, text = fsolve(misses, np.log(START), xtol=1e-9, full_output=True)
     if found != 1:
         raise RuntimeError(f"the periods of Table 1 are not reached: {text}")
-    platform = candidate(base, above, np.exp(solution))
-    return platform, natural_periods(build_scene(platform, fidelity="reference"))
+    return candidate(base, above, np.exp(solution))
 
 
 def with_polars(turbine, polars, factor=1.0):
     """Return the turbine with these polars, their coefficients times a factor."""
-    scale = np.array([1.0, factor, factor, factor])
-    polars = {name: polar * scale for name, polar in polars.items()}
+    polars = {name: polar * np.array([1.0, *[factor] * 3]) for name, polar in polars.items()}
     return turbine.model_copy(update={"blade": turbine.blade.model_copy(update={"polars": polars})})
 
 
@@ -242,7 +221,7 @@ def write_turbine(factor):
 def write():
     """Identify everything and write turbine and platform; return the path of the platform file."""
     write_turbine(1.0)
-    platform, _ = identify()
+    platform = identify()
     factor = polar_factor(platform)
     write_turbine(factor)
     text = [PLATFORM_HEADER, f'name = "{NAME}"', f'turbine = "{TURBINE}"']

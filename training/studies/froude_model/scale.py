@@ -4,11 +4,8 @@ Lengths by the scale L, speeds and times by sqrt(L), masses and forces by L^3 (w
 are), power by L^3.5: 10 MW from 5 MW is L = 2^(1/3.5) = 1.219. Blade twist, polars and all coefficients stay.
 
 The result is similar to its original, not a design: masses of real turbines grow less than L^3, rated wind
-speed does not grow with size, and it has not been built. It shows that the description carries another size,
-and serves where a control law is to be tried on one.
-
-`python -m fowt_env.training.studies.froude_model.scale --help` has the settings; without any it writes the
-built-in oc3_froude_10mw.
+speed does not grow with size, and it has not been built. Without settings (--help) the built-in
+oc3_froude_10mw is written.
 """
 
 from pathlib import Path
@@ -105,11 +102,11 @@ LABEL = """\
 
 def toml_value(value):
     """Return a TOML value as text, numbers to 10 digits."""
-    if isinstance(value, str):
-        return f'"{value}"'
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(toml_value(item) for item in value) + "]"
-    return repr(value) if isinstance(value, int) else f"{float(value):.10g}"
+        return "[" + ", ".join(map(toml_value, value)) + "]"
+    return (
+        f'"{value}"' if isinstance(value, str) else f"{value}" if isinstance(value, int) else f"{value:.10g}"
+    )
 
 
 def entries(values):
@@ -133,21 +130,19 @@ def scaled(record, name, scale, density=1.0):
     """Return {field: value} of the fields that a record sets, times their powers of the scale.
 
     name: key of EXPONENTS; density: ratio of the densities of water, by which all that holds a mass changes
-    too. That is what grows with the second power of the scale or more. A field with a table of its own is
-    left out.
+    too: what grows with the power MASSIVE or more. A field with a table of its own is left out.
     """
     result = {}
     for field, value in record.model_dump(exclude_unset=True, exclude_none=True).items():
         if field not in EXPONENTS[name] or isinstance(value, dict):
             continue
         exponent = EXPONENTS[name][field]
-        if isinstance(value, int | str):
-            result[field] = value
-        elif isinstance(value, float):
-            result[field] = value * scale**exponent * (density if exponent >= MASSIVE else 1.0)
-        else:
+        if isinstance(value, float):
+            value = value * scale**exponent * (density if exponent >= MASSIVE else 1.0)
+        elif not isinstance(value, int | str):
             factor = scale ** np.asarray(exponent) * np.where(np.asarray(exponent) >= MASSIVE, density, 1.0)
-            result[field] = (np.asarray(value) * factor).tolist()
+            value = (np.asarray(value) * factor).tolist()
+        result[field] = value
     return result
 
 
@@ -178,14 +173,13 @@ def platform_text(platform, name, turbine_name, scale):
         lines += toml_table(part, scaled(getattr(platform, part), part, scale))
     for line in platform.lines:
         lines += ["", "[[lines]]", *entries(scaled(line, "lines", scale))]
-    if platform.options:
-        lines += toml_table("options", platform.options)
-    figures = {k: platform.published[k] * scale**e for k, e in PUBLISHED.items() if k in platform.published}
-    if figures:
-        lines += toml_table("published", figures)
-    periods = platform.published.get("natural_periods", {})
-    if periods:
-        lines += toml_table("published.natural_periods", {k: v * scale**TIME for k, v in periods.items()})
+    own = platform.published
+    figures = {key: own[key] * scale**power for key, power in PUBLISHED.items() if key in own}
+    periods = {key: value * scale**TIME for key, value in own.get("natural_periods", {}).items()}
+    tables = {"options": platform.options, "published": figures, "published.natural_periods": periods}
+    for heading, values in tables.items():
+        if values:
+            lines += toml_table(heading, values)
     return "\n".join(lines) + "\n"
 
 
@@ -204,8 +198,7 @@ def polar_files(turbine, words, angle_digits=10, digits=10):
     for name, polar in turbine.blade.polars.items():
         rows = [f"# {name} {words}", "alpha_deg,cl,cd,cm"]
         for alpha, *values in polar:
-            texts = (f"{alpha / DEGREE:.{angle_digits}g}", *(f"{value:.{digits}g}" for value in values))
-            rows.append(",".join(texts))
+            rows.append(f"{alpha / DEGREE:.{angle_digits}g}," + ",".join(f"{v:.{digits}g}" for v in values))
         files[f"{name}.csv"] = "\n".join(rows) + "\n"
     return files
 

@@ -2,12 +2,12 @@
 
 Rotor speed and blade pitch are prescribed at model scale, theory.md Eq. (20). A run starts at its steady
 state in the mean wind; waves start at once, as a wave maker's do, so that a record holds the transient of
-its start. The wind is the printed one, with a turbulence intensity of 3 %, a choice: the paper says "low" and
-prints no value. What is identified and what is not: training/studies/froude_model/identify.py.
+its start. The wind has a turbulence intensity of 3 %, a choice: the paper says "low" and prints no value.
 """
 
-from dataclasses import dataclass, field
+from functools import partial
 from math import hypot, pi
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -34,11 +34,10 @@ INTENSITY = 0.03  # of the wind's turbulence, a choice
 FULL_SCALE = "full_scale"
 
 
-@dataclass(frozen=True)
-class LoadCase:
-    """One load case at model scale, as Table 2 of the paper has it."""
+class LoadCase(NamedTuple):
+    """One load case at model scale, as Table 2 of the paper has it; wind in m/s, None: no wind."""
 
-    wind: float | None  # m/s; None: no wind
+    wind: float | None
     rotor_rpm: float = 0.0
     blade_pitch_deg: float = 0.0
     sea: dict | None = None
@@ -52,15 +51,17 @@ SEAS = (
 )
 WINDS = ((2.02, 62.8, 0.0), (3.36, 85.6, 0.0), (3.56, 85.6, 14.9), (5.93, 0.0, 90.0))
 CASES = {
-    **{f"LC{i}": LoadCase(*wind) for i, wind in enumerate(WINDS, 1)},
-    **{f"LC{i}": LoadCase(None, sea=sea) for i, sea in enumerate(SEAS, 5)},
-    **{f"LC{i}": LoadCase(*wind, sea) for i, (wind, sea) in enumerate(zip(WINDS, SEAS, strict=True), 9)},
+    f"LC{i}": LoadCase(*case)
+    for i, case in enumerate(
+        (
+            *WINDS,
+            *((None, 0.0, 0.0, sea) for sea in SEAS),
+            *((*wind, sea) for wind, sea in zip(WINDS, SEAS, strict=True)),
+        ),
+        1,
+    )
 }
-GROUPS = {
-    "wind": ("LC1", "LC2", "LC3", "LC4"),
-    "waves": ("LC5", "LC6", "LC7", "LC8"),
-    "wind and waves": ("LC9", "LC10", "LC11", "LC12"),
-}
+GROUPS = {"wind": (*CASES,)[:4], "waves": (*CASES,)[4:8], "wind and waves": (*CASES,)[8:]}
 
 
 def wanted_cases(text):
@@ -80,8 +81,8 @@ def wanted_cases(text):
     return list(dict.fromkeys(chosen))
 
 
-def load_case_scene(name, duration=DURATION, seed=1, **options):
-    """Return the scene of a model-scale load case; options as in build_scene.
+def run_load_case(name, **options):
+    """Return the DataFrame of a model-scale load case, started from its steady state; options of build_scene.
 
     The wind is rotor-averaged Kaimal turbulence of low intensity.
     """
@@ -90,25 +91,19 @@ def load_case_scene(name, duration=DURATION, seed=1, **options):
         rotor = read_turbine(platform.turbine).rotor
         period, value = turbulence(
             case.wind, INTENSITY * case.wind, height=rotor.hub_height, diameter=2.0 * rotor.tip_radius,
-            period=duration, seed=seed, shear_turbulence=False,
+            period=DURATION, seed=1, shear_turbulence=False,
         )  # fmt: skip
         time = np.linspace(0.0, period, len(value))
         wind = {"kind": "series", "time": time, "speed": case.wind + value[:, 0]}
-    options = {"fidelity": "standard", "integrator": "rk4", "duration": duration} | options
-    return fowt_env.build_scene(platform, wind=wind, sea=case.sea, seed=seed, **options)
-
-
-def run_load_case(name, duration=DURATION, seed=1, progress=False, **options):
-    """Return the DataFrame of a model-scale load case, started from its steady state."""
-    scene, case = load_case_scene(name, duration, seed, **options), CASES[name]
+    options = {"fidelity": "standard", "integrator": "rk4", "duration": DURATION} | options
+    scene = fowt_env.build_scene(platform, wind=wind, sea=case.sea, seed=1, **options)
     point = trim_prescribed(scene, case.rotor_rpm * RPM, case.blade_pitch_deg * DEGREE)
     motions = [column.split("_[")[0] for column in MOTION_CHANNELS]
     initial = {"start": "zero"} | {motion: point[motion] for motion in motions}
     initial |= {"RotSpeed": case.rotor_rpm, "BldPitch1": case.blade_pitch_deg}
     return fowt_env.simulate(
-        scene, controller=None, duration=duration, dt=STEP, control_dt=0.1, output_dt=OUTPUT,
-        initial=initial, progress=progress,
-    )  # fmt: skip
+        scene, controller=None, duration=DURATION, dt=STEP, control_dt=0.1, output_dt=OUTPUT, initial=initial
+    )
 
 
 def settled(frame, skip=SKIP):
@@ -121,28 +116,28 @@ def statistics(runs):
     rows = []
     for case, frame in runs.items():
         part = settled(frame)
-        channels = [*MOTION_CHANNELS, "RtFldFxh_[N]", *(c for c in frame.columns if c.startswith("FAIRTEN"))]
-        for channel in channels:
+        for channel in (*MOTION_CHANNELS, "RtFldFxh_[N]", *part.filter(regex="^FAIRTEN")):
             x = part[channel].to_numpy()
-            quartiles = np.percentile(x, (25.0, 50.0, 75.0))
-            row = {"case": case, "channel": channel, "mean": x.mean(), "std": x.std(), "min": x.min()}
-            rows.append(row | dict(zip(("q1", "median", "q3"), quartiles, strict=True)) | {"max": x.max()})
+            low, q1, median, q3, high = np.percentile(x, (0.0, 25.0, 50.0, 75.0, 100.0))
+            rows.append({
+                "case": case, "channel": channel, "mean": x.mean(), "std": x.std(), "min": low,
+                "q1": q1, "median": median, "q3": q3, "max": high,
+            })  # fmt: skip
     return pd.DataFrame(rows)
 
 
-def case_spectrum(frame, channel, skip=0.0):
-    """Return (frequency Hz, density) of a channel from skip seconds on."""
-    part = settled(frame, skip)
-    return spectrum(part[TIME], part[channel], segment=SEGMENT)
+def case_spectrum(frame, channel):
+    """Return (frequency Hz, density) of a channel."""
+    return spectrum(frame[TIME], frame[channel], segment=SEGMENT)
 
 
-def prominence(frame, channel, frequency, skip=0.0, width=0.1, reach=0.35):
+def prominence(frame, channel, frequency, width=0.1, reach=0.35):
     """Return the height of a spectral peak near a frequency (Hz) over its surroundings, above 1 for a peak.
 
     The largest density within width (relative) of the frequency, over the larger of the medians of the
     density on its two sides, up to reach away. 0 if the largest is at the edge, i.e. a slope and no peak.
     """
-    f, density = case_spectrum(frame, channel, skip)
+    f, density = case_spectrum(frame, channel)
     near = np.flatnonzero(np.abs(f / frequency - 1.0) <= width)
     top = near[np.argmax(density[near])]
     if not density[top] > max(density[top - 1], density[top + 1]):
@@ -152,14 +147,11 @@ def prominence(frame, channel, frequency, skip=0.0, width=0.1, reach=0.35):
     return float(density[top] / max(np.median(left), np.median(right)))
 
 
-# --------------------------------------------------------------------------- claims
-
 PEAK = 2.0  # a peak rises to at least this many times its surroundings ...
 VISIBLE = 1e-5  # ... and to this fraction of the highest one, five decades of a logarithmic axis
 
 
-@dataclass(frozen=True)
-class PaperClaim:
+class PaperClaim(NamedTuple):
     """One qualitative claim of the paper, the result here, and whether it holds."""
 
     figure: str
@@ -168,13 +160,12 @@ class PaperClaim:
     holds: bool
 
 
-@dataclass
-class PaperStudy:
+class PaperStudy(NamedTuple):
     """Runs and claims of `fowt paper`."""
 
-    runs: dict = field(default_factory=dict)  # model-scale case -> frame
-    claims: list = field(default_factory=list)
-    full: dict = field(default_factory=dict)  # name, or combination of wave kinematics -> frame
+    runs: dict  # model-scale case -> frame
+    claims: list
+    full: dict  # name, or combination of wave kinematics -> frame
 
 
 def natural_frequencies():
@@ -198,30 +189,26 @@ def claims(runs, natural):
 
     def peaks(figure, case, channel, places):
         """Claim that the spectrum of a channel peaks at each of {name of a frequency: Hz}."""
-        for where, frequency in places.items() if case in having else ():
-            height = prominence(runs[case], channel, frequency)
+        words = {SURGE: "surge", PITCH: "pitch"}[channel]
+        for where, at in places.items() if case in having else ():
+            height = prominence(runs[case], channel, at)
             f, density = case_spectrum(runs[case], channel)
-            fraction = density[np.abs(f / frequency - 1.0) <= 0.1].max() / density.max()
-            shown = (
-                f"at {frequency:.3f} Hz {height:.3g} times its surroundings, {fraction:.2g} of the highest"
-            )
-            words = {SURGE: "surge", PITCH: "pitch"}[channel]
-            text = f"{case}: {words} spectrum peaks at {where}"
-            claim(figure, text, shown, height >= PEAK and fraction >= VISIBLE)
+            fraction = density[np.abs(f / at - 1.0) <= 0.1].max() / density.max()
+            shown = f"at {at:.3f} Hz {height:.3g} times its surroundings, {fraction:.2g} of the highest"
+            holds = height >= PEAK and fraction >= VISIBLE
+            claim(figure, f"{case}: {words} spectrum peaks at {where}", shown, holds)
 
     if "LC1" in having:
         surge = settled(runs["LC1"])[SURGE]
         shown = f"mean {surge.mean():.4f} m, std {surge.std():.4f} m"
         claim("6", "LC1: surge is nearly steady", shown, surge.std() < 0.1 * surge.mean())
-    of_pitch = {"the pitch frequency": natural["platform_pitch"]}
+    of_pitch, wave = {"the pitch frequency": natural["platform_pitch"]}, 1.0 / SEAS[0]["T"]
     peaks("7", "LC2", SURGE, of_pitch)
     if set(wind) <= having:
         shown = ", ".join(f"{name} {mean[name]:.2f}" for name in wind) + " deg"
-        largest = max(wind, key=mean.get) == "LC2"
-        claim("8", "mean pitch is largest at rated wind (LC2)", shown, largest)
+        claim("8", "mean pitch is largest at rated wind (LC2)", shown, max(wind, key=mean.get) == "LC2")
         falls = mean["LC2"] > mean["LC3"] > mean["LC4"]
         claim("8", "mean pitch falls above rated (LC2 > LC3 > LC4)", shown, falls)
-    wave = 1.0 / SEAS[0]["T"]
     of_waves = {"the wave frequency": wave, "twice the wave frequency": 2.0 * wave}
     peaks("9", "LC5", SURGE, {"the surge frequency": natural["surge"], **of_pitch, **of_waves})
     if set(waves) <= having:
@@ -232,20 +219,16 @@ def claims(runs, natural):
         text, shown = "LC5 to LC8: waves leave the mean alone", f"means within {shift:.3f} deg"
         claim("10", text, shown, shift < 0.1 * std["LC8"])
     peaks("11", "LC11", PITCH, {**of_pitch, "the wave frequency": 1.0 / SEAS[2]["Tp"]})
-    if {*wind, *waves, *both} <= having:
-        shift = max(abs(mean[name] - mean[alone]) for name, alone in zip(both, wind, strict=True))
+    if {*CASES} <= having:
+        triples = list(zip(both, wind, waves, strict=True))
+        shift = max(abs(mean[name] - mean[alone]) for name, alone, _ in triples)
         shown = f"within {shift:.2f} deg of the mean in wind alone"
         holds = shift < 0.1 * max(mean[name] for name in wind)
         claim("12", "LC9 to LC12: wind sets the mean", shown, holds)
-        triples = list(zip(both, wind, waves, strict=True))
-        text = ", ".join(f"{name} {std[name] / std[sea]:.2f}" for name, _, sea in triples)
+        shown = ", ".join(f"{name} {std[name] / std[sea]:.2f}" for name, _, sea in triples)
         nearer = all(abs(std[name] - std[sea]) < abs(std[name] - std[air]) for name, air, sea in triples[1:])
-        shown = f"std over that in waves alone: {text}"
-        claim("12", "LC10 to LC12: waves set the range", shown, nearer)
+        claim("12", "LC10 to LC12: waves set the range", f"std over that in waves alone: {shown}", nearer)
     return found
-
-
-# --------------------------------------------------------------------------- mooring
 
 
 def static_pull(platform, direction, offsets):
@@ -253,23 +236,18 @@ def static_pull(platform, direction, offsets):
 
     direction: "surge" or "sway". The hull is moved without turning, as in the paper's Fig. 5.
     """
-    axis = ("surge", "sway").index(direction)
-    rows = []
+    way, rows = np.array({"surge": (1.0, 0.0, 0.0), "sway": (0.0, 1.0, 0.0)}[direction]), []
     for offset in offsets:
-        force, tensions = 0.0, {}
+        row = {"offset_[m]": float(offset), "force_[N]": 0.0}
         for number, line in enumerate(platform.lines, 1):
-            place = np.array(line.fairlead)
-            place[axis] += offset
-            dx, dy, dz = np.array(line.anchor) - place
-            span = hypot(dx, dy)
-            state = catenary(span, -dz, line.length, line.wet_weight, line.EA, line.seabed_friction, 0.0)
-            force -= state.H * (dx, dy)[axis] / span
-            tensions[f"tension_{number}_[N]"] = state.fairlead_tension
-        rows.append({"offset_[m]": float(offset), "force_[N]": force} | tensions)
+            gap = np.array(line.anchor) - line.fairlead - offset * way
+            span = hypot(*gap[:2])
+            state = catenary(span, -gap[2], line.length, line.wet_weight, line.EA, line.seabed_friction, 0.0)
+            row["force_[N]"] -= state.H * (gap @ way) / span
+            row[f"tension_{number}_[N]"] = state.fairlead_tension
+        rows.append(row)
     return pd.DataFrame(rows)
 
-
-# --------------------------------------------------------------------------- full scale
 
 EXPECTED_DOUBLE = ((0.02, 0.02), (0.34, 0.34), (0.60, 0.52), (0.92, 0.83))  # %, theory.md, section 8
 DECAYS = {"surge decay": ("PtfmSurge", 10.0, SURGE, 600.0), "pitch decay": ("PtfmPitch", 5.0, PITCH, 300.0)}
@@ -278,57 +256,53 @@ DECAYS = {"surge decay": ("PtfmSurge", 10.0, SURGE, 600.0), "pitch decay": ("Ptf
 def decay(channel, start, duration):
     """Return the frame of a free decay of OC3-Hywind in still water."""
     scene = fowt_env.build_scene("oc3_hywind", fidelity="reference")
-    return fowt_env.simulate(
-        scene, controller=None, duration=duration, dt=0.05, initial={channel: start}
-    )
+    return fowt_env.simulate(scene, controller=None, duration=duration, dt=0.05, initial={channel: start})
 
 
-def regular_wave(position, surface, stretching, duration=460.0):
+def regular_wave(position, surface, stretching):
     """Return the frame of OC3-Hywind in the regular wave H 3 m, T 5 s of Fig. 15."""
     scene = fowt_env.build_scene(
-        "oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0, "ramp": 50.0}, kinematics_position=position,
-        surface=surface, stretching=stretching,
-        fidelity="reference",
+        "oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0, "ramp": 50.0}, fidelity="reference",
+        kinematics_position=position, surface=surface, stretching=stretching,
     )  # fmt: skip
-    return fowt_env.simulate(scene, controller=None, duration=duration, dt=0.1)
+    return fowt_env.simulate(scene, controller=None, duration=460.0, dt=0.1)
 
 
 def double_frequency(frame, start=260.0, period=5.0):
     """Return {channel: (first harmonic, second over first in %)} of surge and pitch in a regular wave."""
     part = frame[(frame[TIME] >= start) & (frame[TIME] < frame[TIME].iloc[-1] - 1e-6)]
-    time = part[TIME].to_numpy()
     found = {}
     for channel in (SURGE, PITCH):
-        first, second = np.abs(harmonics(time, part[channel].to_numpy(), 2.0 * pi / period))
+        series = part[TIME].to_numpy(), part[channel].to_numpy()
+        first, second = np.abs(harmonics(*series, 2.0 * pi / period))
         found[channel] = (float(first), float(100.0 * second / first))
     return found
 
 
-def wind_and_waves(duration=1000.0, seed=1):
+def wind_and_waves():
     """Return the frame of Fig. 16: 18 m/s (class B, a choice), JONSWAP Hs 7.5 m, Tp 10 s, under control."""
+    wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
     scene = fowt_env.build_scene(
-        "oc3_hywind", wind={"kind": "ntm", "speed": 18.0, "class": "B"}, sea="paper_wind_wave", seed=seed,
-        fidelity="standard", duration=duration,
-    )  # fmt: skip
-    return fowt_env.simulate(scene, controller="pi", duration=duration)
+        "oc3_hywind", wind=wind, sea="paper_wind_wave", seed=1, fidelity="standard", duration=1000.0
+    )
+    return fowt_env.simulate(scene, controller="pi", duration=1000.0)
 
 
 def run_paper(names, report=None):
     """Return the PaperStudy of the named cases; report(text, done, total) is called before each run."""
-    runs = {name: lambda name=name: run_load_case(name) for name in names if name in CASES}
-    models = list(runs)
+    models = {name: partial(run_load_case, name) for name in names if name in CASES}
+    full = {}
     if FULL_SCALE in names:
         for name, (channel, start, _, duration) in DECAYS.items():
-            runs[name] = lambda args=(channel, start, duration): decay(*args)
-        for combination in COMBINATIONS:
-            runs[combination] = lambda combination=combination: regular_wave(*combination)
-        runs["wind and waves"] = wind_and_waves
-    study = PaperStudy()
-    for done, (name, run) in enumerate(runs.items()):
+            full[name] = partial(decay, channel, start, duration)
+        full |= {combination: partial(regular_wave, *combination) for combination in COMBINATIONS}
+        full["wind and waves"] = wind_and_waves
+    study = PaperStudy({}, [], {})
+    for done, (name, run) in enumerate((models | full).items()):
         if report is not None:
             text = name if isinstance(name, str) else "regular wave: " + ", ".join(name[:2])
-            report(text, done, len(runs))
+            report(text, done, len(models) + len(full))
         (study.runs if name in models else study.full)[name] = run()
     if models:
-        study.claims = claims(study.runs, natural_frequencies())
+        study.claims.extend(claims(study.runs, natural_frequencies()))
     return study

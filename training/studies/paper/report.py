@@ -1,6 +1,7 @@
 """Files of `fowt paper`: time series, statistics, claims, and plots like the paper's."""
 
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -25,22 +26,12 @@ LABELS = {
 PULLS = {"model": (load_cases.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0)}
 
 
-def _axes(figure, rows, columns=1, **options):
-    """Return styled axes (rows, columns) of a figure."""
+def _axes(figure, rows, columns=1, xlabel=None, **options):
+    """Return styled axes (rows, columns) of a figure, the lowest with a label."""
     axes = figure.subplots(rows, columns, squeeze=False, **options)
-    for one in axes.ravel():
-        style_axes(one)
+    for number, one in enumerate(axes.ravel()):
+        style_axes(one, xlabel if number >= (rows - 1) * columns else None)
     return axes
-
-
-def _label(axis, text):
-    """Write the label of an axis: axis is a method such as axes.set_xlabel."""
-    axis(text, fontsize=9, color=INK)
-
-
-def _within(frame, window):
-    """Return the rows of a frame in a window (s)."""
-    return frame[(frame[TIME] >= window[0]) & (frame[TIME] <= window[1])]
 
 
 def _groups(runs):
@@ -57,21 +48,19 @@ def box_plots(runs, channel, path=None):
     for axes, (name, cases) in zip(panels, groups.items(), strict=True):
         values = [load_cases.settled(runs[case])[channel].to_numpy() for case in cases]
         axes.boxplot(values, tick_labels=cases, whis=(0, 100), medianprops={"color": COLOURS[1]})
-        axes.set_title(name, fontsize=9, color=INK)
-    _label(panels[0].set_ylabel, LABELS[channel])
+        style_axes(axes, title=name, ylabel=LABELS[channel] if axes is panels[0] else None)
     return save_figure(figure, path)
 
 
 def time_series(runs, channel, path=None, window=(0.0, 200.0)):
     """Draw a channel of every case over time, a panel per case."""
     figure = new_figure(9.0, 0.6 + 0.9 * len(runs))
-    rows = _axes(figure, len(runs), sharex=True)[:, 0]
+    rows = _axes(figure, len(runs), xlabel="time (s, model scale)", sharex=True)[:, 0]
     for axes, (case, frame) in zip(rows, runs.items(), strict=True):
-        part = _within(frame, window)
+        part = frame[frame[TIME].between(*window)]
         axes.plot(part[TIME], part[channel], color=COLOURS[0], linewidth=0.8)
         axes.set_ylabel(case, fontsize=8, color=INK)
         axes.margins(x=0.0)
-    _label(rows[-1].set_xlabel, "time (s, model scale)")
     figure.suptitle(LABELS[channel], fontsize=10, color=INK, x=0.01, ha="left")
     return save_figure(figure, path)
 
@@ -80,7 +69,7 @@ def spectra(runs, channel, natural, path=None):
     """Draw power spectra of a channel, a panel per group, with the natural frequencies marked."""
     groups = _groups(runs)
     figure = new_figure(9.0, 0.6 + 2.2 * len(groups))
-    panels = _axes(figure, len(groups), sharex=True)[:, 0]
+    panels = _axes(figure, len(groups), xlabel="frequency (Hz, model scale)", sharex=True)[:, 0]
     for axes, (name, cases) in zip(panels, groups.items(), strict=True):
         top = 0.0
         for number, case in enumerate(cases):
@@ -92,8 +81,7 @@ def spectra(runs, channel, natural, path=None):
         axes.set(xlim=(0.03, 3.0), ylim=(1e-10 * top, 4.0 * top))
         axes.set_title(f"{name}  (dotted: surge, pitch, heave)", fontsize=9, color=INK, loc="left")
         axes.legend(fontsize=8, frameon=False, loc="upper right", ncols=4)
-    _label(panels[-1].set_xlabel, "frequency (Hz, model scale)")
-    _label(figure.supylabel, f"power density of {LABELS[channel]}, squared per Hz")
+    figure.supylabel(f"power density of {LABELS[channel]}, squared per Hz", fontsize=9, color=INK)
     return save_figure(figure, path)
 
 
@@ -107,12 +95,14 @@ def static_pulls(path=None):
             offset = table["offset_[m]"]
             axes.plot(offset, factor * table["force_[N]"], color=INK, label="restoring force")
             for number, column in enumerate(c for c in table if c.startswith("tension")):
-                style = {"color": COLOURS[number % 3], "linewidth": 0.9}
-                style["linestyle"] = ("-", "--")[number // 3]
+                style = {
+                    "color": COLOURS[number % 3],
+                    "linewidth": 0.9,
+                    "linestyle": ("-", "--")[number // 3],
+                }
                 label = column.removesuffix("_[N]").replace("_", " ")
                 axes.plot(offset, factor * table[column], label=label, **style)
-            _label(axes.set_xlabel, f"{direction} (m)")
-            _label(axes.set_ylabel, unit)
+            style_axes(axes, f"{direction} (m)", unit)
             axes.set_title(f"{name}: {direction}", fontsize=9, color=INK, loc="left")
             axes.legend(fontsize=7, frameon=False)
     return save_figure(figure, path)
@@ -121,35 +111,34 @@ def static_pulls(path=None):
 def decays(full, path=None):
     """Draw the surge and pitch decays of Figs 13 and 14."""
     figure = new_figure(9.0, 4.4)
-    rows = _axes(figure, 2)[:, 0]
+    rows = _axes(figure, 2, xlabel="time (s)")[:, 0]
     for axes, (name, (_, _, channel, _)) in zip(rows, load_cases.DECAYS.items(), strict=True):
         axes.plot(full[name][TIME], full[name][channel], color=COLOURS[0], linewidth=1.0)
-        _label(axes.set_ylabel, LABELS[channel])
+        style_axes(axes, ylabel=LABELS[channel])
         axes.margins(x=0.0)
-    _label(rows[-1].set_xlabel, "time (s)")
     return save_figure(figure, path)
 
 
-def regular_waves(full, path=None, window=(420.0, 450.0)):
+def regular_waves(full, path=None):
     """Draw Fig. 15: surge, pitch and tension in the regular wave, and spectra, for the four combinations."""
     channels = (load_cases.SURGE, load_cases.PITCH, "FAIRTEN1_[kN]")
     figure = new_figure(9.0, 6.4)
     panels = _axes(figure, len(channels), 2)
-    for row, channel in zip(panels, channels, strict=True):
-        for number, combination in enumerate(load_cases.COMBINATIONS):
-            label = f"{combination[0]} position, {combination[1]} surface"
-            part = _within(full[combination], window)
-            row[0].plot(part[TIME], part[channel], color=COLOURS[number], linewidth=0.9, label=label)
-            part = _within(full[combination], (260.0, np.inf))
+    for (series, spectral), channel in zip(panels, channels, strict=True):
+        for combination, colour in zip(load_cases.COMBINATIONS, COLOURS, strict=False):
+            frame, label = full[combination], f"{combination[0]} position, {combination[1]} surface"
+            part = frame[frame[TIME].between(420.0, 450.0)]
+            series.plot(part[TIME], part[channel], color=colour, linewidth=0.9, label=label)
+            part = frame[frame[TIME] >= 260.0]
             frequency, density = spectrum(part[TIME], part[channel], segment=100.0)
-            row[1].semilogy(frequency[1:], density[1:], color=COLOURS[number], linewidth=0.9)
-        row[1].set_xlim(0.0, 0.7)
-        _label(row[0].set_ylabel, LABELS[channel])
-        row[0].margins(x=0.0)
-    lines, labels = panels[0, 0].get_legend_handles_labels()
+            spectral.semilogy(frequency[1:], density[1:], color=colour, linewidth=0.9)
+        spectral.set_xlim(0.0, 0.7)
+        style_axes(series, ylabel=LABELS[channel])
+        series.margins(x=0.0)
+    style_axes(series, "time (s)")
+    style_axes(spectral, "frequency (Hz), power density per Hz")
+    lines, labels = series.get_legend_handles_labels()
     figure.legend(lines, labels, fontsize=8, frameon=False, loc="outside upper center", ncols=2)
-    _label(panels[-1, 0].set_xlabel, "time (s)")
-    _label(panels[-1, 1].set_xlabel, "frequency (Hz), power density per Hz")
     return save_figure(figure, path)
 
 
@@ -169,16 +158,14 @@ def double_frequency_table(full):
 
 def statistics_table(runs):
     """Return a Markdown table of pitch and surge per case."""
-    table = load_cases.statistics(runs)
     surge = ("surge mean", "std", "min", "max (m)")
     header = ("case", "pitch mean", "std", "min", "max (deg)", *surge, "thrust mean (N)")
-    cells = []
-    for case in runs:
-        rows = table[table["case"] == case].set_index("channel")
-        line = [case]
-        for channel, digits in ((load_cases.PITCH, 2), (load_cases.SURGE, 3)):
-            line += [f"{rows.loc[channel, name]:.{digits}f}" for name in ("mean", "std", "min", "max")]
-        cells.append([*line, f"{rows.loc['RtFldFxh_[N]', 'mean']:.2f}"])
+    cells, figures = [], ["mean", "std", "min", "max"]
+    for case, rows in load_cases.statistics(runs).groupby("case", sort=False):
+        rows = rows.set_index("channel")
+        pitch = (f"{value:.2f}" for value in rows.loc[load_cases.PITCH, figures])
+        surge = (f"{value:.3f}" for value in rows.loc[load_cases.SURGE, figures])
+        cells.append([case, *pitch, *surge, f"{rows.loc['RtFldFxh_[N]', 'mean']:.2f}"])
     return markdown_table(header, cells)
 
 
@@ -221,18 +208,16 @@ def _plots(study, folder):
     if study.runs:
         natural = load_cases.natural_frequencies()
         for name, channel in (("pitch", load_cases.PITCH), ("surge", load_cases.SURGE)):
-            made[f"box_{name}"] = lambda path, c=channel: box_plots(study.runs, c, path)
-            made[f"spectra_{name}"] = lambda path, c=channel: spectra(study.runs, c, natural, path)
-            made[f"series_{name}"] = lambda path, c=channel: time_series(study.runs, c, path)
+            made[f"box_{name}"] = partial(box_plots, study.runs, channel)
+            made[f"spectra_{name}"] = partial(spectra, study.runs, channel, natural)
+            made[f"series_{name}"] = partial(time_series, study.runs, channel)
         made["static_pull"] = static_pulls
     if study.full:
-        made["full_decays"] = lambda path: decays(study.full, path)
-        made["full_regular_wave"] = lambda path: regular_waves(study.full, path)
-        made["full_wind_and_waves"] = lambda path: plot_run(
-            study.full["wind and waves"], path, "18 m/s, Hs 7.5 m, Tp 10 s"
+        made["full_decays"] = partial(decays, study.full)
+        made["full_regular_wave"] = partial(regular_waves, study.full)
+        made["full_wind_and_waves"] = partial(
+            plot_run, study.full["wind and waves"], title="18 m/s, Hs 7.5 m, Tp 10 s"
         )
-    paths = []
     for name, make in made.items():
-        paths.append(folder / f"{name}.png")
-        make(paths[-1])
-    return paths
+        make(path=folder / f"{name}.png")
+    return [folder / f"{name}.png" for name in made]

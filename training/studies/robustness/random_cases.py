@@ -1,7 +1,6 @@
 """Random scenes and initial states over the whole valid range: does the plant stay finite and bounded?
 
-Weathers are drawn anew for a scene, and many states run in each. A case is a plain dict that holds
-everything to run it again (`fowt benchmark stability --replay FILE`); each failure is stored as one.
+A case is a plain dict that holds everything to run it again (`fowt benchmark stability --replay FILE`).
 """
 
 import json
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from fowt_env.controllers import make
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.plant.advance import NON_FINITE, RUNNING, STOP_REASONS, observe, status_of
 from fowt_env.plant.channels import measure
@@ -26,7 +25,7 @@ from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.state import N_RIGID, Command, State, pose_of
 from fowt_env.run.simulation import hold
 from fowt_env.scene.build import build_scene
-from fowt_env.scene.options import FIDELITIES
+from fowt_env.training.benchmarks.speed import silent
 from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
@@ -100,11 +99,6 @@ class Outcome:
     unconverged: int  # mooring lines that missed their tolerance
 
     @property
-    def capsized(self):
-        """Whether the run stopped for another reason than a state that is no number."""
-        return self.status not in (RUNNING, NON_FINITE)
-
-    @property
     def failure(self):
         """Reason for which the outcome is a failure, or an empty text. A finer run judges a capsize."""
         if self.status == NON_FINITE:
@@ -119,19 +113,15 @@ class Outcome:
     @property
     def text(self):
         """The outcome in words."""
-        if self.failure:
-            return self.failure
         ended = STOP_REASONS[self.status] if self.status != RUNNING else "ran to its end"
         energy, tilt, speed = self.peak[0], np.degrees(self.peak[1]), self.peak[3]
-        return f"{ended}; kinetic energy {energy:.3g} J, tilt {tilt:.1f} deg, rotor {speed:.3g} rad/s at most"
+        peaks = f"kinetic energy {energy:.3g} J, tilt {tilt:.1f} deg, rotor {speed:.3g} rad/s at most"
+        return self.failure or f"{ended}; {peaks}"
 
 
 @kernel
 def line_energy(H, V, length, weight, EA, node, quadrature):
-    """Return the elastic and gravity energy (J) of a frictionless line under fairlead tensions H and V.
-
-    node, quadrature: points and weights of Gauss-Legendre quadrature over [-1, 1].
-    """
+    """Return elastic and gravity energy (J) of a frictionless line under fairlead tensions H and V."""
     lying = max(0.0, length - V / weight)
     start = V - weight * (length - lying)
     total = lying * H * H / (2.0 * EA)
@@ -201,8 +191,7 @@ class Runner:
         self.rest = potential_energy(self.handle, np.zeros(scene.n_state))
         self.speeds = weather_speeds(scene)
         self.controller = make("pi", scene.turbine, CONTROL_DT) if scene.model.aero is not None else None
-        self.dx = np.zeros(scene.n_state)
-        self.measurement = np.zeros(N_MEASUREMENTS)
+        self.dx, self.measurement = np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS)
 
     def bounds(self, x):
         """Return (J, rad/s) that the platform's kinetic energy and the rotor speed must stay below from x on.
@@ -211,22 +200,19 @@ class Runner:
         upright platform; the platform with its added mass at the speed of the water; and the work of the
         wind's thrust over HUB_TRAVEL. Rotor: its start, or FASTEST_TIP times the wind over the radius.
         """
-        wind, water = self.speeds
-        body, rotor = self.scene.model.rigid_body, self.scene.turbine.rotor
-        density = self.scene.platform.environment.air_density
-        thrust = WIND_LOAD * 0.5 * density * pi * rotor.tip_radius**2 * wind**2
+        (wind, water), scene = self.speeds, self.scene
+        body, radius = scene.model.rigid_body, scene.turbine.rotor.tip_radius
+        thrust = WIND_LOAD * 0.5 * scene.platform.environment.air_density * pi * radius**2 * wind**2
         energy = platform_energy(x, body.mass_matrix)
         energy += max(0.0, potential_energy(self.handle, x) - self.rest)
         energy += body.mass * water**2 + thrust * HUB_TRAVEL
-        return FACTOR * energy, max(1.05 * abs(x[State.ROTOR_SPEED]), FASTEST_TIP * wind / rotor.tip_radius)
+        return FACTOR * energy, max(1.05 * abs(x[State.ROTOR_SPEED]), FASTEST_TIP * wind / radius)
 
     def run(self, state, commands, duration):
         """Return the Outcome of a state (n,) under commands (k, 2), or under the PI where there are none."""
         dt, handle, data = self.dt, self.handle, self.data
-        x = np.array(state, dtype=float)
-        commands = np.array(commands, dtype=float).reshape(-1, 2)
-        u, peak = np.array([0.0, x[State.BLADE_PITCH]]), np.zeros(4)
-        bounds = self.bounds(x)
+        x, commands = np.array(state, dtype=float), np.array(commands, dtype=float).reshape(-1, 2)
+        u, peak, bounds = np.array([0.0, x[State.BLADE_PITCH]]), np.zeros(4), self.bounds(x)
         for carried in (data.lines, data.counters, data.cache, data.history, data.elastic):
             carried[:] = 0.0  # as in a scene of its own: a case runs alike alone and among others
         law = hold.compiled, np.zeros(1), np.zeros(1)
@@ -296,22 +282,17 @@ def draw_sea(rng):
 
 
 def draw_state(rng, turbine, tower=None):
-    """Return a state anywhere in the valid range: lines taut to slack, 30 deg of tilt, rotor to 150 %.
-
-    (15,), and those of a tower that bends (TowerModes): to 1 m and 2 m/s in each mode.
-    """
-    modes = 0 if tower is None else len(tower.slope)
+    """Return a state anywhere in the valid range, of a rigid or a bending tower (TowerModes)."""
+    modes, drive = 0 if tower is None else len(tower.slope), turbine.pitch_drive
     x = np.zeros(N_RIGID + 2 * modes)
     offset, bearing = rng.uniform(0.0, 30.0), rng.uniform(0.0, 2.0 * pi)
     x[:3] = offset * cos(bearing), offset * sin(bearing), rng.uniform(-8.0, 8.0)
     tilt, towards = radians(rng.uniform(0.0, 30.0)), rng.uniform(0.0, 2.0 * pi)
     x[3:6] = tilt * cos(towards), tilt * sin(towards), radians(rng.uniform(-30.0, 30.0))
     x[State.AZIMUTH] = rng.uniform(0.0, 2.0 * pi)
-    x[7:10] = rng.uniform(-1.0, 1.0, 3) * [3.0, 3.0, 2.0]
-    x[10:13] = rng.uniform(-1.0, 1.0, 3) * [0.05, 0.05, 0.1]
+    x[7:13] = rng.uniform(-1.0, 1.0, 6) * [3.0, 3.0, 2.0, 0.05, 0.05, 0.1]
     stopped = rng.random() < 0.1
     x[State.ROTOR_SPEED] = 0.0 if stopped else rng.uniform(0.0, 1.5) * turbine.rated_rotor_speed
-    drive = turbine.pitch_drive
     x[State.BLADE_PITCH] = rng.uniform(drive.minimum, drive.maximum)
     x[N_RIGID : N_RIGID + modes] = rng.uniform(-1.0, 1.0, modes)
     x[N_RIGID + modes :] = rng.uniform(-2.0, 2.0, modes)
@@ -328,12 +309,9 @@ def draw_commands(rng, turbine, duration):
 
 def _case(scene, wind, sea, seed, state, commands, duration):
     """Return the dict by which a case can be run again."""
-    return {
-        "fidelity": scene.options["fidelity"], "tower": scene.options["tower"],
-        "integrator": scene.options["integrator"], "dt": scene.dt,
-        "duration": duration, "wind": wind, "sea": sea, "seed": seed,
-        "state": [float(value) for value in state],
-        "commands": np.asarray(commands).tolist(),
+    return {key: scene.options[key] for key in ("fidelity", "tower", "integrator")} | {
+        "dt": scene.dt, "duration": duration, "wind": wind, "sea": sea, "seed": seed,
+        "state": np.asarray(state, dtype=float).tolist(), "commands": np.asarray(commands).tolist(),
     }  # fmt: skip
 
 
@@ -349,22 +327,19 @@ def replay(case):
             raise InputError(f"replay = {str(path)!r}: is not JSON: {error}") from None
         if not isinstance(case, dict):
             raise InputError(f"replay = {str(path)!r}: must hold one case, an object with {', '.join(KEYS)}")
-    missing = [key for key in KEYS if key not in case]
-    if missing:
+    if missing := [key for key in KEYS if key not in case]:
         raise InputError(f"case: {', '.join(missing)} missing; needs {', '.join(KEYS)}")
     scene = build_scene(
-        wind=case["wind"], sea=case["sea"], seed=case["seed"], fidelity=case["fidelity"],
-        integrator=case["integrator"], tower=case.get("tower", "rigid"), duration=WEATHER,
+        **{key: case[key] for key in ("wind", "sea", "seed", "fidelity", "integrator")},
+        tower=case.get("tower", "rigid"), duration=WEATHER,
     )  # fmt: skip
     return Runner(scene, case["dt"]).run(case["state"], case["commands"], case["duration"])
 
 
 def with_integrator(scene, name, rotor_samples=1):
     """Return the scene with another integrator, ab4 with that many rotor loads per step."""
-    return replace(
-        scene.with_model(integrator=build_integrator(name, rotor_samples)),
-        options=scene.options | {"integrator": name},
-    )
+    changed = scene.with_model(integrator=build_integrator(name, rotor_samples))
+    return replace(changed, options=scene.options | {"integrator": name})
 
 
 def finer(scene, case):
@@ -389,96 +364,75 @@ class Tally:
     per_plant: dict = field(default_factory=dict)
 
 
-def random_cases(count, seed=0, per_weather=PER_WEATHER, duration=DURATION, plants=PLANTS, progress=None):
+def random_cases(count, seed=0, per_weather=PER_WEATHER, duration=DURATION, plants=PLANTS, progress=silent):
     """Return the Tally of count random cases, per_weather states in each weather, repeatable by the seed.
 
     Every capsize, and the most energetic case of each weather in twenty, runs again by Runge-Kutta 4 at
     a quarter of the step: a capsize that the finer run does not have, or a peak energy that differs by
-    more than AGREE, is a failure.
-    progress: called with (text, done, total).
+    more than AGREE, is a failure. progress: called with (text, done, total).
     """
-    for plant in plants:
-        if plant.removesuffix(BENDS) not in FIDELITIES:
-            raise unknown("fidelity", plant, FIDELITIES)
-    sequence = np.random.SeedSequence(seed)
-    tally, bases = Tally(), {}
-    weather = 0
+    sequence, tally, bases = np.random.SeedSequence(seed), Tally(), {}
     while tally.cases < count:
         rng = np.random.default_rng(sequence.spawn(1)[0])
-        plant = plants[weather % len(plants)]
         number = min(per_weather, count - tally.cases)
-        _one_weather(tally, bases, plant, rng, number, duration, weather % 20 == 0)
-        weather += 1
-        if progress is not None:
-            progress(f"random cases, {len(tally.failures)} failures", tally.cases, count)
-    tally.weathers = weather
+        _one_weather(tally, bases, plants[tally.weathers % len(plants)], rng, number, duration)
+        tally.weathers += 1
+        progress(f"random cases, {len(tally.failures)} failures", tally.cases, count)
     return tally
 
 
-def _one_weather(tally, bases, plant, rng, number, duration, check):
+def _one_weather(tally, bases, plant, rng, number, duration):
     """Run number cases in one weather drawn from rng, into the tally."""
     wind, sea, seed = draw_wind(rng), draw_sea(rng), int(rng.integers(2**31))
     tally.per_plant[plant] = tally.per_plant.get(plant, 0) + number
+    tally.cases += number
     try:
         if plant not in bases:
             fidelity = plant.removesuffix(BENDS)
-            tower = "rigid" if fidelity == plant else "modes"
-            bases[plant] = build_scene(
-                wind=wind, sea=sea, seed=seed, fidelity=fidelity, duration=WEATHER, tower=tower
-            )
+            options = {"fidelity": fidelity, "tower": "rigid" if fidelity == plant else "modes"}
+            bases[plant] = build_scene(wind=wind, sea=sea, seed=seed, duration=WEATHER, **options)
         scene = bases[plant].with_weather(wind, sea, seed)
         runner = Runner(scene, scene.dt)
     except Exception as error:  # any exception is what this looks for
         case = {"fidelity": plant, "wind": wind, "sea": sea, "seed": seed}
         tally.failures.append((case, f"exception: {error!r}"))
-        tally.cases += number
         return
     hardest = None
     for _ in range(number):
         state = draw_state(rng, scene.turbine, scene.model.tower)
         commands = draw_commands(rng, scene.turbine, duration)
         case = _case(scene, wind, sea, seed, state, commands, duration)
-        tally.cases += 1
         try:
             outcome = runner.run(state, commands, duration)
         except Exception as error:
             tally.failures.append((case, f"exception: {error!r}"))
             continue
-        _count(tally, scene, case, outcome)
+        tally.unconverged += outcome.unconverged
+        if outcome.failure:
+            tally.failures.append((case, outcome.failure))
+        elif outcome.status == RUNNING:
+            tally.worst_ratio = max(tally.worst_ratio, outcome.peak[0] / outcome.energy_bound)
+            np.maximum(tally.peak, outcome.peak, out=tally.peak)
+        elif finer(scene, case).status == outcome.status:
+            tally.capsizes += 1
+        else:
+            tally.failures.append((case, f"{STOP_REASONS[outcome.status]}, but not at a finer step"))
         if outcome.status == RUNNING and (hardest is None or outcome.peak[0] > hardest[1].peak[0]):
             hardest = (case, outcome)
-    if check and hardest is not None:
+    if tally.weathers % 20 == 0 and hardest is not None:
         case, outcome = hardest
-        fine = finer(scene, case)
-        change = abs(fine.peak[0] - outcome.peak[0]) / fine.peak[0]
+        fine = finer(scene, case).peak[0]
+        change = abs(fine - outcome.peak[0]) / fine
         tally.checked += 1
         tally.difference = max(tally.difference, change)
         if not change <= AGREE:
             tally.failures.append((case, f"peak energy differs by {change:.1%} from a finer step's"))
 
 
-def _count(tally, scene, case, outcome):
-    """Add an outcome to the tally."""
-    tally.unconverged += outcome.unconverged
-    if outcome.failure:
-        tally.failures.append((case, outcome.failure))
-        return
-    if outcome.capsized:
-        if finer(scene, case).status == outcome.status:
-            tally.capsizes += 1
-        else:
-            tally.failures.append((case, f"{STOP_REASONS[outcome.status]}, but not at a finer step"))
-        return
-    tally.worst_ratio = max(tally.worst_ratio, outcome.peak[0] / outcome.energy_bound)
-    np.maximum(tally.peak, outcome.peak, out=tally.peak)
-
-
 def store_case(failures, folder):
     """Write each (case, reason) as a JSON file for replay; return the paths."""
-    paths = []
-    for number, (case, reason) in enumerate(failures):
-        path = Path(folder) / f"case_{number:04d}.json"
+    paths = [Path(folder) / f"case_{number:04d}.json" for number in range(len(failures))]
+    for path, (case, reason) in zip(paths, failures, strict=True):
         with replacing(path) as temporary:
-            Path(temporary).write_text(json.dumps(case | {"reason": reason}, indent=1) + "\n")
-        paths.append(path)
+            temporary.write_text(json.dumps(case | {"reason": reason}, indent=1) + "\n")
     return paths

@@ -1,8 +1,7 @@
 """Largest stable step of each integrator and kind of scene: measured on the plant, and as theory has it.
 
-Theory is the amplification matrix of the very scheme of fowt_env/plant/integrators.py applied to the linear
-model of the scene: blade pitch exact and, for the Adams methods, positions by Adams-Moulton from the new
-velocities.
+Theory is the amplification matrix of the very scheme of fowt_env/plant/integrators.py on the linear model:
+blade pitch exact and, for the Adams methods, positions by Adams-Moulton from the new velocities.
 """
 
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from fowt_env.plant.advance import RUNNING, advance, forget
 from fowt_env.plant.integrators import INTEGRATORS, feathering
 from fowt_env.plant.state import STATE_INDEX, STATES, State
 from fowt_env.scene.build import build_scene
+from fowt_env.training.benchmarks.speed import silent
 from fowt_env.training.studies.robustness.random_cases import with_integrator
 
 DURATION = 300.0  # s of each run: hundreds of steps even at the largest
@@ -55,7 +55,7 @@ class LimitScene:
         """Return a scene of this kind with one of INTEGRATORS."""
         options = {"fidelity": self.fidelity, "integrator": integrator, **self.options}
         scene = build_scene(wind=self.wind, sea=self.sea, seed=1, **options)
-        fixed = {"platform_fixed": self.platform_fixed, "rotor_fixed": self.rotor_fixed}
+        fixed = {name: getattr(self, name) for name in ("platform_fixed", "rotor_fixed")}
         return scene.with_model({f"rigid_body.{name}": value for name, value in fixed.items()})
 
     def point(self, scene):
@@ -89,65 +89,36 @@ LIMIT_SCENES = {
 }
 
 
-def exact_pitch(a, h):
-    """Return the factor by which the blade pitch decays in a step h."""
-    return exp(a[PITCH, PITCH] * h)
-
-
-def with_pitch(matrix, factor):
-    """Return the matrix (N, N) with this factor as its row of the blade pitch."""
-    matrix[PITCH] = 0.0
-    matrix[PITCH, PITCH] = factor
-    return matrix
-
-
-def runge_kutta(a, h):
-    """Return the (N, N) matrix of a Runge-Kutta 4 step of x' = a x, blade pitch exact at every stage."""
-    half, whole = exact_pitch(a, 0.5 * h), exact_pitch(a, h)
-    k1 = a
-    k2 = a @ with_pitch(np.eye(N) + 0.5 * h * k1, half)
-    k3 = a @ with_pitch(np.eye(N) + 0.5 * h * k2, half)
-    k4 = a @ with_pitch(np.eye(N) + h * k3, whole)
-    return with_pitch(np.eye(N) + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), whole)
-
-
-def trapezoid(a, h):
-    """Return the (N, N) matrix of one step of heun: explicit trapezoidal rule, blade pitch exact."""
-    pitch = exact_pitch(a, h)
-    predicted = with_pitch(np.eye(N) + h * a, pitch)
-    return with_pitch(np.eye(N) + 0.5 * h * (a + a @ predicted), pitch)
-
-
-def adams(a, h, corrector):
-    """Return the (4 N, 4 N) matrix of one Adams step of the state and its three latest derivatives.
-
-    The present derivative is a x; carried are x and the derivatives one, two and three steps ago.
-    """
-    now = np.zeros((N, 4 * N))
-    now[:, :N] = np.eye(N)
-    past = [a @ now, *(np.roll(now, k * N, axis=1) for k in range(1, 4))]
-    pitch = np.zeros(4 * N)
-    pitch[PITCH] = exact_pitch(a, h)
-    moved = now + h * sum(c * f for c, f in zip(BASHFORTH, past, strict=True))
-    moved[PITCH] = pitch
-    if corrector:
-        new = a @ moved
-        speeds = now + h * (MOULTON[0] * new + sum(c * f for c, f in zip(MOULTON[1:], past[:3], strict=True)))
-        moved[len(MOTIONS) :] = speeds[len(MOTIONS) :]
-        moved[PITCH] = pitch
-    new = a @ moved
-    places = now + h * (MOULTON[0] * new + sum(c * f for c, f in zip(MOULTON[1:], past[:3], strict=True)))
-    moved[: len(MOTIONS)] = places[: len(MOTIONS)]
-    return np.vstack([moved, *past[:3]])
-
-
 def amplification(a, h, integrator):
-    """Return the matrix of one step h of an integrator on x' = a x, a (N, N) of linear_model.STATES."""
-    if integrator == "rk4":
-        return runge_kutta(a, h)
+    """Return the matrix of one step h of an integrator on x' = a x, a (N, N) of linear_model.STATES.
+
+    (N, N), or for the Adams methods (4 N, 4 N): x and the derivatives one, two and three steps ago.
+    """
+    one = np.eye(N)
+
+    def moved(by, share=1.0):  # blade pitch exact
+        matrix = one + by
+        matrix[PITCH] = one[PITCH] * exp(a[PITCH, PITCH] * h * share)
+        return matrix
+
     if integrator == "heun":
-        return trapezoid(a, h)
-    return adams(a, h, integrator == "abm4")
+        return moved(0.5 * h * (a + a @ moved(h * a)))
+    if integrator == "rk4":
+        k2 = a @ moved(0.5 * h * a, 0.5)
+        k3 = a @ moved(0.5 * h * k2, 0.5)
+        k4 = a @ moved(h * k3)
+        return moved(h / 6.0 * (a + 2.0 * k2 + 2.0 * k3 + k4))
+    one = np.eye(N, 4 * N)
+    past = [a @ one, *(np.roll(one, k * N, axis=1) for k in range(1, 4))]
+
+    def corrected(new):
+        return moved(h * (MOULTON[0] * new + sum(c * f for c, f in zip(MOULTON[1:], past[:3], strict=True))))
+
+    after = moved(h * sum(c * f for c, f in zip(BASHFORTH, past, strict=True)))
+    if integrator == "abm4":
+        after[len(MOTIONS) :] = corrected(a @ after)[len(MOTIONS) :]
+    after[: len(MOTIONS)] = corrected(a @ after)[: len(MOTIONS)]
+    return np.vstack([after, *past[:3]])
 
 
 def stable(a, h, integrator, duration=DURATION):
@@ -155,13 +126,6 @@ def stable(a, h, integrator, duration=DURATION):
     radius = np.abs(np.linalg.eigvals(amplification(a, h, integrator))).max()
     own = max(0.0, np.linalg.eigvals(a).real.max())
     return duration / h * log(radius) <= own * duration + log(GROWTH)
-
-
-def limiting_state(a, h, integrator):
-    """Return the name of the state that participates most, in EXCITATION, in the fastest-growing vector."""
-    values, vectors = np.linalg.eig(amplification(a, h, integrator))
-    participation = np.abs(vectors[:N, np.argmax(np.abs(values))]) / EXCITATION
-    return STATES[int(np.argmax(participation))]
 
 
 def first_unstable(holds, start):
@@ -174,14 +138,9 @@ def first_unstable(holds, start):
         low, high = high, high * SCAN
         if high > LARGEST_STEP:
             return float("inf")
-    if low == 0.0:
-        return 0.0
-    while high / low > 1.0 + RESOLUTION:
+    while low > 0.0 and high / low > 1.0 + RESOLUTION:
         middle = (low * high) ** 0.5
-        if holds(middle):
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if holds(middle) else (low, middle)
     return low
 
 
@@ -190,9 +149,7 @@ def excursions(scene, point, dt, duration=DURATION):
 
     The run starts off the operating point by EXCITATION and keeps its command. inf once it has stopped.
     """
-    x, u = point.state.copy(), point.command.copy()
-    rows = np.array(STATE_INDEX)
-    moved = EXCITATION.copy()
+    x, u, rows, moved = point.state.copy(), point.command.copy(), np.array(STATE_INDEX), EXCITATION.copy()
     if scene.model.rigid_body.platform_fixed:
         moved[: 2 * len(MOTIONS)] = 0.0
     if scene.model.rigid_body.rotor_fixed:
@@ -203,17 +160,13 @@ def excursions(scene, point, dt, duration=DURATION):
         x[State.BLADE_PITCH] -= 2.0 * EXCITATION[PITCH]
     handle = scene.handle()
     forget(handle)
-    peaks, late = np.zeros(N), np.zeros(N)
-    steps = round(duration / dt)
+    peaks, steps = np.zeros((2, N)), round(duration / dt)
     for i in range(steps):
         if advance(handle, x, u, i, 1, dt) != RUNNING:
-            return np.full(N, np.inf), np.full(N, np.inf)
-        np.maximum(peaks, np.abs(x[rows] - centre), out=peaks)
-        if i == steps // 2:
-            late = np.abs(x[rows] - centre)
-        elif i > steps // 2:
-            np.maximum(late, np.abs(x[rows] - centre), out=late)
-    return peaks, late
+            return np.full((2, N), np.inf)
+        part = peaks[: 2 if i >= steps // 2 else 1]
+        np.maximum(part, np.abs(x[rows] - centre), out=part)
+    return peaks
 
 
 def stays(scene, point, fine, dt, duration=DURATION):
@@ -221,34 +174,32 @@ def stays(scene, point, fine, dt, duration=DURATION):
     return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
 
 
-def stability_map(kinds=None, integrators=INTEGRATORS, duration=DURATION, progress=None):
+def stability_map(kinds=None, duration=DURATION, progress=silent):
     """Return a DataFrame with a row per kind of scene and integrator.
 
-    Columns: kind, integrator, default_s, measured_s, theory_s (largest steps; inf above LARGEST_STEP),
-    margin (measured over default), mode (state that grows first), fastest_1_per_s (largest eigenvalue
-    of the plant but for the blade-pitch actuator).
+    default_s, measured_s, theory_s: steps, inf above LARGEST_STEP; margin: measured over default; mode: state
+    that grows first; fastest_1_per_s: largest eigenvalue of the plant but for the blade-pitch actuator.
     """
-    names = list(kinds or LIMIT_SCENES)
-    rows = []
+    names, rows = list(kinds or LIMIT_SCENES), []
     for done, name in enumerate(names):
-        if progress is not None:
-            progress(f"stability map: {name}", done, len(names))
+        progress(f"stability map: {name}", done, len(names))
         kind = LIMIT_SCENES[name]
         base = kind.scene()
         point = kind.point(base)
-        model = linearize(base, point)
+        a = linearize(base, point).A
         fine, _ = excursions(base, point, FINE_STEP, duration)
         others = [i for i in range(N) if i != PITCH]
-        fastest = np.abs(np.linalg.eigvals(model.A[np.ix_(others, others)])).max()
-        for integrator in integrators:
-            if kind.rotor_samples > 1 and integrator != "ab4":
-                continue
+        fastest = np.abs(np.linalg.eigvals(a[np.ix_(others, others)])).max()
+        for integrator in INTEGRATORS if kind.rotor_samples == 1 else ("ab4",):
             scene = with_integrator(base, integrator, kind.rotor_samples)
             default = INTEGRATORS[integrator].dt
             found = first_unstable(partial(stays, scene, point, fine, duration=duration), default)
             scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
-            theory = first_unstable(partial(stable, model.A, integrator=scheme, duration=duration), default)
-            mode = limiting_state(model.A, theory * SCAN, scheme) if theory < np.inf else ""
+            theory = first_unstable(partial(stable, a, integrator=scheme, duration=duration), default)
+            mode = ""
+            if theory < np.inf:  # what participates most, in EXCITATION, in the fastest-growing vector
+                values, vectors = np.linalg.eig(amplification(a, theory * SCAN, scheme))
+                mode = STATES[np.argmax(np.abs(vectors[:N, np.abs(values).argmax()]) / EXCITATION)]
             rows.append({
                 "kind": name, "integrator": integrator, "default_s": default, "measured_s": found,
                 "theory_s": theory, "margin": found / default, "mode": mode, "fastest_1_per_s": fastest,

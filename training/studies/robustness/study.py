@@ -1,13 +1,11 @@
-"""Stability under stress: the parts of the study, the claims of each, and the report.
-
-Each part stores its results as JSON beside the others, so that a report can join runs of several days.
-"""
+"""Stability under stress: the parts of the study, each stored as JSON, the claims of each, and the report."""
 
 import json
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +19,14 @@ from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import write_table
 from fowt_env.plant.advance import RUNNING
 from fowt_env.plant.integrators import INTEGRATORS
-from fowt_env.training.benchmarks.speed import header
-from fowt_env.training.studies.robustness import extremes as stability_extremes
-from fowt_env.training.studies.robustness import long_runs, random_cases, step_limits, without_compiler
+from fowt_env.training.benchmarks.speed import header, silent
+from fowt_env.training.studies.robustness import (
+    extremes,
+    long_runs,
+    random_cases,
+    step_limits,
+    without_compiler,
+)
 
 MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
 # relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular
@@ -76,33 +79,25 @@ class Sizes:
     """Sizes of the parts; the documented run has 100000 cases and 10000000 steps."""
 
     cases: int = 2000
-    per_weather: int = random_cases.PER_WEATHER
     steps: int = 200_000
     hostile_steps: int = 600
     seed: int = 0
-    kinds: tuple | None = None  # of the map; None: all
-    extremes: tuple | None = None
-    map_duration: float = step_limits.DURATION
 
 
 def map_part(sizes, folder, progress):
     """Return Found of the stability map."""
-    table = step_limits.stability_map(sizes.kinds, duration=sizes.map_duration, progress=progress)
-    found = Found()
-    for integrator in INTEGRATORS:
-        rows = table[table["integrator"] == integrator]
+    table, found = step_limits.stability_map(progress=progress), Found()
+    for integrator, rows in table.groupby("integrator", sort=False):
         least = rows.loc[rows["margin"].idxmin()]
         what = f"{integrator}: default step of {INTEGRATORS[integrator].dt:g} s"
         text = f"least margin {least['margin']:.1f} ({least['kind']})"
-        target = f"factor {step_limits.MARGIN:g}"
-        holds = least["margin"] >= step_limits.MARGIN
+        target, holds = f"factor {step_limits.MARGIN:g}", least["margin"] >= step_limits.MARGIN
         found.claim(what, f"{len(rows)} kinds of scene", text, target, holds)
     both = table[np.isfinite(table["theory_s"]) & np.isfinite(table["measured_s"])]
     ratio = both["measured_s"] / both["theory_s"]
     count = f"{len(table)} limits, {len(both)} below {step_limits.LARGEST_STEP:g} s in both"
-    text = f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}" if len(both) else "none"
-    holds = len(both) == 0 or ratio.min() > 0.8
-    found.claim("measured limit over linear theory's", count, text, "none below 0.8", holds)
+    text = f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}"
+    found.claim("measured limit over linear theory's", count, text, "none below 0.8", ratio.min() > 0.8)
 
     def limit(value):
         return f"{value:.3f}" if np.isfinite(value) else f"> {step_limits.LARGEST_STEP:g}"
@@ -119,22 +114,11 @@ def map_part(sizes, folder, progress):
     return found
 
 
-def cases_part(sizes, folder, progress):
-    """Return Found of the random scenes and states; failures are stored for replay in folder/failures."""
-    tally = random_cases.random_cases(sizes.cases, sizes.seed, sizes.per_weather, progress=progress)
-    return _found_of(tally, Path(folder) / "failures")
-
-
-def tower_part(sizes, folder, progress):
-    """Return Found of a twentieth as many random scenes and states with a tower that bends, as cases_part."""
-    count, plants = max(1, sizes.cases // 20), (f"standard{random_cases.BENDS}",)
-    tally = random_cases.random_cases(count, sizes.seed, sizes.per_weather, plants=plants, progress=progress)
-    return _found_of(tally, Path(folder) / "tower_failures")
-
-
-def _found_of(tally, failures):
-    """Return Found of a Tally, whose failures go into a folder."""
-    paths = random_cases.store_case(tally.failures, failures)
+def cases_part(sizes, folder, progress, fraction=1, plants=random_cases.PLANTS, failures="failures"):
+    """Return Found of the random scenes and states, one in fraction; failures are stored for replay."""
+    count = max(1, sizes.cases // fraction)
+    tally = random_cases.random_cases(count, sizes.seed, plants=plants, progress=progress)
+    paths = random_cases.store_case(tally.failures, Path(folder) / failures)
     reasons = [reason for _, reason in tally.failures]
     broken = sum("exception" in reason or "non-finite" in reason for reason in reasons)
     found = Found()
@@ -143,8 +127,7 @@ def _found_of(tally, failures):
     found.none("NaN or exception", what, broken, "")
     words = f"above; largest ratio to the energy bound {tally.worst_ratio:.2f}"
     target = "none, nor a stop that a finer step lacks"
-    above = len(reasons) - broken
-    found.none("kinetic energy and rotor speed bounded", tally.cases, above, words, target)
+    found.none("kinetic energy and rotor speed bounded", tally.cases, len(reasons) - broken, words, target)
     what, most = "peak energy with a quarter of the step, every twentieth weather", random_cases.AGREE
     text, holds = f"largest change {tally.difference:.2%}", tally.difference <= most
     found.claim(what, tally.checked, text, f"{most:.0%}", holds)
@@ -166,15 +149,14 @@ def _found_of(tally, failures):
 
 def hostile_part(sizes, folder, progress):
     """Return Found of hostile actions on the environment."""
-    table = stability_extremes.hostile(steps=sizes.hostile_steps, progress=progress)
-    found = Found()
+    table, found = extremes.hostile(steps=sizes.hostile_steps, progress=progress), Found()
     refused = table[table["policy"] == "NaN and infinity"]
     attacks = table.drop(refused.index)
     what = "state, observation and reward finite, or an end with its reason"
-    count = f"{int(attacks['steps'].sum())} control periods, {len(attacks)} policies, modes and tasks"
-    found.none(what, count, int((~attacks["finite"]).sum()), "not finite")
-    accepted, count = int((~refused["finite"]).sum()), int(refused["steps"].sum())
-    found.none("NaN or infinity refused, state untouched", count, accepted, "accepted", "all refused")
+    count = f"{attacks['steps'].sum()} control periods, {len(attacks)} policies, modes and tasks"
+    found.none(what, count, (~attacks["finite"]).sum(), "not finite")
+    what, count = "NaN or infinity refused, state untouched", refused["steps"].sum()
+    found.none(what, count, (~refused["finite"]).sum(), "accepted", "all refused")
     rows = [
         [row["task"], row["mode"], row["policy"], str(row["steps"]),
          "; ".join(f"{reason}: {count}" for reason, count in row["ends"].items()) or "none",
@@ -188,20 +170,19 @@ def hostile_part(sizes, folder, progress):
 
 def extremes_part(sizes, folder, progress):
     """Return Found of the extreme events."""
-    table = stability_extremes.extremes(sizes.extremes, seed=sizes.seed + 1, progress=progress)
-    found = Found()
+    table, found = extremes.extremes(seed=sizes.seed + 1, progress=progress), Found()
     sizes_of_groups = table.groupby("group", sort=False).size().items()
     groups = ", ".join(f"{count} {group}" for group, count in sizes_of_groups)
     stops = (~table["verdict"].str.startswith("finite")).sum()
     words, broken = f"not finite, {stops} stopped with their reason", (~table["finite"]).sum()
     found.none("state finite to the end", f"{len(table)} runs: {groups}", broken, words, "all finite")
     changes = table["step_change"].dropna()
-    text, holds = f"largest change {changes.max():.2%}" if len(changes) else "none", changes <= STEP_CHANGE
-    found.claim("peaks with half the step", f"{len(changes)} runs", text, f"{STEP_CHANGE:.0%}", holds.all())
+    text, holds = f"largest change {changes.max():.2%}", (changes <= STEP_CHANGE).all()
+    found.claim("peaks with half the step", f"{len(changes)} runs", text, f"{STEP_CHANGE:.0%}", holds)
     columns = ["run", "rotor, rpm", "tilt, deg", "yaw, deg", "offset, m", "heave, m", "tension, MN",
                "change with half the step", "verdict"]  # fmt: skip
     rows = [
-        [row["case"], *(f"{row[key]:.2f}" for key in stability_extremes.PEAKS),
+        [row["case"], *(f"{row[key]:.2f}" for key in extremes.PEAKS),
          "-" if np.isnan(row["step_change"]) else f"{row['step_change']:.2%}", row["verdict"]]
         for row in table.to_dict("records")
     ]  # fmt: skip
@@ -211,10 +192,10 @@ def extremes_part(sizes, folder, progress):
 
 def long_part(sizes, folder, progress):
     """Return Found of the long runs, the orders and the quaternion."""
-    long, found = long_runs, Found()
-    runs = [(i, n, long.free_drift, "free", DRIFT[i])
+    found = Found()
+    runs = [(i, n, long_runs.free_drift, "free", DRIFT[i])
             for i in INTEGRATORS for n in (min(SECULAR_STEPS, sizes.steps), sizes.steps)]  # fmt: skip
-    runs += [(i, sizes.steps, long.floating_drift, "floating", {"energy": most})
+    runs += [(i, sizes.steps, long_runs.floating_drift, "floating", {"energy": most})
              for i, most in FLOATING_DRIFT.items()]  # fmt: skip
     for integrator, steps, measure, body, limits in runs:
         drift = measure(integrator, steps, progress=progress)
@@ -222,20 +203,20 @@ def long_part(sizes, folder, progress):
         what, count = f"{body} body, {integrator}", f"{steps} steps of {INTEGRATORS[integrator].dt:g} s"
         text = ", ".join(f"{drift[key]:.1e}" for key in limits)
         found.claim(what, count, text, ", ".join(f"{most:.0e}" for most in limits.values()), holds)
-    memory = long.plant_memory(sizes.steps, progress)
-    what, count = "memory, full plant in turbulence and waves", f"{memory['steps']} steps"
-    text, target = "{growth_MB:.2f} MB after the first tenth", f"{MEMORY_MB:g} MB"
-    holds = memory["status"] == RUNNING and memory["growth_MB"] <= MEMORY_MB
-    found.claim(what, count, text.format(**memory), target, holds)
-    memory = long.environment_memory(max(2000, sizes.steps // 50), progress)
-    count = f"{memory['steps']} control periods, {memory['resets']} resets"
-    holds = memory["growth_MB"] <= MEMORY_MB
-    found.claim("memory, environment", count, text.format(**memory), target, holds)
-    for integrator, order in long.measured_orders().items():
+    plant = long_runs.plant_memory(sizes.steps, progress)
+    env = long_runs.environment_memory(max(2000, sizes.steps // 50), progress)
+    for what, count, memory in (
+        ("memory, full plant in turbulence and waves", f"{plant['steps']} steps", plant),
+        ("memory, environment", f"{env['steps']} control periods, {env['resets']} resets", env),
+    ):
+        text = f"{memory['growth_MB']:.2f} MB after the first tenth"
+        holds = memory.get("status", RUNNING) == RUNNING and memory["growth_MB"] <= MEMORY_MB
+        found.claim(what, count, text, f"{MEMORY_MB:g} MB", holds)
+    for integrator, order in long_runs.measured_orders().items():
         least = INTEGRATORS[integrator].order - ORDER_SLACK
         what, count = f"order of {integrator}", "steps of 0.05 and 0.025 s"
         found.claim(what, count, f"{order:.2f}", f"{least:.2f} or more", order >= least)
-    difference, turned = long.quaternion_difference()
+    difference, turned = long_runs.quaternion_difference()
     what = "tumbling body: Euler angles against a quaternion"
     text = f"rotation matrices differ by {difference:.1e}, turned by {turned / DEGREE:.0f} deg"
     found.claim(what, "60 s, 61 instants", text, f"{TURNED:.0e}", difference <= TURNED)
@@ -244,10 +225,8 @@ def long_part(sizes, folder, progress):
 
 def plain_part(sizes, folder, progress):
     """Return Found of the runs without the compiler."""
-    found = Found()
-    if progress is not None:
-        progress("runs without the compiler", 0, 1)
-    differences = without_compiler.differences()
+    progress("runs without the compiler", 0, 1)
+    differences, found = without_compiler.differences(), Found()
     worst = max(differences, key=differences.get)
     text = f"largest difference {differences[worst]:.1e} ({worst})"
     count, target = f"{len(differences)} runs", f"{PLAIN:.0e} of 1 or the number"
@@ -259,10 +238,7 @@ def plain_part(sizes, folder, progress):
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the study: its function, its title and method in the report, and the size that it takes.
-
-    size: (field of Sizes, option of the command), or None.
-    """
+    """A part of the study: function, title and method in the report, (field of Sizes, its option) or None."""
 
     run: Callable
     title: str
@@ -295,7 +271,9 @@ PARTS = {
         ("cases", "--cases"),
     ),
     "tower": Part(
-        tower_part,
+        partial(
+            cases_part, fraction=20, plants=(f"standard{random_cases.BENDS}",), failures="tower_failures"
+        ),
         "The same with a tower that bends",
         'A twentieth as many with `tower="modes"`, deflections to 1 m and rates to 2 m/s at the start.',
         ("cases", "--cases"),
@@ -310,7 +288,7 @@ PARTS = {
     "extremes": Part(
         extremes_part,
         "Extremes",
-        f"Standard fidelity, {stability_extremes.DURATION:g} s, the event at {stability_extremes.EVENT:g} s,"
+        f"Standard fidelity, {extremes.DURATION:g} s, the event at {extremes.EVENT:g} s,"
         " PI control where the rotor runs. Lines have no breaking strength and the rotor no"
         " aerodynamic brake: a finite state does not say that a turbine survives.",
     ),
@@ -331,29 +309,22 @@ PARTS = {
 }
 
 
-def study(folder, parts=None, sizes=None, progress=None):
+def study(folder, parts=None, sizes=None, progress=silent):
     """Return {part: Found} of the chosen parts (default: all); each is written to folder/<part>.json.
 
     progress: called with (text, done, total). Raises: InputError for an unknown part.
     """
-    sizes = Sizes() if sizes is None else sizes
-    chosen = list(parts or PARTS)
-    for part in chosen:
+    sizes, results = sizes or Sizes(), {}
+    for part in parts or PARTS:
         if part not in PARTS:
             raise unknown("part", part, PARTS)
-    results = {}
-    for part in chosen:
+    for part in parts or PARTS:
         began = time.perf_counter()
         found = results[part] = PARTS[part].run(sizes, folder, progress)
-        stored = {
-            "about": header(),
-            "minutes": (time.perf_counter() - began) / 60.0,
-            "date": f"{datetime.now(UTC):%Y-%m-%d}",
-            "sizes": asdict(sizes),
-            **asdict(found),
-        }
+        about = {"about": header(), "minutes": (time.perf_counter() - began) / 60.0}
+        about |= {"date": f"{datetime.now(UTC):%Y-%m-%d}", "sizes": asdict(sizes)}
         with replacing(Path(folder) / f"{part}.json") as temporary:
-            Path(temporary).write_text(json.dumps(stored, indent=1) + "\n")
+            temporary.write_text(json.dumps(about | asdict(found), indent=1) + "\n")
     return results
 
 
@@ -371,9 +342,16 @@ def write_robustness_report(folder, path):
         f"{len(verdicts)} checks, {verdicts.count(False)} of them missed. Version {fowt_env.__version__};"
         " each part names the date and commit of its runs and the command that repeats them.",
     ]  # fmt: skip
-    for part, stored in parts.items():
-        words = f"{_origin(part, stored)} {PARTS[part].method}"
-        lines += ["", f"## {PARTS[part].title}", "", words, ""]
+    for name, stored in parts.items():
+        part, sizes = PARTS[name], stored["sizes"]
+        about = dict(line.partition(": ")[::2] for line in stored["about"])
+        command = f"fowt benchmark stability --parts {name}"
+        if part.size is not None:
+            command += f" {part.size[1]} {sizes[part.size[0]]}"
+        if sizes["seed"]:
+            command += f" --seed {sizes['seed']}"
+        words = f"{stored['date']}, {about['commit'][:7]}, `{command}`. {part.method}"
+        lines += ["", f"## {part.title}", "", words, ""]
         rows = [
             [c["what"], c["count"], c["found"] if c["holds"] else f"**MISSED**: {c['found']}", c["target"]]
             for c in stored["claims"]
@@ -383,21 +361,9 @@ def write_robustness_report(folder, path):
             if len(rows) <= ROWS_SHOWN:
                 lines += ["", f"**{title}**", "", markdown_table(columns, rows)]
                 continue
-            name = f"{part}_{number + 1}.csv" if number else f"{part}.csv"
-            write_table(pd.DataFrame(rows, columns=columns), path.with_suffix("") / name)
-            lines += ["", f"[{title}, {len(rows)} rows]({path.stem}/{name})."]
+            file = f"{name}_{number + 1}.csv" if number else f"{name}.csv"
+            write_table(pd.DataFrame(rows, columns=columns), path.with_suffix("") / file)
+            lines += ["", f"[{title}, {len(rows)} rows]({path.stem}/{file})."]
     with replacing(path) as temporary:
-        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
-
-
-def _origin(part, stored):
-    """Return date and commit of a part's run, and the command that repeats it."""
-    about = dict(line.partition(": ")[::2] for line in stored["about"])
-    words = ["fowt benchmark stability --parts", part]
-    if PARTS[part].size is not None:
-        name, option = PARTS[part].size
-        words.append(f"{option} {stored['sizes'][name]}")
-    if stored["sizes"]["seed"]:
-        words.append(f"--seed {stored['sizes']['seed']}")
-    return f"{stored['date']}, {about['commit'][:7]}, `{' '.join(words)}`."

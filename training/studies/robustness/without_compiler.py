@@ -1,7 +1,6 @@
 """The same small runs with and without the compiler: numbers must agree to rounding.
 
-As a program (`python -m fowt_env.training.studies.robustness.without_compiler IN OUT`) it runs the jobs of
-IN, a pickle; with NUMBA_DISABLE_JIT=1 in its environment every kernel is then plain Python.
+As a program (arguments IN OUT, with NUMBA_DISABLE_JIT=1 in its environment) it runs the jobs of a pickle.
 """
 
 import os
@@ -52,7 +51,7 @@ def start(scene):
 
 
 def jobs(scenes=SCENES, environments=True):
-    """Return {name: job} of pickled runs: scenes by every integrator, one environment and a vector of them.
+    """Return {name: (None or environment and mode, scene or snapshot)} of pickled runs.
 
     Scenes and snapshots are made here, with the compiler: trims and tables would take long without it.
     """
@@ -61,48 +60,40 @@ def jobs(scenes=SCENES, environments=True):
         scene = build_scene(**{"fidelity": "reference"} | options)
         for integrator in INTEGRATORS:
             made = scene.with_model(integrator=build_integrator(integrator))
-            found[f"{name}, {integrator}"] = ("scene", made)
-    if environments:
-        for mode in ("direct", "residual"):
-            env = FowtEnv(action_mode=mode, **ENV)
+            found[f"{name}, {integrator}"] = (None, made)
+    for mode in ("direct", "residual") if environments else ():
+        for name in ("environment", "vector environment"):
+            env = environment(name, mode)
             env.reset(seed=5)
-            found[f"environment, {mode}"] = ("env", mode, env.get_state())
-            batch = FowtVectorEnv(2, threads=1, action_mode=mode, **ENV)
-            batch.reset(seed=6)
-            found[f"vector environment, {mode}"] = ("vector", mode, batch.get_state())
+            found[f"{name}, {mode}"] = ((name, mode), env.get_state())
     return found
+
+
+def environment(name, mode):
+    """Return an environment of an action mode, or a vector of two."""
+    options = ENV | {"action_mode": mode}
+    return FowtEnv(**options) if name == "environment" else FowtVectorEnv(2, threads=1, **options)
 
 
 def result(job):
     """Return the numbers (n,) of a job."""
-    kind, *given = job
-    if kind == "scene":
-        scene = given[0]
-        x, handle = start(scene), scene.handle()
-        u = np.array([4.0e4, 0.25])
+    kind, begin = job
+    if kind is None:
+        x, handle, u = start(begin), begin.handle(), np.array([4.0e4, 0.25])
         status = advance(handle, x, u, 100, STEPS_PER_SCENE, 0.05)
-        row = output_row(scene.handle(), x, u, 5.0 + STEPS_PER_SCENE * 0.05, len(scene.channels))
+        row = output_row(begin.handle(), x, u, 5.0 + STEPS_PER_SCENE * 0.05, len(begin.channels))
         return np.r_[status, x, row]
-    mode, snapshot = given
-    rng, found = np.random.default_rng(3), []
-    if kind == "env":
-        env, shape = FowtEnv(action_mode=mode, **ENV), (2,)
-        env.set_state(snapshot)
-    else:
-        env, shape = FowtVectorEnv(2, threads=1, action_mode=mode, **ENV), (2, 2)
-        env.set_state(list(snapshot))
+    env, rng, found = environment(*kind), np.random.default_rng(3), []
+    env.set_state(begin)
     for _ in range(ENV_STEPS):
-        found += [np.ravel(part).astype(float) for part in env.step(rng.uniform(-1.0, 1.0, shape))[:3]]
+        action = rng.uniform(-1.0, 1.0, env.action_space.shape)
+        found += [np.ravel(part).astype(float) for part in env.step(action)[:3]]
     return np.concatenate(found)
 
 
 def differences(given=None):
-    """Return {job: largest difference over max(1, largest number)} between compiled and plain Python runs.
-
-    The measure is entry by entry, |a - b| / max(1, |a|). Raises: InputError if the plain process fails.
-    """
+    """Return {job: largest |a - b| / max(1, |a|)} of compiled (a) and plain runs. Raises: InputError."""
     given = jobs() if given is None else given
-    compiled = {name: result(job) for name, job in given.items()}
     with tempfile.TemporaryDirectory() as folder:
         ask, answer = Path(folder) / "ask.pickle", Path(folder) / "answer.npz"
         ask.write_bytes(pickle.dumps(given))
@@ -116,10 +107,11 @@ def differences(given=None):
         if done.returncode != 0:
             raise InputError(f"run without the compiler failed: {done.stderr[-800:]}")
         with np.load(answer) as stored:
-            plain = {name: stored[name] for name in stored.files}
+            plain = dict(stored)
+    compiled = {name: result(job) for name, job in given.items()}
     return {
-        name: float(np.max(np.abs(compiled[name] - plain[name]) / np.maximum(1.0, np.abs(compiled[name]))))
-        for name in given
+        name: float(np.max(np.abs(a - plain[name]) / np.maximum(1.0, np.abs(a))))
+        for name, a in compiled.items()
     }
 
 

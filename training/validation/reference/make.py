@@ -33,49 +33,37 @@ SEA = (
     "platform starts at zero, rotor 12.1 rpm, blade pitch 14.92 deg; DISCON of OC3-Hywind; irregular sea"
     " Hs 7.5 m Tp 10 s"
 )
+_PARKED = [*MOTION_COLUMNS, *TENSION_COLUMNS, *HYDRO]
+_FLOATING = [*MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS]
+_WAVE = "dt 0.025 s; regular wave H 3 m T 5 s, crest at t = 0, no ramp; WaveDisp"
+_HUB_WIND = "dt 0.0125 s; hub wind of wind_hub_18mps blown uniformly over rotor and tower"
 CASES = {  # case -> (columns, settings)
     **{
         f"decay_{name}": (MOTION_COLUMNS, f"dt 0.025 s; free decay from {start}; {STILL}")
-        for name, start in zip(
-            ("surge", "sway", "heave", "roll", "pitch", "yaw"),
-            ("10 m", "10 m", "3 m", "5 deg", "5 deg", "8 deg"),
-            strict=True,
+        for name, start in (
+            ("surge", "10 m"), ("sway", "10 m"), ("heave", "3 m"), ("roll", "5 deg"), ("pitch", "5 deg"),
+            ("yaw", "8 deg"),
         )
     },
     "float_steady_8mps": (
-        MOTION_COLUMNS + ROTOR + TENSION_COLUMNS,
-        f"dt 0.0125 s; uniform steady 8 m/s; rotor 9.16 rpm, blade pitch 0; {WIND}",
+        _FLOATING, f"dt 0.0125 s; uniform steady 8 m/s; rotor 9.16 rpm, blade pitch 0; {WIND}",
     ),
     "float_steady_18mps": (
-        MOTION_COLUMNS + ROTOR + TENSION_COLUMNS,
-        f"dt 0.0125 s; uniform steady 18 m/s; rotor 12.1 rpm, blade pitch 14.92 deg; {WIND}",
+        _FLOATING, f"dt 0.0125 s; uniform steady 18 m/s; rotor 12.1 rpm, blade pitch 14.92 deg; {WIND}",
     ),
     "float_windsteps_12_24": (
-        MOTION_COLUMNS + ROTOR + TENSION_COLUMNS,
+        _FLOATING,
         "dt 0.025 s; uniform wind, 12 m/s, then +1 m/s every 100 s (0.1 s ramp); rotor 12.1 rpm, blade pitch"
         f" 3.83 deg; {WIND}",
     ),
-    "regwave_H3T5": (
-        MOTION_COLUMNS + TENSION_COLUMNS + HYDRO,
-        f"dt 0.025 s; regular wave H 3 m T 5 s, crest at t = 0, no ramp; WaveDisp 0; {STILL}",
-    ),
-    "regwave_H3T5_displaced": (
-        MOTION_COLUMNS + TENSION_COLUMNS + HYDRO,
-        f"dt 0.025 s; regular wave H 3 m T 5 s, crest at t = 0, no ramp; WaveDisp 1; {STILL}",
-    ),
-    "turb_18mps_Hs7.5_uniform": (
-        ["wave_elev_m", *MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS],
-        f"dt 0.0125 s; hub wind of wind_hub_18mps blown uniformly over rotor and tower; {SEA}",
-    ),
+    "regwave_H3T5": (_PARKED, f"{_WAVE} 0; {STILL}"),
+    "regwave_H3T5_displaced": (_PARKED, f"{_WAVE} 1; {STILL}"),
+    "turb_18mps_Hs7.5_uniform": (["wave_elev_m", *_FLOATING], f"{_HUB_WIND}; {SEA}"),
     "turb_18mps_Hs7.5_uniform_flex": (
-        [*MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS, "twr_base_My_kNm", "tower_top_fa_m"],
-        f"dt 0.0125 s; hub wind of wind_hub_18mps blown uniformly over rotor and tower; {SEA}",
+        [*_FLOATING, "twr_base_My_kNm", "tower_top_fa_m"], f"{_HUB_WIND}; {SEA}",
     ),
-    "turb_18mps_Hs7.5_box": (
-        ["wave_elev_m", *MOTION_COLUMNS, *ROTOR, *TENSION_COLUMNS],
-        f"dt 0.0125 s; full-field TurbSim box; {SEA}",
-    ),
-}
+    "turb_18mps_Hs7.5_box": (["wave_elev_m", *_FLOATING], f"dt 0.0125 s; full-field TurbSim box; {SEA}"),
+}  # fmt: skip
 
 
 def sha256(path):
@@ -103,34 +91,35 @@ def six_digits(rows):
     return pd.DataFrame(rows).map(lambda v: float(f"{v:.6g}") if isinstance(v, float) else v)
 
 
-def series(source):
-    """Write the time series of every case."""
-    for case, (columns, settings) in CASES.items():
-        full = pd.read_csv(source / f"{case}.csv.gz", usecols=["time_s", *columns])[["time_s", *columns]]
-        every = round(0.1 / (full["time_s"][1] - full["time_s"][0]))
-        frame = full.iloc[::every].copy()
-        for name in columns:  # a motion that stays below 1e-9 of the others is rounding of the solver
-            if np.abs(frame[name]).max() < 1e-7:
-                frame[name] = 0.0
-        model = FLEXIBLE if case.endswith("_flex") else MODEL
-        write(HERE / f"{case}.csv.gz", (model, settings, *sources(source / f"{case}.csv.gz")), frame)
+def series(source, folder, cases, rounded):
+    """Write the time series of {case: (columns, step s, head lines)}, each column after rounded(column)."""
+    for case, (columns, step, *head) in cases.items():
+        path, names = source / f"{case}.csv.gz", ["time_s", *columns]
+        full = pd.read_csv(path, usecols=names)[names]
+        frame = full.iloc[:: round(step / (full["time_s"][1] - full["time_s"][0]))].copy()
+        for name in columns:
+            frame[name] = rounded(frame[name])
+        write(folder / f"{case}.csv.gz", (*head, *sources(path)), frame)
+
+
+def without_noise(values):
+    """Return a series, or 0 for a motion below 1e-7, which is rounding of the solver."""
+    return values if np.abs(values).max() >= 1e-7 else 0.0
 
 
 def inputs(source):
     """Write the steady curve, the wind and the wave components."""
-    path = source / "steady_operating_points.csv"
-    steady = pd.read_csv(path)
+    steady = "platform and tower locked, uniform steady wind, DISCON of OC3-Hywind; means of the last 50 s"
+    wind = "u at the hub point of the TurbSim box (Kaimal, 18 m/s, class B, seed 180018), shift included"
+    waves = "JONSWAP Hs 7.5 m Tp 10 s gamma 3.3; eta(0, t) = sum amplitude cos(omega t + phase), to +x"
     columns = ["wind_mps", "rotor_speed_rpm", "blade_pitch_deg", "aero_thrust_kN", "aero_torque_kNm"]
-    settings = "platform and tower locked, uniform steady wind, DISCON of OC3-Hywind; means of the last 50 s"
-    write(HERE / "steady.csv.gz", (MODEL, settings, *sources(path)), steady[columns])
-    path = source / "wind_hub_18mps.csv.gz"
-    wind = pd.read_csv(path)
-    settings = "u at the hub point of the TurbSim box (Kaimal, 18 m/s, class B, seed 180018), shift included"
-    write(HERE / "wind_hub_18mps.csv.gz", (settings, *sources(path)), wind[wind["time_s"] <= 601.0])
-    path = source / "waves_hs7.5_tp10.csv"
-    waves = pd.read_csv(path)
-    settings = "JONSWAP Hs 7.5 m Tp 10 s gamma 3.3; eta(0, t) = sum amplitude cos(omega t + phase), to +x"
-    write(HERE / "waves_hs7.5_tp10.csv.gz", (settings, *sources(path)), waves[waves["amplitude_m"] > 0.0])
+    for name, file, head, kept in (
+        ("steady", "steady_operating_points.csv", (MODEL, steady), lambda full: full[columns]),
+        ("wind_hub_18mps", "wind_hub_18mps.csv.gz", (wind,), lambda full: full[full["time_s"] <= 601.0]),
+        ("waves_hs7.5_tp10", "waves_hs7.5_tp10.csv", (waves,), lambda full: full[full["amplitude_m"] > 0.0]),
+    ):
+        path = source / file
+        write(HERE / f"{name}.csv.gz", (*head, *sources(path)), kept(pd.read_csv(path)))
 
 
 # region of the box: columns within this of the axis, rows up to this height, seconds
@@ -166,19 +155,16 @@ def box(source):
         HERE / "turbsim_18mps_region.npz",
         about="TurbSim IEC Kaimal 18 m/s class B, seed 180018, 21 x 21 points over 150 x 170 m, shear 0.14;"
         " region of rotor and tower, rounded; see make.py",
-        shape=shape,
-        steps=ROUNDING,
-        y=y,
-        z=z,
-        dt=dt,
-        speed=float(file["uRef"]),
+        shape=shape, steps=ROUNDING, y=y, z=z, dt=dt, speed=float(file["uRef"]),
         shift=75.0 / float(file["uRef"]),
         codes=np.frombuffer(lzma.compress(payload, format=lzma.FORMAT_XZ, filters=filters), dtype=np.uint8),
-    )
+    )  # fmt: skip
 
 
 if __name__ == "__main__":
     folder = Path(sys.argv[1])
-    series(folder)
+    heads = {case: FLEXIBLE if case.endswith("_flex") else MODEL for case in CASES}
+    cases = {case: (columns, 0.1, heads[case], words) for case, (columns, words) in CASES.items()}
+    series(folder, HERE, cases, without_noise)
     inputs(folder)
     box(folder)

@@ -3,12 +3,11 @@
 DECKS     folder with iea15_volturnus_s, nrel5mw_oc4_semi, nrel5mw_turbine (sources: openfast_decks.py)
 OPENFAST  the program: v5.0.0, Release, -O2, double precision, without OpenMP
 RUNS      folder of the full outputs, one subfolder a case; a case that is there is not run again
-CASE      names of CASES, or volturnus/NAME of VOLTURNUS; none: all of CASES
+CASE      names of CASES, or volturnus/NAME of VOLTURNUS; none: all of CASES but the mended ones
 
-Reduced series go to the folders of the references beside this file, with the settings and the SHA-256 of
-every file that figures are from. Cases that end on "mended" want a program with the correction that their
-heads name, and run only by name. Outputs of VOLTURNUS go to RUNS, for make_volturnus.py; those with a
-controller take ROSCO's library from the path ROSCO_LIB.
+Series go beside this file, with settings and the SHA-256 of every file that figures are from. "mended" cases
+want a program with the correction that their heads name. Outputs of VOLTURNUS go to RUNS, for
+make_volturnus.py; those with a controller take ROSCO's library from the path ROSCO_LIB.
 """
 
 import os
@@ -39,7 +38,7 @@ COLUMNS = {  # channel of OpenFAST: column of a series
     "B1WvsM2yi": "second_order_My_Nm",
 }  # fmt: skip
 PLANE = ("surge_m", "heave_m", "pitch_deg")
-WAVES, WIND = "waves_hs7.5_tp10.csv.gz", "wind_hub_18mps.csv.gz"
+INPUTS = {"components": "waves_hs7.5_tp10.csv.gz", "hub_wind": "wind_hub_18mps.csv.gz"}
 MODEL = f"{OPENFAST}, double precision, loose coupling, ConvTol 1e-6, dt 0.025 s"
 OC4 = (
     "; old-NWTC/FAST 0badc8d with the turbine of NREL/ROSCO fc11f43, written by openfast_decks.py: NREL 5 MW"
@@ -62,17 +61,18 @@ MENDED = (
 TAU = "DBEMT_Mod 2 (time constants from the means over the disk)"
 
 
-def _up(first, last, start=20.0, ramp=1.0, end=400.0):
-    """Return [(time, wind)] of a wind that rises within a ramp."""
-    return [(0.0, first), (start, first), (start + ramp, last), (end, last)]
+STEP = [(0.0, 17.0), (20.0, 17.0), (21.0, 19.0), (400.0, 19.0)]  # (time, wind)
 
 
 CASES = {  # case: (deck, arguments of its writer, columns, words)
-    "decay_surge": (Oc4, dict(t=250, PtfmSurge=8), PLANE, f"free decay from surge 8 m; {LINES}; {STILL}"),
-    "decay_heave": (Oc4, dict(t=100, PtfmHeave=3), PLANE, f"free decay from heave 3 m; {LINES}; {STILL}"),
-    "decay_pitch": (
-        Oc4, dict(t=150, PtfmPitch=6), PLANE, f"free decay from platform pitch 6 deg; {LINES}; {STILL}",
-    ),
+    **{
+        f"decay_{name}": (Oc4, case, PLANE, f"free decay from {start}; {LINES}; {STILL}")
+        for name, start, case in (
+            ("surge", "surge 8 m", dict(t=250, PtfmSurge=8)),
+            ("heave", "heave 3 m", dict(t=100, PtfmHeave=3)),
+            ("pitch", "platform pitch 6 deg", dict(t=150, PtfmPitch=6)),
+        )
+    },
     "waves_Hs7.5": (
         Oc4, dict(t=400, waves=True), ("wave_elev_m", *PLANE),
         f"components of waves_hs7.5_tp10, first order; {LINES}",
@@ -95,15 +95,13 @@ CASES = {  # case: (deck, arguments of its writer, columns, words)
         ("blade_pitch_deg", "aero_thrust_N", "aero_torque_Nm"),
         f"steady 18 m/s, 7.56 rpm, all blades from 15.4 to 13.4 deg at 2 deg/s from 20 s; {TAU}",
     ),
-    "wake_wind_step_18mps": (
-        Volturnus, dict(t=120, fixed=True, wind=_up(17.0, 19.0), rpm=7.56, pitch=15.4, dbemt=2),
-        ("aero_thrust_N", "aero_torque_Nm"),
-        f"{GUST}; {TAU}",
-    ),
-    "wake_wind_step_18mps_mended": (
-        Volturnus, dict(t=120, fixed=True, wind=_up(17.0, 19.0), rpm=7.56, pitch=15.4, dbemt=2),
-        ("aero_thrust_N", "aero_torque_Nm"), f"{GUST}; {TAU}; {MENDED}",
-    ),
+    **{
+        f"wake_wind_step_18mps{end}": (
+            Volturnus, dict(t=120, fixed=True, wind=STEP, rpm=7.56, pitch=15.4, dbemt=2),
+            ("aero_thrust_N", "aero_torque_Nm"), words,
+        )
+        for end, words in (("", f"{GUST}; {TAU}"), ("_mended", f"{GUST}; {TAU}; {MENDED}"))
+    },
 }  # fmt: skip
 PLACES = {Oc4: "nrel5mw_oc4_semi", Volturnus: "iea15_volturnus_s"}
 _TURBULENT = dict(t=600, wind="hub_wind", waves=True, control=True, rpm=7.56, pitch=15.4)
@@ -131,17 +129,12 @@ VOLTURNUS = {  # full outputs that make_volturnus.py reduces
 }
 
 
-def stored(name):
-    """Return a DataFrame of a file of this folder."""
-    return pd.read_csv(HERE / name, comment="#")
-
-
 def run(deck, case, folder, program):
     """Return a DataFrame of OpenFAST's output of a case, run in a new folder. Raises: RuntimeError."""
     if not (folder / "model.out").exists():
         deck.write(
-            folder, case, components=stored(WAVES), hub_wind=stored(WIND),
-            rosco=os.environ.get("ROSCO_LIB", "libdiscon.so"),
+            folder, case, rosco=os.environ.get("ROSCO_LIB", "libdiscon.so"),
+            **{name: pd.read_csv(HERE / file, comment="#") for name, file in INPUTS.items()},
         )  # fmt: skip
         environment = {"OPENBLAS_NUM_THREADS": "1", "PATH": "/usr/bin:/bin"}
         done = subprocess.run(
@@ -154,34 +147,23 @@ def run(deck, case, folder, program):
     lines = (folder / "model.out").read_text().split("\n")
     head = next(number for number, line in enumerate(lines) if line.startswith("Time"))
     names = [name.strip() for name in lines[head].split("\t")]
-    rows = [[float(v) for v in line.split()] for line in lines[head + 2 :] if line.strip()]
-    return pd.DataFrame(np.array(rows), columns=names)
-
-
-def reduce(name, decks, program, runs):
-    """Write the series of a case of CASES."""
-    kind, case, columns, words = CASES[name]
-    deck, place = kind(decks), PLACES[kind]
-    full = run(deck, case, runs / place / name, program).rename(columns=COLUMNS)
-    frame = six_digits(full[["time_s", *columns]])
-    inputs = [*deck.inputs(case), *([HERE / WAVES] if case.get("waves") else [])]
-    (HERE / place).mkdir(exist_ok=True)
-    model = MODEL + (OC4 if kind is Oc4 else IEA15)
-    write(HERE / place / f"{name}.csv.gz", (model, words, *sources(*inputs)), frame)
-
-
-def keep_whole(case, decks, program, runs):
-    """Write the full output of a case of VOLTURNUS, as make_volturnus.py reads it."""
-    full = run(Volturnus(decks), VOLTURNUS[case], runs / "volturnus" / case, program)
-    frame = full[[name for name in full if name in COLUMNS]].rename(columns=COLUMNS)
-    write(runs / f"{case}.csv.gz", (), six_digits(frame))
+    return pd.DataFrame(np.loadtxt(lines[head + 2 :], ndmin=2), columns=names)
 
 
 if __name__ == "__main__":
     decks, program, runs = sys.argv[1], str(Path(sys.argv[2]).resolve()), Path(sys.argv[3]).resolve()
     for name in sys.argv[4:] or [case for case in CASES if not case.endswith("mended")]:
         if name in CASES:
-            reduce(name, decks, program, runs)
+            kind, case, columns, words = CASES[name]
+            deck, place = kind(decks), PLACES[kind]
+            full = run(deck, case, runs / place / name, program).rename(columns=COLUMNS)
+            waves = [HERE / INPUTS["components"]] if case.get("waves") else []
+            (HERE / place).mkdir(exist_ok=True)
+            head = MODEL + (OC4 if kind is Oc4 else IEA15), words, *sources(*deck.inputs(case), *waves)
+            write(HERE / place / f"{name}.csv.gz", head, six_digits(full[["time_s", *columns]]))
         else:
-            keep_whole(name.removeprefix("volturnus/"), decks, program, runs)
+            case = name.removeprefix("volturnus/")
+            full = run(Volturnus(decks), VOLTURNUS[case], runs / "volturnus" / case, program)
+            frame = full[[name for name in full if name in COLUMNS]].rename(columns=COLUMNS)
+            write(runs / f"{case}.csv.gz", (), six_digits(frame))  # as make_volturnus.py reads it
         print(name, flush=True)

@@ -2,9 +2,7 @@
 
 SERIES_FOLDER has the OpenFAST outputs of the rigid IEA 15 MW on VolturnUS-S (make_openfast.py, VOLTURNUS),
 LINEAR_FOLDER the linearisation files (lin_NN.A.lin: operating point NN, azimuth A) of NREL/ROSCO fc11f43,
-Examples/Test_Cases/IEA-15-240-RWT/IEA-15-240-RWT-UMaineSemi/linearizations. Series keep the columns that are
-compared, every 0.1 s or 0.2 s, with a header that says how the run was made; the steady winds are reduced to
-means over whole turns in axes that do not turn; of the linear models remain poles and frequency responses.
+Examples/Test_Cases/IEA-15-240-RWT/IEA-15-240-RWT-UMaineSemi/linearizations.
 """
 
 import sys
@@ -16,7 +14,7 @@ import pandas as pd
 from fowt_env.descriptions.units import RPM
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
-from make import six_digits, sources, write
+from make import series, six_digits, sources, write
 from make_openfast import STEADY as HELD
 
 HERE = Path(__file__).resolve().parent / "iea15_volturnus_s"
@@ -33,40 +31,43 @@ BENDING = MODEL.replace(
 TOWER = ["twr_base_My_kNm", "tower_top_fa_m", "nacelle_acc_x_mps2"]
 STILL = "still water, no wind, rotor at rest, blade pitch 0; all other states start at zero"
 ROSCO = "ROSCO 2.10.6 every 0.025 s, blade pitch follows its command at once; platform starts at zero"
-CASES = {  # case -> (columns, step, settings)
-    "static": (PLANE, 0.2, f"from rest at the undisplaced position; {STILL}"),
-    "decay_surge": (PLANE, 0.2, f"free decay from surge 10 m; {STILL}"),
-    "decay_heave": (PLANE, 0.1, f"free decay from heave 3 m; {STILL}"),
-    "decay_pitch": (PLANE, 0.1, f"free decay from platform pitch 5 deg; {STILL}"),
-    "decay_yaw": (["yaw_deg"], 0.2, f"free decay from yaw 8 deg; {STILL}"),
-    "regwave_H4T9": (PLANE, 0.1, "regular wave H 4 m T 9 s, crest at t = 0, no ramp; no wind, rotor at rest"),
+_CONTROLLED = [*PLANE, *ROTOR]
+_TURBULENCE = (
+    "wind_hub_18mps blown uniformly, components of waves_hs7.5_tp10; rotor 7.56 rpm, blade pitch 15.4 deg;"
+    f" {ROSCO}"
+)
+_QTF = (
+    "components of waves_hs7.5_tp10, with the difference-frequency forces of the full QTF; no wind, rotor at"
+    " rest"
+)
+CASES = {  # case -> (columns, step, model, settings)
+    "static": (PLANE, 0.2, MODEL, f"from rest at the undisplaced position; {STILL}"),
+    "decay_surge": (PLANE, 0.2, MODEL, f"free decay from surge 10 m; {STILL}"),
+    "decay_heave": (PLANE, 0.1, MODEL, f"free decay from heave 3 m; {STILL}"),
+    "decay_pitch": (PLANE, 0.1, MODEL, f"free decay from platform pitch 5 deg; {STILL}"),
+    "decay_yaw": (["yaw_deg"], 0.2, MODEL, f"free decay from yaw 8 deg; {STILL}"),
+    "regwave_H4T9": (
+        PLANE, 0.1, MODEL, "regular wave H 4 m T 9 s, crest at t = 0, no ramp; no wind, rotor at rest",
+    ),
     "waves_Hs7.5": (
-        ["wave_elev_m", *PLANE], 0.2, "components of waves_hs7.5_tp10, first order; no wind, rotor at rest",
+        ["wave_elev_m", *PLANE], 0.2, MODEL,
+        "components of waves_hs7.5_tp10, first order; no wind, rotor at rest",
     ),
-    "waves_Hs7.5_qtf": (
-        ["wave_elev_m", *PLANE], 0.2,
-        "components of waves_hs7.5_tp10, with the difference-frequency forces of the full QTF; no wind,"
-        " rotor at rest",
-    ),
+    "waves_Hs7.5_qtf": (["wave_elev_m", *PLANE], 0.2, MODEL, _QTF),
     "float_steady_12mps": (
-        [*PLANE, *ROTOR], 0.1,
+        _CONTROLLED, 0.1, MODEL,
         f"uniform steady 12 m/s, still water; rotor 7.56 rpm, blade pitch 6.3 deg; {ROSCO}",
     ),
     "float_steady_18mps": (
-        [*PLANE, *ROTOR], 0.1,
+        _CONTROLLED, 0.1, MODEL,
         f"uniform steady 18 m/s, still water; rotor 7.56 rpm, blade pitch 15.4 deg; {ROSCO}",
     ),
-    "turb_18mps_Hs7.5_uniform": (
-        [*PLANE, *ROTOR], 0.1,
-        "wind_hub_18mps blown uniformly, components of waves_hs7.5_tp10; rotor 7.56 rpm, blade pitch 15.4"
-        f" deg; {ROSCO}",
+    "turb_18mps_Hs7.5_uniform": (_CONTROLLED, 0.1, MODEL, _TURBULENCE),
+    "decay_pitch_tower": (
+        [*PLANE, *TOWER], 0.1, BENDING, f"free decay from platform pitch 5 deg; {STILL}",
     ),
-}  # fmt: skip
-BENDING_CASES = {  # the same, with a tower that bends
-    "decay_pitch_tower": ([*PLANE, *TOWER], 0.1, f"free decay from platform pitch 5 deg; {STILL}"),
     "turb_18mps_Hs7.5_uniform_tower": (
-        [*PLANE, *ROTOR, *TOWER, "twr_base_Mx_kNm", "tower_top_ss_m"], 0.1,
-        CASES["turb_18mps_Hs7.5_uniform"][2],
+        [*_CONTROLLED, *TOWER, "twr_base_Mx_kNm", "tower_top_ss_m"], 0.1, BENDING, _TURBULENCE,
     ),
 }  # fmt: skip
 STEADY = {  # case -> (wind, rotor speed, blade pitches, shear exponent)
@@ -76,7 +77,7 @@ STEADY = {  # case -> (wind, rotor speed, blade pitches, shear exponent)
 }  # fmt: skip
 SETTLED = 15.0  # s of a steady case that are left out
 TURNING = (("aero_Fy_N", "aero_Fz_N"), ("aero_My_Nm", "aero_Mz_Nm"))
-ROOTS = [("root1_Mx_kNm", "root1_My_kNm"), ("root2_My_kNm",), ("root3_My_kNm",)]
+ROOTS = ("root1_Mx_kNm", "root1_My_kNm", "root2_My_kNm", "root3_My_kNm")
 
 
 def rounded(values, digits=5):
@@ -87,45 +88,30 @@ def rounded(values, digits=5):
     return values.round(max(0, digits - int(np.ceil(np.log10(largest)))))
 
 
-def series(source):
-    """Write the time series of every case."""
-    for case, (columns, step, settings) in {**CASES, **BENDING_CASES}.items():
-        full = pd.read_csv(source / f"{case}.csv.gz", usecols=["time_s", *columns])[["time_s", *columns]]
-        every = round(step / (full["time_s"][1] - full["time_s"][0]))
-        frame = full.iloc[::every].copy()
-        for name in columns:
-            frame[name] = rounded(frame[name])
-        model = BENDING if case in BENDING_CASES else MODEL
-        write(HERE / f"{case}.csv.gz", (model, settings, *sources(source / f"{case}.csv.gz")), frame)
-
-
 def wave_forces(source):
     """Write the forces of a sea: first order, and difference frequencies of the full QTF, every 2 s."""
     path = source / "waves_Hs7.5_qtf.csv.gz"
-    columns = ["wave_elev_m", "excitation_Fx_N", "excitation_Fz_N", "excitation_My_Nm", "second_order_Fx_N",
-               "second_order_My_Nm"]  # fmt: skip
-    full = pd.read_csv(path, usecols=["time_s", *columns])[["time_s", *columns]]
+    columns = ["time_s", "wave_elev_m", "excitation_Fx_N", "excitation_Fz_N", "excitation_My_Nm",
+               "second_order_Fx_N", "second_order_My_Nm"]  # fmt: skip
+    full = pd.read_csv(path, usecols=columns)[columns]
     every = round(2.0 / (full["time_s"][1] - full["time_s"][0]))
     settings = (
-        f"{CASES['waves_Hs7.5_qtf'][2]}; HydroDyn's forces at the undisplaced place (B1WvsF1, B1WvsF2),"
-        " differences of frequency up to 0.737863 rad/s"
+        f"{_QTF}; HydroDyn's forces at the undisplaced place (B1WvsF1, B1WvsF2), differences of frequency up"
+        " to 0.737863 rad/s"
     )
     write(HERE / "wave_forces.csv.gz", (MODEL, settings, *sources(path)), full.iloc[::every])
 
 
-def whole_turns(time, rpm):
-    """Return a mask of the samples after SETTLED that make up whole turns."""
-    period, step = 60.0 / rpm, time[1] - time[0]
-    turns = np.floor((time[-1] - SETTLED) / period + 1e-9)
-    return (time >= SETTLED - 1e-9) & (time < SETTLED + turns * period - 0.5 * step)
-
-
 def held(source, case):
-    """Return (arrays of a steady case over whole turns, azimuth of blade 1, row of the case's settings)."""
+    """Return (arrays of a steady case, azimuth of blade 1, row of the case's settings).
+
+    Samples after SETTLED that make up whole turns.
+    """
     wind, rpm, pitches, shear = STEADY[case]
     frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
-    time = frame["time_s"].to_numpy()
-    kept = whole_turns(time, rpm)
+    time, period = frame["time_s"].to_numpy(), 60.0 / rpm
+    end = SETTLED + np.floor((time[-1] - SETTLED) / period + 1e-9) * period
+    kept = (time >= SETTLED - 1e-9) & (time < end - 0.5 * (time[1] - time[0]))
     row = {"case": case, "wind_mps": wind, "shear_exponent": shear, "rotor_speed_rpm": rpm}
     row |= {f"blade_pitch{k}_deg": value for k, value in enumerate(pitches, 1)}
     columns = {name: frame[name].to_numpy()[kept] for name in frame}
@@ -149,9 +135,9 @@ def steady(source):
             a, b = values[y], values[z]
             row[y] = (a * np.cos(angle) - b * np.sin(angle)).mean()
             row[z] = (a * np.sin(angle) + b * np.cos(angle)).mean()
-        for name in [name for names in ROOTS for name in names]:
+        for name in ROOTS:
             row[name] = values[name].mean() if name in values else np.nan
-        for name in ("root1_Mx_kNm", "root1_My_kNm"):
+        for name in ROOTS[:2]:
             for part, wave in (("cos", np.cos(angle)), ("sin", np.sin(angle))):
                 row[f"{name}_{part}"] = 2.0 * (values[name] * wave).mean() if name in values else np.nan
         rows.append(row)
@@ -208,7 +194,7 @@ def blade_loads(source):
 if __name__ == "__main__":
     HERE.mkdir(exist_ok=True)
     folder = Path(sys.argv[1])
-    series(folder)
+    series(folder, HERE, CASES, rounded)
     wave_forces(folder)
     steady(folder)
     sheared(folder)

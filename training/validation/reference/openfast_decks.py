@@ -1,8 +1,7 @@
 """Inputs of OpenFAST v5.0.0 from the public decks of VolturnUS-S and of the OC4 semi-submersible.
 
 Decks are those of NOTICE: IEAWindSystems/IEA-15-240-RWT ac5248a (with the DISCON.IN of NREL/ROSCO fc11f43),
-old-NWTC/FAST 0badc8d with the turbine of NREL/ROSCO fc11f43. Figures are carried over by their keys; what a
-run changes is an argument of the writer. make_openfast.py runs what is written here.
+old-NWTC/FAST 0badc8d with the turbine of NREL/ROSCO fc11f43. Figures are carried over by their keys.
 """
 
 import re
@@ -114,11 +113,15 @@ ELASTO_CHANNELS = (
 AERO_CHANNELS = ("RtFldFxh", "RtFldMxh", "RtFldFyh", "RtFldFzh", "RtFldMyh", "RtFldMzh")
 
 
-def value_of(text, key):
-    """Return the text of the value before a key of a deck, None where the deck has no such key."""
+def pattern(key):
+    """Return the pattern of a value before its key in a deck, brackets of the key optional."""
     bare = re.escape(key).replace(r"\(", r"\(?").replace(r"\)", r"\)?")
-    found = re.search(rf"^[ \t]*(\"[^\"\n]*\"|[^\s\"]+)[ \t]+{bare}(?=\s|$)", text, re.M)
-    return None if found is None else found[1]
+    return rf"^[ \t]*(\"[^\"\n]*\"|[^\s\"]+)([ \t]+{bare}(?=\s|$))"
+
+
+def keys_of(settings):
+    """Return settings with BlPitch(1) for BlPitch__1."""
+    return {name.replace("__", "(") + (")" if "__" in name else ""): v for name, v in settings.items()}
 
 
 def filled(layout, deck="", **settings):
@@ -126,34 +129,30 @@ def filled(layout, deck="", **settings):
 
     Raises: KeyError for a setting that the layout lacks, and for a key without any value.
     """
-    settings = {name.replace("__", "(") + (")" if "__" in name else ""): v for name, v in settings.items()}
-    lines, used = [], set()
+    lines, settings = [], keys_of(settings)
     for line in (part.strip() for part in layout.replace("\n", " ").split(";")):
-        key, _, default = line.partition(" ")
+        key, _, value = line.partition(" ")
         if key == "-" or line.startswith('"') or line == "END":
-            lines.append(line if not default or not default[0].isdigit() else default)
+            lines.append(value if value[:1].isdigit() else line)
             continue
-        value = settings.get(key, default or value_of(deck, key))
-        if key in settings:
-            used.add(key)
-        if value is None and key != "OutList":
+        if not value and (found := re.search(pattern(key), deck, re.M)):
+            value = found[1]
+        value = settings.pop(key, value)
+        if value == "" and key != "OutList":
             raise KeyError(key)
-        lines.append(f"{'' if value is None else value} {key}")
-    if unknown := set(settings) - used:
-        raise KeyError(f"no such key: {sorted(unknown)}")
+        lines.append(f"{value} {key}")
+    if settings:
+        raise KeyError(f"no such key: {sorted(settings)}")
     return "\n".join(lines) + "\n"
 
 
 def put(text, **values):
     """Return deck text with the value before each key replaced, where the key comes first."""
-    for name, value in values.items():
-        key = re.escape(name.replace("__", "(") + (")" if "__" in name else ""))
-        text, count = re.subn(
-            rf"^[ \t]*(\"[^\"\n]*\"|[^\s\"]+)([ \t]+{key}(?=\s|$))",
-            lambda found, value=value: f"{value}{found[2]}", text, count=1, flags=re.M,
-        )  # fmt: skip
+    for key, value in keys_of(values).items():
+        replaced = re.compile(pattern(key), re.M)
+        text, count = replaced.subn(lambda found, value=value: f"{value}{found[2]}", text, count=1)
         if not count:
-            raise KeyError(name)
+            raise KeyError(key)
     return text
 
 
@@ -174,35 +173,25 @@ def table(key, rows):
     return f"- table\n{len(rows)} {key}\n-\n-\n" + "".join(f"{row}\n" for row in rows)
 
 
-def members_text(axial=(), joints=(), sections=(), coefficients=(), members=(), fills=()):
+def members_text(axial=("1 0 0 1 0 0 1",), joints=(), sections=(), coefficients=(), members=(), fills=()):
     """Return the text of HydroDyn's strip theory, all tables of it in v5's order."""
-    return "".join([
-        table("NAxCoef", axial or ["1 0 0 1 0 0 1"]),
-        table("NJoints", joints),
-        table("NPropSetsCyl", sections),
-        table("NPropSetsRec", ()),
-        "- simple\n-\n-\n" + "0 " * 14 + "\n",
-        "- simple, rectangular\n-\n-\n" + "0 " * 18 + "\n",
-        table("NCoefDpthCyl", ()),
-        table("NCoefDpthRec", ()),
-        table("NCoefMembersCyl", coefficients),
-        table("NCoefMembersRec", ()),
-        table("NMembers", members),
-        table("NFillGroups", fills),
-        table("NMGDepths", ()),
-        table("NMOutputs", ()),
-        "- joints\n0 NJOutputs\n0 JOutLst\n",
-    ])  # fmt: skip
+    simple = [f"- simple{shape}\n-\n-\n{'0 ' * n}\n" for shape, n in (("", 14), (", rectangular", 18))]
+    before = {"NAxCoef": axial, "NJoints": joints, "NPropSetsCyl": sections, "NPropSetsRec": ()}
+    after = {
+        "NCoefDpthCyl": (), "NCoefDpthRec": (), "NCoefMembersCyl": coefficients, "NCoefMembersRec": (),
+        "NMembers": members, "NFillGroups": fills, "NMGDepths": (), "NMOutputs": (),
+    }  # fmt: skip
+    parts = [[table(*part) for part in tables.items()] for tables in (before, after)]
+    return "".join([*parts[0], *simple, *parts[1], "- joints\n0 NJOutputs\n0 JOutLst\n"])
 
 
 def write_elastodyn(folder, deck, case, **files):
     """Write ED.dat of a run: rigid but for what the case switches on; blade and tower files beside it."""
-    tower, blades = case.get("tower", 0), bool(case.get("blades"))
+    tower = case.get("tower", 0)
     pitches = case.get("pitches", (case.get("pitch", 0),) * 3)
     held = {f"Ptfm{k}DOF": False for k in ("Sg", "Sw", "Hv", "R", "P", "Y")} if case.get("fixed") else {}
     text = filled(
-        ELASTODYN, deck, FlapDOF1=blades, FlapDOF2=blades, EdgeDOF=blades, GenDOF=bool(case.get("control")),
-        TwFADOF1=tower > 0, TwFADOF2=tower > 1, TwSSDOF1=tower > 0, TwSSDOF2=tower > 1,
+        ELASTODYN, deck, GenDOF=bool(case.get("control")), TwFADOF1=tower > 0, TwSSDOF1=tower > 0,
         RotSpeed=case.get("rpm", 0), **{f"BlPitch__{k}": pitches[k - 1] for k in BLADES}, **held,
         **{name: case[name] for name in MOTIONS if name in case},
     )  # fmt: skip
@@ -413,7 +402,7 @@ class Oc4(Deck):
         (folder / "HD.dat").write_text(self._hydrodyn(case))
         # 2 m along the waves, which no component is shorter than 9 m in; all members are within 29 m and 20 m
         grid = {"X_HalfWidth": 60, "NX": 31, "Y_HalfWidth": 40, "NY": 2, "Z_Depth": 24, "NZ": 15}
-        write_sea(folder, case, components, WaveDT=0.1, **(case.get("grid") or grid))
+        write_sea(folder, case, components, WaveDT=0.1, **grid)
         text = self._moordyn() if case.get("moordyn") else self.read("MAP").replace("ˆ", "^")
         (folder / "mooring.dat").write_text(text)
         write_glue(folder, case, Gravity=self.gravity, CompMooring=3 if case.get("moordyn") else 1)
@@ -463,23 +452,20 @@ class Oc4(Deck):
         # the old HydroDyn had the water's weight not move; the deck makes up for it by a stiffness
         restored = -sum(self.gravity * mass * height for mass, height in self.ballast(text))
         stiffness = float(re.search(r"^\s+0\s+0\s+0\s+([1-9]\d+)\s+0\s+0\s*$", text, re.M)[1]) - restored
-        added = matrix("AddCLin", {(4, 4): stiffness, (5, 5): stiffness})
-        added += matrix("AddBLin", {}) + matrix("AddBQuad", {})
-        drag = case.get("drag", 1.0)
-        axial = [
-            f"{name} {drag * float(cd):g} {ca} {cp} 0 0 1" for name, cd, ca, cp in section(text, "NAxCoef")
-        ]
+        entries = {"AddCLin": {(4, 4): stiffness, (5, 5): stiffness}}
+        added = "".join(matrix(name, entries.get(name, {})) for name in MATRICES)
+        axial = [f"{name} {float(cd):g} {ca} {cp} 0 0 1" for name, cd, ca, cp in section(text, "NAxCoef")]
         # members above the water are left out, and strips are as long as the waves allow: a solution of all
         # node accelerations, their number squared, is what a run takes; a node is at the still water level
         joints = [row[:6] for row in section(text, "NJoints")]
         dry = {row[0] for row in joints if float(row[3]) >= 0.0}
         members = [row for row in section(text, "NMembers") if not dry.issuperset(row[1:3])]
         met = {joint for row in members for joint in row[1:3]}
-        coefficients = []
-        for row in section(text, "NCoefMembers"):
-            if any(row[0] == member[0] for member in members):
-                cd = [f"{drag * float(v):g}" for v in row[1:5]]
-                coefficients.append(" ".join([row[0], *cd, *row[5:13], *"0000", *row[13:21], *"1111"]))
+        wetted = {row[0] for row in members}
+        coefficients = [
+            " ".join([name, *(f"{float(v):g}" for v in row[:4]), *row[4:12], *"0000", *row[12:20], *"1111"])
+            for name, *row in section(text, "NCoefMembers") if name in wetted
+        ]  # fmt: skip
         # cylinder, no turn, division, member table, no hydrostatics of its own
         rows = [" ".join([*r[:5], "1 0", self.division[r[3]], r[6], "1", r[7]]) for r in members]
         strips = members_text(

@@ -1,52 +1,40 @@
 """Poles and responses of OpenFAST's linear models of VolturnUS-S with the tower held: `responses`.
 
 Each linearisation file has 106 states: surge, heave, platform pitch, the first fore-aft tower mode, the
-generator's azimuth, their rates, and HydroDyn's states of excitation and radiation. The files of the
-twelve azimuths of an operating point are averaged. The tower is then held by the constraint force lambda
-e_t that makes its acceleration zero: with q'' = a the accelerations of the free model and m = M^-1 e_t,
-
-    a - m a_t / m_t,  q_t = q_t' = 0.
-
-Of M^-1 only the direction of m is needed. The stiffness of the tower mode is a generalised force along
-e_t alone, so the column of A by which the accelerations depend on q_t is m up to gravity and
-aerodynamics: gravity acts on the deflected mass with about 1 % of the column of pitch.
-`direction_from_masses` has m from the deck's masses, the tower's mode shape and the added mass at
-infinite frequency instead; the poles by it are stored beside the others.
+generator's azimuth, their rates, and HydroDyn's. The files of the twelve azimuths of an operating point are
+averaged. The tower is then held by the constraint force lambda e_t that makes its acceleration zero: with
+q'' = a the accelerations of the free model and m = M^-1 e_t, a - m a_t / m_t, q_t = q_t' = 0. The stiffness
+of the tower mode is a generalised force along e_t alone, so that the column of A for q_t is m up to gravity
+and aerodynamics (about 1 % of the column of pitch). `direction_from_masses` has m from the deck's masses
+instead; the poles by it are stored beside the others.
 """
 
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 from make import six_digits, sources, write
 
+from fowt_env.training.validation.linear_cases import named_poles
+
 RAD_PER_S = np.array([0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8])  # of the responses
 PLATFORM = ("surge", "heave", "pitch")
-FREE, TOWER = [0, 1, 2, 4], 3  # positions that stay, and the tower's
+TOWER = 3  # position of the tower
+HELD = (*"surge heave platform_pitch vx vz wy rotor_speed".split(),)  # first states then
 
 
 def read(path):
     """Return (A, B, (states, inputs) operating points) of a linearisation file."""
-    lines = Path(path).read_text().split("\n")
-    found = {}
+    lines, found = Path(path).read_text().split("\n"), {}
     for number, line in enumerate(lines):
+        name = line.split()[-1].rstrip(":") if line.startswith("Order of ") else ""
         if line.startswith(("A:", "B:")):
-            rows, columns = (int(n) for n in line[2:].split("x"))
-            values = [[float(v) for v in text.split()] for text in lines[number + 1 : number + 1 + rows]]
-            found[line[0]] = np.array(values).reshape(rows, columns)
-        if line.startswith("Order of ") and line.split()[-1].rstrip(":") in ("states", "inputs"):
-            table = []
-            for text in lines[number + 3 :]:
-                if not text.strip():
-                    break
-                table.append(float(text.split()[1].rstrip(",")))
-            found[line.split()[-1].rstrip(":")] = np.array(table)
+            rows = int(line[2:].split("x")[0])
+            found[line[0]] = np.loadtxt(lines[number + 1 : number + 1 + rows], ndmin=2)
+        elif name in ("states", "inputs"):
+            rows = takewhile(str.strip, lines[number + 3 :])
+            found[name] = np.array([float(row.split()[1].rstrip(",")) for row in rows])
     return found["A"], found["B"], found["states"], found["inputs"]
-
-
-def mean_over_azimuths(folder, point):
-    """Return (A, B, states, inputs) of an operating point, averaged over its azimuths."""
-    models = [read(path) for path in sorted(Path(folder).glob(f"lin_{point:02d}.*.lin"))]
-    return [np.mean([model[k] for model in models], axis=0) for k in range(4)], len(models)
 
 
 def hold_tower(A, B, direction=None):
@@ -108,31 +96,6 @@ def direction_from_masses():
     return np.append(np.linalg.inv(mass)[:, TOWER], 0.0)
 
 
-def named_poles(A):
-    """Return {motion: complex pole with positive imaginary part, rotor: real pole}, the tower held.
-
-    A mode is found by its participation in the two states of a motion: right times left eigenvector.
-    """
-    value, right = np.linalg.eig(A)
-    left = np.linalg.inv(right)
-    share = np.abs(right.T * left)  # (mode, state)
-    found, used = {}, set()
-    for name, states in (("rotor", [6]), ("surge", [0, 3]), ("heave", [1, 4]), ("pitch", [2, 5])):
-        for mode in np.argsort(-share[:, states].sum(axis=1)):
-            plausible = value[mode].imag >= 0.0 and (name == "rotor" or value[mode].imag > 0.0)
-            if plausible and mode not in used:
-                found[name] = value[mode]
-                used.add(mode)
-                break
-    return found
-
-
-def response(A, B, column, state, omega):
-    """Return the complex response of a state (index) to an input (column) at omega (rad/s)."""
-    unit = np.eye(len(A))
-    return np.array([np.linalg.solve(1j * w * unit - A, B[:, column])[state] for w in omega])
-
-
 WIND, COLLECTIVE = 0, 8  # columns of B
 
 
@@ -140,18 +103,19 @@ def responses(source, folder):
     """Write linear_poles.csv.gz and linear_responses.csv.gz of the operating points 5 to 24 m/s."""
     poles, gains = [], []
     for point in range(20):
-        (A, B, states, inputs), count = mean_over_azimuths(source, point)
+        models = [read(path) for path in sorted(Path(source).glob(f"lin_{point:02d}.*.lin"))]
+        A, B, states, inputs = (np.mean(part, axis=0) for part in zip(*models, strict=True))
         held, by = hold_tower(A, B)
         other, by_other = hold_tower(A, B, direction_from_masses())
         row = {
-            "wind_mps": inputs[0], "azimuths": count, "rotor_speed_rad_s": states[9],
+            "wind_mps": inputs[0], "azimuths": len(models), "rotor_speed_rad_s": states[9],
             "blade_pitch_rad": inputs[COLLECTIVE], "gen_torque_Nm": inputs[7],
             "surge_m": states[0], "heave_m": states[1], "pitch_rad": states[2],
         }  # fmt: skip
-        flexible = A[np.ix_(*[[i for i in range(len(A)) if i != 4]] * 2)]
-        for name, value in named_poles(held).items():
+        flexible = np.delete(np.delete(A, 4, axis=0), 4, axis=1)
+        for name, value in named_poles(held, HELD).items():
             row |= {f"{name}_real": value.real, f"{name}_imag": value.imag}
-        for name, value in named_poles(other).items():
+        for name, value in named_poles(other, HELD).items():
             row |= {f"{name}_real_other": value.real, f"{name}_imag_other": value.imag}
         near = np.linalg.eigvals(flexible)
         for name in PLATFORM:
@@ -161,7 +125,8 @@ def responses(source, folder):
         poles.append(row)
         for source_name, column in (("wind", WIND), ("blade_pitch", COLLECTIVE)):
             for target, state in (("rotor_speed", 6), ("pitch", 2)):
-                for w, value in zip(RAD_PER_S, response(held, by, column, state, RAD_PER_S), strict=True):
+                for w in RAD_PER_S:
+                    value = np.linalg.solve(1j * w * np.eye(len(held)) - held, by[:, column])[state]
                     gains.append({
                         "wind_mps": inputs[0], "input": source_name, "output": target, "omega_rad_s": w,
                         "real": value.real, "imag": value.imag,
