@@ -6,6 +6,7 @@ import json
 import math
 import re
 import tomllib
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,11 @@ _KEY_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_KEY_PART}){{{MAX_DEPTH}}}")
 
 
-def read_text(path, kind, largest=MAX_BYTES):
-    """Return the text of a file of at most `largest` bytes; kind ("platform" ...) is for messages."""
+def read_text(path, kind, largest=MAX_BYTES, fallback=None):
+    """Return the text of a file of at most `largest` bytes; kind ("platform" ...) is for messages.
+
+    fallback: the encoding of what is not UTF-8; None: that is refused.
+    """
     try:
         if not path.exists():
             raise InputError(f"{kind} file {str(path)!r} does not exist")
@@ -32,8 +36,11 @@ def read_text(path, kind, largest=MAX_BYTES):
         size = path.stat().st_size
         if size > largest:
             raise InputError(f"{kind} file {str(path)!r} has {size} bytes; allowed: at most {largest}")
-        return path.read_bytes().decode("utf-8-sig")
+        content = path.read_bytes()
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        if fallback is not None:
+            return content.decode(fallback)
         where = f"{error.reason} at byte {error.start}"
         raise InputError(f"{kind} file {str(path)!r} is not UTF-8 text: {where}") from None
     except (OSError, ValueError) as error:
@@ -142,6 +149,15 @@ def raise_problems(where, problems):
     if len(problems) == 1:
         raise InputError(f"{where}: {problems[0]}")
     raise InputError("\n  ".join([f"{where}: {len(problems)} problems", *shown, *more]))
+
+
+@contextmanager
+def noted(problems, prefix=""):
+    """Context whose InputError becomes one of the problems."""
+    try:
+        yield
+    except InputError as error:
+        problems.append(f"{prefix}{error}")
 
 
 def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, also=""):

@@ -91,19 +91,7 @@ class Key(NamedTuple):
     column: int = -1
 
 
-METHODS = (
-    "number",
-    "whole",
-    "one_of",
-    "flag",
-    "text",
-    "numbers",
-    "matrix",
-    "vector",
-    "table",
-    "other",
-    "find",
-)
+METHODS = ("number", "whole", "one_of", "flag", "text", "matrix", "vector", "table", "other", "find")
 
 
 class Recorder:

@@ -401,7 +401,7 @@ def test_lines_of_map_are_repeated_and_weigh_what_they_do_in_water(imported):
 def test_moordyn_gives_the_lines_of_map(tmp_path):
     write_deck(tmp_path)
     site = (200.0, 1025.0, 9.81)
-    ours, other = (read_mooring(None, tmp_path / NAMES[name], *site)[1] for name in ("MAP", "MoorDyn"))
+    ours, other = (read_mooring(None, tmp_path / NAMES[name], *site)[0] for name in ("MAP", "MoorDyn"))
     for a, b in zip(ours, other, strict=True):
         assert a.anchor == pytest.approx(b.anchor, abs=1e-6)
         assert a.fairlead == pytest.approx(b.fairlead, abs=1e-6)
@@ -615,4 +615,4 @@ def test_no_file_of_a_folder_is_replaced_by_an_import_that_is_not_asked_to(tmp_p
 def test_members_need_joints_and_sections_that_are_there(tmp_path):
     write_deck(tmp_path, HydroDyn=[("1 1 2 1 1 1.0 2 1 TRUE", "1 1 9 1 1 1.0 2 1 TRUE")])
     with pytest.raises(InputError, match="joint 9 is not there"):
-        read_hydrodyn(tmp_path / NAMES["HydroDyn"], (1025.0, 200.0, 0.0))
+        read_hydrodyn(tmp_path / NAMES["HydroDyn"], 1025.0)
