@@ -2,7 +2,7 @@
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
@@ -34,18 +34,16 @@ class Lidar(Record):
     source: str = ""
     confidence: str = ""
 
-    @model_validator(mode="after")
-    def _consistent(self):
+    def _problems(self):
         cone = (self.beams is not None) + (self.half_angle is not None)
         if cone == 1 or (cone == 2) == bool(self.azimuth) or len(self.azimuth) != len(self.elevation):
-            raise ValueError("needs azimuth and elevation, equally long, or else beams and half_angle")
+            yield "needs azimuth and elevation, equally long, or else beams and half_angle"
         optics = (self.lens_radius is not None) + (self.wavelength is not None)
         if optics == 1 or (optics == 2 and self.pulse_length is not None):
-            raise ValueError("needs pulse_length, or else lens_radius and wavelength, or none of these")
+            yield "needs pulse_length, or else lens_radius and wavelength, or none of these"
         pairs = zip(self.distances[:-1], self.distances[1:], strict=True)
         if not self.distances or any(far <= near for near, far in pairs):
-            raise ValueError(f"distances = {self.distances}: must be at least one, increasing, m")
-        return self
+            yield f"distances = {self.distances}: must be at least one, increasing, m"
 
 
 @cached(1)
