@@ -50,8 +50,8 @@ class Fault(Record):
     A run with a fault goes on past the turbine's overspeed, which ends any other as failed: how far a rotor
     without torque or pitch runs away is what such a case shows.
 
-    The kinds are those of FAULTS, the keys of each as in docs/guides/faults.md. Readings are of Measurement or,
-    with pitch="individual", of BladeMeasurement; single blades need a scene with that option too.
+    The kinds are those of FAULTS, the keys of each as in docs/guides/faults.md. Readings are of Measurement
+    or, with pitch="individual", of BladeMeasurement; single blades need a scene with that option too.
     """
 
     kind: Literal[KINDS]

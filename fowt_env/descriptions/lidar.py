@@ -5,8 +5,8 @@ from typing import Annotated
 from pydantic import Field
 
 from fowt_env.caches import cached
-from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
-from fowt_env.descriptions.records import Record, bounded, checked_record, validate
+from fowt_env.descriptions.files import DATA, locate, read_toml
+from fowt_env.descriptions.records import Record, bounded, checked_entries, checked_record
 
 Angle = bounded(gt=-60.0, lt=60.0)  # deg
 Distance = bounded(ge=10.0, le=1000.0)  # m
@@ -49,13 +49,7 @@ class Lidar(Record):
 @cached(1)
 def lidars():
     """Return {name: Lidar} of the built-in lidars."""
-    path = DATA / "lidars.toml"
-    found, problems = {}, []
-    for name, entry in read_toml(path, "lidar")["lidar"].items():
-        found[name], wrong = validate(Lidar, {"name": name, **entry})
-        problems += [f"lidar.{name}: {problem}" for problem in wrong]
-    raise_problems(f"lidar file {str(path)!r}", problems)
-    return found
+    return checked_entries(Lidar, DATA / "lidars.toml", "lidar", "lidar")
 
 
 def read_lidar(lidar):

@@ -25,7 +25,7 @@ from fowt_env.descriptions.checks import (
     plain_number,
     short,
 )
-from fowt_env.descriptions.files import raise_problems
+from fowt_env.descriptions.files import raise_problems, read_toml
 from fowt_env.descriptions.units import FILE_UNITS
 from fowt_env.errors import did_you_mean
 
@@ -167,6 +167,16 @@ def checked_record(model, data, where):
     record, problems = validate(model, data)
     raise_problems(where, problems)
     return record
+
+
+def checked_entries(model, path, kind, table):
+    """Return {name: record} of a table of tables in a TOML file. Raises: InputError."""
+    found, problems = {}, []
+    for name, entry in read_toml(path, kind)[table].items():
+        found[name], wrong = validate(model, {"name": name, **entry})
+        problems += [f"{table}.{name}: {problem}" for problem in wrong]
+    raise_problems(f"{kind} file {str(path)!r}", problems)
+    return found
 
 
 def _problem(model, item, origin):

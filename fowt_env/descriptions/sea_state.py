@@ -10,16 +10,16 @@ from pydantic import model_validator
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number, is_number, parse_number, short
-from fowt_env.descriptions.files import DATA, json_text, locate, raise_problems, read_toml
+from fowt_env.descriptions.files import DATA, json_text, locate, read_toml
 from fowt_env.descriptions.records import (
     FloatArray,
     NonNegative,
     NumberOrArray,
     Record,
     bounded,
+    checked_entries,
     checked_record,
     unknown_key,
-    validate,
 )
 from fowt_env.errors import InputError
 
@@ -178,22 +178,12 @@ def fully_developed_period(Hs):
 def _sea_data():
     """Return ({name: SeaState}, {name: JointTable}) of the built-in file; a table's rows are states too."""
     path = DATA / "sea_states.toml"
-    data = read_toml(path, "sea state")
-    states, tables, problems = {}, {}, []
-    for name, entry in data["table"].items():
-        table, found = validate(JointTable, {"name": name, **entry})
-        problems += [f"table.{name}: {problem}" for problem in found]
-        if table is not None:
-            tables[name] = table
-            for wind, Hs, Tp in zip(table.wind, table.Hs, table.Tp, strict=True):
-                label = f"{table.name}_{wind:g}".replace(".", "_")
-                states[label] = _joint_state(table, wind, Hs, Tp, label)
-    for name, entry in data["state"].items():
-        state, found = validate(SeaState, {"name": name, **entry})
-        problems += [f"state.{name}: {problem}" for problem in found]
-        states[name] = state
-    raise_problems(f"sea state file {str(path)!r}", problems)
-    return states, tables
+    states, tables = {}, checked_entries(JointTable, path, "sea state", "table")
+    for table in tables.values():
+        for wind, Hs, Tp in zip(table.wind, table.Hs, table.Tp, strict=True):
+            name = f"{table.name}_{f'{wind:g}'.replace('.', '_')}"
+            states[name] = _joint_state(table, wind, Hs, Tp, name)
+    return states | checked_entries(SeaState, path, "sea state", "state"), tables
 
 
 def _joint_state(table, wind, Hs, Tp, name):

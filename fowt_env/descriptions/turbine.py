@@ -207,66 +207,48 @@ class TorqueLaw(Record):
             yield f"max_torque = {self.max_torque}: must be >= rated_torque = {self.rated_torque}"
 
 
-# What a torque law is given where its file says nothing, as fractions of its own figures: those of the NREL
-# 5 MW turbine (NREL/TP-500-38060), whose speed filter, 0.25 Hz, follows the rated rotor speed.
-TRANSITION = 0.99  # of rated speed: region 3
-SLIP = 10.0  # percent
-REGION3_PITCH = 0.01745329  # rad, 1 deg
 REGION15 = 0.05  # of the minimum speed, over which the torque rises to that of region 2
-MOST_TORQUE = 1.1  # of rated
-TORQUE_RATE = 0.348  # of rated a second
-FILTER_CORNER = 1.24  # rad/s per rad/s of rated rotor speed
-BELOW_MEETING = 0.999  # of the speed at which region 2 reaches rated torque, where that is the lower one
+# What a torque law is given where its file says nothing: key, the figures that it follows from, and how. The
+# fractions are those of the NREL 5 MW turbine (NREL/TP-500-38060).
+TORQUE_DEFAULTS = (
+    ("rated_speed", ("rated_rotor_speed", "gear_ratio"), lambda rotor, ratio: rotor * ratio),
+    ("rated_torque", ("rated_power", "rated_speed"), lambda power, speed: power / speed),
+    ("rated_power", ("rated_torque", "rated_speed"), lambda torque, speed: torque * speed),
+    ("cut_in_speed", ("minimum_speed",), lambda speed: speed),
+    ("region2_start_speed", ("minimum_speed",), lambda speed: (1.0 + REGION15) * speed),
+    # region 3: at 99 % of rated speed, or before, just below the speed at which region 2 reaches rated torque
+    ("transition_speed", ("rated_speed", "rated_torque", "region2_constant"),
+     lambda speed, torque, constant: min(0.99 * speed, 0.999 * (torque / constant) ** 0.5)),
+    ("slip_percent", (), lambda: 10.0),
+    ("region3_min_pitch", (), lambda: 0.01745329),  # rad, 1 deg
+    ("max_torque", ("rated_torque",), lambda torque: 1.1 * torque),
+    ("max_torque_rate", ("rated_torque",), lambda torque: 0.348 * torque),  # a second
+    ("speed_filter_corner", ("rated_rotor_speed",), lambda rotor: 1.24 * rotor),  # 0.25 Hz
+)  # fmt: skip
 
 
 def with_torque_defaults(data):
-    """Return the entries of a turbine (SI) with those of torque_law that follow from others.
+    """Return the entries of a turbine (SI) with those of torque_law that follow from others: TORQUE_DEFAULTS.
 
-    rated_torque and rated_power follow from each other by rated_speed, and this from the rotor's and the
-    gearbox; cut_in_speed and region2_start_speed from minimum_speed. Region 3 starts at 99 % of rated speed,
-    or where the torque of region 2 reaches the rated one before. Whatever is no positive number stays as it
-    is.
+    Whatever is no positive number stays as it is.
     Raises: ValueError where minimum_speed is given with one of the speeds that it stands for.
     """
     law, drive = data.get("torque_law"), data.get("drivetrain")
     if not isinstance(law, dict):
         return data
-    law = dict(law)
-
-    def known(table, *keys):
-        values = [table.get(key) if isinstance(table, dict) else getattr(table, key, None) for key in keys]
-        return values if all(is_number(value) and value > 0.0 for value in values) else None
-
-    def default(key, value):
-        if key not in law:
-            law[key] = value
-
-    rotor, ratio = known(data, "rated_rotor_speed"), known(drive, "gear_ratio")
-    if rotor and ratio:
-        default("rated_speed", rotor[0] * ratio[0])
-    if found := known(law, "rated_power", "rated_speed"):
-        default("rated_torque", found[0] / found[1])
-    if found := known(law, "rated_torque", "rated_speed"):
-        default("rated_power", found[0] * found[1])
+    ratio = drive.get("gear_ratio") if isinstance(drive, dict) else getattr(drive, "gear_ratio", None)
+    law, others = dict(law), {"rated_rotor_speed": data.get("rated_rotor_speed"), "gear_ratio": ratio}
     if "minimum_speed" in law:
+        slowest = others["minimum_speed"] = law.pop("minimum_speed")
         given = [key for key in ("cut_in_speed", "region2_start_speed") if key in law]
         if given:
             raise ValueError(f"torque_law.{given[0]}: given beside minimum_speed, which stands for it")
-        found = known(law, "minimum_speed")
-        if not found:
-            raise ValueError(f"torque_law.minimum_speed = {law['minimum_speed']!r}: must be a number > 0")
-        del law["minimum_speed"]
-        law["cut_in_speed"], law["region2_start_speed"] = found[0], (1.0 + REGION15) * found[0]
-    if found := known(law, "rated_speed", "rated_torque", "region2_constant"):
-        meeting = BELOW_MEETING * (found[1] / found[2]) ** 0.5
-        default("transition_speed", min(TRANSITION * found[0], meeting))
-    default("slip_percent", SLIP)
-    default("region3_min_pitch", REGION3_PITCH)
-    if found := known(law, "rated_torque"):
-        default("max_torque", MOST_TORQUE * found[0])
-        default("max_torque_rate", TORQUE_RATE * found[0])
-    if rotor:
-        default("speed_filter_corner", FILTER_CORNER * rotor[0])
+        if not (is_number(slowest) and slowest > 0.0):
+            raise ValueError(f"torque_law.minimum_speed = {slowest!r}: must be a number > 0")
+    for key, needs, value in TORQUE_DEFAULTS:
+        known = [others.get(name, law.get(name)) for name in needs]
+        if key not in law and all(is_number(figure) and figure > 0.0 for figure in known):
+            law[key] = value(*known)
     return data | {"torque_law": law}
 
 

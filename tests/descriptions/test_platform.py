@@ -57,6 +57,13 @@ def message(read, argument):
     return str(caught.value)
 
 
+def blade_message(folder, blade, *changes):
+    """(path, text of the InputError) of a turbine file with a blade file beside it."""
+    write(folder, "blade.csv", blade)
+    path = write(folder, "mine.toml", turbine_text(('"nrel5mw/blade.csv"', '"blade.csv"'), *changes))
+    return path, message(read_turbine, path)
+
+
 def hull_volume(hull):
     """Displaced volume at rest, m3: conical sections up to still water."""
     z = [*(height for height in hull.z if height < 0.0), 0.0]
@@ -246,9 +253,8 @@ def test_all_problems_of_a_file_come_in_one_message(tmp_path):
 
 
 def test_turbine_problems_in_toml_and_blade_come_in_one_message(tmp_path):
-    write(tmp_path, "blade.csv", BLADE.read_text().replace("DU40_A17", "DU40_A71"))
-    text = turbine_text(("mass = 240000.0", "mass = -1"), ('"nrel5mw/blade.csv"', '"blade.csv"'))
-    found = message(read_turbine, write(tmp_path, "mine.toml", text))
+    blade = BLADE.read_text().replace("DU40_A17", "DU40_A71")
+    found = blade_message(tmp_path, blade, ("mass = 240000.0", "mass = -1"))[1]
     assert "nacelle.mass = -1" in found
     assert "unknown airfoil 'DU40_A71'. Did you mean 'DU40_A17'?" in found
 
@@ -269,20 +275,16 @@ def test_turbine_problems_in_toml_and_blade_come_in_one_message(tmp_path):
     ],
 )
 def test_a_wrong_blade_file_names_line_column_value_and_range(tmp_path, change, parts):
-    blade = write(tmp_path, "blade.csv", changed(BLADE.read_text(), [change]))
-    path = write(tmp_path, "mine.toml", turbine_text(('"nrel5mw/blade.csv"', '"blade.csv"')))
-    text = message(read_turbine, path)
+    path, text = blade_message(tmp_path, changed(BLADE.read_text(), [change]))
     for part in [str(path), *parts]:
         assert part in text
-    assert str(blade) in text or "blade.radius" in text
+    assert str(tmp_path / "blade.csv") in text or "blade.radius" in text
 
 
 @pytest.mark.parametrize("content", ["", "# only a comment\n", "radius_m,chord_m,twist_deg,airfoil\n"])
 def test_an_empty_blade_file_is_refused(tmp_path, content):
-    blade = write(tmp_path, "blade.csv", content)
-    path = write(tmp_path, "mine.toml", turbine_text(('"nrel5mw/blade.csv"', '"blade.csv"')))
-    text = message(read_turbine, path)
-    assert str(blade) in text
+    text = blade_message(tmp_path, content)[1]
+    assert str(tmp_path / "blade.csv") in text
     assert "expected the columns radius_m, chord_m, twist_deg, airfoil" in text
 
 
@@ -300,9 +302,8 @@ def test_an_empty_blade_file_is_refused(tmp_path, content):
 )
 def test_a_wrong_polar_is_refused(tmp_path, content, parts):
     polar = write(tmp_path, "flat.csv", "alpha_deg,cl,cd,cm\n" + content)
-    write(tmp_path, "blade.csv", "radius_m,chord_m,twist_deg,airfoil\n2,3,4,flat\n60,1,0,flat\n")
-    change = (('"nrel5mw/blade.csv"', '"blade.csv"'), ('"nrel5mw/polars"', '"."'))
-    text = message(read_turbine, write(tmp_path, "mine.toml", turbine_text(*change)))
+    blade = "radius_m,chord_m,twist_deg,airfoil\n2,3,4,flat\n60,1,0,flat\n"
+    text = blade_message(tmp_path, blade, ('"nrel5mw/polars"', '"."'))[1]
     for part in [str(polar), *parts]:
         assert part in text
 

@@ -1,8 +1,8 @@
 """AeroDyn 15's files: blade geometry, polars and the drag of the tower."""
 
 import re
-from dataclasses import dataclass
 from itertools import islice
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,19 +13,18 @@ MOST_AIRFOILS = 1000
 FULL = 180.0  # deg, to which a polar must reach
 
 
-@dataclass(frozen=True)
-class AeroDyn:
+class AeroDyn(NamedTuple):
     """What the conversion takes of AeroDyn's files."""
 
     file: PartFile
     blade_file: PartFile
     blade: np.ndarray  # (n, 5) m from the root along the pitch axis, chord, twist (deg), BlCrvAC, BlSwpAC
-    airfoil: tuple  # (n,) names
+    airfoil: list  # (n,) names
     polars: dict  # name: (m, 4) alpha (deg), cl, cd, cm
     tables: dict  # name: (number of the table taken, tables in the file, its Reynolds number in millions)
     tower: np.ndarray  # (k, 3) height above still water, diameter, drag coefficient
     tower_loads: bool
-    notes: tuple  # (what the deck has, what the plant has)
+    notes: list  # (what the deck has, what the plant has)
 
 
 def read_aerodyn(path, folders=(), blades=3):
@@ -57,17 +56,9 @@ def read_aerodyn(path, folders=(), blades=3):
         raise file.refusal("TwrElev must increase from row to row", heights[0][0])
     if (tower[:, 1:] < 0.0).any():
         raise file.refusal("TwrDiam and TwrCd must be >= 0", heights[0][0])
-    return AeroDyn(
-        file=file,
-        blade_file=blade_file,
-        blade=blade,
-        airfoil=tuple(names[number][0] for number in numbers),
-        polars=polars,
-        tables=tables,
-        tower=tower,
-        tower_loads=file.flag("TwrAero", default=True),
-        notes=tuple(row for part in parts for row in differences(part)),
-    )
+    airfoil, tower_loads = [names[number][0] for number in numbers], file.flag("TwrAero", default=True)
+    notes = [row for part in parts for row in differences(part)]
+    return AeroDyn(file, blade_file, blade, airfoil, polars, tables, tower, tower_loads, notes)
 
 
 def _blade(file, count):

@@ -1,7 +1,7 @@
 """A whole deck: the .fst file, or part files one by one, and everything that they name."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from fowt_env.errors import InputError
 from fowt_env.files.openfast_deck.aerodyn import AeroDyn, read_aerodyn
@@ -26,8 +26,7 @@ NEEDED = ("elastodyn", "aerodyn", "hydrodyn")
 POSITIVE = {"low": 0.0, "high": 1e5, "open_low": True}
 
 
-@dataclass(frozen=True)
-class Site:
+class Site(NamedTuple):
     """Figures of the site, with their sources."""
 
     gravity: float
@@ -37,8 +36,7 @@ class Site:
     sources: dict
 
 
-@dataclass(frozen=True)
-class Deck:
+class Deck(NamedTuple):
     """Everything that was read; notes: (what the deck has, what the plant has)."""
 
     name: str
@@ -53,7 +51,7 @@ class Deck:
     inflow: Inflow
     control: Control
     notes: tuple
-    files: tuple  # paths of the part files
+    files: list  # paths of the .fst and the part files
 
 
 def read_deck(fst=None, parts=None, folders=(), discon=None):
@@ -95,20 +93,11 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
         raise elastodyn.file.wrong("PtfmRefzt", reference, allowed)
     inflow = read_inflow(parts["inflow"], folders) if "inflow" in parts else Inflow(None, "none")
     sea = read_sea(water)
+    files = [*([] if main is None else [main.path]), *parts.values()]
+    name = files[0].stem if main is not None else parts["elastodyn"].stem
+    notes = (*sea.notes, *inflow.notes, *notes, *more)
     return Deck(
-        name=(main.path if main is not None else parts["elastodyn"]).stem,
-        fst=main,
-        site=site,
-        elastodyn=elastodyn,
-        aerodyn=aerodyn,
-        hydrodyn=hydrodyn,
-        water=water,
-        lines=lines,
-        sea=sea,
-        inflow=inflow,
-        control=control,
-        notes=(*sea.notes, *inflow.notes, *notes, *more),
-        files=tuple(([] if main is None else [main.path]) + list(parts.values())),
+        name, main, site, elastodyn, aerodyn, hydrodyn, water, lines, sea, inflow, control, notes, files
     )
 
 

@@ -54,9 +54,9 @@ class ElastoDyn:
     blade: BladeMass
     tower: tuple  # mass (kg), first (kg m) and second (kg m2) moment about the base of the tower
     bending: TowerBending | None  # of a tower file with mode shapes
-    platform_products: tuple  # PtfmXYIner, PtfmYZIner, PtfmXZIner, kg m2
-    flexible: tuple  # names of degrees of freedom that are on and that the plant does not have
-    notes: tuple  # (what the deck has, what the plant has)
+    platform_products: list  # PtfmXYIner, PtfmYZIner, PtfmXZIner, kg m2
+    flexible: list  # names of degrees of freedom that are on and that the plant does not have
+    notes: list  # (what the deck has, what the plant has)
 
     def __getitem__(self, key):
         return self.values[key]
@@ -93,17 +93,10 @@ def read_elastodyn(path, folders=()):
         raise file.wrong("OverHang", values["OverHang"], "<= 0: downwind rotors cannot be represented")
     tower_file, tower, bending = _tower(file, folders, values)
     blade_file, blade = _blade(file, folders, values, blades)
-    return ElastoDyn(
-        file=file,
-        values=values,
-        blades=blades,
-        blade=blade,
-        tower=tower,
-        bending=bending,
-        platform_products=tuple(file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")),
-        flexible=tuple(what for key, what in FLEXIBLE.items() if file.flag(key, default=False)),
-        notes=tuple(row for part in (file, blade_file, tower_file) for row in differences(part)),
-    )
+    products = [file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")]
+    flexible = [what for key, what in FLEXIBLE.items() if file.flag(key, default=False)]
+    notes = [row for part in (file, blade_file, tower_file) for row in differences(part)]
+    return ElastoDyn(file, values, blades, blade, tower, bending, products, flexible, notes)
 
 
 def _distributed(file, count_key, first, *columns):

@@ -1,7 +1,6 @@
 """HydroDyn's file: potential flow, additional matrices, members with coefficients, and ballast water."""
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -47,8 +46,7 @@ class PotentialFiles(NamedTuple):
     centre_of_buoyancy: tuple
 
 
-@dataclass(frozen=True)
-class HydroDyn:
+class HydroDyn(NamedTuple):
     """What the conversion takes of HydroDyn's file."""
 
     file: PartFile
@@ -58,7 +56,7 @@ class HydroDyn:
     fills: list
     second_order: dict  # key of HydroDyn: the file that it takes, where not 0
     memory: int  # RdtnMod
-    notes: tuple
+    notes: list  # (what the deck has, what the plant has)
 
 
 def read_hydrodyn(path, density, folders=()):
@@ -79,20 +77,14 @@ def read_hydrodyn(path, density, folders=()):
         if np.any(added[key]):
             notes.append((f"{key}, which HydroDyn does not use with PotMod 0", "left out"))
             added[key] = np.zeros_like(added[key])
-    second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
     members = _members(file, notes, inside)
     if not inside and not members:
         raise file.wrong("PotMod", 0, "1, or there must be members: nothing makes the platform float")
-    return HydroDyn(
-        file=file,
-        potential=potential,
-        added=added,
-        members=members,
-        fills=_fills(file, members, density),
-        second_order={key: value for key, value in second.items() if value and inside},
-        memory=file.whole("RdtnMod", default=1) if inside else 0,
-        notes=(*notes, *differences(file)),
-    )
+    fills = _fills(file, members, density)
+    second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
+    second = {key: value for key, value in second.items() if value and inside}
+    memory = file.whole("RdtnMod", default=1) if inside else 0
+    return HydroDyn(file, potential, added, members, fills, second, memory, [*notes, *differences(file)])
 
 
 def _potential(file, folders):

@@ -14,7 +14,6 @@ from pathlib import Path
 from fowt_env.descriptions.files import read_text
 from fowt_env.errors import InputError
 
-MAX_BYTES = 5_000_000  # of a part file; the largest that are in use have some 100 kB
 MAX_ROWS = 100_000  # of a table
 _WORD = re.compile(r"""@?"[^"]*"?|@?'[^']*'?|[^\s,;]+""")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
@@ -112,7 +111,7 @@ class PartFile:
         """path: the file. kind: "ElastoDyn" ..., for messages. Raises: InputError if it cannot be read."""
         self.path, self.kind = Path(path), kind
         # old files have degree signs and superscripts of Windows
-        text = read_text(self.path, kind, MAX_BYTES, fallback="latin-1")
+        text = read_text(self.path, kind, fallback="latin-1")
         if "\0" in text:
             raise self.refusal("is not a text file: it has a zero byte")
         self.lines = text.splitlines()

@@ -60,7 +60,6 @@ BESIDE = {  # further files that these name
 WITHOUT_EFFECT = set()  # (file, key) that are read for no more than a check, each with its reason beside it
 
 
-
 class Key(NamedTuple):
     """A key of a file, or a column of a table of it."""
 
