@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, checked_record
 from fowt_env.errors import InputError, unknown
@@ -50,50 +50,34 @@ class Fault(Record):
     A run with a fault goes on past the turbine's overspeed, which ends any other as failed: how far a rotor
     without torque or pitch runs away is what such a case shows.
 
-    grid_loss       the generator torque is zero from `time` on; the controller goes on pitching. With a
-                    delay (s) the protection feathers the blades that long after the loss
-    emergency_stop  the generator torque is zero and the blades feather from `time` on
-    normal_stop     the blades feather at the normal rate; the torque falls with the rotor speed
-    rate            deg/s of feathering in these, in place of the turbine's protection's; within the limit of
-                    the pitch drive
-    stuck_pitch     blades stay from `time` on where they are then; the torque is still the controller's
-    pitch_runaway   blades run to `towards`, "fine" or "feather", an end of the drive's range, as fast as the
-                    drive can
-    pitch_offset    blades are `offset` (deg) beyond what their encoders show, and so beyond their command
-    backup          true: the fault is one of control, so that an emergency stop feathers these blades all the
-                    same, from their own energy stores; without it nothing moves them
-    blades          [1], [2, 3] ...; without it all of them. Single ones need a scene with pitch="individual"
-    sensor_bias     `value` (SI) is added to the reading of `field`: of Measurement or, with
-                    pitch="individual", of BladeMeasurement
-    sensor_freeze   the reading stays what it is at `time`
-    sensor_loss     the reading is zero
+    The kinds are those of FAULTS, the keys of each as in docs/guides/faults.md. Readings are of Measurement
+    or, with pitch="individual", of BladeMeasurement; single blades need a scene with that option too.
     """
 
     kind: Literal[KINDS]
     time: NonNegative  # s
-    delay: NonNegative | None = None  # s
-    rate: Positive | None = None  # deg/s
-    blades: tuple[Blade, ...] | None = None
+    delay: NonNegative | None = None  # s from the loss of the grid to feathering; None: no feathering
+    rate: Positive | None = None  # deg/s of feathering, in place of the protection's
+    blades: tuple[Blade, ...] | None = None  # None: all
+    # whether an emergency stop feathers these blades all the same, from their own energy stores
     backup: Annotated[bool, Field(strict=True)] = False
     towards: Literal["fine", "feather"] | None = None
-    offset: Finite | None = None  # deg
+    offset: Finite | None = None  # deg, of the blades beyond what their encoders show
     field: str | None = None
-    value: Finite | None = None
+    value: Finite | None = None  # SI, added to the reading
 
-    @model_validator(mode="after")
-    def _keys(self):
+    def _problems(self):
         known = FAULTS[self.kind].keys
         for key in sorted(self.model_fields_set - {"kind", "time", *known}):
             if getattr(self, key) not in (None, False):
-                raise ValueError(f"{key}: is no key of {self.kind}, which has {', '.join(known)}")
+                yield f"{key}: is no key of {self.kind}, which has {', '.join(known)}"
         for key in NEEDED:
             if key in known and getattr(self, key) is None:
-                raise ValueError(f"{key} is missing: {self.kind} needs it")
+                yield f"{key} is missing: {self.kind} needs it"
         if self.field is not None and self.field not in FIELDS:
-            raise ValueError(str(unknown("field", self.field, FIELDS)))
+            yield str(unknown("field", self.field, FIELDS))
         if self.blades is not None and len(set(self.blades)) != max(len(self.blades), 1):
-            raise ValueError(f"blades = {list(self.blades)}: must be one or more of 1, 2, 3, each once")
-        return self
+            yield f"blades = {list(self.blades)}: must be one or more of 1, 2, 3, each once"
 
     @property
     def grid_loss(self) -> float | None:
@@ -117,7 +101,7 @@ def read_faults(value: Any) -> tuple[Fault, ...]:
         value = (value,)
     if isinstance(value, str) or not isinstance(value, Sequence):
         raise InputError(f"faults = {value!r}: must be a Fault, a mapping of its keys, or a list of them")
-    found = []
-    for number, item in enumerate(value, 1):
-        found.append(item if isinstance(item, Fault) else checked_record(Fault, item, f"faults.{number}"))
-    return tuple(found)
+    return tuple(
+        item if isinstance(item, Fault) else checked_record(Fault, item, f"faults.{number}")
+        for number, item in enumerate(value, 1)
+    )

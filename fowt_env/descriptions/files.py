@@ -6,6 +6,7 @@ import json
 import math
 import re
 import tomllib
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -22,8 +23,11 @@ _KEY_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_KEY_PART}){{{MAX_DEPTH}}}")
 
 
-def read_text(path, kind, largest=MAX_BYTES):
-    """Return the text of a file of at most `largest` bytes; kind ("platform" ...) is for messages."""
+def read_text(path, kind, largest=MAX_BYTES, fallback=None):
+    """Return the text of a file of at most `largest` bytes; kind ("platform" ...) is for messages.
+
+    fallback: the encoding of what is not UTF-8; None: that is refused.
+    """
     try:
         if not path.exists():
             raise InputError(f"{kind} file {str(path)!r} does not exist")
@@ -32,8 +36,11 @@ def read_text(path, kind, largest=MAX_BYTES):
         size = path.stat().st_size
         if size > largest:
             raise InputError(f"{kind} file {str(path)!r} has {size} bytes; allowed: at most {largest}")
-        return path.read_bytes().decode("utf-8-sig")
+        content = path.read_bytes()
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        if fallback is not None:
+            return content.decode(fallback)
         where = f"{error.reason} at byte {error.start}"
         raise InputError(f"{kind} file {str(path)!r} is not UTF-8 text: {where}") from None
     except (OSError, ValueError) as error:
@@ -144,6 +151,15 @@ def raise_problems(where, problems):
     raise InputError("\n  ".join([f"{where}: {len(problems)} problems", *shown, *more]))
 
 
+@contextmanager
+def noted(problems, prefix=""):
+    """Context whose InputError becomes one of the problems."""
+    try:
+        yield
+    except InputError as error:
+        problems.append(f"{prefix}{error}")
+
+
 def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, also=""):
     """Return the file of a built-in name (builtin(name) -> Path), or of a path relative to a folder.
 
@@ -153,34 +169,17 @@ def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, 
         return builtin(name_or_path)
     if not isinstance(name_or_path, (str, Path)):
         raise InputError(f"{kind} = {short(name_or_path)}: must be a built-in name or a path to a .toml file")
-    path = _as_path(name_or_path)
-    if path is None:
-        raise _unknown_name(kind, name_or_path, known, listed, also)
-    return folder / path
-
-
-def _unknown_name(kind, name, known, command, also):
-    hint = did_you_mean(name, known, 3)
-    if len(known) <= MOST_NAMED:
-        listed = ", ".join(known)
-    else:
-        near = nearest(name, known, NEAREST, cutoff=0.0)
-        printed = "" if command is None else f", all by `{command}`"
-        listed = f"one of {len(known)} names (nearest: {', '.join(near)}{printed})"
-    others = f", {also}" if also else ""
-    label = kind.replace("_", " ")
-    return InputError(
-        f"unknown {label} {short(name)}.{hint} Allowed: {listed}{others}, or a path to a .toml file"
-    )
-
-
-def _as_path(name_or_path):
-    """Return the path of a user's file, with ~ expanded; None if the text is a plain name."""
     text = str(name_or_path)
-    has_separator = "/" in text or "\\" in text
-    if isinstance(name_or_path, str) and not has_separator and not text.lower().endswith(".toml"):
-        return None
-    try:
-        return Path(text).expanduser()
-    except RuntimeError:  # ~user that does not exist
-        return Path(text)
+    if isinstance(name_or_path, Path) or "/" in text or "\\" in text or text.lower().endswith(".toml"):
+        try:
+            return folder / Path(text).expanduser()
+        except RuntimeError:  # ~user that does not exist
+            return folder / text
+    names = ", ".join(known)
+    if len(known) > MOST_NAMED:
+        near = nearest(text, known, NEAREST, cutoff=0.0)
+        printed = "" if listed is None else f", all by `{listed}`"
+        names = f"one of {len(known)} names (nearest: {', '.join(near)}{printed})"
+    allowed = ", ".join(part for part in (names, also, "or a path to a .toml file") if part)
+    what = f"unknown {kind.replace('_', ' ')} {short(text)}.{did_you_mean(text, known, 3)}"
+    raise InputError(f"{what} Allowed: {allowed}")

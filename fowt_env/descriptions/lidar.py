@@ -2,11 +2,11 @@
 
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fowt_env.caches import cached
-from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
-from fowt_env.descriptions.records import Record, bounded, checked_record, validate
+from fowt_env.descriptions.files import DATA, locate, read_toml
+from fowt_env.descriptions.records import Record, bounded, checked_entries, checked_record
 
 Angle = bounded(gt=-60.0, lt=60.0)  # deg
 Distance = bounded(ge=10.0, le=1000.0)  # m
@@ -34,30 +34,22 @@ class Lidar(Record):
     source: str = ""
     confidence: str = ""
 
-    @model_validator(mode="after")
-    def _consistent(self):
+    def _problems(self):
         cone = (self.beams is not None) + (self.half_angle is not None)
         if cone == 1 or (cone == 2) == bool(self.azimuth) or len(self.azimuth) != len(self.elevation):
-            raise ValueError("needs azimuth and elevation, equally long, or else beams and half_angle")
+            yield "needs azimuth and elevation, equally long, or else beams and half_angle"
         optics = (self.lens_radius is not None) + (self.wavelength is not None)
         if optics == 1 or (optics == 2 and self.pulse_length is not None):
-            raise ValueError("needs pulse_length, or else lens_radius and wavelength, or none of these")
+            yield "needs pulse_length, or else lens_radius and wavelength, or none of these"
         pairs = zip(self.distances[:-1], self.distances[1:], strict=True)
         if not self.distances or any(far <= near for near, far in pairs):
-            raise ValueError(f"distances = {self.distances}: must be at least one, increasing, m")
-        return self
+            yield f"distances = {self.distances}: must be at least one, increasing, m"
 
 
 @cached(1)
 def lidars():
     """Return {name: Lidar} of the built-in lidars."""
-    path = DATA / "lidars.toml"
-    found, problems = {}, []
-    for name, entry in read_toml(path, "lidar")["lidar"].items():
-        found[name], wrong = validate(Lidar, {"name": name, **entry})
-        problems += [f"lidar.{name}: {problem}" for problem in wrong]
-    raise_problems(f"lidar file {str(path)!r}", problems)
-    return found
+    return checked_entries(Lidar, DATA / "lidars.toml", "lidar", "lidar")
 
 
 def read_lidar(lidar):

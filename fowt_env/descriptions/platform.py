@@ -8,9 +8,9 @@ import math
 from pathlib import Path
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from fowt_env.descriptions.files import DATA, locate, raise_problems, read_toml
+from fowt_env.descriptions.files import DATA, locate, noted, raise_problems, read_toml
 from fowt_env.descriptions.potential_flow import PotentialFlow, read_potential_flow
 from fowt_env.descriptions.records import (
     Finite,
@@ -23,15 +23,7 @@ from fowt_env.descriptions.records import (
     validate,
 )
 from fowt_env.descriptions.tower_modes import TowerBending, mass_problem, read_tower_modes
-from fowt_env.descriptions.turbine import (
-    Inertia,
-    Turbine,
-    Vector3,
-    read_turbine,
-    turbine_file,
-    turbine_names,
-)
-from fowt_env.errors import InputError
+from fowt_env.descriptions.turbine import Inertia, Turbine, Vector3, read_turbine, turbine_names
 
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 SixBySix = tuple[SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers]
@@ -65,21 +57,17 @@ class Hull(Record):
     z: tuple[bounded(ge=-1e4, le=1e4), ...]  # m, body frame, increasing
     diameter: tuple[bounded(gt=0, le=1e4), ...]  # m, the last two equal (the water-piercing cylinder)
 
-    @model_validator(mode="after")
-    def _shape(self):
+    def _problems(self):
         if len(self.z) != len(self.diameter) or len(self.z) < 2:
-            raise ValueError(
-                f"z and diameter need the same length, at least 2; got {len(self.z)} and {len(self.diameter)}"
-            )
+            sizes = f"{len(self.z)} and {len(self.diameter)}"
+            yield f"z and diameter need the same length, at least 2; got {sizes}"
+            return
         if any(b <= a for a, b in zip(self.z[:-1], self.z[1:], strict=True)):
-            raise ValueError(f"z = {list(self.z)}: must increase from the keel upwards")
+            yield f"z = {list(self.z)}: must increase from the keel upwards"
         if not self.z[0] < 0.0 < self.z[-1]:
-            raise ValueError(f"z = {list(self.z)}: must start below 0 and end above 0 (still water)")
+            yield f"z = {list(self.z)}: must start below 0 and end above 0 (still water)"
         if self.diameter[-1] != self.diameter[-2] or self.z[-2] >= 0.0:
-            raise ValueError(
-                f"diameter = {list(self.diameter)}: the section through the water line must be a cylinder"
-            )
-        return self
+            yield f"diameter = {list(self.diameter)}: the section through the water line must be a cylinder"
 
 
 class HydroCoefficients(Record):
@@ -93,16 +81,14 @@ class HydroCoefficients(Record):
     yaw_stiffness: NonNegative = 0.0  # delta lines, N m/rad
     added_mass: SixBySix | None = None  # further constant one about the body origin, kg, kg m, kg m2
 
-    @model_validator(mode="after")
-    def _added_mass(self):
+    def _problems(self):
         if self.added_mass is not None:
             matrix = np.array(self.added_mass)
             scale = np.abs(matrix).max()
             if np.abs(matrix - matrix.T).max() > 1e-6 * scale:
-                raise ValueError("added_mass: must be symmetric, 6 rows of 6 numbers")
-            if np.linalg.eigvalsh(matrix)[0] < -1e-9 * scale:
-                raise ValueError("added_mass: must be positive semidefinite: it has a negative eigenvalue")
-        return self
+                yield "added_mass: must be symmetric, 6 rows of 6 numbers"
+            elif np.linalg.eigvalsh(matrix)[0] < -1e-9 * scale:
+                yield "added_mass: must be positive semidefinite: it has a negative eigenvalue"
 
 
 class AdditionalLoads(Record):
@@ -117,14 +103,12 @@ class AdditionalLoads(Record):
     linear_damping: SixBySix | None = None  # N/(m/s) ...
     quadratic_damping: SixBySix | None = None  # N/(m/s)^2 ...
 
-    @model_validator(mode="after")
-    def _damping(self):
+    def _problems(self):
         for name in ("linear_damping", "quadratic_damping"):
             rows = getattr(self, name)
             for i, row in enumerate(rows or ()):
                 if row[i] < 0.0:
-                    raise ValueError(f"{name}.{i + 1}.{i + 1} = {row[i]:g}: must be >= 0: it damps")
-        return self
+                    yield f"{name}.{i + 1}.{i + 1} = {row[i]:g}: must be >= 0: it damps"
 
 
 class Straight(Record):
@@ -133,11 +117,9 @@ class Straight(Record):
     start: Vector3  # m
     end: Vector3
 
-    @model_validator(mode="after")
-    def _length(self):
+    def _problems(self):
         if math.dist(self.start, self.end) < 1e-6:
-            raise ValueError(f"start = {list(self.start)}: must not be end")
-        return self
+            yield f"start = {list(self.start)}: must not be end"
 
 
 class Member(Straight):
@@ -166,11 +148,10 @@ class Shape(Straight):
     diameter: Positive | None = None  # m
     section: tuple[Positive, Positive] | None = None  # m, width and height of a box
 
-    @model_validator(mode="after")
-    def _one_section(self):
+    def _problems(self):
+        yield from super()._problems()
         if (self.diameter is None) == (self.section is None):
-            raise ValueError("diameter: must be given where section is not, and only there")
-        return self
+            yield "diameter: must be given where section is not, and only there"
 
 
 class Tower(Record):
@@ -186,14 +167,11 @@ class Tower(Record):
     drag_coefficient: NonNegative = 1.0
     modes: TowerBending | None = None
 
-    @model_validator(mode="after")
-    def _heights(self):
+    def _problems(self):
         if self.top_height <= self.base_height:
-            raise ValueError(f"top_height = {self.top_height}: must be > base_height = {self.base_height} m")
-        if self.modes is not None:
-            if problem := mass_problem(self.modes, self.mass, self.top_height - self.base_height):
-                raise ValueError(problem)
-        return self
+            yield f"top_height = {self.top_height}: must be > base_height = {self.base_height} m"
+        elif self.modes is not None:
+            yield from mass_problem(self.modes, self.mass, self.top_height - self.base_height)
 
 
 class LineProperties(Record):
@@ -244,31 +222,22 @@ class Platform(Record):
             depths.append(self.potential_flow.volume ** (1.0 / 3.0) / 3.0)
         return max(depths)
 
-    @model_validator(mode="after")
-    def _floats(self):
+    def _problems(self):
         if (self.hull is None) != (self.hydro is None):
-            raise ValueError(_missing_half("hydro" if self.hydro is None else "hull"))
-        if self.hull is not None and self.potential_flow is not None:
-            raise ValueError("potential_flow: a platform has it or hull, not both")
-        if self.hull is None and self.potential_flow is None and not self.members:
-            raise ValueError("hull is missing: a platform needs hull and hydro, potential_flow or members")
-        return self
-
-    @model_validator(mode="after")
-    def _depths(self):
+            yield _missing_half("hydro" if self.hydro is None else "hull")
+        elif self.hull is not None and self.potential_flow is not None:
+            yield "potential_flow: a platform has it or hull, not both"
+        elif self.hull is None and self.potential_flow is None and not self.members:
+            yield "hull is missing: a platform needs hull and hydro, potential_flow or members"
         depth = self.environment.water_depth
-        problems = []
         for i, line in enumerate(self.lines, 1):
             key = f"lines.{i}.anchor z = {line.anchor[2]}"
             if not -depth - 1e-6 <= line.anchor[2] <= 0.0:
-                problems.append(f"{key}: must be between -water_depth = {-depth} and 0 m")
+                yield f"{key}: must be between -water_depth = {-depth} and 0 m"
             if line.anchor[2] >= line.fairlead[2]:
-                problems.append(f"{key}: must be below its fairlead at {line.fairlead[2]} m")
+                yield f"{key}: must be below its fairlead at {line.fairlead[2]} m"
         if self.hull is not None and self.hull.z[0] < -depth:
-            problems.append(f"hull.z.1 = {self.hull.z[0]}: must be >= -water_depth = {-depth} m")
-        if problems:
-            raise ValueError("\n".join(problems))
-        return self
+            yield f"hull.z.1 = {self.hull.z[0]}: must be >= -water_depth = {-depth} m"
 
 
 def _missing_half(name):
@@ -301,10 +270,6 @@ class MooringSpread(LineProperties):
 # --------------------------------------------------------------------------- readers
 
 
-def _platform_file(name):
-    return DATA / "platforms" / f"{name}.toml"
-
-
 def platform_names():
     """Return the sorted names of the built-in platforms."""
     return sorted(path.stem for path in (DATA / "platforms").glob("*.toml"))
@@ -315,7 +280,8 @@ def read_platform(name_or_path: str | Path) -> Platform:
 
     The turbine of the result is a built-in name or an absolute path; in the file it is relative to the file.
     """
-    path = locate("platform", name_or_path, platform_names(), _platform_file)
+    folder = DATA / "platforms"
+    path = locate("platform", name_or_path, platform_names(), lambda name: folder / f"{name}.toml")
     data = read_toml(path, "platform")
     problems = []
     free = {key: data.pop(key) for key in ("options", "published") if key in data}
@@ -330,28 +296,19 @@ def read_platform(name_or_path: str | Path) -> Platform:
         if isinstance(data.get(key), list):
             data[key] = tuple(data[key])
     if "potential_flow" in data:
-        try:
-            site, _ = validate(Environment, data.get("environment"))
-            gravity, density = (9.80665, 1025.0) if site is None else (site.gravity, site.water_density)
-            table = data["potential_flow"]
+        site, _ = validate(Environment, data.get("environment"))
+        gravity, density = (9.80665, 1025.0) if site is None else (site.gravity, site.water_density)
+        table = data.pop("potential_flow")
+        with noted(problems, "potential_flow: "):
             data["potential_flow"] = read_potential_flow(table, path.parent, gravity, density)
-        except InputError as error:
-            problems.append(f"potential_flow: {error}")
-            del data["potential_flow"]
     tower = data.get("tower")
     if isinstance(tower, dict) and "modes" in tower:
         data["tower"] = {key: value for key, value in tower.items() if key != "modes"}
-        try:
+        with noted(problems):
             data["tower"]["modes"] = read_tower_modes(tower["modes"], path.parent)
-        except InputError as error:
-            problems.append(str(error))
-    if isinstance(data.get("turbine"), str):
-        try:
-            turbine = locate("turbine", data["turbine"], turbine_names(), turbine_file, path.parent)
-            if data["turbine"] not in turbine_names():
-                data["turbine"] = str(turbine.resolve())
-        except InputError as error:
-            problems.append(f"turbine: {error}")
+    if isinstance(name := data.get("turbine"), str) and name not in turbine_names():
+        with noted(problems, "turbine: "):
+            data["turbine"] = str(locate("turbine", name, turbine_names(), folder=path.parent).resolve())
     if ("hull" in data) != ("hydro" in data):
         problems.append(_missing_half("hydro" if "hull" in data else "hull"))
     platform, found = validate(Platform, {**data, **free}, origin)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, model_validator
+from pydantic import BeforeValidator
 
 from fowt_env.descriptions.files import raise_problems
 from fowt_env.descriptions.records import NonNegative, Positive, Record, bounded, to_si, validate
@@ -29,12 +29,8 @@ class TripLimit(Record):
     stop: Literal[STOPS] = "emergency"
 
 
-def _none(value):
-    """Return None for false, which is how a file says that there is no such trip."""
-    return None if value is False else value
-
-
-Limited = Annotated[TripLimit | None, BeforeValidator(_none)]
+# false is how a file says that there is no such trip
+Limited = Annotated[TripLimit | None, BeforeValidator(lambda value: None if value is False else value)]
 
 
 class Protection(Record):
@@ -57,13 +53,11 @@ class Protection(Record):
     emergency_rate: Positive = EMERGENCY_RATE
     off_speed: bounded(gt=0, lt=1) = OFF_SPEED  # of rated rotor speed
 
-    @model_validator(mode="after")
-    def _above_rated(self):
+    def _problems(self):
         for name in ("overspeed", "overpower"):
             trip = getattr(self, name)
             if trip is not None and not trip.limit > 1.0:
-                raise ValueError(f"{name}.limit = {trip.limit:g}: must be above 1, of rated")
-        return self
+                yield f"{name}.limit = {trip.limit:g}: must be above 1, of rated"
 
 
 NO_TRIPS = dict.fromkeys(("overspeed", "overpower", "acceleration", "pitch_deviation"))

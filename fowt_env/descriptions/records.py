@@ -9,7 +9,7 @@ import typing
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import PydanticCustomError
 
 from fowt_env.descriptions.checks import (
@@ -25,7 +25,7 @@ from fowt_env.descriptions.checks import (
     plain_number,
     short,
 )
-from fowt_env.descriptions.files import raise_problems
+from fowt_env.descriptions.files import raise_problems, read_toml
 from fowt_env.descriptions.units import FILE_UNITS
 from fowt_env.errors import did_you_mean
 
@@ -49,13 +49,6 @@ def _float_array(value):
     if array.dtype.kind not in "iuf" or array.ndim != 1 or not np.isfinite(array).all():
         raise PydanticCustomError("no_array", "must be a list of finite numbers")
     return array.astype(np.float64)
-
-
-def _number_or_array(value):
-    """Return a float, or a (n,) float64 copy of a list or array of finite numbers."""
-    if is_number(value):
-        return float(value)
-    return _float_array(value)
 
 
 KEY = "\0"  # where a message of a check has the key
@@ -103,13 +96,25 @@ Finite = bounded()
 Place = bounded(ge=-1e5, le=1e5)  # m, whose square times a mass is a number still
 Fraction = bounded(gt=0, le=1)
 FloatArray = Annotated[np.ndarray, BeforeValidator(_float_array)]
-NumberOrArray = Annotated[typing.Any, BeforeValidator(_number_or_array)]
+NumberOrArray = Annotated[
+    typing.Any, BeforeValidator(lambda value: float(value) if is_number(value) else _float_array(value))
+]
 
 
 class Record(BaseModel):
     """Base of all descriptions: frozen, no unknown keys, no silent type changes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+    def _problems(self):
+        """Yield a line for each thing that is wrong between the fields."""
+        return ()
+
+    @model_validator(mode="after")
+    def _checked(self):
+        if problems := "\n".join(self._problems()):
+            raise ValueError(problems)
+        return self
 
 
 # --------------------------------------------------------------------------- units
@@ -153,10 +158,8 @@ def validate(model, data, origin=None):
     try:
         return model.model_validate(data), []
     except ValidationError as error:
-        problems = []
-        for item in error.errors(include_url=False):
-            problems.extend(_problem(model, item, origin or {}))
-        return None, problems
+        items = error.errors(include_url=False)
+        return None, [line for item in items for line in _problem(model, item, origin or {})]
 
 
 def checked_record(model, data, where):
@@ -164,6 +167,16 @@ def checked_record(model, data, where):
     record, problems = validate(model, data)
     raise_problems(where, problems)
     return record
+
+
+def checked_entries(model, path, kind, table):
+    """Return {name: record} of a table of tables in a TOML file. Raises: InputError."""
+    found, problems = {}, []
+    for name, entry in read_toml(path, kind)[table].items():
+        found[name], wrong = validate(model, {"name": name, **entry})
+        problems += [f"{table}.{name}: {problem}" for problem in wrong]
+    raise_problems(f"{kind} file {str(path)!r}", problems)
+    return found
 
 
 def _problem(model, item, origin):
@@ -187,8 +200,7 @@ def _problem(model, item, origin):
     if kind == "value_error":
         if KEY in (text := str(item["ctx"]["error"])):
             return [text.replace(KEY, key)]
-        prefix = f"{key}: " if key else ""
-        return [prefix + line for line in str(item["ctx"]["error"]).splitlines()]
+        return [f"{key}: {line}" if key else line for line in text.splitlines()]
     close = ""
     if isinstance(value, str) and kind == "literal_error":
         options = [option.strip("'") for option in allowed(model, loc).removeprefix("one of ").split(", ")]
@@ -261,32 +273,25 @@ def allowed(model, loc):
     if kind in (float, int):
         low, high, low_open, high_open = -math.inf, math.inf, True, True
         for entry in metadata:
-            if (limit := getattr(entry, "ge", None)) is not None:
-                low, low_open = limit, False
-            if (limit := getattr(entry, "gt", None)) is not None:
-                low, low_open = limit, True
-            if (limit := getattr(entry, "le", None)) is not None:
-                high, high_open = limit, False
-            if (limit := getattr(entry, "lt", None)) is not None:
-                high, high_open = limit, True
+            for name in ("ge", "gt"):
+                if (limit := getattr(entry, name, None)) is not None:
+                    low, low_open = limit, name == "gt"
+            for name in ("le", "lt"):
+                if (limit := getattr(entry, name, None)) is not None:
+                    high, high_open = limit, name == "lt"
         return interval(low, high, low_open, high_open, "a number" if kind is float else "a whole number")
-    if typing.get_origin(kind) is typing.Literal:
-        return "one of " + ", ".join(repr(option) for option in typing.get_args(kind))
-    if typing.get_origin(kind) is list:
-        inner, _ = _unwrapped(typing.get_args(kind)[0], [])
-        return f"a list of {'numbers' if inner is float else 'entries'}"
-    if typing.get_origin(kind) is tuple:
-        arguments = typing.get_args(kind)
-        count = "" if arguments[-1] is Ellipsis else f"{len(arguments)} "
-        inner, _ = _unwrapped(arguments[0], [])
-        return f"a list of {count}{'numbers' if inner is float else 'entries'}"
-    if kind is str:
-        return "text"
-    if kind is np.ndarray:
-        return "a list of finite numbers"
-    if kind is typing.Any:
-        return "a finite number or, for components, a list of finite numbers"
-    return "a table"
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Literal:
+        return "one of " + ", ".join(map(repr, arguments))
+    if origin in (list, tuple):
+        count = "" if origin is list or arguments[-1] is Ellipsis else f"{len(arguments)} "
+        return f"a list of {count}{'numbers' if _unwrapped(arguments[0], [])[0] is float else 'entries'}"
+    words = {
+        str: "text",
+        np.ndarray: "a list of finite numbers",
+        typing.Any: "a finite number or, for components, a list of finite numbers",
+    }
+    return words.get(kind, "a table")
 
 
 def dotted(path):

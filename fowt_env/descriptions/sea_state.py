@@ -10,16 +10,16 @@ from pydantic import model_validator
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_number, is_number, parse_number, short
-from fowt_env.descriptions.files import DATA, json_text, locate, raise_problems, read_toml
+from fowt_env.descriptions.files import DATA, json_text, locate, read_toml
 from fowt_env.descriptions.records import (
     FloatArray,
     NonNegative,
     NumberOrArray,
     Record,
     bounded,
+    checked_entries,
     checked_record,
     unknown_key,
-    validate,
 )
 from fowt_env.errors import InputError
 
@@ -106,36 +106,26 @@ class SeaState(Record):
             given["Tp"] = fully_developed_period(float(given["Hs"]))
         return given
 
-    @model_validator(mode="after")
-    def _shapes(self):
+    def _problems(self):
         if self.kind != "components":
-            problems = [
-                f"{name} = {short(value.tolist())}: must be one number for kind {self.kind!r}"
-                for name, value in (("heading", self.heading), ("phase", self.phase))
-                if isinstance(value, np.ndarray)
-            ]
+            for name, value in (("heading", self.heading), ("phase", self.phase)):
+                if isinstance(value, np.ndarray):
+                    yield f"{name} = {short(value.tolist())}: must be one number for kind {self.kind!r}"
             if self.Hs is not None and 0.0 < self.Hs < LOWEST_WAVE:
-                problems.append(f"Hs = {self.Hs:g}: must be 0, or at least {LOWEST_WAVE:g} m")
-        else:
-            problems = self._component_problems()
-        if problems:
-            raise ValueError("\n".join(problems))
-        return self
-
-    def _component_problems(self):
+                yield f"Hs = {self.Hs:g}: must be 0, or at least {LOWEST_WAVE:g} m"
+            return
         sizes = {"omega": len(self.omega), "amplitude": len(self.amplitude)}
         sizes |= {key: len(getattr(self, key)) for key in ("phase", "heading") if np.ndim(getattr(self, key))}
         if len(set(sizes.values())) != 1:
-            return [f"{', '.join(sizes)}: need the same length; got {', '.join(map(str, sizes.values()))}"]
-        problems = []
+            yield f"{', '.join(sizes)}: need the same length; got {', '.join(map(str, sizes.values()))}"
+            return
         for name, bad, rule in (
             ("omega", self.omega <= 0.0, "a number > 0"),
             ("amplitude", self.amplitude < 0.0, "a number >= 0"),
         ):
             if bad.any():
                 first = int(np.argmax(bad))
-                problems.append(f"{name}.{first + 1} = {getattr(self, name)[first]}: must be {rule}")
-        return problems
+                yield f"{name}.{first + 1} = {getattr(self, name)[first]}: must be {rule}"
 
 
 class JointTable(Record):
@@ -148,14 +138,12 @@ class JointTable(Record):
     source: str = ""
     confidence: str = ""
 
-    @model_validator(mode="after")
-    def _columns(self):
+    def _problems(self):
         sizes = [len(self.wind), len(self.Hs), len(self.Tp)]
         if len(set(sizes)) != 1 or sizes[0] < 2:
-            raise ValueError(f"wind, Hs, Tp need the same length, at least 2; got {sizes}")
+            yield f"wind, Hs, Tp need the same length, at least 2; got {sizes}"
         if any(b <= a for a, b in zip(self.wind[:-1], self.wind[1:], strict=True)):
-            raise ValueError(f"wind = {list(self.wind)}: must increase")
-        return self
+            yield f"wind = {list(self.wind)}: must increase"
 
 
 def _usable(*values):
@@ -190,26 +178,12 @@ def fully_developed_period(Hs):
 def _sea_data():
     """Return ({name: SeaState}, {name: JointTable}) of the built-in file; a table's rows are states too."""
     path = DATA / "sea_states.toml"
-    data = read_toml(path, "sea state")
-    states, tables, problems = {}, {}, []
-    for name, entry in data["table"].items():
-        table, found = validate(JointTable, {"name": name, **entry})
-        problems += [f"table.{name}: {problem}" for problem in found]
-        if table is not None:
-            tables[name] = table
-            states.update({state.name: state for state in _rows(table)})
-    for name, entry in data["state"].items():
-        state, found = validate(SeaState, {"name": name, **entry})
-        problems += [f"state.{name}: {problem}" for problem in found]
-        states[name] = state
-    raise_problems(f"sea state file {str(path)!r}", problems)
-    return states, tables
-
-
-def _rows(table):
-    for wind, Hs, Tp in zip(table.wind, table.Hs, table.Tp, strict=True):
-        label = f"{wind:g}".replace(".", "_")
-        yield _joint_state(table, wind, Hs, Tp, f"{table.name}_{label}")
+    states, tables = {}, checked_entries(JointTable, path, "sea state", "table")
+    for table in tables.values():
+        for wind, Hs, Tp in zip(table.wind, table.Hs, table.Tp, strict=True):
+            name = f"{table.name}_{f'{wind:g}'.replace('.', '_')}"
+            states[name] = _joint_state(table, wind, Hs, Tp, name)
+    return states | checked_entries(SeaState, path, "sea state", "state"), tables
 
 
 def _joint_state(table, wind, Hs, Tp, name):

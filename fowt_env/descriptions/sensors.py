@@ -30,9 +30,7 @@ class Sensor:
     time_constant: float = 0.0  # s, of a first-order low pass; 0: none
     delay: float = 0.0  # s from measurement to reading, taken as the nearest whole number of control periods
     step: float = 0.0  # of the quantisation; 0: none
-    integral_of: str | None = (
-        None  # field whose reading is integrated instead, as an acceleration to a velocity
-    )
+    integral_of: str | None = None  # field that is integrated instead, as an acceleration to a velocity
     high_pass: float = 0.0  # rad/s, of the first-order high pass on such an integral
     source: str = ""
     confidence: str = ""
@@ -67,15 +65,9 @@ class SensorChain:
             if measured is None:
                 continue
             if measured not in self.sensors or self.sensors[measured].integral_of is not None:
-                raise InputError(
-                    f"{where}: {name}.integral_of = {measured!r}: must be a field that the chain measures"
-                )
-            if sensor != Sensor(
-                integral_of=measured,
-                high_pass=sensor.high_pass,
-                source=sensor.source,
-                confidence=sensor.confidence,
-            ):
+                allowed = "must be a field that the chain measures"
+                raise InputError(f"{where}: {name}.integral_of = {measured!r}: {allowed}")
+            if sensor != replace(sensor, noise=0.0, time_constant=0.0, delay=0.0, step=0.0):
                 raise InputError(
                     f"{where}: {name}: an integral has integral_of and high_pass; noise, time_constant, delay"
                     f" and step are those of {measured}"

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from fowt_env.descriptions.files import DATA, column, raise_problems, read_table
 from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record, bounded, checked_record
@@ -36,27 +36,20 @@ class ModeShapes(Record):
     # equal ones, mass and stiffness at their middles, as ElastoDyn's TwrNodes
     elements: Annotated[int, Field(strict=True, ge=1, le=999)] = 20
 
-    @model_validator(mode="after")
-    def _alike(self):
-        problems = []
+    def _problems(self):
         count = len(self.fore_aft)
         if count not in (1, 2):
-            problems.append(f"fore_aft: has {count} shapes; must be 1 or 2")
+            yield f"fore_aft: has {count} shapes; must be 1 or 2"
         for name in (
             "side_side", "fore_aft_damping", "side_side_damping", "fore_aft_tuner", "side_side_tuner",
         ):  # fmt: skip
             values = getattr(self, name)
             if values is not None and len(values) != count:
-                problems.append(f"{name}: has {len(values)} entries; must be {count}, as many as fore_aft")
+                yield f"{name}: has {len(values)} entries; must be {count}, as many as fore_aft"
         for name in ("fore_aft", "side_side"):
             for i, shape in enumerate(getattr(self, name), 1):
                 if abs(sum(shape) - 1.0) > END:
-                    problems.append(
-                        f"{name}.{i}: adds up to {sum(shape):g}; must be 1 (within {END}), at the top"
-                    )
-        if problems:
-            raise ValueError("\n".join(problems))
-        return self
+                    yield f"{name}.{i}: adds up to {sum(shape):g}; must be 1 (within {END}), at the top"
 
 
 class TowerBending(ModeShapes):
@@ -78,14 +71,13 @@ class TowerBending(ModeShapes):
 
 
 def mass_problem(modes, mass, height):
-    """Return what is wrong between a TowerBending and its tower's mass (kg) and height (m), or None."""
+    """Yield what is wrong between a TowerBending and its tower's mass (kg) and height (m)."""
     found = modes.mass(height)
-    if abs(found - mass) <= MASS * mass:
-        return None
-    return (
-        f"modes.distribution: has a mass of {found:.6g} kg with top_mass; must be the tower's mass ="
-        f" {mass:.6g} kg within {MASS:.0%}"
-    )
+    if abs(found - mass) > MASS * mass:
+        yield (
+            f"modes.distribution: has a mass of {found:.6g} kg with top_mass; must be the tower's mass ="
+            f" {mass:.6g} kg within {MASS:.0%}"
+        )
 
 
 class _ModesTable(ModeShapes):
@@ -103,20 +95,12 @@ def read_tower_modes(table, folder):
     path = folder / Path(record.distribution).expanduser()
     if not path.exists() and (builtin := DATA / "platforms" / record.distribution).is_file():
         path = builtin
-    given = {name: getattr(record, name) for name in record.model_fields_set if name != "distribution"}
-    return TowerBending(**_read_distribution(path), **given)
-
-
-def _read_distribution(path):
-    """Return {column: tuple of numbers} of a distribution file."""
-    rows = read_table(path, "tower", COLUMNS)
-    problems = []
+    rows, problems = read_table(path, "tower", COLUMNS), []
     place = column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False, increasing=True)
     values = {"height_fraction": place}
-    values |= {
-        name: column(rows, name, problems, 0.0, largest, open_ends=True) for name, largest in LARGEST.items()
-    }
+    values |= {name: column(rows, name, problems, 0.0, largest) for name, largest in LARGEST.items()}
     if not problems and (place[0] != 0.0 or place[-1] != 1.0):
         problems.append(f"height_fraction: goes from {place[0]:g} to {place[-1]:g}; must go from 0 to 1")
     raise_problems(f"tower file {str(path)!r}", problems)
-    return {name: tuple(map(float, value)) for name, value in values.items()}
+    given = {name: getattr(record, name) for name in record.model_fields_set if name != "distribution"}
+    return TowerBending(**given, **{name: tuple(map(float, value)) for name, value in values.items()})

@@ -1,5 +1,6 @@
 """Descriptions of turbines: nacelle, rotor, drivetrain, blade with polars, and the reader of their files."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -7,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from fowt_env.descriptions.checks import is_number
-from fowt_env.descriptions.files import DATA, column, locate, raise_problems, read_table, read_toml
+from fowt_env.descriptions.files import DATA, column, locate, noted, raise_problems, read_table, read_toml
 from fowt_env.descriptions.protection import Protection
 from fowt_env.descriptions.records import (
     Finite,
@@ -58,39 +59,32 @@ class Rotor(Record):
     blade_first_moment: NonNegative | None = None  # kg m, about the blade's root, along the pitch axis
     blade_second_moment: NonNegative | None = None  # kg m2, the same
 
-    @model_validator(mode="after")
-    def _radii(self):
+    def _problems(self):
         if self.tip_radius <= self.hub_radius:
-            raise ValueError(f"tip_radius = {self.tip_radius}: must exceed hub_radius = {self.hub_radius}")
-        return self
-
-    @model_validator(mode="after")
-    def _blade_masses(self):
+            yield f"tip_radius = {self.tip_radius}: must exceed hub_radius = {self.hub_radius}"
+            return
         given = {key: getattr(self, key) for key in BLADE_MASSES}
         missing = [key for key, value in given.items() if value is None]
         if missing and len(missing) < len(given):
-            raise ValueError(f"{missing[0]}: is missing; {', '.join(BLADE_MASSES)} go together")
+            yield f"{missing[0]}: is missing; {', '.join(BLADE_MASSES)} go together"
         if missing:
-            return self
+            return
         mass, first, second = given.values()
         if self.blades * mass > self.mass * BLADE_SLACK:
-            raise ValueError(f"blade_mass = {mass:g}: must be <= mass/blades = {self.mass / self.blades:g}")
+            yield f"blade_mass = {mass:g}: must be <= mass/blades = {self.mass / self.blades:g}"
         longest = mass * (self.tip_radius - self.hub_radius)
         if first > longest * BLADE_SLACK:
-            raise ValueError(f"blade_first_moment = {first:g}: must be <= {longest:g}, blade_mass at the tip")
+            yield f"blade_first_moment = {first:g}: must be <= {longest:g}, blade_mass at the tip"
         if first**2 > mass * second * BLADE_SLACK:
-            raise ValueError(
-                f"blade_second_moment = {second:g}: must be >= blade_first_moment**2/blade_mass ="
-                f" {first**2 / mass:g}"
-            )
+            least = first**2 / mass if mass else math.inf
+            yield f"blade_second_moment = {second:g}: must be >= blade_first_moment**2/blade_mass = {least:g}"
         about_shaft = second + 2.0 * self.hub_radius * first + self.hub_radius**2 * mass
         about_shaft *= self.blades * np.cos(self.cone) ** 2
         if about_shaft > self.inertia * BLADE_SLACK:
-            raise ValueError(
+            yield (
                 f"blade_second_moment = {second:g}: about the blade's root; with the other blades it makes"
                 f" {about_shaft:g} about the shaft, must be <= inertia = {self.inertia:g}"
             )
-        return self
 
 
 class Drivetrain(Record):
@@ -129,32 +123,26 @@ class PitchDrive(SecondOrderDrive):
     damping: bounded(gt=0, le=5) | None = None
     second_order: SecondOrderDrive | None = None
 
-    @model_validator(mode="after")
-    def _limits(self):
+    def _problems(self):
         if self.maximum <= self.minimum:
-            raise ValueError(f"maximum = {self.maximum}: must exceed minimum = {self.minimum}")
-        return self
-
-    @model_validator(mode="after")
-    def _order(self):
+            yield f"maximum = {self.maximum}: must exceed minimum = {self.minimum}"
         if self.natural_frequency is None and self.time_constant is None:
-            raise ValueError(
+            yield (
                 "time_constant is missing: must be a number >= 0; or natural_frequency and damping, of a"
                 " drive of second order"
             )
         if (self.natural_frequency is None) != (self.damping is None):
             missing = "damping" if self.damping is None else "natural_frequency"
-            raise ValueError(f"{missing} is missing: natural_frequency and damping belong together, each > 0")
+            yield f"{missing} is missing: natural_frequency and damping belong together, each > 0"
         if self.natural_frequency is not None and self.time_constant is not None:
-            raise ValueError(
+            yield (
                 f"time_constant = {self.time_constant:g}: given beside natural_frequency and damping;"
                 " allowed: it, of a drive of first order, or they, of one of second order"
             )
         for key in ("acceleration_limit", "deadband", "friction"):
             value = getattr(self, key)
             if self.natural_frequency is None and value:
-                raise ValueError(f"{key} = {value:g}: needs natural_frequency and damping")
-        return self
+                yield f"{key} = {value:g}: needs natural_frequency and damping"
 
     @property
     def lag(self):
@@ -208,79 +196,59 @@ class TorqueLaw(Record):
     max_torque_rate: Positive
     speed_filter_corner: Positive  # rad/s
 
-    @model_validator(mode="after")
-    def _order(self):
+    def _problems(self):
         if not self.cut_in_speed < self.region2_start_speed < self.transition_speed <= self.rated_speed:
-            raise ValueError(
+            yield (
                 f"cut_in_speed = {self.cut_in_speed}, region2_start_speed = {self.region2_start_speed}, "
                 f"transition_speed = {self.transition_speed}, rated_speed = {self.rated_speed}: "
                 "must be cut_in_speed < region2_start_speed < transition_speed <= rated_speed"
             )
         if self.max_torque < self.rated_torque:
-            raise ValueError(f"max_torque = {self.max_torque}: must be >= rated_torque = {self.rated_torque}")
-        return self
+            yield f"max_torque = {self.max_torque}: must be >= rated_torque = {self.rated_torque}"
 
 
-# What a torque law is given where its file says nothing, as fractions of its own figures: those of the NREL
-# 5 MW turbine (NREL/TP-500-38060), whose speed filter, 0.25 Hz, follows the rated rotor speed.
-TRANSITION = 0.99  # of rated speed: region 3
-SLIP = 10.0  # percent
-REGION3_PITCH = 0.01745329  # rad, 1 deg
 REGION15 = 0.05  # of the minimum speed, over which the torque rises to that of region 2
-MOST_TORQUE = 1.1  # of rated
-TORQUE_RATE = 0.348  # of rated a second
-FILTER_CORNER = 1.24  # rad/s per rad/s of rated rotor speed
-BELOW_MEETING = 0.999  # of the speed at which region 2 reaches rated torque, where that is the lower one
+# What a torque law is given where its file says nothing: key, the figures that it follows from, and how. The
+# fractions are those of the NREL 5 MW turbine (NREL/TP-500-38060).
+TORQUE_DEFAULTS = (
+    ("rated_speed", ("rated_rotor_speed", "gear_ratio"), lambda rotor, ratio: rotor * ratio),
+    ("rated_torque", ("rated_power", "rated_speed"), lambda power, speed: power / speed),
+    ("rated_power", ("rated_torque", "rated_speed"), lambda torque, speed: torque * speed),
+    ("cut_in_speed", ("minimum_speed",), lambda speed: speed),
+    ("region2_start_speed", ("minimum_speed",), lambda speed: (1.0 + REGION15) * speed),
+    # region 3: at 99 % of rated speed, or before, just below the speed at which region 2 reaches rated torque
+    ("transition_speed", ("rated_speed", "rated_torque", "region2_constant"),
+     lambda speed, torque, constant: min(0.99 * speed, 0.999 * (torque / constant) ** 0.5)),
+    ("slip_percent", (), lambda: 10.0),
+    ("region3_min_pitch", (), lambda: 0.01745329),  # rad, 1 deg
+    ("max_torque", ("rated_torque",), lambda torque: 1.1 * torque),
+    ("max_torque_rate", ("rated_torque",), lambda torque: 0.348 * torque),  # a second
+    ("speed_filter_corner", ("rated_rotor_speed",), lambda rotor: 1.24 * rotor),  # 0.25 Hz
+)  # fmt: skip
 
 
 def with_torque_defaults(data):
-    """Return the entries of a turbine (SI) with those of torque_law that follow from others.
+    """Return the entries of a turbine (SI) with those of torque_law that follow from others: TORQUE_DEFAULTS.
 
-    rated_torque and rated_power follow from each other by rated_speed, and this from the rotor's and the
-    gearbox; cut_in_speed and region2_start_speed from minimum_speed. Region 3 starts at 99 % of rated speed,
-    or where the torque of region 2 reaches the rated one before. Whatever is no positive number stays as it
-    is.
+    Whatever is no positive number stays as it is.
     Raises: ValueError where minimum_speed is given with one of the speeds that it stands for.
     """
     law, drive = data.get("torque_law"), data.get("drivetrain")
     if not isinstance(law, dict):
         return data
-    law = dict(law)
-
-    def known(table, *keys):
-        values = [table.get(key) if isinstance(table, dict) else getattr(table, key, None) for key in keys]
-        return values if all(is_number(value) and value > 0.0 for value in values) else None
-
-    def default(key, value):
-        if key not in law:
-            law[key] = value
-
-    rotor, ratio = known(data, "rated_rotor_speed"), known(drive, "gear_ratio")
-    if rotor and ratio:
-        default("rated_speed", rotor[0] * ratio[0])
-    if found := known(law, "rated_power", "rated_speed"):
-        default("rated_torque", found[0] / found[1])
-    if found := known(law, "rated_torque", "rated_speed"):
-        default("rated_power", found[0] * found[1])
+    ratio = drive.get("gear_ratio") if isinstance(drive, dict) else getattr(drive, "gear_ratio", None)
+    law, others = dict(law), {"rated_rotor_speed": data.get("rated_rotor_speed"), "gear_ratio": ratio}
     if "minimum_speed" in law:
+        slowest = others["minimum_speed"] = law.pop("minimum_speed")
         given = [key for key in ("cut_in_speed", "region2_start_speed") if key in law]
         if given:
             raise ValueError(f"torque_law.{given[0]}: given beside minimum_speed, which stands for it")
-        found = known(law, "minimum_speed")
-        if not found:
-            raise ValueError(f"torque_law.minimum_speed = {law['minimum_speed']!r}: must be a number > 0")
-        del law["minimum_speed"]
-        law["cut_in_speed"], law["region2_start_speed"] = found[0], (1.0 + REGION15) * found[0]
-    if found := known(law, "rated_speed", "rated_torque", "region2_constant"):
-        meeting = BELOW_MEETING * (found[1] / found[2]) ** 0.5
-        default("transition_speed", min(TRANSITION * found[0], meeting))
-    default("slip_percent", SLIP)
-    default("region3_min_pitch", REGION3_PITCH)
-    if found := known(law, "rated_torque"):
-        default("max_torque", MOST_TORQUE * found[0])
-        default("max_torque_rate", TORQUE_RATE * found[0])
-    if rotor:
-        default("speed_filter_corner", FILTER_CORNER * rotor[0])
+        if not (is_number(slowest) and slowest > 0.0):
+            raise ValueError(f"torque_law.minimum_speed = {slowest!r}: must be a number > 0")
+    for key, needs, value in TORQUE_DEFAULTS:
+        known = [others.get(name, law.get(name)) for name in needs]
+        if key not in law and all(is_number(figure) and figure > 0.0 for figure in known):
+            law[key] = value(*known)
     return data | {"torque_law": law}
 
 
@@ -307,12 +275,12 @@ class Blade(Record):
     prebend: FloatArray | None = None  # (n,) m, blade axis downwind of the pitch axis at zero pitch
     sweep: FloatArray | None = None  # (n,) m, blade axis from the pitch axis in the rotor plane, as BlSwpAC
 
-    @model_validator(mode="after")
-    def _stations(self):
+    def _problems(self):
         sizes = [len(values) for values in (self.radius, self.chord, self.twist, self.airfoil)]
         sizes += [len(values) for values in (self.prebend, self.sweep) if values is not None]
         if len(set(sizes)) != 1 or sizes[0] < 2:
-            raise ValueError(f"radius, chord, twist, airfoil need the same length, at least 2; got {sizes}")
+            yield f"radius, chord, twist, airfoil need the same length, at least 2; got {sizes}"
+            return
         for name, bad, rule in (
             ("radius", ~(np.diff(self.radius, prepend=0.0) > 0), "increasing, > 0"),
             ("chord", ~(np.isfinite(self.chord) & (self.chord > 0)), "finite, > 0"),
@@ -320,14 +288,13 @@ class Blade(Record):
         ):
             if bad.any():
                 first = int(np.argmax(bad))
-                raise ValueError(f"{name}.{first + 1} = {getattr(self, name)[first]}: must be {rule}")
-        for name in self.airfoil:
+                yield f"{name}.{first + 1} = {getattr(self, name)[first]}: must be {rule}"
+        for name in dict.fromkeys(self.airfoil):
             if name not in self.polars:
-                raise ValueError(str(unknown("airfoil", name, self.polars)))
+                yield str(unknown("airfoil", name, self.polars))
         for name, polar in self.polars.items():
             if problem := _polar_problem(polar):
-                raise ValueError(f"polars.{name}: {problem}")
-        return self
+                yield f"polars.{name}: {problem}"
 
 
 def _polar_problem(polar):
@@ -358,9 +325,7 @@ class Turbine(Record):
     drivetrain: Drivetrain
     pitch_drive: PitchDrive
     torque_law: TorqueLaw
-    gains: dict[
-        str, PitchGains
-    ] = {}  # published ones by name; without any they are derived (controllers/gains.py)
+    gains: dict[str, PitchGains] = {}  # published ones; without any they are derived (controllers/gains.py)
     protection: Protection = Protection()
     blade: Blade
     discon: str | None = None  # path of a DISCON.IN of ROSCO for this turbine
@@ -371,27 +336,19 @@ class Turbine(Record):
     def _torque_defaults(cls, data):
         return with_torque_defaults(data) if isinstance(data, dict) else data
 
-    @model_validator(mode="after")
-    def _consistent(self):
-        problems = []
+    def _problems(self):
         if not self.cut_in_wind_speed < self.rated_wind_speed < self.cut_out_wind_speed:
-            problems.append(
+            yield (
                 f"rated_wind_speed = {self.rated_wind_speed}: must be between cut_in_wind_speed = "
                 f"{self.cut_in_wind_speed} and cut_out_wind_speed = {self.cut_out_wind_speed}"
             )
         if self.overspeed <= self.rated_rotor_speed:
-            problems.append(
-                f"overspeed = {self.overspeed:g}: must be > rated_rotor_speed = {self.rated_rotor_speed:g}"
-            )
+            yield f"overspeed = {self.overspeed:g}: must be > rated_rotor_speed = {self.rated_rotor_speed:g}"
         hub, tip = self.rotor.hub_radius, self.rotor.tip_radius
         for i, radius in enumerate(self.blade.radius, 1):
             if not hub < radius < tip:
-                problems.append(
-                    f"blade.radius.{i} = {radius:g}: must be > hub_radius = {hub} and < tip_radius = {tip} m"
-                )
-        if problems:
-            raise ValueError("\n".join(problems))
-        return self
+                allowed = f"must be > hub_radius = {hub} and < tip_radius = {tip} m"
+                yield f"blade.radius.{i} = {radius:g}: {allowed}"
 
 
 def turbine_file(name):
@@ -415,15 +372,15 @@ def read_turbine(name_or_path: str | Path) -> Turbine:
     data, origin = to_si(read_toml(path, "turbine"), problems)
     blade, blade_problems = validate(_BladeFile, {"blade": data.pop("blade")} if "blade" in data else {})
     if blade is not None:
-        try:
+        with noted(blade_problems):
             data["blade"] = _read_blade(blade.blade, path.parent)
-        except InputError as error:
-            blade_problems.append(str(error))
     if isinstance(data.get("discon"), str):
-        try:
-            data["discon"] = str(_discon(data["discon"], path.parent))
-        except InputError as error:
-            problems.append(str(error))
+        with noted(problems):
+            place = _beside(path.parent, data["discon"])
+            if not place.is_file():
+                allowed = "must be a file, relative to the turbine file's folder"
+                raise InputError(f"discon = {data['discon'][:60]!r}: {allowed}")
+            data["discon"] = str(place.absolute())
     turbine, found = validate(Turbine, data, origin)
     if blade_problems:  # which say why the record has no blade
         found = [problem for problem in found if not problem.startswith("blade is missing")]
@@ -450,14 +407,6 @@ def _beside(folder, text):
         raise InputError(f"path {text[:60]!r} cannot be used: {error}") from None
 
 
-def _discon(text, folder):
-    """Return the path of the DISCON.IN that a turbine file names. Raises: InputError where there is none."""
-    path = _beside(folder, text)
-    if not path.is_file():
-        raise InputError(f"discon = {text[:60]!r}: must be a file, relative to the turbine file's folder")
-    return path.absolute()
-
-
 def _read_blade(table, folder):
     """Return the Blade from the station file and polar folder that a turbine file names."""
     path = _beside(folder, table.stations)
@@ -477,11 +426,8 @@ def _read_blade(table, folder):
         raise InputError(f"polars folder {str(polar_folder)!r} cannot be read: {error}") from None
     if not files:
         raise InputError(f"blade.polars = {table.polars!r}: no CSV files in a folder {str(polar_folder)!r}")
-    shape = {
-        name: column(rows, f"{name}_m", problems)
-        for name in ("prebend", "sweep")
-        if f"{name}_m" in rows[0][1]
-    }
+    shapes = [name for name in ("prebend", "sweep") if f"{name}_m" in rows[0][1]]
+    shape = {name: column(rows, f"{name}_m", problems) for name in shapes}
     airfoils = tuple(row["airfoil"] for _, row in rows)
     polars = {}
     for (number, _), name in zip(rows, airfoils, strict=True):

@@ -119,12 +119,6 @@ class _Reader(NamedTuple):
         text = content.tobytes().decode("ascii")
         return [text[i : i + length].strip() for i in range(0, len(text), length)]
 
-    def last(self, size, what):
-        """Raises: InputError unless `size` bytes are left."""
-        left = self.size - self.file.tell()
-        if size != left:
-            raise self.refuse(f"{what} take {size} bytes, {left} are left")
-
 
 def _outb(reader):
     """(column names, values (n, columns)) of an open .outb file."""
@@ -146,12 +140,14 @@ def _outb(reader):
     reader.take(reader.whole("i4", "length of the description", 0), "u1", "description")
     names = reader.words(channels + 1, length, "channel names")
     units = reader.words(channels + 1, length, "units")
-    columns = [f"{name}_[{_bare(unit)}]" for name, unit in zip(names, units, strict=True)]
+    units = [unit[1:-1] if unit[:1] + unit[-1:] in ("()", "[]") else unit for unit in units]
+    columns = [f"{name}_[{unit}]" for name, unit in zip(names, units, strict=True)]
     if len(set(columns)) < len(columns):
         twice = Counter(columns).most_common(1)[0][0]
         raise reader.refuse(f"channel {twice!r} is there twice")
     size = (4 * rows if kind == WITH_TIME else 0) + rows * channels * (2 if packed else 8)
-    reader.last(size, f"{rows} rows of {channels} channels")
+    if size != (left := reader.size - reader.file.tell()):
+        raise reader.refuse(f"{rows} rows of {channels} channels take {size} bytes, {left} are left")
     values = np.empty((rows, channels + 1))
     with np.errstate(over="ignore"):
         if kind == WITH_TIME:
@@ -166,8 +162,3 @@ def _outb(reader):
         values[:, 1:] -= offset
         values[:, 1:] /= slope
     return columns, values
-
-
-def _bare(unit):
-    """A unit without its brackets."""
-    return unit[1:-1] if unit[:1] + unit[-1:] in ("()", "[]") else unit

@@ -4,7 +4,6 @@ import itertools
 import json
 import os
 import pickle
-import subprocess
 import sys
 import zipfile
 from contextlib import suppress
@@ -234,20 +233,6 @@ def test_no_text_in_a_policy_file_is_looked_up_as_code_or_as_a_file(text, trappe
             make("policy:self.npz", read_turbine("nrel5mw"), 0.1)
 
 
-@pytest.mark.parametrize("text", HOSTILE)
-def test_a_policy_whose_baseline_is_no_built_in_controller_is_refused_by_the_commands(text, trapped):
-    settings = read_policy(AGENTS / "ppo_lqr.npz")[0] | {"baseline": text}
-    policy_of_a_stranger(settings, "self.npz")
-    result = invoke("simulate", "--controller", "policy:self.npz", "--duration", "1")
-    assert result.exit_code == console.EXIT_INPUT, result.output
-    assert f"baseline = '{text}': must be one of 'constant'" in result.stderr
-    result = invoke("evaluate", "--controllers", "policy:self.npz", "--duration", "1", "--skip", "0")
-    assert result.exit_code == console.EXIT_INPUT, result.output
-    from fowt_env.training.reports.scores import inputs
-
-    assert inputs("policy:self.npz" if text.startswith("policy:") else text) == ""
-
-
 def settings_of_a_stranger():
     """Settings of a run with a value in every section of them, as many texts among them as there can be."""
     from fowt_env.training.rl.train import resolve
@@ -280,19 +265,6 @@ def test_no_text_in_the_settings_of_a_stranger_is_looked_up_as_code(text, trappe
         (folder / "settings.yml").write_text(yaml.safe_dump(changed(sound, path, text)))
         with pytest.raises(InputError, match=text):
             Training(None, folder, resume=True).run()
-
-
-@pytest.mark.parametrize("text", HOSTILE)
-def test_a_folder_of_nothing_but_settings_is_refused_where_its_baseline_is_no_built_in_one(text, trapped):
-    import yaml
-
-    Path("run").mkdir()
-    settings = changed(settings_of_a_stranger(), ("environment", "baseline"), text)
-    Path("run", "settings.yml").write_text(yaml.safe_dump(settings))
-    result = invoke("train", "--resume", "--out", "run")
-    assert result.exit_code == console.EXIT_INPUT
-    assert f"environment.baseline = '{text}': must be one of constant, " in result.stderr
-    assert [path.name for path in Path("run").iterdir()] == ["settings.yml"]
 
 
 @pytest.mark.parametrize("tag", ["object/apply:own_law.Law []", "name:own_law.Law", "module:own_law"])
@@ -338,37 +310,6 @@ def test_no_text_in_a_suite_is_looked_up_as_code(text, trapped):
         Path("suite.toml").write_text(content)
         with suppress(InputError):
             read_suite("suite.toml")
-
-
-def test_the_study_itself_finds_a_crash_a_hang_and_a_wrong_error(tmp_path):
-    """Of a worker whose loaders do so, at once and not after its time limit."""
-    code = (
-        "import sys, os, time; sys.argv = ['mutation.py', *sys.argv[1:]]\n"
-        "import mutation\n"
-        "class Samples:\n"
-        "    def __init__(self, folder):\n"
-        "        path = folder / 'file'\n"
-        "        path.write_text('sound')\n"
-        "        self.calls = 0\n"
-        "        self.kinds = {'odd': (path, (mutation.flipped,), self.load)}\n"
-        "    def load(self):\n"
-        "        self.calls += 1\n"
-        "        if self.calls == 2: raise KeyError('a')\n"
-        "        if self.calls == 3: time.sleep(60)\n"
-        "        if self.calls == 4: bytearray(10**11)\n"
-        "        if self.calls == 5: os.kill(os.getpid(), 11)\n"
-        "mutation.Samples, mutation.SECONDS, mutation.WAITS = Samples, 1, 1\n"
-        "mutation.main()\n"
-    )
-    words = ["--folder", tmp_path / "worker", "--count", "9", "--work"]
-    root = mutation.ROOT
-    variables = os.environ | {"PYTHONPATH": f"{root}{os.pathsep}{root / 'tests'}"}
-    command = [sys.executable, "-c", code, *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, env=variables)
-    assert done.returncode == -11
-    told = [line for line in done.stdout.splitlines() if "told" in line]
-    assert ["KeyError" in told[0], "TimeoutError" in told[1], "MemoryError" in told[2]] == [True] * 3
-    assert len(told) == 3
 
 
 ODD_VALUES = (None, -1, 10**400, "x", [{}], {"a": {}})

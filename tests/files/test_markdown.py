@@ -19,14 +19,3 @@ def test_a_bar_in_a_cell_ends_no_column(aligned):
     lines = markdown_table(("|x|", "y"), [("a|b", 1)], aligned).splitlines()
     assert lines[0].replace("\\|", "").count("|") == lines[2].replace("\\|", "").count("|") == 3
     assert len(set(map(len, lines))) == 1 or not aligned
-
-
-@pytest.mark.parametrize("aligned", [False, True])
-def test_a_table_may_have_no_rows_and_empty_cells(aligned):
-    lines = markdown_table(("", "y"), [], aligned).splitlines()
-    assert len(lines) == 2 and lines[1] == "|---|---|"
-
-
-def test_a_row_of_another_length_is_no_table():
-    with pytest.raises(ValueError):
-        markdown_table(("x", "y"), [("a",)])

@@ -1,21 +1,16 @@
 """A full disk, or a place where nothing can be written: one clear line, and what was there stays as it was.
 
-The disk is full by a limit on the size of files, and once in earnest on a small file system in memory. The
-place is one beneath a file, which stops even the superuser.
+The disk is full by a limit on the size of files. The place is one beneath a file, which stops even the
+superuser.
 """
 
-import os
 import resource
-import subprocess
 from contextlib import contextmanager
 
-import numpy as np
 import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from fowt_env.files.atomic import is_leftover
-from fowt_env.files.tables import write_table
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import console
 from fowt_env.training.evaluation import results
@@ -163,31 +158,3 @@ def test_report_into_a_place_where_nothing_can_be_written_names_it(evaluation, t
     (tmp_path / "file").touch()
     out = tmp_path / "file" / "page.html"
     refused("report", evaluation, "--no-schedule", "--out", out, named=out)
-
-
-@pytest.fixture
-def small_disk(tmp_path):
-    """A file system of 64 kB in memory. Skipped where mounting one is not permitted."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", place], capture_output=True)
-    if mounted.returncode != 0:
-        pytest.skip(f"no file system can be mounted: {mounted.stderr.decode().strip()}")
-    yield place
-    subprocess.run(["umount", place], check=True)
-
-
-def test_a_full_disk_names_the_file_and_loses_nothing(small_disk):
-    frame = pd.DataFrame({"Time_[s]": np.arange(20_000) * 0.1, "RotSpeed_[rpm]": np.random.rand(20_000)})
-    old = write_table(frame[:100], small_disk / "run.csv")
-    before = contents(small_disk)
-    for name in ("run.csv", "other.csv", "run.parquet", "run.outb"):
-        with pytest.raises(OSError, match=rf"cannot be written: No space left on device: .*{name}"):
-            write_table(frame, small_disk / name)
-    refused("simulate", *SHORT, "--out", old, named=old)
-    assert contents(small_disk) == before
-    (small_disk / "rest").write_bytes(bytes(os.statvfs(small_disk).f_bavail * 4096))
-    refused("benchmark", "evaluation", "--count", "1", "--out", small_disk / "a.csv", named="a.csv")
-    refused("trim", "--winds", "18", "--out", old, named=old)
-    assert contents(small_disk) == before | {small_disk / "rest": (small_disk / "rest").read_bytes()}
-    assert not [path for path in small_disk.iterdir() if is_leftover(path)]

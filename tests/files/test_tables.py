@@ -80,11 +80,6 @@ def test_a_link_goes_on_pointing_to_the_new_content(tmp_path):
     ]  # fmt: skip
 
 
-def test_the_mask_of_the_process_is_never_changed(tmp_path, monkeypatch):
-    monkeypatch.delattr(os, "umask")
-    write_table(FRAME, tmp_path / "run.csv")
-
-
 def test_wrong_endings_and_missing_files_are_named(tmp_path):
     with pytest.raises(InputError, match="run.xlsx"):
         write_table(FRAME, tmp_path / "run.xlsx")

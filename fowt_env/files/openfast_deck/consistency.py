@@ -12,9 +12,7 @@ MOTIONS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
 def contradictions(deck, body=None):
     """(what the deck says, what follows) rows; body: the deck's PotentialFlow, or None."""
     yield from _wave_grid(deck)
-    yield from _site(deck)
-    yield from _turbine(deck)
-    yield from _controller(deck)
+    yield from _figures(deck)
     if body is not None:
         yield from _coefficients(body)
 
@@ -28,7 +26,7 @@ def _wave_grid(deck):
         return
     ends = np.concatenate(wet)
     for axis, key in ((0, "X_HalfWidth"), (1, "Y_HalfWidth")):
-        half, reach = water.number(key, low=0.0, open_low=True), float(np.abs(ends[:, axis]).max())
+        half, reach = water.positive(key), float(np.abs(ends[:, axis]).max())
         if half < reach:
             proposed = 5.0 * math.ceil((reach + ROOM) / 5.0)
             yield (
@@ -36,8 +34,7 @@ def _wave_grid(deck):
                 "here the wave at each member; OpenFAST has that of the grid's edge beyond it: for a"
                 f" comparison give {key} {proposed:g} m (members and {ROOM:g} m of drift)",
             )
-    bottom = water.number("Z_Depth", default=math.inf, low=0.0, open_low=True)
-    deepest = -float(ends[:, 2].min())
+    bottom, deepest = water.positive("Z_Depth", default=math.inf), -float(ends[:, 2].min())
     if bottom < deepest:
         yield (
             f"a grid of waves down to Z_Depth {bottom:g} m, members down to {deepest:.4g} m",
@@ -46,67 +43,44 @@ def _wave_grid(deck):
         )
 
 
-def _site(deck):
-    """Of figures that the .fst and a module both have."""
-    if deck.fst is None:
-        return
+def _figures(deck):
+    """Of figures that two files have."""
+    site, values, aero = deck.site, deck.elastodyn, deck.aerodyn
     for file, key, taken in (
-        (deck.water, "WtrDpth", deck.site.water_depth),
-        (deck.water, "WtrDens", deck.site.water_density),
-        (deck.aerodyn.file, "AirDens", deck.site.air_density),
+        (deck.water, "WtrDpth", site.water_depth),
+        (deck.water, "WtrDens", site.water_density),
+        (aero.file, "AirDens", site.air_density),
     ):
-        other = deck.fst.number(key, default=None)
-        if file is not deck.fst and other is not None and not _alike(taken, other):
+        other = None if deck.fst is None else deck.fst.number(key, default=None)
+        if other is not None and not _alike(taken, other):
             yield f"{key} {taken:g} in {file.kind}, {other:g} in the .fst", f"{taken:g}"
-
-
-def _turbine(deck):
-    """Of the lengths of blade and tower, which ElastoDyn and AeroDyn both have."""
-    values, aero = deck.elastodyn, deck.aerodyn
-    span = values["TipRad"] - values["HubRad"]
-    if not _alike(float(aero.span[-1]), span):
-        yield (
-            f"blade of {aero.span[-1]:.5g} m in AeroDyn (BlSpn), {span:.5g} m in ElastoDyn (TipRad - HubRad)",
-            "stations of AeroDyn, masses of ElastoDyn",
-        )
-    if aero.tower_loads and len(aero.tower) > 1:
-        top = float(aero.tower[-1, 0])
-        if not _alike(top, values["TowerHt"], 0.02):
-            yield (
-                f"tower up to {top:.5g} m in AeroDyn (TwrElev), {values['TowerHt']:.5g} m in ElastoDyn"
-                " (TowerHt)",
-                "the tower of ElastoDyn",
-            )
-
-
-def _controller(deck):
-    """Of what ROSCO is told of the turbine."""
-    file, values = deck.control.discon, deck.elastodyn
-    if file is None:
-        return
+    own, span = float(aero.blade[-1, 0]), values["TipRad"] - values["HubRad"]
+    if not _alike(own, span):
+        what = f"blade of {own:.5g} m in AeroDyn (BlSpn), {span:.5g} m in ElastoDyn (TipRad - HubRad)"
+        yield what, "stations of AeroDyn, masses of ElastoDyn"
+    top, height = float(aero.tower[-1, 0]) if len(aero.tower) > 1 else 0.0, values["TowerHt"]
+    if aero.tower_loads and len(aero.tower) > 1 and not _alike(top, height, 0.02):
+        what = f"tower up to {top:.5g} m in AeroDyn (TwrElev), {height:.5g} m in ElastoDyn (TowerHt)"
+        yield what, "the tower of ElastoDyn"
     for key, own, source in (
         ("WE_GearboxRatio", values["GBRatio"], "GBRatio of ElastoDyn"),
         ("WE_BladeRadius", values["TipRad"], "TipRad of ElastoDyn"),
-        ("WE_RhoAir", deck.site.air_density, deck.site.sources["air_density"]),
+        ("WE_RhoAir", site.air_density, site.sources["air_density"]),
     ):
-        told = file.number(key, default=None)
+        told = None if deck.control.discon is None else deck.control.discon.number(key, default=None)
         if told is not None and not _alike(told, own):
             yield f"{key} {told:g} of ROSCO's wind estimator", f"the turbine has {own:g} ({source})"
 
 
 def _coefficients(body):
-    """Of added mass that no body has."""
+    """Of added mass and stiffness that no body has."""
     for motion, value in zip(MOTIONS, np.diag(body.added_mass_infinite), strict=True):
         if value < 0.0:
-            yield (
-                f"added mass of {value:.4g} in {motion} at infinite frequency",
-                "the same: a body's is never negative; look at WAMIT's .1",
-            )
+            what = f"added mass of {value:.4g} in {motion} at infinite frequency"
+            yield what, "the same: a body's is never negative; look at WAMIT's .1"
     if not np.any(body.stiffness):
-        yield (
-            "hydrostatic stiffness of zero (.hst)",
-            "the same: nothing but lines and members restores the platform",
-        )
+        said = "the same: nothing but lines and members restores the platform"
+        yield "hydrostatic stiffness of zero (.hst)", said
 
 
 def _alike(a, b, near=NEAR):

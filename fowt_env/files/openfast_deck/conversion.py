@@ -1,49 +1,40 @@
 """From a deck to the figures of this project's platform and turbine files, each with its source.
 
-A table of a file is a list of Row; a value is a number, a list, or a text. Nothing is written here.
+A table of a file is a list of rows (key, value, comment); a value is a number, a list, or a text, and None
+leaves the row out. Nothing is written here.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.descriptions.rotor_mass import rotor_mass_properties
-from fowt_env.descriptions.units import RPM
+from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.files.openfast_deck.hydrodyn import is_old
 from fowt_env.files.openfast_deck.rosco_files import DISCON
+from fowt_env.files.openfast_deck.servodyn import LEGACY_SOURCE
 
 NEAR = 0.05  # m, of the outermost blade stations from hub and tip: line loads fall to zero there
 OVERSPEED = 1.3  # of the rated speed: failure threshold of the environment, a choice of this project
 DEFAULT_SHEAR = 0.14
 
 
-class Row(NamedTuple):
-    """A line of a text file."""
-
-    key: str
-    value: object
-    comment: str = ""
-
-
 def mass_properties(deck):
-    """{name: figure} of the parts and their sum, kg and m: what ElastoDyn's summary lists too."""
+    """{name: figure} of the parts and their sum, kg: what ElastoDyn's summary lists too."""
     values = deck.elastodyn
-    blade = float(values.blade.mass.sum())
-    rotor = values["HubMass"] + values.blades * blade
-    water = sum(fill.mass for fill in deck.hydrodyn.fills)
-    top = rotor + values["NacMass"] + values["YawBrMass"]
-    return {
-        "blade": blade,
-        "rotor": rotor,
+    parts = {
+        "blade": float(values.blade.mass.sum()),
+        "rotor": values["HubMass"] + values.blades * float(values.blade.mass.sum()),
         "nacelle": values["NacMass"],
         "yaw bearing": values["YawBrMass"],
-        "tower top": top,
-        "tower": deck.elastodyn.tower.mass,
-        "platform": values["PtfmMass"],
-        "ballast water": water,
-        "total": top + deck.elastodyn.tower.mass + values["PtfmMass"] + water,
     }
+    parts["tower top"] = parts["rotor"] + values["NacMass"] + values["YawBrMass"]
+    parts |= {
+        "tower": values.tower[0],
+        "platform": values["PtfmMass"],
+        "ballast water": sum(fill.mass for fill in deck.hydrodyn.fills),
+    }
+    return parts | {"total": sum(parts[key] for key in ("tower top", "tower", "platform", "ballast water"))}
 
 
 def rotor_mass(deck):
@@ -52,25 +43,18 @@ def rotor_mass(deck):
     if values["HubMass"] + values.blade.mass.sum() <= 0.0:
         raise values.file.wrong("HubMass", values["HubMass"], "> 0 with massless blades")
     return rotor_mass_properties(
-        values.blade,
-        blades=values.blades,
-        cone=-values["PreCone"],
-        hub_mass=values["HubMass"],
-        hub_inertia=values["HubIner"],
-        hub_cm=values["HubCM"],
-    )
+        values.blade, blades=values.blades, cone=-values["PreCone"], hub_mass=values["HubMass"],
+        hub_inertia=values["HubIner"], hub_cm=values["HubCM"],
+    )  # fmt: skip
 
 
 def ballast(deck):
     """(mass, centre (3,), inertia tensor (3, 3) about it) of the platform with the water in its members."""
     values = deck.elastodyn
     xy, yz, xz = values.platform_products
-    inertia = np.array([
-        [values["PtfmRIner"], xy, xz],
-        [xy, values["PtfmPIner"], yz],
-        [xz, yz, values["PtfmYIner"]],
-    ])  # fmt: skip
-    place = np.array([values["PtfmCMxt"], values["PtfmCMyt"], values["PtfmCMzt"]])
+    inertia = np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
+    inertia += np.diag([values[f"Ptfm{axis}Iner"] for axis in "RPY"])
+    place = np.array([values[f"PtfmCM{axis}t"] for axis in "xyz"])
     bodies = [(values["PtfmMass"], place, inertia)]
     bodies += [(fill.mass, np.array(fill.centre), fill.inertia) for fill in deck.hydrodyn.fills]
     mass = sum(body[0] for body in bodies)
@@ -90,58 +74,41 @@ def additional_stiffness(deck):
     Of old files alone (hydrodyn.is_old); in all others the weight moves with the members.
     """
     hydro, source = deck.hydrodyn, deck.hydrodyn.file.source("AddCLin")
-    stiffness = np.array(hydro.stiffness)
+    stiffness = np.array(hydro.added["AddCLin"])
     if not hydro.fills or not is_old(hydro.file):
         return stiffness, source
     own = np.zeros((6, 6))
     for fill in hydro.fills:
         x, y, z = np.array(fill.centre) * fill.mass * deck.site.gravity
-        own[3, 3] -= z
-        own[4, 4] -= z
-        own[3, 5] += x
-        own[4, 5] += y
+        own[[3, 4], [3, 4]] -= z
+        own[[3, 4], 5] += x, y
     rest = stiffness - own
     rest[np.abs(rest) < 1e-6 * np.abs(own).max()] = 0.0
     return rest, f"{source}, less what the weight of the water in members restores"
 
 
-def tower_mass(deck):
-    """(mass, height of its centre, inertia across) of the tower with the yaw bearing, a point at its top."""
-    values, span = deck.elastodyn, deck.elastodyn.tower
-    base, extra = values["TowerBsHt"], values["YawBrMass"]
-    mass = span.mass + extra
-    first = span.first + extra * span.length
-    second = span.second + extra * span.length**2
-    centre = first / mass if mass else 0.5 * span.length
-    return mass, base + centre, max(second - mass * centre**2, 0.0)
-
-
 def hub_place(deck):
     """(overhang, hub height): the rotor centre upwind of the tower axis and above still water, m."""
-    values = deck.elastodyn
-    tilt = values["ShftTilt"]
-    return (
-        -values["OverHang"] * math.cos(tilt),
-        values["TowerHt"] + values["Twr2Shft"] + values["OverHang"] * math.sin(tilt),
-    )
+    values, tilt = deck.elastodyn, deck.elastodyn["ShftTilt"]
+    height = values["TowerHt"] + values["Twr2Shft"] + values["OverHang"] * math.sin(tilt)
+    return -values["OverHang"] * math.cos(tilt), height
 
 
 def stations(deck):
     """(n, 5) radius, chord, twist (deg), prebend, sweep and the airfoils of the blade."""
-    aero, values = deck.aerodyn, deck.elastodyn
-    hub, tip = values["HubRad"], values["TipRad"]
-    radius = hub + aero.span
+    aero, hub, tip = deck.aerodyn, deck.elastodyn["HubRad"], deck.elastodyn["TipRad"]
+    span = aero.blade[:, 0]
+    radius = hub + span
     if radius[-1] > tip * 1.005:
-        raise aero.blade_file.refusal(
-            f"BlSpn ends at {aero.span[-1]:g} m: must be within TipRad - HubRad = {tip - hub:g} m"
-        )
+        allowed = f"must be within TipRad - HubRad = {tip - hub:g} m"
+        raise aero.blade_file.refusal(f"BlSpn ends at {span[-1]:g} m: {allowed}")
     radius = np.clip(radius, hub + NEAR, tip - NEAR)
     keep = np.concatenate([[True], np.diff(radius) > 1e-6])
     if not keep[-1]:  # the moved tip counts, not what came to lie upon it
         keep[np.flatnonzero(keep)[-1]], keep[-1] = len(np.flatnonzero(keep)) == 1, True
-    columns = np.column_stack([radius, aero.chord, aero.twist, aero.prebend, aero.sweep])
     if keep.sum() < 2:
         raise aero.blade_file.refusal("needs two nodes between root and tip")
+    columns = np.column_stack([radius, aero.blade[:, 1:]])
     return columns[keep], [name for name, kept in zip(aero.airfoil, keep, strict=True) if kept]
 
 
@@ -162,106 +129,107 @@ def tower_drag(deck):
 # --------------------------------------------------------------------------- files
 
 
-def platform_rows(deck, name, turbine, coefficients, distribution, options=None):
+def platform_rows(deck, name, turbine, coefficients, distribution):
     """{table: rows} of platform.toml; "" is its head, "lines" and "members" are lists of tables."""
-    site, values = deck.site, deck.elastodyn
-    source = values.file.source
-    mass, centre, inertia = ballast(deck)
-    water = f" and the water of {len(deck.hydrodyn.fills)} members" if deck.hydrodyn.fills else ""
-    tower, tower_height, tower_inertia = tower_mass(deck)
-    base_diameter, top_diameter, drag = tower_drag(deck)
-    bearing = ", YawBrMass at its top" if values["YawBrMass"] else ""
+    site, hydro = deck.site, deck.hydrodyn
     exponent = deck.inflow.shear_exponent
+    shear = "InflowWind" if exponent is not None else "offshore value of IEC 61400-3: not in the deck"
+    mass, centre, inertia = ballast(deck)
+    water = f" and the water of {len(hydro.fills)} members" if hydro.fills else ""
+
+    def source(*keys):
+        return deck.elastodyn.file.source(*keys) + water
+
+    def beside(value):
+        return value if abs(value) > 1e-9 else None
+
     tables = {
-        "": [
-            Row("name", name),
-            Row("turbine", turbine),
-            Row("source", f"imported from {deck.name}"),
-        ],
+        "": [("name", name), ("turbine", turbine), ("source", f"imported from {deck.name}")],
         "environment": [
-            *(Row(key, getattr(site, key), site.sources[key])
+            *((key, getattr(site, key), site.sources[key])
               for key in ("gravity", "water_density", "air_density", "water_depth")),
-            Row("shear_exponent", DEFAULT_SHEAR if exponent is None else exponent,
-                "InflowWind" if exponent is not None else "offshore value of IEC 61400-3: not in the deck"),
+            ("shear_exponent", DEFAULT_SHEAR if exponent is None else exponent, shear),
         ],
         "ballast": [
-            Row("mass", mass, source("PtfmMass") + water),
-            Row("cm_depth", -centre[2], source("PtfmCMzt") + water),
-            *([Row("cm_downwind", centre[0], source("PtfmCMxt") + water)] if abs(centre[0]) > 1e-9 else []),
-            *([Row("cm_left", centre[1], source("PtfmCMyt") + water)] if abs(centre[1]) > 1e-9 else []),
-            Row("inertia", list(np.diag(inertia)), source("PtfmRIner", "PtfmPIner", "PtfmYIner") + water),
+            ("mass", mass, source("PtfmMass")),
+            ("cm_depth", -centre[2], source("PtfmCMzt")),
+            ("cm_downwind", beside(centre[0]), source("PtfmCMxt")),
+            ("cm_left", beside(centre[1]), source("PtfmCMyt")),
+            ("inertia", list(np.diag(inertia)), source("PtfmRIner", "PtfmPIner", "PtfmYIner")),
         ],
-        "tower": [
-            Row("mass", tower, source("TwrFile") + f", TwrNodes elements{bearing}"),
-            Row("cm_height", tower_height, "the same"),
-            Row("inertia", [tower_inertia, tower_inertia, 0.0], "the same; none about its axis in ElastoDyn"),
-            Row("base_height", values["TowerBsHt"], source("TowerBsHt")),
-            Row("top_height", values["TowerHt"], source("TowerHt")),
-            Row("base_diameter", base_diameter, deck.aerodyn.file.source("TwrDiam")),
-            Row("top_diameter", top_diameter, deck.aerodyn.file.source("TwrDiam")),
-            Row("drag_coefficient", drag, deck.aerodyn.file.source("TwrCd") + ", of the table's load"),
-        ],
-    }  # fmt: skip
-    if values.bending is not None:
-        tables["tower.modes"] = _bending_rows(values.bending, distribution)
-    hydro = deck.hydrodyn
+    } | _tower_rows(deck, distribution)  # fmt: skip
+    source = hydro.file.source
     if hydro.potential is not None:
         tables["potential_flow"] = [
-            Row("coefficients", coefficients, f"WAMIT's files {hydro.file.source('PotFile')}"),
-            Row("displaced_volume", hydro.potential.volume, hydro.file.source("PtfmVol0")),
-            Row("centre_of_buoyancy", list(hydro.potential.centre_of_buoyancy),
-                hydro.file.source("PtfmCOBxt", "PtfmCOByt")),
-        ]  # fmt: skip
-        if (depth := draft(deck)) is not None:
-            tables["potential_flow"].append(Row("draft", depth, hydro.file.source("Jointzi")))
+            ("coefficients", coefficients, f"WAMIT's files {source('PotFile')}"),
+            ("displaced_volume", hydro.potential.volume, source("PtfmVol0")),
+            ("centre_of_buoyancy", hydro.potential.centre_of_buoyancy, source("PtfmCOBxt", "PtfmCOByt")),
+            ("draft", draft(deck), source("Jointzi")),
+        ]
     added = [
-        Row(key, value, comment)
-        for key, value, comment in (
-            ("preload", hydro.preload, hydro.file.source("AddF0")),
-            ("stiffness", *additional_stiffness(deck)),
-            ("linear_damping", hydro.linear_damping, hydro.file.source("AddBLin")),
-            ("quadratic_damping", hydro.quadratic_damping, hydro.file.source("AddBQuad")),
-        )
-        if np.any(value)
+        ("preload", hydro.added["AddF0"], source("AddF0")),
+        ("stiffness", *additional_stiffness(deck)),
+        ("linear_damping", hydro.added["AddBLin"], source("AddBLin")),
+        ("quadratic_damping", hydro.added["AddBQuad"], source("AddBQuad")),
     ]
-    if added:
-        tables["additional"] = added
-    tables["members"] = [_member_rows(member) for member in hydro.members if _counts(member)]
+    if any(np.any(row[1]) for row in added):
+        tables["additional"] = [row for row in added if np.any(row[1])]
+    tables["members"] = [
+        _member_rows(member) for member in hydro.members
+        # one in the potential-flow body has drag alone
+        if not member.potential_flow or any(member.drag) or any(any(end[:2]) for end in member.axial)
+    ]  # fmt: skip
     tables["lines"] = [
         [
-            Row("anchor", list(line.anchor)),
-            Row("fairlead", list(line.fairlead)),
-            Row("length", line.length),
-            Row("wet_weight", line.wet_weight, f"of {line.kind}: mass less displaced water, times gravity"),
-            Row("EA", line.EA),
-            *([Row("seabed_friction", line.seabed_friction)] if line.seabed_friction else []),
+            ("anchor", line.anchor),
+            ("fairlead", line.fairlead),
+            ("length", line.length),
+            ("wet_weight", line.wet_weight, f"of {line.kind}: mass less displaced water, times gravity"),
+            ("EA", line.EA),
+            ("seabed_friction", line.seabed_friction or None),
         ]
         for line in deck.lines
     ]
-    if options:
-        tables["options"] = [Row(key, value) for key, value in options.items()]
     return tables
 
 
-def _bending_rows(modes, distribution):
-    """Rows of [tower.modes] of a descriptions.tower_modes.TowerBending."""
-    rows = [
-        Row(
-            "distribution",
-            distribution,
-            "tower: TMassDen, TwFAStif, TwSSStif, with AdjTwMa, AdjFASt, AdjSSSt",
-        ),
-        Row("fore_aft", modes.fore_aft, "tower: TwFAM1Sh, TwFAM2Sh, of the powers 2 to 6"),
-        Row("side_side", modes.side_side, "tower: TwSSM1Sh, TwSSM2Sh"),
-        Row("fore_aft_damping", modes.fore_aft_damping, "tower: TwrFADmp"),
-        Row("side_side_damping", modes.side_side_damping, "tower: TwrSSDmp"),
-    ]
-    for name, key in (("fore_aft_tuner", "FAStTunr"), ("side_side_tuner", "SSStTunr")):
-        if any(factor != 1.0 for factor in getattr(modes, name)):
-            rows.append(Row(name, getattr(modes, name), f"tower: {key}"))
-    if modes.top_mass:
-        rows.append(Row("top_mass", modes.top_mass, "ElastoDyn: YawBrMass, in the mass above too"))
-    return [*rows, Row("elements", modes.elements, "ElastoDyn: TwrNodes")]
+def _tower_rows(deck, distribution):
+    """The tables [tower] and, where the deck has shapes of its modes, [tower.modes]."""
+    values, modes = deck.elastodyn, deck.elastodyn.bending
+    source, aero = values.file.source, deck.aerodyn.file.source
+    base, extra, length = values["TowerBsHt"], values["YawBrMass"], values["TowerHt"] - values["TowerBsHt"]
+    # the yaw bearing is a point at the top
+    mass, first, second = (moment + extra * length**power for power, moment in enumerate(values.tower))
+    centre = first / mass if mass else 0.5 * length
+    across = max(second - mass * centre**2, 0.0)
+    base_diameter, top_diameter, drag = tower_drag(deck)
+    tables = {"tower": [
+        ("mass", mass, source("TwrFile") + ", TwrNodes elements" + ", YawBrMass at its top" * bool(extra)),
+        ("cm_height", base + centre, "the same"),
+        ("inertia", [across, across, 0.0], "the same; none about its axis in ElastoDyn"),
+        ("base_height", base, source("TowerBsHt")),
+        ("top_height", values["TowerHt"], source("TowerHt")),
+        ("base_diameter", base_diameter, aero("TwrDiam")),
+        ("top_diameter", top_diameter, aero("TwrDiam")),
+        ("drag_coefficient", drag, aero("TwrCd") + ", of the table's load"),
+    ]}  # fmt: skip
+    if modes is None:
+        return tables
+
+    def factors(tuner):
+        return tuner if set(tuner) != {1.0} else None
+
+    return tables | {"tower.modes": [
+        ("distribution", distribution, "tower: TMassDen, TwFAStif, TwSSStif, with AdjTwMa, AdjFASt, AdjSSSt"),
+        ("fore_aft", modes.fore_aft, "tower: TwFAM1Sh, TwFAM2Sh, of the powers 2 to 6"),
+        ("side_side", modes.side_side, "tower: TwSSM1Sh, TwSSM2Sh"),
+        ("fore_aft_damping", modes.fore_aft_damping, "tower: TwrFADmp"),
+        ("side_side_damping", modes.side_side_damping, "tower: TwrSSDmp"),
+        ("fore_aft_tuner", factors(modes.fore_aft_tuner), "tower: FAStTunr"),
+        ("side_side_tuner", factors(modes.side_side_tuner), "tower: SSStTunr"),
+        ("top_mass", modes.top_mass or None, "ElastoDyn: YawBrMass, in the mass above too"),
+        ("elements", modes.elements, "ElastoDyn: TwrNodes"),
+    ]}  # fmt: skip
 
 
 def draft(deck):
@@ -270,134 +238,110 @@ def draft(deck):
     return max(depths) if depths and max(depths) > 0.0 else None
 
 
-def _counts(member):
-    """Whether a member has any load: one in the potential-flow body has drag alone."""
-    if not member.potential_flow:
-        return True
-    return any(member.drag) or any(any(end[:2]) for end in member.axial)
-
-
 def _member_rows(member):
     """Rows of a table of members."""
-    rows = [
-        Row("start", list(member.start), f"member {member.number}"),
-        Row("end", list(member.end)),
-        Row("diameter", list(member.diameter)),
-        Row("drag_coefficient", list(member.drag)),
-    ]
-    if member.potential_flow:
-        rows.append(Row("potential_flow", True))
-    if not member.potential_flow:
-        rows.append(Row("added_mass_coefficient", list(member.added_mass)))
-        rows.append(Row("pressure_coefficient", list(member.pressure)))
-    axial = list(zip(*member.axial, strict=True))
-    for key, value, usual in (
-        ("axial_drag_coefficient", axial[0], (0.0, 0.0)),
-        ("axial_added_mass_coefficient", axial[1], (0.0, 0.0)),
-        ("axial_pressure_coefficient", axial[2], None),
-    ):
-        if tuple(value) != usual and not (usual is None and member.potential_flow):
-            comment = (
-                "half of AxCd: HydroDyn's is on rho A |v| v / 4" if key == "axial_drag_coefficient" else ""
-            )
-            rows.append(Row(key, list(value), comment))
-    return rows
-
-
-def _second_order(control, why):
-    """Table of the pitch drive of second order, where the deck's controller has one."""
-    if control.second_order is None:
-        return {}
-    frequency, damping = control.second_order
-    return {
-        "pitch_drive.second_order": [
-            Row(
-                "natural_frequency", frequency, why["natural_frequency"] + "; used where a scene asks for it"
-            ),
-            Row("damping", damping, why["damping"]),
-        ]
-    }
+    inside = member.potential_flow
+    drag, mass, pressure = zip(*member.axial, strict=True)
+    return [
+        ("start", member.start, f"member {member.number}"),
+        ("end", member.end),
+        ("diameter", member.diameter),
+        ("drag_coefficient", member.drag),
+        ("potential_flow", inside or None),
+        ("added_mass_coefficient", None if inside else member.added_mass),
+        ("pressure_coefficient", None if inside else member.pressure),
+        ("axial_drag_coefficient", drag if any(drag) else None,
+         "half of AxCd: HydroDyn's is on rho A |v| v / 4"),
+        ("axial_added_mass_coefficient", mass if any(mass) else None),
+        ("axial_pressure_coefficient", None if inside else pressure),
+    ]  # fmt: skip
 
 
 def turbine_rows(deck, name):
     """{table: rows} of turbine.toml."""
     values, control = deck.elastodyn, deck.control
-    source, why = values.file.source, control.sources
+    source, figures = values.file.source, control.figures
     rotor = rotor_mass(deck)
     overhang, height = hub_place(deck)
-    rated = control.rated_speed / values["GBRatio"]
-    nacelle = values["NacYIner"] - values["NacMass"] * (values["NacCMxn"] ** 2 + values["NacCMyn"] ** 2)
-    if nacelle < 0.0:
-        raise values.file.wrong(
-            "NacYIner",
-            values["NacYIner"],
-            f">= {values['NacYIner'] - nacelle:g}, NacMass at NacCMxn and NacCMyn alone",
-        )
-    law = {"rated_torque": control.rated_torque, "rated_power": control.rated_power,
-           "rated_speed": control.rated_speed} | control.law  # fmt: skip
-    why = {"rated_power": "rated_torque times rated_speed, mechanical"} | why
-    law_rows = [Row(key, value, why.get(key, "")) for key, value in law.items()]
-    blades = source("BldFile(1)", "HubMass", "HubIner")
+    rated, why = control["rated_speed"] / values["GBRatio"], figures["rated_speed"][1]
+    apart = values["NacMass"] * (values["NacCMxn"] ** 2 + values["NacCMyn"] ** 2)
+    if values["NacYIner"] < apart:
+        allowed = f">= {apart:g}, NacMass at NacCMxn and NacCMyn alone"
+        raise values.file.wrong("NacYIner", values["NacYIner"], allowed)
+    blades, lumps = source("BldFile(1)", "HubMass", "HubIner"), source("BldFile(1)") + ", BldNodes elements"
     span = values.blade.radius - values["HubRad"]
     own = [float(values.blade.mass @ span**power) for power in range(3)]
+
+    def of_control(key, name=None, unit=1.0):
+        value, comment = figures[name or key]
+        return key, value / unit, comment
+
     tables = {
         "": [
-            Row("name", name),
-            Row("source", f"imported from {deck.name}"),
-            *([Row("discon", DISCON, "of the controller rosco")] if control.discon else []),
-            Row("rated_rotor_speed_rpm", rated / RPM, f"{why.get('rated_speed', '')} over GBRatio"),
-            Row("rated_wind_speed", control.rated_wind_speed or 11.4, why.get("rated_wind_speed", "a guess")),
-            Row("cut_in_wind_speed", control.cut_in_wind_speed, why.get("cut_in_wind_speed", "usual value")),
-            Row("cut_out_wind_speed", control.cut_out_wind_speed, why.get("cut_out_wind_speed", "usual")),
-            Row("overspeed_rpm", OVERSPEED * rated / RPM,
-                f"{OVERSPEED} times rated: failure threshold of the environment, a choice of this project"),
+            ("name", name),
+            ("source", f"imported from {deck.name}"),
+            ("discon", DISCON if control.discon else None, "of the controller rosco"),
+            ("rated_rotor_speed_rpm", rated / RPM, f"{why} over GBRatio"),
+            *map(of_control, ("rated_wind_speed", "cut_in_wind_speed", "cut_out_wind_speed")),
+            ("overspeed_rpm", OVERSPEED * rated / RPM,
+             f"{OVERSPEED} times rated: failure threshold of the environment, a choice of this project"),
         ],
         "rotor": [
-            Row("blades", values.blades, source("NumBl")),
-            Row("mass", rotor.mass, blades + ", BldNodes elements"),
-            Row("overhang", overhang, source("OverHang", "ShftTilt")),
-            Row("hub_height", height, source("TowerHt", "Twr2Shft", "OverHang", "ShftTilt")),
-            Row("hub_radius", values["HubRad"], source("HubRad")),
-            Row("tip_radius", values["TipRad"], source("TipRad")),
-            Row("inertia", rotor.inertia, blades + ", PreCone"),
-            Row("inertia_diameter", rotor.inertia_diameter, blades + ", PreCone; of the hub none"),
-            Row("shaft_tilt_deg", -math.degrees(values["ShftTilt"]) + 0.0, "minus " + source("ShftTilt")),
-            Row("cone_deg", -math.degrees(values["PreCone"]) + 0.0, "minus " + source("PreCone(1)")),
-            Row("cm_offset", rotor.cm_offset, blades + ", HubCM, PreCone"),
-            Row("blade_mass", own[0], source("BldFile(1)") + ", BldNodes elements"),
-            Row("blade_first_moment", own[1], "the same, about the root"),
-            Row("blade_second_moment", own[2], "the same, about the root"),
+            ("blades", values.blades, source("NumBl")),
+            ("mass", rotor.mass, blades + ", BldNodes elements"),
+            ("overhang", overhang, source("OverHang", "ShftTilt")),
+            ("hub_height", height, source("TowerHt", "Twr2Shft", "OverHang", "ShftTilt")),
+            ("hub_radius", values["HubRad"], source("HubRad")),
+            ("tip_radius", values["TipRad"], source("TipRad")),
+            ("inertia", rotor.inertia, blades + ", PreCone"),
+            ("inertia_diameter", rotor.inertia_diameter, blades + ", PreCone; of the hub none"),
+            ("shaft_tilt_deg", -math.degrees(values["ShftTilt"]) + 0.0, "minus " + source("ShftTilt")),
+            ("cone_deg", -math.degrees(values["PreCone"]) + 0.0, "minus " + source("PreCone(1)")),
+            ("cm_offset", rotor.cm_offset, blades + ", HubCM, PreCone"),
+            ("blade_mass", own[0], lumps),
+            ("blade_first_moment", own[1], "the same, about the root"),
+            ("blade_second_moment", own[2], "the same, about the root"),
         ],
         "nacelle": [
-            Row("mass", values["NacMass"], source("NacMass")),
-            Row("cm_downwind", values["NacCMxn"], source("NacCMxn")),
-            *([Row("cm_left", values["NacCMyn"], source("NacCMyn"))] if values["NacCMyn"] else []),
-            Row("cm_height", values["TowerHt"] + values["NacCMzn"], source("TowerHt", "NacCMzn")),
-            Row("inertia", [0.0, 0.0, nacelle], source("NacYIner") + " less NacMass at NacCMxn; yaw alone"),
+            ("mass", values["NacMass"], source("NacMass")),
+            ("cm_downwind", values["NacCMxn"], source("NacCMxn")),
+            ("cm_left", values["NacCMyn"] or None, source("NacCMyn")),
+            ("cm_height", values["TowerHt"] + values["NacCMzn"], source("TowerHt", "NacCMzn")),
+            ("inertia", [0.0, 0.0, values["NacYIner"] - apart],
+             source("NacYIner") + " less NacMass at NacCMxn; yaw alone"),
         ],
         "drivetrain": [
-            Row("gear_ratio", values["GBRatio"], source("GBRatio")),
-            Row("generator_inertia", values["GenIner"], source("GenIner") + ", about the high-speed shaft"),
-            Row("mesh_loss", 1.0 - values["GBoxEff"] / 100.0, "1 less " + source("GBoxEff")),
-            Row("bearing_loss", 0.0, "none in ElastoDyn"),
-            Row("generator_efficiency", control.generator_efficiency,
-                why.get("generator_efficiency", "not in the deck")),
+            ("gear_ratio", values["GBRatio"], source("GBRatio")),
+            ("generator_inertia", values["GenIner"], source("GenIner") + ", about the high-speed shaft"),
+            ("mesh_loss", 1.0 - values["GBoxEff"] / 100.0, "1 less " + source("GBoxEff")),
+            ("bearing_loss", 0.0, "none in ElastoDyn"),
+            of_control("generator_efficiency"),
         ],
         "pitch_drive": [
-            Row("time_constant", control.time_constant,
-                why.get("time_constant", "followed at once: no actuator in the deck")),
-            Row("rate_limit_deg_per_s", math.degrees(control.pitch_rate), why.get("pitch_rate", "")),
-            Row("minimum_deg", math.degrees(control.minimum_pitch), why.get("minimum_pitch", "usual value")),
-            Row("maximum_deg", math.degrees(control.maximum_pitch), why.get("maximum_pitch", "usual value")),
+            of_control("time_constant"),
+            of_control("rate_limit_deg_per_s", "pitch_rate", DEGREE),
+            of_control("minimum_deg", "minimum_pitch", DEGREE),
+            of_control("maximum_deg", "maximum_pitch", DEGREE),
         ],
-        **_second_order(control, why),
-        "torque_law": law_rows,
     }  # fmt: skip
+    if "damping" in figures:
+        frequency, said = figures["natural_frequency"]
+        tables["pitch_drive.second_order"] = [
+            ("natural_frequency", frequency, said + "; used where a scene asks for it"),
+            of_control("damping"),
+        ]
+    power = control["rated_torque"] * control["rated_speed"]
+    tables["torque_law"] = [
+        of_control("rated_torque"),
+        ("rated_power", power, "rated_torque times rated_speed, mechanical"),
+        of_control("rated_speed"),
+        *((key, *figure) for key, figure in control.law.items()),
+    ]
     for gain_set, (proportional, integral, half) in control.gains.items():
         tables[f"gains.{gain_set}"] = [
-            Row("KP", proportional, why.get("gains", "")),
-            Row("KI", integral, why.get("gains", "")),
-            Row("gain_schedule_pitch", half, "rad, at which the gains are half"),
+            ("KP", proportional, LEGACY_SOURCE),
+            ("KI", integral, LEGACY_SOURCE),
+            ("gain_schedule_pitch", half, "rad, at which the gains are half"),
         ]
-    tables["blade"] = [Row("stations", "blade.csv"), Row("polars", "polars")]
+    tables["blade"] = [("stations", "blade.csv"), ("polars", "polars")]
     return tables

@@ -1,22 +1,19 @@
 """HydroDyn's file: potential flow, additional matrices, members with coefficients, and ballast water."""
 
 import math
-from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.files.openfast_deck.keys import differences
-from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
+from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of
 
 MOST = 10_000  # joints, members
-ENDS = ("cd", "ca", "cp", "axcd")  # coefficients along a member
-SECOND_ORDER = {"MnDrift": "mean drift", "NewmanApp": "Newman's approximation",
-                "DiffQTF": "difference-frequency forces", "SumQTF": "sum-frequency forces"}  # fmt: skip
+SECOND_ORDER = ("MnDrift", "NewmanApp", "DiffQTF", "SumQTF")
 
 
-@dataclass(frozen=True)
-class Cylinder:
+class Cylinder(NamedTuple):
     """A member of HydroDyn; a pair of values is of its two ends."""
 
     number: int
@@ -31,8 +28,7 @@ class Cylinder:
     potential_flow: bool
 
 
-@dataclass(frozen=True)
-class Fill:
+class Fill(NamedTuple):
     """Water (or what has the density) in a member up to a height: a rigid body."""
 
     member: int
@@ -41,8 +37,7 @@ class Fill:
     inertia: np.ndarray  # (3, 3) about its centre, kg m2
 
 
-@dataclass(frozen=True)
-class PotentialFiles:
+class PotentialFiles(NamedTuple):
     """Where the coefficients of WAMIT are, and what HydroDyn says of the body."""
 
     root: object  # Path without ending
@@ -51,183 +46,143 @@ class PotentialFiles:
     centre_of_buoyancy: tuple
 
 
-@dataclass(frozen=True)
-class HydroDyn:
+class HydroDyn(NamedTuple):
     """What the conversion takes of HydroDyn's file."""
 
     file: PartFile
     potential: PotentialFiles | None
-    preload: tuple
-    stiffness: tuple  # 6 rows of 6
-    linear_damping: tuple
-    quadratic_damping: tuple
-    members: tuple
-    fills: tuple
+    added: dict  # AddF0: (6,), AddCLin, AddBLin, AddBQuad: 6 rows of 6
+    members: list
+    fills: list
     second_order: dict  # key of HydroDyn: the file that it takes, where not 0
     memory: int  # RdtnMod
-    notes: tuple
-    sources: dict
+    notes: list  # (what the deck has, what the plant has)
 
 
-def read_hydrodyn(path, site, folders=()):
-    """HydroDyn of its file. site: (water density, depth or None, still water above the mean level).
-
-    Raises: InputError, also for what cannot be represented.
-    """
+def read_hydrodyn(path, density, folders=()):
+    """HydroDyn of its file; density: of the water. Raises: InputError, also for what cannot be had here."""
     file = PartFile(path, "HydroDyn")
     notes = []
-    mode = file.one_of("PotMod", (0, 1), why="2, fluid impulse theory, cannot be represented")
-    potential = _potential(file, folders) if mode == 1 else None
+    inside = file.one_of("PotMod", (0, 1), why="2, fluid impulse theory, cannot be represented") == 1
+    potential = _potential(file, folders) if inside else None
     growth = file.table("NMGDepths", high=MOST)
     if any(cells.get("mgthck", 0.0) != 0.0 for _, cells in growth):
-        raise file.refusal(
-            "marine growth cannot be represented: NMGDepths must be 0", growth[0][0], "NMGDepths"
-        )
-    for key, what in (
-        ("NPropSetsRec", "rectangular cross-sections"),
-        ("NCoefMembersRec", "rectangular members"),
-    ):
-        if file.whole(key, default=0) != 0:
-            raise file.wrong(key, file.whole(key), f"0: {what} cannot be represented")
-    added = {"AddF0": [file.vector("AddF0")]}
+        what = "marine growth cannot be represented: NMGDepths must be 0"
+        raise file.refusal(what, growth[0][0], "NMGDepths")
+    for key in ("NPropSetsRec", "NCoefMembersRec"):
+        file.one_of(key, (0,), default=0, why="rectangular members cannot be represented")
+    added = {"AddF0": file.vector("AddF0")}
     added |= {key: file.matrix(key) for key in ("AddCLin", "AddBLin", "AddBQuad")}
-    unused = [key for key, values in added.items() if np.any(values)] if mode == 0 else []
-    for key in unused:
-        notes.append((f"{key}, which HydroDyn does not use with PotMod 0", "left out"))
-        added[key] = np.zeros_like(added[key]).tolist()
-    second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
-    rows = _members(file, site, notes, mode == 1)
-    if mode == 0 and not rows:
+    for key in added if not inside else ():
+        if np.any(added[key]):
+            notes.append((f"{key}, which HydroDyn does not use with PotMod 0", "left out"))
+            added[key] = np.zeros_like(added[key])
+    members = _members(file, notes, inside)
+    if not inside and not members:
         raise file.wrong("PotMod", 0, "1, or there must be members: nothing makes the platform float")
-    return HydroDyn(
-        file=file,
-        potential=potential,
-        preload=tuple(added["AddF0"][0]),
-        stiffness=tuple(map(tuple, added["AddCLin"])),
-        linear_damping=tuple(map(tuple, added["AddBLin"])),
-        quadratic_damping=tuple(map(tuple, added["AddBQuad"])),
-        members=tuple(rows),
-        fills=tuple(_fills(file, rows, site)),
-        second_order={key: value for key, value in second.items() if value and mode == 1},
-        memory=file.whole("RdtnMod", default=1) if mode == 1 else 0,
-        notes=(*notes, *differences(file)),
-        sources={},
-    )
+    fills = _fills(file, members, density)
+    second = {key: file.whole(key, default=0) for key in SECOND_ORDER}
+    second = {key: value for key, value in second.items() if value and inside}
+    memory = file.whole("RdtnMod", default=1) if inside else 0
+    return HydroDyn(file, potential, added, members, fills, second, memory, [*notes, *differences(file)])
 
 
 def _potential(file, folders):
     """PotentialFiles of a file with PotMod 1."""
-    bodies = file.whole("NBody", default=1, low=1)
-    if bodies != 1:
-        raise file.wrong("NBody", bodies, "1: floaters of several bodies cannot be represented")
-    name = file.text("PotFile")
-    root = _wamit_root(name, (file.path.parent, *folders))
-    if root is None:
+    file.one_of("NBody", (1,), default=1, why="floaters of several bodies cannot be represented")
+    name, folders = file.text("PotFile"), (file.path.parent, *folders)
+    path = locate(name + ".1", folders) or locate(name + ".hst", folders)
+    if path is None:
         raise file.wrong("PotFile", name, "the root of WAMIT's files: no .1 or .hst is there")
-    volume = file.number("PtfmVol0", low=0.0, high=1e9, open_low=True)
-    centre = tuple(file.number(key, default=0.0, low=-1e3, high=1e3) for key in ("PtfmCOBxt", "PtfmCOByt"))
     return PotentialFiles(
-        root, file.number("WAMITULEN", default=1.0, low=0.0, high=1e4, open_low=True), volume, centre
+        root=path.with_suffix(""),
+        volume=file.positive("PtfmVol0", high=1e9),
+        centre_of_buoyancy=tuple(
+            file.number(key, default=0.0, low=-1e3, high=1e3) for key in ("PtfmCOBxt", "PtfmCOByt")
+        ),
+        length_scale=file.positive("WAMITULEN", default=1.0, high=1e4),
     )
-
-
-def _wamit_root(name, folders):
-    """Path without ending of WAMIT's files, letters of either case; or None."""
-    for ending in (".1", ".hst"):
-        path = locate(name + ending, folders)
-        if path is not None:
-            return path.with_name(path.name[: -len(ending)])
-    return None
 
 
 # --------------------------------------------------------------------------- members
 
 
-def _members(file, site, notes, potential):
+class _Member(NamedTuple):
+    """A member as its row has it."""
+
+    line: int
+    number: int
+    ends: tuple  # (place, number of the axial coefficients) of each
+    sections: tuple  # (diameter, thickness) of each end
+    model: int  # MCoefMod
+    inside: bool  # of the potential-flow body
+
+
+def _members(file, notes, potential):
     """List of Cylinder; potential: whether there is a body that members may be inside of (PropPot)."""
-    rows = file.table("NMembers", texts=("proppot",), high=MOST)
-    if not rows:
+    needs = ("MemberID", "MJointID1", "MJointID2", "MPropSetID1", "MPropSetID2", "MCoefMod")
+    table = file.table("NMembers", texts=("proppot",), needs=needs, high=MOST)
+    if not table:
         return []
-    density, _, level = site
-    joints = {}
-    for line, cells in file.table("NJoints", high=MOST):
-        _need(file, line, cells, ("jointid", "jointxi", "jointyi", "jointzi", "jointaxid"))
+    joints, sections, axial, members = {}, {}, {}, {}
+    needs = ("JointID", "Jointxi", "Jointyi", "Jointzi", "JointAxID")
+    for line, cells in file.table("NJoints", needs=needs, high=MOST):
         place = tuple(cells[f"joint{axis}i"] for axis in "xyz")
         if max(map(abs, place)) > 1e4:
             raise file.refusal(f"joint {cells['jointid']:g}: must be within 10 km of the body", line)
         joints[file.new(line, joints, cells["jointid"], "joint")] = (place, int(cells["jointaxid"]))
-    sections = {}
-    for line, cells in file.table("NPropSets", "NPropSetsCyl", high=MOST):
-        _need(file, line, cells, ("propsetid", "propd", "propthck"))
-        if not (0.0 < cells["propd"] <= 1e3 and 0.0 <= cells["propthck"] <= 0.5 * cells["propd"] + 1e-9):
+    needs = ("PropSetID", "PropD", "PropThck")
+    for line, cells in file.table("NPropSets", "NPropSetsCyl", needs=needs, high=MOST):
+        size, thickness = cells["propd"], cells["propthck"]
+        if not (0.0 < size <= 1e3 and 0.0 <= thickness <= 0.5 * size + 1e-9):
             raise file.refusal("PropD must be > 0 and PropThck from 0 to its half", line)
-        number = file.new(line, sections, cells["propsetid"], "property set")
-        sections[number] = (cells["propd"], cells["propthck"])
-    axial = {}
-    for line, cells in file.table("NAxCoef", high=MOST):
-        _need(file, line, cells, ("axcoefid", "axcd", "axca", "axcp"))
+        sections[file.new(line, sections, cells["propsetid"], "property set")] = (size, thickness)
+    for line, cells in file.table("NAxCoef", needs=("AxCoefID", "AxCd", "AxCa", "AxCp"), high=MOST):
         number = file.new(line, axial, cells["axcoefid"], "axial coefficient")
         axial[number] = tuple(cells[name] for name in ("axcd", "axca", "axcp"))
     coefficients = _Coefficients(file)
-    bare_members = []
-    for line, cells in rows:
-        _need(
-            file,
-            line,
-            cells,
-            ("memberid", "mjointid1", "mjointid2", "mpropsetid1", "mpropsetid2", "mcoefmod"),
-        )
-        number = file.new(line, [row[1] for row in bare_members], cells["memberid"], "member")
+
+    def looked_up(line, known, number, what):
+        if number != int(number) or int(number) not in known:
+            raise file.refusal(f"{what} {number:g} is not there", line)
+        return known[int(number)]
+
+    for line, cells in table:
+        number = file.new(line, members, cells["memberid"], "member")
         if cells.get("msecgeom", 1.0) not in (0.0, 1.0):
             raise file.refusal(f"member {number}: MSecGeom must be 1, a circular section", line)
-        ends = [_looked_up(file, line, joints, cells[f"mjointid{i}"], "joint") for i in (1, 2)]
-        props = [_looked_up(file, line, sections, cells[f"mpropsetid{i}"], "property set") for i in (1, 2)]
+        ends = tuple(looked_up(line, joints, cells[f"mjointid{i}"], "joint") for i in (1, 2))
+        props = tuple(looked_up(line, sections, cells[f"mpropsetid{i}"], "property set") for i in (1, 2))
         for _, coefficient in ends:
-            _looked_up(file, line, axial, coefficient, "axial coefficient")
+            looked_up(line, axial, coefficient, "axial coefficient")
         if math.dist(ends[0][0], ends[1][0]) < 1e-6:
             raise file.refusal(f"member {number}: its joints are at one place", line)
         text = cells.get("proppot", "False").lower()
         inside = potential and (text[:1] == "t" or text.startswith(".t") or text == "1")
-        model = int(cells["mcoefmod"])
+        member = _Member(line, number, ends, props, int(cells["mcoefmod"]), inside)
         if not inside:
-            coefficients.check_buoyancy(line, number, model, cells.get("mhstlmod", 1.0))
+            coefficients.check_buoyancy(member, cells.get("mhstlmod", 1.0))
         if props[0][0] != props[1][0]:
-            notes += coefficients.of_taper(number, model, inside)
-        bare_members.append((line, number, ends, props, model, inside))
-    faces = _faces(bare_members, axial, notes)
-    found = []
-    for line, number, ends, props, model, inside in bare_members:
-        starts = [0.0, *coefficients.breaks(model, ends[0][0][2] - level, ends[1][0][2] - level), 1.0]
-        low, high = (np.array(end[0]) for end in ends)
-        for a, b in zip(starts[:-1], starts[1:], strict=True):
-            values = [
-                coefficients.at(line, number, model, (1.0 - t) * low[2] + t * high[2] - level, t)
-                for t in (a, b)
-            ]
-            size = [tuple((1.0 - t) * props[0][i] + t * props[1][i] for t in (a, b)) for i in (0, 1)]
-            place = [tuple(float(x) for x in low + t * (high - low)) for t in (a, b)]
-            none = (0.0, 0.0, 0.0)
-            found.append(Cylinder(
-                number, place[0], place[1], size[0], size[1],
-                *(tuple(value[name] for value in values) for name in ("cd", "ca", "cp")),
-                (faces[number][0] if a == 0.0 else none, faces[number][1] if b == 1.0 else none), inside,
-            ))  # fmt: skip
-    if any(level != 0.0 for level in (site[2],)):
-        raise file.wrong("MSL2SWL", site[2], "0: still water at the mean sea level")
-    return found
+            notes += coefficients.of_taper(member)
+        members[number] = member
+    faces = _faces(members.values(), axial, notes)
+    return [part for member in members.values() for part in _parts(member, coefficients, faces)]
 
 
-def _need(file, line, cells, names):
-    for name in names:
-        if name not in cells:
-            raise file.refusal(f"the column {name} is missing", line - 1)
-
-
-def _looked_up(file, line, known, number, what):
-    """The entry of a number. Raises: InputError."""
-    if number != int(number) or int(number) not in known:
-        raise file.refusal(f"{what} {number:g} is not there", line)
-    return known[int(number)]
+def _parts(member, coefficients, faces):
+    """Cylinders of a member, between the depths where its coefficients bend; faces: see _faces."""
+    (low, _), (high, _) = member.ends
+    low, high = np.array(low), np.array(high)
+    starts = [0.0, *coefficients.breaks(member, low[2], high[2]), 1.0]
+    for a, b in zip(starts[:-1], starts[1:], strict=True):
+        values = [coefficients.at(member, (1.0 - t) * low[2] + t * high[2], t) for t in (a, b)]
+        places = [tuple(float(x) for x in low + t * (high - low)) for t in (a, b)]
+        pairs = zip(*member.sections, strict=True)
+        sizes = [tuple((1.0 - t) * first + t * last for t in (a, b)) for first, last in pairs]
+        none = (0.0, 0.0, 0.0)
+        first, last = faces[member.number]
+        axial = first if a == 0.0 else none, last if b == 1.0 else none
+        yield Cylinder(member.number, *places, *sizes, *zip(*values, strict=True), axial, member.inside)
 
 
 def _faces(members, axial, notes):
@@ -238,46 +193,34 @@ def _faces(members, axial, notes):
     the sum's part along its own axis. The drag coefficient of a joint multiplies rho A |v| v / 4 in HydroDyn,
     and rho A |v| v / 2 here.
     """
-    at = {}
-    for _, number, ends, props, _, inside in members:
-        along = np.subtract(ends[1][0], ends[0][0])
+    at = {}  # place of a joint: (member, end, diameter, direction outwards (3,)) of those that end there
+    for member in members:
+        along = np.subtract(member.ends[1][0], member.ends[0][0])
         along /= np.linalg.norm(along)
-        for end in (0, 1):
-            face = _Face(number, end, props[end][0], along if end else -along, ends[end][1], inside)
-            at.setdefault(tuple(np.round(ends[end][0], 6)), []).append(face)
-    result = {number: np.zeros((2, 3)) for _, number, *_ in members}
+        for end, outward in ((0, -along), (1, along)):
+            face = member, end, member.sections[end][0], outward
+            at.setdefault(tuple(np.round(member.ends[end][0], 6)), []).append(face)
+    result = {member.number: np.zeros((2, 3)) for member in members}
     for place, faces in at.items():
-        drag, mass, pressure = axial[faces[0].axial]
-        wet = [face for face in faces if not face.inside]
+        member, end, *_ = faces[0]
+        drag, mass, pressure = axial[member.ends[end][1]]
+        wet = [face for face in faces if not face[0].inside]
         for meeting, power, coefficients in (
             (faces, 2, (0.5 * drag, 0.0, 0.0)), (wet, 3, (0.0, mass, 0.0)), (wet, 2, (0.0, 0.0, pressure)),
         ):  # fmt: skip
             if not meeting or not any(coefficients):
                 continue
-            biggest = max(meeting, key=lambda face: face.diameter)
-            total = sum((face.diameter**power * face.outward for face in meeting), np.zeros(3))
-            total /= biggest.diameter**power
-            part = float(total @ biggest.outward)
-            aside = float(np.linalg.norm(total - part * biggest.outward))
+            member, end, largest, along = max(meeting, key=lambda face: face[2])
+            total = sum((diameter**power * outward for _, _, diameter, outward in meeting), np.zeros(3))
+            total /= largest**power
+            part = float(total @ along)
+            aside = float(np.linalg.norm(total - part * along))
             if aside > 1e-3 and (coefficients[0] or coefficients[1]):
-                notes.append((
-                    f"axial loads of the joint at {place} across member {biggest.member}",
-                    f"left out: {aside:.2g} of those along it",
-                ))  # fmt: skip
+                what = f"axial loads of the joint at {place} across member {member.number}"
+                notes.append((what, f"left out: {aside:.2g} of those along it"))
             if part > 1e-6:
-                result[biggest.member][biggest.end] += part * np.array(coefficients)
+                result[member.number][end] += part * np.array(coefficients)
     return {number: tuple(map(tuple, ends.tolist())) for number, ends in result.items()}
-
-
-class _Face(NamedTuple):
-    """End of a member at a joint."""
-
-    member: int
-    end: int  # 0 or 1
-    diameter: float
-    outward: np.ndarray  # (3,)
-    axial: int  # number of the joint's axial coefficients
-    inside: bool  # of the potential-flow body
 
 
 class _Coefficients:
@@ -285,128 +228,107 @@ class _Coefficients:
 
     def __init__(self, file):
         self.file = file
-        self.depth = sorted(
-            (cells for _, cells in file.table("NCoefDpth", "NCoefDpthCyl", high=MOST)),
-            key=lambda cells: cells.get("dpth", 0.0),
-        )
+        rows = file.table("NCoefDpth", "NCoefDpthCyl", needs=("Dpth",), high=MOST)
+        self.depth = sorted((cells for _, cells in rows), key=lambda cells: cells["dpth"])
         self.member = {}
-        for line, cells in file.table("NCoefMembers", "NCoefMembersCyl", high=MOST):
-            _need(file, line, cells, ("memberid",))
+        for line, cells in file.table("NCoefMembers", "NCoefMembersCyl", needs=("MemberID",), high=MOST):
             self.member[file.new(line, self.member, cells["memberid"], "coefficients of member")] = cells
-        self._simple = None
 
-    @property
+    @cached_property
     def simple(self):
         """{column: value} of the coefficients of all members alike."""
-        if self._simple is None:
-            self._simple = self.file.headed("SimplCd", 1)[0][1]
-        return self._simple
+        return self.file.headed("SimplCd", 1)[0][1]
 
-    def _listed(self, model, number, name):
-        """[(column, value)] of all that the table of a model has of a coefficient, for a member."""
-        if model == 1:
+    def _listed(self, member, name):
+        """[(column, value)] of all that the table of a member's model has for it of a coefficient."""
+        if member.model == 1:
             rows, columns = [self.simple], [f"simpl{name}"]
-        elif model == 2:
+        elif member.model == 2:
             rows, columns = self.depth, [f"dpth{name}"]
         else:
-            rows, columns = [self.member.get(number, {})], [f"member{name}{i}" for i in (1, 2)]
+            rows, columns = [self.member.get(member.number, {})], [f"member{name}{i}" for i in (1, 2)]
         return [(column, row[column]) for row in rows for column in columns if column in row]
 
-    def check_buoyancy(self, line, number, model, switch):
+    def check_buoyancy(self, member, switch):
         """Raises: InputError for a member whose buoyancy is not that of its volume (Cb, MHstLMod 0)."""
+        named = f"member {member.number}"
         if switch == 0.0:
-            raise self.file.refusal(
-                f"member {number}: MHstLMod = 0: must be 1 or 2: a member outside of the potential-flow body"
-                " has its buoyancy here",
-                line,
-            )
-        for column, value in self._listed(model, number, "cb"):
+            allowed = "must be 1 or 2: a member outside of the potential-flow body has its buoyancy here"
+            raise self.file.refusal(f"{named}: MHstLMod = 0: {allowed}", member.line)
+        for column, value in self._listed(member, "cb"):
             if value != 1.0:
-                raise self.file.refusal(f"member {number}: its {column} = {value:g}: must be 1", line)
+                raise self.file.refusal(f"{named}: its {column} = {value:g}: must be 1", member.line)
 
-    def of_taper(self, number, model, inside):
+    def of_taper(self, member):
         """[(what the deck has, what is here)] of the coefficients along a member that tapers."""
-        neutral = {"axcd": 0.0} if inside else {"axcd": 0.0, "axca": 0.0, "axcp": 1.0}
+        neutral = {"axcd": 0.0} if member.inside else {"axcd": 0.0, "axca": 0.0, "axcp": 1.0}
         for name, usual in neutral.items():
-            for column, value in self._listed(model, number, name):
-                if value != usual:
-                    yield f"loads along the taper of member {number} ({column} {value:g})", "left out"
-                    break
+            if other := [pair for pair in self._listed(member, name) if pair[1] != usual]:
+                column, value = other[0]
+                yield f"loads along the taper of member {member.number} ({column} {value:g})", "left out"
 
-    def breaks(self, model, z1, z2):
+    def breaks(self, member, z1, z2):
         """Fractions of a member's length where depth-dependent coefficients bend."""
-        if model != 2 or z1 == z2:
+        if member.model != 2 or z1 == z2:
             return []
-        at = sorted((-cells.get("dpth", 0.0) - z1) / (z2 - z1) for cells in self.depth)
+        at = sorted((-cells["dpth"] - z1) / (z2 - z1) for cells in self.depth)
         inner = [t for t in at if 1e-6 < t < 1.0 - 1e-6]
         return [t for t, before in zip(inner, [0.0, *inner], strict=False) if t - before > 1e-6]
 
-    def at(self, line, number, model, z, t):
-        """{cd, ca, cp} at height z and fraction t of the member's length."""
-        if model == 1:
-            values = {name: self.simple.get(f"simpl{name}") for name in ("cd", "ca", "cp")}
-        elif model == 2:
-            values = {name: self._of_depth(f"dpth{name}", -z) for name in ("cd", "ca", "cp")}
-        elif model == 3:
-            if number not in self.member:
-                raise self.file.refusal(f"member {number}: has no row of NCoefMembers", line)
-            own = self.member[number]
-            values = {}
-            for name in ("cd", "ca", "cp"):
-                ends = [own.get(f"member{name}{i}") for i in (1, 2)]
-                values[name] = None if None in ends else (1.0 - t) * ends[0] + t * ends[1]
-        else:
-            raise self.file.refusal(f"member {number}: MCoefMod = {model}: must be 1, 2 or 3", line)
-        for name, value in values.items():
+    def at(self, member, z, t):
+        """[cd, ca, cp] at height z and fraction t of a member's length."""
+        named = f"member {member.number}"
+        if member.model not in (1, 2, 3):
+            raise self.file.refusal(f"{named}: MCoefMod = {member.model}: must be 1, 2 or 3", member.line)
+        if member.model == 3 and member.number not in self.member:
+            raise self.file.refusal(f"{named}: has no row of NCoefMembers", member.line)
+        places = {1: [0.0], 2: [cells["dpth"] for cells in self.depth], 3: [0.0, 1.0]}[member.model]
+        found = []
+        for name in ("cd", "ca", "cp"):
+            values = [value for _, value in self._listed(member, name)]
+            whole = 0 < len(values) == len(places)
+            value = float(np.interp(-z if member.model == 2 else t, places, values)) if whole else None
             if value is None or not 0.0 <= value <= 1e4:
-                raise self.file.refusal(
-                    f"member {number}: its coefficient {name} = {value}: must be >= 0", line
-                )
-        return values
-
-    def _of_depth(self, name, depth):
-        if not self.depth or name not in self.depth[0]:
-            return None
-        return float(np.interp(depth, [c["dpth"] for c in self.depth], [c[name] for c in self.depth]))
+                what = f"{named}: its coefficient {name} = {value}: must be >= 0"
+                raise self.file.refusal(what, member.line)
+            found.append(value)
+        return found
 
 
 # --------------------------------------------------------------------------- ballast water
 
 
-def _fills(file, members, site):
-    """List of Fill: of each member of each group."""
+def _fills(file, members, density):
+    """List of Fill: of each member of each group; density: of the water."""
     found = []
     count = file.whole("NFillGroups", default=0, low=0, high=MOST)
     if not count:
         return found
-    line = file.find("NFillGroups")[0] + 1
-    rows = []
-    while line < len(file.lines) and len(rows) < count:
-        words = words_of(file.lines[line][:2000])
+    head, rows = file.find("NFillGroups")[0], []
+    for line in range(head + 1, len(file.lines)):
+        words = file.words(line)
+        if len(rows) == count or (words and words[0].startswith("---")):
+            break
         if words and number_of(words[0]) is not None:
             rows.append((line, words))
-        elif words and words[0].startswith("---"):
-            break
-        line += 1
     if len(rows) < count:
-        raise file.refusal(f"NFillGroups = {count}: {len(rows)} rows are there", file.find("NFillGroups")[0])
+        raise file.refusal(f"NFillGroups = {count}: {len(rows)} rows are there", head)
     for line, words in rows:
-        head = number_of(words[0])
-        some = int(head) if head == int(head) and 0 < head <= MOST else 0
-        numbers = [number_of(word) for word in words[1 : some + 2]]
-        if not some or len(numbers) < some + 1 or None in numbers:
+        size = number_of(words[0])
+        size = int(size) if size == int(size) and 0 < size <= MOST else 0
+        *numbers, level = [number_of(word) for word in words[1 : size + 2]] or [None]
+        if not size or len(numbers) < size or None in (*numbers, level):
             raise file.refusal("must be FillNumM, as many members, FillFSLoc, FillDens", line, "FillMList")
-        word = bare(words[some + 2]) if len(words) > some + 2 else "default"
-        density = site[0] if word.lower() == "default" else number_of(word)
-        if density is None or not 0.0 <= density <= 1e5:
+        word = bare(words[size + 2]) if len(words) > size + 2 else "default"
+        filled = density if word.lower() == "default" else number_of(word)
+        if filled is None or not 0.0 <= filled <= 1e5:
             raise file.refusal(f"FillDens = {word[:20]}: must be a density >= 0 or DEFAULT", line)
-        for number in numbers[:-1]:
+        for number in numbers:
             parts = [member for member in members if member.number == number]
             if not parts:
                 raise file.refusal(f"FillMList: member {number:g} is not there", line)
-            fills = [_fill(part, numbers[-1], density, not is_old(file)) for part in parts]
-            found += [fill for fill in fills if fill is not None]
-    return found
+            found += [_fill(part, level, filled, not is_old(file)) for part in parts]
+    return [fill for fill in found if fill is not None]
 
 
 def is_old(file):

@@ -24,17 +24,9 @@ DISTRIBUTION = "tower.csv"
 
 
 def import_deck(
-    fst,
-    folder,
-    *,
-    parts=None,
-    search=(),
-    discon=None,
-    excitation=None,
-    name=None,
-    replace_files=False,
+    fst, folder, *, parts=None, search=(), discon=None, excitation=None, name=None, replace_files=False,
     head=(),
-):
+):  # fmt: skip
     """Report of a deck written as platform.toml, turbine/, hydro.npz, tower.csv and report.md into a folder.
 
     fst            the .fst file, or None with parts
@@ -54,21 +46,19 @@ def import_deck(
     deck = read_deck(fst, parts, search, discon)
     body = _coefficients(deck, excitation)
     report = make_report(deck, name, body)
-    texts = _texts(deck, name, head)
-    there = [file for file in (*texts, COEFFICIENTS, "report.md") if (folder / file).exists()]
+    texts = {"report.md": markdown(report), **_texts(deck, name, head)}
+    there = [file for file in (COEFFICIENTS, *texts) if (folder / file).exists()]
     if there and not replace_files:
-        raise InputError(f"folder {str(folder)!r} has a {there[0]} already: give another, or --overwrite")
+        raise InputError(f"folder {str(folder)!r} has a {there[-1]} already: give another, or --overwrite")
     with tempfile.TemporaryDirectory(prefix="fowt-import-") as temporary:
-        trial = Path(temporary)
-        _write(trial, deck, texts, body, markdown(report))
+        _write(Path(temporary), texts, body)
         try:
-            read_turbine(read_platform(trial / "platform.toml").turbine)
+            read_turbine(read_platform(Path(temporary) / "platform.toml").turbine)
         except InputError as error:
-            problem = str(error).replace(f"{trial}/", "")
-            raise InputError(
-                f"deck {deck.name!r}: its figures cannot be used as they are: {problem}"
-            ) from None
-        _write(folder, deck, texts, body, markdown(report))
+            problem = str(error).replace(f"{temporary}/", "")
+            what = f"deck {deck.name!r}: its figures cannot be used as they are: {problem}"
+            raise InputError(what) from None
+        _write(folder, texts, body)
     return report
 
 
@@ -85,52 +75,45 @@ def _coefficients(deck, excitation):
 
 
 def _texts(deck, name, head):
-    """{path in the folder: text} of all text files but the report."""
-    files = [("OpenFAST", deck.fst), ("ElastoDyn", deck.elastodyn.file), ("AeroDyn", deck.aerodyn.file),
-             ("HydroDyn", deck.hydrodyn.file)]  # fmt: skip
-    named = [f"{kind} {file.path.name}" for kind, file in files if file is not None]
-    if deck.control.discon is not None:
-        named.append(f"DISCON.IN {deck.control.discon.path.name}")
+    """{path in the folder: text} of all text files but the report, the platform's last."""
+    control, aero, bending = deck.control, deck.aerodyn, deck.elastodyn.bending
+    files = {"OpenFAST": deck.fst, "ElastoDyn": deck.elastodyn.file, "AeroDyn": aero.file,
+             "HydroDyn": deck.hydrodyn.file, "DISCON.IN": control.discon}  # fmt: skip
+    named = ", ".join(f"{kind} {file.path.name}" for kind, file in files.items() if file is not None)
     title = [f"Imported from the OpenFAST deck {deck.name} by fowt import. {UNITS}",
              "Origin on the tower axis at still water; x downwind, z up, y to the left looking downwind.",
-             "Beside each figure: the file and the keys that it is from. Files: " + ", ".join(named) + ".",
+             f"Beside each figure: the file and the keys that it is from. Files: {named}.",
              *head]  # fmt: skip
-    columns, airfoils = stations(deck)
-    source = deck.aerodyn.blade_file.path.name
     texts = {
-        "platform.toml": toml_text(
-            platform_rows(deck, name, "turbine/turbine.toml", COEFFICIENTS, DISTRIBUTION), title
-        ),
-        "turbine/turbine.toml": toml_text(turbine_rows(deck, name), title),
-        "turbine/blade.csv": blade_text(columns, airfoils, [
-            f"Blade of {source}: its nodes, the end ones 0.05 m inside root and tip, where loads are 0.",
-            "radius from the rotor centre along the pitch axis, m; twist in degrees; prebend downwind, m.",
-            *head,
-        ]),
-    }  # fmt: skip
-    if (bending := deck.elastodyn.bending) is not None:
-        texts[DISTRIBUTION] = tower_text(bending, [
-            f"Tower of {deck.elastodyn.file.text('TwrFile')}: mass density in kg/m, stiffness (EI) in N m2.",
-            *head,
-        ])  # fmt: skip
-    control = deck.control
-    if control.discon is not None:
-        texts[f"turbine/{DISCON}"] = discon_text(control.discon, control.performance)
+        f"turbine/polars/{airfoil}.csv": polar_text(
+            polar, [f"{airfoil} of {aero.file.path.name}; alpha in degrees.", *head]
+        )
+        for airfoil, polar in aero.polars.items()
+    }
     if control.performance is not None:
         texts[f"turbine/{PERFORMANCE}"] = control.performance.text
-    for airfoil, polar in deck.aerodyn.polars.items():
-        texts[f"turbine/polars/{airfoil}.csv"] = polar_text(
-            polar, [f"{airfoil} of {deck.aerodyn.file.path.name}; alpha in degrees.", *head]
-        )
-    return texts
+    if control.discon is not None:
+        texts[f"turbine/{DISCON}"] = discon_text(control.discon, control.performance)
+    if bending is not None:
+        file = deck.elastodyn.file.text("TwrFile")
+        said = f"Tower of {file}: mass density in kg/m, stiffness (EI) in N m2."
+        texts[DISTRIBUTION] = tower_text(bending, [said, *head])
+    blade = aero.blade_file.path.name
+    texts["turbine/blade.csv"] = blade_text(*stations(deck), [
+        f"Blade of {blade}: its nodes, the end ones 0.05 m inside root and tip, where loads are 0.",
+        "radius from the rotor centre along the pitch axis, m; twist in degrees; prebend downwind, m.", *head,
+    ])  # fmt: skip
+    texts["turbine/turbine.toml"] = toml_text(turbine_rows(deck, name), title)
+    rows = platform_rows(deck, name, "turbine/turbine.toml", COEFFICIENTS, DISTRIBUTION)
+    return texts | {"platform.toml": toml_text(rows, title)}
 
 
-def _write(folder, deck, texts, body, report):
+def _write(folder, texts, body):
     """All files of an import, each whole or not at all; the platform's last, which makes them one."""
     (folder / "turbine" / "polars").mkdir(parents=True, exist_ok=True)
     if body is not None:
         with replacing(folder / COEFFICIENTS) as path, path.open("wb") as file:
             np.savez_compressed(file, **coefficient_arrays(body))
-    for name, text in {"report.md": report, **dict(reversed(texts.items()))}.items():
+    for name, text in texts.items():
         with replacing(folder / name) as path:
             path.write_text(text, encoding="utf-8")

@@ -32,39 +32,21 @@ class Otherwise(NamedTuple):
     when: Callable | None = None
 
 
-class Keys(NamedTuple):
-    """The keys of one kind of file, all as same_key has them; "#" stands for a number at the end."""
-
-    read: frozenset
-    ignored: dict  # {reason: keys}
-    neutral: dict  # {key: Otherwise}
-
-    def known(self, key):
-        """The form in which a key is listed, or None."""
-        listed = self.read.union(self.neutral, *self.ignored.values())
-        return next((form for form in (key, re.sub(r"\d+$", "#", key)) if form in listed), None)
-
-
 def _names(text):
-    return frozenset(same_key(word) for word in text.split())
+    return map(same_key, text.split())
 
 
 def _keys(read, ignored, **neutral):
-    return Keys(
-        _names(read),
-        {reason: _names(text) for reason, text in ignored.items()},
-        {same_key(key): value for key, value in neutral.items()},
-    )
+    """{key as same_key has it, "#" for a number at its end: None where it is read, a reason or Otherwise}."""
+    table = dict.fromkeys(_names(read))
+    for reason, text in ignored.items():
+        table |= dict.fromkeys(_names(text), reason)
+    return table | {same_key(key): value for key, value in neutral.items()}
 
 
-def _together(*tables):
-    """One table of several."""
-    ignored = {}
-    for table in tables:
-        for reason, names in table.ignored.items():
-            ignored[reason] = ignored.get(reason, frozenset()) | names
-    neutral = {key: value for table in tables for key, value in table.neutral.items()}
-    return Keys(frozenset().union(*(table.read for table in tables)), ignored, neutral)
+def known(table, key):
+    """The form in which a table has a key, or None."""
+    return next((form for form in (key, re.sub(r"\d+$", "#", key)) if form in table), None)
 
 
 def _all(names, value):
@@ -94,15 +76,15 @@ def differences(file):
         for line, value in cells
     ]
     for name, line, values in found:
-        form = table.known(same_key(name))
+        form = known(table, same_key(name))
         value = " ".join(map(bare, values))
         if form is None:
             if same_key(name) in unknown:
                 continue  # the other values of a column
             unknown.add(same_key(name))
             rows.append((f"{name} {value[:60]} ({file.kind})".replace("  ", " "), UNKNOWN))
-        elif form in table.neutral:
-            rows += _row(file, name, line, values, table.neutral[form])
+        elif isinstance(table[form], Otherwise):
+            rows += _row(file, name, line, values, table[form])
     return list(dict.fromkeys(rows))
 
 
@@ -466,7 +448,7 @@ KEYS = {
     "AeroDyn blade": AERODYN_BLADE,
     "polar": POLAR,
     "ServoDyn": SERVODYN,
-    "HydroDyn": _together(HYDRODYN, SEASTATE),  # before OpenFAST 4 the sea is in HydroDyn's file
+    "HydroDyn": HYDRODYN | SEASTATE,  # before OpenFAST 4 the sea is in HydroDyn's file
     "SeaState": SEASTATE,
     "InflowWind": INFLOWWIND,
     "MoorDyn": MOORDYN,

@@ -11,9 +11,9 @@ import math
 import re
 from pathlib import Path
 
+from fowt_env.descriptions.files import read_text
 from fowt_env.errors import InputError
 
-MAX_BYTES = 5_000_000  # of a part file; the largest that are in use have some 100 kB
 MAX_ROWS = 100_000  # of a table
 _WORD = re.compile(r"""@?"[^"]*"?|@?'[^']*'?|[^\s,;]+""")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
@@ -110,7 +110,11 @@ class PartFile:
     def __init__(self, path, kind):
         """path: the file. kind: "ElastoDyn" ..., for messages. Raises: InputError if it cannot be read."""
         self.path, self.kind = Path(path), kind
-        self.lines = _text(self.path, kind).splitlines()
+        # old files have degree signs and superscripts of Windows
+        text = read_text(self.path, kind, fallback="latin-1")
+        if "\0" in text:
+            raise self.refusal("is not a text file: it has a zero byte")
+        self.lines = text.splitlines()
         if len(self.lines) > MAX_ROWS:
             raise self.refusal(f"has {len(self.lines)} lines; allowed: at most {MAX_ROWS}")
         if kind in COMMENTED:
@@ -162,6 +166,10 @@ class PartFile:
 
     # ------------------------------------------------------------------ values
 
+    def words(self, line):
+        """Words of a line (from 0)."""
+        return words_of(self.lines[line][:2000])
+
     def find(self, key, *also):
         """(line from 0, values) of the first of some names of a key, or None."""
         for name in (key, *also):
@@ -195,6 +203,10 @@ class PartFile:
             allowed = " ".join(["a number", " and ".join(ends)]).strip()
             raise self.refusal(f"{key} = {word[:60]}: must be {allowed}", line)
         return value
+
+    def positive(self, key, *also, default=REQUIRED, high=math.inf):
+        """Number > 0 of a key."""
+        return self.number(key, *also, default=default, low=0.0, high=high, open_low=True)
 
     def whole(self, key, *also, default=REQUIRED, low=None, high=None):
         """Whole number of a key."""
@@ -233,19 +245,6 @@ class PartFile:
         line, word = self._one(key, also, default)
         return word if line is None else bare(word)
 
-    def numbers(self, key, *also, count=None, default=REQUIRED):
-        """List of the numbers before a key; count: how many it must be."""
-        found = self.find(key, *also)
-        if found is None:
-            if default is REQUIRED:
-                raise self.refusal(f"{key} is missing: there must be a line 'values  {key}'")
-            return default
-        values = [number_of(bare(word)) for word in found[1]]
-        if None in values or (count is not None and len(values) != count):
-            wanted = "numbers" if count is None else f"{count} numbers"
-            raise self.refusal(f"{key} = {' '.join(found[1])[:60]}: must be {wanted}", found[0])
-        return values
-
     def matrix(self, key, size=6):
         """size x size numbers: the row of a key and those below it; zeros where the file lacks the key."""
         found = self.find(key)
@@ -263,7 +262,7 @@ class PartFile:
         return [self._row(found[0] + i, 1, key)[0] for i in range(size)]
 
     def _row(self, line, size, key):
-        words = words_of(self.lines[line][:2000])[:size] if line < len(self.lines) else []
+        words = self.words(line)[:size] if line < len(self.lines) else []
         values = [number_of(word) for word in words]
         if len(values) < size or None in values:
             raise self.refusal(f"{' '.join(words)[:60]!r}: must be {size} numbers", line, key)
@@ -271,17 +270,21 @@ class PartFile:
 
     # ------------------------------------------------------------------ tables
 
-    def table(self, key, *also, default=0, texts=(), high=MAX_ROWS):
+    def table(self, key, *also, default=0, texts=(), needs=(), high=MAX_ROWS):
         """Rows of the table below a count: a list of (line from 0, {column in small letters: number}).
 
-        The line after the count names the columns. texts: columns that hold texts, in small letters. A row
-        may be followed by a comment; it must have a value of every column but the last texts.
+        The line after the count names the columns. texts: columns that hold texts, in small letters. needs:
+        columns that there must be. A row may be followed by a comment; it must have a value of every column
+        but the last texts.
         """
         count = self.whole(key, *also, default=default, low=0, high=high)
         if not count:
             return []
         line = self.find(key, *also)[0] + 1
-        return self.rows_below(line, count, key, texts)
+        rows = self.rows_below(line, count, key, texts)
+        for row in rows:
+            self.need(row, *needs)
+        return rows
 
     def headed(self, column, count, texts=()):
         """The same, of the table whose first column has this name."""
@@ -300,7 +303,7 @@ class PartFile:
             raise self.refusal("the line below must name the columns of the table", line - 1, key)
         rows = []
         for number in range(line + 1, len(self.lines)):
-            words = words_of(self.lines[number][:2000])
+            words = self.words(number)
             if not words or (
                 not rows and words[0].startswith(("(", "[", "-")) and number_of(words[0]) is None
             ):
@@ -328,6 +331,12 @@ class PartFile:
             cells[name] = value
         return cells
 
+    def need(self, row, *names):
+        """Raises: InputError unless a row (line, cells) of a table has the columns."""
+        for name in names:
+            if name.lower() not in row[1]:
+                raise self.refusal(f"the column {name} is missing", row[0] - 1)
+
     # ------------------------------------------------------------------ other files
 
     def other(self, key, *also, folders=(), default=REQUIRED):
@@ -337,8 +346,18 @@ class PartFile:
             return None
         path = locate(name, (self.path.parent, *folders))
         if path is None:
-            found = self.find(key, *also)
-            raise self.refusal(f"{key} = {name[:200]!r}: no such file", None if found is None else found[0])
+            raise self.refusal(f"{key} = {name[:200]!r}: no such file", self.find(key, *also)[0])
+        return path
+
+    def blade(self, key, blades, folders):
+        """Path of the file of blade 1, KEY(1), of a rotor whose blades are alike."""
+        path = self.other(f"{key}(1)", key, folders=folders)
+        if path is None:
+            raise self.wrong(f"{key}(1)", "unused", "the blade file")
+        for i in range(2, min(blades, 3) + 1):
+            name = self.text(f"{key}({i})", default=None)
+            if name not in (None, self.text(f"{key}(1)", key)):
+                raise self.wrong(f"{key}({i})", name, "the file of blade 1: blades are alike")
         return path
 
 
@@ -348,27 +367,6 @@ OPTIONAL_COLUMNS = (
     "blcam", "twrti", "twrcb", "twrcp", "twrca", "simplmcf", "dpthmcf", "membermcf",
     "fdmod", "vncoffa", "vncoffb", "fdlofsca", "fdlofscb",
 )  # fmt: skip
-
-
-def _text(path, kind):
-    """Text of a part file."""
-    try:
-        if not path.is_file():
-            raise InputError(f"{kind} file {str(path)[:300]!r} does not exist")
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(f"{kind} file {str(path)!r} has {size} bytes; allowed: at most {MAX_BYTES}")
-        content = path.read_bytes()
-    except (OSError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{kind} file {str(path)[:200]!r} cannot be read: {error}") from None
-    if b"\0" in content:
-        raise InputError(f"{kind} file {str(path)!r} is not a text file: it has a zero byte")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")  # old files have degree signs and superscripts of Windows
 
 
 def locate(name, folders):
@@ -391,16 +389,12 @@ def locate(name, folders):
 
 def _either_case(path):
     """The file that differs from a path in the case of letters alone, or None."""
-    here = Path(path.anchor) if path.is_absolute() else Path()
-    for part in path.parts[1 if path.is_absolute() else 0 :]:
-        exact = here / part
-        if part == ".." or exact.exists():
-            here = exact
-            continue
-        if not here.is_dir():
-            return None
-        same = sorted(entry for entry in here.iterdir() if entry.name.lower() == part.lower())
-        if not same:
-            return None
-        here = same[0]
+    here = Path(path.anchor)
+    for part in path.parts[bool(path.anchor) :]:
+        if part != ".." and not (here / part).exists():
+            names = sorted(entry.name for entry in here.iterdir()) if here.is_dir() else ()
+            part = next((name for name in names if name.lower() == part.lower()), None)
+            if part is None:
+                return None
+        here = here / part
     return here if here.is_file() else None

@@ -41,22 +41,19 @@ def make_report(deck, name, body=None):
 
 
 def _figures(deck, body):
-    masses = mass_properties(deck)
+    masses, hydro, control = mass_properties(deck), deck.hydrodyn, deck.control
     for part, value in masses.items():
         if value or part == "total":
             yield f"mass, {part}", f"{value:,.1f} kg".replace(",", " ")
-    rotor = rotor_mass(deck)
     overhang, height = hub_place(deck)
-    mass, centre, inertia = ballast(deck)
-    yield "rotor inertia about the shaft", f"{rotor.inertia:.6g} kg m2"
+    _, centre, inertia = ballast(deck)
+    yield "rotor inertia about the shaft", f"{rotor_mass(deck).inertia:.6g} kg m2"
     yield "hub height, overhang", f"{height:.3f} m, {overhang:.3f} m"
     yield "platform centre of mass", ", ".join(f"{x:.4g}" for x in centre) + " m"
     yield "platform inertia about it", ", ".join(f"{x:.5g}" for x in np.diag(inertia)) + " kg m2"
-    potential = deck.hydrodyn.potential
-    if potential is not None:
-        volume = potential.volume
-        yield "displaced volume", f"{volume:.6g} m3"
-        lift = deck.site.water_density * volume - masses["total"]
+    if hydro.potential is not None:
+        lift = deck.site.water_density * hydro.potential.volume - masses["total"]
+        yield "displaced volume", f"{hydro.potential.volume:.6g} m3"
         yield "buoyancy less weight, which lines and members hold", f"{lift / 1e3:,.1f} t".replace(",", " ")
     if body is not None:
         low, high = body.omega[0], body.omega[-1]
@@ -65,108 +62,80 @@ def _figures(deck, body):
         if body.difference_qtf is not None:
             shape = body.difference_qtf.value.shape
             yield "difference-frequency QTF", f"{shape[1]} frequencies, {shape[0]} pairs of headings"
-    inside = sum(member.potential_flow for member in deck.hydrodyn.members)
-    if deck.hydrodyn.members:
-        yield "members", f"{len(deck.hydrodyn.members)}, {inside} of them in the potential-flow body"
+    if hydro.members:
+        inside = sum(member.potential_flow for member in hydro.members)
+        yield "members", f"{len(hydro.members)}, {inside} of them in the potential-flow body"
     yield "mooring lines", str(len(deck.lines))
-    control = deck.control
-    yield "rated torque, speed", f"{control.rated_torque:.6g} N m, {control.rated_speed:.6g} rad/s"
-    yield "rated wind speed", f"{control.rated_wind_speed or 11.4:.4g} m/s"
+    yield "rated torque, speed", f"{control['rated_torque']:.6g} N m, {control['rated_speed']:.6g} rad/s"
+    yield "rated wind speed", f"{control['rated_wind_speed']:.4g} m/s"
 
 
 def _differences(deck):
     """(what the deck has, what the plant has) of everything that is not alike."""
-    bends = deck.elastodyn.bending is not None
-    for what in deck.elastodyn.flexible:
+    values, hydro = deck.elastodyn, deck.hydrodyn
+    for what in values.flexible:
         option = next((option for word, option in TOWER_OPTIONS.items() if what.startswith(word)), None)
-        yield what, f"rigid; with the option {option} as in the deck" if bends and option else "rigid"
-    yield from deck.elastodyn.notes
-    if any(deck.elastodyn.platform_products):
+        known = values.bending is not None and option
+        yield what, f"rigid; with the option {option} as in the deck" if known else "rigid"
+    yield from values.notes
+    if any(values.platform_products):
         names = "PtfmXYIner, PtfmYZIner, PtfmXZIner"
         yield f"products of inertia of the platform ({names})", "left out: its principal axes are the body's"
     _, _, inertia = ballast(deck)
     across = np.abs(inertia - np.diag(np.diag(inertia))).max()
-    if deck.hydrodyn.fills and across > 1e-3 * np.diag(inertia).min():
-        yield (
-            "ballast water whose principal axes are not the body's",
-            f"products of inertia of {across:.3g} kg m2 left out",
-        )
+    if hydro.fills and across > 1e-3 * np.diag(inertia).min():
+        what = "ballast water whose principal axes are not the body's"
+        yield what, f"products of inertia of {across:.3g} kg m2 left out"
     yield from deck.aerodyn.notes
-    many = [name for name, (_, tables, _) in deck.aerodyn.tables.items() if tables > 1]
+    many = [(name, table) for name, table in deck.aerodyn.tables.items() if table[1] > 1]
     if many:
-        taken, tables, reynolds = deck.aerodyn.tables[many[0]]
-        yield (
-            f"{len(many)} polars of several tables, such as {tables} of {many[0]}",
-            f"one table each: number {taken} (Reynolds number {reynolds} million)",
-        )
-    yield (
-        "tower drag of a table over height (TwrDiam, TwrCd)",
-        "a straight taper and one drag coefficient of the same load in even wind",
-    )
-    if deck.elastodyn["GBoxEff"] != 100.0:
-        yield (
-            f"gearbox efficiency {deck.elastodyn['GBoxEff']:g} % (GBoxEff)",
-            "mesh_loss, the same part of the torque",
-        )
-    yield from deck.hydrodyn.notes
-    if deck.hydrodyn.fills and is_old(deck.hydrodyn.file):
+        name, (taken, tables, reynolds) = many[0]
+        said = f"one table each: number {taken} (Reynolds number {reynolds} million)"
+        yield f"{len(many)} polars of several tables, such as {tables} of {name}", said
+    said = "a straight taper and one drag coefficient of the same load in even wind"
+    yield "tower drag of a table over height (TwrDiam, TwrCd)", said
+    if values["GBoxEff"] != 100.0:
+        what = f"gearbox efficiency {values['GBoxEff']:g} % (GBoxEff)"
+        yield what, "mesh_loss, the same part of the torque"
+    yield from hydro.notes
+    if hydro.fills and is_old(hydro.file):
         yield (
             "water in members that restores nothing, its moment in AddCLin (HydroDyn before OpenFAST 3)",
             "water whose weight turns with the platform; AddCLin less that moment",
         )
-    if deck.hydrodyn.memory == 0 and deck.hydrodyn.potential is not None:
+    if hydro.memory == 0 and hydro.potential is not None:
         yield "no memory of radiated waves (RdtnMod 0)", "radiation with its memory"
-    if deck.hydrodyn.memory == 2:
+    if hydro.memory == 2:
         yield "state-space fit of the radiation in a file (.ss)", "from the coefficients themselves"
-    for key, value in deck.hydrodyn.second_order.items():
+    for key, value in hydro.second_order.items():
         if key == "DiffQTF" and value == 12:
             yield f"difference-frequency forces (DiffQTF {value})", "with the option second_order"
         else:
             yield f"second-order forces ({key} {value})", "left out"
-    if any(end[0] for member in deck.hydrodyn.members for end in member.axial):
-        yield (
-            "axial drag of joints, which HydroDyn has on rho A |v| v / 4",
-            "axial_drag_coefficient, on rho A |v| v / 2: half of AxCd",
-        )
+    if any(end[0] for member in hydro.members for end in member.axial):
+        said = "axial_drag_coefficient, on rho A |v| v / 2: half of AxCd"
+        yield "axial drag of joints, which HydroDyn has on rho A |v| v / 4", said
     yield from deck.notes
     yield from deck.control.notes
-
-
-def _contradictions(report):
-    """Lines of report.md on where the deck contradicts itself; none where it does not."""
-    if not report.contradictions:
-        return []
-    return [
-        "## Where the deck contradicts itself",
-        "",
-        markdown_table(("the deck", "what follows"), report.contradictions),
-        "",
-    ]
 
 
 def markdown(report):
     """Text of report.md."""
     parts = [
         f"# {report.title}",
-        "",
         "Figures of `platform.toml` and `turbine/turbine.toml` name the file and the keys they are from.",
-        "",
         "## Key figures",
-        "",
         markdown_table(("figure", "value"), report.figures),
-        "",
         "## What is not as in the deck",
-        "",
         markdown_table(("in the deck", "here"), report.differences),
-        "",
-        *_contradictions(report),
-        "## Wind and sea",
-        "",
-        *(f"- {line}" for line in report.suggestions),
-        "",
-        "## Files read",
-        "",
-        *(f"- `{row[0]}` and what it names" for row in report.files),
-        "",
     ]
-    return "\n".join(parts)
+    if report.contradictions:
+        parts.append("## Where the deck contradicts itself")
+        parts.append(markdown_table(("the deck", "what follows"), report.contradictions))
+    parts += [
+        "## Wind and sea",
+        "\n".join(f"- {line}" for line in report.suggestions),
+        "## Files read",
+        "\n".join(f"- `{row[0]}` and what it names" for row in report.files),
+    ]
+    return "\n\n".join(parts) + "\n"

@@ -6,21 +6,6 @@ import pytest
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 
-YAW_BEARING = 28249.0  # kg of VolturnUS-S: in our tower, in ElastoDyn's tower top
-
-
-def test_volturnus_has_the_masses_of_elastodyn_s_summary():
-    platform = read_platform("iea15_volturnus_s")
-    turbine, said = read_turbine(platform.turbine), platform.published
-    assert turbine.rotor.mass == pytest.approx(said["rotor_mass"], abs=0.1)
-    assert platform.tower.mass == pytest.approx(said["tower_mass"] + YAW_BEARING, abs=0.1)
-    top = turbine.rotor.mass + turbine.nacelle.mass + YAW_BEARING
-    assert top == pytest.approx(said["tower_top_mass"], abs=0.1)
-    total = turbine.rotor.mass + turbine.nacelle.mass + platform.tower.mass + platform.ballast.mass
-    assert total == pytest.approx(said["total_mass"], abs=0.1)
-    assert platform.potential_flow.volume == said["displaced_volume"]
-    assert turbine.rotor.hub_height == pytest.approx(150.0, abs=1e-3)  # NREL/TP-5000-75698
-
 
 def test_oc4_with_its_ballast_water_is_the_platform_of_the_definition():
     """NREL/TP-5000-60601 gives mass, centre and inertia of platform and water together, to four digits."""

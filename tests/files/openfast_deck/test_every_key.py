@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from small_deck import NAMES, ROTOR_TABLE, write_deck
+from small_deck import ROTOR_TABLE, write_deck
 
 from fowt_env.errors import InputError
 from fowt_env.files.openfast_deck.importer import import_deck
@@ -59,25 +59,6 @@ BESIDE = {  # further files that these name
 }
 WITHOUT_EFFECT = set()  # (file, key) that are read for no more than a check, each with its reason beside it
 
-# what is read by its place, not by a key: (kind of deck, part, line, another word for each that is read)
-BY_PLACE = [
-    ("plain", "MAP", "chain  0.1  100.0  4.0E8  0.7", {1: "0.11", 2: "101", 3: "4.1E8", 4: "0.8"}),
-    ("plain", "MAP", "1 fix    400 0 depth", {1: "Vessel", 2: "401", 3: "1", 4: "-199"}),
-    ("plain", "MAP", "2 Vessel   5 0 -10.0", {1: "fix", 2: "6", 3: "1", 4: "-11"}),
-    ("plain", "MAP", "1 chain 450.0 1 2", {1: "rope", 2: "451", 3: "2", 4: "1"}),
-    ("plain", "MAP", "repeat 120 240", {1: "90", 2: "180"}),
-    ("MoorDyn", "MoorDyn", "chain 0.1 100.0 4.0E8", {1: "0.11", 2: "101", 3: "4.1E8"}),
-    ("MoorDyn", "MoorDyn", "1 Fixed   400 0 -200", {1: "Free", 2: "401", 3: "1", 4: "-199"}),
-    ("MoorDyn", "MoorDyn", "2 Coupled   5 0  -10", {1: "Fixed", 2: "6", 3: "1", 4: "-11"}),
-    ("MoorDyn", "MoorDyn", "1 chain 1 2 450.0", {1: "rope", 2: "3", 3: "4", 4: "451"}),
-    ("plain", "polar", "   0.0 0.4 0.01 -0.05", {0: "1.0", 1: "0.5", 2: "0.02", 3: "-0.06"}),
-    ("plain", "HydroDyn", "1 3 -7.0 1300.0", {0: "2", 1: "1", 2: "-6.0", 3: "1200.0"}),
-    ("plain", "AeroDyn", '"foils/One.dat"', {0: '"foils/two.dat"'}),
-    ("plain", "DISCON", "8.8 11.0", {1: "11.5"}),
-    ("plain", "DISCON", "3.0 12.0 24.0", {0: "4.0", 2: "25.0"}),
-    ("other options of ROSCO", "DISCON", "4.0 12.0 23.0", {0: "4.5", 2: "22.0"}),
-]
-
 
 class Key(NamedTuple):
     """A key of a file, or a column of a table of it."""
@@ -91,19 +72,7 @@ class Key(NamedTuple):
     column: int = -1
 
 
-METHODS = (
-    "number",
-    "whole",
-    "one_of",
-    "flag",
-    "text",
-    "numbers",
-    "matrix",
-    "vector",
-    "table",
-    "other",
-    "find",
-)
+METHODS = ("number", "whole", "one_of", "flag", "text", "matrix", "vector", "table", "other", "find")
 
 
 class Recorder:
@@ -306,18 +275,3 @@ def test_every_key_that_is_read_moves_what_is_written_or_is_refused(tried):
 
 def test_the_other_names_of_a_key_mean_the_same(tried):
     assert not tried.unlike
-
-
-@pytest.mark.parametrize("kind", ["plain", "MoorDyn", "other options of ROSCO"])
-def test_every_figure_that_is_read_by_its_place_moves_what_is_written_or_is_refused(tmp_path, kind):
-    deck = deck_of(kind, tmp_path)
-    plain = import_of(deck)
-    for part, start, others_of in ((row[1:]) for row in BY_PLACE if row[0] == kind):
-        path = tmp_path / NAMES[part]
-        lines = path.read_text().splitlines()
-        (line,) = (number for number, text in enumerate(lines) if text.startswith(start))
-        for place, word in others_of.items():
-            words = words_of(lines[line])
-            words[place] = word
-            changed = [*lines[:line], " ".join(words), *lines[line + 1 :]]
-            assert import_with(path, changed, deck) != plain, (part, start, place)

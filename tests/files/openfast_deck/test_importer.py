@@ -28,6 +28,17 @@ def imported(tmp_path_factory):
     return platform, read_turbine(platform.turbine), report, folder / "out"
 
 
+def platform_of(folder, **changes):
+    """Platform of a changed deck."""
+    import_deck(write_deck(folder, **changes), folder / "out")
+    return read_platform(folder / "out" / "platform.toml")
+
+
+def turbine_of(folder, **changes):
+    """Turbine of a changed deck."""
+    return read_turbine(platform_of(folder, **changes).turbine)
+
+
 def refused(folder, **changes):
     """Text of the InputError that a changed deck is refused with; nothing may be written."""
     with pytest.raises(InputError) as caught:
@@ -114,18 +125,14 @@ def test_tower_bends_with_the_shapes_damping_and_factors_of_its_file(imported):
 
 
 def test_a_deck_whose_tower_bends_says_which_option_has_it(tmp_path):
-    report = import_deck(
-        write_deck(tmp_path, ElastoDyn=[("False  TwFADOF1", "True   TwFADOF1")]), tmp_path / "out"
-    )
-    assert dict(report.differences)["first fore-aft tower mode"].startswith(
-        'rigid; with the option tower = "modes"'
-    )
+    path = write_deck(tmp_path, ElastoDyn=[("False  TwFADOF1", "True   TwFADOF1")])
+    said = dict(import_deck(path, tmp_path / "out").differences)["first fore-aft tower mode"]
+    assert said.startswith('rigid; with the option tower = "modes"')
 
 
 @pytest.mark.parametrize("old, new", [("TwFAM1Sh(2)", "TwOtherSh(2)"), ("0.0 3000.0 1e12", "0.0 3000.0 0.0")])
 def test_a_tower_file_without_shapes_or_stiffness_gives_a_rigid_tower(tmp_path, old, new):
-    import_deck(write_deck(tmp_path, tower=[(old, new)]), tmp_path / "out")
-    assert read_platform(tmp_path / "out" / "platform.toml").tower.modes is None
+    assert platform_of(tmp_path, tower=[(old, new)]).tower.modes is None
 
 
 def test_a_shape_that_is_not_1_at_the_top_is_refused_with_its_file(tmp_path):
@@ -177,8 +184,7 @@ def test_old_hydrodyn_has_water_on_the_axis_and_its_moment_in_the_additional_sti
     yaw_pitch = sum(weight * y for weight, _, y, _ in weights)
     old = old.replace("0 0 0 7.0e5 0 0\n", f"0 0 0 {7e5 + roll} 0 {yaw_roll}\n")
     old = old.replace("2.0e4 0 0 0 8.0e5 0\n", f"2.0e4 0 0 0 {8e5 + roll} {yaw_pitch}\n")
-    import_deck(write_deck(tmp_path, HydroDyn=old), tmp_path / "out")
-    platform = read_platform(tmp_path / "out" / "platform.toml")
+    platform = platform_of(tmp_path, HydroDyn=old)
     assert np.array(platform.additional.stiffness) == pytest.approx(STIFFNESS, rel=1e-6, abs=1e-3)
     mass = 6.0e6 + sum(water[0] for water in WATER)
     assert platform.ballast.mass == pytest.approx(mass)
@@ -214,15 +220,12 @@ def test_blade_has_the_nodes_of_aerodyn_with_the_outermost_just_inside(imported)
 
 @pytest.mark.parametrize(("flag", "moment"), [("True", (0.03, -0.05, 0.03)), ("False", (0.0, 0.0, 0.0))])
 def test_the_pitching_moment_of_polars_is_used_where_aerodyn_does(tmp_path, flag, moment):
-    import_deck(write_deck(tmp_path, AeroDyn=[("True     UseBlCm", f"{flag} UseBlCm")]), tmp_path / "out")
-    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    turbine = turbine_of(tmp_path, AeroDyn=[("True     UseBlCm", f"{flag} UseBlCm")])
     assert turbine.blade.polars["one"][:, 3] == pytest.approx(moment)
 
 
 def test_the_middle_table_of_a_polar_is_taken_where_aerodyn_interpolates(tmp_path):
-    path = write_deck(tmp_path, AeroDyn=[("1        InCol_Alfa", "2 AFTabMod\n1 InCol_Alfa")])
-    import_deck(path, tmp_path / "out")
-    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    turbine = turbine_of(tmp_path, AeroDyn=[("1        InCol_Alfa", "2 AFTabMod\n1 InCol_Alfa")])
     assert turbine.blade.polars["one"][1, 1] == 0.5
     assert "number 2 (Reynolds number 5.0 million)" in (tmp_path / "out" / "report.md").read_text()
 
@@ -368,9 +371,7 @@ def test_axial_drag_of_a_joint_goes_by_the_sum_of_its_areas_and_half_of_its_coef
 
 
 def test_members_without_a_potential_flow_body_have_all_their_loads(tmp_path):
-    path = write_deck(tmp_path, HydroDyn=[("1    PotMod ", "0    PotMod ")])
-    import_deck(path, tmp_path / "out")
-    platform = read_platform(tmp_path / "out" / "platform.toml")
+    platform = platform_of(tmp_path, HydroDyn=[("1    PotMod ", "0    PotMod ")])
     assert platform.potential_flow is None
     assert platform.additional is None  # which HydroDyn has with potential flow alone
     assert not any(member.potential_flow for member in platform.members)
@@ -401,7 +402,7 @@ def test_lines_of_map_are_repeated_and_weigh_what_they_do_in_water(imported):
 def test_moordyn_gives_the_lines_of_map(tmp_path):
     write_deck(tmp_path)
     site = (200.0, 1025.0, 9.81)
-    ours, other = (read_mooring(None, tmp_path / NAMES[name], *site)[1] for name in ("MAP", "MoorDyn"))
+    ours, other = (read_mooring(None, tmp_path / NAMES[name], *site)[0] for name in ("MAP", "MoorDyn"))
     for a, b in zip(ours, other, strict=True):
         assert a.anchor == pytest.approx(b.anchor, abs=1e-6)
         assert a.fairlead == pytest.approx(b.fairlead, abs=1e-6)
@@ -504,9 +505,7 @@ def test_torque_law_and_pitch_drive_are_rosco_s(imported):
 
 def test_servodyn_s_own_torque_law_is_on_the_high_speed_shaft_in_si(tmp_path):
     """VSContrl 1: speeds in rpm, the constant of region 2 in N m/rpm^2, the slip in percent."""
-    path = write_deck(tmp_path, ServoDyn=[("5     VSContrl", "1     VSContrl")])
-    import_deck(path, tmp_path / "out")
-    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    turbine = turbine_of(tmp_path, ServoDyn=[("5     VSContrl", "1     VSContrl")])
     law, speed = turbine.torque_law, 1200.0 * 2.0 * math.pi / 60.0
     assert (law.rated_torque, law.slip_percent) == (31000.0, 8.5)
     assert law.rated_speed == pytest.approx(speed)
@@ -521,19 +520,16 @@ def test_the_rated_wind_has_rated_power_at_the_best_power_coefficient(tmp_path, 
     """Where DISCON.IN says none: P = rho / 2 pi R^2 Cp v^3, with a usual coefficient if there is no table.
 
     The table has one of 0.99 too, which no rotor can have."""
-    path = write_deck(tmp_path, DISCON=[("8.8 11.0  ! IPC_Vramp", '"Cp.txt" ! PerfFileName')])
     if table is not None:
         (tmp_path / "Cp.txt").write_text(table)
-    import_deck(path, tmp_path / "out")
-    wind = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml").rated_wind_speed
+    named = [("8.8 11.0  ! IPC_Vramp", '"Cp.txt" ! PerfFileName')]
+    wind = turbine_of(tmp_path, DISCON=named).rated_wind_speed
     assert 0.5 * 1.2 * math.pi * 52.0**2 * best * wind**3 == pytest.approx(3e4 * 130.0, rel=1e-6)
 
 
 def test_the_pitch_actuator_of_rosco_is_the_second_drive_of_the_turbine(tmp_path):
     text = "2 ! PA_Mode - actuator\n1.5 ! PA_CornerFreq - rad/s\n0.7 ! PA_Damping - of it"
-    path = write_deck(tmp_path, DISCON=[("0         ! PA_Mode - actuator", text)])
-    import_deck(path, tmp_path / "out")
-    drive = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml").pitch_drive
+    drive = turbine_of(tmp_path, DISCON=[("0         ! PA_Mode - actuator", text)]).pitch_drive
     assert (drive.time_constant, drive.natural_frequency) == (0.0, None)
     assert (drive.second_order.natural_frequency, drive.second_order.damping) == (1.5, 0.7)
     written = (tmp_path / "out" / "turbine" / "turbine.toml").read_text()
@@ -541,18 +537,11 @@ def test_the_pitch_actuator_of_rosco_is_the_second_drive_of_the_turbine(tmp_path
 
 
 def test_the_legacy_controller_of_the_5_mw_turbine_is_known_by_its_library(tmp_path):
-    path = write_deck(
-        tmp_path,
-        ServoDyn=[('"libdiscon.so"', '"ServoData/DISCON_OC3Hywind_win32.dll"')],
-        ElastoDyn=[("90     GBRatio", "97 GBRatio")],
-    )
-    import_deck(path, tmp_path / "out")
-    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
-    known = read_turbine("nrel5mw")
-    assert turbine.torque_law == known.torque_law.model_copy(
-        update={"rated_power": turbine.torque_law.rated_power}
-    )
-    assert turbine.torque_law.rated_power == pytest.approx(known.torque_law.rated_power, rel=1e-6)
+    library = [('"libdiscon.so"', '"ServoData/DISCON_OC3Hywind_win32.dll"')]
+    turbine = turbine_of(tmp_path, ServoDyn=library, ElastoDyn=[("90     GBRatio", "97 GBRatio")])
+    known, power = read_turbine("nrel5mw"), turbine.torque_law.rated_power
+    assert turbine.torque_law == known.torque_law.model_copy(update={"rated_power": power})
+    assert power == pytest.approx(known.torque_law.rated_power, rel=1e-6)
     assert turbine.gains == known.gains
 
 
@@ -615,4 +604,4 @@ def test_no_file_of_a_folder_is_replaced_by_an_import_that_is_not_asked_to(tmp_p
 def test_members_need_joints_and_sections_that_are_there(tmp_path):
     write_deck(tmp_path, HydroDyn=[("1 1 2 1 1 1.0 2 1 TRUE", "1 1 9 1 1 1.0 2 1 TRUE")])
     with pytest.raises(InputError, match="joint 9 is not there"):
-        read_hydrodyn(tmp_path / NAMES["HydroDyn"], (1025.0, 200.0, 0.0))
+        read_hydrodyn(tmp_path / NAMES["HydroDyn"], 1025.0)

@@ -1,21 +1,17 @@
 """What a deck has and the plant does not is said: every key is read, neutral, without effect, or reported."""
 
 import re
-import shutil
-from pathlib import Path
 
 import pytest
 from small_deck import NAMES, write_deck
 
 from fowt_env.errors import InputError
-from fowt_env.files.openfast_deck.conversion import platform_rows, stations, turbine_rows
 from fowt_env.files.openfast_deck.deck import read_deck
 from fowt_env.files.openfast_deck.importer import import_deck
-from fowt_env.files.openfast_deck.keys import KEYS, UNKNOWN
-from fowt_env.files.openfast_deck.parser import PartFile, bare, number_of, same_key, truth_of
-from fowt_env.files.openfast_deck.report import make_report, markdown
+from fowt_env.files.openfast_deck.keys import UNKNOWN
+from fowt_env.files.openfast_deck.parser import PartFile, bare, same_key
+from fowt_env.files.openfast_deck.report import make_report
 
-DECKS = Path(__file__).parents[2] / "reference" / "decks"
 MOORED = {"OpenFAST": [("1    CompMooring", "3    CompMooring"), ("map.dat", "moor.dat")]}
 
 
@@ -98,47 +94,26 @@ def test_a_comment_in_a_table_of_map_is_refused_as_map_takes_it_for_a_row(tmp_pa
     [
         ("ElastoDyn", "GenDOF", "False", "rotor speed held", "free"),
         ("ElastoDyn", "PtfmSgDOF", "False", "surge of the platform held", "free"),
-        ("ElastoDyn", "PtfmSwDOF", "False", "sway of the platform held", "planar"),
-        ("ElastoDyn", "PtfmHvDOF", "False", "heave of the platform held", "free"),
-        ("ElastoDyn", "PtfmRDOF", "False", "roll of the platform held", "planar"),
-        ("ElastoDyn", "PtfmPDOF", "False", "pitch of the platform held", "free"),
         ("ElastoDyn", "PtfmYDOF", "False", "yaw of the platform held", "planar"),
         ("ElastoDyn", "NacYaw", "30", "nacelle turned out of the wind", "along x"),
         ("ElastoDyn", "NewKey", "3", "NewKey 3 (ElastoDyn)", "not looked at"),
         ("AeroDyn", "TipLoss", "False", "no tip loss", "with it"),
-        ("AeroDyn", "HubLoss", "False", "no hub loss", "with it"),
-        ("AeroDyn", "TanInd", "False", "no tangential induction", "with it"),
-        ("AeroDyn", "AIDrag", "False", "no drag in the axial induction", "with it"),
-        ("AeroDyn", "TIDrag", "False", "no drag in the tangential induction", "with it"),
         ("AeroDyn", "Skew_Mod", "1", "skewed-wake correction", "skewed_wake"),
-        ("AeroDyn", "SkewMod", "2", "skewed-wake correction", "skewed_wake"),
-        ("AeroDyn", "BEM_Mod", "2", "polar grid", "BEM_Mod 1"),
-        ("AeroDyn", "SectAvg", "True", "averaged over sectors", "section"),
         ("AeroDyn", "Wake_Mod", "0", "no induction", "induction is there"),
-        ("AeroDyn", "Wake_Mod", "3", "free vortex wake", "momentum"),
         ("AeroDyn", "DBEMT_Mod", "2", "dynamic wake", "dynamic_inflow"),
         ("AeroDyn", "UA_Mod", "3", "unsteady airfoil", "quasi-steady"),
-        ("AeroDyn", "AFAeroMod", "2", "unsteady airfoil", "quasi-steady"),
         ("AeroDyn", "TwrShadow", "True", "tower shadow", "no influence"),
-        ("AeroDyn", "Buoyancy", "True", "buoyancy of blades", "none"),
         ("ServoDyn", "VSContrl", "4", "generator torque by another law", "DISCON.IN"),
         ("ServoDyn", "PCMode", "0", "no pitch control", "controller of a run"),
         ("ServoDyn", "TPitManS(1)", "10", "override of the blade pitch", "run"),
-        ("ServoDyn", "TimGenOf", "50", "generator off", "run"),
-        ("ServoDyn", "AfCmode", "5", "airfoils", "none"),
         ("ServoDyn", "NumTStC", "2", "tuned mass dampers", "none"),
-        ("ServoDyn", "YawNeut", "8", "nacelle turned", "along x"),
         ("ServoDyn", "BPCutoff", "2", "low pass", "none"),
         ("SeaState", "MCFD", "5", "MacCamy-Fuchs", "diffraction"),
-        ("SeaState", "WaveStMod", "1", "stretched", "stretching"),
-        ("SeaState", "WaveDirMod", "1", "short-crested", "long-crested"),
         ("SeaState", "WvDiffQTF", "True", "second-order wave kinematics", "first order"),
-        ("HydroDyn", "ExctnDisp", "1", "displaced position", "excitation_position"),
         ("HydroDyn", "ExctnMod", "0", "no wave excitation", "it is there"),
         ("HydroDyn", "WaveDisp", "1", "displaced members", "kinematics_position"),
         ("InflowWind", "PropagationDir", "20", "another direction", "along x"),
         ("AeroDyn", "Skew_Mod", "-1", "wind across the rotor taken off", "it is there"),
-        ("OpenFAST", "NewSwitch", "1", "NewSwitch 1 (OpenFAST)", "not looked at"),
     ],
 )
 def test_what_the_plant_does_not_have_is_said(tmp_path, part, key, value, deck, here):
@@ -211,46 +186,28 @@ def test_a_switch_of_diffraction_in_a_table_may_be_a_truth(tmp_path):
     assert any("MacCamy-Fuchs diffraction of members (simplmcf 1)" in what for what in said)
 
 
+TYPE, POINT = "chain 0.1 100.0 4.0E8 -1.0 0 2.0 0.8 0.4 0.3\n", "1 Fixed   400 0 -200 0 0 0 0\n"
+MAP_TYPE, MAP_NODE = "chain  0.1  100.0  4.0E8  0.7  0 0 0 0\n", "1 fix    400 0 depth 0 0 # # #\n"
+
+
 @pytest.mark.parametrize(
-    ("part", "start", "said"),
+    ("part", "old", "new", "said"),
     [
-        ("MoorDyn", "2 Coupled   5 0  -10 1e6 0", ("M = 1e+06", "must be 0")),
-        ("MoorDyn", "2 Coupled   5 0  -10 0 100", ("V = 100", "must be 0")),
-        ("MoorDyn", "1 Fixed   400 0 -200 0 0 0 0\n1 Fixed   400 0 -200", ("point 1", "one row alone")),
-        (
-            "MoorDyn",
-            "chain 0.1 100.0 4.0E8 -1.0 0 2.0 0.8 0.4 0.3\nchain 0.1",
-            ("line type chain", "one row"),
-        ),
-        ("MoorDyn", "1 chain 1 2 450.0 20 -\n1 chain 1 2", ("line 1", "one row alone")),
-        ("MoorDyn", "0.001 dtM - step\n150 WtrDpth", ("WtrDpth = 150", "must be 200")),
-        ("MoorDyn", "chain 0.1 100.0 4.0E8 -1.0 stiff.dat", ("EI = stiff.dat", "must be a number")),
-        ("MAP", "2 Vessel   5 0 -10.0 1e5 0", ("M = 100000", "must be 0")),
-        ("MAP", "2 Vessel   5 0 -10.0 0 5", ("B = 5", "must be 0")),
-        ("MAP", "1 fix    400 0 depth 0 0 # # #\n1 fix    400", ("node 1", "one row alone")),
-        ("MAP", "chain  0.1  100.0  4.0E8  0.7  0 0 0 0\nchain  0.1", ("line type chain", "one row alone")),
+        ("MoorDyn", "5 0  -10 0 0", "5 0  -10 1e6 0", ("M = 1e+06", "must be 0")),
+        ("MoorDyn", "5 0  -10 0 0", "5 0  -10 0 100", ("V = 100", "must be 0")),
+        ("MoorDyn", POINT, 2 * POINT, ("point 1", "one row alone")),
+        ("MoorDyn", TYPE, 2 * TYPE, ("line type chain", "one row")),
+        ("MoorDyn", "1 chain 1 2", "1 chain 1 2 450.0 20 -\n1 chain 1 2", ("line 1", "one row alone")),
+        ("MoorDyn", "0.001 dtM - step", "150 WtrDpth", ("WtrDpth = 150", "must be 200")),
+        ("MoorDyn", "4.0E8 -1.0 0", "4.0E8 -1.0 stiff.dat", ("EI = stiff.dat", "must be a number")),
+        ("MAP", "5 0 -10.0 0 0", "5 0 -10.0 1e5 0", ("M = 100000", "must be 0")),
+        ("MAP", "5 0 -10.0 0 0", "5 0 -10.0 0 5", ("B = 5", "must be 0")),
+        ("MAP", MAP_NODE, 2 * MAP_NODE, ("node 1", "one row alone")),
+        ("MAP", MAP_TYPE, 2 * MAP_TYPE, ("line type chain", "one row alone")),
     ],
 )
-def test_a_mooring_of_another_kind_is_refused(tmp_path, part, start, said):
-    own = start.rsplit("\n", 1)[-1].split()[:3] if "\n" in start else start.split()[:3]
-    path = write_deck(tmp_path, **(MOORED if part == "MoorDyn" else {}))
-    text = (tmp_path / NAMES[part]).read_text()
-    head = start.split("\n")[0].split()[0]
-    lines, last = text.splitlines(), start.split("\n")[-1]
-    if "WtrDpth" in start:
-        lines.insert(
-            next(i for i, line in enumerate(lines) if "OPTIONS" in line) + 1, "150 WtrDpth - of its own"
-        )
-    else:
-        place = next(
-            i for i, line in enumerate(lines) if line.split()[:1] == [head] and line.split()[1:2] == own[1:2]
-        )
-        if "\n" in start:
-            lines.insert(place, lines[place])
-        else:
-            kept = lines[place].split()[len(last.split()) :]
-            lines[place] = " ".join([last, *kept])
-    (tmp_path / NAMES[part]).write_text("\n".join(lines))
+def test_a_mooring_of_another_kind_is_refused(tmp_path, part, old, new, said):
+    path = write_deck(tmp_path, **{part: [(old, new)]} | (MOORED if part == "MoorDyn" else {}))
     with pytest.raises(InputError) as caught:
         read_deck(path)
     for words in (NAMES[part], *said):
@@ -312,7 +269,7 @@ def test_an_anchor_may_lie_on_the_bed_by_a_word(tmp_path):
 
 def test_the_controller_s_file_may_be_that_of_the_first_rotor(tmp_path):
     path = write_deck(tmp_path, OpenFAST=[('"servo.dat"  ServoFile', '"servo.dat"  ServoFile(1)')])
-    assert read_deck(path).control.generator_efficiency == 0.95
+    assert read_deck(path).control["generator_efficiency"] == 0.95
     assert not any(here == UNKNOWN for here in differences(path).values())
 
 
@@ -393,121 +350,7 @@ def test_coefficients_that_no_body_has_are_said(tmp_path):
     assert any("hydrostatic stiffness of zero" in said for said, _ in report.contradictions)
 
 
-# --------------------------------------------------------------------------- the tables
-
-
-@pytest.mark.parametrize("kind", KEYS)
-def test_a_key_is_in_one_list_alone(kind):
-    table = KEYS[kind]
-    lists = [table.read, frozenset(table.neutral), *table.ignored.values()]
-    assert sum(map(len, lists)) == len(frozenset().union(*lists))
-
-
-def public_decks(root=DECKS):
-    """{name: arguments of read_deck} of the public decks, in a folder."""
-    iea = root / "IEA-15-240-RWT" / "OpenFAST" / "IEA-15-240-RWT-UMaineSemi"
-    rosco, fast = root / "ROSCO" / "Examples" / "Test_Cases", root / "FAST" / "CertTest" / "5MW_Baseline"
-    discon = rosco / iea.name.replace("-UMaineSemi", "") / iea.name / f"{iea.name}_DISCON.IN"
-    found = {"iea": {"fst": iea / f"{iea.name}.fst", "discon": discon}}
-    for floater, mooring in (("OC4DeepCwindSemi", "MAP"), ("ITIBarge4", "MoorDyn")):
-        kinds = {"elastodyn": "ElastoDyn", "hydrodyn": "HydroDyn", "servodyn": "ServoDyn", "mooring": mooring}
-        parts = {part: fast / f"NRELOffshrBsline5MW_{floater}_{kind}.dat" for part, kind in kinds.items()}
-        parts["aerodyn"] = rosco / "NREL-5MW" / "NRELOffshrBsline5MW_Onshore_AeroDyn15.dat"
-        found[floater] = {"parts": parts, "folders": (rosco / "NREL-5MW",)}
-    return found
-
-
-def outcome(arguments):
-    """All that an import of a deck says and writes, but for WAMIT's coefficients; or the refusal."""
-    try:
-        deck = read_deck(**arguments)
-        rows = platform_rows(deck, "x", "x", "x", "x"), turbine_rows(deck, "x"), stations(deck)
-        rows = *rows, {name: polar.tolist() for name, polar in deck.aerodyn.polars.items()}
-        return str(rows) + markdown(make_report(deck, "x"))
-    except InputError as error:
-        return str(error)
-
-
-def test_no_key_of_a_public_deck_is_unknown():
-    for arguments in public_decks().values():
-        assert UNKNOWN not in outcome(arguments)
-
-
-def others(values):
-    """Other values for a key."""
-    text = bare(values[0])
-    if truth_of(text) is not None:
-        return [str(not truth_of(text))]
-    value = number_of(text)
-    if value is None:
-        return ['"nowhere"', "False", "3"]
-    return [
-        f"{number:.12g}"
-        for number in (value * 1.03 + 0.001, value + 1, 0, 1, 2, 3, 50, 1e-3)
-        if number != value
-    ]
-
-
-_CURRENT = "CurrSSV0 CurrSSDir CurrNSRef CurrNSV0 CurrNSDir CurrDIV CurrDIDir"
-WITHOUT_EFFECT = {  # what is read and changes nothing in these decks: why, and the keys of each kind of file
-    "a rotor of three blades": {"ElastoDyn": "TeetDOF UndSling"},
-    "no current (CurrMod 0)": {"HydroDyn": _CURRENT, "SeaState": _CURRENT},
-    "no members that waves must reach": {"SeaState": "X_HalfWidth Y_HalfWidth Z_Depth"},
-    "steady wind (WindType 1)": {"InflowWind": "Filename_Uni RefHt_Uni"},
-    "a part file in place of that of the .fst": {"OpenFAST": "AeroFile"},
-    "torque of a library (VSContrl 5)": {"ServoDyn": "VS_RtGnSp VS_RtTq VS_Rgn2K VS_SlPc"},
-    "a DISCON.IN in place of the deck's, or none": {
-        "ServoDyn": "DLL_InFile PitManRat1 PitManRat2 PitManRat3"
-    },
-    "polars of one table": {"polar": "Re"},
-}
-
-
-@pytest.mark.slow
-def test_every_key_of_the_public_decks_changes_the_files_or_the_report_or_is_refused(tmp_path, monkeypatch):
-    """All but those that are listed as without effect, each in at least one of the decks that have it."""
-    moved, still = set(), set()
-    shutil.copytree(DECKS, tmp_path / "decks")
-    decks = public_decks(tmp_path / "decks")
-    # of two rotors with the same keys the one of fewer polars
-    decks["iea"]["parts"] = {"aerodyn": decks["ITIBarge4"]["parts"]["aerodyn"]}
-    decks["iea"]["folders"] = decks["ITIBarge4"]["folders"]
-    for arguments in decks.values():
-        files = {}
-        original = PartFile.__init__
-
-        def opened(self, path, kind, original=original, files=files):
-            original(self, path, kind)
-            files.setdefault(Path(path), (kind, self))
-
-        with monkeypatch.context() as context:
-            context.setattr(PartFile, "__init__", opened)
-            before = outcome(arguments)
-        for path, (kind, file) in files.items():
-            if kind not in KEYS or (kind == "polar" and ("polar", "numalf") in moved):
-                continue
-            table = KEYS[kind]
-            for key, (written, _, values) in file.entries.items():
-                form = table.known(key)
-                if (kind, key) in moved or any(form in names for names in table.ignored.values()):
-                    continue
-                copy = shutil.copy(path, tmp_path / "kept")
-                try:
-                    for value in others(values):
-                        set_key(path, kind, written, value)
-                        after = outcome(arguments)
-                        shutil.copy(copy, path)
-                        if after != before:
-                            moved.add((kind, key))
-                            break
-                    else:
-                        still.add((kind, key))
-                finally:
-                    shutil.copy(copy, path)
-    expected = {(kind, same_key(key)) for keys in WITHOUT_EFFECT.values()
-                for kind, names in keys.items() for key in names.split()}  # fmt: skip
-    assert still - moved == expected
-    assert len(moved) > 200
+# --------------------------------------------------------------------------- tables of the files
 
 
 def test_each_line_of_map_is_asked_when_it_breaks(tmp_path):

@@ -18,13 +18,12 @@ def test_values_stand_before_their_keys_in_any_order_and_layout(tmp_path):
         tmp_path,
         "------ HEADING Mass --- [unused]\n"
         '   1.5D+02, Mass - of the thing (kg)\r\n\t.FALSE.   Flag\n"a, name"  File(1)  - quoted\n'
-        "3.0 ! KEY - behind a mark\n1.0, 2.0 3.0   List - of three\nDEFAULT Other - (-)\nplain.dat Bare\n",
+        "3.0 ! KEY - behind a mark\nDEFAULT Other - (-)\nplain.dat Bare\n",
     )
     assert file.number("mass") == 150.0
     assert file.flag("Flag") is False
     assert file.text("File1") == "a, name"
     assert file.number("key") == 3.0
-    assert file.numbers("List", count=3) == [1.0, 2.0, 3.0]
     assert file.number("Other", default=7.0) == 7.0
     assert file.text("Bare") == "plain.dat"
     assert file.number("NewName", "Mass") == 150.0

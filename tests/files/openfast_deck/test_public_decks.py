@@ -15,6 +15,7 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.files.openfast_deck.deck import read_deck
 from fowt_env.files.openfast_deck.importer import import_deck
+from fowt_env.files.openfast_deck.keys import UNKNOWN
 from fowt_env.files.openfast_deck.parser import PartFile
 
 DATA = Path(fowt_env.__file__).parent / "data"
@@ -187,6 +188,10 @@ def numbers_of(path):
     return [word for line in path.read_text().splitlines() if line[:1] != "#" for word in line.split()]
 
 
+def test_no_key_of_a_public_deck_is_unknown(imported):
+    assert UNKNOWN not in (imported.folder / "report.md").read_text()
+
+
 # --------------------------------------------------------------------------- OpenFAST's summaries
 
 # of ElastoDyn of OpenFAST 2895884 in double precision; of the barge's tower and platform of FAST 8.16 in
@@ -254,8 +259,9 @@ def test_the_lines_of_moordyn_1_are_those_of_map(floater):
     lines = {}
     for kind in ("MAP", "MoorDyn"):
         parts = arguments["parts"] | {"mooring": FAST / f"NRELOffshrBsline5MW_{floater}_{kind}.dat"}
-        found = read_deck(None, parts, arguments["search"]).lines
-        lines[kind] = sorted(found, key=lambda line: round(math.degrees(math.atan2(*line.anchor[:2]))))
+        deck = read_deck(None, parts, arguments["search"])
+        assert all(here != UNKNOWN for _, here in deck.notes)
+        lines[kind] = sorted(deck.lines, key=lambda line: round(math.degrees(math.atan2(*line.anchor[:2]))))
     for ours, other in zip(lines["MAP"], lines["MoorDyn"], strict=True):
         assert other.anchor == pytest.approx(ours.anchor, abs=0.04)
         assert other.fairlead == pytest.approx(ours.fairlead, abs=0.04)
