@@ -108,8 +108,6 @@ class Writer:
         """Return the Surface of a text, which must not be empty, with `height` pixels per line."""
         key = text, height, colour
         if key not in self._kept:
-            if not text:
-                raise ValueError("no text: pygame cannot scale an empty picture")
             if len(self._kept) >= self.MOST:
                 self._kept.clear()
             size = max(6, round(height * self.zoom))
@@ -182,7 +180,12 @@ def tension_colour(tension, at_rest):
     """Return the colour of a line: blue if loose, yellow at its tension at rest, red at 1.5 times that."""
     fraction = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
     other, fraction = (TIGHT, min(fraction, 1.0)) if fraction > 0.0 else (LOOSE, min(-fraction, 1.0))
-    return tuple(round(a + fraction * (b - a)) for a, b in zip(AT_REST, other, strict=True))
+    return _mixed(AT_REST, other, fraction)
+
+
+def _mixed(colour, other, share):
+    """Return the colour at a share of the way to another one."""
+    return tuple(round(a + share * (b - a)) for a, b in zip(colour, other, strict=True))
 
 
 class _SideView:
@@ -198,12 +201,34 @@ class _SideView:
         return np.column_stack([across, (self.top - points[:, 2]) * self.scale])
 
 
-def _shades(colour):
-    """Yield (from, to, colour) of the strips of a lit cylinder, -1 to 1 across."""
-    edges = np.linspace(-1.0, 1.0, 8)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
-        light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
-        yield low, high, [round(c * light) for c in colour]
+def _dark(colour):
+    """Return a colour in shade."""
+    return [round(0.85 * c) for c in colour]
+
+
+def _solids(platform):
+    """Return [(ends (2, 3), (diameters) or (width, height), "round" or "box")], the farthest first.
+
+    The spar, else shapes of the platform file, else members, else a box of the hull's volume and draft.
+    """
+    hull = platform.hull
+    if hull is not None:
+        axis = [(0.0, 0.0, z) for z in hull.z]
+        return [
+            (np.array(axis[i : i + 2]), np.array(hull.diameter[i : i + 2]), "round")
+            for i in range(len(axis) - 1)
+        ]
+    solids = sorted(platform.shapes or platform.members, key=lambda solid: -(solid.start[1] + solid.end[1]))
+    if not solids:
+        half, middle = 0.5 * np.sqrt(platform.potential_flow.volume / platform.draft), -0.25 * platform.draft
+        ends = np.array([(-half, 0.0, middle), (half, 0.0, middle)])
+        return [(ends, (0.01, 1.5 * platform.draft), "box")]
+    return [
+        (np.array([solid.start, solid.end]), solid.section, "box")
+        if solid.diameter is None
+        else (np.array([solid.start, solid.end]), np.broadcast_to(solid.diameter, 2), "round")
+        for solid in solids
+    ]
 
 
 class TurbinePanel(_SideView):
@@ -240,12 +265,10 @@ class TurbinePanel(_SideView):
 
     def _gradient(self, colours, end, begin=0):
         """Return a Surface with a colour gradient between two heights."""
-        pygame = self.pygame
-        picture = pygame.Surface(self.inner, pygame.SRCALPHA)
+        picture = self.pygame.Surface(self.inner, self.pygame.SRCALPHA)
         for y in range(self.inner[1]):
-            fraction = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
-            mixed = [round(a + fraction * (b - a)) for a, b in zip(*colours, strict=True)]
-            pygame.draw.line(picture, mixed, (0, y), (self.inner[0], y))
+            share = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
+            self.pygame.draw.line(picture, _mixed(*colours, share), (0, y), (self.inner[0], y))
         return picture
 
     def draw(self, row, label=None, colour=None, speed=None):
@@ -268,28 +291,23 @@ class TurbinePanel(_SideView):
         """Fill a polygon of body-fixed points."""
         self.pygame.draw.polygon(canvas, colour, self.pixels(pose.inertial(points)))
 
-    def _tapered(self, canvas, pose, heights, diameters, colour):
-        """Draw a shaded body of revolution about the platform's axis."""
-        for low, high, shade in _shades(colour):
-            sides = [(low, heights, diameters), (high, heights[::-1], diameters[::-1])]
-            body = [(0.5 * s * d, 0.0, z) for s, zs, ds in sides for z, d in zip(zs, ds, strict=True)]
-            self._polygon(canvas, shade, pose, body)
-
     def _cylinder(self, canvas, pose, ends, diameters, colour):
-        """Draw a shaded cylinder or cone of any direction between two body-fixed points."""
+        """Draw a shaded cylinder or cone between two body-fixed points."""
         first, second = self.pixels(pose.inertial(ends))
         radii = 0.5 * self.scale * np.asarray(diameters)
         along = second - first
         length = float(np.hypot(*along))
         if length < 0.5 * self.scale * np.linalg.norm(np.subtract(*ends)):  # seen along its axis
-            self.pygame.draw.circle(canvas, [round(0.85 * c) for c in colour], second, max(radii[1], 1.0))
+            self.pygame.draw.circle(canvas, _dark(colour), second, max(radii[1], 1.0))
         if length < 1.0:
             return
         across = np.array([-along[1], along[0]]) / length
-        for low, high, shade in _shades(colour):
+        edges = np.linspace(-1.0, 1.0, 8)
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
             corners = [(first, low, 0), (second, low, 1), (second, high, 1), (first, high, 0)]
             body = [point + side * radii[end] * across for point, side, end in corners]
-            self.pygame.draw.polygon(canvas, shade, body)
+            self.pygame.draw.polygon(canvas, [round(c * light) for c in colour], body)
 
     def _member(self, canvas, pose, ends, diameters, limit):
         """Draw a cylinder or cone, yellow above the height `limit`."""
@@ -303,47 +321,25 @@ class TurbinePanel(_SideView):
 
     def _beam(self, canvas, pose, ends, section, limit):
         """Draw a straight box: outline dark, near side light, yellow above the height `limit`."""
-        start, end = ends
-        width, height = section
-        along = (end - start) / np.linalg.norm(end - start)
-        across = np.array([-along[1], along[0], 0.0]) * 0.5 * width / np.hypot(*along[:2])
-        up, middle = np.array([0.0, 0.0, 0.5 * height]), 0.5 * (start[2] + end[2])
-        near = min((-1, 1), key=lambda side: (start + side * across)[1])
-        share = (limit - middle) / (0.5 * height)
-        layers = [(-1.0, 1.0, STEEL if middle < limit else YELLOW)]
-        if -1.0 < share < 1.0:
-            layers = [(-1.0, share, STEEL), (share, 1.0, YELLOW)]
-        for low, high, colour in layers:
-            corners = [p + s * across + z * up for p in ends for s in (-1, 1) for z in (low, high)]
-            seen = self.pixels(pose.inertial(corners))
-            dark = [round(0.85 * c) for c in colour]
-            self.pygame.draw.polygon(canvas, dark, seen[ConvexHull(seen).vertices])
-            face = [(start, low), (end, low), (end, high), (start, high)]
-            self._polygon(canvas, colour, pose, [p + near * across + z * up for p, z in face])
+        along, half = ends[1] - ends[0], 0.5 * section[1]
+        near = np.array([-along[1], along[0], 0.0]) * 0.5 * section[0] / np.hypot(*along[:2])
+        near = near if near[1] < 0.0 else -near
+        share = np.clip((limit - ends[:, 2].mean()) / half, -1.0, 1.0)
+        for low, high, colour in ((-1.0, share, STEEL), (share, 1.0, YELLOW)):
+            if low < high:
+                face = near + np.vstack([ends + (0, 0, low * half), ends[::-1] + (0, 0, high * half)])
+                seen = self.pixels(pose.inertial(np.vstack([face, face - 2.0 * near])))
+                self.pygame.draw.polygon(canvas, _dark(colour), seen[ConvexHull(seen).vertices])
+                self._polygon(canvas, colour, pose, face)
 
     def _hull(self, canvas, pose):
-        """Draw hull and tower: the spar, else shapes of the platform file, else members, else a box."""
+        """Draw hull and tower."""
         platform, tower = self.scene.platform, self.scene.platform.tower
-        hull, draft, limit = platform.hull, platform.draft, -SPLASH * platform.draft
-        solids = platform.shapes or platform.members
-        if hull is not None:
-            z, diameter = np.array(hull.z), np.array(hull.diameter)
-            self._tapered(canvas, pose, z, diameter, STEEL)
-            splash = np.array([max(z[0], -SPLASH * abs(z[0])), z[-1]])
-            self._tapered(canvas, pose, splash, np.interp(splash, z, diameter), YELLOW)
-        elif not solids:
-            half = 0.5 * np.sqrt(platform.potential_flow.volume / draft)
-            for low, high, colour in ((-draft, limit, STEEL), (limit, 0.5 * draft, YELLOW)):
-                box = [(-half, 0.0, low), (half, 0.0, low), (half, 0.0, high), (-half, 0.0, high)]
-                self._polygon(canvas, colour, pose, box)
-        for solid in sorted(solids, key=lambda solid: -(solid.start[1] + solid.end[1])):  # farthest first
-            ends = np.array([solid.start, solid.end])
-            if solid.diameter is None:
-                self._beam(canvas, pose, ends, solid.section, limit)
-            else:
-                self._member(canvas, pose, ends, np.broadcast_to(solid.diameter, 2), limit)
-        heights = np.array([tower.base_height, tower.top_height])
-        self._tapered(canvas, pose, heights, np.array([tower.base_diameter, tower.top_diameter]), WHITE)
+        for ends, size, draw in _solids(platform):
+            shape = self._member if draw == "round" else self._beam
+            shape(canvas, pose, ends, size, -SPLASH * platform.draft)
+        ends = np.array([(0.0, 0.0, tower.base_height), (0.0, 0.0, tower.top_height)])
+        self._cylinder(canvas, pose, ends, (tower.base_diameter, tower.top_diameter), WHITE)
 
     def _sea_over(self, canvas, time):
         """Draw the sea over the parts below the surface."""

@@ -10,7 +10,7 @@ from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 from fowt_env.training.design.linear_bound import efficient
 from fowt_env.visual.response import broken_at_wraps
-from fowt_env.visual.style import COLOURS, FAINT, INK, SOFT, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, FAINT, INK, LINES, SOFT, new_figure, save_figure, style_axes
 
 MODE_NAMES = (
     "surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed", "blade_pitch", "other",
@@ -218,32 +218,39 @@ def plot_bound(table, names, points=None, path=None, title=None):
         winds = [wind for wind in winds if wind in set(points[WIND])]
     if not winds:
         raise InputError("nothing to plot: no wind has both a Pareto front and simulated points")
+    looks = {
+        information: {"label": text, "color": COLOURS[i], "ls": LINES[i % 4], "linewidth": 1.2 if i else 1.6}
+        for i, (information, text) in enumerate(names.items())
+    }
     columns = min(4, len(winds))
     rows = -(-(len(winds) + (len(winds) > 3)) // columns)
     figure = new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
     places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
     for axes, wind in zip(places, winds, strict=False):
-        style_axes(axes)
-        here = table[table[WIND] == wind]
-        for index, (information, text) in enumerate(names.items()):
-            front = here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
-            if len(front):
-                line = efficient(front)
-                style = {"color": COLOURS[index], "linewidth": 1.6 if index == 0 else 1.2}
-                axes.plot(line[:, 0], line[:, 1], label=text, ls=("-", "--", ":", "-.")[index % 4], **style)
-        axes.scatter(1.0, 1.0, marker="+", s=70, color=INK, label="gspi_oc3", zorder=4)
+        draw_fronts(axes, table, wind, looks, (1.25, 1.15))
         if points is not None:
             shown = points[points[WIND] == wind]
             drawn = axes.scatter(
                 shown["speed_ratio_[-]"], shown["pitch_ratio_[-]"], c=shown["travel_ratio_[-]"], **TRAVEL,
                 s=30, edgecolor=INK, linewidth=0.5, label="lqr, simulated", zorder=5,
             )  # fmt: skip
-        axes.set_xlim(0.0, 1.25)
-        axes.set_ylim(0.0, 1.15)
-        axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
     if points is not None:
         _colour_bar(figure, drawn, places, "mean blade-pitch rate over that of gspi_oc3")
     return finish_bound(figure, places, len(winds), path, title)
+
+
+def draw_fronts(axes, table, wind, looks, ends):
+    """Draw the fronts {information: look} of one wind of a bound_table, within the upper ends of the axes."""
+    style_axes(axes)
+    here = table[table[WIND] == wind]
+    for information, look in looks.items():
+        front = efficient(here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]])
+        if len(front):
+            axes.plot(*front.T, **look)
+    axes.scatter(1.0, 1.0, marker="+", s=70, color=INK, label="gspi_oc3", zorder=4)
+    axes.set_xlim(0.0, ends[0])
+    axes.set_ylim(0.0, ends[1])
+    axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
 
 
 def finish_bound(figure, places, used, path, title):

@@ -35,7 +35,7 @@ from fowt_env.training.evaluation.results import (
     run_file,
     write_run,
 )
-from fowt_env.training.reports.terminal import evaluation_plots
+from fowt_env.training.reports.evaluation_plots import evaluation_plots
 
 CALM = Case("calm", 16.0)
 SHORT = {"duration": 4.0, "skip": 1.0}

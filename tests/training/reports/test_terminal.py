@@ -10,13 +10,13 @@ from fowt_env.training.evaluation.cases import chosen_cases
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.reports.evaluation_plots import evaluation_plots
 from fowt_env.training.reports.metric_words import SHORT
 from fowt_env.training.reports.terminal import (
     DROPPED_FIRST,
     LEADERBOARD,
     LEADERBOARD_DROPS,
     PRINTED_METRICS,
-    evaluation_plots,
     leaderboard_rows,
     summary_rows,
 )
