@@ -33,6 +33,7 @@ WAVE_STEP = 9  # pixels of the enlarged picture between points of the sea surfac
 LEAST_BLADE = 0.0055, 0.0022  # of the picture's height: smallest half width of a drawn blade at root and tip
 FIRST_WINDOWS = (15.0, 30.0, WINDOW)  # s shown at the start of a run
 ANGLES = ("PtfmRoll", "PtfmPitch", "PtfmYaw")
+ACTION_NAMES = {2: ("torque", "blade pitch"), 4: ("torque", "blade 1", "blade 2", "blade 3")}
 MOTIONS = ("PtfmSurge", "PtfmSway", "PtfmHeave", *ANGLES)
 
 INK, SOFT, FAINT, CARD, PAGE = (30, 38, 50), (110, 120, 134), (224, 229, 235), (255,) * 3, (240, 243, 247)
@@ -207,28 +208,24 @@ def _dark(colour):
 
 
 def _solids(platform):
-    """Return [(ends (2, 3), (diameters) or (width, height), "round" or "box")], the farthest first.
+    """Yield (ends (2, 3), two diameters or (width, height), whether round) of a hull, the farthest first.
 
     The spar, else shapes of the platform file, else members, else a box of the hull's volume and draft.
     """
-    hull = platform.hull
+    hull, draft = platform.hull, platform.draft
+    solids = platform.shapes or platform.members
     if hull is not None:
         axis = [(0.0, 0.0, z) for z in hull.z]
-        return [
-            (np.array(axis[i : i + 2]), np.array(hull.diameter[i : i + 2]), "round")
-            for i in range(len(axis) - 1)
-        ]
-    solids = sorted(platform.shapes or platform.members, key=lambda solid: -(solid.start[1] + solid.end[1]))
-    if not solids:
-        half, middle = 0.5 * np.sqrt(platform.potential_flow.volume / platform.draft), -0.25 * platform.draft
-        ends = np.array([(-half, 0.0, middle), (half, 0.0, middle)])
-        return [(ends, (0.01, 1.5 * platform.draft), "box")]
-    return [
-        (np.array([solid.start, solid.end]), solid.section, "box")
-        if solid.diameter is None
-        else (np.array([solid.start, solid.end]), np.broadcast_to(solid.diameter, 2), "round")
-        for solid in solids
-    ]
+        for i in range(len(axis) - 1):
+            yield np.array(axis[i : i + 2]), hull.diameter[i : i + 2], True
+    elif not solids:
+        half = 0.5 * np.sqrt(platform.potential_flow.volume / draft)
+        yield np.array([(-half, 0.0, -0.25 * draft), (half, 0.0, -0.25 * draft)]), (0.01, 1.5 * draft), False
+    else:
+        for solid in sorted(solids, key=lambda solid: -(solid.start[1] + solid.end[1])):
+            is_round = solid.diameter is not None
+            size = np.broadcast_to(solid.diameter, 2) if is_round else solid.section
+            yield np.array([solid.start, solid.end]), size, is_round
 
 
 class TurbinePanel(_SideView):
@@ -282,8 +279,9 @@ class TurbinePanel(_SideView):
             tint = tension_colour(tension, self.tension_at_rest[number])
             pygame.draw.lines(canvas, tint, False, self.pixels(points), 2 * SAMPLING)
         self._rotor(canvas, pose, row)
-        self._wind(canvas, row)
+        place = self._wind(canvas, row["Wind1VelX"])
         picture = pygame.transform.smoothscale(canvas, self.size)
+        self._writer.put(picture, f"{row['Wind1VelX']:.1f} m/s", place, self._small, RGB_COLOURS[0])
         self._words(picture, row, label, colour, speed)
         return picture
 
@@ -335,8 +333,8 @@ class TurbinePanel(_SideView):
     def _hull(self, canvas, pose):
         """Draw hull and tower."""
         platform, tower = self.scene.platform, self.scene.platform.tower
-        for ends, size, draw in _solids(platform):
-            shape = self._member if draw == "round" else self._beam
+        for ends, size, is_round in _solids(platform):
+            shape = self._member if is_round else self._beam
             shape(canvas, pose, ends, size, -SPLASH * platform.draft)
         ends = np.array([(0.0, 0.0, tower.base_height), (0.0, 0.0, tower.top_height)])
         self._cylinder(canvas, pose, ends, (tower.base_diameter, tower.top_diameter), WHITE)
@@ -410,37 +408,33 @@ class TurbinePanel(_SideView):
         wide = (side * np.maximum(side * reach, np.linspace(*least, count)))[:, None] * across
         return np.vstack([middle + wide, tip, (middle - wide)[::-1]])
 
-    def _wind(self, canvas, row):
-        """Draw an arrow at hub height with the length of the wind speed."""
-        pygame, rotor = self.pygame, self.scene.turbine.rotor
-        speed = row["Wind1VelX"]
-        y = (self.top - rotor.hub_height) * self.scale
-        x, unit = 0.035 * self.inner[0], 0.011 * self.inner[0]
-        tip, head = x + unit * speed, 0.014 * self.inner[1]
+    def _wind(self, canvas, speed):
+        """Draw an arrow at hub height with the length of the wind speed; return the place of its text."""
+        x, y = 0.035 * self.inner[0], (self.top - self.scene.turbine.rotor.hub_height) * self.scale
+        tip, head = x + 0.011 * self.inner[0] * speed, 0.014 * self.inner[1]
         if abs(speed) > 0.05:
             back = tip - np.sign(speed) * 1.6 * head
-            pygame.draw.line(canvas, RGB_COLOURS[0], (x, y), (back, y), 3 * SAMPLING)
-            pygame.draw.polygon(canvas, RGB_COLOURS[0], [(tip, y), (back, y - head), (back, y + head)])
-        self._wind_text = f"{speed:.1f} m/s", x / SAMPLING, (y + 1.2 * head) / SAMPLING
+            self.pygame.draw.line(canvas, RGB_COLOURS[0], (x, y), (back, y), 3 * SAMPLING)
+            corners = [(tip, y), (back, y - head), (back, y + head)]
+            self.pygame.draw.polygon(canvas, RGB_COLOURS[0], corners)
+        return x / SAMPLING, (y + 1.2 * head) / SAMPLING + 2
 
     def _words(self, picture, row, label, colour, speed):
-        """Write time, speed, label and wind onto the picture after averaging, which would blur text."""
-        text, x, y = self._wind_text
+        """Write time, speed and label onto the picture after averaging, which would blur text."""
         put, margin = self._writer.put, round(0.02 * self.size[1])
-        put(picture, text, (x, y + 2), self._small, RGB_COLOURS[0])
         right = self.size[0] - margin
         put(picture, f"{row['Time']:.1f} s", (right, margin), self._large, INK, right=True)
         if speed is not None:
             place = right, margin + 1.2 * self._large
             put(picture, f"{speed:.3g} x real time", place, self._small, SOFT, right=True)
         if label:
-            chip = 0
+            left = margin
             if colour is not None:
                 chip = round(0.75 * self._large)
                 box = self.pygame.Rect(margin, margin + 1, chip, round(0.6 * self._large))
                 self.pygame.draw.rect(picture, colour, box, border_radius=2)
-                chip += margin // 2
-            put(picture, label, (margin + chip, margin), self._large, INK)
+                left += chip + margin // 2
+            put(picture, label, (left, margin), self._large, INK)
 
 
 class MooringPanel(_SideView):
@@ -478,9 +472,8 @@ class MooringPanel(_SideView):
         spar = self.pixels(pose.inertial([(0.0, 0.0, keel), (0.0, 0.0, 0.0), (0.0, 0.0, hub)]))
         pygame.draw.line(picture, YELLOW, spar[0], spar[1], 3)
         pygame.draw.line(picture, SOFT, spar[1], spar[2], 2)
-        shown = ", ".join(texts)
-        if len(texts) > MOST_TENSIONS:
-            shown = f"{min(texts, key=int)} to {max(texts, key=int)}"
+        many = len(texts) > MOST_TENSIONS
+        shown = f"{min(texts, key=int)} to {max(texts, key=int)}" if many else ", ".join(texts)
         self._writer.put(picture, f"fairlead tension: {shown} kN", (10, self.size[1] - 34), 16, SOFT)
         tension_key(pygame, picture, self._writer, (10, self.size[1] - 16), self.size[0] - 20)
         return picture
@@ -519,30 +512,14 @@ class TracePanel:
         self._writer = Writer(pygame, min(1.0, max(0.72, size[0] / 330.0, size[1] / 700.0)))
         self.histories = [deque() for _ in range(runs)]
 
-    def clear(self):
-        """Delete the history."""
-        for history in self.histories:
-            history.clear()
-
     def add(self, rows):
         """Append one row of channels per run; a decreasing time clears the history."""
-        time = rows[0]["Time"]
-        if self.histories[0] and time < self.histories[0][-1][0]:
-            self.clear()
         for history, row in zip(self.histories, rows, strict=True):
-            if history and row["Time"] == history[-1][0]:
+            while history and row["Time"] <= history[-1][0]:
                 history.pop()
             history.append((row["Time"], *(row[trace.channel] for trace in TRACES)))
             while self.span is None and history[0][0] < row["Time"] - WINDOW:
                 history.popleft()
-
-    def _times(self, data):
-        """Return (begin, end) of the time axis."""
-        if self.span is not None:
-            return self.span
-        first, last = data[0][0, 0], data[0][-1, 0]
-        window = next((w for w in FIRST_WINDOWS if last - first <= w), WINDOW)
-        return max(first, last - window), max(first, last - window) + window
 
     def _levels(self, trace):
         """Return [(text, value)] of the horizontal lines of a strip."""
@@ -563,7 +540,10 @@ class TracePanel:
         foot, head, gutter = round(16 * zoom), round(20 * zoom), round(42 * zoom)
         height = (self.size[1] - foot) / len(TRACES)
         data = [np.array(history) for history in self.histories]
-        times = self._times(data)
+        first, last = data[0][0, 0], data[0][-1, 0]
+        window = next((w for w in FIRST_WINDOWS if last - first <= w), WINDOW)
+        begin = max(first, last - window)
+        times = self.span or (begin, begin + window)
         for number, trace in enumerate(TRACES):
             top, width = number * height, self.size[0] - gutter - 10
             box = self.pygame.Rect(gutter, round(top + head), width, round(height - head - 7))
@@ -617,36 +597,27 @@ class TracePanel:
             put(picture, levels, (left, top + 6), 14, LEVEL)
 
 
-class AgentPanel:
-    """Draws the last action, each entry as a bar about zero, and the reward of the step."""
-
-    NAMES = {2: ("torque", "blade pitch"), 4: ("torque", "blade 1", "blade 2", "blade 3")}
-
-    def __init__(self, pygame, width):
-        self.pygame, self.width = pygame, width
-        self._writer = Writer(pygame)
-
-    def draw(self, agent):
-        """Return the picture of an Agent."""
-        draw, put = self.pygame.draw, self._writer.put
-        names = self.NAMES.get(len(agent.action), [f"action {n + 1}" for n in range(len(agent.action))])
-        picture = self.pygame.Surface((self.width, 18 * (len(names) + 1) + 10), self.pygame.SRCALPHA)
-        draw.rect(picture, (*CARD, 225), picture.get_rect(), border_radius=4)
-        left, right = 86, self.width - 46
-        middle = 0.5 * (left + right)
-        reward = "-" if agent.reward is None else f"{agent.reward:+.3f}"
-        rows = [(name, value, f"{value:+.2f}") for name, value in zip(names, agent.action, strict=True)]
-        for number, (name, value, text) in enumerate([*rows, ("reward", None, reward)]):
-            y = 6 + 18 * number
-            put(picture, name, (8, y + 2), 16, SOFT)
-            put(picture, text, (self.width - 8, y + 2), 16, INK, right=True)
-            if value is not None:
-                draw.rect(picture, PAGE, (left, y + 2, right - left, 11))
-                tip = middle + 0.5 * (right - left) * min(max(value, -1.0), 1.0)
-                bar = (round(min(middle, tip)), y + 2, max(1, round(abs(tip - middle))), 11)
-                draw.rect(picture, RGB_COLOURS[0], bar)
-                draw.line(picture, SOFT, (middle, y), (middle, y + 14))
-        return picture
+def agent_picture(pygame, writer, width, agent):
+    """Return the picture of an Agent: each entry of the action as a bar about zero, and the reward."""
+    draw, put = pygame.draw, writer.put
+    names = ACTION_NAMES.get(len(agent.action), [f"action {n + 1}" for n in range(len(agent.action))])
+    picture = pygame.Surface((width, 18 * (len(names) + 1) + 10), pygame.SRCALPHA)
+    draw.rect(picture, (*CARD, 225), picture.get_rect(), border_radius=4)
+    left, right = 86, width - 46
+    middle = 0.5 * (left + right)
+    reward = "-" if agent.reward is None else f"{agent.reward:+.3f}"
+    rows = [(name, value, f"{value:+.2f}") for name, value in zip(names, agent.action, strict=True)]
+    for number, (name, value, text) in enumerate([*rows, ("reward", None, reward)]):
+        y = 6 + 18 * number
+        put(picture, name, (8, y + 2), 16, SOFT)
+        put(picture, text, (width - 8, y + 2), 16, INK, right=True)
+        if value is not None:
+            draw.rect(picture, PAGE, (left, y + 2, right - left, 11))
+            tip = middle + 0.5 * (right - left) * min(max(value, -1.0), 1.0)
+            bar = (round(min(middle, tip)), y + 2, max(1, round(abs(tip - middle))), 11)
+            draw.rect(picture, RGB_COLOURS[0], bar)
+            draw.line(picture, SOFT, (middle, y), (middle, y + 14))
+    return picture
 
 
 class View:
@@ -672,14 +643,15 @@ class View:
         self.mooring = MooringPanel(pygame, scenes[0], (side, below)) if moored else None
         levels = ratings(scenes[0].turbine)
         self.traces = TracePanel(pygame, (side, height - below), len(scenes), levels, span, limits)
-        self.agent = AgentPanel(pygame, min(240, self.right - 20))
+        self._writer = Writer(pygame)
         self.canvas = pygame.Surface(size)
         self._window = self._clock = None
 
     def enter(self, scene):
         """Change the scene of the first panel and clear the traces."""
         self.panels[0].enter(scene)
-        self.traces.clear()
+        for history in self.traces.histories:
+            history.clear()
 
     def draw(self, rows, agent=None):
         """Return the pygame Surface of one row of channels per run, and of the Agent of the first run."""
@@ -694,7 +666,8 @@ class View:
             picture = self.mooring.draw(rows[0], self.panels[0].scene, self.panels[0].tension_at_rest)
             self.canvas.blit(picture, (self.right, self.size[1] - self.mooring.size[1]))
         if agent is not None:
-            self.canvas.blit(self.agent.draw(agent), (10, 10))
+            picture = agent_picture(self.pygame, self._writer, min(240, self.right - 20), agent)
+            self.canvas.blit(picture, (10, 10))
         return self.canvas
 
     def array(self):

@@ -109,30 +109,22 @@ def resolve(algo, task, seed, steps, changes=None):
     check_whole_number("steps", steps, 1)
     settings = deepcopy(table[task])
     for key, value in (changes or {}).items():
-        _change(settings, key, value)
+        *sections, last = key.split(".")
+        if (sections or [last])[0] not in SECTIONS:
+            raise unknown("setting", key, (f"{section}.*" for section in SECTIONS))
+        place = settings
+        for section in sections:
+            place = place.setdefault(section, {})
+            if not isinstance(place, dict):
+                raise InputError(f"setting {key!r}: {section!r} holds no further settings")
+        place[last] = value
     return check_settings({"algo": algo, "name": task, "seed": seed, "steps": steps} | settings)
-
-
-def _change(settings, key, value):
-    """Set a dotted key. Raises: InputError for a section that does not exist."""
-    *sections, last = key.split(".")
-    if (sections or [last])[0] not in SECTIONS:
-        raise unknown("setting", key, (f"{section}.*" for section in SECTIONS))
-    place = settings
-    for section in sections:
-        place = place.setdefault(section, {})
-        if not isinstance(place, dict):
-            raise InputError(f"setting {key!r}: {section!r} holds no further settings")
-    place[last] = value
 
 
 def environment_settings(settings):
     """Return the settings of FowtEnv for training: task with its reach and weather seeds, information set."""
-    given = dict(settings["environment"])
-    given.pop("num_envs", None)
-    given.pop("randomise", None)
-    turbine = turbine_of(given["platform"]) if "platform" in given else None
-    task = task_of(settings["task"], turbine)
+    given = {k: v for k, v in settings["environment"].items() if k not in ("num_envs", "randomise")}
+    task = task_of(settings["task"], turbine_of(given["platform"]) if "platform" in given else None)
     reach = {name: given.pop(name) for name in TASK_FIELDS if name in given}
     reach = {name: tuple(value) if isinstance(value, list) else value for name, value in reach.items()}
     task = replace(task, weather_seeds=(TRAINING.start, TRAINING.stop), **reach)
@@ -177,25 +169,24 @@ def validation_episodes(settings):
     """
     chosen = settings["validation"]
     seeds = seeds_for("validation", int(chosen["first"]), int(chosen["seeds"]))
-    found = []  # (kind of episode, wind, sea, seed, more)
+    episodes, kinds = [], []
+
+    def add(kind, wind, seed, **more):
+        state = None if kind == "steady" else joint_sea_state(SITE, wind["speed"])
+        sea = None if state is None else {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
+        episodes.append({"wind": wind, "sea": sea, "weather_seed": seed} | more)
+        kinds.append(kind)
+
     for speed in map(float, chosen["winds"]):
         wind = {"kind": "ntm", "speed": speed, "class": "B", "sigma": chosen.get("sigma", "90%")}
-        found += [("turbulent", wind, _sea_at(speed), seed, {}) for seed in seeds]
+        for seed in seeds:
+            add("turbulent", wind, seed)
     for speed in map(float, chosen.get("steady", ())):
-        wind = {"kind": "steady", "speed": speed}
-        found.append(("steady", wind, None, seeds[0], {"offsets": STEADY_KICK}))
+        add("steady", {"kind": "steady", "speed": speed}, seeds[0], offsets=STEADY_KICK)
     for speed in map(float, chosen.get("gusts", ())):
         for kind in ("eog", "edc"):
-            wind = {"kind": kind, "speed": speed, "start": GUST_START}
-            found.append(("gust", wind, _sea_at(speed), seeds[0], {}))
-    episodes = [{"wind": wind, "sea": sea, "weather_seed": seed} | more for _, wind, sea, seed, more in found]
-    return episodes, [kind for kind, *_ in found]
-
-
-def _sea_at(speed):
-    """Return the JONSWAP sea of the site's normal sea state at a wind speed (m/s)."""
-    state = joint_sea_state(SITE, speed)
-    return {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
+            add("gust", {"kind": kind, "speed": speed, "start": GUST_START}, seeds[0])
+    return episodes, kinds
 
 
 def make_envs(settings):
@@ -230,14 +221,12 @@ def validation_env(settings, chosen):
 
     given = settings["validation"]
     episodes, kinds = validation_episodes(settings)
-    sensors = given.get("sensors")
-    per_env = None
+    sensors, per_env = given.get("sensors"), None
     if sensors:
-        turns = [i % given["seeds"] % len(sensors) for i in range(len(episodes))]
         exact = {"noise": 0.0, "delay": 0}
         per_env = [
-            {"sensors": exact if kind == "steady" else sensors[turn]}
-            for kind, turn in zip(kinds, turns, strict=True)
+            {"sensors": exact if kind == "steady" else sensors[i % given["seeds"] % len(sensors)]}
+            for i, kind in enumerate(kinds)
         ]
     return ValidationVecEnv(episodes, given.get("skip", 60.0), threads=1, per_env=per_env, **chosen)
 
@@ -550,7 +539,7 @@ class Training:
 
         if not self.rows:
             return None
-        return plot_learning_curve({self.folder.name: self.rows}, self.folder / "learning_curve.png")
+        return plot_learning_curve(self.folder.name, self.rows, self.folder / "learning_curve.png")
 
 
 def _schedules(settings):
