@@ -36,14 +36,13 @@ def _wind_colours(winds):
 
     Raises: InputError without winds.
     """
-    from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     if not winds:
         raise InputError("nothing to plot: no linear models were given")
     low, high = min(winds), max(winds)
-    scale = ScalarMappable(Normalize(low, high if high > low else low + 1.0), colormaps["viridis"])
+    scale = ScalarMappable(Normalize(low, high if high > low else low + 1.0), "viridis")
     return {wind: scale.to_rgba(wind) for wind in winds}, scale
 
 
