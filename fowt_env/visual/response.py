@@ -20,7 +20,7 @@ from fowt_env.visual.style import (
     save_figure,
     style_axes,
 )
-from fowt_env.visual.time_series import TIME, even_step, named_runs
+from fowt_env.visual.time_series import PANELS, TIME, even_step, named_runs
 
 WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`
@@ -29,13 +29,8 @@ HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of c
 ENERGETIC = 0.02  # of the peak of the wave spectrum: least wave energy for an estimate of an RAO
 COHERENT = 0.5  # above it an RAO is drawn solid
 RAO_RANGE = (0.015, 0.3)  # Hz: from below the resonances of spars and semi-submersibles to the end of waves
-BOXES = (
-    ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
-    ("power\n(kW)", "GenPwr_[kW]"),
-    ("blade pitch\n(deg)", "BldPitch1_[deg]"),
-    ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
-    ("surge\n(m)", "PtfmSurge_[m]"),
-    ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
+BOXES = tuple(
+    panel for panel in PANELS if panel[1] not in ("Wind1VelX_[m/s]", "Wave1Elev_[m]", "GenTq_[kN-m]")
 )
 SCHEDULE = (
     ("rotor speed (rpm)", "RotSpeed_[rpm]"),

@@ -2,14 +2,11 @@
 
     fowt design bound --wind 12,14,16,18,20,22,24
 
-Per wind speed, on the linear plant of bound_plant.py (surge, heave, platform pitch, rotor, pitch actuator,
-hull drag linearised in the sea and the motion under gspi_oc3): the least weighted sum of both variances at no
-more blade-pitch travel and no more power deviation than gspi_oc3 has on the same model, and a torque
-deviation that the drivetrain can give (the torque's own maximum is 10 % above rated). The limits are met by
-multipliers in the quadratic cost, so that each point is optimal among all linear controllers of the same
-information, for weather of the fitted spectra; deviations are those in the whole spectra. The linear model
-has no limits of torque, pitch or their rates, and nothing is sampled. A controller that moves the platform
-less than gspi_oc3 has a little less drag than the model: the limit errs to the low side.
+Per wind speed, on the linear plant of bound_plant.py: the least weighted sum of both variances at no more
+blade-pitch travel and no more power deviation than gspi_oc3 has on the same model, and a torque deviation
+that the drivetrain can give. The limits are met by multipliers in the quadratic cost, so that each point is
+optimal among all linear controllers of the same information, for weather of the fitted spectra; deviations
+are those in the whole spectra. The model limits no torque, pitch or rate, and nothing is sampled.
 """
 
 from dataclasses import replace

@@ -47,6 +47,9 @@ TITLES = {
     "TwrBsMyt_DEL_[kN-m]": "tower base, fatigue load (kN m)",
 }
 UPRIGHT = 6  # characters of a case's name that fit below a group of marks without being turned
+# places of a name about its mark: to the right and up, and points of distance
+SIDES = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)])
+WAYS = np.array([0.0, 10.0, 22.0, 36.0, 52.0, 70.0])
 ROOM = 0.6  # of the distance between two cases that the marks of one may take
 
 
@@ -85,17 +88,11 @@ def plot_evaluation(table, metrics, path=None, title=None):
             mean, low, high = (getattr(groups, what)().reindex(cases) for what in ("mean", "min", "max"))
             offset = step * (index - 0.5 * (len(controllers) - 1))
             axes.errorbar(
-                np.arange(len(cases)) + offset,
-                mean,
+                np.arange(len(cases)) + offset, mean,
                 yerr=np.maximum([mean - low, high - mean], 0.0),  # a mean of equal figures is rounded
-                color=COLOURS[index % len(COLOURS)],
-                marker=MARKS[index % len(MARKS)],
-                markersize=4,
-                linestyle="none",  # cases have no order
-                elinewidth=1.0,
-                capsize=0,
-                label=controller,
-            )
+                color=COLOURS[index % len(COLOURS)], marker=MARKS[index % len(MARKS)], markersize=4,
+                linestyle="none", elinewidth=1.0, capsize=0, label=controller,  # cases have no order
+            )  # fmt: skip
         for edge in np.arange(0.5, len(cases) - 1):
             axes.axvline(edge, color=FAINT, linewidth=0.8, zorder=0)
         axes.set_title(metric_title(name), fontsize=9, color=INK, loc="left")
@@ -273,40 +270,27 @@ def _label_marks(figure, axes, names, points, areas, places, ratios):
         (x, y), (left, low, right, high) = placed([(1.0, 1.0)])[0], frame
         taken += [(x - 1, low, x + 1, high), (left, y - 1, right, y + 1)]
 
-    def overlap(one, other):
-        wide = min(one[2], other[2]) - max(one[0], other[0])
-        high = min(one[3], other[3]) - max(one[1], other[1])
-        return max(0.0, wide) * max(0.0, high)
+    def overlap(boxes, others):
+        """Return the common areas (n, m)."""
+        sides = np.minimum(boxes[:, None, 2:], others[:, 2:]) - np.maximum(boxes[:, None, :2], others[:, :2])
+        return np.maximum(sides, 0.0).prod(axis=2)
 
-    def spoilt(place):
-        inside = overlap(place, frame)
-        area = (place[2] - place[0]) * (place[3] - place[1])
-        return sum(overlap(place, other) for other in taken) + 20.0 * (area - inside)
-
-    for name, point, (x, y), r in zip(names, points, centres, radii, strict=True):
-        width, height = 0.58 * size * len(name), 1.25 * size
-        options = []
-        for way in (0.0, 10.0, 22.0, 36.0, 52.0, 70.0):
-            for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)):
-                gap = (0.75 * r if dx and dy else r) + 2.5 + way * (0.7 if dx and dy else 1.0)
-                left = x + dx * gap - (width if dx < 0 else 0.0 if dx else 0.5 * width)
-                low = y + dy * gap - (height if dy < 0 else 0.0 if dy else 0.5 * height)
-                options.append((left, low, left + width, low + height, way))
-        best = min(options, key=lambda place: spoilt(place) + 0.15 * place[4])
-        taken.append(best[:4])
+    diagonal = SIDES.all(axis=1)
+    for name, point, centre, r in zip(names, points, centres, radii, strict=True):
+        shape = np.array([0.58 * size * len(name), 1.25 * size])
+        gaps = np.where(diagonal, 0.75, 1.0) * r + 2.5 + WAYS[:, None] * np.where(diagonal, 0.7, 1.0)
+        low = (centre + gaps[:, :, None] * SIDES - 0.5 * (1.0 - SIDES) * shape).reshape(-1, 2)
+        boxes = np.hstack([low, low + shape])
+        outside = shape.prod() - overlap(boxes, frame[None])[:, 0]
+        cost = overlap(boxes, np.array(taken)).sum(axis=1) + 20.0 * outside + 0.15 * WAYS.repeat(len(SIDES))
+        best = int(np.argmin(cost))
+        taken.append(tuple(boxes[best]))
         leader = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.6, "shrinkA": 0, "shrinkB": float(r)}
         axes.annotate(
-            name,
-            point,
-            xytext=(best[0] - x, best[1] - y),
-            textcoords="offset points",
-            fontsize=size,
-            color=INK,
-            annotation_clip=False,
-            arrowprops=leader if best[4] > 0.0 else None,
+            name, point, low[best] - centre, textcoords="offset points", fontsize=size, color=INK, zorder=5,
+            annotation_clip=False, arrowprops=leader if best >= len(SIDES) else None,
             path_effects=[withStroke(linewidth=2.0, foreground="white")],
-            zorder=5,
-        ).set_in_layout(False)
+        ).set_in_layout(False)  # fmt: skip
 
 
 def evaluation_plots(table, board, folder):

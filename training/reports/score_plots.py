@@ -8,7 +8,7 @@ from itertools import cycle
 from fowt_env.errors import InputError
 from fowt_env.training.design.plots import WIND, draw_fronts, finish_bound
 from fowt_env.visual.style import COLOURS, INK, new_figure
-from fowt_env.visual.time_series import TIME, named_runs, plot_runs
+from fowt_env.visual.time_series import PANELS, TIME, named_runs, plot_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
 FRONTS = {  # looks
@@ -21,15 +21,9 @@ FRONTS = {  # looks
 }
 FRAME = 1.3  # upper end of both axes of plot_fractions
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
-GUST = (  # panels of plot_gust: label, channel
-    ("wind\n(m/s)", "Wind1VelX_[m/s]"),
-    ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
-    ("blade pitch\n(deg)", "BldPitch1_[deg]"),
-    ("torque\n(kN m)", "GenTq_[kN-m]"),
-    ("power\n(kW)", "GenPwr_[kW]"),
-    ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
+GUST = (  # panels of plot_gust
+    *(panel for panel in PANELS if panel[1] not in ("Wave1Elev_[m]", "PtfmSurge_[m]")),
     ("tower-base\nmoment (kN m)", "TwrBsMyt_[kN-m]"),
-    ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
 )
 
 

@@ -3,11 +3,9 @@
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores baselines results/rl --against gspi_oc3,rosco_float
 
-Each ratio is one metric of an agent over that of a baseline in the same wind and waves, both means over the
-lifetime: cases are weighted by the column weight_[-] of the table, or equally without it. Training seeds of
-one configuration form a group, whose interval resamples training and weather seeds
-(training.evaluation.bootstrap). A lost run of an agent counts PENALTY times the baseline's metrics of that
-case and seed (training.evaluation.failures); a lost run of the baseline has no ratio.
+Both means are over the lifetime, in the same wind and waves. Training seeds of one configuration form a
+group, whose interval resamples training and weather seeds (training.evaluation.bootstrap). A lost run of an
+agent counts PENALTY times the baseline's metrics of that case and seed; one of the baseline has no ratio.
 """
 
 import re

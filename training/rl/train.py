@@ -8,9 +8,8 @@ replay buffer, random states); validation.csv with a row per validation; best.np
 best there, and last.npz; learning_curve.png; and TensorBoard's files.
 
 A resumed run has the bits of one that was never stopped, on the same machine with the same number of torch
-threads: PPO's checkpoints lie between an update and the next rollout, those of SAC and TQC between two calls
-of their update with the replay buffer, and hold parameters, optimiser, environments in mid-episode,
-normalisation and the states of every random generator. Wall times and the rates shown differ.
+threads: checkpoints hold parameters, optimiser, environments in mid-episode, normalisation, replay buffer and
+the states of every random generator.
 """
 
 import errno
@@ -21,7 +20,6 @@ import random
 import shutil
 import signal
 import sys
-import time
 from collections import deque
 from contextlib import contextmanager
 from copy import deepcopy
@@ -293,8 +291,7 @@ def _mean(values):
 class Training:
     """One run in one folder. resume: continue from its newest checkpoint, or anew where it has none.
 
-    Loading a checkpoint executes code from it: one that no run of this user wrote (checkpoint_signature.py)
-    is refused unless trusted.
+    Loading a checkpoint executes code from it: one that no run of this user wrote is refused unless trusted.
     Raises: InputError where the folder holds another run, none to resume, or a stranger's; on run(), where
     another training is in the folder.
     """
@@ -312,13 +309,12 @@ class Training:
 
     def _check_folder(self):
         """Raise InputError unless the run can begin in its folder, or continue there."""
-        begun = self.settings_path.exists()
-        if not self.resume and begun:
+        if self.resume != self.settings_path.exists():
             raise InputError(
-                f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
+                f"--resume: {self.folder} holds no run"
+                if self.resume
+                else f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
             )
-        if self.resume and not begun:
-            raise InputError(f"--resume: {self.folder} holds no run")
         newest = self.newest() if self.resume else None
         if newest is not None and not self.trusted and not is_own(newest):
             raise InputError(
@@ -380,23 +376,22 @@ class Training:
 
         from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, Validation
 
-        model = self.model
-        say = report or (lambda done, total, text: None)
+        model, steps = self.model, self.settings["steps"]
         self.reference_name = self.settings["validation"].get("reference", REFERENCE)
-        say(model.num_timesteps, self.settings["steps"], f"scoring the reference {self.reference_name}")
+        if report is not None:
+            report(model.num_timesteps, steps, f"scoring the reference {self.reference_name}")
         self.reference = baseline_figures(self.settings)
         self.kinds = validation_episodes(self.settings)[1]
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
         self.evaluation, self.checkpointing = Validation(self, validation), CheckpointCallback(self, report)
-        listeners = [self.evaluation, self.checkpointing]
         if state is not None:
             self.evaluation.n_calls, self.evaluation.best = state["evaluation_calls"], state["best"]
             self.checkpointing.before, self.checkpointing.torch_state = state["seconds"], state["torch"]
-        left = self.settings["steps"] - model.num_timesteps
-        finished = True
+        finished, left = True, steps - model.num_timesteps
         with self._signals():
             if left > 0:
                 try:
+                    listeners = [self.evaluation, self.checkpointing]
                     model.learn(left, callback=listeners, reset_num_timesteps=state is None)
                 except Stopped:
                     finished = False
@@ -546,11 +541,9 @@ def _schedules(settings):
     """Return those of SCHEDULES that fall linearly over a run, as stable-baselines3 takes them."""
     from stable_baselines3.common.utils import LinearSchedule
 
-    pairs = {key: settings["algorithm"].get(key) for key in SCHEDULES}
-    return {
-        key: LinearSchedule(float(pair[0]), float(pair[1]), 1.0)
-        for key, pair in pairs.items() if isinstance(pair, list)
-    }  # fmt: skip
+    given = {key: settings["algorithm"].get(key) for key in SCHEDULES}
+    pairs = {key: map(float, pair) for key, pair in given.items() if isinstance(pair, list)}
+    return {key: LinearSchedule(*pair, 1.0) for key, pair in pairs.items()}
 
 
 def _new_model(kind, settings, env):
@@ -565,8 +558,3 @@ def _new_model(kind, settings, env):
         return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **given)
     except (AssertionError, TypeError, ValueError) as error:
         raise InputError(f"algorithm: {settings['algo']} does not take these settings: {error}") from error
-
-
-def seconds_text(seconds):
-    """Return a duration as h:mm:ss."""
-    return time.strftime("%H:%M:%S", time.gmtime(max(0.0, seconds)))
