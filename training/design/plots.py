@@ -66,9 +66,9 @@ def plot_poles(models, path=None, title=None):
         turning = [pole for _, _, pole in shown if pole.imag > 0.0 or not slow]
         _damping_lines(axes, min(p.real for p in turning), max(p.imag for p in turning))
         axes.set_xlabel("real part (1/s)", fontsize=9, color=INK)
-    names = {name for _, name, _ in found}
+    names = {name for _, name, _ in found} - {name for name, _ in beyond}
     for name, mark in zip(MODE_NAMES, MODE_MARKERS, strict=True):
-        if name in names and name not in {far for far, _ in beyond}:
+        if name in names:
             panels[0].scatter([], [], marker=mark, color=SOFT, label=name.replace("_", " "))
     handles, labels = panels[0].get_legend_handles_labels()
     panels[0].set_ylabel("imaginary part (rad/s)", fontsize=9, color=INK)
@@ -144,16 +144,14 @@ def plot_damping(models, path=None, title=None):
         raise InputError("nothing to plot: no linear models were given")
     figure = new_figure(9.0, 5.6)
     panels = figure.subplots(2, 1, sharex=True)
-    for index, name in enumerate(MODE_NAMES):
-        found = [
-            (wind, mode) for wind, model in models.items() for mode in model.modes() if mode.name == name
-        ]
-        if not found:
-            continue
-        winds = [wind for wind, _ in found]
-        style = {"color": COLOURS[index], "marker": MODE_MARKERS[index], "markersize": 4, "linewidth": 1.0}
-        panels[0].plot(winds, [mode.period for _, mode in found], label=name.replace("_", " "), **style)
-        panels[1].plot(winds, [mode.damping_ratio for _, mode in found], **style)
+    modes = [(wind, mode) for wind, model in models.items() for mode in model.modes()]
+    for colour, mark, name in zip(COLOURS * 2, MODE_MARKERS, MODE_NAMES, strict=False):
+        found = [(wind, mode.period, mode.damping_ratio) for wind, mode in modes if mode.name == name]
+        if found:
+            winds, periods, ratios = zip(*found, strict=True)
+            style = {"color": colour, "marker": mark, "markersize": 4, "linewidth": 1.0}
+            panels[0].plot(winds, periods, label=name.replace("_", " "), **style)
+            panels[1].plot(winds, ratios, **style)
     for axes, label in zip(panels, ("period (s)", "damping ratio"), strict=True):
         style_axes(axes)
         axes.set_ylabel(label, fontsize=9, color=INK)

@@ -102,11 +102,12 @@ def bound_fractions(table, bound, groups=None, agents=None, information=None):
             raise InputError(f"{name}: no run at a wind of the limit succeeded")
         whole = pd.concat(parts).groupby(WIND, as_index=False)[list(RATIOS)].mean().assign(seed_of="")
         for part in [*(parts if len(labels) > 1 else []), whole]:
-            rows.append(_with_fractions(part, bound, limit).assign(agent=name))
+            ratios = part[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
+            reached = [np.nan if limit is None else fraction_of_bound(bound, *each, limit) for each in ratios]
+            rows.append(part.assign(agent=name, limit=limit or "none", **{"of_limit_[-]": reached}))
     found = pd.concat(rows, ignore_index=True)
     found["within"] = (found["travel_ratio_[-]"] <= MORE) & (found["power_ratio_[-]"] <= MORE)
-    first = ["agent", "seed_of", WIND]
-    return found[[*first, *found.columns.drop(first)]]
+    return found[["agent", "seed_of", WIND, *RATIOS, "limit", "of_limit_[-]", "within"]]
 
 
 def declared(label):
@@ -145,15 +146,6 @@ def _ratios(own, base, label):
     pair = pd.concat([frame.merge(shared, on=KEY[1:]) for frame in (base, own)])
     ratios = ratio_table(pair.rename(columns={"controller": "variant"}))
     return ratios.drop(columns="variant").assign(seed_of=label)
-
-
-def _with_fractions(ratios, bound, limit):
-    """Return the ratios with the name of the limit and their fractions of it."""
-    found = [
-        float("nan") if limit is None else fraction_of_bound(bound, wind, speed, lean, limit)
-        for wind, speed, lean in ratios[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
-    ]
-    return ratios.assign(limit=limit or "none", **{"of_limit_[-]": found})
 
 
 def bound_markdown(fractions):

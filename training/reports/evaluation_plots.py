@@ -29,23 +29,7 @@ from fowt_env.visual.style import (
 )
 from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
 
-TITLES = {
-    "RotSpeed_mean_[rpm]": "rotor speed, mean (rpm)",
-    "RotSpeed_std_[rpm]": "rotor speed, std (rpm)",
-    "overspeed_[%]": "greatest rotor speed above rated (%)",
-    "GenPwr_capped_mean_[kW]": "power counted up to rated, mean (kW)",
-    "GenPwr_std_[kW]": "power, std (kW)",
-    "GenPwr_max_[kW]": "greatest power (kW)",
-    "PtfmPitch_mean_[deg]": "platform pitch, mean (deg)",
-    "PtfmPitch_std_[deg]": "platform pitch, std (deg)",
-    "PtfmPitch_max_[deg]": "platform pitch, greatest (deg)",
-    "blade_pitch_travel_[deg/s]": "mean blade-pitch rate (deg/s)",
-    "torque_travel_[kN-m/s]": "mean torque rate (kN m/s)",
-    "RotTorq_DEL_[kN-m]": "shaft torque, fatigue load (kN m)",
-    "NcIMUTAxs_rms_[m/s^2]": "nacelle acceleration, rms (m/s²)",
-    "FAIRTEN_max_[kN]": "mooring tension, greatest (kN)",
-    "TwrBsMyt_DEL_[kN-m]": "tower base, fatigue load (kN m)",
-}
+TITLES = {name: title for _, name, _, _, title in PRINTED_METRICS}
 UPRIGHT = 6  # characters of a case's name that fit below a group of marks without being turned
 # places of a name about its mark: to the right and up, and points of distance
 SIDES = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)])
@@ -307,7 +291,7 @@ def evaluation_plots(table, board, folder):
         return []
     paths = [folder / "pareto.png", folder / "metrics.png"]
     plot_pareto(board, paths[0], order=table["controller"].unique())
-    names = [name for _, name, _ in PRINTED_METRICS]
+    names = [name for _, name, *_ in PRINTED_METRICS]
     plot_evaluation(table, names, paths[1], "Mean over seeds, with their range")
     boxes = {}
     for case, about in manifest["cases"].items():

@@ -406,14 +406,12 @@ def _page_data(table, board_file, manifest, runs, schedule):
     score = {"name": "score", "label": "score", "unit": "", "headline": True, "better": -1, "about": about}
     if any(row["values"].get("score") is not None for row in board[ALL_CASES]):
         metrics = [score, *metrics]
-    shown = [metric["name"] for metric in metrics]
     points = [
         [row["controller"], row["case"], str(row["seed"]), _rounded([row[name] for name in names])]
         for row in table[table["status"] == OK].to_dict("records")
     ]
     ranked = board_file is not None and all(entry.rank is not None for entry in board_file.controllers)
-    first = ("rank",) if ranked else ()
-    sortable = {*first, *shown, "controller"}
+    sortable = {"controller", *(metric["name"] for metric in metrics), *(("rank",) if ranked else ())}
     shares = dict(zip(cases, map(float, case_shares(table, cases)), strict=True))
     shares = shares if len(set(shares.values())) > 1 else None
     conditions = page_words.case_conditions(table, manifest, shares)
@@ -433,7 +431,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         "conditions": {row["case"]: page_words.conditions_text(row) for row in conditions},
         "lost": lost,
         "metrics": metrics,
-        "sort": next(name for name in (*first, "score", PARETO_AXES[0], "controller") if name in sortable),
+        "sort": next(name for name in ("rank", "score", PARETO_AXES[0], "controller") if name in sortable),
         "board": board,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
         "pareto": list(PARETO_AXES),

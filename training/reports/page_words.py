@@ -49,7 +49,7 @@ def page_title(manifest, cases):
 
 def page_lead(table, manifest):
     """Return the size of an evaluation in one line."""
-    parts = [counted(table["controller"].nunique(), "controller"), counted(table["case"].nunique(), "case")]
+    parts = [counted(table[key].nunique(), key) for key in ("controller", "case")]
     parts += [seeds_text(sorted(set(table["seed"]))), counted(len(table), "run")]
     if isinstance(manifest.get("created"), str):
         parts.append(f"evaluated {manifest['created'][:10]}")
@@ -98,13 +98,13 @@ def conditions_table(rows):
 def table_rows(headings, rows, texts=()):
     """Return the head and body of an HTML table; texts: numbers of the columns of class "text"."""
 
-    def cells(row, tag, scope=""):
-        marks = (' class="text"' if number in texts else "" for number in range(len(row)))
-        return "".join(f"<{tag}{scope}{mark}>{cell}</{tag}>" for mark, cell in zip(marks, row, strict=True))
+    def line(row, tag, scope=""):
+        marks = [' class="text"' if number in texts else "" for number in range(len(row))]
+        cells = (f"<{tag}{scope}{mark}>{cell}</{tag}>" for mark, cell in zip(marks, row, strict=True))
+        return f"<tr>{''.join(cells)}</tr>"
 
-    head = cells(list(headings), "th", ' scope="col"')
-    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
+    head, body = line(list(headings), "th", ' scope="col"'), "".join(line(row, "td") for row in rows)
+    return f"<thead>{head}</thead><tbody>{body}</tbody>"
 
 
 def _wind(wind):

@@ -4,34 +4,22 @@ from fowt_env.training.evaluation.bootstrap import holm
 from fowt_env.training.evaluation.failures import KINDS, lost_text
 from fowt_env.training.reports.metric_words import counted, seeds_text
 
-# printed columns: heading, metric, format
+# printed columns: heading, metric, format, place among those that a narrow terminal lacks, title of its plot
 PRINTED_METRICS = (
-    ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f"),
-    ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f"),
-    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f"),
-    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
-    ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f"),
-    ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f"),
-    ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f"),
-    ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f"),
-    ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f"),
-    ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f"),
-    ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f"),
-    ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f"),
-    ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f"),
-    ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f"),
-)
-# left out of a table wider than the terminal, the first one first
-DROPPED_FIRST = (
-    "FAIRTEN_max_[kN]",
-    "NcIMUTAxs_rms_[m/s^2]",
-    "RotSpeed_mean_[rpm]",
-    "PtfmPitch_max_[deg]",
-    "PtfmPitch_mean_[deg]",
-    "GenPwr_std_[kW]",
-    "GenPwr_max_[kW]",
-    "GenPwr_capped_mean_[kW]",
-    "RotTorq_DEL_[kN-m]",
+    ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f", 3, "rotor speed, mean (rpm)"),
+    ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f", None, "rotor speed, std (rpm)"),
+    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", None, "greatest rotor speed above rated (%)"),
+    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f", 8, "power up to rated, mean (kW)"),
+    ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f", 6, "power, std (kW)"),
+    ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f", 7, "greatest power (kW)"),
+    ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f", 5, "platform pitch, mean (deg)"),
+    ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f", None, "platform pitch, std (deg)"),
+    ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f", 4, "platform pitch, greatest (deg)"),
+    ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", None, "pitch rate, mean (deg/s)"),
+    ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f", None, "torque rate, mean (kN m/s)"),
+    ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", 9, "shaft torque, fatigue load (kN m)"),
+    ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f", 2, "nacelle acceleration, rms (m/s²)"),
+    ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f", 1, "mooring tension, greatest (kN)"),
 )
 
 
@@ -40,9 +28,10 @@ def summary_rows(means, width):
     lost = list(means[list(KINDS)].sum(axis=1))
     columns = {name: (name, list(means[name])) for name in ("controller", "case")}
     columns["runs"] = "runs", [f"{n - bad}/{n}" for n, bad in zip(means["runs"], lost, strict=True)]
-    for heading, name, form in PRINTED_METRICS:
+    for heading, name, form, *_ in PRINTED_METRICS:
         columns[name] = heading, ["-" if value != value else format(value, form) for value in means[name]]
-    return *_fitted(columns, DROPPED_FIRST, width), lost
+    drops = {place: name for _, name, _, place, _ in PRINTED_METRICS if place}
+    return *_fitted(columns, [drops[place] for place in sorted(drops)], width), lost
 
 
 def _fitted(columns, drops, width):

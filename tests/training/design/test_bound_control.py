@@ -148,9 +148,9 @@ def test_preview_is_the_optimum_with_a_delay_line_for_states(plant):
     np.testing.assert_allclose(values(problem.deviations(q, plant.fitted)), expected, rtol=0.02)
 
 
-def total(plant, information, q):
+def total(plant, information, q, noise=None):
     """Value of the quadratic cost, less that of the controls' rates, in the fitted weather."""
-    problem = Problem(plant, information)
+    problem = Problem(plant, information, noise)
     parts = problem.parts(problem.deviations(q, plant.fitted))
     return float(parts**2 @ [1.0 - WEIGHTS[0], *WEIGHTS])
 
@@ -178,13 +178,11 @@ def test_more_knowledge_costs_less(plant):
 
 def test_more_noise_costs_more_and_none_is_full_knowledge(plant):
     q = Problem(plant, FULL).cost(*WEIGHTS)
-    noise = np.array(list(noise_of().values()))
-
-    def cost(factor):
-        problem = Problem(plant, MEASURED, dict(zip(SENSORS, factor * noise, strict=True)))
-        return float(problem.parts(problem.deviations(q, plant.fitted)) ** 2 @ [1.0 - WEIGHTS[0], *WEIGHTS])
-
-    costs = [cost(factor) for factor in (1e-2, 0.3, 1.0, 5.0)]
+    noise = noise_of()
+    costs = [
+        total(plant, MEASURED, q, {name: factor * size for name, size in noise.items()})
+        for factor in (1e-2, 0.3, 1.0, 5.0)
+    ]
     assert np.all(np.diff(costs) > 0.0)
     assert costs[0] == pytest.approx(total(plant, FULL, q), rel=0.05)
     with pytest.raises(InputError, match="noise: blade_pitch = 0.0: must be a standard deviation above 0"):
