@@ -513,7 +513,7 @@ class TracePanel:
         self.histories = [deque() for _ in range(runs)]
 
     def add(self, rows):
-        """Append one row of channels per run; a decreasing time clears the history."""
+        """Append one row of channels per run, in place of those of the same or a later time."""
         for history, row in zip(self.histories, rows, strict=True):
             while history and row["Time"] <= history[-1][0]:
                 history.pop()

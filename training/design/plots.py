@@ -4,6 +4,8 @@ As in visual/time_series.py every function returns a matplotlib Figure and, if g
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 
+from itertools import cycle
+
 import numpy as np
 
 from fowt_env.descriptions.units import DEGREE, RPM
@@ -216,8 +218,10 @@ def plot_bound(table, names, points=None, path=None, title=None):
     if not winds:
         raise InputError("nothing to plot: no wind has both a Pareto front and simulated points")
     looks = {
-        information: {"label": text, "color": COLOURS[i], "ls": LINES[i % 4], "linewidth": 1.2 if i else 1.6}
-        for i, (information, text) in enumerate(names.items())
+        name: {"label": text, "color": colour, "ls": line, "linewidth": 1.2 if i else 1.6}
+        for i, ((name, text), colour, line) in enumerate(
+            zip(names.items(), cycle(COLOURS), cycle(LINES), strict=False)
+        )
     }
     columns = min(4, len(winds))
     rows = -(-(len(winds) + (len(winds) > 3)) // columns)
