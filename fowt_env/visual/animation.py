@@ -62,7 +62,10 @@ def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0,
     check_number("start", start, tracks[0].time[0], end, high_open=True)
     times = np.arange(start, end, 0.01 * pause * speed)
     span = (float(start), float(end)) if end - start <= MOST_STILL * WINDOW else None
-    limits = {trace.channel: _limits(tracks, trace.channel, start) for trace in TRACES}
+    limits = {}
+    for channel in (trace.channel for trace in TRACES):
+        kept = [track.values[channel][track.time >= start] for track in tracks]
+        limits[channel] = min(values.min() for values in kept), max(values.max() for values in kept)
     labels = None if list(runs) == [""] else list(short_names(runs).values())
     view = View([scene] * len(tracks), labels, tuple(size), speed=speed, span=span, limits=limits)
 
@@ -85,12 +88,6 @@ def animation_path(path):
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"animation {str(path)!r}: must end with {' or '.join(SUFFIXES)}")
     return path
-
-
-def _limits(tracks, channel, start):
-    """Return (smallest, largest) value of a channel of all tracks from a time onwards."""
-    kept = [track.values[channel][track.time >= start] for track in tracks]
-    return min(values.min() for values in kept), max(values.max() for values in kept)
 
 
 class _Track:
@@ -136,15 +133,13 @@ def _write_gif(pictures, path, pause):
         found.putpalette(entries)
         return found
 
-    first = reduced(shown)
-    whole = image(first)
+    before = reduced(shown)
+    whole = image(before)
     whole.info = dict(settings)
     with open(path, "wb") as file:
-        for block in GifImagePlugin.getheader(whole, info=settings)[0]:
-            file.write(block)
-        for block in GifImagePlugin.getdata(whole, **settings):
-            file.write(block)
-        shown, before = shown.astype(np.int16), first
+        file.writelines(GifImagePlugin.getheader(whole, info=settings)[0])
+        file.writelines(GifImagePlugin.getdata(whole, **settings))
+        shown = shown.astype(np.int16)
         for picture in pictures:
             places = reduced(picture)
             gap = np.abs(picture - shown).max(axis=2)
@@ -155,9 +150,8 @@ def _write_gif(pictures, path, pause):
                 rows = columns = np.zeros(1, dtype=int)
             box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
             part = image(np.where(changed, places, CLEAR).astype(np.uint8)[box])
-            corner = int(columns[0]), int(rows[0])
-            for block in GifImagePlugin.getdata(part, corner, **settings, transparency=CLEAR, disposal=1):
-                file.write(block)
+            look = settings | {"transparency": CLEAR, "disposal": 1}
+            file.writelines(GifImagePlugin.getdata(part, (int(columns[0]), int(rows[0])), **look))
         file.write(b";")
 
 

@@ -33,6 +33,7 @@ WAVE_STEP = 9  # pixels of the enlarged picture between points of the sea surfac
 LEAST_BLADE = 0.0055, 0.0022  # of the picture's height: smallest half width of a drawn blade at root and tip
 FIRST_WINDOWS = (15.0, 30.0, WINDOW)  # s shown at the start of a run
 ANGLES = ("PtfmRoll", "PtfmPitch", "PtfmYaw")
+ACTION_NAMES = {2: ("torque", "blade pitch"), 4: ("torque", "blade 1", "blade 2", "blade 3")}
 MOTIONS = ("PtfmSurge", "PtfmSway", "PtfmHeave", *ANGLES)
 
 INK, SOFT, FAINT, CARD, PAGE = (30, 38, 50), (110, 120, 134), (224, 229, 235), (255,) * 3, (240, 243, 247)
@@ -108,8 +109,6 @@ class Writer:
         """Return the Surface of a text, which must not be empty, with `height` pixels per line."""
         key = text, height, colour
         if key not in self._kept:
-            if not text:
-                raise ValueError("no text: pygame cannot scale an empty picture")
             if len(self._kept) >= self.MOST:
                 self._kept.clear()
             size = max(6, round(height * self.zoom))
@@ -182,7 +181,12 @@ def tension_colour(tension, at_rest):
     """Return the colour of a line: blue if loose, yellow at its tension at rest, red at 1.5 times that."""
     fraction = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
     other, fraction = (TIGHT, min(fraction, 1.0)) if fraction > 0.0 else (LOOSE, min(-fraction, 1.0))
-    return tuple(round(a + fraction * (b - a)) for a, b in zip(AT_REST, other, strict=True))
+    return _mixed(AT_REST, other, fraction)
+
+
+def _mixed(colour, other, share):
+    """Return the colour at a share of the way to another one."""
+    return tuple(round(a + share * (b - a)) for a, b in zip(colour, other, strict=True))
 
 
 class _SideView:
@@ -198,12 +202,30 @@ class _SideView:
         return np.column_stack([across, (self.top - points[:, 2]) * self.scale])
 
 
-def _shades(colour):
-    """Yield (from, to, colour) of the strips of a lit cylinder, -1 to 1 across."""
-    edges = np.linspace(-1.0, 1.0, 8)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
-        light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
-        yield low, high, [round(c * light) for c in colour]
+def _dark(colour):
+    """Return a colour in shade."""
+    return [round(0.85 * c) for c in colour]
+
+
+def _solids(platform):
+    """Yield (ends (2, 3), two diameters or (width, height), whether round) of a hull, the farthest first.
+
+    The spar, else shapes of the platform file, else members, else a box of the hull's volume and draft.
+    """
+    hull, draft = platform.hull, platform.draft
+    solids = platform.shapes or platform.members
+    if hull is not None:
+        axis = [(0.0, 0.0, z) for z in hull.z]
+        for i in range(len(axis) - 1):
+            yield np.array(axis[i : i + 2]), hull.diameter[i : i + 2], True
+    elif not solids:
+        half = 0.5 * np.sqrt(platform.potential_flow.volume / draft)
+        yield np.array([(-half, 0.0, -0.25 * draft), (half, 0.0, -0.25 * draft)]), (0.01, 1.5 * draft), False
+    else:
+        for solid in sorted(solids, key=lambda solid: -(solid.start[1] + solid.end[1])):
+            is_round = solid.diameter is not None
+            size = np.broadcast_to(solid.diameter, 2) if is_round else solid.section
+            yield np.array([solid.start, solid.end]), size, is_round
 
 
 class TurbinePanel(_SideView):
@@ -240,12 +262,10 @@ class TurbinePanel(_SideView):
 
     def _gradient(self, colours, end, begin=0):
         """Return a Surface with a colour gradient between two heights."""
-        pygame = self.pygame
-        picture = pygame.Surface(self.inner, pygame.SRCALPHA)
+        picture = self.pygame.Surface(self.inner, self.pygame.SRCALPHA)
         for y in range(self.inner[1]):
-            fraction = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
-            mixed = [round(a + fraction * (b - a)) for a, b in zip(*colours, strict=True)]
-            pygame.draw.line(picture, mixed, (0, y), (self.inner[0], y))
+            share = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
+            self.pygame.draw.line(picture, _mixed(*colours, share), (0, y), (self.inner[0], y))
         return picture
 
     def draw(self, row, label=None, colour=None, speed=None):
@@ -259,8 +279,9 @@ class TurbinePanel(_SideView):
             tint = tension_colour(tension, self.tension_at_rest[number])
             pygame.draw.lines(canvas, tint, False, self.pixels(points), 2 * SAMPLING)
         self._rotor(canvas, pose, row)
-        self._wind(canvas, row)
+        place = self._wind(canvas, row["Wind1VelX"])
         picture = pygame.transform.smoothscale(canvas, self.size)
+        self._writer.put(picture, f"{row['Wind1VelX']:.1f} m/s", place, self._small, RGB_COLOURS[0])
         self._words(picture, row, label, colour, speed)
         return picture
 
@@ -268,28 +289,23 @@ class TurbinePanel(_SideView):
         """Fill a polygon of body-fixed points."""
         self.pygame.draw.polygon(canvas, colour, self.pixels(pose.inertial(points)))
 
-    def _tapered(self, canvas, pose, heights, diameters, colour):
-        """Draw a shaded body of revolution about the platform's axis."""
-        for low, high, shade in _shades(colour):
-            sides = [(low, heights, diameters), (high, heights[::-1], diameters[::-1])]
-            body = [(0.5 * s * d, 0.0, z) for s, zs, ds in sides for z, d in zip(zs, ds, strict=True)]
-            self._polygon(canvas, shade, pose, body)
-
     def _cylinder(self, canvas, pose, ends, diameters, colour):
-        """Draw a shaded cylinder or cone of any direction between two body-fixed points."""
+        """Draw a shaded cylinder or cone between two body-fixed points."""
         first, second = self.pixels(pose.inertial(ends))
         radii = 0.5 * self.scale * np.asarray(diameters)
         along = second - first
         length = float(np.hypot(*along))
         if length < 0.5 * self.scale * np.linalg.norm(np.subtract(*ends)):  # seen along its axis
-            self.pygame.draw.circle(canvas, [round(0.85 * c) for c in colour], second, max(radii[1], 1.0))
+            self.pygame.draw.circle(canvas, _dark(colour), second, max(radii[1], 1.0))
         if length < 1.0:
             return
         across = np.array([-along[1], along[0]]) / length
-        for low, high, shade in _shades(colour):
+        edges = np.linspace(-1.0, 1.0, 8)
+        for low, high in zip(edges[:-1], edges[1:], strict=True):
+            light = 1.0 - 0.38 * ((0.5 * (low + high) + 0.35) / 1.35) ** 2
             corners = [(first, low, 0), (second, low, 1), (second, high, 1), (first, high, 0)]
             body = [point + side * radii[end] * across for point, side, end in corners]
-            self.pygame.draw.polygon(canvas, shade, body)
+            self.pygame.draw.polygon(canvas, [round(c * light) for c in colour], body)
 
     def _member(self, canvas, pose, ends, diameters, limit):
         """Draw a cylinder or cone, yellow above the height `limit`."""
@@ -303,47 +319,25 @@ class TurbinePanel(_SideView):
 
     def _beam(self, canvas, pose, ends, section, limit):
         """Draw a straight box: outline dark, near side light, yellow above the height `limit`."""
-        start, end = ends
-        width, height = section
-        along = (end - start) / np.linalg.norm(end - start)
-        across = np.array([-along[1], along[0], 0.0]) * 0.5 * width / np.hypot(*along[:2])
-        up, middle = np.array([0.0, 0.0, 0.5 * height]), 0.5 * (start[2] + end[2])
-        near = min((-1, 1), key=lambda side: (start + side * across)[1])
-        share = (limit - middle) / (0.5 * height)
-        layers = [(-1.0, 1.0, STEEL if middle < limit else YELLOW)]
-        if -1.0 < share < 1.0:
-            layers = [(-1.0, share, STEEL), (share, 1.0, YELLOW)]
-        for low, high, colour in layers:
-            corners = [p + s * across + z * up for p in ends for s in (-1, 1) for z in (low, high)]
-            seen = self.pixels(pose.inertial(corners))
-            dark = [round(0.85 * c) for c in colour]
-            self.pygame.draw.polygon(canvas, dark, seen[ConvexHull(seen).vertices])
-            face = [(start, low), (end, low), (end, high), (start, high)]
-            self._polygon(canvas, colour, pose, [p + near * across + z * up for p, z in face])
+        along, half = ends[1] - ends[0], 0.5 * section[1]
+        near = np.array([-along[1], along[0], 0.0]) * 0.5 * section[0] / np.hypot(*along[:2])
+        near = near if near[1] < 0.0 else -near
+        share = np.clip((limit - ends[:, 2].mean()) / half, -1.0, 1.0)
+        for low, high, colour in ((-1.0, share, STEEL), (share, 1.0, YELLOW)):
+            if low < high:
+                face = near + np.vstack([ends + (0, 0, low * half), ends[::-1] + (0, 0, high * half)])
+                seen = self.pixels(pose.inertial(np.vstack([face, face - 2.0 * near])))
+                self.pygame.draw.polygon(canvas, _dark(colour), seen[ConvexHull(seen).vertices])
+                self._polygon(canvas, colour, pose, face)
 
     def _hull(self, canvas, pose):
-        """Draw hull and tower: the spar, else shapes of the platform file, else members, else a box."""
+        """Draw hull and tower."""
         platform, tower = self.scene.platform, self.scene.platform.tower
-        hull, draft, limit = platform.hull, platform.draft, -SPLASH * platform.draft
-        solids = platform.shapes or platform.members
-        if hull is not None:
-            z, diameter = np.array(hull.z), np.array(hull.diameter)
-            self._tapered(canvas, pose, z, diameter, STEEL)
-            splash = np.array([max(z[0], -SPLASH * abs(z[0])), z[-1]])
-            self._tapered(canvas, pose, splash, np.interp(splash, z, diameter), YELLOW)
-        elif not solids:
-            half = 0.5 * np.sqrt(platform.potential_flow.volume / draft)
-            for low, high, colour in ((-draft, limit, STEEL), (limit, 0.5 * draft, YELLOW)):
-                box = [(-half, 0.0, low), (half, 0.0, low), (half, 0.0, high), (-half, 0.0, high)]
-                self._polygon(canvas, colour, pose, box)
-        for solid in sorted(solids, key=lambda solid: -(solid.start[1] + solid.end[1])):  # farthest first
-            ends = np.array([solid.start, solid.end])
-            if solid.diameter is None:
-                self._beam(canvas, pose, ends, solid.section, limit)
-            else:
-                self._member(canvas, pose, ends, np.broadcast_to(solid.diameter, 2), limit)
-        heights = np.array([tower.base_height, tower.top_height])
-        self._tapered(canvas, pose, heights, np.array([tower.base_diameter, tower.top_diameter]), WHITE)
+        for ends, size, is_round in _solids(platform):
+            shape = self._member if is_round else self._beam
+            shape(canvas, pose, ends, size, -SPLASH * platform.draft)
+        ends = np.array([(0.0, 0.0, tower.base_height), (0.0, 0.0, tower.top_height)])
+        self._cylinder(canvas, pose, ends, (tower.base_diameter, tower.top_diameter), WHITE)
 
     def _sea_over(self, canvas, time):
         """Draw the sea over the parts below the surface."""
@@ -414,37 +408,33 @@ class TurbinePanel(_SideView):
         wide = (side * np.maximum(side * reach, np.linspace(*least, count)))[:, None] * across
         return np.vstack([middle + wide, tip, (middle - wide)[::-1]])
 
-    def _wind(self, canvas, row):
-        """Draw an arrow at hub height with the length of the wind speed."""
-        pygame, rotor = self.pygame, self.scene.turbine.rotor
-        speed = row["Wind1VelX"]
-        y = (self.top - rotor.hub_height) * self.scale
-        x, unit = 0.035 * self.inner[0], 0.011 * self.inner[0]
-        tip, head = x + unit * speed, 0.014 * self.inner[1]
+    def _wind(self, canvas, speed):
+        """Draw an arrow at hub height with the length of the wind speed; return the place of its text."""
+        x, y = 0.035 * self.inner[0], (self.top - self.scene.turbine.rotor.hub_height) * self.scale
+        tip, head = x + 0.011 * self.inner[0] * speed, 0.014 * self.inner[1]
         if abs(speed) > 0.05:
             back = tip - np.sign(speed) * 1.6 * head
-            pygame.draw.line(canvas, RGB_COLOURS[0], (x, y), (back, y), 3 * SAMPLING)
-            pygame.draw.polygon(canvas, RGB_COLOURS[0], [(tip, y), (back, y - head), (back, y + head)])
-        self._wind_text = f"{speed:.1f} m/s", x / SAMPLING, (y + 1.2 * head) / SAMPLING
+            self.pygame.draw.line(canvas, RGB_COLOURS[0], (x, y), (back, y), 3 * SAMPLING)
+            corners = [(tip, y), (back, y - head), (back, y + head)]
+            self.pygame.draw.polygon(canvas, RGB_COLOURS[0], corners)
+        return x / SAMPLING, (y + 1.2 * head) / SAMPLING + 2
 
     def _words(self, picture, row, label, colour, speed):
-        """Write time, speed, label and wind onto the picture after averaging, which would blur text."""
-        text, x, y = self._wind_text
+        """Write time, speed and label onto the picture after averaging, which would blur text."""
         put, margin = self._writer.put, round(0.02 * self.size[1])
-        put(picture, text, (x, y + 2), self._small, RGB_COLOURS[0])
         right = self.size[0] - margin
         put(picture, f"{row['Time']:.1f} s", (right, margin), self._large, INK, right=True)
         if speed is not None:
             place = right, margin + 1.2 * self._large
             put(picture, f"{speed:.3g} x real time", place, self._small, SOFT, right=True)
         if label:
-            chip = 0
+            left = margin
             if colour is not None:
                 chip = round(0.75 * self._large)
                 box = self.pygame.Rect(margin, margin + 1, chip, round(0.6 * self._large))
                 self.pygame.draw.rect(picture, colour, box, border_radius=2)
-                chip += margin // 2
-            put(picture, label, (margin + chip, margin), self._large, INK)
+                left += chip + margin // 2
+            put(picture, label, (left, margin), self._large, INK)
 
 
 class MooringPanel(_SideView):
@@ -482,9 +472,8 @@ class MooringPanel(_SideView):
         spar = self.pixels(pose.inertial([(0.0, 0.0, keel), (0.0, 0.0, 0.0), (0.0, 0.0, hub)]))
         pygame.draw.line(picture, YELLOW, spar[0], spar[1], 3)
         pygame.draw.line(picture, SOFT, spar[1], spar[2], 2)
-        shown = ", ".join(texts)
-        if len(texts) > MOST_TENSIONS:
-            shown = f"{min(texts, key=int)} to {max(texts, key=int)}"
+        many = len(texts) > MOST_TENSIONS
+        shown = f"{min(texts, key=int)} to {max(texts, key=int)}" if many else ", ".join(texts)
         self._writer.put(picture, f"fairlead tension: {shown} kN", (10, self.size[1] - 34), 16, SOFT)
         tension_key(pygame, picture, self._writer, (10, self.size[1] - 16), self.size[0] - 20)
         return picture
@@ -523,30 +512,14 @@ class TracePanel:
         self._writer = Writer(pygame, min(1.0, max(0.72, size[0] / 330.0, size[1] / 700.0)))
         self.histories = [deque() for _ in range(runs)]
 
-    def clear(self):
-        """Delete the history."""
-        for history in self.histories:
-            history.clear()
-
     def add(self, rows):
-        """Append one row of channels per run; a decreasing time clears the history."""
-        time = rows[0]["Time"]
-        if self.histories[0] and time < self.histories[0][-1][0]:
-            self.clear()
+        """Append one row of channels per run, in place of those of the same or a later time."""
         for history, row in zip(self.histories, rows, strict=True):
-            if history and row["Time"] == history[-1][0]:
+            while history and row["Time"] <= history[-1][0]:
                 history.pop()
             history.append((row["Time"], *(row[trace.channel] for trace in TRACES)))
             while self.span is None and history[0][0] < row["Time"] - WINDOW:
                 history.popleft()
-
-    def _times(self, data):
-        """Return (begin, end) of the time axis."""
-        if self.span is not None:
-            return self.span
-        first, last = data[0][0, 0], data[0][-1, 0]
-        window = next((w for w in FIRST_WINDOWS if last - first <= w), WINDOW)
-        return max(first, last - window), max(first, last - window) + window
 
     def _levels(self, trace):
         """Return [(text, value)] of the horizontal lines of a strip."""
@@ -567,7 +540,10 @@ class TracePanel:
         foot, head, gutter = round(16 * zoom), round(20 * zoom), round(42 * zoom)
         height = (self.size[1] - foot) / len(TRACES)
         data = [np.array(history) for history in self.histories]
-        times = self._times(data)
+        first, last = data[0][0, 0], data[0][-1, 0]
+        window = next((w for w in FIRST_WINDOWS if last - first <= w), WINDOW)
+        begin = max(first, last - window)
+        times = self.span or (begin, begin + window)
         for number, trace in enumerate(TRACES):
             top, width = number * height, self.size[0] - gutter - 10
             box = self.pygame.Rect(gutter, round(top + head), width, round(height - head - 7))
@@ -621,36 +597,27 @@ class TracePanel:
             put(picture, levels, (left, top + 6), 14, LEVEL)
 
 
-class AgentPanel:
-    """Draws the last action, each entry as a bar about zero, and the reward of the step."""
-
-    NAMES = {2: ("torque", "blade pitch"), 4: ("torque", "blade 1", "blade 2", "blade 3")}
-
-    def __init__(self, pygame, width):
-        self.pygame, self.width = pygame, width
-        self._writer = Writer(pygame)
-
-    def draw(self, agent):
-        """Return the picture of an Agent."""
-        draw, put = self.pygame.draw, self._writer.put
-        names = self.NAMES.get(len(agent.action), [f"action {n + 1}" for n in range(len(agent.action))])
-        picture = self.pygame.Surface((self.width, 18 * (len(names) + 1) + 10), self.pygame.SRCALPHA)
-        draw.rect(picture, (*CARD, 225), picture.get_rect(), border_radius=4)
-        left, right = 86, self.width - 46
-        middle = 0.5 * (left + right)
-        reward = "-" if agent.reward is None else f"{agent.reward:+.3f}"
-        rows = [(name, value, f"{value:+.2f}") for name, value in zip(names, agent.action, strict=True)]
-        for number, (name, value, text) in enumerate([*rows, ("reward", None, reward)]):
-            y = 6 + 18 * number
-            put(picture, name, (8, y + 2), 16, SOFT)
-            put(picture, text, (self.width - 8, y + 2), 16, INK, right=True)
-            if value is not None:
-                draw.rect(picture, PAGE, (left, y + 2, right - left, 11))
-                tip = middle + 0.5 * (right - left) * min(max(value, -1.0), 1.0)
-                bar = (round(min(middle, tip)), y + 2, max(1, round(abs(tip - middle))), 11)
-                draw.rect(picture, RGB_COLOURS[0], bar)
-                draw.line(picture, SOFT, (middle, y), (middle, y + 14))
-        return picture
+def agent_picture(pygame, writer, width, agent):
+    """Return the picture of an Agent: each entry of the action as a bar about zero, and the reward."""
+    draw, put = pygame.draw, writer.put
+    names = ACTION_NAMES.get(len(agent.action), [f"action {n + 1}" for n in range(len(agent.action))])
+    picture = pygame.Surface((width, 18 * (len(names) + 1) + 10), pygame.SRCALPHA)
+    draw.rect(picture, (*CARD, 225), picture.get_rect(), border_radius=4)
+    left, right = 86, width - 46
+    middle = 0.5 * (left + right)
+    reward = "-" if agent.reward is None else f"{agent.reward:+.3f}"
+    rows = [(name, value, f"{value:+.2f}") for name, value in zip(names, agent.action, strict=True)]
+    for number, (name, value, text) in enumerate([*rows, ("reward", None, reward)]):
+        y = 6 + 18 * number
+        put(picture, name, (8, y + 2), 16, SOFT)
+        put(picture, text, (width - 8, y + 2), 16, INK, right=True)
+        if value is not None:
+            draw.rect(picture, PAGE, (left, y + 2, right - left, 11))
+            tip = middle + 0.5 * (right - left) * min(max(value, -1.0), 1.0)
+            bar = (round(min(middle, tip)), y + 2, max(1, round(abs(tip - middle))), 11)
+            draw.rect(picture, RGB_COLOURS[0], bar)
+            draw.line(picture, SOFT, (middle, y), (middle, y + 14))
+    return picture
 
 
 class View:
@@ -676,14 +643,15 @@ class View:
         self.mooring = MooringPanel(pygame, scenes[0], (side, below)) if moored else None
         levels = ratings(scenes[0].turbine)
         self.traces = TracePanel(pygame, (side, height - below), len(scenes), levels, span, limits)
-        self.agent = AgentPanel(pygame, min(240, self.right - 20))
+        self._writer = Writer(pygame)
         self.canvas = pygame.Surface(size)
         self._window = self._clock = None
 
     def enter(self, scene):
         """Change the scene of the first panel and clear the traces."""
         self.panels[0].enter(scene)
-        self.traces.clear()
+        for history in self.traces.histories:
+            history.clear()
 
     def draw(self, rows, agent=None):
         """Return the pygame Surface of one row of channels per run, and of the Agent of the first run."""
@@ -698,7 +666,8 @@ class View:
             picture = self.mooring.draw(rows[0], self.panels[0].scene, self.panels[0].tension_at_rest)
             self.canvas.blit(picture, (self.right, self.size[1] - self.mooring.size[1]))
         if agent is not None:
-            self.canvas.blit(self.agent.draw(agent), (10, 10))
+            picture = agent_picture(self.pygame, self._writer, min(240, self.right - 20), agent)
+            self.canvas.blit(picture, (10, 10))
         return self.canvas
 
     def array(self):

@@ -4,8 +4,6 @@ As in time_series.py every function returns a matplotlib Figure and writes it to
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy.signal import csd, welch
 
@@ -22,7 +20,7 @@ from fowt_env.visual.style import (
     save_figure,
     style_axes,
 )
-from fowt_env.visual.time_series import TIME, even_step, named_runs
+from fowt_env.visual.time_series import PANELS, TIME, even_step, named_runs
 
 WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`
@@ -31,13 +29,8 @@ HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of c
 ENERGETIC = 0.02  # of the peak of the wave spectrum: least wave energy for an estimate of an RAO
 COHERENT = 0.5  # above it an RAO is drawn solid
 RAO_RANGE = (0.015, 0.3)  # Hz: from below the resonances of spars and semi-submersibles to the end of waves
-BOXES = (
-    ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
-    ("power\n(kW)", "GenPwr_[kW]"),
-    ("blade pitch\n(deg)", "BldPitch1_[deg]"),
-    ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
-    ("surge\n(m)", "PtfmSurge_[m]"),
-    ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
+BOXES = tuple(
+    panel for panel in PANELS if panel[1] not in ("Wind1VelX_[m/s]", "Wave1Elev_[m]", "GenTq_[kN-m]")
 )
 SCHEDULE = (
     ("rotor speed (rpm)", "RotSpeed_[rpm]"),
@@ -89,10 +82,11 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
     width = 0.8 / len(labels)
     for axes, (name, channel) in zip(places, panels, strict=True):
         for number, label in enumerate(labels):
-            having = [i for i, runs in enumerate(kept.values()) if channel in runs.get(label, ())]
-            values = [list(kept.values())[i][label][channel].to_numpy() for i in having]
-            if not values:
+            frames = [runs.get(label, ()) for runs in kept.values()]
+            having = [i for i, frame in enumerate(frames) if channel in frame]
+            if not having:
                 continue
+            values = [frames[i][channel].to_numpy() for i in having]
             at = [i + width * (number - 0.5 * (len(labels) - 1)) for i in having]
             colour = COLOURS[number % len(COLOURS)]
             boxes = axes.boxplot(
@@ -143,16 +137,6 @@ def plot_schedule(points, path=None, title=None, *, rated_wind=None):
     return save_figure(figure, path)
 
 
-class _Estimate(NamedTuple):
-    """Holds Welch's estimates of a response to waves, (n,) each."""
-
-    frequency: np.ndarray  # Hz
-    amplitude: np.ndarray  # per metre of wave
-    phase: np.ndarray  # rad in (-pi, pi], by which it leads the wave
-    coherence: np.ndarray
-    energetic: np.ndarray  # whether the waves have energy at the frequency
-
-
 def response_operator(frame, channel, skip=0.0, segment=None):
     """Return (frequency Hz, amplitude per metre of wave, coherence) of a channel where waves have energy.
 
@@ -161,13 +145,15 @@ def response_operator(frame, channel, skip=0.0, segment=None):
     and rather too large. segment: seconds per window; None: an eighth of the record.
     Raises: InputError for a missing channel, a record without waves, or uneven times.
     """
-    found = _estimate(frame, channel, skip, segment)
-    inside = found.energetic
-    return found.frequency[inside], found.amplitude[inside], found.coherence[inside]
+    frequency, amplitude, _, coherence, energetic = _estimate(frame, channel, skip, segment)
+    return frequency[energetic], amplitude[energetic], coherence[energetic]
 
 
 def _estimate(frame, channel, skip, segment):
-    """Return the _Estimate at all frequencies above zero; arguments and errors as response_operator."""
+    """Return (frequency, amplitude, phase lead in deg, coherence, whether waves have energy), (n,) each.
+
+    At all frequencies above zero; arguments and errors as response_operator.
+    """
     for name in (TIME, WAVE, channel):
         if name not in frame.columns:
             raise InputError(f"response operator: the run has no column {name!r}")
@@ -188,18 +174,13 @@ def _estimate(frame, channel, skip, segment):
     with np.errstate(invalid="ignore", divide="ignore"):
         coherence = np.abs(cross) ** 2 / (power * answer)
         amplitude = np.abs(cross) / power
-    found = _Estimate(frequency, amplitude, np.angle(cross), coherence, power > ENERGETIC * power.max())
-    return _Estimate(*(values[1:] for values in found))
-
-
-def wrapped(degrees):
-    """Return angles (n,) in [-180, 180) deg."""
-    return (np.asarray(degrees) + 180.0) % 360.0 - 180.0
+    found = frequency, amplitude, np.degrees(np.angle(cross)), coherence, power > ENERGETIC * power.max()
+    return tuple(values[1:] for values in found)
 
 
 def broken_at_wraps(x, degrees):
-    """Return (x, wrapped angles, deg) of a line that is interrupted where the angle passes +-180 deg."""
-    x, angle = np.asarray(x, dtype=float), wrapped(degrees)
+    """Return (x, angles in [-180, 180) deg) of a line, interrupted where the angle passes +-180 deg."""
+    x, angle = np.asarray(x, dtype=float), (np.asarray(degrees) + 180.0) % 360.0 - 180.0
     jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
     return np.insert(x, jumps, np.nan), np.insert(angle, jumps, np.nan)
 
@@ -220,24 +201,21 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitc
         for number, (label, frame) in enumerate(runs.items()):
             if channel not in frame.columns:
                 continue
-            found = _estimate(frame, channel, skip, segment)
-            good = found.energetic & (found.coherence > COHERENT)
-            highest = max(highest, found.amplitude[found.energetic].max())
-            style, degrees = line_style(number), np.degrees(found.phase)
+            frequency, amplitude, phase, coherence, energetic = _estimate(frame, channel, skip, segment)
+            highest = max(highest, amplitude[energetic].max())
+            style = line_style(number)
             for kept, look in (
-                (found.energetic, {"lw": 0.9, "alpha": 0.3}),
-                (good, {"lw": 1.5, "label": label}),
+                (energetic, {"lw": 0.9, "alpha": 0.3}),
+                (energetic & (coherence > COHERENT), {"lw": 1.5, "label": label}),
             ):
-                shown = np.where(kept, found.amplitude, np.nan)
-                grid[0, column].plot(found.frequency, shown, **look, **style)
-                shown = np.where(kept, degrees, np.nan)
-                grid[1, column].plot(*broken_at_wraps(found.frequency, shown), **look, **style)
-            grid[2, column].plot(found.frequency, found.coherence, linewidth=1.1, **style)
-            quiet = ~found.energetic
+                grid[0, column].plot(frequency, np.where(kept, amplitude, np.nan), **look, **style)
+                line = broken_at_wraps(frequency, np.where(kept, phase, np.nan))
+                grid[1, column].plot(*line, **look, **style)
+            grid[2, column].plot(frequency, coherence, linewidth=1.1, **style)
         for axes in grid[:, column]:
             style_axes(axes)
             axes.fill_between(
-                found.frequency, 0, 1, where=quiet, step="mid", color=UNSCORED, zorder=0, linewidth=0,
+                frequency, 0, 1, where=~energetic, step="mid", color=UNSCORED, zorder=0, linewidth=0,
                 transform=axes.get_xaxis_transform(),
             )  # fmt: skip
             if platform_pitch_period is not None:

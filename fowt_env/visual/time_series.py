@@ -90,7 +90,7 @@ def plot_run(frame, path=None, title=None, *, skip=0.0, ratings=None):
 
     skip, ratings: as for plot_runs.
     """
-    return plot_runs({"": frame}, path=path, title=title, skip=skip, ratings=ratings)
+    return plot_runs({"": frame}, path, title, skip=skip, ratings=ratings)
 
 
 def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None, panels=PANELS):
@@ -115,10 +115,17 @@ def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None, panels=PAN
         lines = _lines(runs, channel)
         for text, style, frame in lines:
             axes.plot(frame[TIME], frame[channel], linewidth=0.9, label=text, **style)
-        _fit(axes, [frame[channel] for _, _, frame in lines])
+        axes.ticklabel_format(axis="y", useOffset=False)
+        series = [frame[channel] for _, _, frame in lines]
+        low, high = min(values.min() for values in series), max(values.max() for values in series)
+        if high - low <= STEADY * max(abs(low), abs(high)):  # constant up to rounding
+            middle, half = 0.5 * (low + high), max(0.05 * abs(low), 0.5)
+            axes.set_ylim(middle - half, middle + half)
         for text, rating in MARKED.get(channel, ()):
             if rating in ratings:
-                _mark_level(axes, text, ratings[rating])
+                level, words = ratings[rating], f"{text}\n{ratings[rating]:.4g}"
+                axes.axhline(level, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
+                note(axes, words, (1.0, level), (4, 0), "axes", va="center", annotation_clip=False)
         if skip > 0.0:
             axes.axvspan(start, start + skip, color=UNSCORED, zorder=0, linewidth=0)
         axes.set_ylabel(label, fontsize=8, color=INK)
@@ -129,21 +136,6 @@ def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None, panels=PAN
     figure.align_ylabels(rows)
     head_of(figure, rows, runs, title)
     return save_figure(figure, path)
-
-
-def _fit(axes, series):
-    """Set full tick labels, and a range for signals that are constant up to rounding."""
-    axes.ticklabel_format(axis="y", useOffset=False)
-    low, high = min(values.min() for values in series), max(values.max() for values in series)
-    if high - low <= STEADY * max(abs(low), abs(high)):
-        middle, half = 0.5 * (low + high), max(0.05 * abs(low), 0.5)
-        axes.set_ylim(middle - half, middle + half)
-
-
-def _mark_level(axes, text, level):
-    """Draw a dashed line at a level of a panel, with its name at the right end."""
-    axes.axhline(level, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
-    note(axes, f"{text}\n{level:.4g}", (1.0, level), (4, 0), "axes", va="center", annotation_clip=False)
 
 
 def spectrum(time, value, segment=None):
@@ -175,11 +167,12 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
     `skip` seconds are omitted.
     """
     runs = named_runs(runs if isinstance(runs, dict) else {"": runs}, skip)
-    if not any(entry[1] in frame.columns for entry in SPECTRA for frame in runs.values()):
-        raise InputError(f"nothing to plot: none of {', '.join(entry[1] for entry in SPECTRA)} is in the run")
-    shown = [entry for entry in SPECTRA if any(_varies(frame.get(entry[1])) for frame in runs.values())]
+    present = [entry for entry in SPECTRA if any(entry[1] in frame for frame in runs.values())]
+    shown = [entry for entry in present if any(_varies(frame.get(entry[1])) for frame in runs.values())]
     if not shown:
-        raise InputError(f"nothing to plot: {', '.join(entry[1] for entry in SPECTRA)} are constant")
+        names = ", ".join(channel for _, channel, _ in SPECTRA)
+        why = f"{names} are constant" if present else f"none of {names} is in the run"
+        raise InputError(f"nothing to plot: {why}")
     figure, rows = _stacked(len(shown), 1.7)
     marks = frequency_marks(next(iter(runs.values())), platform_pitch_period)
     for axes, (label, channel, unit) in zip(rows, shown, strict=True):

@@ -27,7 +27,6 @@ from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import console
 from fowt_env.training.evaluation import provenance
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.reports import html_page
 
 FILES = int(os.environ.get("FOWT_MUTATIONS", "10000"))
 
@@ -321,7 +320,7 @@ ODD_VALUES = (None, -1, 10**400, "x", [{}], {"a": {}})
 def test_every_value_of_a_results_folder_s_files_may_be_any_other(tmp_path, monkeypatch, name, every):
     pytest.importorskip("openfast_io", reason="openfast_io is not installed")
     pytest.importorskip("plotly", reason="plotly is not installed")
-    monkeypatch.setattr(html_page, "_plotly_script", lambda: "")
+    monkeypatch.setattr("plotly.offline.get_plotlyjs", lambda: "")
     monkeypatch.setattr(provenance, "plant_code", provenance.plant_code)  # as Samples leaves it
     monkeypatch.setattr(provenance, "versions", provenance.versions)
     samples = mutation.Samples(tmp_path, ["results"])

@@ -201,18 +201,6 @@ def test_gymnasium_finds_nothing_wrong_with_either_mode():
         env.close()
 
 
-def test_videos_can_be_recorded(tmp_path):
-    pytest.importorskip("moviepy", reason="moviepy is not installed: the extra `video` is missing")
-    env = gymnasium.make("fowt_env/OC3Hywind-v1", render_mode="rgb_array", duration=1.0, **QUICK)
-    env = gymnasium.wrappers.RecordVideo(env, str(tmp_path), episode_trigger=lambda episode: True)
-    env.reset(seed=1)
-    for _ in range(10):
-        env.step(np.zeros(2))
-    env.close()
-    (video,) = tmp_path.glob("*.mp4")
-    assert video.stat().st_size > 5000
-
-
 def test_an_unrendered_run_never_loads_pygame():
     code = (
         "import sys, numpy as np, fowt_env.envs as e;"
@@ -313,47 +301,6 @@ def test_animations_that_cannot_be_made_are_named(scene, runs, tmp_path, argumen
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize(
-    ("name", "above", "below"),
-    [("iea15_volturnus_s", 4, 12), ("nrel5mw_iti_barge", 1, 1)],
-)
-def test_shapes_stand_for_hulls_whose_loads_have_none(name, above, below):
-    """Of every column that the file gives the middle above the water is yellow; water is beside the hull."""
-    scene = fowt_env.build_scene(name, fidelity="standard")
-    view = View([scene])
-    view.draw([ROW])
-    panel, picture, shapes = view.panels[0], view.array().astype(int), scene.platform.shapes
-
-    def colour(point):
-        x, y = panel.pixels([point])[0] / rendering.SAMPLING
-        return picture[round(y), round(x)]
-
-    assert sum(shape.end[2] > 0.0 for shape in shapes) >= above and len(shapes) <= below
-    for shape in shapes:
-        start, end = np.array(shape.start), np.array(shape.end)
-        if end[2] > 0.0 and (shape.section or shape.diameter > 2.0):
-            at = 0.75 * start + 0.25 * end  # of a beam: beside the tower
-            red, green, blue = colour((*at[:2], 3.0))
-            assert red > green > 1.5 * blue, shape
-    red, green, blue = colour((-90.0, 0.0, 2.0))
-    assert blue > red
-
-
-def test_the_agent_s_bars_show_its_action_and_the_reward_changes_the_picture(still):
-    panel = View([still]).agent
-    pygame = panel.pygame
-
-    def blue(action):
-        picture = pygame.surfarray.array3d(panel.draw(rendering.Agent(action, 0.0))).astype(int)
-        return int((np.abs(picture - np.array(RGB_COLOURS[0])).max(axis=2) < 5).sum())
-
-    assert blue((1.0, 0.0)) > 1.8 * blue((0.5, 0.0)) > 1.5 * blue((0.25, 0.0))
-    some, other = (
-        pygame.image.tobytes(panel.draw(rendering.Agent((0.0, 0.0), r)), "RGB") for r in (1.0, 2.0)
-    )
-    assert some != other
-
-
 def test_an_environment_s_picture_has_its_size_action_and_reward(monkeypatch):
     shown = []
     draw = View.draw
@@ -394,37 +341,63 @@ def test_a_blade_seen_edge_on_keeps_a_width_and_its_outline_does_not_cross_itsel
     assert len(set(np.sign(width))) == 1
 
 
-@pytest.mark.parametrize("make", [floaters.semi, floaters.tension_leg], ids=["semi", "tension leg"])
-def test_members_are_drawn_where_they_are(make):
-    """Each column above the water is yellow where its axis is; nothing is beside the outermost."""
-    scene = fowt_env.build_scene(make(), fidelity="standard")
-    view = View([scene])
+def pixel(view, point):
+    """Colour (3,) at a point of the platform at rest."""
+    x, y = view.panels[0].pixels([point])[0] / rendering.SAMPLING
+    return view.array()[round(y), round(x)].astype(int)
+
+
+def view_of(platform):
+    view = View([fowt_env.build_scene(platform, fidelity="standard")])
     view.draw([ROW])
-    panel, picture = view.panels[0], view.array()
+    return view
 
-    def colour(point):
-        x, y = panel.pixels(PlatformPose(REST).inertial([point]))[0] / rendering.SAMPLING
-        return picture[round(y), round(x)].astype(int)
 
-    for member in scene.platform.members:
-        top, low = np.array(member.end), np.array(member.start)
-        if top[2] <= 0.0:
-            continue
-        red, green, blue = colour(low + (top - low) * (2.0 - low[2]) / (top[2] - low[2]))
-        assert red > green > 2 * blue, member
-    red, green, blue = colour((60.0, 0.0, 3.0))
-    assert blue > red
+@pytest.mark.parametrize(
+    ("platform", "beside"),
+    [
+        ("iea15_volturnus_s", (-90.0, 0.0, 2.0)),
+        ("nrel5mw_iti_barge", (-90.0, 0.0, 2.0)),
+        (floaters.semi(), (60.0, 0.0, 3.0)),
+        (floaters.tension_leg(), (60.0, 0.0, 3.0)),
+    ],
+    ids=["shapes", "box", "semi", "tension leg"],
+)
+def test_columns_and_boxes_are_drawn_where_they_are(platform, beside):
+    """Each part above the water is yellow 3 m above it; beside the hull there is water or sky."""
+    view = view_of(platform)
+    described = view.panels[0].scene.platform
+    seen = 0
+    for solid in described.shapes or described.members:
+        start, end = np.array(solid.start), np.array(solid.end)
+        if end[2] > 0.0 and (solid.diameter is None or np.max(solid.diameter) > 2.0):
+            at = 0.75 * start + 0.25 * end  # of a box: beside the tower
+            red, green, blue = pixel(view, (*at[:2], 3.0))
+            assert red > green > 1.5 * blue, solid
+            seen += 1
+    red, green, blue = pixel(view, beside)
+    assert seen and blue > red
 
 
 def test_a_hull_without_a_shape_is_a_box_of_its_draft():
     potential = read_platform("nrel5mw_iti_barge")
-    bare = potential.model_copy(update={"members": (), "shapes": ()})
-    scene = fowt_env.build_scene(bare, fidelity="standard")
-    view = View([scene])
-    view.draw([ROW])
-    panel, picture = view.panels[0], view.array()
+    view = view_of(potential.model_copy(update={"members": (), "shapes": ()}))
     half = 0.5 * np.sqrt(potential.potential_flow.volume / potential.draft)
     for x, inside in ((0.9 * half, True), (1.15 * half, False)):
-        px, py = panel.pixels([(x, 0.0, 0.25 * potential.draft)])[0] / rendering.SAMPLING
-        red, green, blue = picture[round(py), round(px)].astype(int)
+        red, green, blue = pixel(view, (x, 0.0, 0.25 * potential.draft))
         assert (red > 2 * blue) == inside
+
+
+def test_the_agent_s_bars_show_its_action_and_the_reward_changes_the_picture():
+    pygame = rendering.load_pygame()
+
+    def shown(action, reward=0.0):
+        agent = rendering.Agent(action, reward)
+        picture = rendering.agent_picture(pygame, rendering.Writer(pygame), 240, agent)
+        return pygame.surfarray.array3d(picture).astype(int)
+
+    one, half, less = (
+        (np.abs(shown((size, 0.0)) - RGB_COLOURS[0]).max(axis=2) < 5).sum() for size in (1.0, 0.5, 0.25)
+    )
+    assert one > 1.8 * half > 1.5 * less
+    assert (shown((0.0, 0.0), 1.0) != shown((0.0, 0.0), 2.0)).any()

@@ -20,8 +20,7 @@ from fowt_env.training.evaluation.bootstrap import LEVEL, holm
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import better
 from fowt_env.training.reports.metric_words import about_metric
-from fowt_env.training.reports.page_policy import content_policy
-from fowt_env.training.reports.page_words import table_rows
+from fowt_env.training.reports.page_words import content_policy, table_rows
 
 FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "rotor speed": "RotSpeed_std_[rpm]",

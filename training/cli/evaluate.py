@@ -202,7 +202,7 @@ def _places(flags):
 
 def _evaluation_plots(table, board, folder):
     """Return the paths of the plots; none, with a note, if matplotlib is missing."""
-    from fowt_env.training.reports.terminal import evaluation_plots
+    from fowt_env.training.reports.evaluation_plots import evaluation_plots
 
     try:
         with progress_bar("plotting", None):

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from math import pi, sqrt
 
 import numpy as np
-from scipy.linalg import expm, solve_continuous_are, solve_sylvester
+from scipy.linalg import block_diag, expm, solve_continuous_are, solve_sylvester
 
 from fowt_env.controllers.lqr.design import SENSORS
 from fowt_env.descriptions.sensors import sensor_chain, sensors_of
@@ -65,17 +65,6 @@ class Information:
     sensors: tuple | None = None
     preview: float | None = None
     torque: bool = True
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """Response of estimates to each of k inputs of a plant, over OMEGA; the gains do not matter.
-
-    plant (n, 8, k): state less estimate; weather (n, 8, k): estimates of the filters' states.
-    """
-
-    plant: np.ndarray
-    weather: np.ndarray
 
 
 class Problem:
@@ -141,26 +130,26 @@ class Problem:
 
     def deviations(self, q, weather):
         """Return Deviations under the best control for the cost q, in a bound_plant.Weather."""
-        return self._deviations(*self.gains(q), weather)
-
-    def _deviations(self, p, k, weather):
+        p, k = self.gains(q)
         closed, n = self.a - self.b @ k, len(self.states)
-        estimate = self._estimate(weather)
+        if id(weather) not in self.estimates:  # the same for all gains
+            self.estimates[id(weather)] = weather, self._estimate(weather)
+        errors, filters = self.estimates[id(weather)][1]
         inputs = 2 + self.noise.size
         drive = np.zeros((OMEGA.size, n, inputs), complex)
         drive[:, :, 0], drive[:, :, 1] = self.wind, weather.force @ self.waves.T
         # the feedback acts on the estimate, the state less its error
-        drive += self.b @ (k[:, :N] @ estimate.plant)
+        drive += self.b @ (k[:, :N] @ errors)
         gain = np.linalg.solve(self.r, self.b.T)
         ahead = np.zeros((OMEGA.size, n, inputs), complex)
         wave = solve_sylvester(closed.T, self.plant.wave_filter.a, -p @ self.wave_drive)
         wind = solve_sylvester(closed.T, self.plant.wind_filter.a, -p @ self.wind_drive)
         order = wind.shape[1]
-        ahead += wave @ estimate.weather[:, order:]
+        ahead += wave @ filters[:, order:]
         if self.knows_wind:
             ahead[:, :, 0] += self._ahead(closed, p, wind)
         else:
-            ahead += wind @ estimate.weather[:, :order]
+            ahead += wind @ filters[:, :order]
         drive -= (self.b @ gain) @ ahead
         moved = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(n) - closed, drive)
         noise = np.broadcast_to(self.noise / pi, (OMEGA.size, self.noise.size))
@@ -187,42 +176,40 @@ class Problem:
         return found
 
     def _estimate(self, weather):
-        """Return Estimates in a weather, which are kept as they are the same for all gains."""
-        key = id(weather)
-        if key not in self.estimates:
-            self.estimates[key] = (weather, self._estimated(weather))
-        return self.estimates[key][1]
+        """Return (plant's state less its estimate, estimates of the filters' states), both (n, 8, k).
 
-    def _estimated(self, weather):
+        Responses over OMEGA to each of k inputs in a weather; the gains do not matter.
+        """
         plant, k = self.plant, 2 + self.noise.size
-        wind, waves = plant.wind_filter, plant.wave_filter
-        order, orders = wind.b.size, wind.b.size + waves.b.size
-        found = Estimates(np.zeros((OMEGA.size, N, k), complex), np.zeros((OMEGA.size, orders, k), complex))
+        waves, order = plant.wave_filter, plant.wind_filter.b.size
+        size = N + order + waves.b.size
         if self.information.sensors is None:
+            found = np.zeros((OMEGA.size, size, k), complex)
             states = waves.states(OMEGA)
-            elevation, zero = (states @ waves.output)[:, None], np.zeros_like(states)
-            found.weather[:, order:, 1] = np.divide(states, elevation, out=zero, where=elevation != 0.0)
-            return found
+            elevation = (states @ waves.output)[:, None]
+            np.divide(states, elevation, out=found[:, N + order :, 1], where=elevation != 0.0)
+            return found[:, :N], found[:, N:]
         gain, c = self.estimator()
         used = [SENSORS.index(name) for name in self.information.sensors]
-        model = np.zeros((N + orders, N + orders))
-        model[:N, :N], model[:N, N : N + order] = plant.A, np.outer(plant.wind, wind.output)
-        model[:N, N + order :] = plant.E @ plant.force
-        model[N : N + order, N : N + order], model[N + order :, N + order :] = wind.a, waves.a
         # state of the plant less its estimate, and estimates of the weather
-        sign = np.r_[np.ones(N), -np.ones(orders)]
-        loop = model - gain @ c
-        loop = loop * sign[:, None] * sign
-        drive = np.zeros((OMEGA.size, N + orders, k), complex)
+        sign = np.r_[np.ones(N), -np.ones(size - N)]
+        loop = (self._with_filters()[0] - gain @ c) * sign[:, None] * sign
+        drive = np.zeros((OMEGA.size, size, k), complex)
         drive[:, :N, 1] = weather.force @ plant.E.T
         drive[:, :, 1] -= (weather.force @ plant.F[used].T) @ gain.T * sign
         if not self.knows_wind:
             drive[:, :N, 0] = plant.wind
             drive[:, :, 0] -= gain @ plant.Dwind[used] * sign
         drive[:, :, 2:] -= gain * sign[:, None]
-        moved = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(N + orders) - loop, drive)
-        found.plant[:], found.weather[:] = moved[:, :N], moved[:, N:]
-        return found
+        moved = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(size) - loop, drive)
+        return moved[:, :N], moved[:, N:]
+
+    def _with_filters(self):
+        """Return (A, Q) of the plant with the filters' states, and the intensity of the noise on them."""
+        plant, wind, waves = self.plant, self.plant.wind_filter, self.plant.wave_filter
+        a = block_diag(plant.A, wind.a, waves.a)
+        a[:N, N:] = np.hstack([np.outer(plant.wind, wind.output), plant.E @ plant.force])
+        return a, block_diag(LEAST_NOISE, np.outer(wind.b, wind.b), np.outer(waves.b, waves.b))
 
     def estimator(self):
         """Return (gain, C): Kalman gain on plant and filters' states, and what the sensors read of these.
@@ -230,26 +217,15 @@ class Problem:
         Torque and pitch command are known. A wind that is known acts through them alike: its filter's states
         are not estimated, and have no gain.
         """
-        plant = self.plant
-        wind, waves = plant.wind_filter, plant.wave_filter
-        order = wind.b.size
+        plant, wind = self.plant, self.plant.wind_filter
         used = [SENSORS.index(name) for name in self.information.sensors]
-        n = N + order + waves.b.size
-        a, q, c = np.zeros((n, n)), np.zeros((n, n)), np.zeros((len(used), n))
-        a[:N, :N] = plant.A
-        a[:N, N : N + order], a[:N, N + order :] = np.outer(plant.wind, wind.output), plant.E @ plant.force
-        a[N : N + order, N : N + order], a[N + order :, N + order :] = wind.a, waves.a
-        c[:, :N] = plant.C[used]
-        c[:, N : N + order] = np.outer(plant.Dwind[used], wind.output)
-        c[:, N + order :] = plant.F[used] @ plant.force
-        q[:N, :N] = LEAST_NOISE
-        q[N : N + order, N : N + order] = np.outer(wind.b, wind.b)
-        q[N + order :, N + order :] = np.outer(waves.b, waves.b)
-        kept = np.r_[np.arange(N), np.arange(N + (order if self.knows_wind else 0), n)]
-        a, q, read = a[np.ix_(kept, kept)], q[np.ix_(kept, kept)], c[:, kept]
-        r = np.diag(self.noise)
-        p = solve_continuous_are(a.T, read.T, q, r)
-        gain = np.zeros((n, len(used)))
+        a, q = self._with_filters()
+        of_wind = np.outer(plant.Dwind[used], wind.output)
+        c = np.hstack([plant.C[used], of_wind, plant.F[used] @ plant.force])
+        kept = np.r_[np.arange(N), np.arange(N + (wind.b.size if self.knows_wind else 0), len(a))]
+        r, read = np.diag(self.noise), c[:, kept]
+        p = solve_continuous_are(a[np.ix_(kept, kept)].T, read.T, q[np.ix_(kept, kept)], r)
+        gain = np.zeros((len(a), len(used)))
         gain[kept] = p @ read.T @ np.linalg.inv(r)
         return gain, c
 

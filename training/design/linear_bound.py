@@ -2,14 +2,11 @@
 
     fowt design bound --wind 12,14,16,18,20,22,24
 
-Per wind speed, on the linear plant of bound_plant.py (surge, heave, platform pitch, rotor, pitch actuator,
-hull drag linearised in the sea and the motion under gspi_oc3): the least weighted sum of both variances at no
-more blade-pitch travel and no more power deviation than gspi_oc3 has on the same model, and a torque
-deviation that the drivetrain can give (the torque's own maximum is 10 % above rated). The limits are met by
-multipliers in the quadratic cost, so that each point is optimal among all linear controllers of the same
-information, for weather of the fitted spectra; deviations are those in the whole spectra. The linear model
-has no limits of torque, pitch or their rates, and nothing is sampled. A controller that moves the platform
-less than gspi_oc3 has a little less drag than the model: the limit errs to the low side.
+Per wind speed, on the linear plant of bound_plant.py: the least weighted sum of both variances at no more
+blade-pitch travel and no more power deviation than gspi_oc3 has on the same model, and a torque deviation
+that the drivetrain can give. The limits are met by multipliers in the quadratic cost, so that each point is
+optimal among all linear controllers of the same information, for weather of the fitted spectra; deviations
+are those in the whole spectra. The model limits no torque, pitch or rate, and nothing is sampled.
 """
 
 from dataclasses import replace
@@ -36,6 +33,7 @@ KNOWN = {  # what the feedback knows: name, words, sensors
     "measured": ("five sensors", SENSORS),
     "speed": ("rotor speed and blade pitch", SENSORS[:2]),
 }
+FITTED = ("wind", "elevation", "surge_force", "heave_force", "pitch_moment")
 PITCH_ONLY = "_pitch_only"
 PLOTTED = ("full", "measured", "speed", "measured_pitch_only", "full_preview_3", "full_preview_11")
 RATIOS = {  # column of ratio_table: metric
@@ -113,7 +111,11 @@ def bound_table(
     for number, wind in enumerate(winds):
         plant = BoundPlant(scene, wind, sea)
         base, fitted = (baseline_deviations(plant, weather) for weather in (plant.true, plant.fitted))
-        fits.append(_fits(plant))
+        errors = (plant.wind_filter.error, plant.wave_filter.error, *plant.force_errors)
+        fits.append({"wind_[m/s]": plant.wind_speed})
+        fits[-1] |= {f"{of}_error_[%]": 100.0 * float(x) for of, x in zip(FITTED, errors, strict=True)}
+        fits[-1]["surge_drag_[kN-s/m]"] = 1e-3 * float(plant.drag.damping[0, 0])
+        fits[-1]["pitch_drag_[MN-m-s/rad]"] = 1e-6 * float(plant.drag.damping[4, 4])
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base, fitted))
         limits = replace(base, travel=travel * base.travel, power=power * base.power, torque=torque_std)
         for place, name in enumerate(chosen, 1):
@@ -125,18 +127,6 @@ def bound_table(
     table = pd.DataFrame(rows)
     table.attrs["fits"] = pd.DataFrame(fits)
     return table
-
-
-def _fits(plant):
-    """Return the errors of a BoundPlant's fits in percent, and the damping of its drag."""
-    errors = plant.wind_filter.error, plant.wave_filter.error, *plant.force_errors
-    names = ("wind", "elevation", "surge_force", "heave_force", "pitch_moment")
-    return {
-        "wind_[m/s]": plant.wind_speed,
-        **{f"{name}_error_[%]": 100.0 * float(error) for name, error in zip(names, errors, strict=True)},
-        "surge_drag_[kN-s/m]": 1e-3 * float(plant.drag.damping[0, 0]),
-        "pitch_drag_[MN-m-s/rad]": 1e-6 * float(plant.drag.damping[4, 4]),
-    }
 
 
 def _row(wind, information, fraction, found, base, fitted):
@@ -207,20 +197,16 @@ def ratio_table(runs, bound=None):
         row = {"wind_[m/s]": wind, "variant": variant}
         row |= {name: float(mean[column] / base[column]) for name, column in RATIOS.items()}
         if bound is not None:
-            for information, name in (("full", "of_bound_[-]"), ("measured", "of_measured_[-]")):
-                row[name] = fraction_of_bound(
-                    bound, wind, row["speed_ratio_[-]"], row["pitch_ratio_[-]"], information
-                )
+            ratios = row["speed_ratio_[-]"], row["pitch_ratio_[-]"]
+            row["of_bound_[-]"] = fraction_of_bound(bound, wind, *ratios)
+            row["of_measured_[-]"] = fraction_of_bound(bound, wind, *ratios, "measured")
         rows.append(row)
     return pd.DataFrame(rows)
 
 
 def efficient(points):
     """Return the rows of (n, 2) points that no other betters in both columns, by rising first column."""
-    points = np.asarray(points, dtype=float)
-    best, kept = np.inf, []
-    for x, y in points[np.lexsort((points[:, 1], points[:, 0]))]:
-        if y < best:
-            kept.append((x, y))
-            best = y
-    return np.array(kept).reshape(-1, 2)
+    points = np.asarray(points, dtype=float).reshape(-1, 2)
+    points = points[np.lexsort((points[:, 1], points[:, 0]))]
+    lowest = np.minimum.accumulate(points[:, 1])
+    return points[points[:, 1] < np.r_[np.inf, lowest[:-1]]]

@@ -4,13 +4,15 @@ As in visual/time_series.py every function returns a matplotlib Figure and, if g
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 
+from itertools import cycle
+
 import numpy as np
 
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 from fowt_env.training.design.linear_bound import efficient
 from fowt_env.visual.response import broken_at_wraps
-from fowt_env.visual.style import COLOURS, FAINT, INK, SOFT, new_figure, save_figure, style_axes
+from fowt_env.visual.style import COLOURS, FAINT, INK, LINES, SOFT, new_figure, save_figure, style_axes
 
 MODE_NAMES = (
     "surge", "sway", "heave", "roll", "platform_pitch", "yaw", "rotor_speed", "blade_pitch", "other",
@@ -36,14 +38,13 @@ def _wind_colours(winds):
 
     Raises: InputError without winds.
     """
-    from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     if not winds:
         raise InputError("nothing to plot: no linear models were given")
     low, high = min(winds), max(winds)
-    scale = ScalarMappable(Normalize(low, high if high > low else low + 1.0), colormaps["viridis"])
+    scale = ScalarMappable(Normalize(low, high if high > low else low + 1.0), "viridis")
     return {wind: scale.to_rgba(wind) for wind in winds}, scale
 
 
@@ -67,9 +68,9 @@ def plot_poles(models, path=None, title=None):
         turning = [pole for _, _, pole in shown if pole.imag > 0.0 or not slow]
         _damping_lines(axes, min(p.real for p in turning), max(p.imag for p in turning))
         axes.set_xlabel("real part (1/s)", fontsize=9, color=INK)
-    names = {name for _, name, _ in found}
+    names = {name for _, name, _ in found} - {name for name, _ in beyond}
     for name, mark in zip(MODE_NAMES, MODE_MARKERS, strict=True):
-        if name in names and name not in {far for far, _ in beyond}:
+        if name in names:
             panels[0].scatter([], [], marker=mark, color=SOFT, label=name.replace("_", " "))
     handles, labels = panels[0].get_legend_handles_labels()
     panels[0].set_ylabel("imaginary part (rad/s)", fontsize=9, color=INK)
@@ -145,16 +146,14 @@ def plot_damping(models, path=None, title=None):
         raise InputError("nothing to plot: no linear models were given")
     figure = new_figure(9.0, 5.6)
     panels = figure.subplots(2, 1, sharex=True)
-    for index, name in enumerate(MODE_NAMES):
-        found = [
-            (wind, mode) for wind, model in models.items() for mode in model.modes() if mode.name == name
-        ]
-        if not found:
-            continue
-        winds = [wind for wind, _ in found]
-        style = {"color": COLOURS[index], "marker": MODE_MARKERS[index], "markersize": 4, "linewidth": 1.0}
-        panels[0].plot(winds, [mode.period for _, mode in found], label=name.replace("_", " "), **style)
-        panels[1].plot(winds, [mode.damping_ratio for _, mode in found], **style)
+    modes = [(wind, mode) for wind, model in models.items() for mode in model.modes()]
+    for colour, mark, name in zip(COLOURS * 2, MODE_MARKERS, MODE_NAMES, strict=False):
+        found = [(wind, mode.period, mode.damping_ratio) for wind, mode in modes if mode.name == name]
+        if found:
+            winds, periods, ratios = zip(*found, strict=True)
+            style = {"color": colour, "marker": mark, "markersize": 4, "linewidth": 1.0}
+            panels[0].plot(winds, periods, label=name.replace("_", " "), **style)
+            panels[1].plot(winds, ratios, **style)
     for axes, label in zip(panels, ("period (s)", "damping ratio"), strict=True):
         style_axes(axes)
         axes.set_ylabel(label, fontsize=9, color=INK)
@@ -218,32 +217,41 @@ def plot_bound(table, names, points=None, path=None, title=None):
         winds = [wind for wind in winds if wind in set(points[WIND])]
     if not winds:
         raise InputError("nothing to plot: no wind has both a Pareto front and simulated points")
+    looks = {
+        name: {"label": text, "color": colour, "ls": line, "linewidth": 1.2 if i else 1.6}
+        for i, ((name, text), colour, line) in enumerate(
+            zip(names.items(), cycle(COLOURS), cycle(LINES), strict=False)
+        )
+    }
     columns = min(4, len(winds))
     rows = -(-(len(winds) + (len(winds) > 3)) // columns)
     figure = new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
     places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
     for axes, wind in zip(places, winds, strict=False):
-        style_axes(axes)
-        here = table[table[WIND] == wind]
-        for index, (information, text) in enumerate(names.items()):
-            front = here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
-            if len(front):
-                line = efficient(front)
-                style = {"color": COLOURS[index], "linewidth": 1.6 if index == 0 else 1.2}
-                axes.plot(line[:, 0], line[:, 1], label=text, ls=("-", "--", ":", "-.")[index % 4], **style)
-        axes.scatter(1.0, 1.0, marker="+", s=70, color=INK, label="gspi_oc3", zorder=4)
+        draw_fronts(axes, table, wind, looks, (1.25, 1.15))
         if points is not None:
             shown = points[points[WIND] == wind]
             drawn = axes.scatter(
                 shown["speed_ratio_[-]"], shown["pitch_ratio_[-]"], c=shown["travel_ratio_[-]"], **TRAVEL,
                 s=30, edgecolor=INK, linewidth=0.5, label="lqr, simulated", zorder=5,
             )  # fmt: skip
-        axes.set_xlim(0.0, 1.25)
-        axes.set_ylim(0.0, 1.15)
-        axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
     if points is not None:
         _colour_bar(figure, drawn, places, "mean blade-pitch rate over that of gspi_oc3")
     return finish_bound(figure, places, len(winds), path, title)
+
+
+def draw_fronts(axes, table, wind, looks, ends):
+    """Draw the fronts {information: look} of one wind of a bound_table, within the upper ends of the axes."""
+    style_axes(axes)
+    here = table[table[WIND] == wind]
+    for information, look in looks.items():
+        front = efficient(here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]])
+        if len(front):
+            axes.plot(*front.T, **look)
+    axes.scatter(1.0, 1.0, marker="+", s=70, color=INK, label="gspi_oc3", zorder=4)
+    axes.set_xlim(0.0, ends[0])
+    axes.set_ylim(0.0, ends[1])
+    axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
 
 
 def finish_bound(figure, places, used, path, title):

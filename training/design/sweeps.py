@@ -44,11 +44,11 @@ def models_over(scene, winds, progress=None):
 def mode_table(models):
     """Return a DataFrame: wind, mode, period (s), damping ratio of oscillations, pitch and torque held."""
     rows = [
-        {"wind_[m/s]": wind, "mode": m.name, "period_[s]": m.period, "damping_[-]": m.damping_ratio}
+        (wind, mode.name, mode.period, mode.damping_ratio)
         for wind, model in models.items()
-        for m in model.modes()
+        for mode in model.modes()
     ]
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=["wind_[m/s]", "mode", "period_[s]", "damping_[-]"])
 
 
 def transmission_zeros(model, source="blade_pitch_command", output="rotor_speed"):
@@ -74,11 +74,8 @@ def zero_table(models):
 
     Winds at which the blade pitch rests on its minimum are left out: there is no pitch control.
     """
-    rows = [
-        {"wind_[m/s]": wind, "real_[rad/s]": z.real, "imag_[rad/s]": z.imag}
-        for wind, model in models.items()
-        for z in (() if model.pitch_rests else _right_half(model))
-    ]
+    moving = {wind: model for wind, model in models.items() if not model.pitch_rests}
+    rows = [(wind, z.real, z.imag) for wind, model in moving.items() for z in _right_half(model)]
     return pd.DataFrame(rows, columns=["wind_[m/s]", "real_[rad/s]", "imag_[rad/s]"])
 
 

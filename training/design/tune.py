@@ -2,13 +2,11 @@
 
     fowt design tune rosco_float --budget 40 --out results/tune
 
-Every setting runs on the cases of a suite, on validation seeds (1000 and above, on which no suite is scored),
-through the suite's sensors and behind its trip. Its cost is the mean of the lifetime deviations of rotor
-speed and platform pitch over those of gspi_oc3 on the same runs, plus PENALTY times the excess over the
-suite's limits and over LIMITS, in fractions of them, plus LOST times the fraction of lost runs. The
-present settings come first, then up to half of the budget spread evenly (Sobol), then Nelder and Mead's
-method from the best. A row of OUT/tune_NAME.csv is written after each setting, so that an interrupted
-search leaves the settings it has tried.
+Every setting runs on the cases of a suite, on validation seeds (1000 and above, on which no suite is scored).
+Its cost is the mean of the lifetime deviations of rotor speed and platform pitch over those of gspi_oc3 on
+the same runs, plus PENALTY times the excess over the suite's limits and over LIMITS, in fractions of them,
+plus LOST times the fraction of lost runs. The present settings come first, then up to half of the budget
+spread evenly (Sobol), then Nelder and Mead's method from the best. OUT/tune_NAME.csv is written after each.
 """
 
 from collections.abc import Callable, Mapping
@@ -72,20 +70,19 @@ class Space:
 
     def settings(self, place):
         """Return {setting: value} of a place (n,) in the unit cube."""
-        found = {}
-        for (key, (low, high)), x in zip(self.ranges.items(), np.clip(place, 0.0, 1.0), strict=True):
-            value = low * (high / low) ** x if low > 0.0 else low + (high - low) * x
-            found[key] = float(value)
-        return found
+        x = dict(zip(self.ranges, np.clip(place, 0.0, 1.0), strict=True))
+        return {
+            key: float(low * (high / low) ** x[key] if low > 0.0 else low + (high - low) * x[key])
+            for key, (low, high) in self.ranges.items()
+        }
 
     def place(self, settings):
         """Return the place (n,) of settings in the unit cube, at its walls where they lie outside."""
-        place = []
-        for key, (low, high) in self.ranges.items():
-            value = min(max(settings[key], low), high)
-            x = np.log(value / low) / np.log(high / low) if low > 0.0 else (value - low) / (high - low)
-            place.append(x)
-        return np.array(place)
+        low, high = np.array(list(self.ranges.values())).T
+        value = np.clip([settings[key] for key in self.ranges], low, high)
+        with np.errstate(all="ignore"):
+            logarithmic = np.log(value / low) / np.log(high / low)
+        return np.where(low > 0.0, logarithmic, (value - low) / (high - low))
 
 
 def _pi(settings, turbine, control_dt):
@@ -171,13 +168,11 @@ class Objective:
         own, base = (self._means(table[table["controller"] == name]) for name in ("candidate", REFERENCE))
         ratio = own / base
         lost = float((runs["status"] != OK).mean())
-        excess = 0.0
-        for name, limit in {**self.suite.limits.relative, **LIMITS}.items():
-            excess += max(0.0, -better(name) * (ratio[name] / limit - 1.0))
-        for name, limit in self.suite.limits.lifetime.items():
-            excess += max(0.0, own[name] / limit - 1.0)
-        for name, limit in self.suite.limits.run.items():
-            excess += max(0.0, runs[name].max() / limit - 1.0)
+        limits = self.suite.limits
+        beyond = [-better(k) * (ratio[k] / x - 1.0) for k, x in (limits.relative | LIMITS).items()]
+        beyond += [own[name] / limit - 1.0 for name, limit in limits.lifetime.items()]
+        beyond += [runs[name].max() / limit - 1.0 for name, limit in limits.run.items()]
+        excess = sum(max(0.0, each) for each in beyond)
         cost = float(np.mean([ratio[name] for name in AIMS])) + PENALTY * excess + LOST * lost
         found = {"cost": cost if np.isfinite(cost) else 2.0 * LOST}
         found |= {key: float(ratio[name]) for key, name in FIGURES.items()}

@@ -7,6 +7,7 @@ of the wind, five sensors or fewer, torque and blade pitch or blade pitch alone.
 at the blade-pitch travel and power deviation of gspi_oc3; a controller with more of either is marked.
 """
 
+import re
 from contextlib import suppress
 from pathlib import Path
 
@@ -34,7 +35,6 @@ MORE = 1.02  # ratios of travel and power deviation above this are more than tho
 TORQUE_TRAVEL = "torque_travel_[kN-m/s]"
 MOVED = 1.5  # ratio of torque travel to that of gspi_oc3 above which a controller uses the torque
 FREE = {"time", "generator_torque", "generator_speed", "plant_model"}  # inputs that every limit has
-AHEAD = "_preview_"  # in the names of limits
 
 
 def read_bound(path=None):
@@ -56,23 +56,20 @@ def limit_for(information, moves_torque, bound, preview_times=()):
     Preview counts as exact, and the next longer one of the table is taken: that of the same sensors, or else
     of all states, which differs by less than 1 %.
     """
-    used = set(information) - FREE
+    used, limits = set(information) - FREE, list(bound["information"].unique())
     ahead = "wind_preview" in used
     if ahead:
         used -= {"wind_preview", "wind_speed"}  # the preview begins with the present wind
     known = [name for name, (_, sensors) in KNOWN.items() if sensors is None or used <= set(sensors)]
     name, end = known[-1], "" if moves_torque else PITCH_ONLY
-    limits = set(bound["information"])
-    if ahead:
-        times = {}
-        for start in ("full", name):
-            for limit in limits:
-                kind, _, rest = limit.removesuffix(PITCH_ONLY).partition(AHEAD)
-                if rest and kind == start and limit == start + AHEAD + rest + end:
-                    times[float(rest)] = limit
-        horizon = max(preview_times, default=max(times, default=0.0))
-        return next((times[time] for time in sorted(times) if time >= horizon), None)
-    return name + end if name + end in limits else None
+    if not ahead:
+        return name + end if name + end in limits else None
+    times = {}
+    for kind in ("full", name):
+        found = (re.fullmatch(rf"{kind}_preview_([\d.]+){end}", limit) for limit in limits)
+        times |= {float(match[1]): match[0] for match in found if match}
+    horizon = max(preview_times, default=max(times, default=0.0))
+    return next((times[time] for time in sorted(times) if time >= horizon), None)
 
 
 def bound_fractions(table, bound, groups=None, agents=None, information=None):
@@ -105,11 +102,12 @@ def bound_fractions(table, bound, groups=None, agents=None, information=None):
             raise InputError(f"{name}: no run at a wind of the limit succeeded")
         whole = pd.concat(parts).groupby(WIND, as_index=False)[list(RATIOS)].mean().assign(seed_of="")
         for part in [*(parts if len(labels) > 1 else []), whole]:
-            rows.append(_with_fractions(part, bound, limit).assign(agent=name))
+            ratios = part[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
+            reached = [np.nan if limit is None else fraction_of_bound(bound, *each, limit) for each in ratios]
+            rows.append(part.assign(agent=name, limit=limit or "none", **{"of_limit_[-]": reached}))
     found = pd.concat(rows, ignore_index=True)
     found["within"] = (found["travel_ratio_[-]"] <= MORE) & (found["power_ratio_[-]"] <= MORE)
-    first = ["agent", "seed_of", WIND]
-    return found[[*first, *found.columns.drop(first)]]
+    return found[["agent", "seed_of", WIND, *RATIOS, "limit", "of_limit_[-]", "within"]]
 
 
 def declared(label):
@@ -150,41 +148,24 @@ def _ratios(own, base, label):
     return ratios.drop(columns="variant").assign(seed_of=label)
 
 
-def _with_fractions(ratios, bound, limit):
-    """Return the ratios with the name of the limit and their fractions of it."""
-    found = [
-        float("nan") if limit is None else fraction_of_bound(bound, wind, speed, lean, limit)
-        for wind, speed, lean in ratios[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
-    ]
-    return ratios.assign(limit=limit or "none", **{"of_limit_[-]": found})
-
-
 def bound_markdown(fractions):
     """Return the markdown table of bound_fractions: agents by winds.
 
     [0.9]: more travel or power deviation than gspi_oc3; (0.8 to 0.9): range over the training seeds of a
     group; "worse": no better than gspi_oc3 in either deviation; "-": no limit for its information.
     """
-    rows = {}
-    winds = sorted(fractions[WIND].unique())
+    rows, column = {}, "of_limit_[-]"
     for name, here in fractions.groupby("agent", sort=False):
-        cells = {"limit": here["limit"].iloc[0]}
-        for wind in winds:
-            at = here[here[WIND] == wind]
-            cells[f"{wind:g} m/s"] = _cell(at[at["seed_of"] == ""], at[at["seed_of"] != ""])
-        rows[f"`{name}`"] = cells
+        cells = rows[f"`{name}`"] = {"limit": here["limit"].iloc[0]}
+        for wind in sorted(fractions[WIND].unique()):
+            at = here[here[WIND] == wind].set_index("seed_of")
+            text, seeds = "-", at[column].drop("", errors="ignore")
+            if "" in at.index and cells["limit"] != "none":
+                fraction = at.loc["", column]
+                text = f"{fraction:.2f}" if np.isfinite(fraction) else "worse"
+                text += f" ({seeds.min():.2f} to {seeds.max():.2f})" if seeds.notna().any() else ""
+                text = text if at.loc["", "within"] else f"[{text}]"
+            cells[f"{wind:g} m/s"] = text
     wide = pd.DataFrame.from_dict(rows, orient="index")
     wide.index.name = "fraction of the performance limit"
     return frame_markdown(wide)
-
-
-def _cell(whole, seeds):
-    """Return the text of one agent at one wind."""
-    column = "of_limit_[-]"
-    if whole.empty or whole["limit"].iloc[0] == "none":
-        return "-"
-    fraction, within = whole[column].iloc[0], whole["within"].iloc[0]
-    text = "worse" if not np.isfinite(fraction) else f"{fraction:.2f}"
-    if len(seeds) and np.isfinite(seeds[column]).any():
-        text += f" ({seeds[column].min():.2f} to {seeds[column].max():.2f})"
-    return text if within else f"[{text}]"

@@ -1,11 +1,20 @@
-"""Plots of an evaluation: metrics over cases, and the Pareto plot of a leaderboard."""
+"""Plots of an evaluation: metrics over cases, the Pareto plot of a leaderboard, and runs of each case."""
+
+import json
 
 import numpy as np
 
+from fowt_env.descriptions.platform import Platform, read_platform, turbine_of
+from fowt_env.descriptions.ratings import ratings
 from fowt_env.errors import InputError
+from fowt_env.files.tables import read_table
+from fowt_env.training.design.linear_bound import efficient
 from fowt_env.training.evaluation.failures import known_figures, lost_text
-from fowt_env.training.evaluation.run_case import OK
+from fowt_env.training.evaluation.results import file_name, run_file
+from fowt_env.training.evaluation.run_case import OK, REFERENCE
 from fowt_env.training.reports.metric_words import counted
+from fowt_env.training.reports.terminal import PRINTED_METRICS
+from fowt_env.visual.response import plot_boxes
 from fowt_env.visual.style import (
     COLOURS,
     FAINT,
@@ -17,25 +26,13 @@ from fowt_env.visual.style import (
     short_names,
     style_axes,
 )
+from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
 
-TITLES = {
-    "RotSpeed_mean_[rpm]": "rotor speed, mean (rpm)",
-    "RotSpeed_std_[rpm]": "rotor speed, std (rpm)",
-    "overspeed_[%]": "greatest rotor speed above rated (%)",
-    "GenPwr_capped_mean_[kW]": "power counted up to rated, mean (kW)",
-    "GenPwr_std_[kW]": "power, std (kW)",
-    "GenPwr_max_[kW]": "greatest power (kW)",
-    "PtfmPitch_mean_[deg]": "platform pitch, mean (deg)",
-    "PtfmPitch_std_[deg]": "platform pitch, std (deg)",
-    "PtfmPitch_max_[deg]": "platform pitch, greatest (deg)",
-    "blade_pitch_travel_[deg/s]": "mean blade-pitch rate (deg/s)",
-    "torque_travel_[kN-m/s]": "mean torque rate (kN m/s)",
-    "RotTorq_DEL_[kN-m]": "shaft torque, fatigue load (kN m)",
-    "NcIMUTAxs_rms_[m/s^2]": "nacelle acceleration, rms (m/s²)",
-    "FAIRTEN_max_[kN]": "mooring tension, greatest (kN)",
-    "TwrBsMyt_DEL_[kN-m]": "tower base, fatigue load (kN m)",
-}
+TITLES = {name: title for _, name, _, _, title in PRINTED_METRICS}
 UPRIGHT = 6  # characters of a case's name that fit below a group of marks without being turned
+# places of a name about its mark: to the right and up, and points of distance
+SIDES = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)])
+WAYS = np.array([0.0, 10.0, 22.0, 36.0, 52.0, 70.0])
 ROOM = 0.6  # of the distance between two cases that the marks of one may take
 
 
@@ -74,17 +71,11 @@ def plot_evaluation(table, metrics, path=None, title=None):
             mean, low, high = (getattr(groups, what)().reindex(cases) for what in ("mean", "min", "max"))
             offset = step * (index - 0.5 * (len(controllers) - 1))
             axes.errorbar(
-                np.arange(len(cases)) + offset,
-                mean,
+                np.arange(len(cases)) + offset, mean,
                 yerr=np.maximum([mean - low, high - mean], 0.0),  # a mean of equal figures is rounded
-                color=COLOURS[index % len(COLOURS)],
-                marker=MARKS[index % len(MARKS)],
-                markersize=4,
-                linestyle="none",  # cases have no order
-                elinewidth=1.0,
-                capsize=0,
-                label=controller,
-            )
+                color=COLOURS[index % len(COLOURS)], marker=MARKS[index % len(MARKS)], markersize=4,
+                linestyle="none", elinewidth=1.0, capsize=0, label=controller,  # cases have no order
+            )  # fmt: skip
         for edge in np.arange(0.5, len(cases) - 1):
             axes.axvline(edge, color=FAINT, linewidth=0.8, zorder=0)
         axes.set_title(metric_title(name), fontsize=9, color=INK, loc="left")
@@ -108,7 +99,6 @@ def plot_evaluation(table, metrics, path=None, title=None):
 PARETO_METRICS = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "overspeed_[%]")
 LARGEST_MARK = 420.0  # points squared, of the controller that travels most
 SMALLEST_MARK = 16.0
-REFERENCE = "reference"  # gid of the lines through the baseline
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours: 56 pairs
 
 
@@ -138,12 +128,12 @@ def plot_pareto(board, path=None, title=None, order=()):
     rates = np.array([figures[2]["mean"] for _, figures in kept])
     areas = np.maximum(LARGEST_MARK * rates / max(rates.max(), 1e-9), SMALLEST_MARK)
     whole = [not entry["lost"] for entry, _ in kept]  # one that lost runs dominates no other
-    front = _undominated(points[whole])
+    front = efficient(points[whole])
     if len(front) > 1:
         axes.step(*front.T, where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
     if base is not None:
         for line in (axes.axvline, axes.axhline):
-            line(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1, gid=REFERENCE)
+            line(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
     names = short_names([entry["controller"] for entry, _ in kept])
     marks, drawn = [], set()
     for place, ((entry, figures), (point, bars, kind)) in enumerate(zip(kept, places, strict=True)):
@@ -194,7 +184,8 @@ def plot_pareto(board, path=None, title=None, order=()):
     if base is not None and not drawn:
         text += f"; {counted(len(board.get('seeds', ())), 'seed')}: no interval"
     figure.suptitle(f"{title}\n{text}" if title else text, fontsize=9, color=INK, x=0.01, ha="left")
-    _label_marks(figure, axes, [names[entry["controller"]] for entry, _ in kept], points, areas, places)
+    labels = [names[entry["controller"]] for entry, _ in kept]
+    _label_marks(figure, axes, labels, points, areas, places, base is not None)
     return save_figure(figure, path)
 
 
@@ -202,12 +193,10 @@ def _absolute_axes(axes, speed, pitch):
     """Add the scales in rpm and deg, on the top and on the right."""
     top = axes.secondary_xaxis("top", functions=(lambda x: x * speed, lambda x: x / speed))
     right = axes.secondary_yaxis("right", functions=(lambda y: y * pitch, lambda y: y / pitch))
-    for other, name, set_label in (
-        (top, "rotor speed, std (rpm)", top.set_xlabel),
-        (right, "platform pitch, std (deg)", right.set_ylabel),
-    ):
+    top.set_xlabel("rotor speed, std (rpm)", fontsize=8, color=SOFT)
+    right.set_ylabel("platform pitch, std (deg)", fontsize=8, color=SOFT)
+    for other in (top, right):
         other.tick_params(colors=SOFT, labelsize=7)
-        set_label(name, fontsize=8, color=SOFT)
         for spine in other.spines.values():
             spine.set_visible(False)
 
@@ -242,13 +231,7 @@ def _ratio_ends(gap, share):
     return tuple(max(0.0, 1.0 + share * gap[end] / gap["mean"]) for end in ("low", "high"))
 
 
-def _undominated(points):
-    """Return the points (n, 2) of the Pareto front, from left to right."""
-    kept = [p for p in points if not ((points <= p).all(axis=1) & (points < p).any(axis=1)).any()]
-    return np.array(sorted(map(tuple, kept)))
-
-
-def _label_marks(figure, axes, names, points, areas, places):
+def _label_marks(figure, axes, names, points, areas, places, ratios):
     """Write each name beside its mark, if possible without covering a mark, bar or other name."""
     from matplotlib.patheffects import withStroke
 
@@ -265,47 +248,71 @@ def _label_marks(figure, axes, names, points, areas, places):
             low, high = placed([point - bars[:, 0, 0], point + bars[:, 1, 0]])
             x, y = placed([point])[0]
             taken += [(low[0], y - 1.0, high[0], y + 1.0), (x - 1.0, low[1], x + 1.0, high[1])]
-    for line in axes.lines:  # of the baseline
-        x, y = line.get_xdata(), line.get_ydata()
-        if len(x) == 2 and line.get_gid() == REFERENCE:
-            whole = axes.get_window_extent().extents / per_point
-            (at_x, at_y), (low_x, low_y, high_x, high_y) = placed([(1.0, 1.0)])[0], whole
-            taken.append(
-                (at_x - 1, low_y, at_x + 1, high_y) if x[0] == x[1] else (low_x, at_y - 1, high_x, at_y + 1)
-            )
     frame = axes.get_window_extent().extents / per_point
+    if ratios:  # lines through the baseline
+        (x, y), (left, low, right, high) = placed([(1.0, 1.0)])[0], frame
+        taken += [(x - 1, low, x + 1, high), (left, y - 1, right, y + 1)]
 
-    def overlap(one, other):
-        wide = min(one[2], other[2]) - max(one[0], other[0])
-        high = min(one[3], other[3]) - max(one[1], other[1])
-        return max(0.0, wide) * max(0.0, high)
+    def overlap(boxes, others):
+        """Return the common areas (n, m)."""
+        sides = np.minimum(boxes[:, None, 2:], others[:, 2:]) - np.maximum(boxes[:, None, :2], others[:, :2])
+        return np.maximum(sides, 0.0).prod(axis=2)
 
-    def spoilt(place):
-        inside = overlap(place, frame)
-        area = (place[2] - place[0]) * (place[3] - place[1])
-        return sum(overlap(place, other) for other in taken) + 20.0 * (area - inside)
-
-    for name, point, (x, y), r in zip(names, points, centres, radii, strict=True):
-        width, height = 0.58 * size * len(name), 1.25 * size
-        options = []
-        for way in (0.0, 10.0, 22.0, 36.0, 52.0, 70.0):
-            for dx, dy in ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)):
-                gap = (0.75 * r if dx and dy else r) + 2.5 + way * (0.7 if dx and dy else 1.0)
-                left = x + dx * gap - (width if dx < 0 else 0.0 if dx else 0.5 * width)
-                low = y + dy * gap - (height if dy < 0 else 0.0 if dy else 0.5 * height)
-                options.append((left, low, left + width, low + height, way))
-        best = min(options, key=lambda place: spoilt(place) + 0.15 * place[4])
-        taken.append(best[:4])
+    diagonal = SIDES.all(axis=1)
+    for name, point, centre, r in zip(names, points, centres, radii, strict=True):
+        shape = np.array([0.58 * size * len(name), 1.25 * size])
+        gaps = np.where(diagonal, 0.75, 1.0) * r + 2.5 + WAYS[:, None] * np.where(diagonal, 0.7, 1.0)
+        low = (centre + gaps[:, :, None] * SIDES - 0.5 * (1.0 - SIDES) * shape).reshape(-1, 2)
+        boxes = np.hstack([low, low + shape])
+        outside = shape.prod() - overlap(boxes, frame[None])[:, 0]
+        cost = overlap(boxes, np.array(taken)).sum(axis=1) + 20.0 * outside + 0.15 * WAYS.repeat(len(SIDES))
+        best = int(np.argmin(cost))
+        taken.append(tuple(boxes[best]))
         leader = {"arrowstyle": "-", "color": SOFT, "linewidth": 0.6, "shrinkA": 0, "shrinkB": float(r)}
         axes.annotate(
-            name,
-            point,
-            xytext=(best[0] - x, best[1] - y),
-            textcoords="offset points",
-            fontsize=size,
-            color=INK,
-            annotation_clip=False,
-            arrowprops=leader if best[4] > 0.0 else None,
+            name, point, low[best] - centre, textcoords="offset points", fontsize=size, color=INK, zorder=5,
+            annotation_clip=False, arrowprops=leader if best >= len(SIDES) else None,
             path_effects=[withStroke(linewidth=2.0, foreground="white")],
-            zorder=5,
-        ).set_in_layout(False)
+        ).set_in_layout(False)  # fmt: skip
+
+
+def evaluation_plots(table, board, folder):
+    """Plot a results folder with its table and leaderboard; return the paths.
+
+    pareto.png: rotor-speed against platform-pitch deviation; metrics.png: the controllers over all cases;
+    boxes.png, timeseries_CASE.png and spectra_CASE.png: quartiles, series and spectra of the first seed of
+    each case that succeeded.
+    """
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    table = table[table["controller"] != REFERENCE]
+    good = table[table["status"] == OK]
+    if good.empty:
+        return []
+    paths = [folder / "pareto.png", folder / "metrics.png"]
+    plot_pareto(board, paths[0], order=table["controller"].unique())
+    names = [name for _, name, *_ in PRINTED_METRICS]
+    plot_evaluation(table, names, paths[1], "Mean over seeds, with their range")
+    boxes = {}
+    for case, about in manifest["cases"].items():
+        rows = good[good["case"] == case]
+        if rows.empty:
+            continue
+        seed = rows["seed"].iloc[0]
+        names = rows.loc[rows["seed"] == seed, "controller"]
+        runs = {name: read_table(run_file(folder / "runs", name, case, seed)) for name in names}
+        name = file_name(case)
+        paths += [folder / f"timeseries_{name}.png", folder / f"spectra_{name}.png"]
+        title = f"{case}, seed {seed}"
+        plot_runs(runs, paths[-2], title, skip=about["skip"], ratings=ratings(turbine_of(about["platform"])))
+        period = platform_pitch_period(about["platform"])
+        plot_spectra(runs, paths[-1], title, about["skip"], platform_pitch_period=period)
+        boxes[case] = {name: frame[frame[TIME] >= about["skip"]] for name, frame in runs.items()}
+    paths.append(folder / "boxes.png")
+    plot_boxes(boxes, paths[-1], "First seed of each case: quartiles, and 1 to 99 %")
+    return paths
+
+
+def platform_pitch_period(platform):
+    """Return the natural period (s) in platform pitch of a platform's file, or None."""
+    description = platform if isinstance(platform, Platform) else read_platform(platform)
+    return description.published.get("natural_periods", {}).get("pitch")

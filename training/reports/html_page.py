@@ -27,21 +27,11 @@ from fowt_env.training.evaluation.leaderboard_file import Interval, check_leader
 from fowt_env.training.evaluation.metrics import better, mean_exponent
 from fowt_env.training.evaluation.results_table import KEY, WEIGHT, WORDS, case_shares, read_results
 from fowt_env.training.evaluation.run_case import OK
+from fowt_env.training.reports import page_words
+from fowt_env.training.reports.evaluation_plots import platform_pitch_period
 from fowt_env.training.reports.metric_words import SHORT, about_metric, counted, seeds_text, short_name
-from fowt_env.training.reports.page_policy import content_policy
-from fowt_env.training.reports.page_words import (
-    case_conditions,
-    conditions_table,
-    conditions_text,
-    described_cases,
-    lost_list,
-    lost_runs,
-    page_lead,
-    page_title,
-    provenance,
-)
-from fowt_env.training.reports.terminal import platform_pitch_period
 from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict
+from fowt_env.visual.response import BOXES, SCHEDULE
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
@@ -54,20 +44,8 @@ MAX_SERIES_RUNS = 120  # with time series in the page, unless cases or seeds are
 SPECTRUM_RANGE = (0.002, 1.0)  # Hz
 SPECTRUM_SPAN = 1e-6  # of the peak, down to which the axis reaches
 PERCENTILES = (1.0, 25.0, 50.0, 75.0, 99.0)
-SAMPLED_CHANNELS = (  # of the box plots
-    *("RotSpeed_[rpm]", "GenPwr_[kW]", "PtfmPitch_[deg]"),
-    *("PtfmSurge_[m]", "BldPitch1_[deg]", "FAIRTEN1_[kN]"),
-)
 # m/s
 SCHEDULE_WINDS = (4.0, 6.0, 8.0, 10.0, 11.0, 11.5, 12.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0, 25.0)
-SCHEDULE = (
-    ("rotor speed (rpm)", "RotSpeed"),
-    ("blade pitch (deg)", "BldPitch1"),
-    ("power (kW)", "GenPwr"),
-    ("thrust (kN)", "RotThrust"),
-    ("generator torque (kN m)", "GenTq"),
-    ("platform pitch (deg)", "PtfmPitch"),
-)
 
 
 def write_report(
@@ -90,7 +68,10 @@ def write_report(
     Raises: InputError for a folder without results, a table or run that cannot be read, an unknown case
     or seed, or if plotly is missing.
     """
-    plotly_script = _plotly_script()
+    try:
+        from plotly.offline import get_plotlyjs
+    except ImportError as error:
+        raise InputError(f'the report needs plotly ({error}): pip install "fowt-env[report]"') from error
     folder = Path(folder)
     out = folder / "report.html" if out is None else Path(out)
     if out.suffix.lower() not in (".html", ".htm"):
@@ -103,30 +84,24 @@ def write_report(
     manifest, path = _json_file(folder / "manifest.json"), folder / "leaderboard.json"
     board_file = check_leaderboard(_json_file(path), path) if path.is_file() else None
     say = progress or (lambda done, total, text: None)
-    chosen = _chosen_runs(table, cases, seeds)
-    runs = _read_runs(folder, table, chosen, described_cases(manifest), rate, say)
-    point = _schedule(platform, _platform_of(manifest), say) if schedule else None
+    about = page_words.described_cases(manifest)
+    runs = _read_runs(folder, table, _chosen_runs(table, cases, seeds), about, rate, say)
+    point = _schedule(platform, about, say) if schedule else None
     data = _page_data(table, board_file, manifest, runs, point)
     texts = _page_texts(folder, table, manifest, board_file, data, runs, point)
     page = Path(__file__).parent / "page"
-    scripts = {"plotly": plotly_script, "script": (page / "page.js").read_text(encoding="utf-8")}
-    policy = content_policy(scripts.values(), dynamic_styles=True)  # plotly.js sets styles as it draws
-    style = (page / "page.css").read_text(encoding="utf-8")
+    scripts = {"plotly": get_plotlyjs(), "script": (page / "page.js").read_text(encoding="utf-8")}
+    # plotly.js sets styles as it draws
+    texts["policy"] = page_words.content_policy(scripts.values(), dynamic_styles=True)
+    texts["style"] = (page / "page.css").read_text(encoding="utf-8")
+    # no NaN, and no < that could end the element
+    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    for character in "<\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
     template = Template((page / "page.html").read_text(encoding="utf-8"))
-    fixed = {"policy": policy, "style": style, "data": _embedded_json(data)}
-    text = template.substitute(texts, **fixed, **scripts)
     with replacing(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(template.substitute(texts, data=text, **scripts), encoding="utf-8")
     return out
-
-
-def _plotly_script():
-    """Return plotly.js. Raises: InputError that names the extra to install."""
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as error:
-        raise InputError(f'the report needs plotly ({error}): pip install "fowt-env[report]"') from error
-    return get_plotlyjs()
 
 
 def _json_file(path):
@@ -172,40 +147,43 @@ def _read_runs(folder, table, chosen, about, rate, say):
     about: {case: mapping} of the manifest. pool: codes of the series, each once; a series has its index.
     """
     drawn, pool = set(chosen.index), {}
-    periods = {case: _pitch_period(each.get("platform")) for case, each in about.items()}
-    series, samples, rates, missing = {}, {}, [], 0
+    periods = {}
+    for case, each in about.items():
+        try:
+            periods[case] = platform_pitch_period(str(each.get("platform")))
+        except InputError:
+            periods[case] = None
+    series, samples, rates, missing = {}, {}, set(), 0
     for number, (index, row) in enumerate(table.iterrows()):
-        say(number, len(table), f"reading {row['controller']}, {row['case']}, seed {row['seed']}")
-        path = run_file(folder / "runs", row["controller"], row["case"], row["seed"])
+        controller, case, seed = row["controller"], row["case"], row["seed"]
+        say(number, len(table), f"reading {controller}, {case}, seed {seed}")
+        path = run_file(folder / "runs", controller, case, seed)
         frame = read_table(path) if path.is_file() else None
         if frame is None or TIME not in frame.columns or len(frame) < 2:
             missing += 1
             continue
-        skip = _skipped(row, frame, about.get(row["case"], {}))
+        skip = _skipped(row, frame, about.get(case, {}))
         kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip - 1e-9]
-        if row["status"] == "ok" and len(kept):
-            for channel in (name for name in SAMPLED_CHANNELS if name in frame.columns):
-                cell = samples.setdefault(channel, {}).setdefault((row["controller"], row["case"]), [])
+        if row["status"] == OK and len(kept):
+            for channel in (name for _, name in BOXES if name in frame.columns):
+                cell = samples.setdefault(channel, {}).setdefault(controller, {}).setdefault(case, [])
                 cell.append(kept[channel].to_numpy())
         if index in drawn:
-            run, used = _drawn_run(frame, skip, rate, periods.get(row["case"]), pool)
-            rates.append(used)
-            series.setdefault(row["case"], {}).setdefault(str(row["seed"]), {})[row["controller"]] = run
-    quantiles = {}
-    for channel, cells in samples.items():
-        for (controller, case), parts in cells.items():
-            values = np.percentile(np.concatenate(parts), PERCENTILES)
-            quantiles.setdefault(channel, {}).setdefault(controller, []).append([case, *_rounded(values)])
-    rest = {"pool": list(pool), "rates": sorted(set(rates)), "missing": missing}
+            run, used = _drawn_run(frame, skip, rate, periods.get(case), pool)
+            rates.add(used)
+            series.setdefault(case, {}).setdefault(str(seed), {})[controller] = run
+    quantiles = {
+        channel: {
+            controller: [
+                [case, *_rounded(np.percentile(np.concatenate(parts), PERCENTILES))]
+                for case, parts in cells.items()
+            ]
+            for controller, cells in controllers.items()
+        }
+        for channel, controllers in samples.items()
+    }
+    rest = {"pool": list(pool), "rates": sorted(rates), "missing": missing}
     return {"series": series, "quantiles": quantiles, **rest}
-
-
-def _pitch_period(platform):
-    """Return the natural period (s) in platform pitch of a platform's file; None: none, or no such file."""
-    try:
-        return platform_pitch_period(str(platform))
-    except InputError:
-        return None
 
 
 def _skipped(row, frame, about):
@@ -228,7 +206,8 @@ def _drawn_run(frame, skip, rate, pitch_period, pool):
     present = [channel for _, channel in PANELS if channel in frame.columns]
     series = {}
     for channel in present:
-        values = _block_means(frame[channel].to_numpy(dtype=float), block)
+        values = frame[channel].to_numpy(dtype=float)  # means of blocks; a shorter rest is left out
+        values = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
         series[channel] = _packed(values, time[0] + 0.5 * (block - 1) * step, block * step, pool)
     scored = frame[time >= time[0] + skip - 1e-9]
     spectra = {}
@@ -240,19 +219,10 @@ def _drawn_run(frame, skip, rate, pitch_period, pool):
                 logs = np.full(inside.sum(), np.nan)
                 np.log10(density[inside], out=logs, where=density[inside] > 0.0)
                 spectra[channel] = _packed(logs, frequency[inside][0], frequency[1] - frequency[0], pool)
-    marks = []
-    if spectra:
-        found = frequency_marks(scored, pitch_period)
-        marks = [[f"{name} {at:.3g} Hz", float(at)] for name, at in found]
+    found = frequency_marks(scored, pitch_period) if spectra else ()
+    marks = [[f"{name} {at:.3g} Hz", float(at)] for name, at in found]
     run = {"series": series, "spectra": spectra, "marks": marks, "start": float(time[0]), "skip": skip}
     return run, float(f"{1.0 / (block * step):.4g}")
-
-
-def _block_means(values, block):
-    """Return the means over `block` samples each; a shorter rest at the end is left out."""
-    if block == 1:
-        return values
-    return values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
 
 
 def _packed(values, start, step, pool):
@@ -280,22 +250,17 @@ def _rounded_items(values):
     return {name: float(f"{value:.6g}") for name, value in values.items() if value is not None}
 
 
-def _platform_of(manifest):
-    """Return the only platform of a manifest's cases, else oc3_hywind."""
-    named = {case.get("platform") for case in described_cases(manifest).values()} - {None}
-    only = named.pop() if len(named) == 1 else None
-    return only if isinstance(only, str) else "oc3_hywind"
-
-
-def _schedule(chosen, default, say):
+def _schedule(chosen, about, say):
     """Return {"platform", "wind", "panels"} of the steady operating points over wind speed.
 
-    chosen: platform, or None for the default, that of the evaluation; if the default has no file here:
-    {"platform", "missing": why}.
+    chosen: platform; None: the only one of the manifest's cases, else oc3_hywind, and {"platform",
+    "missing": why} if that has no file here.
     """
     import fowt_env
 
-    platform = chosen or default
+    named = {case.get("platform") for case in about.values()} - {None}
+    only = named.pop() if len(named) == 1 else None
+    platform = chosen or (only if isinstance(only, str) else "oc3_hywind")
     try:
         fowt_env.build_scene(platform)
     except InputError as error:
@@ -307,7 +272,8 @@ def _schedule(chosen, default, say):
         say(number, len(SCHEDULE_WINDS), f"steady point at {speed:g} m/s")
         points.append(fowt_env.trim(fowt_env.build_scene(platform, wind=speed)))
     panels = [
-        {"label": label, "values": _rounded([point[name] for point in points])} for label, name in SCHEDULE
+        {"label": label, "values": _rounded([point[channel.partition("_[")[0]] for point in points])}
+        for label, channel in SCHEDULE
     ]
     return {"platform": platform, "wind": list(SCHEDULE_WINDS), "panels": panels}
 
@@ -386,19 +352,6 @@ def _intervals(figures):
     return {name: _rounded(ends) for name, ends in known.items()}
 
 
-def _board(table, board_file, metrics):
-    """Return {case: rows} of the leaderboard, from leaderboard.json if it exists."""
-    cases = [ALL_CASES, *dict.fromkeys(table["case"])]
-    if board_file is None:
-        return {case: _means(table, metrics, case) for case in cases}
-    return {case: _board_rows(board_file, case) for case in cases}
-
-
-def _interval(board_file):
-    """Return the Interval of a leaderboard.json, or the default without that file."""
-    return Interval() if board_file is None else board_file.interval
-
-
 def _remark(table, board_file, case):
     """Return a line on runs, cases, seeds and tests of the leaderboard."""
     part = table if case == ALL_CASES else table[table["case"] == case]
@@ -406,23 +359,21 @@ def _remark(table, board_file, case):
     text = f"{counted(len(part), 'run')}, {counted(part['case'].nunique(), 'case')}, {seeds_text(seeds)}."
     if board_file is None:
         return f"{text} Means only: the folder has no leaderboard.json with intervals and differences."
-    if len(seeds) < board_file.interval.least_seeds:
+    needed = board_file.interval.least_seeds
+    if len(seeds) < needed:
         count = "a single seed" if len(seeds) == 1 else f"{len(seeds)} seeds"
-        return (
-            f"{text} No intervals and no tests: {count} of the {board_file.interval.least_seeds} they need."
-        )
+        return f"{text} No intervals and no tests: {count} of the {needed} they need."
     if case != ALL_CASES and board_file.baseline is not None:
         return f"{text} Differences are tested over all cases together, not case by case."
     return text
 
 
-def _fine_print(board_file):
+def _fine_print(board_file, interval):
     """Return HTML of the help text of the leaderboard."""
     lines = [
         "Choose a heading to sort by it; it also explains the metric. Bold: the best of a column, among"
         " controllers that lost no run."
     ]
-    level = _interval(board_file).level
     names = ", ".join(short_name(name) for name in TESTED)
     if board_file is None:
         lines.append("Means over the lifetime, of the runs that ended well.")
@@ -431,14 +382,14 @@ def _fine_print(board_file):
             f"Differences are paired: each run against that of {html.escape(board_file.baseline)} in the same"
             " wind and waves.",
             "* significant: without a real difference, one as large would be found with a probability of at"
-            f" most {1.0 - level:.2g} (p-value with Holm's correction over the {len(TESTED)} tested metrics:"
-            f" {names})."
+            f" most {1.0 - interval.level:.2g} (p-value with Holm's correction over the {len(TESTED)} tested"
+            f" metrics: {names})."
             " Without a star a difference may be due to chance, which does not prove that there is none.",
             '<span class="better">✓ better</span> and <span class="worse">✗ worse</span> than the baseline;'
             " grey: tested and not significant; regular weight: not tested.",
         ]
-    if _interval(board_file).method:
-        lines.append(f"Intervals: {100 * level:g} %, {html.escape(board_file.interval.method)}.")
+    if interval.method:
+        lines.append(f"Intervals: {100 * interval.level:g} %, {html.escape(interval.method)}.")
     return "".join(f"<p>{line}</p>" for line in lines)
 
 
@@ -446,42 +397,41 @@ def _page_data(table, board_file, manifest, runs, schedule):
     """Return the mapping that the page's script reads."""
     metrics = _metric_columns(table)
     names = [metric["name"] for metric in metrics]
-    board = _board(table, board_file, names)
+    cases = list(dict.fromkeys(table["case"]))
+    board = {
+        case: _means(table, names, case) if board_file is None else _board_rows(board_file, case)
+        for case in [ALL_CASES, *cases]
+    }
     about = "Score of the suite: weighted mean of metrics over the baseline's. Less is better."
     score = {"name": "score", "label": "score", "unit": "", "headline": True, "better": -1, "about": about}
     if any(row["values"].get("score") is not None for row in board[ALL_CASES]):
         metrics = [score, *metrics]
-    shown = [metric["name"] for metric in metrics]
-    good = table[table["status"] == OK]
     points = [
         [row["controller"], row["case"], str(row["seed"]), _rounded([row[name] for name in names])]
-        for row in good.to_dict("records")
+        for row in table[table["status"] == OK].to_dict("records")
     ]
-    labels = {channel: label.replace("\n", " ") for label, channel in PANELS}
-    cases = list(dict.fromkeys(table["case"]))
     ranked = board_file is not None and all(entry.rank is not None for entry in board_file.controllers)
-    first = ("rank",) if ranked else ()
-    sortable = {*first, *shown, "controller"}
+    sortable = {"controller", *(metric["name"] for metric in metrics), *(("rank",) if ranked else ())}
     shares = dict(zip(cases, map(float, case_shares(table, cases)), strict=True))
     shares = shares if len(set(shares.values())) > 1 else None
-    conditions = case_conditions(table, manifest, shares)
+    conditions = page_words.case_conditions(table, manifest, shares)
     units = {metric["name"]: f"{metric['label']} ({metric['unit']})" for metric in metrics if metric["unit"]}
     seeds = table.groupby("case", sort=False)["seed"].unique()
     lost = {}
-    for who, case, seed, text in lost_runs(table):
+    for who, case, seed, text in page_words.lost_runs(table):
         lost.setdefault(case, {}).setdefault(str(seed), {})[who] = text
     return {
         "controllers": list(dict.fromkeys(table["controller"])),
         "ranked": ranked,
         "baseline": None if board_file is None else board_file.baseline,
-        "alpha": 1.0 - _interval(board_file).level,
+        "alpha": 1.0 - (Interval() if board_file is None else board_file.interval).level,
         "shares": shares,
         "cases": cases,
         "seeds": {case: [str(seed) for seed in sorted(each)] for case, each in seeds.items()},
-        "conditions": {row["case"]: conditions_text(row) for row in conditions},
+        "conditions": {row["case"]: page_words.conditions_text(row) for row in conditions},
         "lost": lost,
         "metrics": metrics,
-        "sort": next(name for name in (*first, "score", PARETO_AXES[0], "controller") if name in sortable),
+        "sort": next(name for name in ("rank", "score", PARETO_AXES[0], "controller") if name in sortable),
         "board": board,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
         "pareto": list(PARETO_AXES),
@@ -495,15 +445,10 @@ def _page_data(table, board_file, manifest, runs, schedule):
             {"label": f"{label}<br>({unit}²/Hz)", "channel": channel} for label, channel, unit in SPECTRA
         ],
         "span": SPECTRUM_SPAN,
-        "titles": {**{name: units.get(name, name.replace("_", " ")) for name in names}, **labels},
+        "titles": {name: units.get(name, name.replace("_", " ")) for name in names}
+        | {channel: label.replace("\n", " ") for label, channel in PANELS},
         "schedule": None if schedule is None or "missing" in schedule else schedule,
     }
-
-
-def _embedded_json(data):
-    """Return JSON for a script element: without NaN, and without a < that could end the element."""
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
 def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
@@ -517,22 +462,23 @@ def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
         scope += " Others: fowt report FOLDER --cases NAME --seeds 1,2."
     if runs["missing"]:
         scope += f" {counted(runs['missing'], 'run')} of {len(table)} have no time series in the folder."
+    interval = Interval() if board_file is None else board_file.interval
     texts = {
-        "title": page_title(manifest, data["cases"]),
-        "lead": page_lead(table, manifest),
-        "controllers": ", ".join(data["controllers"]),
+        "title": page_words.page_title(manifest, data["cases"]),
+        "lead": page_words.page_lead(table, manifest),
         "series_remark": f"{scope} {series}",
         "case_count": counted(len(data["cases"]), "case"),
     }
+    conditions = page_words.case_conditions(table, manifest, data["shares"])
     return {
         **{name: html.escape(text) for name, text in texts.items()},
-        "verdict": verdict(board_file, table["seed"].nunique(), _interval(board_file).least_seeds),
-        "fine_print": _fine_print(board_file),
-        "conditions": conditions_table(case_conditions(table, manifest, data["shares"])),
-        "failures": lost_list(lost_runs(table), len(table)),
+        "verdict": verdict(board_file, table["seed"].nunique(), interval.least_seeds),
+        "fine_print": _fine_print(board_file, interval),
+        "conditions": page_words.conditions_table(conditions),
+        "failures": page_words.lost_list(page_words.lost_runs(table), len(table)),
         "schedule_section": _schedule_section(schedule),
         "schedule_link": '<a href="#schedule">Steady schedule</a>' if schedule else "",
-        "provenance": provenance(folder, table, manifest, board_file),
+        "provenance": page_words.provenance(folder, table, manifest, board_file),
     }
 
 
@@ -540,13 +486,13 @@ def _schedule_section(schedule):
     """Return HTML of the section of the steady schedule, or why it is missing; "" for none."""
     if not schedule:
         return ""
-    where = html.escape(schedule["platform"])
-    remark, plot = f"Operating points of {where} in steady wind and still water, the platform floating.", ""
     if "missing" in schedule:
-        remark = (
-            f"Not shown: {html.escape(schedule['missing'])}. Choose another --platform, or --no-schedule."
-        )
+        remark = f"Not shown: {schedule['missing']}. Choose another --platform, or --no-schedule."
+        body = f'<p class="remark">{html.escape(remark)}</p>'
     else:
-        plot = '<div class="plot" id="schedule-plot"></div>'
-    body = f'<p class="remark">{remark}</p>{plot}'
+        where = html.escape(schedule["platform"])
+        body = (
+            f'<p class="remark">Operating points of {where} in steady wind and still water, the platform'
+            ' floating.</p><div class="plot" id="schedule-plot"></div>'
+        )
     return f'<section id="schedule"><div class="heading"><h2>Steady schedule</h2></div>{body}</section>'

@@ -1,11 +1,10 @@
-"""HTML texts of a report page: title, conditions of the cases, lost runs, provenance.
+"""HTML texts of a report page, all escaped: title, conditions of the cases, lost runs, provenance, policy."""
 
-The results folder may come from somebody else: every text is escaped here.
-"""
-
+import base64
+import hashlib
 import html
 import platform as machine
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from pathlib import Path
 
 from fowt_env.descriptions.checks import is_number
@@ -38,21 +37,19 @@ def page_title(manifest, cases):
     """Return the title: the platform, and the suite or the cases by name or number."""
     about = described_cases(manifest)
     platforms = {str(about[name].get("platform")) for name in cases if name in about} - {"None"}
-    where = f" on {Path(min(platforms)).stem}" if len(platforms) == 1 else f" on {len(platforms)} platforms"
-    where = where if platforms else ""
+    where = f"{len(platforms)} platforms" if len(platforms) > 1 else Path(min(platforms, default="")).stem
     suite = manifest.get("suite")
-    if isinstance(suite, dict) and suite.get("name"):
-        what = f"suite {suite['name']}" + (f", version {suite['version']}" if "version" in suite else "")
-    elif isinstance(suite, str) and suite:
-        what = f"suite {suite}"
+    named = suite if isinstance(suite, dict) else {"name": suite} if isinstance(suite, str) else {}
+    if named.get("name"):
+        what = f"suite {named['name']}" + (f", version {named['version']}" if "version" in named else "")
     else:
         what = ", ".join(cases) if len(cases) <= NAMED_CASES else counted(len(cases), "load case")
-    return f"Controllers{where}: {what}"
+    return f"Controllers{f' on {where}' if where else ''}: {what}"
 
 
 def page_lead(table, manifest):
     """Return the size of an evaluation in one line."""
-    parts = [counted(table["controller"].nunique(), "controller"), counted(table["case"].nunique(), "case")]
+    parts = [counted(table[key].nunique(), key) for key in ("controller", "case")]
     parts += [seeds_text(sorted(set(table["seed"]))), counted(len(table), "run")]
     if isinstance(manifest.get("created"), str):
         parts.append(f"evaluated {manifest['created'][:10]}")
@@ -70,9 +67,7 @@ def case_conditions(table, manifest, shares=None):
         if case is not None:
             row |= {"wind": _wind(case.get("wind")), "sea": _sea(case.get("sea")), "events": _events(case)}
             row["platform"] = Path(str(case.get("platform"))).stem
-            row["duration (s)"], row["scored from (s)"] = map(
-                _number, (case.get("duration"), case.get("skip"))
-            )
+            row["duration (s)"], row["scored from (s)"] = (_number(case.get(k)) for k in ("duration", "skip"))
             row["sensors"] = str(case.get("sensors", ""))
         row["seeds"] = numbers_text(sorted(set(runs["seed"])))
         if shares is not None:
@@ -103,13 +98,13 @@ def conditions_table(rows):
 def table_rows(headings, rows, texts=()):
     """Return the head and body of an HTML table; texts: numbers of the columns of class "text"."""
 
-    def cells(row, tag, scope=""):
-        marks = (' class="text"' if number in texts else "" for number in range(len(row)))
-        return "".join(f"<{tag}{scope}{mark}>{cell}</{tag}>" for mark, cell in zip(marks, row, strict=True))
+    def line(row, tag, scope=""):
+        marks = [' class="text"' if number in texts else "" for number in range(len(row))]
+        cells = (f"<{tag}{scope}{mark}>{cell}</{tag}>" for mark, cell in zip(marks, row, strict=True))
+        return f"<tr>{''.join(cells)}</tr>"
 
-    head = cells(list(headings), "th", ' scope="col"')
-    body = "".join(f"<tr>{cells(row, 'td')}</tr>" for row in rows)
-    return f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
+    head, body = line(list(headings), "th", ' scope="col"'), "".join(line(row, "td") for row in rows)
+    return f"<thead>{head}</thead><tbody>{body}</tbody>"
 
 
 def _wind(wind):
@@ -147,14 +142,13 @@ def _number(value):
 
 
 def lost_runs(table):
-    """Return [(controller, case, seed, text)] of lost runs; text: status, time and reason."""
+    """Return [(controller, case, seed, text)] of lost runs; text: status, time and reason, each once."""
     lost = []
     for row in table[table["status"] != OK].to_dict("records"):
-        at = row.get("stopped_[s]")
+        at, status, reason = row.get("stopped_[s]"), row["status"], row["reason"]
         when = f" at {at:.1f} s" if is_number(at) and at == at else ""
-        when = "" if when in row["reason"] else when
-        text = f"{row['status']}{when}: {row['reason']}" if row["reason"] else f"{row['status']}{when}"
-        text = row["reason"] if row["reason"].startswith(f"{row['status']}:") else text  # not repeated
+        text = f"{status}{'' if when in reason else when}{': ' if reason else ''}{reason}"
+        text = reason if reason.startswith(f"{status}:") else text
         lost.append((row["controller"], row["case"], int(row["seed"]), text))
     return lost
 
@@ -171,48 +165,34 @@ def lost_list(lost, runs):
 
 def provenance(folder, table, manifest, board_file):
     """Return the rows of the table of provenance, as HTML."""
-    facts = {"folder": folder.resolve().name}
+    facts, suite = {"folder": folder.resolve().name}, manifest.get("suite")
     if manifest:
-        suite = manifest.get("suite")
+        facts["suite"], site = suite, None
         if isinstance(suite, dict):
-            suite = " ".join(str(suite[key]) for key in ("name", "version") if key in suite)
-        facts |= {"suite": suite, "created": manifest.get("created"), "plant sources": manifest.get("plant")}
-        facts |= _case_facts(manifest)
+            facts["suite"] = " ".join(str(suite[key]) for key in ("name", "version") if key in suite)
+            site = suite.get("site")
+        facts |= {"created": manifest.get("created"), "plant sources": manifest.get("plant")}
+        trips = [case.get("trip") for case in described_cases(manifest).values()]
+        found = {f"{_number(trip)} times rated rotor speed": None for trip in trips if trip is not None}
+        facts["overspeed trip"] = " or ".join(found)
+        if isinstance(site, dict):
+            facts["site"] = f"Weibull A = {site.get('A')} m/s, k = {site.get('k')} ({site.get('source')})"
         for key in ("versions", "options", "controllers"):
             if isinstance(manifest.get(key), dict):
-                facts[key] = ", ".join(
-                    f"{name} {_brief(name, value)}" for name, value in manifest[key].items()
-                )
+                facts[key] = ", ".join(f"{n} {_brief(n, value)}" for n, value in manifest[key].items())
     else:
         facts["evaluation"] = "the folder has no manifest.json: the versions of its runs are unknown"
-    if board_file is not None and board_file.baseline is not None:
-        facts["baseline"] = board_file.baseline
+    facts["baseline"] = None if board_file is None else board_file.baseline
     if "scored_[s]" in table.columns:
         lengths = sorted(table["scored_[s]"].dropna().unique())
         facts["scored"] = ", ".join(f"{value:g} s" for value in lengths)
-    packages = ("fowt-env", "numpy", "scipy", "pandas", "plotly")
-    made = ", ".join(f"{name} {_version(name)}" for name in packages)
-    facts["page made by"] = f"{made}, Python {machine.python_version()}"
+    made = [f"{name} {version(name)}" for name in ("fowt-env", "numpy", "scipy", "pandas", "plotly")]
+    facts["page made by"] = ", ".join([*made, f"Python {machine.python_version()}"])
     return "".join(
         f'<tr><th scope="row">{html.escape(name)}</th><td>{html.escape(str(value))}</td></tr>'
         for name, value in facts.items()
         if value not in (None, "")
     )
-
-
-def _case_facts(manifest):
-    """Return {"overspeed trip", "site"} of a manifest's cases and suite, as texts."""
-    found = dict.fromkeys(
-        f"{_number(case['trip'])} times rated rotor speed"
-        for case in described_cases(manifest).values()
-        if case.get("trip") is not None
-    )
-    facts = {"overspeed trip": " or ".join(found)}
-    suite = manifest.get("suite")
-    site = suite.get("site") if isinstance(suite, dict) else None
-    if isinstance(site, dict):
-        facts["site"] = f"Weibull A = {site.get('A')} m/s, k = {site.get('k')} ({site.get('source')})"
-    return facts
 
 
 def _brief(label, value):
@@ -223,9 +203,19 @@ def _brief(label, value):
     return f"({', '.join(words)})"
 
 
-def _version(name):
-    """Return the version of an installed package, or "unknown"."""
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"
+def content_policy(scripts=(), styles=(), dynamic_styles=False):
+    """Return the Content-Security-Policy: a script runs only if its hash is in it, and no network is used.
+
+    scripts, styles: contents of the page's elements, exactly as between their tags. dynamic_styles: whether
+    any style may be set, as plotting libraries do.
+    """
+    style = "'unsafe-inline'" if dynamic_styles else _hashes(styles)
+    parts = ["default-src 'none'", f"script-src {_hashes(scripts)}", f"style-src {style}"]
+    return "; ".join([*parts, "img-src data: blob:", "base-uri 'none'", "form-action 'none'"])
+
+
+def _hashes(texts):
+    """Return the sources of inline texts, "'none'" for none; HTML parsers read line ends as line feeds."""
+    plain = (text.replace("\r\n", "\n").replace("\r", "\n").encode("utf-8") for text in texts)
+    digests = (base64.b64encode(hashlib.sha256(text).digest()).decode("ascii") for text in plain)
+    return " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"

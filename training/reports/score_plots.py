@@ -3,34 +3,28 @@
 As in visual/time_series.py, every function returns a matplotlib Figure and writes it to a path, if any.
 """
 
+from itertools import cycle
+
 from fowt_env.errors import InputError
-from fowt_env.training.design.plots import WIND, finish_bound
-from fowt_env.visual.style import COLOURS, INK, new_figure, style_axes
-from fowt_env.visual.time_series import TIME, named_runs, plot_runs
+from fowt_env.training.design.plots import WIND, draw_fronts, finish_bound
+from fowt_env.visual.style import COLOURS, INK, new_figure
+from fowt_env.visual.time_series import PANELS, TIME, named_runs, plot_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
-FRONTS = (
-    ("full", "-", "limit: plant, wind and waves"),
-    ("measured", "--", "limit: five sensors"),
-    ("full_preview_11", ":", "limit: wind 11 s ahead"),
-)
+FRONTS = {  # looks
+    name: {"color": INK, "linewidth": 1.2, "ls": line, "label": text}
+    for name, line, text in (
+        ("full", "-", "limit: plant, wind and waves"),
+        ("measured", "--", "limit: five sensors"),
+        ("full_preview_11", ":", "limit: wind 11 s ahead"),
+    )
+}
 FRAME = 1.3  # upper end of both axes of plot_fractions
 HOLLOW = "hollow: more travel or power\ndeviation than gspi_oc3"
-GUST = (  # panels of plot_gust: label, channel
-    ("wind\n(m/s)", "Wind1VelX_[m/s]"),
-    ("rotor speed\n(rpm)", "RotSpeed_[rpm]"),
-    ("blade pitch\n(deg)", "BldPitch1_[deg]"),
-    ("torque\n(kN m)", "GenTq_[kN-m]"),
-    ("power\n(kW)", "GenPwr_[kW]"),
-    ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
+GUST = (  # panels of plot_gust
+    *(panel for panel in PANELS if panel[1] not in ("Wave1Elev_[m]", "PtfmSurge_[m]")),
     ("tower-base\nmoment (kN m)", "TwrBsMyt_[kN-m]"),
-    ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
 )
-
-
-def agent_style(number):
-    """Return (colour, mark) of the number-th of several controllers; those of the first 84 differ."""
-    return COLOURS[number % len(COLOURS)], AGENT_MARKERS[number % len(AGENT_MARKERS)]
 
 
 def plot_fractions(fractions, bound, path=None, title=None):
@@ -40,8 +34,6 @@ def plot_fractions(fractions, bound, path=None, title=None):
     their training seeds. Hollow: more travel or power deviation than gspi_oc3, so that the limit does not
     apply. Agents outside FRAME are listed in the corner with their ratios.
     """
-    from fowt_env.training.design.linear_bound import efficient
-
     winds = sorted(fractions[WIND].unique())
     if not winds:
         raise InputError("nothing to plot: no wind has both a Pareto front and runs")
@@ -50,27 +42,16 @@ def plot_fractions(fractions, bound, path=None, title=None):
     figure = new_figure(3.1 * columns + 0.6, 3.1 * rows + 0.3)
     places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
     names = list(dict.fromkeys(fractions["agent"]))
+    styles = list(zip(names, cycle(COLOURS), cycle(AGENT_MARKERS), strict=False))  # 84 differ
     for axes, wind in zip(places, winds, strict=False):
-        style_axes(axes)
-        here = bound[bound[WIND] == wind]
-        for information, line_style, text in FRONTS:
-            front = efficient(
-                here[here["information"] == information][["speed_ratio_[-]", "pitch_ratio_[-]"]]
-            )
-            if len(front):
-                axes.plot(front[:, 0], front[:, 1], color=INK, ls=line_style, linewidth=1.2, label=text)
-        axes.scatter(1.0, 1.0, marker="+", s=80, color=INK, label="gspi_oc3", zorder=4)
+        draw_fronts(axes, bound, wind, FRONTS, (FRAME, FRAME))
         at = fractions[fractions[WIND] == wind]
         beyond = 0
-        for number, name in enumerate(names):
-            beyond += _marks(axes, at[at["agent"] == name], *agent_style(number), beyond)
-            colour, mark = agent_style(number)  # the same in the legend, whatever the first wind has
+        for name, colour, mark in styles:
+            beyond += _marks(axes, at[at["agent"] == name], colour, mark, beyond)
             style = {"facecolor": colour, "edgecolor": INK, "linewidth": 0.5}
-            axes.scatter([], [], marker=mark, s=46, label=name, **style)
+            axes.scatter([], [], marker=mark, s=46, label=name, **style)  # of the legend
         axes.scatter([], [], marker="o", s=46, facecolor="none", edgecolor=INK, label=HOLLOW)
-        axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
-        axes.set_xlim(0.0, FRAME)
-        axes.set_ylim(0.0, FRAME)
     return finish_bound(figure, places, len(winds), path, title)
 
 

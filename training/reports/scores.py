@@ -3,16 +3,14 @@
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores baselines results/rl --against gspi_oc3,rosco_float
 
-Each ratio is one metric of an agent over that of a baseline in the same wind and waves, both means over the
-lifetime: cases are weighted by the column weight_[-] of the table, or equally without it. Training seeds of
-one configuration form a group, whose interval resamples training and weather seeds
-(training.evaluation.bootstrap). A lost run of an agent counts PENALTY times the baseline's metrics of that
-case and seed (training.evaluation.failures); a lost run of the baseline has no ratio.
+Both means are over the lifetime, in the same wind and waves. Training seeds of one configuration form a
+group, whose interval resamples training and weather seeds (training.evaluation.bootstrap). A lost run of an
+agent counts PENALTY times the baseline's metrics of that case and seed; one of the baseline has no ratio.
 """
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -29,13 +27,10 @@ from fowt_env.training.evaluation.failures import KINDS, lost_counts, penalised
 from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
 from fowt_env.training.evaluation.results_table import KEY, case_shares
 
-__all__ = ["COUNTS", "FIGURES", "Figure", "agent_counts", "agent_scores", "by_kind"]
-
 PAST_ANY = "past a constraint"
 
 
-@dataclass(frozen=True)
-class Figure:
+class Figure(NamedTuple):
     """A metric scored as ratio to a baseline's, with a first and a second target (None: no target).
 
     more: whether the ratio must be at least the target; else at most.
@@ -47,39 +42,24 @@ class Figure:
     then: float | None = None
     more: bool = False
 
-    def reaches(self, ratio, aim):
-        """Return whether a ratio reaches a target."""
-        return ratio >= aim if self.more else ratio <= aim
-
-    def level(self, ratio):
-        """Return "then", "first" or "missed"; with a single target "met" or "missed"."""
-        if self.then is not None and self.reaches(ratio, self.then):
-            return "then"
-        if self.reaches(ratio, self.first):
-            return "met" if self.then is None else "first"
-        return "missed"
-
-    @property
-    def aims(self):
-        """The targets, the first one first."""
-        return tuple(aim for aim in (self.first, self.then) if aim is not None)
-
     def verdict(self, ratio, sure=(), failed=0):
-        """Return the level that a ratio reaches, with "*" if significant; "" without a ratio.
+        """Return the last target that a ratio reaches, with "*" if significant; "" without a ratio.
 
         sure: for each target, whether the hypothesis that the ratio equals it is rejected, after correction
         for all tests (agent_scores). "then, first*": the ratio reaches the second target, and significantly
-        the first. "failed": runs were lost.
+        the first. With a single target "met" or "missed". "failed": runs were lost.
         """
         if self.first is None or not np.isfinite(ratio):
             return ""
         if failed:
             return "failed"
-        found = self.level(ratio)
+        aims = [aim for aim in (self.first, self.then) if aim is not None]
+        met = sum((ratio >= aim) if self.more else (ratio <= aim) for aim in aims)
+        found = "missed" if not met else "met" if len(aims) == 1 else "then" if met == 2 else "first"
         sure = (*sure, False, False)
-        if found == "then" and not sure[1]:
-            return "then, first*" if sure[0] else "then"
-        return f"{found}*" if sure[0] else found
+        if not sure[0]:
+            return found
+        return "then, first*" if found == "then" and not sure[1] else f"{found}*"
 
 
 FIGURES = (
@@ -137,12 +117,6 @@ def grouped(table, baselines, groups=None, agents=None):
     return groups | {name: (name,) for name in agents}
 
 
-def _values(runs, labels, cases, seeds, metric):
-    """Return the values (labels, cases, seeds) of a metric; NaN: the run failed or does not exist."""
-    index = pd.MultiIndex.from_product([labels, cases, seeds])
-    return runs[metric].reindex(index).to_numpy(dtype=float).reshape(len(labels), len(cases), len(seeds))
-
-
 def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
     """Return a DataFrame: per agent or group, baseline and figure the ratio, its interval and a verdict.
 
@@ -181,15 +155,15 @@ def _scores(table, baselines, chosen, figures):
 
 def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
     """Return {column: value} of one Figure: ratio, interval, p-values, pairs."""
-    own = _values(runs, list(labels), cases, seeds, figure.metric)
-    other = _values(runs, [baseline], cases, seeds, figure.metric)[0]
-    exponent = mean_exponent(figure.metric)
-    estimate = crossed_ratio(own, other, shares, exponent, positive=never_negative(figure.metric))
-    p = [estimate.p_value(aim) for aim in figure.aims] + [float("nan")] * 2
-    ratio = {"ratio": estimate.value, "low": estimate.low, "high": estimate.high}
-    tests = {"p_first": p[0], "p_then": p[1]}
-    pairs = int((np.isfinite(own) & np.isfinite(other)).sum()) if np.isfinite(estimate.value) else 0
-    return {"figure": figure.name, "metric": figure.metric, **ratio, **tests, "pairs": pairs}
+    places = pd.MultiIndex.from_product([[*labels, baseline], cases, seeds])
+    values = runs[figure.metric].reindex(places).to_numpy(dtype=float)  # NaN: failed, or no such run
+    values = values.reshape(-1, len(cases), len(seeds))
+    exponent, positive = mean_exponent(figure.metric), never_negative(figure.metric)
+    estimate = crossed_ratio(values[:-1], values[-1], shares, exponent, positive=positive)
+    p = [float("nan") if aim is None else estimate.p_value(aim) for aim in (figure.first, figure.then)]
+    pairs = int(np.isfinite(values[:-1] + values[-1]).sum()) if np.isfinite(estimate.value) else 0
+    row = {"figure": figure.name, "metric": figure.metric, "ratio": estimate.value}
+    return row | {"low": estimate.low, "high": estimate.high, "p_first": p[0], "p_then": p[1], "pairs": pairs}
 
 
 def agent_counts(table, baselines, groups=None, agents=None):
@@ -207,12 +181,13 @@ def _counts(table, chosen):
     rows = []
     for name, labels in chosen.items():
         here = table[table["controller"].isin(labels)]
+        past = here[list(COUNTS.values())] > 0
+        lost = lost_counts(here["status"])
         row = {"agent": name, "inputs": "; ".join(dict.fromkeys(map(inputs, labels))), "runs": len(here)}
-        row |= lost_counts(here["status"])
-        row |= {text: int((here[metric] > 0).sum()) for text, metric in COUNTS.items()}
-        row[PAST_ANY] = int((here[list(COUNTS.values())] > 0).any(axis=1).sum())
+        row |= lost | {text: int(past[metric].sum()) for text, metric in COUNTS.items()}
+        row[PAST_ANY] = int(past.any(axis=1).sum())
         row["largest overspeed (%)"] = float(here["overspeed_[%]"].max())
-        row["verdict"] = "missed" if row[PAST_ANY] or any(row[kind] for kind in KINDS) else "met"
+        row["verdict"] = "missed" if row[PAST_ANY] or sum(lost.values()) else "met"
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -262,8 +237,8 @@ def ratio_text(row):
     """Return the text of a row of agent_scores: ratio [low, high]."""
     if not np.isfinite(row["ratio"]):
         return "-"
-    text = f"{row['ratio']:.3f}"
-    return f"{text} [{row['low']:.3f}, {row['high']:.3f}]" if np.isfinite(row["low"]) else text
+    ends = f" [{row['low']:.3f}, {row['high']:.3f}]" if np.isfinite(row["low"]) else ""
+    return f"{row['ratio']:.3f}{ends}"
 
 
 def frame_markdown(frame):
@@ -272,12 +247,15 @@ def frame_markdown(frame):
     return markdown_table(frame.columns, frame.astype(str).to_numpy()) + "\n"
 
 
-def wide_markdown(frame, title, index, rows, column, names):
-    """Return the markdown table of the column `text`: values of `index` by those of `column`."""
-    wide = frame.pivot(index=index, columns=column, values="text").loc[rows, names]
+def wide_markdown(frame, texts, title, index, column, rows=None):
+    """Return the markdown table of texts of the rows of a frame: values of `index` by those of `column`.
+
+    rows: values of `index` that are shown; None: all. Order is that of the frame.
+    """
+    wide = frame.assign(text=texts).pivot(index=index, columns=column, values="text")
+    wide = wide.loc[frame[index].unique() if rows is None else rows, frame[column].unique()]
     wide.index.name = title
-    wide.columns = [f"`{name}`" for name in names]
-    return frame_markdown(wide)
+    return frame_markdown(wide.rename(columns="`{}`".format))
 
 
 def _remark(scores):
@@ -290,38 +268,27 @@ def _remark(scores):
 def scores_markdown(scores, counts):
     """Return markdown of agent_scores and agent_counts: a table per baseline, one of failures."""
     parts = []
-    names = list(dict.fromkeys(scores["agent"]))
     for baseline, rows in scores.groupby("baseline", sort=False):
-        shown = rows.assign(
-            text=[f"{ratio_text(row)} {row['verdict']}".rstrip() for _, row in rows.iterrows()]
-        )
-        figures = list(dict.fromkeys(scores["figure"]))
-        parts.append(wide_markdown(shown, f"over `{baseline}`", "figure", figures, "agent", names))
-    parts += _remark(scores)
-    shown = counts.copy()
+        texts = [f"{ratio_text(row)} {row['verdict']}".rstrip() for row in rows.to_dict("records")]
+        parts.append(wide_markdown(rows, texts, f"over `{baseline}`", "figure", "agent"))
+    shown = counts.drop(columns=PAST_ANY)
     shown["largest overspeed (%)"] = shown["largest overspeed (%)"].map("{:.1f}".format)
     shown["agent"] = shown["agent"].map("`{}`".format)
-    parts.append(frame_markdown(shown.drop(columns=PAST_ANY)))
-    return "\n".join(parts)
+    return "\n".join([*parts, *_remark(scores), frame_markdown(shown)])
 
 
 def kinds_markdown(scores, counts, figures=None):
     """Return markdown of by_kind: a table per figure (names; None: all), one of failures."""
     parts = []
-    names = list(dict.fromkeys(scores["agent"]))
-    kinds = list(dict.fromkeys(scores["kind"]))
-    for name in figures or list(dict.fromkeys(scores["figure"])):
+    for name in figures or scores["figure"].unique():
         rows = scores[scores["figure"] == name]
-        shown = rows.assign(text=[ratio_text(row) for _, row in rows.iterrows()])
+        texts = [ratio_text(row) for row in rows.to_dict("records")]
         title = f"{name} over `{rows['baseline'].iloc[0]}`"
-        parts.append(wide_markdown(shown, title, "kind", kinds, "agent", names))
-    parts += _remark(scores)
-    lost = counts[list(KINDS)].sum(axis=1)
-    columns = zip(lost, counts[PAST_ANY], counts["runs"], strict=True)
-    shown = counts.assign(text=[f"{missing} / {past} of {runs}" for missing, past, runs in columns])
-    agents = list(dict.fromkeys(counts["agent"]))
-    parts.append(wide_markdown(shown, f"lost / {PAST_ANY}", "kind", kinds, "agent", agents))
-    return "\n".join(parts)
+        parts.append(wide_markdown(rows, texts, title, "kind", "agent"))
+    columns = zip(counts[list(KINDS)].sum(axis=1), counts[PAST_ANY], counts["runs"], strict=True)
+    texts = [f"{missing} / {past} of {runs}" for missing, past, runs in columns]
+    lost = wide_markdown(counts, texts, f"lost / {PAST_ANY}", "kind", "agent")
+    return "\n".join([*parts, *_remark(scores), lost])
 
 
 def write_scores(tables, text, path):

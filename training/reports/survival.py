@@ -1,7 +1,5 @@
 """Tables of the faults that each controller survives, from an evaluation of the suite faults."""
 
-import re
-
 import numpy as np
 import pandas as pd
 
@@ -17,7 +15,6 @@ FIGURES = {  # heading: column of the survival table, digits
     "longest time to standstill (s)": ("standstill", 0),
 }
 NEVER = "-"  # a run did not come to rest
-TRIP = re.compile(r"^(.*) trip at ")
 
 
 def survival(table, limits=None):
@@ -38,7 +35,7 @@ def survival(table, limits=None):
             "kind": table["case"].map(kind_of),
             "controller": table["controller"],
             "survived": kept,
-            "trip": [_trip(text) for text in table["reason"].fillna("")],
+            "trip": table["reason"].fillna("").str.extract("^(.*) trip at ", expand=False),
             "rotor_speed": 100.0 + table["overspeed_[%]"],
             "platform_pitch": _size(table, "PtfmPitch_{}_[deg]"),
             "tower_base": 1e-3 * _size(table, "TwrBsMyt_{}_[kN-m]"),
@@ -46,12 +43,12 @@ def survival(table, limits=None):
             "standstill": table["standstill_time_[s]"],
         }
     )
-    figures = [name for name, _ in FIGURES.values()]
     rows = []
     for (kind, controller), here in runs.groupby(["kind", "controller"], sort=False):
+        trips = ", ".join(f"{count} {name}" for name, count in here["trip"].value_counts().items())
         row = {"kind": kind, "controller": controller, "runs": len(here)}
-        row |= {"survived": int(here["survived"].sum()), "trips": _counted(here["trip"])}
-        rows.append(row | {name: here[name].max(skipna=name != "standstill") for name in figures})
+        row |= {"survived": int(here["survived"].sum()), "trips": trips}
+        rows.append(row | {n: here[n].max(skipna=n != "standstill") for n, _ in FIGURES.values()})
     return pd.DataFrame(rows)
 
 
@@ -60,28 +57,15 @@ def _size(table, name):
     return np.maximum(table[name.format("max")].abs(), table[name.format("min")].abs())
 
 
-def _trip(reason):
-    """Return the name of the trip in a run's reason; "" for none."""
-    found = TRIP.match(reason)
-    return found.group(1) if found else ""
-
-
-def _counted(trips):
-    """Return a text of the trips and their counts."""
-    counts = trips[trips != ""].value_counts()
-    return ", ".join(f"{count} {name}" for name, count in counts.items())
-
-
 def survival_markdown(found):
     """Return markdown tables of `survival`: survived runs, motions and loads, trips."""
-    kinds, names = (list(dict.fromkeys(found[key])) for key in ("kind", "controller"))
+
+    def part(title, texts, rows=None):
+        return wide_markdown(found, texts, title, "kind", "controller", rows)
+
     shares = [f"{kept} of {runs}" for kept, runs in zip(found["survived"], found["runs"], strict=True)]
-    parts = [wide_markdown(found.assign(text=shares), "survived", "kind", kinds, "controller", names)]
+    parts = [part("survived", shares)]
     for title, (column, digits) in FIGURES.items():
         texts = [NEVER if np.isnan(value) else f"{value:.{digits}f}" for value in found[column]]
-        shown = found.assign(text=texts)
-        stopped = [kind for kind in kinds if (shown["text"][shown["kind"] == kind] != NEVER).any()]
-        parts.append(wide_markdown(shown, title, "kind", stopped, "controller", names))
-    tripped = found.assign(text=found["trips"].replace("", "none"))
-    parts.append(wide_markdown(tripped, "trips", "kind", kinds, "controller", names))
-    return "\n".join(parts)
+        parts.append(part(title, texts, found["kind"][found[column].notna()].unique()))
+    return "\n".join([*parts, part("trips", found["trips"].replace("", "none"))])

@@ -1,68 +1,37 @@
-"""The printed tables and the plots of an evaluation."""
+"""The printed tables of an evaluation."""
 
-import json
-
-from fowt_env.descriptions.platform import Platform, read_platform, turbine_of
-from fowt_env.descriptions.ratings import ratings
-from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import holm
-from fowt_env.training.evaluation.cases import chosen_cases
 from fowt_env.training.evaluation.failures import KINDS, lost_text
-from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
-from fowt_env.training.evaluation.results import file_name, run_file
-from fowt_env.training.evaluation.run_case import OK, REFERENCE
-from fowt_env.training.reports.evaluation_plots import plot_evaluation, plot_pareto
 from fowt_env.training.reports.metric_words import counted, seeds_text
-from fowt_env.visual.response import BOXES, plot_boxes
-from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
 
-# chosen_cases and write_leaderboard are defined in evaluation; this is their former place
-__all__ = ["chosen_cases", "evaluation_plots", "leaderboard_rows", "summary_rows", "write_leaderboard"]
-
-# printed columns: heading, metric, format
+# printed columns: heading, metric, format, place among those that a narrow terminal lacks, title of its plot
 PRINTED_METRICS = (
-    ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f"),
-    ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f"),
-    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f"),
-    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f"),
-    ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f"),
-    ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f"),
-    ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f"),
-    ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f"),
-    ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f"),
-    ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f"),
-    ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f"),
-    ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f"),
-    ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f"),
-    ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f"),
-)
-
-
-# left out of a table wider than the terminal, the first one first
-DROPPED_FIRST = (
-    "FAIRTEN_max_[kN]",
-    "NcIMUTAxs_rms_[m/s^2]",
-    "RotSpeed_mean_[rpm]",
-    "PtfmPitch_max_[deg]",
-    "PtfmPitch_mean_[deg]",
-    "GenPwr_std_[kW]",
-    "GenPwr_max_[kW]",
-    "GenPwr_capped_mean_[kW]",
-    "RotTorq_DEL_[kN-m]",
+    ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f", 3, "rotor speed, mean (rpm)"),
+    ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f", None, "rotor speed, std (rpm)"),
+    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", None, "greatest rotor speed above rated (%)"),
+    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f", 8, "power up to rated, mean (kW)"),
+    ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f", 6, "power, std (kW)"),
+    ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f", 7, "greatest power (kW)"),
+    ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f", 5, "platform pitch, mean (deg)"),
+    ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f", None, "platform pitch, std (deg)"),
+    ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f", 4, "platform pitch, greatest (deg)"),
+    ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", None, "pitch rate, mean (deg/s)"),
+    ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f", None, "torque rate, mean (kN m/s)"),
+    ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", 9, "shaft torque, fatigue load (kN m)"),
+    ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f", 2, "nacelle acceleration, rms (m/s²)"),
+    ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f", 1, "mooring tension, greatest (kN)"),
 )
 
 
 def summary_rows(means, width):
     """Return (headings, rows of texts, lost runs per row) of evaluate.summary, in `width` characters."""
     lost = list(means[list(KINDS)].sum(axis=1))
-    columns = {
-        "controller": ("controller", list(means["controller"])),
-        "case": ("case", list(means["case"])),
-        "runs": ("runs", [f"{n - bad}/{n}" for n, bad in zip(means["runs"], lost, strict=True)]),
-    }
-    for heading, name, form in PRINTED_METRICS:
+    columns = {name: (name, list(means[name])) for name in ("controller", "case")}
+    columns["runs"] = "runs", [f"{n - bad}/{n}" for n, bad in zip(means["runs"], lost, strict=True)]
+    for heading, name, form, *_ in PRINTED_METRICS:
         columns[name] = heading, ["-" if value != value else format(value, form) for value in means[name]]
-    return *_fitted(columns, DROPPED_FIRST, width), lost
+    drops = {place: name for _, name, _, place, _ in PRINTED_METRICS if place}
+    return *_fitted(columns, [drops[place] for place in sorted(drops)], width), lost
 
 
 def _fitted(columns, drops, width):
@@ -101,76 +70,50 @@ def leaderboard_rows(board, width=200):
     what the table lacks or does not show, and why.
     """
     baseline, entries = board["baseline"], board["controllers"]
+    level = board["interval"]["level"]
+    lows = [figure["low"] for entry in entries for figure in entry["metrics"].values()]
+    intervals = any(low is not None and low == low for low in lows)
     name = "" if not board.get("suite") else f"suite {board['suite']['name']} {board['suite']['version']}, "
-    intervals = has_intervals(board)
     kind = "lifetime means" if len(set(board["shares"].values())) > 1 else "means"
     title = f"{name}{counted(len(board['cases']), 'case')}, {seeds_text(board['seeds'])}: {kind}"
-    if intervals:
-        title += f" [{round(100 * board['interval']['level'])} % interval]"
+    title += f" [{round(100 * level)} % interval]" if intervals else ""
     if baseline is not None:
         title += f", paired difference from {baseline}{' (* significant)' if intervals else ''}"
-    sure = [_sure(entry, board["interval"]["level"]) for entry in entries]
     columns = {
         "controller": ("controller", [entry["controller"] for entry in entries]),
         "runs": ("runs", [_runs_text(entry) for entry in entries]),
     }
     if any(entry["score"] for entry in entries):
         columns["score"] = "score", [_score_text(entry["score"]) for entry in entries]
-    for heading, metric, form, with_interval, with_difference in LEADERBOARD:
-        columns[metric] = (
-            heading,
-            [
-                _cell(
-                    entry,
-                    metric,
-                    form,
-                    with_interval,
-                    with_difference and entry["controller"] != baseline,
-                    stars,
-                )
-                for entry, stars in zip(entries, sure, strict=True)
-            ],
-        )
+    tested = [metric for _, metric, _, _, different in LEADERBOARD if different]
+    adjusted = [holm([entry["difference"][metric]["p"] for metric in tested]) for entry in entries]
+    stars = [{m for m, p in zip(tested, each, strict=True) if p <= 1.0 - level} for each in adjusted]
+    for heading, metric, form, with_interval, different in LEADERBOARD:
+        cells = [
+            _cell(entry, metric, form, with_interval, different and entry["controller"] != baseline, sure)
+            for entry, sure in zip(entries, stars, strict=True)
+        ]
+        columns[metric] = heading, cells
     return title, *_fitted(columns, LEADERBOARD_DROPS, width), _remarks(board, intervals)
-
-
-def _sure(entry, level):
-    """Return the set of printed metrics with a significant difference, corrected for all of them."""
-    names = [metric for _, metric, _, _, different in LEADERBOARD if different]
-    adjusted = holm([entry["difference"][name]["p"] for name in names])
-    return {name for name, p in zip(names, adjusted, strict=True) if p <= 1.0 - level}
-
-
-def has_intervals(board):
-    """Return whether any metric of a leaderboard has an interval, which needs enough seeds."""
-    return any(
-        figure["low"] is not None and figure["low"] == figure["low"]
-        for entry in board["controllers"]
-        for figure in entry["metrics"].values()
-    )
-
-
-def no_interval(board):
-    """Return "3 seeds: no interval (needs 4)"."""
-    return f"{counted(len(board['seeds']), 'seed')}: no interval (needs {board['interval']['least_seeds']})"
 
 
 def _remarks(board, intervals):
     """Return the lines below the leaderboard: on intervals, lost runs, the baseline and limits."""
-    lines = [] if intervals else [no_interval(board)]
-    lost = {entry["controller"]: lost_text(entry) for entry in board["controllers"] if entry["lost"]}
+    lines, entries = [], board["controllers"]
+    if not intervals:
+        needed = board["interval"]["least_seeds"]
+        lines.append(f"{counted(len(board['seeds']), 'seed')}: no interval (needs {needed})")
+    lost = {entry["controller"]: lost_text(entry) for entry in entries if entry["lost"]}
     if lost:
         texts = "; ".join(f"{name}: {text}" for name, text in lost.items())
-        scored = any(entry["score"] for entry in board["controllers"])
+        scored = any(entry["score"] for entry in entries)
         counts = f"; a score counts them {board['penalty']:g} times the reference's" if scored else ""
         lines.append(f"runs lost by {texts}: not in these means{counts}; ranked last")
-    if board["baseline"] is None and board["controllers"]:
+    if board["baseline"] is None and entries:
         lines.append("no paired differences: every controller has runs that failed or lost power")
     if board["baseline"] in lost:
         lines.append(f"differences from {board['baseline']} are over the runs that it did not lose")
-    for entry in board["controllers"]:
-        if entry["beyond"]:
-            lines.append(f"{entry['controller']} exceeds a limit: {'; '.join(entry['beyond'])}")
+    lines += [f"{e['controller']} exceeds a limit: {'; '.join(e['beyond'])}" for e in entries if e["beyond"]]
     if board["unchecked"]:
         lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")
     return lines
@@ -200,51 +143,3 @@ def _score_text(score):
     if score is None or score["mean"] is None:
         return "-"
     return f"{score['mean']:.3f}" if score["valid"] else f"({score['mean']:.3f})"
-
-
-def evaluation_plots(table, board, folder):
-    """Plot a results folder with its table and leaderboard; return the paths.
-
-    pareto.png: rotor-speed against platform-pitch deviation; metrics.png: the controllers over all cases;
-    boxes.png, timeseries_CASE.png and spectra_CASE.png: quartiles, series and spectra of the first seed of
-    each case that succeeded.
-    """
-    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
-    table = table[table["controller"] != REFERENCE]
-    good = table[table["status"] == OK]
-    if good.empty:
-        return []
-    paths = [folder / "pareto.png", folder / "metrics.png"]
-    plot_pareto(board, paths[0], order=table["controller"].unique())
-    names = [name for _, name, _ in PRINTED_METRICS]
-    plot_evaluation(table, names, paths[1], "Mean over seeds, with their range")
-    boxes = {}
-    for case, about in manifest["cases"].items():
-        rows = good[good["case"] == case]
-        if rows.empty:
-            continue
-        seed = rows["seed"].iloc[0]
-        names = rows.loc[rows["seed"] == seed, "controller"]
-        runs = {name: read_table(run_file(folder / "runs", name, case, seed)) for name in names}
-        name = file_name(case)
-        paths += [folder / f"timeseries_{name}.png", folder / f"spectra_{name}.png"]
-        title = f"{case}, seed {seed}"
-        plot_runs(runs, paths[-2], title, skip=about["skip"], ratings=ratings(turbine_of(about["platform"])))
-        period = platform_pitch_period(about["platform"])
-        plot_spectra(runs, paths[-1], title, about["skip"], platform_pitch_period=period)
-        boxes[case] = {name: _scored_rows(frame, about["skip"]) for name, frame in runs.items()}
-    paths.append(folder / "boxes.png")
-    plot_boxes(boxes, paths[-1], "First seed of each case: quartiles, and 1 to 99 %")
-    return paths
-
-
-def _scored_rows(frame, skip):
-    """Return the plotted channels of the scored part of a run."""
-    columns = [TIME, *(channel for _, channel in BOXES if channel in frame.columns)]
-    return frame.loc[frame[TIME] >= skip, columns]
-
-
-def platform_pitch_period(platform):
-    """Return the natural period (s) in platform pitch of a platform's file, or None."""
-    description = platform if isinstance(platform, Platform) else read_platform(platform)
-    return description.published.get("natural_periods", {}).get("pitch")

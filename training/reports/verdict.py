@@ -13,12 +13,7 @@ from fowt_env.training.reports.metric_words import short_name
 from fowt_env.training.reports.terminal import LEADERBOARD
 
 TESTED = tuple(metric for _, metric, _, _, different in LEADERBOARD if different)
-OBSERVED = (
-    "RotSpeed_std_[rpm]",
-    "PtfmPitch_std_[deg]",
-    "blade_pitch_travel_[deg/s]",
-    "GenPwr_capped_mean_[kW]",
-)
+OBSERVED = (*TESTED[:3], "GenPwr_capped_mean_[kW]")
 SHOWN = 5  # sentences that are not folded away
 
 
@@ -49,7 +44,7 @@ def verdict(board, seeds, least_seeds):
         return "<p>No verdict: no baseline, as every controller has runs that failed or lost power.</p>"
     if not others:
         return "<p>No verdict: a single controller was evaluated, without another to compare.</p>"
-    baseline = next((e for e in board.controllers if e.controller == board.baseline), None)
+    own = [entry for entry in board.controllers if entry.controller == board.baseline and entry.lost]
     tested = {entry.controller: corrected_p(entry) for entry in others}
     level = 1.0 - board.interval.level
     name = f"<b>{html.escape(board.baseline)}</b>"
@@ -58,8 +53,8 @@ def verdict(board, seeds, least_seeds):
     else:
         count = "A single seed" if seeds == 1 else f"{seeds} seeds"
         head = f"{count}: no difference is tested (that needs {least_seeds} seeds). Observed against {name}:"
-    if baseline is not None and baseline.lost:
-        head += f" The baseline itself lost runs ({_lost(baseline)}); these have no differences."
+    for entry in own:
+        head += f" The baseline itself lost runs ({_lost(entry)}); these have no differences."
     items = [f"<li>{_sentence(entry, tested[entry.controller], level)}</li>" for entry in others]
     text = f"<p>{head}</p><ul>{''.join(items[:SHOWN])}</ul>"
     if items[SHOWN:]:

@@ -8,7 +8,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 
 from fowt_env.files.tables import write_table
-from fowt_env.training.rl.train import decision_env, seconds_text, validation_score
+from fowt_env.training.rl.train import decision_env, validation_score
 
 REPORT_EVERY = 1.0  # s
 
@@ -91,7 +91,8 @@ class CheckpointCallback(BaseCallback):
             self._reported = now
             total = self.training.settings["steps"]
             rate = (self.num_timesteps - self._first) / max(now - self._begin, 1e-9)
-            left = seconds_text((total - self.num_timesteps) / max(rate, 1e-9))
+            seconds = max(0.0, total - self.num_timesteps) / max(rate, 1e-9)
+            left = time.strftime("%H:%M:%S", time.gmtime(seconds))
             parts = [f"{rate:.0f} decisions/s"]
             returns = [episode["r"] for episode in self.model.ep_info_buffer]
             if returns:

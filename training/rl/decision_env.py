@@ -16,6 +16,7 @@ from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
 SETTLED_AFTER = 300.0  # s, from which on an episode of steady wind must be at rest
 SWING_AFTER = 500.0  # s, and its blade pitch: by then surge has died down
+KEPT = ("observations", "action", "memory")  # of Decisions, in a state
 RECORDED_FIELDS = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
@@ -90,16 +91,14 @@ class DecisionVecEnv(VecEnvWrapper):
 
     def get_state(self):
         """Return the state of the episodes, to be pickled: plants, histories, actions."""
-        kept = (getattr(self.decisions, name).copy() for name in ("observations", "action", "memory"))
-        return self.base.env.get_state(), *kept
+        return self.base.env.get_state(), *(getattr(self.decisions, name).copy() for name in KEPT)
 
     def set_state(self, state):
         """Continue from a state of get_state; return its features."""
-        plants, observations, action, memory = state
+        plants, *kept = state
         self.base.env.set_state(list(plants))
-        self.decisions.observations[:] = observations
-        self.decisions.action[:] = action
-        self.decisions.memory[:] = memory
+        for name, values in zip(KEPT, kept, strict=True):
+            getattr(self.decisions, name)[:] = values
         return self.decisions.features()
 
 
@@ -128,10 +127,8 @@ class ValidationVecEnv(FowtSB3VecEnv):
         """Return observations at the start of the fixed episodes, whose randomness is the same each time."""
         self._seeds = list(range(self.num_envs))
         self._options = [dict(episode) for episode in self.episodes]
-        self._record[:] = np.nan
-        self._clock = 0
-        self._over[:] = False
-        self._failed[:] = False
+        self._record[:], self._clock = np.nan, 0
+        self._over[:] = self._failed[:] = False
         return super().reset()
 
     def step_wait(self):

@@ -19,11 +19,9 @@ def layers_of(model):
     Raises: InputError for policies that are not multilayer perceptrons with one known activation.
     """
     if hasattr(model.policy, "mlp_extractor"):
-        modules = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
-        squash = "clip"
+        modules, squash = [*model.policy.mlp_extractor.policy_net, model.policy.action_net], "clip"
     else:
-        modules = [*model.actor.latent_pi, model.actor.mu]
-        squash = "tanh"
+        modules, squash = [*model.actor.latent_pi, model.actor.mu], "tanh"
     linear = [module for module in modules if type(module).__name__ == "Linear"]
     names = {type(module).__name__ for module in modules} - {"Linear"}
     if len(names) > 1 or not names <= set(ACTIVATION_NAMES):
@@ -50,14 +48,10 @@ def export_policy(model, normalisation, single, decisions, path, about):
         "blade_pitch": list(task.blade_pitch), "setpoint": list(task.setpoint),
         "residual_torque": task.residual_torque, "residual_pitch": task.residual_pitch, "about": about,
     }  # fmt: skip
-    arrays = {
-        "settings": np.array(json.dumps(settings)),
-        "mean": statistics.mean,
-        "scale": np.sqrt(statistics.var + normalisation.epsilon),
-    }
+    arrays = {"settings": np.array(json.dumps(settings)), "mean": statistics.mean}
+    arrays["scale"] = np.sqrt(statistics.var + normalisation.epsilon)
     for i, layer in enumerate(linear):
-        arrays[f"weight_{i}"] = layer.weight.detach().cpu().numpy()
-        arrays[f"bias_{i}"] = layer.bias.detach().cpu().numpy()
+        arrays |= {f"{kind}_{i}": getattr(layer, kind).detach().cpu().numpy() for kind in ("weight", "bias")}
     with replacing(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)
     return path

@@ -13,11 +13,13 @@ from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.plant_perturbation import PLANT, PLATFORM, plant_settings
 
-SENSORS = {
-    "noise": "white noise of every reading, standard deviation over the channel's observation scale",
-    "delay": "whole control periods from measurement to reading",
+SENSORS = {  # words, distribution by default
+    "noise": (
+        "white noise of every reading, standard deviation over the channel's observation scale",
+        ("uniform", 0.0, 0.02),
+    ),
+    "delay": ("whole control periods from measurement to reading", ("uniform", 0.0, 3.0)),
 }
-DEFAULT_SENSORS = {"noise": ("uniform", 0.0, 0.02), "delay": ("uniform", 0.0, 3.0)}
 DISTRIBUTIONS = {
     "uniform": lambda rng, low, high: rng.uniform(low, high),
     "loguniform": lambda rng, low, high: float(np.exp(rng.uniform(np.log(low), np.log(high)))),
@@ -44,17 +46,13 @@ def distributions(spec):
 
     spec: {name: [kind, a, b] or None (not randomised)}; "plants" is left out. Raises: InputError.
     """
-    chosen = {name: default for name, (_, default) in PLANT.items()} | DEFAULT_SENSORS
-    for name, given in spec.items():
-        if name == "plants":
-            continue
-        if name not in chosen:
+    chosen = {name: default for name, (_, default) in (PLANT | SENSORS).items()}
+    for name in spec:
+        if name not in chosen and name != "plants":
             raise unknown("randomised quantity", name, chosen)
-        if given is None:
-            del chosen[name]
-        else:
-            chosen[name] = given
-    return {name: check_distribution(f"randomise.{name}", given) for name, given in chosen.items()}
+    chosen = {name: spec.get(name, default) for name, default in chosen.items()}
+    kept = {name: given for name, given in chosen.items() if given is not None}
+    return {name: check_distribution(f"randomise.{name}", given) for name, given in kept.items()}
 
 
 def draw(chosen, rng):

@@ -106,13 +106,13 @@ def check_settings(settings, where="settings"):
         unknown_key(f"{section}.{key}", key, keys)
         for section, keys in known.items() for key in settings[section] if key not in keys
     ]  # fmt: skip
+    given = settings["environment"]
     for key, kinds, words in FORMS:
-        value = settings["environment"].get(key)
-        if value is not None and not isinstance(value, kinds):
-            problems.append(str(refusal(f"environment.{key}", value, words)))
+        if given.get(key) is not None and not isinstance(given[key], kinds):
+            problems.append(str(refusal(f"environment.{key}", given[key], words)))
     for key, default, check, allowed in SIMPLE:
         try:
-            check(f"environment.{key}", settings["environment"].get(key, default), allowed)
+            check(f"environment.{key}", given.get(key, default), allowed)
         except InputError as error:
             problems.append(str(error))
     raise_problems(where, problems)
@@ -129,25 +129,21 @@ def check_algorithm(kind, name, given):
     for key, value in given.items():
         if key not in known:
             problems.append(unknown_key(f"algorithm.{key}", key, known))
-        elif (wanted := _not_allowed(key, value, known[key])) is not None:
-            problems.append(str(refusal(f"algorithm.{key}", value, wanted)))
-        elif key == "policy_kwargs":
-            problems += _policy_problems(value)
+            continue
+        found = {key: (value, _not_allowed(key, value, known[key]))}
+        if key == "policy_kwargs" and isinstance(value, dict):
+            found = {f"{key}.{name}": (each, _not_of_policy(name, each)) for name, each in value.items()}
+        for place, (each, wanted) in found.items():
+            if wanted is not None:
+                problems.append(str(refusal(f"algorithm.{place}", each, wanted)))
     raise_problems(name, problems)
 
 
-def _policy_problems(given):
-    """Return a line per wrong value of policy_kwargs, whose only text is the name of an activation."""
-    problems = []
-    for key, value in given.items():
-        if key == "activation" and value not in tuple(ACTIVATIONS):
-            wanted = f"one of {', '.join(ACTIVATIONS)}"
-        elif key != "activation" and _holds_text(value):
-            wanted = "numbers, or lists or tables of them"
-        else:
-            continue
-        problems.append(str(refusal(f"algorithm.policy_kwargs.{key}", value, wanted)))
-    return problems
+def _not_of_policy(key, value):
+    """Return, for a wrong value of policy_kwargs, what it must be in words; else None."""
+    if key == "activation":
+        return None if value in tuple(ACTIVATIONS) else f"one of {', '.join(ACTIVATIONS)}"
+    return "numbers, or lists or tables of them" if _holds_text(value) else None
 
 
 def _holds_text(value):

@@ -8,9 +8,8 @@ replay buffer, random states); validation.csv with a row per validation; best.np
 best there, and last.npz; learning_curve.png; and TensorBoard's files.
 
 A resumed run has the bits of one that was never stopped, on the same machine with the same number of torch
-threads: PPO's checkpoints lie between an update and the next rollout, those of SAC and TQC between two calls
-of their update with the replay buffer, and hold parameters, optimiser, environments in mid-episode,
-normalisation and the states of every random generator. Wall times and the rates shown differ.
+threads: checkpoints hold parameters, optimiser, environments in mid-episode, normalisation, replay buffer and
+the states of every random generator.
 """
 
 import errno
@@ -21,7 +20,6 @@ import random
 import shutil
 import signal
 import sys
-import time
 from collections import deque
 from contextlib import contextmanager
 from copy import deepcopy
@@ -109,30 +107,22 @@ def resolve(algo, task, seed, steps, changes=None):
     check_whole_number("steps", steps, 1)
     settings = deepcopy(table[task])
     for key, value in (changes or {}).items():
-        _change(settings, key, value)
+        *sections, last = key.split(".")
+        if (sections or [last])[0] not in SECTIONS:
+            raise unknown("setting", key, (f"{section}.*" for section in SECTIONS))
+        place = settings
+        for section in sections:
+            place = place.setdefault(section, {})
+            if not isinstance(place, dict):
+                raise InputError(f"setting {key!r}: {section!r} holds no further settings")
+        place[last] = value
     return check_settings({"algo": algo, "name": task, "seed": seed, "steps": steps} | settings)
-
-
-def _change(settings, key, value):
-    """Set a dotted key. Raises: InputError for a section that does not exist."""
-    *sections, last = key.split(".")
-    if (sections or [last])[0] not in SECTIONS:
-        raise unknown("setting", key, (f"{section}.*" for section in SECTIONS))
-    place = settings
-    for section in sections:
-        place = place.setdefault(section, {})
-        if not isinstance(place, dict):
-            raise InputError(f"setting {key!r}: {section!r} holds no further settings")
-    place[last] = value
 
 
 def environment_settings(settings):
     """Return the settings of FowtEnv for training: task with its reach and weather seeds, information set."""
-    given = dict(settings["environment"])
-    given.pop("num_envs", None)
-    given.pop("randomise", None)
-    turbine = turbine_of(given["platform"]) if "platform" in given else None
-    task = task_of(settings["task"], turbine)
+    given = {k: v for k, v in settings["environment"].items() if k not in ("num_envs", "randomise")}
+    task = task_of(settings["task"], turbine_of(given["platform"]) if "platform" in given else None)
     reach = {name: given.pop(name) for name in TASK_FIELDS if name in given}
     reach = {name: tuple(value) if isinstance(value, list) else value for name, value in reach.items()}
     task = replace(task, weather_seeds=(TRAINING.start, TRAINING.stop), **reach)
@@ -177,25 +167,24 @@ def validation_episodes(settings):
     """
     chosen = settings["validation"]
     seeds = seeds_for("validation", int(chosen["first"]), int(chosen["seeds"]))
-    found = []  # (kind of episode, wind, sea, seed, more)
+    episodes, kinds = [], []
+
+    def add(kind, wind, seed, **more):
+        state = None if kind == "steady" else joint_sea_state(SITE, wind["speed"])
+        sea = None if state is None else {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
+        episodes.append({"wind": wind, "sea": sea, "weather_seed": seed} | more)
+        kinds.append(kind)
+
     for speed in map(float, chosen["winds"]):
         wind = {"kind": "ntm", "speed": speed, "class": "B", "sigma": chosen.get("sigma", "90%")}
-        found += [("turbulent", wind, _sea_at(speed), seed, {}) for seed in seeds]
+        for seed in seeds:
+            add("turbulent", wind, seed)
     for speed in map(float, chosen.get("steady", ())):
-        wind = {"kind": "steady", "speed": speed}
-        found.append(("steady", wind, None, seeds[0], {"offsets": STEADY_KICK}))
+        add("steady", {"kind": "steady", "speed": speed}, seeds[0], offsets=STEADY_KICK)
     for speed in map(float, chosen.get("gusts", ())):
         for kind in ("eog", "edc"):
-            wind = {"kind": kind, "speed": speed, "start": GUST_START}
-            found.append(("gust", wind, _sea_at(speed), seeds[0], {}))
-    episodes = [{"wind": wind, "sea": sea, "weather_seed": seed} | more for _, wind, sea, seed, more in found]
-    return episodes, [kind for kind, *_ in found]
-
-
-def _sea_at(speed):
-    """Return the JONSWAP sea of the site's normal sea state at a wind speed (m/s)."""
-    state = joint_sea_state(SITE, speed)
-    return {"kind": "jonswap", "Hs": state.Hs, "Tp": state.Tp}
+            add("gust", {"kind": kind, "speed": speed, "start": GUST_START}, seeds[0])
+    return episodes, kinds
 
 
 def make_envs(settings):
@@ -230,14 +219,12 @@ def validation_env(settings, chosen):
 
     given = settings["validation"]
     episodes, kinds = validation_episodes(settings)
-    sensors = given.get("sensors")
-    per_env = None
+    sensors, per_env = given.get("sensors"), None
     if sensors:
-        turns = [i % given["seeds"] % len(sensors) for i in range(len(episodes))]
         exact = {"noise": 0.0, "delay": 0}
         per_env = [
-            {"sensors": exact if kind == "steady" else sensors[turn]}
-            for kind, turn in zip(kinds, turns, strict=True)
+            {"sensors": exact if kind == "steady" else sensors[i % given["seeds"] % len(sensors)]}
+            for i, kind in enumerate(kinds)
         ]
     return ValidationVecEnv(episodes, given.get("skip", 60.0), threads=1, per_env=per_env, **chosen)
 
@@ -304,8 +291,7 @@ def _mean(values):
 class Training:
     """One run in one folder. resume: continue from its newest checkpoint, or anew where it has none.
 
-    Loading a checkpoint executes code from it: one that no run of this user wrote (checkpoint_signature.py)
-    is refused unless trusted.
+    Loading a checkpoint executes code from it: one that no run of this user wrote is refused unless trusted.
     Raises: InputError where the folder holds another run, none to resume, or a stranger's; on run(), where
     another training is in the folder.
     """
@@ -323,13 +309,12 @@ class Training:
 
     def _check_folder(self):
         """Raise InputError unless the run can begin in its folder, or continue there."""
-        begun = self.settings_path.exists()
-        if not self.resume and begun:
+        if self.resume != self.settings_path.exists():
             raise InputError(
-                f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
+                f"--resume: {self.folder} holds no run"
+                if self.resume
+                else f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
             )
-        if self.resume and not begun:
-            raise InputError(f"--resume: {self.folder} holds no run")
         newest = self.newest() if self.resume else None
         if newest is not None and not self.trusted and not is_own(newest):
             raise InputError(
@@ -391,23 +376,22 @@ class Training:
 
         from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, Validation
 
-        model = self.model
-        say = report or (lambda done, total, text: None)
+        model, steps = self.model, self.settings["steps"]
         self.reference_name = self.settings["validation"].get("reference", REFERENCE)
-        say(model.num_timesteps, self.settings["steps"], f"scoring the reference {self.reference_name}")
+        if report is not None:
+            report(model.num_timesteps, steps, f"scoring the reference {self.reference_name}")
         self.reference = baseline_figures(self.settings)
         self.kinds = validation_episodes(self.settings)[1]
         model.set_logger(configure(str(self.folder / "tensorboard"), ["tensorboard"]))
         self.evaluation, self.checkpointing = Validation(self, validation), CheckpointCallback(self, report)
-        listeners = [self.evaluation, self.checkpointing]
         if state is not None:
             self.evaluation.n_calls, self.evaluation.best = state["evaluation_calls"], state["best"]
             self.checkpointing.before, self.checkpointing.torch_state = state["seconds"], state["torch"]
-        left = self.settings["steps"] - model.num_timesteps
-        finished = True
+        finished, left = True, steps - model.num_timesteps
         with self._signals():
             if left > 0:
                 try:
+                    listeners = [self.evaluation, self.checkpointing]
                     model.learn(left, callback=listeners, reset_num_timesteps=state is None)
                 except Stopped:
                     finished = False
@@ -550,18 +534,16 @@ class Training:
 
         if not self.rows:
             return None
-        return plot_learning_curve({self.folder.name: self.rows}, self.folder / "learning_curve.png")
+        return plot_learning_curve(self.folder.name, self.rows, self.folder / "learning_curve.png")
 
 
 def _schedules(settings):
     """Return those of SCHEDULES that fall linearly over a run, as stable-baselines3 takes them."""
     from stable_baselines3.common.utils import LinearSchedule
 
-    pairs = {key: settings["algorithm"].get(key) for key in SCHEDULES}
-    return {
-        key: LinearSchedule(float(pair[0]), float(pair[1]), 1.0)
-        for key, pair in pairs.items() if isinstance(pair, list)
-    }  # fmt: skip
+    given = {key: settings["algorithm"].get(key) for key in SCHEDULES}
+    pairs = {key: map(float, pair) for key, pair in given.items() if isinstance(pair, list)}
+    return {key: LinearSchedule(*pair, 1.0) for key, pair in pairs.items()}
 
 
 def _new_model(kind, settings, env):
@@ -576,8 +558,3 @@ def _new_model(kind, settings, env):
         return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **given)
     except (AssertionError, TypeError, ValueError) as error:
         raise InputError(f"algorithm: {settings['algo']} does not take these settings: {error}") from error
-
-
-def seconds_text(seconds):
-    """Return a duration as h:mm:ss."""
-    return time.strftime("%H:%M:%S", time.gmtime(max(0.0, seconds)))

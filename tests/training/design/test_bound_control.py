@@ -123,23 +123,9 @@ def delay_line(problem, q, time, step):
     A[:core, :core], B[:core] = held[:core, :core], held[:core, core : core + m]
     A[core:line, core:line] = expm(wind.a * step)
     effect = held[:core, -1]
-    out = np.zeros(size)
-    out[core:line] = wind.output
-
-    def wind_at(index):
-        row = np.zeros(size)
-        if index < count:
-            row[line + index] = 1.0
-            return row
-        return out
-
-    A[:core] += 0.5 * np.outer(effect, wind_at(0))
-    if count:
-        A[:core] += 0.5 * np.outer(effect, wind_at(1))
-    else:
-        A[:core] += 0.5 * np.outer(effect, out @ A)
-    for index in range(count):
-        A[line + index] = wind_at(index + 1)
+    A[:core, line] = A[:core, line + 1] = 0.5 * effect
+    A[line : size - 1, line + 1 :] = np.eye(count - 1)
+    A[-1, core:line] = wind.output
     noise = np.zeros((size, size))
     g = np.zeros((core, 1))
     g[n:, 0] = waves.b
@@ -152,9 +138,9 @@ def delay_line(problem, q, time, step):
     return A, B, noise, k
 
 
-@pytest.mark.parametrize("time", [0.0, 3.0])
-def test_preview_is_the_optimum_with_a_delay_line_for_states(plant, time):
+def test_preview_is_the_optimum_with_a_delay_line_for_states(plant):
     """Sampled at 0.1 s, the wind of the next seconds as that many states, one Riccati equation for all."""
+    time = 3.0
     problem = Problem(plant, replace(FULL, preview=time))
     q = problem.cost(*WEIGHTS)
     a, b, noise, k = delay_line(problem, q, time, 0.1)
@@ -162,9 +148,9 @@ def test_preview_is_the_optimum_with_a_delay_line_for_states(plant, time):
     np.testing.assert_allclose(values(problem.deviations(q, plant.fitted)), expected, rtol=0.02)
 
 
-def total(plant, information, q):
+def total(plant, information, q, noise=None):
     """Value of the quadratic cost, less that of the controls' rates, in the fitted weather."""
-    problem = Problem(plant, information)
+    problem = Problem(plant, information, noise)
     parts = problem.parts(problem.deviations(q, plant.fitted))
     return float(parts**2 @ [1.0 - WEIGHTS[0], *WEIGHTS])
 
@@ -192,13 +178,11 @@ def test_more_knowledge_costs_less(plant):
 
 def test_more_noise_costs_more_and_none_is_full_knowledge(plant):
     q = Problem(plant, FULL).cost(*WEIGHTS)
-    noise = np.array(list(noise_of().values()))
-
-    def cost(factor):
-        problem = Problem(plant, MEASURED, dict(zip(SENSORS, factor * noise, strict=True)))
-        return float(problem.parts(problem.deviations(q, plant.fitted)) ** 2 @ [1.0 - WEIGHTS[0], *WEIGHTS])
-
-    costs = [cost(factor) for factor in (1e-2, 0.3, 1.0, 5.0)]
+    noise = noise_of()
+    costs = [
+        total(plant, MEASURED, q, {name: factor * size for name, size in noise.items()})
+        for factor in (1e-2, 0.3, 1.0, 5.0)
+    ]
     assert np.all(np.diff(costs) > 0.0)
     assert costs[0] == pytest.approx(total(plant, FULL, q), rel=0.05)
     with pytest.raises(InputError, match="noise: blade_pitch = 0.0: must be a standard deviation above 0"):

@@ -89,22 +89,26 @@ def test_the_share_is_of_the_own_limit_and_torque_shows_in_its_travel():
     assert "| `lqr` | measured | 0.50 |" in bound_markdown(found)
 
 
-def test_a_controller_without_a_limit_has_no_share():
-    table = runs({"x": (0.8, 0.8, 1.0, 1.0)})
-    found = bound_fractions(table, bound(), information={"x": ((*FIVE, "wind_preview"), (30.0,))})
-    assert found["of_limit_[-]"].isna().all() and "| `x` | none | - |" in bound_markdown(found)
+@pytest.mark.parametrize(
+    ("ratios", "information", "text"),
+    [
+        ((0.75, 0.75, 1.0, 1.0), {}, "| `x` | full | 0.50 |"),
+        ((0.75, 0.75, 1.3, 1.0), {}, "| `x` | full | [0.50] |"),
+        ((0.75, 0.75, 1.0, 1.1), {}, "| `x` | full | [0.50] |"),
+        ((1.1, 1.2, 1.0, 1.0), {}, "| `x` | full | worse |"),
+        ((0.8, 0.8, 1.0, 1.0), {"x": ((*FIVE, "wind_preview"), (30.0,))}, "| `x` | none | - |"),
+    ],
+)
+def test_more_travel_or_power_is_marked_and_what_has_no_share_says_so(ratios, information, text):
+    found = bound_fractions(runs({"x": ratios}), bound(), information=information)
+    assert text in bound_markdown(found)
+    assert found["within"].all() == (max(ratios[2:]) == 1.0)
+    assert np.isfinite(found["of_limit_[-]"]).all() == ("0.50" in text)
 
 
 def test_code_of_the_user_s_own_is_not_run_to_ask_what_it_knows():
     assert declared("no_such_module:Law") == declared("x") == (("surge",), ())
     assert "nacelle_acceleration" in declared("lqr")[0]
-
-
-def test_more_travel_than_the_baseline_is_marked():
-    table = bound_fractions(runs({"x": (0.75, 0.75, 1.3, 1.0), "y": (0.75, 0.75, 1.0, 1.1)}), bound())
-    assert not table["within"].any()
-    assert "| `x` | full | [0.50] |" in bound_markdown(table)
-    assert "| `x` | full | 0.50 |" in bound_markdown(table.assign(within=True))
 
 
 def test_a_group_has_its_mean_and_the_range_of_its_training_seeds():
@@ -122,11 +126,6 @@ def test_a_failed_run_takes_its_pair_along():
     table["status"] = "failed"
     with pytest.raises(InputError, match="no run of gspi_oc3"):
         bound_fractions(table, bound())
-
-
-def test_a_controller_worse_in_both_has_no_share():
-    found = bound_fractions(runs({"x": (1.1, 1.2, 1.0, 1.0)}), bound())
-    assert np.isnan(found["of_limit_[-]"].iloc[0]) and "worse" in bound_markdown(found)
 
 
 def test_cases_of_two_kinds_are_not_mixed():

@@ -69,9 +69,7 @@ def write_folder(folder):
                     else {"status": "ok", "reason": ""}
                 )
                 rows.append(row | (dict.fromkeys(figures, np.nan) if failed else figures))
-    table = pd.DataFrame(rows)
-    table.to_csv(folder / "results.csv", index=False)
-    return table
+    pd.DataFrame(rows).to_csv(folder / "results.csv", index=False)
 
 
 @pytest.fixture(scope="module")
@@ -100,24 +98,18 @@ def decoded(packed, pool):
     return np.where(codes == 0, np.nan, values)
 
 
-def test_the_page_holds_everything_and_asks_nothing_of_a_network(folder, tmp_path):
-    page = write_report(folder, tmp_path / "page.html", schedule=False)
-    text = page.read_text(encoding="utf-8")
+def test_the_page_asks_nothing_of_a_network_and_names_are_never_read_as_markup(page_file):
+    text = page_file.read_text(encoding="utf-8")
     assert text.count("* plotly.js v") == 1
     assert not re.search(r"<(script|link|img|iframe)[^>]*\b(src|href)=[\"']?(https?:)?//", text)
-    assert page.stat().st_size < 8e6
-
-
-def test_names_are_shown_and_never_read_as_markup(folder, tmp_path):
-    text = write_report(folder, tmp_path / "page.html", schedule=False).read_text(encoding="utf-8")
+    assert page_file.stat().st_size < 8e6
     assert "<img src=x" not in text
     assert "&lt;img src=x onerror=alert(1)&gt;&lt;/script&gt;&amp;" in text
-    assert data_of(tmp_path / "page.html")["controllers"] == list(CONTROLLERS)
+    assert data_of(page_file)["controllers"] == list(CONTROLLERS)
 
 
-def test_means_are_over_the_lifetime_and_the_runs_that_ended_well(folder, tmp_path):
-    table = write_folder(tmp_path)
-    data = data_of(write_report(folder, tmp_path / "page.html", schedule=False))
+def test_means_are_over_the_lifetime_and_the_runs_that_ended_well(folder, page_file):
+    table, data = pd.read_csv(folder / "results.csv"), data_of(page_file)
     rows = {row["controller"]: row for row in data["board"][""]}
     speeds = table[table["controller"] == "busy"].groupby("case")["RotSpeed_std_[rpm]"]
     expected = np.sqrt(speeds.apply(lambda each: (each**2).mean()).mean())
@@ -126,8 +118,8 @@ def test_means_are_over_the_lifetime_and_the_runs_that_ended_well(folder, tmp_pa
     assert "novelty_[-]" in [metric["name"] for metric in data["metrics"]]  # metrics of other versions
 
 
-def test_drawn_series_are_block_means_and_spectra_keep_the_peak(folder, tmp_path):
-    data = data_of(write_report(folder, tmp_path / "page.html", schedule=False))
+def test_drawn_series_are_block_means_and_spectra_keep_the_peak(page_file):
+    data = data_of(page_file)
     drawn = data["series"]["ntm_14"]["1"]["calm"]
     packed = drawn["series"]["RotSpeed_[rpm]"]
     frame = run(0, 1)
@@ -326,19 +318,6 @@ def test_another_case_and_another_theme_change_what_is_drawn(opened):
     light = opened.evaluate("getComputedStyle(document.body).backgroundColor")
     opened.click("#theme")
     assert opened.evaluate("getComputedStyle(document.body).backgroundColor") != light
-
-
-def test_zooming_narrows_the_time_axis_of_every_panel(opened):
-    panel = opened.locator("#series-plot .nsewdrag").first
-    panel.scroll_into_view_if_needed()
-    box = panel.bounding_box()
-    opened.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 5)
-    opened.mouse.down()
-    opened.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 8, steps=4)
-    opened.mouse.up()
-    opened.wait_for_function("document.getElementById('series-plot').layout.xaxis.range[0] > 10")
-    low, high = opened.evaluate("document.getElementById('series-plot').layout.xaxis.range")
-    assert 20.0 < low < 50.0 < high < 90.0
 
 
 def test_a_difference_has_its_percentage_its_mark_and_its_star_in_the_table(copy, browser):

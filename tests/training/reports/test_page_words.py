@@ -3,11 +3,11 @@ import pytest
 
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.reports.metric_words import SHORT, about_metric, short_name
-from fowt_env.training.reports.page_policy import content_policy
 from fowt_env.training.reports.page_words import (
     case_conditions,
     conditions_table,
     conditions_text,
+    content_policy,
     lost_list,
     lost_runs,
     page_lead,

@@ -140,22 +140,6 @@ def test_a_resumed_run_that_cannot_be_built_keeps_its_settings(tmp_path, monkeyp
     assert (tmp_path / "settings.yml").exists()
 
 
-def test_a_run_has_its_folder_to_itself_as_long_as_it_learns_and_no_longer(tmp_path):
-    run = Training(small("ppo", steps=32), tmp_path / "run")
-    refusals = []
-
-    def report(done, total, text):
-        with pytest.raises(InputError, match="another training is writing to it") as caught:
-            Training(None, run.folder, resume=True, trusted=True).run()
-        refusals.append(caught)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(callbacks, "REPORT_EVERY", 0.0)
-        assert run.run(report)
-    assert refusals
-    assert Training({"steps": 48}, run.folder, resume=True).run()
-
-
 def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resumed_run(tmp_path, monkeypatch):
     scores, networks, runs = [2.0, 1.0, 3.0], [], []
     real = callbacks.validation_score
