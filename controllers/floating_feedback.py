@@ -9,12 +9,11 @@ The blade-pitch part fades in over the first degree (the region-3 pitch) of the 
 
 from dataclasses import dataclass
 from enum import IntEnum
-from math import exp, inf
-
-import numpy as np
+from math import exp
 
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.pi import (
+    END,
     PI,
     Memory,
     Parameter,
@@ -26,23 +25,26 @@ from fowt_env.controllers.pi import (
     speed_error,
     write_commands,
 )
+from fowt_env.controllers.settings import Settings
 from fowt_env.controllers.tuned import tuned_for
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, clamp
+from fowt_env.plant.drivetrain import clamp
 from fowt_env.plant.measurement import Measure
 
 SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": Measure.PLATFORM_PITCH_RATE}
 
 
 @dataclass(frozen=True)
-class FeedbackSettings:
-    """What is fed back and how. Raises: InputError naming the key, value and allowed range.
+class FeedbackSettings(Settings):
+    """What is fed back and how. Raises: InputError naming the key, value and allowed range."""
 
-    The controller of that name takes what `fowt design tune` found; controllers/tuned.toml has it with its
-    values.
-    """
+    RANGES = {
+        "pitch_gain": {},
+        "torque_gain": {},
+        "high_pass": {"low": 0.0, "allowed": ">= 0 rad/s and finite; 0: none"},
+    }
 
     signal: str = "nacelle_velocity"
     pitch_gain: float = 0.01  # rad per m/s of nacelle velocity, or per rad/s of platform pitch rate
@@ -54,9 +56,7 @@ class FeedbackSettings:
     def __post_init__(self):
         if self.signal not in SIGNALS:
             raise unknown("signal", self.signal, SIGNALS)
-        for key in ("pitch_gain", "torque_gain"):
-            check_number(key, getattr(self, key))
-        check_number("high_pass", self.high_pass, 0.0, allowed=">= 0 rad/s and finite; 0: none")
+        super().__post_init__()
         allowed = f"above high_pass = {self.high_pass} rad/s; inf: none"
         check_number("low_pass", self.low_pass, self.high_pass, low_open=True, infinite=True, allowed=allowed)
 
@@ -64,7 +64,7 @@ class FeedbackSettings:
 class FeedbackParameter(IntEnum):
     """Entries of the law's parameter array beyond those it shares with the PI law."""
 
-    SIGNAL = Parameter.CURVE + len(TorqueCurve._fields)  # index of the fed-back entry of the measurement
+    SIGNAL = END  # index of the fed-back entry of the measurement
     PITCH_GAIN = SIGNAL + 1
     TORQUE_GAIN = SIGNAL + 2
     HIGH_DECAY = SIGNAL + 3  # fraction of the slow part that one period leaves
@@ -116,29 +116,19 @@ class FloatingFeedback(PI):
     kernel = staticmethod(feedback_law)
 
     def __init__(self, settings, feedback, control_dt, name="floating_feedback"):
-        control_dt = check_control_dt(control_dt)
-        super().__init__(settings, control_dt, name)
-        self.feedback = feedback
+        self.feedback, dt = feedback, check_control_dt(control_dt)
         self.inputs = (*PI.inputs, feedback.signal)
-        low = feedback.low_pass
-        own = {
-            FeedbackParameter.SIGNAL: SIGNALS[feedback.signal],
-            FeedbackParameter.PITCH_GAIN: feedback.pitch_gain,
-            FeedbackParameter.TORQUE_GAIN: feedback.torque_gain,
-            FeedbackParameter.HIGH_DECAY: exp(-control_dt * feedback.high_pass),
-            FeedbackParameter.LOW_DECAY: 0.0 if low == inf else exp(-control_dt * low),
-            FeedbackParameter.SCHEDULED: feedback.scheduled,
-        }
-        self.parameters = np.append(self.parameters, np.zeros(len(own)))
-        self.parameters[list(own)] = list(own.values())
-        self.memory = np.zeros(len(Memory) + len(FeedbackMemory))
+        decays = exp(-dt * feedback.high_pass), exp(-dt * feedback.low_pass)
+        own = (
+            SIGNALS[feedback.signal], feedback.pitch_gain, feedback.torque_gain, *decays, feedback.scheduled,
+        )  # fmt: skip
+        super().__init__(settings, dt, name, len(FeedbackMemory), own)
 
     def reset(self, measurement):
         """Start as PI.reset, with the present motion taken as the mean one: nothing is fed back yet."""
         super().reset(measurement)
-        self.memory[FeedbackMemory.SLOW] = getattr(measurement, self.feedback.signal)
-        if self.feedback.high_pass == 0.0:
-            self.memory[FeedbackMemory.SLOW] = 0.0
+        passing = self.feedback.high_pass == 0.0
+        self.memory[FeedbackMemory.SLOW] = 0.0 if passing else getattr(measurement, self.feedback.signal)
         self.memory[FeedbackMemory.LOW_ONE] = self.memory[FeedbackMemory.LOW_TWO] = 0.0
 
 

@@ -40,13 +40,6 @@ SPEEDS = 14  # winds of the steady curve, from that of rated torque to cut-out
 POSITION_STEPS = (1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5)  # m, rad
 
 
-class Gains(NamedTuple):
-    """Published form of the PI gains: blade pitch over generator-speed error and its integral."""
-
-    KP: float  # s
-    KI: float  # -
-
-
 class PowerSlope(NamedTuple):
     """dP/d theta (W/rad) at rated speed along the steady curve, at_zero (1 + theta/doubling)."""
 
@@ -58,7 +51,7 @@ class PowerSlope(NamedTuple):
 
 
 def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch):
-    """Return the gains that give the rotor-speed loop this frequency (rad/s) and damping ratio at zero pitch.
+    """Return (KP s, KI), which give the rotor-speed loop a frequency (rad/s) and damping ratio at zero pitch.
 
     inertia: I_D about the low-speed shaft, kg m2; rated_speed: w_b0 of the rotor, rad/s; dP_dpitch:
     slope of the aerodynamic power at rated speed, W/rad, negative. theory.md, section 4.
@@ -69,7 +62,7 @@ def gains(design_frequency, damping, inertia, rated_speed, gear_ratio, dP_dpitch
         check_number(key, value, 0.0, low_open=True, allowed="positive and finite")
     check_number("dP_dpitch", dP_dpitch, high=0.0, high_open=True, allowed="negative and finite, W/rad")
     scale = inertia * rated_speed / (gear_ratio * -dP_dpitch)
-    return Gains(KP=2.0 * damping * design_frequency * scale, KI=design_frequency**2 * scale)
+    return 2.0 * damping * design_frequency * scale, design_frequency**2 * scale
 
 
 _SLOPES = Cache(16)  # (id of the turbine, density) -> (turbine, PowerSlope)
@@ -81,8 +74,8 @@ def power_slope(turbine, density=AIR):
     Raises: InputError if the rotor cannot reach rated torque below cut-out, or does not lose power by
     pitching there.
     """
-    found = _SLOPES.get((id(turbine), float(density)), lambda: (turbine, _power_slope(turbine, density)))
-    return found[1]
+    key = id(turbine), float(density)
+    return _SLOPES.get(key, lambda: (turbine, _power_slope(turbine, density)))[1]
 
 
 @entry
@@ -145,8 +138,8 @@ def derived_gains(turbine, frequency, damping=DAMPING, density=AIR):
     slope, drive = power_slope(turbine, density), turbine.drivetrain
     inertia = turbine.rotor.inertia + drive.gear_ratio**2 * drive.generator_inertia
     rated = turbine.rated_rotor_speed
-    found = gains(frequency, damping, inertia, rated, drive.gear_ratio, slope.at_zero)
-    return PitchGains(KP=found.KP, KI=found.KI, gain_schedule_pitch=slope.doubling)
+    kp, ki = gains(frequency, damping, inertia, rated, drive.gear_ratio, slope.at_zero)
+    return PitchGains(KP=kp, KI=ki, gain_schedule_pitch=slope.doubling)
 
 
 def published_set(turbine, gain_set):
@@ -180,12 +173,7 @@ def gains_of_turbine(turbine, gain_set="oc3"):
 _MODES = Cache(64)  # (plant, water) -> eigenvalues, shares
 
 
-def platform_pitch_frequency(scene):
-    """Return platform_frequency of the platform's pitch."""
-    return platform_frequency(scene, State.PLATFORM_PITCH)
-
-
-def platform_frequency(scene, motion):
+def platform_frequency(scene, motion=State.PLATFORM_PITCH):
     """Return the undamped natural frequency (rad/s) of a platform motion about a scene's trim in rated wind.
 
     motion: State.SURGE ... State.YAW; the frequency is that of the mode in which it has the greatest share.
@@ -239,7 +227,7 @@ def _modes(scene):
 
 def floating_frequency(scene):
     """Return w0 (rad/s) of the floating set for the platform of a scene."""
-    return min(DETUNED * platform_pitch_frequency(scene), land_frequency(scene.turbine))
+    return min(DETUNED * platform_frequency(scene), land_frequency(scene.turbine))
 
 
 _TURBINES = Cache(64)  # (id of the turbine, plant, water) -> (turbine, the one with gains)

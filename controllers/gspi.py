@@ -10,44 +10,32 @@ the measured pitch, which with an actuator lag of 0.2 s would limit the blades t
 (controllers/openfast_baseline.py does so, for the deck without an actuator).
 """
 
-from enum import IntEnum
 from math import ceil, isnan, nan
 
-import numpy as np
-
 from fowt_env.control import check_control_dt
-from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
+from fowt_env.controllers.pi import END, PI, Memory, PISettings, pi_step
 from fowt_env.plant.compile.decorators import control_kernel
-from fowt_env.plant.drivetrain import TorqueCurve
 from fowt_env.plant.measurement import Measure
 
 SAMPLING = 0.0125  # s, longest period of the law itself
 
 
-class SampledParameter(IntEnum):
-    """Entries of the law's parameter array beyond those it shares with the PI law."""
-
-    PERIODS = Parameter.CURVE + len(TorqueCurve._fields)  # of the law in one control_dt
-
-
-class SampledMemory(IntEnum):
-    """Entries of the law's memory array beyond those it shares with the PI law."""
-
-    LAST_SPEED = len(Memory)  # generator speed measured at the last call, rad/s; NaN before the first
+PERIODS = END  # parameter beyond those of the PI law: of the law in one control_dt
+LAST_SPEED = len(Memory)  # memory beyond that of it: generator speed of the last call, rad/s; NaN: none yet
 
 
 @control_kernel
 def gspi_law(parameters, memory, measurement, command):
     """One control_dt: the PI law at its own periods, on the line from the last to this measured speed."""
-    periods = int(parameters[SampledParameter.PERIODS])
+    periods = int(parameters[PERIODS])
     speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
-    last = memory[SampledMemory.LAST_SPEED]
+    last = memory[LAST_SPEED]
     if isnan(last):  # the first call: no time has passed yet
         periods, last = 1, speed
     for k in range(1, periods + 1):
         fraction = k / periods
         pi_step(parameters, memory, (1.0 - fraction) * last + fraction * speed, pitch, command)
-    memory[SampledMemory.LAST_SPEED] = speed
+    memory[LAST_SPEED] = speed
 
 
 class GSPI(PI):
@@ -58,14 +46,12 @@ class GSPI(PI):
     def __init__(self, settings, control_dt, name="gspi"):
         control_dt = check_control_dt(control_dt)
         self.periods = max(1, ceil(control_dt / SAMPLING - 1e-9))
-        super().__init__(settings, control_dt / self.periods, name)
-        self.parameters = np.append(self.parameters, float(self.periods))
-        self.memory = np.zeros(len(Memory) + len(SampledMemory))
+        super().__init__(settings, control_dt / self.periods, name, 1, [self.periods])
 
     def reset(self, measurement):
         """Start so that act() on this same measurement commands the measured blade pitch, as PI.reset."""
         super().reset(measurement)
-        self.memory[SampledMemory.LAST_SPEED] = nan
+        self.memory[LAST_SPEED] = nan
 
 
 def gspi_oc3(turbine, control_dt):

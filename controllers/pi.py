@@ -4,14 +4,15 @@ Above rated the torque (or, by name, the power) is constant and blade pitch cont
 rated the pitch is at its minimum and the torque follows its curve.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from enum import IntEnum
-from math import exp, inf, isfinite, isinf
+from math import exp, inf, isfinite
 
 import numpy as np
 
 from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.gains import gains_of_turbine, published_set, with_gains
+from fowt_env.controllers.settings import NOT_NEGATIVE, POSITIVE, POSITIVE_OR_INF, Settings
 from fowt_env.controllers.tuned import tuned
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import unknown
@@ -41,6 +42,9 @@ class Parameter(IntEnum):
     CURVE = 12
 
 
+END = Parameter.CURVE + len(TorqueCurve._fields)  # where the parameters of laws begin that extend this one
+
+
 class Memory(IntEnum):
     """Entries of the law's memory array."""
 
@@ -51,8 +55,15 @@ class Memory(IntEnum):
 
 
 @dataclass(frozen=True)
-class PISettings:
+class PISettings(Settings):
     """Everything that shapes the PI law. Raises: InputError naming the key, value and allowed range."""
+
+    RANGES = {
+        **dict.fromkeys(("KI", "rated_speed", "gear_ratio"), POSITIVE),
+        **dict.fromkeys(("pitch_rate_limit", "torque_rate_limit"), POSITIVE),
+        "KP": NOT_NEGATIVE,
+        **dict.fromkeys(("speed_filter_corner", "gain_schedule_pitch"), POSITIVE_OR_INF),
+    }
 
     KP: float  # on generator speed, s
     KI: float  # on generator speed, -
@@ -69,12 +80,7 @@ class PISettings:
     derived: str = ""  # gain set that stands for a platform's own, until for_scene; "": gains as given
 
     def __post_init__(self):
-        for key in ("KI", "rated_speed", "gear_ratio", "pitch_rate_limit", "torque_rate_limit"):
-            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
-        check_number("KP", self.KP, 0.0, allowed="non-negative and finite")
-        for key in ("speed_filter_corner", "gain_schedule_pitch"):
-            allowed = "positive; inf switches it off"
-            check_number(key, getattr(self, key), 0.0, low_open=True, infinite=True, allowed=allowed)
+        super().__post_init__()
         low, high = self.pitch_minimum, self.pitch_maximum
         check_number("pitch_maximum", high, low, low_open=True, allowed=f"above pitch_minimum = {low}")
         lowest = -0.5 * self.gain_schedule_pitch  # there GK has doubled; it is singular at -beta_K
@@ -89,26 +95,21 @@ class PISettings:
         changes: fields of PISettings that replace the published ones. A turbine without published gains has
         those of controllers/gains.py, which for_scene makes the platform's own.
         """
-        known = {field.name for field in fields(cls)}
-        for key in changes:
-            if key not in known:
-                raise unknown("PI setting", key, known)
         published, law, drive = gains_of_turbine(turbine, gain_set), turbine.torque_law, turbine.pitch_drive
-        settings = {
-            "KP": published.KP,
-            "KI": published.KI,
-            "rated_speed": turbine.rated_rotor_speed,
-            "gear_ratio": turbine.drivetrain.gear_ratio,
-            "pitch_minimum": drive.minimum,
-            "pitch_maximum": drive.maximum,
-            "pitch_rate_limit": drive.rate_limit,
-            "torque_rate_limit": law.max_torque_rate,
-            "curve": build_torque_curve(law, region3),
-            "speed_filter_corner": law.speed_filter_corner,
-            "gain_schedule_pitch": published.gain_schedule_pitch if scheduled else inf,
-            "derived": gain_set if published_set(turbine, gain_set) is None else "",
-        }
-        return cls(**(settings | changes))
+        return cls(
+            KP=published.KP,
+            KI=published.KI,
+            rated_speed=turbine.rated_rotor_speed,
+            gear_ratio=turbine.drivetrain.gear_ratio,
+            pitch_minimum=drive.minimum,
+            pitch_maximum=drive.maximum,
+            pitch_rate_limit=drive.rate_limit,
+            torque_rate_limit=law.max_torque_rate,
+            curve=build_torque_curve(law, region3),
+            speed_filter_corner=law.speed_filter_corner,
+            gain_schedule_pitch=published.gain_schedule_pitch if scheduled else inf,
+            derived=gain_set if published_set(turbine, gain_set) is None else "",
+        ).changed(**changes)
 
     def for_scene(self, scene):
         """These settings with the gains of a scene's platform, where none are published; else as they are.
@@ -125,10 +126,9 @@ class PISettings:
 
     def parameters(self, control_dt):
         """Return (n,) parameter array of the law at this control period, in the order of Parameter."""
-        filtered = not isinf(self.speed_filter_corner)
-        head = {
+        values = {
             Parameter.CONTROL_DT: control_dt,
-            Parameter.FILTER_DECAY: exp(-control_dt * self.speed_filter_corner) if filtered else 0.0,
+            Parameter.FILTER_DECAY: exp(-control_dt * self.speed_filter_corner),  # 0 without a filter
             Parameter.GEAR_RATIO: self.gear_ratio,
             Parameter.RATED_SPEED: self.rated_speed,
             Parameter.PROPORTIONAL: self.KP * self.gear_ratio,
@@ -140,10 +140,7 @@ class PISettings:
             Parameter.PITCH_RATE_LIMIT: self.pitch_rate_limit,
             Parameter.TORQUE_RATE_LIMIT: self.torque_rate_limit,
         }
-        values = np.empty(Parameter.CURVE + len(self.curve))
-        values[list(head)] = list(head.values())
-        values[Parameter.CURVE :] = self.curve
-        return values
+        return np.array([*values.values(), *self.curve])
 
 
 @kernel
@@ -244,9 +241,10 @@ def pi_law(parameters, memory, measurement, command):
 class GainScheduled(CompiledController):
     """Base of the laws of a PISettings; prepare(scene) takes a platform's gains where none are published."""
 
-    def __init__(self, settings, control_dt, name, n_memory):
+    def __init__(self, settings, control_dt, name, n_memory, own=()):
+        """own: parameters of the law beyond those of the PI law."""
         self.settings, self.law_dt = settings, check_control_dt(control_dt)
-        super().__init__(name, settings.parameters(self.law_dt), n_memory)
+        super().__init__(name, np.append(settings.parameters(self.law_dt), own), n_memory)
 
     @property
     def information(self):
@@ -272,8 +270,8 @@ class PI(GainScheduled):
     kernel = staticmethod(pi_law)
     inputs = ("generator_speed", "blade_pitch", "generator_torque")
 
-    def __init__(self, settings, control_dt, name="pi"):
-        super().__init__(settings, control_dt, name, len(Memory))
+    def __init__(self, settings, control_dt, name="pi", own_memory=0, own=()):
+        super().__init__(settings, control_dt, name, len(Memory) + own_memory, own)
         self.bumpless = True
 
     def reset(self, measurement):
@@ -331,7 +329,6 @@ def pi_land_power(turbine, control_dt):
 
 def pi_tuned(turbine, control_dt):
     """OC3 gains times stored factors: least deviations at no more pitch travel than `pi`, on other seeds."""
-    factors = tuned("pi_tuned")
     published = PISettings.published(turbine)
-    changes = {name: getattr(published, name) * factor for name, factor in factors.items()}
-    return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")
+    changes = {name: getattr(published, name) * factor for name, factor in tuned("pi_tuned").items()}
+    return PI(published.changed(**changes), control_dt, "pi_tuned")

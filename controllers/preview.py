@@ -14,8 +14,9 @@ from math import exp
 import numpy as np
 
 from fowt_env.analysis.trim import trim, without_fluctuations
-from fowt_env.control import check_control_dt, wind_ahead
+from fowt_env.control import wind_ahead
 from fowt_env.controllers.pi import (
+    END,
     PI,
     Memory,
     Parameter,
@@ -25,10 +26,9 @@ from fowt_env.controllers.pi import (
     speed_error,
     write_commands,
 )
-from fowt_env.descriptions.checks import check_number
+from fowt_env.controllers.settings import Settings
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
 
@@ -37,21 +37,19 @@ BELOW_RATED = 0.5  # m/s below the published rated wind that the schedule starts
 
 
 @dataclass(frozen=True)
-class PreviewSettings:
+class PreviewSettings(Settings):
     """Defines the use of the preview. Raises: InputError naming the key, value and allowed range."""
+
+    RANGES = {"preview_time": {"low": 0.5, "high": 60.0}, "gain": {"low": 0.0, "high": 2.0}}
 
     preview_time: float = 3.0  # s that the wind is known ahead
     gain: float = 1.0  # fraction of the steady schedule that is fed forward
-
-    def __post_init__(self):
-        check_number("preview_time", self.preview_time, 0.5, 60.0)
-        check_number("gain", self.gain, 0.0, 2.0)
 
 
 class PreviewParameter(IntEnum):
     """Entries of the law's parameter array beyond those of the PI law."""
 
-    GAIN = Parameter.CURVE + len(TorqueCurve._fields)
+    GAIN = END
     DECAY = GAIN + 1  # fraction of each low pass that one period leaves
     WIND = GAIN + 2  # SCHEDULE_SPEEDS winds of the steady schedule, m/s
     PITCH = WIND + SCHEDULE_SPEEDS  # and the blade pitch there, rad
@@ -111,12 +109,9 @@ class Preview(PI):
     inputs = (*PI.inputs, "wind_preview", "plant_model")
 
     def __init__(self, settings, preview, control_dt, name="preview"):
-        super().__init__(settings, control_dt, name)
+        super().__init__(settings, control_dt, name, len(PreviewMemory), np.zeros(2 + 2 * SCHEDULE_SPEEDS))
         self.preview = preview
-        self.control_dt = check_control_dt(control_dt)
         self.preview_times = (float(preview.preview_time),)
-        self.parameters = np.append(self.parameters, np.zeros(2 + 2 * SCHEDULE_SPEEDS))
-        self.memory = np.zeros(len(Memory) + len(PreviewMemory))
         self.prepared = False
 
     def prepare(self, scene):
@@ -127,7 +122,7 @@ class Preview(PI):
         if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
         super().prepare(scene)
-        step = self.control_dt
+        step = self.law_dt
         delay = self.preview.preview_time - scene.turbine.pitch_drive.lag - 0.5 * step
         if delay <= 0.0:
             raise InputError(

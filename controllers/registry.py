@@ -12,28 +12,9 @@ from fowt_env.controllers.preview import preview
 from fowt_env.controllers.printed_eq8 import eq8_literal
 from fowt_env.controllers.rosco import rosco, rosco_float, rosco_ipc
 
-CONTROLLERS = {  # name -> factory(turbine: descriptions.turbine.Turbine, control_dt: float) -> controller
-    "constant": constant,
-    "eq8_literal": eq8_literal,
-    "floating_feedback": floating_feedback,
-    "gspi_land": gspi_land,
-    "gspi_oc3": gspi_oc3,
-    "ipc": ipc,
-    "ipc_constrained": ipc_constrained,
-    "ipc_floating": ipc_floating,
-    "lq_preview": lq_preview,
-    "lqr": lqr,
-    "mpc": mpc,
-    "mpc_lidar": mpc_lidar,
-    "mpc_preview": mpc_preview,
-    "openfast_oc3": openfast_oc3,
-    "pi": pi,
-    "pi_land": pi_land,
-    "pi_land_power": pi_land_power,
-    "pi_tuned": pi_tuned,
-    "pi_unscheduled": pi_unscheduled,
-    "preview": preview,
-    "rosco": rosco,
-    "rosco_float": rosco_float,
-    "rosco_ipc": rosco_ipc,
-}
+FACTORIES = (  # (turbine: descriptions.turbine.Turbine, control_dt: float) -> controller
+    constant, eq8_literal, floating_feedback, gspi_land, gspi_oc3, ipc, ipc_constrained, ipc_floating,
+    lq_preview, lqr, mpc, mpc_lidar, mpc_preview, openfast_oc3, pi, pi_land, pi_land_power, pi_tuned,
+    pi_unscheduled, preview, rosco, rosco_float, rosco_ipc,
+)  # fmt: skip
+CONTROLLERS = {factory.__name__: factory for factory in FACTORIES}

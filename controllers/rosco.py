@@ -1,17 +1,11 @@
 """Runs ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
 
-Abbas et al., Wind Energ. Sci. 7, 2022. The library (libdiscon of the PyPI wheel `rosco`, installed with
---no-deps: its toolbox is not used) is called through the Bladed interface, as OpenFAST does. DISCON.IN is
-written for the scene from the turbine's description, the Cp, Ct, Cq table from the blade elements. If the
-turbine file names a DISCON.IN, that file is used unchanged with its table, or with a computed table if it
-has none. Otherwise gains and schedule are those published for OC3-Hywind (or of controllers/gains.py),
-because no ROSCO tuning of it is published and the automatic one has a positive proportional gain above 16
-deg; torque above rated is constant. Below rated ROSCO has its defaults: wind estimation by an extended
-Kalman filter, tracking of the best tip-speed ratio, set-point smoother, no peak shaving.
-
-Its individual pitch control integrates the tilt and yaw moment of the hub. The gains are those of the
-turbine's DISCON.IN, otherwise the integral gain of `ipc` (controllers/ipc/design.py) at zero blade pitch, as
-the library has no schedule for it, with the azimuth lead for the drive's lag and the limits of its toolbox.
+Abbas et al., Wind Energ. Sci. 7, 2022. libdiscon of the PyPI wheel `rosco` (its toolbox is not used) is
+called through the Bladed interface, as OpenFAST does. If the turbine file names a DISCON.IN, that file is
+used unchanged with its table, or with a computed table if it has none. Otherwise DISCON.IN is written from
+the turbine's description and the Cp, Ct, Cq table from the blade elements; gains and schedule are those
+published for OC3-Hywind (or of controllers/gains.py), as the automatic tuning has a positive proportional
+gain above 16 deg. Individual pitch control has the integral gain of `ipc` (ipc/design.py) at zero pitch.
 
 A loaded library is one controller that can start once: every reset() loads a private copy of the file.
 """
@@ -28,6 +22,7 @@ from _ctypes import dlclose
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
@@ -37,8 +32,9 @@ from fowt_env.caches import Cache
 from fowt_env.control import check_control_dt
 from fowt_env.controllers.gains import published_set, with_gains
 from fowt_env.controllers.ipc.design import BANDWIDTH, lead_time, root_slope
+from fowt_env.controllers.settings import POSITIVE, Settings
 from fowt_env.controllers.tuned import tuned_for
-from fowt_env.descriptions.checks import check_number, check_one_of
+from fowt_env.descriptions.checks import check_one_of
 from fowt_env.descriptions.files import read_text
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import ControllerError, InputError, unknown
@@ -68,11 +64,15 @@ TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROS
 
 
 @dataclass(frozen=True)
-class RoscoSettings:
+class RoscoSettings(Settings):
     """Floating feedback of ROSCO (Fl_Mode), and its pitch gains.
 
     Raises: InputError naming the key, value and allowed range.
     """
+
+    RANGES = dict.fromkeys(("low_pass", "high_pass", "kp", "ki"), POSITIVE) | {
+        "gain": {"high": 0.0, "allowed": "finite and <= 0 (beyond it drives the platform)"}
+    }
 
     mode: int = 0  # Fl_Mode: 0 none, 1 of the tower-top acceleration, 2 of the nacelle's pitch acceleration
     gain: float = 0.0  # Fl_Kp, rad per m/s (mode 1) or s (mode 2); negative damps the platform
@@ -83,11 +83,7 @@ class RoscoSettings:
 
     def __post_init__(self):
         check_one_of("mode", self.mode, (0, 1, 2))
-        check_number("gain", self.gain, high=0.0, allowed="finite and <= 0 (beyond it drives the platform)")
-        for key in ("low_pass", "high_pass"):
-            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite, rad/s")
-        for key in ("kp", "ki"):
-            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
+        super().__post_init__()
 
 
 class Discon:
@@ -100,10 +96,9 @@ class Discon:
     def __init__(self, path, individual=False):
         self.path = Path(path)
         self.text = read_text(self.path, "DISCON.IN")
-        self.values = {}
-        for line in self.text.splitlines():
-            if found := ENTRY.match(line):
-                self.values.setdefault(found["name"], found["value"].strip())
+        entries = [found for line in self.text.splitlines() if (found := ENTRY.match(line))]
+        # the first of a name counts
+        self.values = {found["name"]: found["value"].strip() for found in reversed(entries)}
         where = f"DISCON.IN {str(path)!r}"
         for key in ("PerfFileName", "PerfTableSize", "Fl_Mode", "LoggingLevel", INDIVIDUAL, *OFF):
             if key not in self.values:
@@ -114,17 +109,11 @@ class Discon:
                 raise InputError(f"{where}: {key} = {self.values[key]}: must be 0 here")
         if self.values["Fl_Mode"] not in ("0", "1", "2"):
             raise InputError(f"{where}: Fl_Mode = {self.values['Fl_Mode']}: must be 0, 1 or 2")
-
-    @property
-    def mode(self):
-        """Return the Fl_Mode, which says what acceleration the library is given."""
-        return int(self.values["Fl_Mode"])
+        self.mode = int(self.values["Fl_Mode"])  # says what acceleration the library is given
 
     def texts(self, changes, table):
         """(text of DISCON.IN with changes, text of its rotor table); table(): Table where it has no file."""
-        for key in changes:
-            if key not in self.values:
-                raise unknown("entry of DISCON.IN", key, self.values)
+        _check_entries(changes, self.values)
         changes = SILENT | {"PerfFileName": '"rotor.txt"'} | self.switched | changes
         named = self.path.parent / self.values["PerfFileName"].strip("\"'")
         if named.is_file():
@@ -140,6 +129,12 @@ class Discon:
                 line = f"{_words(changes[found['name']])}{line[found.end('value') :]}"
             lines.append(line)
         return "\n".join([*lines, ""]), rows
+
+
+def _check_entries(changes, known):
+    for key in changes:
+        if key not in known:
+            raise unknown("entry of DISCON.IN", key, known)
 
 
 def find_library():
@@ -158,17 +153,6 @@ def find_library():
     return library, [path for name in PRELOADED for path in bundled if path.name.startswith(name)]
 
 
-def _load(path):
-    """Return the library at a path. Raises: InputError saying what is wrong with it."""
-    try:
-        library = ctypes.CDLL(str(path))
-        library.DISCON.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
-        library.DISCON.restype = None
-    except (OSError, AttributeError) as error:
-        raise InputError(f"controller 'rosco': {path} cannot be used ({error}); {INSTALL}") from error
-    return library
-
-
 _needed = []  # libraries of the wheel, loaded once per process
 
 
@@ -179,14 +163,6 @@ def _preload(paths):
             _needed.extend(ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL) for path in paths)
         except OSError as error:
             raise InputError(f"controller 'rosco': cannot load what it needs ({error}); {INSTALL}") from error
-
-
-def _flush():
-    """Return the function that writes out what the Fortran library has buffered for standard output."""
-    for library in _needed:
-        if hasattr(library, "_gfortran_flush_i4"):
-            return library._gfortran_flush_i4
-    return lambda unit: None
 
 
 _redirecting = threading.Lock()  # of two threads at it, one would keep the other's redirection for good
@@ -207,17 +183,14 @@ class Rosco:
         self.control_dt = check_control_dt(control_dt)
         self.name = str(name)
         self.individual = bool(individual)
+        self._files = self._remove = None
         # a turbine measures the rate of its pitching: its own DISCON.IN is given the change of that
         turning = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
         felt = {0: (), 1: ("nacelle_acceleration",), 2: (turning,)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
-        blades = BLADE_INPUTS if self.individual else ()
+        blades = tuple(SWAPPED.values()) if self.individual else ()
         self.information = (*used, *felt, *blades, "plant_model")
         self._felt = felt
-        self._forget()
-
-    def _forget(self):
-        self._files = self._library = self._first = None
 
     def __getstate__(self):
         """Everything but the running library: a copy needs prepare() and reset() of its own."""
@@ -245,13 +218,14 @@ class Rosco:
             values = deck(with_gains(scene), density, made, self.settings)
             if self.individual:
                 values |= individual_entries(turbine, self.control_dt)
-            for key in self.changes:
-                if key not in values:
-                    raise unknown("entry of DISCON.IN", key, values)
+            _check_entries(self.changes, values)
             text, table = deck_text(values | self.changes), table_text(made)
-        self._files = _Folder()
-        self._files.write("rotor.txt", table)
-        self._files.write("DISCON.IN", text)
+        if self._remove is not None:
+            self._remove()
+        self._files = tempfile.mkdtemp(prefix="fowt_rosco_")
+        self._remove = weakref.finalize(self, shutil.rmtree, self._files, ignore_errors=True)
+        for name, content in (("rotor.txt", table), ("DISCON.IN", text)):
+            Path(self._files, name).write_text(content)
 
     def reset(self, measurement):
         """Load a fresh copy of the library and start it at a Measurement.
@@ -261,9 +235,9 @@ class Rosco:
         """
         if self._files is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
-        self._library = _Copy(self._source, self._files.path)
+        self._library = _Copy(self._source, self._files)
         self._swap = np.zeros(SWAP_SIZE, dtype=np.float32)
-        self._deck = str(self._files.path / "DISCON.IN").encode()
+        self._deck = str(Path(self._files, "DISCON.IN")).encode()
         self._rate = None
         self._first = (measurement.time, self._call(0, measurement))
 
@@ -295,11 +269,9 @@ class Rosco:
             self._rate = rate
         s[60] = 3.0
         if self.individual:
-            blades = m.blades
             s[27] = 1.0
-            s[59] = blades.azimuth
             for entry, name in SWAPPED.items():
-                s[entry] = getattr(blades, name)
+                s[entry] = getattr(m.blades, name)
         failed = self._library.call(s, self._deck)
         if failed is not None:
             raise ControllerError(
@@ -308,32 +280,13 @@ class Rosco:
                 time=m.time,
                 returned=None,
             )
-        if self.individual:
-            return float(s[46]), float(s[41]), float(s[42]), float(s[43])
-        return float(s[46]), float(s[41])
+        return tuple(float(s[i]) for i in ((46, 41, 42, 43) if self.individual else (46, 41)))
 
 
-SWAPPED = {  # entries of the interface's array
-    3: "blade_pitch_1",
-    32: "blade_pitch_2",
-    33: "blade_pitch_3",
-    29: "root_out_of_plane_1",
-    30: "root_out_of_plane_2",
-    31: "root_out_of_plane_3",
-}
-BLADE_INPUTS = ("azimuth", *SWAPPED.values())
+# entries of the interface's array
+SWAPPED = {59: "azimuth", 3: "blade_pitch_1", 32: "blade_pitch_2", 33: "blade_pitch_3"}
+SWAPPED |= {28 + blade: f"root_out_of_plane_{blade}" for blade in (1, 2, 3)}
 OUT_NAME = b"rosco"  # root of the files that ROSCO would write at higher logging levels
-
-
-class _Folder:
-    """A temporary folder that goes with its owner."""
-
-    def __init__(self):
-        self.path = Path(tempfile.mkdtemp(prefix="fowt_rosco_"))
-        self._end = weakref.finalize(self, shutil.rmtree, str(self.path), ignore_errors=True)
-
-    def write(self, name, text):
-        (self.path / name).write_text(text)
 
 
 class _Copy:
@@ -344,13 +297,19 @@ class _Copy:
         os.close(handle)
         shutil.copyfile(source, path)
         try:
-            library = _load(path)
+            library = ctypes.CDLL(path)
+            self._discon = library.DISCON
+        except (OSError, AttributeError) as error:
+            raise InputError(f"controller 'rosco': {path} cannot be used ({error}); {INSTALL}") from error
         finally:
             os.unlink(path)  # once loaded the file is not needed
-        self._discon = library.DISCON
+        self._discon.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
+        self._discon.restype = None
         self._message = ctypes.create_string_buffer(TEXT_SIZE)
         self._failure = ctypes.c_int32(0)
-        self._flush = _flush()
+        # writes out what the Fortran library has buffered for standard output
+        flushing = (library for library in _needed if hasattr(library, "_gfortran_flush_i4"))
+        self._flush = getattr(next(flushing, None), "_gfortran_flush_i4", lambda unit: None)
         self._nowhere = os.open(os.devnull, os.O_WRONLY)
         self._end = weakref.finalize(self, _unload, library._handle, self._nowhere)
 
@@ -380,8 +339,7 @@ def _unload(library, nowhere):
     os.close(nowhere)
 
 
-@dataclass(frozen=True, eq=False)
-class Table:
+class Table(NamedTuple):
     """Rotor performance over tip-speed ratio (n,) and blade pitch (m,) rad; coefficients (n, m)."""
 
     ratio: np.ndarray
@@ -439,17 +397,11 @@ def _inertia(turbine):
     return turbine.rotor.inertia + drive.gear_ratio**2 * drive.generator_inertia
 
 
-def pitch_gains(turbine, gain_set="oc3"):
-    """(KP, KI), each (n,), over SCHEDULE in ROSCO's sign: blade pitch over reference less measured speed.
-
-    Raises: InputError if a proportional gain would not be negative.
-    """
-    published = published_set(turbine, gain_set)
+def pitch_gains(turbine):
+    """(KP, KI), each (n,), over SCHEDULE in ROSCO's sign: blade pitch over reference less measured speed."""
+    published = published_set(turbine, "oc3")
     schedule = 1.0 / (1.0 + SCHEDULE / published.gain_schedule_pitch)
-    proportional, integral = -published.KP * schedule, -published.KI * schedule
-    if not (proportional < 0.0).all():
-        raise InputError(f"turbine {turbine.name!r}, gains.{gain_set}: KP over the schedule must be negative")
-    return proportional, integral
+    return -published.KP * schedule, -published.KI * schedule
 
 
 def deck(turbine, density, table, settings):
@@ -552,17 +504,15 @@ def individual_entries(turbine, control_dt):
 
 def _words(value):
     """Return the text of a value of the deck."""
-    if isinstance(value, str):
-        return value
-    if isinstance(value, int):
+    if isinstance(value, str | int):
         return str(value)
     return " ".join(str(v) if isinstance(v, int) else f"{v:.8g}" for v in np.atleast_1d(value).tolist())
 
 
 def deck_text(values):
     """Return DISCON.IN of a deck: a value and its name on each line."""
-    lines = ["! ROSCO deck, written for one run"]
-    return "\n".join([*lines, *(f"{_words(value)}   ! {name} -" for name, value in values.items()), ""])
+    lines = [f"{_words(value)}   ! {name} -" for name, value in values.items()]
+    return "\n".join(["! ROSCO deck, written for one run", *lines, ""])
 
 
 def table_text(table):
@@ -576,20 +526,22 @@ def table_text(table):
     return "\n".join(lines)
 
 
+def _made(turbine, control_dt, name, individual=False, **settings):
+    """Return a Rosco with the turbine's own DISCON.IN, else with RoscoSettings."""
+    own = RoscoSettings(**settings) if turbine.discon is None else Discon(turbine.discon, individual)
+    return Rosco(own, control_dt, name, individual=individual)
+
+
 def rosco(turbine, control_dt):
     """The ROSCO library: with the turbine's own DISCON.IN, else the OC3 gains and no floating feedback."""
-    settings = RoscoSettings() if turbine.discon is None else Discon(turbine.discon)
-    return Rosco(settings, control_dt, "rosco")
+    return _made(turbine, control_dt, "rosco")
 
 
 def rosco_float(turbine, control_dt):
     """The ROSCO library with OC3 gains and its floating feedback, tuned on training cases; or as rosco."""
-    if turbine.discon is not None:
-        return Rosco(Discon(turbine.discon), control_dt, "rosco_float")
-    return Rosco(RoscoSettings(mode=1, **tuned_for("rosco_float", turbine)), control_dt, "rosco_float")
+    return _made(turbine, control_dt, "rosco_float", mode=1, **tuned_for("rosco_float", turbine))
 
 
 def rosco_ipc(turbine, control_dt):
     """The ROSCO library as rosco, with its individual pitch control at 1P."""
-    settings = RoscoSettings() if turbine.discon is None else Discon(turbine.discon, individual=True)
-    return Rosco(settings, control_dt, "rosco_ipc", individual=True)
+    return _made(turbine, control_dt, "rosco_ipc", individual=True)

@@ -7,6 +7,7 @@ import numba
 import numpy as np
 import pandas as pd
 import pytest
+from naive.preview import add_motion
 from naive.sensors import NaiveSensors
 from potential_body import made_up_body
 
@@ -35,7 +36,7 @@ from fowt_env.plant.measurement import (
     measurement_rows,
 )
 from fowt_env.weather.lidar import lidar_preview
-from fowt_env.weather.preview import Motion, Preview, add_motion, exact_preview, rotor_wind_series
+from fowt_env.weather.preview import Motion, Preview, exact_preview, rotor_wind_series
 from fowt_env.weather.sensor_noise import draw_noise
 
 GUST = {"kind": "steps", "speeds": [17.0, 19.0, 16.0], "every": 10.0, "ramp": 4.0}

@@ -39,20 +39,16 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     gain = schedule_gain(pitch, settings.gain_schedule_pitch)
     proportional = gain * settings.KP * settings.gear_ratio
     integral = gain * settings.KI * settings.gear_ratio
-    feedback = 0.0
+    a, command = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
     if settings.schedule_on == "measured":
-        feedback = -(1.0 - gain)
+        command[blade] = -(1.0 - gain)
     else:
         proportional /= 2.0 - gain
         integral /= 2.0 - gain
-    a = np.zeros((n + 2, n + 2))
     a[:n, :n] = model.A
-    command = np.zeros(n + 2)
     filtered = not isinf(settings.speed_filter_corner)
     measured_speed = n if filtered else speed
-    command[measured_speed] += proportional
-    command[n + 1] += integral
-    command[blade] += feedback
+    command[[measured_speed, n + 1]] = proportional, integral
     a[:n] += np.outer(model.B[:, 1], command)
     ratio = settings.gear_ratio
     centre = float(point.state[State.ROTOR_SPEED])
@@ -67,18 +63,23 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     return a, (*model.states, "filtered_speed", "speed_integral")
 
 
-def nearest_to_platform(found, model):
-    """That of some Modes whose period is nearest to the platform's own, with blades and torque held."""
+def platform_damping(model, settings):
+    """Return the damping ratio of the platform-pitch mode of a LinearModel under a PI law.
+
+    Of the modes of that name (or all) it has the period nearest to the platform's own, with blades and torque
+    held: the rotor loop may come near.
+    """
+    a, names = closed_loop_matrix(model, settings)
+    found = modes(a, names, model.cm_height, model.arm)
+    pitching = [mode for mode in found if mode.name == "platform_pitch"] or found
     period = 2.0 * pi / platform_frequency(model)
-    return min(found, key=lambda mode: abs(mode.period - period))
+    return min(pitching, key=lambda mode: abs(mode.period - period)).damping_ratio
 
 
 def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
     """Return {gain set: [damping ratio of the platform-pitch mode at each wind]} on the floating platform.
 
-    gain_sets: {name: changes of PISettings.published, e.g. {"gain_set": "land"}}. The mode is the one
-    named platform pitch with the period nearest to that of the platform alone. Viscous damping is not
-    in it.
+    gain_sets: {name: changes of PISettings.published, e.g. {"gain_set": "land"}}; without viscous damping.
     """
     table = {name: [] for name in gain_sets}
     for wind in winds:
@@ -86,8 +87,5 @@ def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
         model = with_pitch_lag(linearize(scene, trim(scene)))
         for name, changes in gain_sets.items():
             settings = PISettings.published(with_gains(scene), **changes)
-            a, names = closed_loop_matrix(model, settings)
-            pitching = [m for m in modes(a, names, model.cm_height, model.arm) if m.name == "platform_pitch"]
-            # the rotor loop may come near; the platform's own period tells them apart
-            table[name].append(nearest_to_platform(pitching, model).damping_ratio)
+            table[name].append(platform_damping(model, settings))
     return table

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fowt_env.analysis.linear_model import modes
-from fowt_env.controllers.design.closed_loop import closed_loop_matrix, nearest_to_platform
+from fowt_env.controllers.design.closed_loop import platform_damping
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE
@@ -72,15 +71,7 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
                 "KI_[-]": float(small * ki),
                 "omega_[rad/s]": float(frequency),
                 "zeta_[-]": float(0.5 * slope * small * kp * ratio / frequency),
-                "platform_zeta_[-]": _platform_damping(models[wind], settings),
+                "platform_zeta_[-]": platform_damping(models[wind], settings),
             }
         )
     return PIDesign(kp, ki, gain_schedule_pitch, table)
-
-
-def _platform_damping(model, settings):
-    """Return the damping ratio of the platform-pitch mode of the whole plant under a PI law."""
-    a, names = closed_loop_matrix(model, settings)
-    found = modes(a, names, model.cm_height, model.arm)
-    pitching = [mode for mode in found if mode.name == "platform_pitch"]
-    return nearest_to_platform(pitching or found, model).damping_ratio

@@ -36,16 +36,8 @@ def save_design(path, kind, scene, settings, command, **further):
     path = Path(path)
     if path.suffix.lower() != ".json":
         raise InputError(f"design file {str(path)!r}: must end with .json")
-    content = {
-        "format": FORMAT,
-        "version": VERSION,
-        "kind": kind,
-        "platform": scene.platform.name,
-        "turbine": scene.turbine.name,
-        "command": command,
-        "settings": settings,
-        **further,
-    }
+    known = (FORMAT, VERSION, kind, scene.platform.name, scene.turbine.name, command, settings)
+    content = dict(zip(KEYS, known, strict=True)) | further
     _factory(content, f"design file {str(path)!r}")
     text = json.dumps(content, indent=1, allow_nan=False)
     with replacing(path) as temporary:
@@ -144,8 +136,7 @@ def _lqr(settings, where):
         raise InputError(f"{where}: settings.models: must list models of two winds or more")
     models = [_model(row, f"settings.models[{i}]", where) for i, row in enumerate(rows)]
     for i in range(1, len(models)):
-        step = models[i].wind - models[i - 1].wind
-        if not math.isclose(step, SPACING, rel_tol=1e-9):
+        if not math.isclose(models[i].wind - models[i - 1].wind, SPACING, rel_tol=1e-9):
             raise InputError(
                 f"{where}: settings.models[{i}].wind = {models[i].wind:g}: must be {SPACING:g} m/s above"
                 " the last"

@@ -1,22 +1,18 @@
 """Defines individual pitch control: PI law for torque and mean pitch, cyclic pitch against 1P loads.
 
-The out-of-plane root moments are transformed to the hub's tilt and yaw moment M (multi-blade coordinates,
-controllers/ipc/design.py). The moment without cyclic pitch theta is estimated as M - G theta with the slope G
-of the root moment, scheduled on the mean pitch. After a notch at 3P, where the blades' second and fourth
-harmonics appear, theta follows -(M - G theta)/G with a first-order lag. Without the notch this is integral
-control of M with the gain bandwidth/|G|; the estimate keeps the loop damped with notches and limits. A
-proportional part would only add turbulence. The azimuth of the inverse transformation leads by the lag of
-pitch drive and control period at 1P, which decouples tilt and yaw.
+The out-of-plane root moments are transformed to the hub's tilt and yaw moment M
+(controllers/ipc/design.py). The moment without cyclic pitch theta is estimated as M - G theta with the
+slope G of the root moment, scheduled on the mean pitch; it passes a notch at 3P, and theta follows -(M - G
+theta)/G with a first-order lag, which without the notch is integral control of M with the gain
+bandwidth/|G|. The azimuth of the inverse transformation leads by the lag of pitch drive and control period
+at 1P, which decouples tilt and yaw.
 
 The cyclic amplitude is limited to `amplitude`, by the drive's rate at the present rotor speed, and to the
-distance of the mean pitch from the drive's ends, so that it fades in above rated; there is no windup.
-
-With a `bound` theta follows -(1 - bound/|M - G theta|) (M - G theta)/G, and zero within the bound:
-output-constrained control of the magnitude of tilt and yaw together, Hummel, Kober and Mulders, Wind Energ.
-Sci. 10, 2005-2024, 2025.
-
-To avoid excitation of the platform, the yaw moment, which yaws the platform, is cancelled below `yaw_corner`
-only, and the tilt moment, whose control excites sway and roll by tangential loads, passes `tilt_notches`.
+distance of the mean pitch from the drive's ends; there is no windup. With a `bound` theta follows -(1 -
+bound/|M - G theta|) (M - G theta)/G, and zero within the bound: output-constrained control of tilt and yaw
+together, Hummel, Kober and Mulders, Wind Energ. Sci. 10, 2005-2024, 2025. The yaw moment, which yaws the
+platform, is cancelled below `yaw_corner` only, and the tilt moment, whose control excites sway and roll,
+passes `tilt_notches`.
 """
 
 from dataclasses import dataclass, replace
@@ -27,12 +23,13 @@ import numpy as np
 
 from fowt_env.controllers.gains import platform_frequency
 from fowt_env.controllers.ipc.design import BANDWIDTH, lead_time, root_slope
-from fowt_env.controllers.pi import PI, Memory, Parameter, PISettings, pi_step
+from fowt_env.controllers.pi import END, PI, Memory, Parameter, PISettings, pi_step
+from fowt_env.controllers.settings import NOT_NEGATIVE, POSITIVE, POSITIVE_OR_INF, Settings
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import control_kernel, kernel
-from fowt_env.plant.drivetrain import TorqueCurve, clamp, rate_limit
+from fowt_env.plant.drivetrain import clamp, rate_limit
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.state import BLADES, Command, State
 
@@ -44,8 +41,17 @@ CONSTRAINED_BOUND = 0.1  # of the greatest root moment in steady wind, of ipc_co
 
 
 @dataclass(frozen=True)
-class IPCSettings:
+class IPCSettings(Settings):
     """Defines the cyclic pitch control. Raises: InputError naming the key, value and allowed range."""
+
+    RANGES = {
+        "bandwidth": POSITIVE | {"high": 1.0, "allowed": "above 0 and at most 1"},
+        "amplitude": POSITIVE | {"high": 0.5, "allowed": "above 0 and at most 0.5"},
+        "rate_share": POSITIVE | {"high": 1.0, "allowed": "above 0 and at most 1"},
+        **dict.fromkeys(("notch_damping", "tilt_damping"), POSITIVE),
+        "bound": NOT_NEGATIVE,
+        "yaw_corner": POSITIVE_OR_INF,
+    }
 
     bandwidth: float = BANDWIDTH
     amplitude: float = 5.0 * DEGREE  # rad, greatest cyclic pitch
@@ -58,26 +64,19 @@ class IPCSettings:
     yaw_corner: float = inf  # rad/s, of a first-order low pass of the yaw moment; inf: none
 
     def __post_init__(self):
-        for key, high in (("bandwidth", 1.0), ("amplitude", 0.5), ("rate_share", 1.0)):
-            allowed = f"above 0 and at most {high:g}"
-            check_number(key, getattr(self, key), 0.0, high, low_open=True, allowed=allowed)
-        for key in ("notch_damping", "tilt_damping"):
-            check_number(key, getattr(self, key), 0.0, low_open=True, allowed="positive and finite")
-        check_number("bound", self.bound, 0.0, allowed="0 or more and finite")
-        allowed = "positive, rad/s; inf: none"
-        check_number("yaw_corner", self.yaw_corner, 0.0, low_open=True, infinite=True, allowed=allowed)
+        super().__post_init__()
         if len(self.tilt_notches) > TILT_NOTCHES:
             raise InputError(
                 f"tilt_notches: {len(self.tilt_notches)} frequencies: at most {TILT_NOTCHES} fit"
             )
         for frequency in self.tilt_notches:
-            check_number("tilt_notches", frequency, 0.0, low_open=True, allowed="positive and finite, rad/s")
+            check_number("tilt_notches", frequency, **POSITIVE)
 
 
 class CyclicParameter(IntEnum):
     """Entries of the law's parameter array beyond those it shares with the PI law."""
 
-    DECAY = Parameter.CURVE + len(TorqueCurve._fields)  # of the distance to the target, in a period
+    DECAY = END  # of the distance to the target, in a period
     SLOPE = DECAY + 1  # G at zero pitch, N m/rad
     DOUBLING = DECAY + 2  # rad
     AMPLITUDE = DECAY + 3  # rad
@@ -225,12 +224,9 @@ class IPC(PI):
     )  # fmt: skip
 
     def __init__(self, settings, cyclic, control_dt, name="ipc"):
-        super().__init__(settings, control_dt, name)
+        own = np.full(N_PARAMETERS - END, np.nan)  # until prepare
+        super().__init__(settings, control_dt, name, N_MEMORY - len(Memory), own)
         self.cyclic = cyclic
-        own = np.zeros(N_PARAMETERS)
-        own[: len(self.parameters)] = self.parameters
-        own[CyclicParameter.SLOPE] = np.nan  # until prepare
-        self.parameters, self.memory = own, np.zeros(N_MEMORY)
 
     def cyclic_settings(self, scene):
         """Return the IPCSettings for a scene."""
@@ -241,18 +237,17 @@ class IPC(PI):
         super().prepare(scene)
         turbine, cyclic, p = scene.turbine, self.cyclic_settings(scene), self.parameters
         slope, rated = root_slope(turbine), turbine.rated_rotor_speed
-        values = {
-            CyclicParameter.DECAY: exp(-self.law_dt * cyclic.bandwidth * rated),
-            CyclicParameter.SLOPE: slope.at_zero,
-            CyclicParameter.DOUBLING: slope.doubling,
-            CyclicParameter.AMPLITUDE: cyclic.amplitude,
-            CyclicParameter.RATE: cyclic.rate_share * turbine.pitch_drive.rate_limit,
-            CyclicParameter.NOTCH_DAMPING: cyclic.notch_damping,
-            CyclicParameter.LEAD_TIME: lead_time(turbine, self.law_dt) if cyclic.lead else 0.0,
-            CyclicParameter.BOUND: cyclic.bound * slope.moment,
-            CyclicParameter.YAW_DECAY: exp(-self.law_dt * cyclic.yaw_corner),  # 0 without a corner
-        }
-        p[list(values)] = list(values.values())
+        p[CyclicParameter.DECAY : CyclicParameter.NOTCHES] = (
+            exp(-self.law_dt * cyclic.bandwidth * rated),
+            slope.at_zero,
+            slope.doubling,
+            cyclic.amplitude,
+            cyclic.rate_share * turbine.pitch_drive.rate_limit,
+            cyclic.notch_damping,
+            lead_time(turbine, self.law_dt) if cyclic.lead else 0.0,
+            cyclic.bound * slope.moment,
+            exp(-self.law_dt * cyclic.yaw_corner),  # 0 without a corner
+        )
         coefficients = np.zeros((TILT_NOTCHES, COEFFICIENTS))
         coefficients[:, 0] = 1.0  # passes everything
         for k, frequency in enumerate(cyclic.tilt_notches):

@@ -10,7 +10,7 @@ Winds, travels and moments of the NREL 5 MW turbine are scaled to other turbines
 the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub height.
 """
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import ceil, floor, pi, sqrt
 
 import numpy as np
@@ -23,11 +23,12 @@ from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.caches import Cache, cached
-from fowt_env.descriptions.checks import check_number
+from fowt_env.controllers.settings import NOT_NEGATIVE, POSITIVE, Settings
 from fowt_env.descriptions.iec import ntm_sigma
 from fowt_env.descriptions.nrel5mw import HUB_HEIGHT, RATED_WIND, ROTOR_SPEED, TIP_RADIUS
 from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import InputError
+from fowt_env.plant.state import State
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites
@@ -51,13 +52,22 @@ MOMENT_NOISE = 2e5  # N m per root second: random walk of what no other state ex
 
 
 @dataclass(frozen=True)
-class LQGSettings:
+class LQGSettings(Settings):
     """What the feedback of lqr aims at and may spend, see controllers/lqr/optimum.py.
 
     The limits are on deviations of the linear loop; those near rated wind hold at lowest_design_wind. The
     defaults are what `fowt design tune lqr` found on OC3-Hywind; winds and travels in them are those of the
     NREL 5 MW turbine and are scaled to others.
     """
+
+    NAME = "lqr"
+    RANGES = {
+        "share": {"low": 0.0, "high": 1.0},
+        "share_growth": {},
+        "speed_integral": NOT_NEGATIVE,
+        **dict.fromkeys(("travel", "travel_cap", "travel_near_rated", "power", "torque", "shaft"), POSITIVE),
+        **dict.fromkeys(("shaft_near_rated", "torque_rate", "schedule_time"), POSITIVE),
+    }
 
     share: float = 0.577  # of platform pitch in the aim, at SHARE_WIND; the rest is rotor speed
     share_growth: float = -0.00345  # of the share, per m/s
@@ -71,25 +81,6 @@ class LQGSettings:
     speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
     torque_rate: float = 0.0474  # cost of (torque rate / 5 % of rated a second)^2
     schedule_time: float = 144.1  # s, over which the operating wind follows the estimate
-
-    def __post_init__(self):
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name == "share_growth":
-                check_number(item.name, value, allowed="finite")
-            elif item.name == "share":
-                check_number(item.name, value, 0.0, 1.0)
-            elif item.name == "speed_integral":
-                check_number(item.name, value, 0.0, allowed="finite and 0 or more")
-            else:
-                check_number(item.name, value, 0.0, low_open=True, allowed="finite and positive")
-
-    def changed(self, **changes):
-        """Return a copy with some settings changed. Raises: InputError for unknown names."""
-        for key in changes:
-            if key not in asdict(self):
-                raise unknown("setting of lqr", key, asdict(self))
-        return replace(self, **changes)
 
     def share_at(self, wind):
         """Return the share of platform pitch at a wind (m/s) of the NREL 5 MW turbine (equivalent_wind)."""
@@ -115,15 +106,9 @@ class DesignModel:
 
 
 MODEL_SHAPES = {  # of the fields of DesignModel
-    "wind": (),
-    "A": (N_STATE, N_STATE),
-    "B": (N_STATE, 2),
-    "G": (N_STATE, 2),
-    "C": (N_SENSORS, N_STATE),
-    "trim": (N_PLANT,),
-    "torque": (),
-    "pitch": (),
-}
+    "wind": (), "A": (N_STATE, N_STATE), "B": (N_STATE, 2), "G": (N_STATE, 2), "C": (N_SENSORS, N_STATE),
+    "trim": (N_PLANT,), "torque": (), "pitch": (),
+}  # fmt: skip
 
 
 def design_winds(turbine):
@@ -224,15 +209,8 @@ def design_model(scene, speed):
     a[WAVE + 1, [WAVE, WAVE + 1]] = -peak, -2.0 * WAVE_DAMPING * peak
     g[WAVE + 1, 1] = 0.25 * sea.Hs * sqrt(4.0 * WAVE_DAMPING * peak)
     point = model.point
-    full = np.array([point.state[i] for i in _state_rows()])
+    full = np.array([point.state[State[name.upper()]] for name in PLANT])
     return DesignModel(float(speed), a, b, g, c, full, float(point.command[0]), float(point.command[1]))
-
-
-def _state_rows():
-    """Return the entries of PLANT in the state vector."""
-    from fowt_env.plant.state import State
-
-    return [State[name.upper()] for name in PLANT]
 
 
 _MODELS = Cache(16)  # all that a design depends on -> DesignModels
@@ -242,9 +220,8 @@ def design_models(scene):
     """DesignModels of the scene's plant over design_winds; remembered per plant, whatever its weather."""
     aero = scene.model.aero
     key = (plant_key(scene), water_key(scene), aero.wind.shear_exponent, aero.field is None)
-    return _MODELS.get(
-        key, lambda: tuple(design_model(scene, speed) for speed in design_winds(scene.turbine))
-    )
+    winds = design_winds(scene.turbine)
+    return _MODELS.get(key, lambda: tuple(design_model(scene, speed) for speed in winds))
 
 
 def sampled_noise(a, q, dt):

@@ -115,6 +115,21 @@ def blocks(models, settings, turbine, dt):
 _BLOCKS = Cache(32)  # (id of models, settings, control period) -> (models, their blocks)
 
 
+def limits_of(turbine, control_dt):
+    """Return {entry: value} of the first entries of Head, which mpc has too."""
+    law, drive = turbine.torque_law, turbine.pitch_drive
+    return {
+        Head.CONTROL_DT: control_dt,
+        Head.RATED_SPEED: turbine.rated_rotor_speed,
+        Head.RATED_TORQUE: law.rated_torque,
+        Head.GEAR_RATIO: turbine.drivetrain.gear_ratio,
+        Head.PITCH_MINIMUM: drive.minimum,
+        Head.PITCH_MAXIMUM: drive.maximum,
+        Head.PITCH_RATE_LIMIT: drive.rate_limit,
+        Head.TORQUE_RATE_LIMIT: law.max_torque_rate,
+    }
+
+
 class LQR(CompiledController):
     """LQG law of LQGSettings; prepare(scene) designs it on the scene's platform unless models are given."""
 
@@ -161,17 +176,9 @@ class LQR(CompiledController):
 
     def install(self, first_wind, table):
         """Take the blocks of winds 1 m/s apart."""
-        turbine, law, drive = self.turbine, self.turbine.torque_law, self.turbine.pitch_drive
-        head = np.zeros(BLOCKS)
+        turbine, law = self.turbine, self.turbine.torque_law
         values = {
-            Head.CONTROL_DT: self.control_dt,
-            Head.RATED_SPEED: turbine.rated_rotor_speed,
-            Head.RATED_TORQUE: law.rated_torque,
-            Head.GEAR_RATIO: turbine.drivetrain.gear_ratio,
-            Head.PITCH_MINIMUM: drive.minimum,
-            Head.PITCH_MAXIMUM: drive.maximum,
-            Head.PITCH_RATE_LIMIT: drive.rate_limit,
-            Head.TORQUE_RATE_LIMIT: law.max_torque_rate,
+            **limits_of(turbine, self.control_dt),
             Head.FIRST_WIND: first_wind,
             Head.WIND_STEP: 1.0,
             Head.WINDS: len(table),
@@ -181,9 +188,7 @@ class LQR(CompiledController):
             Head.HANDOVER_LOW: HANDOVER[0],
             Head.HANDOVER_HIGH: HANDOVER[1],
         }
-        head[list(values)] = list(values.values())
-        head[Head.CURVE :] = build_torque_curve(law)
-        self.parameters = np.concatenate([head, np.ravel(table)])
+        self.parameters = np.concatenate([[*values.values(), *build_torque_curve(law)], np.ravel(table)])
         self.prepared = True
 
     def reset(self, measurement):

@@ -17,7 +17,7 @@ from fowt_env.control import check_control_dt
 from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, design_models, lowest_design_wind
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
-from fowt_env.controllers.lqr.law import LQR, WindEstimator, speed_integral
+from fowt_env.controllers.lqr.law import LQR, WindEstimator, limits_of, speed_integral
 from fowt_env.controllers.mpc.ahead import LearntShare
 from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, SPEED, TORQUE, WindModel, cost_rows, wind_model
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
@@ -37,7 +37,7 @@ CURVE_WINDS = (8.5, 9.5)  # m/s, of the NREL 5 MW turbine: curve and resting bla
 
 
 class Entry(IntEnum):
-    """Entries of the parameter array."""
+    """Entries of the parameter array; the first are those of Head."""
 
     CONTROL_DT = 0
     RATED_SPEED = 1
@@ -117,7 +117,7 @@ class MPC:
     ):  # fmt: skip
         self.name, self.turbine, self.control_dt = name, turbine, check_control_dt(control_dt)
         self.settings = MPCSettings() if settings is None else settings
-        self.nonlinear, self.constrained, self.exact = bool(nonlinear), bool(constrained), bool(exact)
+        self.nonlinear, self.constrained, self.exact = nonlinear, constrained, exact
         self.information = LQR.information
         self.every = max(1, round(PERIOD / self.control_dt))
         self.preview_times = ()
@@ -139,19 +139,12 @@ class MPC:
         return self.every * self.control_dt
 
     def _parameters(self):
-        turbine, law, drive = self.turbine, self.turbine.torque_law, self.turbine.pitch_drive
+        turbine, law, settings = self.turbine, self.turbine.torque_law, self.settings
         values = {
-            Entry.CONTROL_DT: self.control_dt,
-            Entry.RATED_SPEED: turbine.rated_rotor_speed,
-            Entry.RATED_TORQUE: law.rated_torque,
-            Entry.GEAR_RATIO: turbine.drivetrain.gear_ratio,
-            Entry.PITCH_MINIMUM: drive.minimum,
-            Entry.PITCH_MAXIMUM: drive.maximum,
-            Entry.PITCH_RATE_LIMIT: drive.rate_limit,
-            Entry.TORQUE_RATE_LIMIT: law.max_torque_rate,
-            Entry.TORQUE_LOW: self.settings.torque_low * law.rated_torque,
-            Entry.TORQUE_HIGH: min(self.settings.torque_high * law.rated_torque, law.max_torque),
-            Entry.DECAY: exp(-self.control_dt / self.settings.schedule_time),
+            **limits_of(turbine, self.control_dt),
+            Entry.TORQUE_LOW: settings.torque_low * law.rated_torque,
+            Entry.TORQUE_HIGH: min(settings.torque_high * law.rated_torque, law.max_torque),
+            Entry.DECAY: exp(-self.control_dt / settings.schedule_time),
             Entry.CURVE_BELOW: CURVE_WINDS[0] + (turbine.rated_wind_speed - RATED_WIND),
             Entry.PLAN_ABOVE: CURVE_WINDS[1] + (turbine.rated_wind_speed - RATED_WIND),
         }
@@ -171,16 +164,13 @@ class MPC:
         known = (id(models), id(self.table), self.turbine.torque_law.rated_torque, self.settings, self.period)
 
         def make():  # with its inputs, so that their ids stay valid
-            return models, self.table, (models[0].wind, self._wind_models(models))
+            lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
+            same = (self.settings, self.turbine, self.table, self.period)
+            made = [wind_model(m, m if m.wind >= lowest.wind else lowest, *same) for m in models]
+            rows = WindModel(*(np.array(rows) for rows in zip(*made, strict=True)))
+            return models, self.table, (models[0].wind, rows)
 
         self.first_wind, self.models = _MODELS.get(known, make)[2]
-
-    def _wind_models(self, models):
-        """Return the WindModel of arrays with a row per wind."""
-        lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
-        same = (self.settings, self.turbine, self.table, self.period)
-        made = [wind_model(m, m if m.wind >= lowest.wind else lowest, *same) for m in models]
-        return WindModel(*(np.array(rows) for rows in zip(*made, strict=True)))
 
     def reset(self, measurement):
         """Start at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured, without a plan.

@@ -28,9 +28,7 @@ SURGE_RATE, SPEED, LEAN, LEAN_RATE, BLADE = (
 TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2
 FILTER, WIND = N_PLANT + 3, N_PLANT + 4
 WEIGHT_WIND = 18.0  # m/s of the NREL 5 MW turbine, where the weights hold as given
-N_COST = (
-    8  # squared terms: speed, platform pitch, its rate, torque, power, integral, rates of torque and pitch
-)
+N_COST = 8  # squared terms: speed, platform pitch and rate, torque, power, integral, rates of both commands
 
 
 class WindModel(NamedTuple):

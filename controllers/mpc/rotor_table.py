@@ -39,17 +39,9 @@ def rotor_table(turbine, density):
         for values in (thrust, torque):
             parts += [values, *np.gradient(values, RATIOS, PITCHES)]
         radius = float(turbine.rotor.tip_radius)
-        table = RotorTable(
-            np.ascontiguousarray(parts),
-            *(
-                float(RATIOS[0]),
-                float(RATIOS[1] - RATIOS[0]),
-                float(PITCHES[0]),
-                float(PITCHES[1] - PITCHES[0]),
-            ),
-            radius,
-            float(0.5 * density * np.pi * radius**2),
-        )
+        grid = (RATIOS[0], RATIOS[1] - RATIOS[0], PITCHES[0], PITCHES[1] - PITCHES[0])
+        numbers = map(float, (*grid, radius, 0.5 * density * np.pi * radius**2))
+        table = RotorTable(np.ascontiguousarray(parts), *numbers)
         return turbine, table  # with the turbine, whose id is then its own
 
     return _tables.get((id(turbine), float(density)), make)[1]

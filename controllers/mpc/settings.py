@@ -1,31 +1,37 @@
 """Settings of the predictive law: weights of its cost, horizon and limits."""
 
-from dataclasses import asdict, dataclass, fields, replace
-from math import inf
+from dataclasses import dataclass
 
-from fowt_env.descriptions.checks import check_number
-from fowt_env.errors import unknown
+from fowt_env.controllers.settings import Settings
 
-RANGES = {  # of what is not simply 0 or more: (low, high, low omitted)
-    "pitch_rate": (0.0, inf, True),
-    "torque_rate": (0.0, inf, True),
-    "schedule_time": (0.0, inf, True),
-    "horizon": (5.0, 120.0, False),
-    "preview_time": (1.0, 60.0, False),
-    "speed_limit": (1.02, 1.3, False),
-    "torque_low": (0.0, 1.0, False),
-    "torque_high": (1.0, 1.5, False),
-}
+COSTS = (
+    "speed", "platform_pitch", "platform_pitch_rate", "power", "torque", "speed_integral",
+)  # fmt: skip
+GROWTHS = (
+    "pitch_rate_growth", "pitch_rate_growth_above", "power_growth", "power_growth_above", "torque_growth",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
-class MPCSettings:
+class MPCSettings(Settings):
     """Cost of each squared term in units of the scale in its comment, and what bounds the moves.
 
     The weights of defaults are what `fowt design tune mpc` found.
 
     Raises: InputError naming the key, value and allowed range.
     """
+
+    NAME = "mpc"
+    RANGES = {
+        **dict.fromkeys(COSTS, {"low": 0.0}),
+        **dict.fromkeys(("pitch_rate", "torque_rate", "schedule_time"), {"low": 0.0, "low_open": True}),
+        **dict.fromkeys(GROWTHS, {"low": -10.0, "high": 10.0}),
+        "horizon": {"low": 5.0, "high": 120.0},
+        "preview_time": {"low": 1.0, "high": 60.0},
+        "speed_limit": {"low": 1.02, "high": 1.3},
+        "torque_low": {"low": 0.0, "high": 1.0},
+        "torque_high": {"low": 1.0, "high": 1.5},
+    }
 
     speed: float = 1.0  # rotor speed, over 5 % of rated
     platform_pitch: float = 1.215  # over 1 deg
@@ -46,22 +52,6 @@ class MPCSettings:
     speed_limit: float = 1.15  # of rated, soft
     torque_low: float = 0.5  # of rated
     torque_high: float = 1.1  # of rated
-
-    def __post_init__(self):
-        for item in fields(self):
-            key, value = f"mpc {item.name}", getattr(self, item.name)
-            if "_growth" in item.name:
-                check_number(key, value, -10.0, 10.0)
-                continue
-            low, high, left_out = RANGES.get(item.name, (0.0, inf, False))
-            check_number(key, value, low, high, low_open=left_out)
-
-    def changed(self, **changes):
-        """Return a copy with some settings changed. Raises: InputError for unknown names."""
-        for key in changes:
-            if key not in asdict(self):
-                raise unknown("mpc setting", key, asdict(self))
-        return replace(self, **changes)
 
 
 PREVIEW = MPCSettings(power=0.1, torque=0.1)  # with the wind ahead torque has less to make up for

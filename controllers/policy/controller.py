@@ -122,15 +122,15 @@ class PolicyController:
         own = preview if "wind_preview" in names else ()
         based = () if self._baseline is None else self._baseline.preview_times
         self.preview_times = tuple(sorted({*own, *based}))
-        self._own_leads = np.array([self.preview_times.index(lead) for lead in own], dtype=int)
-        self._baseline_leads = np.array([self.preview_times.index(lead) for lead in based], dtype=int)
+        self._own_leads, self._baseline_leads = (
+            np.array([self.preview_times.index(lead) for lead in leads], dtype=int) for leads in (own, based)
+        )
         self._hidden = None if self._baseline is None else hidden(self._baseline)
 
     def _information(self, names):
         """Measurements and extras that the agent and its baseline use, each once."""
-        used = []
-        for part in (self._baseline, self._estimator):
-            used += [] if part is None else part.information
+        parts = [part for part in (self._baseline, self._estimator) if part is not None]
+        used = [name for part in parts for name in part.information]
         used += [name for name in names if name in Measurement._fields or name == "wind_preview"]
         used += ["generator_torque", "blade_pitch"]  # where the commands start
         if self._mode != ActionMode.RESIDUAL:
@@ -147,7 +147,8 @@ class PolicyController:
         """Start afresh: the command in force is the measured one, the history is empty."""
         self._u[:] = measurement.generator_torque, measurement.blade_pitch
         if self._baseline is not None:
-            self._baseline.reset(self._for_baseline(measurement))
+            ahead = np.array(wind_ahead(measurement))[self._baseline_leads]
+            self._baseline.reset(view_of(self._baseline)([*measurement, *ahead.tolist()]))
             self._parameters, self._memory = self._baseline.parameters, self._baseline.memory
         elif self._mode == ActionMode.SETPOINT:
             start_tracking(self._memory, measurement, self._actions)
@@ -165,7 +166,9 @@ class PolicyController:
         if self._estimator is not None and self._calls > 0:  # the first instant is that of the reset
             call_law(self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u)
         if self._calls % decisions.settings.hold == 0:
-            self._observe(values, ahead)
+            estimate = None if self._estimator is None else self._estimator.memory
+            fill_signals(values, 0.0, self._accepted, estimate, 0.0, ahead[self._own_leads], self._signals)
+            fill_observation(self._signals, self._observation_map, self._observation)
             if self._calls == 0:
                 decisions.restart(0, self._observation, self._accepted)
             else:
@@ -184,17 +187,6 @@ class PolicyController:
         self._u[0] = followed_torque(self._u[0], command[0], control_dt, limits)
         self._u[1] = command[1]
         return tuple(command.tolist())
-
-    def _for_baseline(self, measurement):
-        """Return the measurement with the wind ahead at the baseline's look-ahead times."""
-        ahead = wind_ahead(measurement)
-        return view_of(self._baseline)([*measurement, *(ahead[i] for i in self._baseline_leads)])
-
-    def _observe(self, values, ahead):
-        """Fill the observation from measurements (N_MEASUREMENTS,) and the wind ahead."""
-        estimate = None if self._estimator is None else self._estimator.memory
-        fill_signals(values, 0.0, self._accepted, estimate, 0.0, ahead[self._own_leads], self._signals)
-        fill_observation(self._signals, self._observation_map, self._observation)
 
 
 def policy(name):

@@ -32,7 +32,7 @@ PAIR = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 class PolicySettings(Record):
     """The JSON text of a policy file."""
 
-    format: Literal[1]
+    format: Literal[FORMAT]
     activation: Literal[tuple(ACTIVATIONS)]
     squash: Literal[tuple(SQUASHES)]
     layers: Annotated[int, Field(ge=1, le=MAX_LAYERS, strict=True)]
@@ -93,10 +93,8 @@ def read_policy(path):
     except (KeyError, ValueError) as error:
         raise InputError(f"{where}: array {error}") from None
     _check_shapes(where, weights, biases, mean, scale)
-    network = Network(
-        weights, biases, settings["activation"], settings["squash"], mean, scale, settings["clip_observation"]
-    )
-    return settings, network
+    kinds = settings["activation"], settings["squash"]
+    return settings, Network(weights, biases, *kinds, mean, scale, settings["clip_observation"])
 
 
 def _numbers(array):
@@ -110,8 +108,6 @@ def _check_settings(where, settings):
     """Raises: InputError unless settings are those of a policy of this format."""
     if not isinstance(settings, dict):
         raise InputError(f"{where}: its settings must be a JSON object")
-    if settings.get("format") != FORMAT:
-        raise InputError(f"{where}: format {settings.get('format')!r}: must be {FORMAT}")
     found, problems = validate(PolicySettings, settings)
     raise_problems(where, problems)
     known = [field.name for field in fields(DecisionSettings)]

@@ -58,7 +58,8 @@ def check_platform(platform, **options):
     except InputError as error:
         faults["rest"] = str(error).rstrip(".")
     else:
-        rest = _rest(point.state)
+        values = point.state[:6].tolist()
+        rest = dict(zip(MOTION_LABELS, [*values[:3], *map(degrees, values[3:])], strict=True))
         if abs(rest["heave"]) <= SETTLED_HEAVE * scene.platform.draft:
             faults.pop("vertical", None)  # a wide waterplane carries what is missing
         periods, tower = natural_modes(scene, point)
@@ -75,20 +76,10 @@ def _static_faults(scene, figures):
     rest = np.zeros(scene.n_state)
     evaluation.at(rest, LoadCache.TOTAL)
     faults = causes_of(scene, evaluated(rest, evaluation.data))
-    if not min(figures.metacentric_height) > 0.0 and figures.buoyancy > 0.0 and not _held_by_lines(figures):
+    held = figures.pull > 0.15 * figures.buoyancy  # upright by lines, as tension legs are
+    if not min(figures.metacentric_height) > 0.0 and figures.buoyancy > 0.0 and not held:
         faults["upright"] = metacentre(scene, figures)
     return faults
-
-
-def _held_by_lines(figures):
-    """Whether lines keep the platform upright, as tension legs do: they carry a good part of its buoyancy."""
-    return figures.pull > 0.15 * figures.buoyancy
-
-
-def _rest(state):
-    """Return {motion: m or deg} of a state."""
-    values = [float(value) for value in state[:6]]
-    return dict(zip(MOTION_LABELS, [*values[:3], *map(degrees, values[3:])], strict=True))
 
 
 def _rest_faults(scene, rest):
@@ -144,17 +135,13 @@ def natural_modes(scene, point):
     evaluation.at(x, LoadCache.TOTAL)
     mass = scene.model.rigid_body.mass_matrix + evaluation.data.added_mass
     moved = _kinematics(x)
-    height = mass[0, 4] / mass[0, 0]
-    potential = scene.platform.potential_flow
-    arm = 0.5 * scene.platform.draft
-    tower = tower_frequencies(scene, mass, slopes, moved)
-    periods = _periods(moved, mass, slopes, height, arm)
-    if potential is None:
-        return periods, tower
-    return {
-        motion: _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potential)
-        for motion, period in periods.items()
-    }, tower
+    potential, arm = scene.platform.potential_flow, 0.5 * scene.platform.draft
+    same = {"moved": moved, "slopes": slopes, "height": mass[0, 4] / mass[0, 0], "arm": arm}
+    periods = _periods(mass, **same)
+    if potential is not None:
+        for motion, period in periods.items():
+            periods[motion] = _at_own_frequency(motion, period, mass, potential, same)
+    return periods, tower_frequencies(scene, mass, slopes, moved)
 
 
 def _kinematics(x):
@@ -169,7 +156,7 @@ def _kinematics(x):
     return found
 
 
-def _periods(moved, mass, slopes, height, arm):
+def _periods(mass, moved, slopes, height, arm):
     """Return {motion: s} of the six modes of a mass matrix and the slopes of the loads over the motions."""
     values, vectors = np.linalg.eig(moved @ np.linalg.solve(mass, slopes))
     shapes = vectors.copy()
@@ -180,13 +167,13 @@ def _periods(moved, mass, slopes, height, arm):
     return named_periods(values, shapes, MOTION_LABELS)
 
 
-def _at_own_frequency(motion, period, moved, mass, slopes, height, arm, potential):
+def _at_own_frequency(motion, period, mass, potential, same):
     """Return the natural period, s, of a motion with the added mass at its own frequency."""
     for _ in range(ROUNDS):
         if not np.isfinite(period):
             return period
         change = _added_mass(potential, 2.0 * pi / period) - potential.added_mass_infinite
-        new = _periods(moved, mass + 0.5 * (change + change.T), slopes, height, arm)[motion]
+        new = _periods(mass + 0.5 * (change + change.T), **same)[motion]
         if not np.isfinite(new) or abs(new - period) < SETTLED * period:
             return new
         period = new
@@ -199,5 +186,5 @@ def _added_mass(potential, omega):
     if potential.added_mass_zero is not None:
         known = np.concatenate([[0.0], known])
         values = np.concatenate([potential.added_mass_zero[None], values])
-    rows = values.reshape(len(known), 36)
-    return np.array([np.interp(omega, known, row) for row in rows.T]).reshape(6, 6)
+    rows = values.reshape(len(known), 36).T
+    return np.array([np.interp(omega, known, row) for row in rows]).reshape(6, 6)

@@ -186,9 +186,8 @@ def _mooring_causes(mooring, start, weight, net):
     if len(pull) > 1 and together > ONE_SIDED * pull.sum() > 0.0:
         anchors = ", ".join(f"({x:.4g}, {y:.4g})" for x, y, _ in mooring.anchor[:4])
         azimuths = in_radians(mooring.anchor, mooring.fairlead)
-        hint = (
-            "" if azimuths is None else f": {', '.join(f'{a:.4g}' for a in azimuths[:4])} look like radians"
-        )
+        shown = ", ".join(f"{azimuth:.4g}" for azimuth in (azimuths or ())[:4])
+        hint = f": {shown} look like radians" if shown else ""
         found["one-sided"] = (
             f"all mooring lines pull to the same side, with {_kilo(together)} kN (anchors at (x, y) ="
             f" {anchors} m; azimuth_deg is in degrees{hint})"
@@ -214,7 +213,7 @@ def _growing(scene, slope):
     if np.max(np.linalg.eigvals(slope).real) <= limit:
         return {}
     values, shapes = np.linalg.eig(slope)
-    names = MOTION_LABELS if len(slope) == 6 else (MOTION_LABELS[0], MOTION_LABELS[2], MOTION_LABELS[4])
+    names = MOTION_LABELS if len(slope) == 6 else MOTION_LABELS[::2]  # in the plane: surge, heave, pitch
     arms = [0.5 * draft if name in MOTION_LABELS[3:] else 1.0 for name in names]
     found = {}
     for value, shape in zip(values, shapes.T, strict=True):

@@ -104,7 +104,7 @@ def linear_drag(scene, state, omega, sea, motion=AT_REST):
     if hydro is None:
         return LinearDrag(damping, excitation, at_rest, heights[0], deviations[0])
     site = scene.platform.environment
-    rotation, height = _axes(state)
+    rotation, height = rotation_of(pose_of(np.ascontiguousarray(state))), float(state[State.HEAVE])
     heading = 0.0 if sea is None else np.radians(float(sea.heading))
     number = wave_number(omega, site.water_depth, site.gravity)
     weight = density * np.gradient(omega) if omega.size > 1 else np.zeros(omega.size)
@@ -198,10 +198,7 @@ def mean_slope(mean, covariance):
     size = mean.shape[1]
     values, axes = np.linalg.eigh(covariance)
     root = axes * np.sqrt(np.maximum(values, 0.0))[:, None, :]
-    if size == 1:
-        angles = np.array([0.0, pi])
-    else:
-        angles = (np.arange(ANGLES) + 0.5) * 2.0 * pi / ANGLES
+    angles = np.array([0.0, pi]) if size == 1 else (np.arange(ANGLES) + 0.5) * 2.0 * pi / ANGLES
     unit = np.stack([np.cos(angles), np.sin(angles)])[:size]
     spread = np.einsum("mij,ja->mai", root, unit)  # r at one standard deviation in each direction
     if not np.any(mean):
@@ -225,25 +222,19 @@ def _slopes(r):
     return size * np.eye(r.shape[-1]) + np.divide(outer, size, out=np.zeros_like(outer), where=size > 0.0)
 
 
-def _axes(state):
-    """Return (rotation (3, 3) from body to inertial components, height of the body origin, m) at a state."""
-    return rotation_of(pose_of(np.ascontiguousarray(state))), float(state[State.HEAVE])
-
-
 def _nodes(strips, height, rotation):
     """Return the body z, length and diameter (m,) of the strips' nodes below the mean surface on the axis."""
     surface = min(max(-height / max(rotation[2, 2], 0.1), strips.keel_z), strips.top_z)
-    places, lengths, diameters = [], [], []
+    found = []
     for number, cells in enumerate(strips.cells):
         bottom = strips.section_bottom[number]
         top = surface if number == 0 else min(surface, strips.section_top[number])
         cell = max(top - bottom, 0.0) / cells
         inside = np.array([GAUSS_OFFSET, 1.0 - GAUSS_OFFSET])
         z = top - cell * (np.arange(cells)[:, None] + inside).ravel()
-        places.append(z)
-        lengths.append(np.full(z.size, 0.5 * cell))
-        diameters.append(strips.diameter_bottom[number] + strips.diameter_slope[number] * (z - bottom))
-    return np.concatenate(places), np.concatenate(lengths), np.concatenate(diameters)
+        diameter = strips.diameter_bottom[number] + strips.diameter_slope[number] * (z - bottom)
+        found.append((z, np.full(z.size, 0.5 * cell), diameter))
+    return tuple(np.concatenate(found, axis=1))
 
 
 def _wave_velocity(omega, number, place, heading, depth):

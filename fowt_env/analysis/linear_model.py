@@ -7,6 +7,7 @@ from math import pi
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 from scipy.linalg import expm
 
 from fowt_env.analysis.statics import central_difference, named_periods, rotation_of
@@ -88,13 +89,14 @@ def sampled(a, b, dt):
     return both[:n, :n], both[:n, n:]
 
 
-def _python_control(where):
-    """Return the module control. Raises: InputError that names the extra to install."""
+def _state_space(matrices, states, inputs, outputs, name, *dt):
+    """Return control.StateSpace. Raises: InputError that names the extra to install."""
     try:
-        import control
+        from control import ss
     except ImportError as error:
-        raise InputError(f'{where} needs python-control ({error}): pip install "fowt-env[design]"') from error
-    return control
+        missing = f'to_statespace needs python-control ({error}): pip install "fowt-env[design]"'
+        raise InputError(missing) from error
+    return ss(*matrices, *dt, states=list(states), inputs=list(inputs), outputs=list(outputs), name=name)
 
 
 @dataclass(frozen=True)
@@ -115,10 +117,8 @@ class DiscreteModel:
 
     def to_statespace(self):
         """Return control.StateSpace in discrete time. Raises: InputError that names the extra to install."""
-        return _python_control("to_statespace").ss(
-            self.A, self.B, self.C, self.D, self.dt, states=list(self.states), inputs=list(self.inputs),
-            outputs=list(self.outputs), name="fowt_sampled",
-        )  # fmt: skip
+        matrices, names = (self.A, self.B, self.C, self.D), (self.states, self.inputs, self.outputs)
+        return _state_space(matrices, *names, "fowt_sampled", self.dt)
 
 
 @dataclass(frozen=True)
@@ -173,22 +173,18 @@ class LinearModel:
     @property
     def x0(self):
         """Return (m,) the states at the operating point."""
-        names, rows, _ = plant_states(self.scene)
-        row_of = dict(zip(names, rows, strict=True))
-        return np.array([self.point.state[row_of[n]] if n in row_of else 0.0 for n in self.states])
+        names, places, _ = plant_states(self.scene)
+        known = {name: self.point.state[each[0]] for name, each in zip(names, places, strict=True)}
+        return np.array([known.get(name, 0.0) for name in self.states])
 
     @property
     def equilibrium(self):
         """Return pandas.Series (m,) of the states at the operating point, by name; units has their units."""
-        import pandas as pd
-
         return pd.Series(self.x0, index=list(self.states), name="equilibrium")
 
     @property
     def equilibrium_inputs(self):
         """pandas.Series (3,) of the inputs at the operating point, by name; the wind of none is NaN."""
-        import pandas as pd
-
         torque, blade_pitch = self.point.command[:2]
         wind = np.nan if self.point.wind_speed is None else self.point.wind_speed
         return pd.Series([torque, blade_pitch, wind], index=list(self.inputs), name="equilibrium")
@@ -202,30 +198,25 @@ class LinearModel:
     @property
     def fields(self):
         """Fields of a Measurement that state() reads: what a controller declares as its information."""
-        return tuple(dict.fromkeys(MEASURED_AS[name] for name in self._observed))
-
-    @property
-    def _observed(self):
-        """Return the states. Raises: InputError if some are not measured."""
         hidden = [name for name in self.states if name not in MEASURED_AS]
         if hidden:
             raise InputError(
                 f"state: {', '.join(hidden[:4])}{' ...' if len(hidden) > 4 else ''}: are not measured; take"
                 " the model without them (residualised of fowt_env.analysis.reduced_model), or an estimator"
             )
-        return self.states
+        return tuple(MEASURED_AS[name] for name in self.states)
 
     @cached_property
     def _from_measurement(self):
         """Return (places in a Measurement, (m, m) matrix, (m,) equilibrium) of state()."""
-        places = [int(Measure[MEASURED_AS[name].upper()]) for name in self._observed]
+        places = [int(Measure[field.upper()]) for field in self.fields]
         return places, self._turning(euler=True), self.x0
 
     @cached_property
     def _from_frame(self):
         """Return (columns of a run's DataFrame, (m, m) matrix times the factors to SI, (m,) equilibrium)."""
         channels = {channel.name: channel for channel in FIXED_CHANNELS}
-        found = [channels[COLUMNS[name]] for name in self._observed]
+        found = [channels[COLUMNS[name]] for name, _ in zip(self.states, self.fields, strict=True)]
         columns = [channel.column for channel in found]
         return columns, self._turning(euler=False) / [channel.scale for channel in found], self.x0
 
@@ -300,18 +291,17 @@ class LinearModel:
         inputs: names of inputs or "wave_elevation", the elevation at the hull's mean place.
         """
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
-        result = np.empty((omega.size, len(self.outputs), len(inputs)), dtype=complex)
-        force = wave_force(self.scene, self.point.state, omega) if "wave_elevation" in inputs else None
-        eye = np.eye(len(self.states))
+        every = (*self.inputs, "wave_elevation")
+        columns = [every.index(name) for name in chosen("input", inputs, every)]
+        force = np.zeros((omega.size, 6))
+        if "wave_elevation" in inputs:
+            force = wave_force(self.scene, self.point.state, omega)
+        result = np.empty((omega.size, len(self.outputs), len(columns)), dtype=complex)
         for i, w in enumerate(omega):
-            for j, name in enumerate(inputs):
-                if name == "wave_elevation":
-                    b, d = self.E @ force[i], self.F @ force[i]
-                elif name in self.inputs:
-                    b, d = self.B[:, self.inputs.index(name)], self.D[:, self.inputs.index(name)]
-                else:
-                    raise unknown("input", name, (*self.inputs, "wave_elevation"))
-                result[i, :, j] = self.C @ np.linalg.solve(1j * w * eye - self.A, b) + d
+            b, d = np.c_[self.B, self.E @ force[i]], np.c_[self.D, self.F @ force[i]]
+            left = 1j * w * np.eye(len(self.states)) - self.A
+            for k, j in enumerate(columns):
+                result[i, :, k] = self.C @ np.linalg.solve(left, b[:, j]) + d[:, j]
         return result
 
     def to_statespace(self, waves=None, inputs=None, outputs=None, name=None):
@@ -327,7 +317,6 @@ class LinearModel:
         name: of the system, in titles of plots; None: "fowt", of a part "INPUTS to OUTPUTS".
         Raises: InputError for unknown names, and that names the extra to install.
         """
-        control = _python_control("to_statespace")
         if waves is None:
             waves = sea_state_of(self.scene.sea).height > 0.0
         a, b, c, d, states = self._with_waves() if waves else (self.A, self.B, self.C, self.D, self.states)
@@ -337,10 +326,7 @@ class LinearModel:
             whole = inputs is None and outputs is None
             name = "fowt" if whole else f"{', '.join(into)} to {', '.join(out)}"
         columns, rows = [every.index(i) for i in into], [self.outputs.index(o) for o in out]
-        return control.ss(
-            a, b[:, columns], c[rows], d[np.ix_(rows, columns)], states=list(states), inputs=list(into),
-            outputs=list(out), name=name,
-        )  # fmt: skip
+        return _state_space((a, b[:, columns], c[rows], d[np.ix_(rows, columns)]), states, into, out, name)
 
     def _with_waves(self):
         """(A, B, C, D, states) with the wave filter behind the plant and the elevation as last input."""
@@ -367,38 +353,25 @@ def chosen(kind, names, known):
 
 
 def plant_states(scene):
-    """(names, indices in the state vector, steps of differences) of a LinearModel's states, less memory."""
-    names, rows, steps = list(STATES), [int(i) for i in STATE_INDEX], list(STATE_STEPS)
-    for block in scene.blocks:
-        if block.name == "wake":
-            each = block.size // scene.turbine.rotor.blades
-            names += [f"{WAKE}{k + 1}" for k in range(each)]
-            rows += range(block.offset, block.offset + each)
-            steps += each * [WAKE_STEP]
-        if block.name in TOWER_BLOCKS:
-            end, step = TOWER_BLOCKS[block.name]
-            names += [name + end for name in TOWER[: block.size]]
-            rows += range(block.offset, block.offset + block.size)
-            steps += block.size * [step]
-        if block.name in ACTUATOR_STATES:
-            name, step = ACTUATOR_STATES[block.name]
-            names.append(name)
-            rows.append(block.offset)
-            steps.append(step)
-    return tuple(names), rows, steps
+    """Return (names, places in the state vector, steps of differences) of the states, less memory.
 
-
-def of_all_blades(scene, rows):
-    """[indices] that each state of plant_states stands for: of what each blade has, those of all blades."""
-    together = {int(State.BLADE_PITCH): list(scene.pitch_states)}
-    for block in scene.blocks:
-        if block.name == "wake":
-            each = block.size // scene.turbine.rotor.blades
-            for row in range(block.offset, block.offset + each):
-                together[row] = list(range(row, block.offset + block.size, each))
-        if block.name in ACTUATOR_STATES:
-            together[block.offset] = list(range(block.offset, block.offset + block.size))
-    return [together.get(row, [row]) for row in rows]
+    Of what each blade has the places are those of all blades, which move together.
+    """
+    found = [(name, [int(i)], step) for name, i, step in zip(STATES, STATE_INDEX, STATE_STEPS, strict=True)]
+    pitch = STATES.index("blade_pitch")
+    found[pitch] = ("blade_pitch", list(scene.pitch_states), STATE_STEPS[pitch])
+    for name, first, size, *_ in scene.blocks:
+        if name == "wake":
+            each = size // scene.turbine.rotor.blades
+            places = (list(range(first + k, first + size, each)) for k in range(each))
+            found += [(f"{WAKE}{k}", blades, WAKE_STEP) for k, blades in enumerate(places, 1)]
+        elif name in TOWER_BLOCKS:
+            end, step = TOWER_BLOCKS[name]
+            found += [(mode + end, [first + k], step) for k, mode in enumerate(TOWER[:size])]
+        elif name in ACTUATOR_STATES:
+            state, step = ACTUATOR_STATES[name]
+            found.append((state, list(range(first, first + size)), step))
+    return tuple(zip(*found, strict=True))
 
 
 class Mode(NamedTuple):
@@ -421,9 +394,8 @@ def modes(a, names, cm_height, arm):
     """
     values, vectors = np.linalg.eig(a)
     found = []
-    remembered = [name.startswith((MEMORY, WAKE, *CYCLIC)) for name in names]
-    if "pitch_rate" in names:
-        remembered = [is_memory or name in DRIVE for is_memory, name in zip(remembered, names, strict=True)]
+    drive = DRIVE if "pitch_rate" in names else ()
+    remembered = [name.startswith((MEMORY, WAKE, *CYCLIC)) or name in drive for name in names]
     water = np.zeros(len(values))
     if any(remembered):
         factors = np.abs(vectors * np.linalg.inv(vectors).T)
@@ -436,9 +408,7 @@ def modes(a, names, cm_height, arm):
             "surge": abs(part["surge"] + cm_height * part["platform_pitch"]),
             "sway": abs(part["sway"] - cm_height * part["roll"]),
             "heave": abs(part["heave"]),
-            "roll": arm * abs(part["roll"]),
-            "platform_pitch": arm * abs(part["platform_pitch"]),
-            "yaw": arm * abs(part["yaw"]),
+            **{angle: arm * abs(part[angle]) for angle in MOTIONS[3:]},
             "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
             **{deflection: abs(part[deflection]) for deflection in TOWER if deflection in part},
         }
@@ -478,21 +448,19 @@ def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, m
     data.cache[LoadCache.VALID] = 0.0
 
 
-class _Plant:
+class Plant:
     """State rates and outputs of a scene without fluctuations at any state, command and further force."""
 
     def __init__(self, scene, n_lines):
         self.handle = scene.handle()
         self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + n_lines)]
         self.measures = [Measure[name.upper()] for name in MEASURED]
-        names, self.states, _ = plant_states(scene)
-        groups = of_all_blades(scene, self.states)
+        names, places, _ = plant_states(scene)
+        self.states = [each[0] for each in places]
         self.wake = [i for i, name in enumerate(names) if name.startswith(WAKE)]
-        self.annuli = [groups[i] for i in self.wake]  # in wind with shear their blades' rates differ
-        rows = len(scene.channels)
-        measured = scene.n_measurements
-        self.scratch = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
-        self.means = (np.zeros(scene.n_state), np.zeros(measured), np.zeros(rows))
+        self.annuli = [places[i] for i in self.wake]  # in wind with shear their blades' rates differ
+        sizes = (scene.n_state, scene.n_measurements, len(scene.channels))
+        self.scratch, self.means = tuple(map(np.zeros, sizes)), tuple(map(np.zeros, sizes))
 
     def __call__(self, x, u, force):
         """Return the rates of plant_states and the outputs."""
@@ -528,12 +496,10 @@ def linearize(scene, operating_point=None, *, wind=None):
     models over the wind with it.
 
     The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
-    wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there.
-    Radiation memory comes in exactly, in a scene with convolution by the fit that state_space takes. The wake
-    of dynamic inflow comes in by annulus, its blades moved together: wake_1 to 4 are those of the innermost
-    station (aero/wake.py). Other internal states (those of loads) are not linearised. A pitch drive counts
-    without deadband and friction, within which it would not move at all. blade_pitch is that of all blades
-    together, also where each has its own: multiblade.py has the rest.
+    wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there. Radiation
+    memory comes in exactly, in a scene with convolution by the fit that state_space takes. The wake of
+    dynamic inflow comes in by annulus: wake_1 to 4 are those of the innermost station (aero/wake.py). A pitch
+    drive counts without deadband and friction. blade_pitch is that of all blades together.
 
     Raises: InputError if the scene has any, for a wind in a scene without aerodynamics, and for a wind beside
     an operating point, which has its own.
@@ -549,18 +515,16 @@ def linearize(scene, operating_point=None, *, wind=None):
     x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
 
     def plant_at(speed):
-        return _Plant(without_fluctuations(scene, speed).with_model(parts), scene.n_lines)
+        return Plant(without_fluctuations(scene, speed).with_model(parts), scene.n_lines)
 
     plant = plant_at(point.wind_speed)
-    names, rows, state_steps = plant_states(scene)
+    names, places, state_steps = plant_states(scene)
 
     def slopes(vector, indices, steps):
-        def evaluate():
-            return plant(x, u, force)
+        pairs = zip(indices, steps, strict=True)
+        return [central_difference(lambda: plant(x, u, force), vector, *each) for each in pairs]
 
-        return [central_difference(evaluate, vector, *each) for each in zip(indices, steps, strict=True)]
-
-    of_states = slopes(x, of_all_blades(scene, rows), state_steps)
+    of_states = slopes(x, places, state_steps)
     of_inputs = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
     of_inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force), point, of_inputs[0]))
     of_forces = slopes(force, range(6), FORCE_STEPS)
@@ -622,13 +586,11 @@ def natural_periods(scene):
     """
     model = linearize(scene)
     periods = _periods(model, 0.0)
-    if not any(name.startswith(MEMORY) for name in model.states):
-        return periods
+    rounds = FREQUENCY_ROUNDS if any(name.startswith(MEMORY) for name in model.states) else 0
     for motion in periods:
-        for _ in range(FREQUENCY_ROUNDS):
-            if np.isinf(periods[motion]):
-                break
-            periods[motion] = _periods(model, 2.0 * np.pi / periods[motion])[motion]
+        for _ in range(rounds):
+            if np.isfinite(periods[motion]):
+                periods[motion] = _periods(model, 2.0 * np.pi / periods[motion])[motion]
     return periods
 
 
@@ -649,5 +611,5 @@ def _periods(model, omega):
         square = own @ own + omega**2 * np.eye(own.shape[0])
         stiffness = np.linalg.solve(np.eye(n) + out @ np.linalg.solve(square, into), stiffness)
     values, vectors = np.linalg.eig(kinematics @ stiffness)
-    scale = np.array([1.0, 1.0, 1.0, model.arm, model.arm, model.arm, *(1.0 for _ in deflections)])
+    scale = np.array([model.arm if name in MOTIONS[3:] else 1.0 for name in names])
     return named_periods(values, np.abs(vectors) * scale[:, None], names)

@@ -120,10 +120,7 @@ def linear_law(
                 f"controller = {controller!r}: must be a control.StateSpace, (KP, KI) or a matrix of gains"
             ) from None
         read = chosen("output", model.states if outputs is None else outputs, known)
-        moved = chosen(
-            "input", MOVED[-len(gain) :] if inputs is None else inputs,
-            MOVED,
-        )  # fmt: skip
+        moved = chosen("input", MOVED[-len(gain) :] if inputs is None else inputs, MOVED)
         matrices = (np.zeros((0, 0)), np.zeros((0, gain.shape[1])), np.zeros((len(gain), 0)), gain)
     shape = (len(moved), len(read))
     if matrices[3].shape != shape:
@@ -157,28 +154,22 @@ def margins(
     """
     law = linear_law(model, controller, outputs, inputs)
     plant = _plant_of(model, law)
-    a = closed_loop(plant, law)
     sensitivity = _sensitivity(plant, law)
-    poles = np.r_[np.linalg.eigvals(a), np.linalg.eigvals(model.A), np.linalg.eigvals(law.A)]
-    grid = _frequencies(poles)
-    values = sensitivity(grid)
-    eye = np.eye(len(law.inputs))
+    poles, *others = (np.linalg.eigvals(a) for a in (closed_loop(plant, law), model.A, law.A))
+    grid = _frequencies(np.concatenate([poles, *others]))
+    values, half = sensitivity(grid), 0.5 * np.eye(len(law.inputs))
 
-    def peak(w):
-        return least_size(sensitivity(np.array([w])))[0]
+    def at(w):
+        return sensitivity(np.array([w]))
 
-    def skewed(w):
-        return least_size(sensitivity(np.array([w])) - 0.5 * eye)[0]
-
-    most, where = _largest(peak, grid, least_size(values))
-    skew, _ = _largest(skewed, grid, least_size(values - 0.5 * eye))  # (S - T)/2 = S - I/2
-    loops = {}
-    for i, name in enumerate(law.inputs):
-        loops[name] = _loop_margins(
-            lambda w, i=i: 1.0 / sensitivity(np.array([w]))[0, i, i] - 1.0, grid, 1.0 / values[:, i, i] - 1.0
-        )
-    stable = bool(np.linalg.eigvals(a).real.max() < 0.0)
-    return Margins(stable, loops, float(most), float(where), float(1.0 / skew))
+    most, where = _largest(lambda w: least_size(at(w))[0], grid, least_size(values))
+    # (S - T)/2 = S - I/2
+    skew, _ = _largest(lambda w: least_size(at(w) - half)[0], grid, least_size(values - half))
+    loops = {
+        name: _loop_margins(lambda w, i=i: 1.0 / at(w)[0, i, i] - 1.0, grid, 1.0 / values[:, i, i] - 1.0)
+        for i, name in enumerate(law.inputs)
+    }
+    return Margins(bool(poles.real.max() < 0.0), loops, float(most), float(where), float(1.0 / skew))
 
 
 def least_size(matrices: np.ndarray) -> np.ndarray:
@@ -200,16 +191,11 @@ def least_size(matrices: np.ndarray) -> np.ndarray:
 def _plant_of(model, law):
     """Return (A, B, C, D) of the model from what the law moves to what it reads."""
     columns = [model.inputs.index(name) for name in law.inputs]
-    rows, direct = [], []
-    for name in law.outputs:
-        if name in model.outputs:
-            i = model.outputs.index(name)
-            rows.append(model.C[i])
-            direct.append(model.D[i, columns])
-        else:
-            rows.append(np.eye(len(model.states))[model.index(name)])
-            direct.append(np.zeros(len(columns)))
-    return model.A, model.B[:, columns], np.array(rows), np.array(direct)
+    known = (*model.outputs, *model.states)
+    rows = [known.index(name) for name in law.outputs]
+    c = np.vstack([model.C, np.eye(len(model.states))])[rows]
+    d = np.vstack([model.D, np.zeros((len(model.states), len(model.inputs)))])[np.ix_(rows, columns)]
+    return model.A, model.B[:, columns], c, d
 
 
 def closed_loop(plant: tuple, law: LinearLaw) -> np.ndarray:
@@ -244,10 +230,9 @@ def _sensitivity(plant, law):
 def _frequencies(poles):
     """Return the increasing frequencies (rad/s) of the search, closer about each pole."""
     decades = np.log10(HIGHEST / LOWEST)
-    found = [np.logspace(np.log10(LOWEST), np.log10(HIGHEST), int(decades * PER_DECADE) + 1)]
-    for pole in poles:
-        found.append(abs(pole.imag) + AROUND_POLE * max(abs(pole.real), 1e-9))
-    grid = np.unique(np.concatenate(found))
+    even = np.logspace(np.log10(LOWEST), np.log10(HIGHEST), int(decades * PER_DECADE) + 1)
+    near = (abs(pole.imag) + AROUND_POLE * max(abs(pole.real), 1e-9) for pole in poles)
+    grid = np.unique(np.concatenate([even, *near]))
     return grid[(grid >= LOWEST) & (grid <= HIGHEST)]
 
 
@@ -274,9 +259,9 @@ def _loop_margins(loop: Callable[[float], complex], grid, values):
         value = loop(w)
         if value.real < 0.0:
             gains.append((1.0 / abs(value), w))
-    phases = []  # (lag in (0, 360) deg that puts it at -1, frequency) of each crossing of the unit circle
-    for w in _crossings(lambda w: abs(loop(w)) - 1.0, grid, np.abs(values) - 1.0):
-        phases.append(((degrees(np.angle(loop(w))) + 180.0) % 360.0, w))
+    # (lag in (0, 360) deg that puts it at -1, frequency) of each crossing of the unit circle
+    circle = _crossings(lambda w: abs(loop(w)) - 1.0, grid, np.abs(values) - 1.0)
+    phases = [((degrees(np.angle(loop(w))) + 180.0) % 360.0, w) for w in circle]
     up = min((g for g in gains if g[0] > 1.0), default=(inf, inf))
     down = max((g for g in gains if g[0] < 1.0), default=(0.0, 0.0))
     phase = min(((min(lag, 360.0 - lag), w) for lag, w in phases), default=(inf, inf))

@@ -15,12 +15,10 @@ from fowt_env.analysis.linear_model import (
     FORCE_STEPS,
     INPUT_STEPS,
     LINEAR,
-    MEASURED,
-    RECORDED,
+    Plant,
     assembled,
     check_linear,
     fill_response,
-    of_all_blades,
     plant_states,
     steady_parts,
     wind_slope,
@@ -28,10 +26,9 @@ from fowt_env.analysis.linear_model import (
 from fowt_env.analysis.statics import central_difference
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.errors import InputError
-from fowt_env.plant.channels import N_FIXED
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import BLADES, Command, State
 
@@ -97,18 +94,15 @@ def _mean_response(
     data.cache[LoadCache.VALID] = 0.0
 
 
-class _Plant:
+class _Plant(Plant):
     """Rates and outputs of a scene without fluctuations, in multi-blade coordinates."""
 
     def __init__(self, scene, places):
-        self.handle, self.places = scene.handle(), places
-        self.states = plant_states(scene)[1]
-        self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + scene.n_lines)]
-        self.measures = [Measure[name.upper()] for name in MEASURED]
-        n, commands, fields, rows = scene.n_state, scene.n_commands, scene.n_measurements, len(scene.channels)
-        self.scratch = (np.zeros(n), np.zeros(commands), np.zeros(n), np.zeros(fields), np.zeros(rows))
-        turned = np.zeros((len(places), 2))
-        self.means = (np.zeros(n), turned, np.zeros(fields), np.zeros(len(MOMENTS)), np.zeros(rows))
+        super().__init__(scene, scene.n_lines)
+        self.places = places
+        n, fields, rows = scene.n_state, scene.n_measurements, len(scene.channels)
+        self.scratch = tuple(map(np.zeros, (n, scene.n_commands, n, fields, rows)))
+        self.means = tuple(map(np.zeros, (n, (len(places), 2), fields, len(MOMENTS), rows)))
 
     def __call__(self, x, u, force, cyclic):
         """Return the rates of the states and of the cyclic ones, then the outputs."""
@@ -136,8 +130,7 @@ def linearize_blades(scene, operating_point=None):
         )
     check_linear(scene, [name for name in LINEAR if name != "wake"])  # which would have cyclic parts too
     point = trim(scene) if operating_point is None else operating_point
-    names, rows, state_steps = plant_states(scene)
-    together = of_all_blades(scene, rows)
+    names, together, state_steps = plant_states(scene)
     own = [i for i, indices in enumerate(together) if len(indices) == BLADES]
     places = np.array([together[i] for i in own])
     parts = steady_parts(scene, point)

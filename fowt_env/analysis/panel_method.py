@@ -149,6 +149,5 @@ def _hydrostatics(mesh, density, gravity):
     stiffness[3, 4] = stiffness[4, 3] = -c * (plane * x * y).sum()
     stiffness[3, 3] = c * ((plane * y * y).sum() + volume * centre[2])
     stiffness[4, 4] = c * ((plane * x * x).sum() + volume * centre[2])
-    stiffness[3, 5] = -c * volume * centre[0]
-    stiffness[4, 5] = -c * volume * centre[1]
+    stiffness[3:5, 5] = -c * volume * centre[:2]
     return volume, centre, stiffness

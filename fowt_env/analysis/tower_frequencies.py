@@ -1,5 +1,6 @@
 """Natural frequencies of a flexible tower: clamped at its base, and on its floating platform."""
 
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -14,21 +15,14 @@ NAMES = {  # mode in each direction -> names, fore-aft and side-side
 }
 
 
+Bending = namedtuple("Bending", "fore_aft mass stiffness inertia weight")
+
+
 class TowerFrequency(NamedTuple):
     """Undamped natural frequencies of one bending mode, Hz, with the rotor locked."""
 
     clamped: float
     floating: float  # on the platform at rest
-
-
-class _Bending(NamedTuple):
-    """Linear equation of the deflections q about a straight upright tower, and their coupling."""
-
-    fore_aft: np.ndarray  # (n,) bool
-    mass: np.ndarray  # (n, n) kg
-    stiffness: np.ndarray  # (n, n) N/m, with weight
-    inertia: np.ndarray  # (6, n) of the platform's six equations by the second derivatives of q
-    weight: np.ndarray  # (6, n) of the platform's six equations by q
 
 
 def tower_frequencies(scene, mass, slopes, kinematics, count=None):
@@ -42,17 +36,18 @@ def tower_frequencies(scene, mass, slopes, kinematics, count=None):
     modes = scene.platform.tower.modes
     if modes is None:
         return {}
-    tower = bending(scene.platform, scene.turbine, len(modes.fore_aft) if count is None else count)
-    n = len(tower.fore_aft)
-    whole = np.block([[mass, tower.inertia], [tower.inertia.T, tower.mass]])
-    restoring = np.block([[-slopes, tower.weight], [tower.weight.T, tower.stiffness]])
+    count = len(modes.fore_aft) if count is None else count
+    fore_aft, own_mass, stiffness, inertia, weight = bending(scene.platform, scene.turbine, count)
+    n = len(fore_aft)
+    whole = np.block([[mass, inertia], [inertia.T, own_mass]])
+    restoring = np.block([[-slopes, weight], [weight.T, stiffness]])
     moved = np.eye(6 + n)
     moved[:6, :6] = kinematics
     found = {}
     for along in (True, False):
-        rows = np.flatnonzero(tower.fore_aft == along)
+        rows = np.flatnonzero(fore_aft == along)
         block = np.ix_(rows, rows)
-        clamped = _frequencies(np.linalg.solve(tower.mass[block], tower.stiffness[block]))[0]
+        clamped = _frequencies(np.linalg.solve(own_mass[block], stiffness[block]))[0]
         values, vectors = _frequencies(moved @ np.linalg.solve(whole, restoring))
         size = np.abs(vectors[6:])
         mine = [k for k in np.argsort(values)[-n:] if size[rows, k].max() == size[:, k].max()]
@@ -68,7 +63,11 @@ def _frequencies(matrix):
 
 
 def bending(platform, turbine, count):
-    """_Bending of that many modes in each direction, with nacelle and rotor as one rigid body on the top."""
+    """Return the Bending of a straight upright tower: linear equation of n deflections q, and their coupling.
+
+    (fore-aft or not (n,), mass (n, n) kg, stiffness with weight (n, n) N/m, and of the platform's equations
+    (6, n) by the second derivatives of q, and by q), nacelle and rotor one rigid body on the top.
+    """
     tower = build_tower_modes(platform, turbine, count, 0)
     gravity, height, slope = platform.environment.gravity, tower.top_height, tower.slope
     along, across = tower.fore_aft, 1.0 - tower.fore_aft
@@ -87,10 +86,5 @@ def bending(platform, turbine, count):
     aside = gravity * (tower.first_moment + top[0, 0] * (1.0 + arm * slope))
     weight = np.zeros_like(inertia)
     weight[State.ROLL], weight[State.PLATFORM_PITCH] = across * aside, -along * aside
-    return _Bending(
-        along == 1.0,
-        tower.mass * alike + moved.T @ top @ moved,
-        tower.stiffness - gravity * hanging,
-        inertia,
-        weight,
-    )
+    mass, stiffness = tower.mass * alike + moved.T @ top @ moved, tower.stiffness - gravity * hanging
+    return Bending(along == 1.0, mass, stiffness, inertia, weight)

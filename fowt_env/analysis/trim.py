@@ -1,14 +1,13 @@
 """Steady operating point of a scene, averaged over the rotor's azimuth, in its mean wind and still water."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections import UserDict
 from math import cos, pi, sin
 
 import numpy as np
 from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
-from fowt_env.analysis.statics import central_difference, mean_derivative
+from fowt_env.analysis.statics import Evaluation, central_difference, mean_derivative
 from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
@@ -44,7 +43,7 @@ DEFLECTION_STEP = 1e-3  # m, of those of a flexible tower
 PLATFORM_MODES = ("floating", "fixed")
 
 
-class OperatingPoint(Mapping):
+class OperatingPoint(UserDict):
     """Steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] or op["RotThrust_[kN]"].
 
     Attributes: state (n_state,) and command (n_commands,): generator torque N m, blade pitch rad, both SI;
@@ -52,49 +51,38 @@ class OperatingPoint(Mapping):
     """
 
     def __init__(self, values, state, command, wind_speed, platform):
-        self._values = values
-        self.state = state
-        self.command = command
-        self.wind_speed = wind_speed
-        self.platform = platform
+        super().__init__(values)
+        self.state, self.command = state, command
+        self.wind_speed, self.platform = wind_speed, platform
 
     def __getitem__(self, name):
         key = channel_name(name)
-        if key not in self._values:
-            raise unknown("channel", name, self._values)
-        return self._values[key]
+        if key not in self.data:
+            raise unknown("channel", name, self.data)
+        return self.data[key]
 
     def get(self, name, default=None):
-        return self._values.get(channel_name(name), default)
+        return self.data.get(channel_name(name), default)
 
     def __contains__(self, name):
-        return channel_name(name) in self._values
-
-    def __iter__(self):
-        return iter(self._values)
-
-    def __len__(self):
-        return len(self._values)
+        return channel_name(name) in self.data
 
     def copy(self):
         """Return the same point with separate arrays."""
         return OperatingPoint(
-            dict(self._values), self.state.copy(), self.command.copy(), self.wind_speed, self.platform
+            self.data, self.state.copy(), self.command.copy(), self.wind_speed, self.platform
         )
 
     def _repr_html_(self):
         """What a notebook shows: each channel with its unit and meaning."""
         wind = "without wind" if self.wind_speed is None else f"at {self.wind_speed:g} m/s"
-        rows = [
-            (name, float(value), channel_unit(name), channel_meaning(name))
-            for name, value in self._values.items()
-        ]
+        rows = [(name, value, channel_unit(name), channel_meaning(name)) for name, value in self.items()]
         title = f"Operating point {wind}, platform {self.platform}"
         return html_table(title, ("channel", "value", "unit", "meaning"), rows)
 
     def __repr__(self):
         shown = ("RotSpeed", "BldPitch1", "GenPwr", "RotThrust", "PtfmSurge", "PtfmPitch")
-        text = ", ".join(f"{name} {self._values[name]:.4g}" for name in shown)
+        text = ", ".join(f"{name} {self.data[name]:.4g}" for name in shown)
         return f"OperatingPoint({text}, platform={self.platform!r})"
 
 
@@ -135,19 +123,12 @@ def settle_wake(handle, x, dx):
 SETTLING = 8  # Newton steps for a block of internal states; one is enough where they are linear
 
 
-@dataclass
-class _Steady:
+class _Steady(Evaluation):
     """Residual evaluations of a scene without fluctuations about one state vector."""
 
-    scene: object
-
-    def __post_init__(self):
-        self.data = self.scene.data()
-        self.handle = self.scene.handle(self.data)
-        self.x = np.zeros(self.scene.n_state)
-        self.u = np.zeros(self.scene.n_commands)
-        self.dx = np.zeros_like(self.x)
-        self.mean = np.zeros_like(self.x)
+    def __init__(self, scene):
+        super().__init__(scene)
+        self.scene, self.x = scene, np.zeros(scene.n_state)
         self.curve = build_torque_curve(self.scene.turbine.torque_law)
         self.start = None  # equilibrium.Evaluated of the undisplaced platform
         self.slope = None  # last Jacobian of the motions
@@ -271,14 +252,12 @@ class _Steady:
 
     def free_states(self):
         """Return indices of the states that a trim finds: positions, pitch or speed of a turning rotor."""
-        positions = self.positions()
-        wind = self.scene.wind_speed
-        if wind is None or not 0.0 < wind <= self.scene.turbine.cut_out_wind_speed:
+        positions, wind, turbine = self.positions(), self.scene.wind_speed, self.scene.turbine
+        if wind is None or not 0.0 < wind <= turbine.cut_out_wind_speed:
             return positions
-        rotor_speed, blade_pitch = self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH]
-        if blade_pitch > self.scene.turbine.pitch_drive.minimum:
+        if self.x[State.BLADE_PITCH] > turbine.pitch_drive.minimum:
             return [*positions, int(State.BLADE_PITCH)]
-        return [*positions, int(State.ROTOR_SPEED)] if rotor_speed > 0.0 else positions
+        return [*positions, int(State.ROTOR_SPEED)] if self.x[State.ROTOR_SPEED] > 0.0 else positions
 
     def residual(self, free):
         """Return the accelerations of the free states, which vanish in the steady one."""
@@ -333,18 +312,19 @@ class _Steady:
                 if size < before:
                     break
                 change *= 0.5
-            if not size < 0.1 * before:
-                if not size < before and not fresh:
-                    self.x[free] = start  # the old Jacobian does not serve here
-                    residual, size = self.residual(free), before
-                elif not size < before:
+            if not size < before:
+                if fresh:
                     break  # as near as rounding lets it
+                self.x[free] = start  # the old Jacobian does not serve here
+                residual, size = self.residual(free), before
+            if not size < 0.1 * before:
                 jacobian = None
         return size
 
     def _of_motions(self, jacobian):
         """Return the part of a Jacobian that has the motions alone."""
-        return jacobian[: len(self.motions()), : len(self.motions())]
+        n = len(self.motions())
+        return jacobian[:n, :n]
 
     def refusal(self, ending=None):
         """InputError of a search that ends at this state without a steady one; ending as in unbalanced."""
@@ -376,18 +356,22 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     one is meant to.
     """
     check_scene(scene)
-    if platform not in PLATFORM_MODES:
-        raise unknown("platform mode of trim", platform, PLATFORM_MODES)
     if platform not in scene.trims:
         scene.trims[platform] = _trim(scene, platform)
     return scene.trims[platform].copy()
 
 
+def _steady(scene, platform, rotor_fixed):
+    """Return the _Steady of a scene. Raises: InputError for an unknown platform mode."""
+    if platform not in PLATFORM_MODES:
+        raise unknown("platform mode of trim", platform, PLATFORM_MODES)
+    body = scene.model.rigid_body._replace(platform_fixed=platform == "fixed", rotor_fixed=rotor_fixed)
+    return _Steady(without_fluctuations(scene).with_model(rigid_body=body))
+
+
 def _trim(scene, platform):
     """Recompute a trim."""
-    fixed = platform == "fixed"
-    body = scene.model.rigid_body._replace(platform_fixed=fixed, rotor_fixed=False)
-    steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
+    steady = _steady(scene, platform, False)
     steady.settle_rotor()
     if steady.positions():
         for _ in range(OUTER_ROUNDS):
@@ -408,10 +392,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     For model tests, where a motor holds the rotor speed: theory.md Eq. (20). Mean wind, waves flat.
     Raises: InputError as trim does.
     """
-    if platform not in PLATFORM_MODES:
-        raise unknown("platform mode of trim_prescribed", platform, PLATFORM_MODES)
-    body = scene.model.rigid_body._replace(platform_fixed=platform == "fixed", rotor_fixed=True)
-    steady = _Steady(without_fluctuations(scene).with_model(rigid_body=body))
+    steady = _steady(scene, platform, True)
     steady.x[State.ROTOR_SPEED] = rotor_speed
     steady.set_pitch(blade_pitch)
     if steady.positions():

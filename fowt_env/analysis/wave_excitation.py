@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from fowt_env.analysis.statics import rotation_of
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of
@@ -84,8 +85,7 @@ def _strip_forces(scene, state, omega, strips):
     x = np.zeros_like(state)
     x[: State.AZIMUTH] = state[: State.AZIMUTH]
     x[State.SURGE] = x[State.SWAY] = 0.0  # the wave's phase counts from the hull
-    kinematics = np.zeros((7, strips.nodes))
-    quarters = np.zeros((4, 6))
+    kinematics, quarters = np.zeros((7, strips.nodes)), np.zeros((4, 6))
     for i, frequency in enumerate(omega):
         sea = sea_state_of({"kind": "regular", "H": 2.0 * AMPLITUDE, "T": 2.0 * pi / frequency})
         waves = _waves(scene, sea)._replace(ramp=0.0)
@@ -165,9 +165,8 @@ def fit_wave_filter(scene, state):
     for lead in leads:
         target = force * np.exp(-1j * omega * lead)[:, None]
         c = np.zeros((6, b.size))
-        for row in range(6):
-            left = basis * weight[:, row, None]
-            right = target[:, row] * weight[:, row]
+        for row, w in enumerate(weight.T):
+            left, right = basis * w[:, None], target[:, row] * w
             both = (np.r_[left.real, left.imag], np.r_[right.real, right.imag])
             c[row] = np.linalg.lstsq(*both, rcond=1e-10)[0]
         miss = np.linalg.norm((basis @ c.T - target) * weight)
@@ -180,13 +179,8 @@ def fit_wave_filter(scene, state):
 
 def _resonators(frequencies, damping):
     """Return (A, B) of second-order resonators side by side, all driven by the input."""
-    n = len(frequencies)
-    a, b = np.zeros((2 * n, 2 * n)), np.zeros(2 * n)
-    for i, frequency in enumerate(frequencies):
-        block = slice(2 * i, 2 * i + 2)
-        a[block, block] = [[0.0, frequency], [-frequency, -2.0 * damping * frequency]]
-        b[2 * i + 1] = frequency
-    return a, b
+    a = block_diag(*([[0.0, w], [-w, -2.0 * damping * w]] for w in frequencies))
+    return a, np.kron(frequencies, [0.0, 1.0])
 
 
 def _band_errors(omega, force, fitted):

@@ -1,6 +1,6 @@
 """Checks positions in a platform file for plausibility: lines, anchors, fairleads, members."""
 
-from math import degrees, dist
+from math import degrees, dist, hypot
 
 import numpy as np
 
@@ -49,39 +49,35 @@ def _reach(platform):
 
 
 def _line_faults(platform):
-    """Return {name: sentence} of the lines."""
+    """Return {name: sentence} of the first line of each fault."""
     found, depth = {}, platform.environment.water_depth
     reach, draft = _reach(platform), platform.draft
     for number, line in enumerate(platform.lines, 1):
-        x, y, z = line.fairlead
-        out = dist((x, y), (0.0, 0.0))
-        if reach is not None and out > WIDE * reach:
-            found.setdefault(
-                "fairlead",
+        (x, y, z), anchor = line.fairlead, line.anchor
+        out, above = hypot(x, y), anchor[2] + depth
+        span, rise = dist(anchor[:2], (x, y)), z - anchor[2]
+        faults = {
+            "fairlead": (
+                reach is not None and out > WIDE * reach,
                 f"the fairlead of line {number} is {out:.4g} m from the tower axis, and the hull reaches"
-                f" {reach:.4g} m",
-            )
-        if -z > LOW * draft:
-            found.setdefault(
-                "fairlead depth",
+                f" {reach or 0.0:.4g} m",
+            ),
+            "fairlead depth": (
+                -z > LOW * draft,
                 f"the fairlead of line {number} is at z = {z:.4g} m, below the draft of {draft:.4g} m",
-            )
-        above = line.anchor[2] + depth
-        if above > ABOVE_BED * depth:
-            found.setdefault(
-                "anchor depth",
-                f"the anchor of line {number} at z = {line.anchor[2]:.4g} m is {above:.4g} m above the sea"
+            ),
+            "anchor depth": (
+                above > ABOVE_BED * depth,
+                f"the anchor of line {number} at z = {anchor[2]:.4g} m is {above:.4g} m above the sea"
                 f" bed (water_depth = {depth:g} m)",
-            )
-        span = dist(line.anchor[:2], line.fairlead[:2])
-        rise = z - line.anchor[2]
-        inside = dist(line.anchor[:2], (0.0, 0.0)) < out
-        if inside and span > UPRIGHT * rise:
-            found.setdefault(
-                "anchor inside",
+            ),
+            "anchor inside": (
+                hypot(*anchor[:2]) < out and span > UPRIGHT * rise,
                 f"the anchor of line {number} is nearer to the tower axis than its fairlead,"
                 f" {span:.4g} m from it",
-            )
+            ),
+        }
+        found |= {name: text for name, (wrong, text) in faults.items() if wrong and name not in found}
     return found
 
 

@@ -41,10 +41,11 @@ def _rotor_body(rotor):
     return rotor.mass, centre, inertia
 
 
-def _upper_bodies(platform, turbine):
-    """Return the tower, nacelle and rotor as (mass, centre, inertia)."""
-    tower, nacelle = platform.tower, turbine.nacelle
+def _bodies(platform, turbine):
+    """Return ballast, tower, nacelle and rotor as (mass, centre, inertia)."""
+    ballast, tower, nacelle = platform.ballast, platform.tower, turbine.nacelle
     return [
+        (ballast.mass, (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth), ballast.inertia),
         (tower.mass, (0.0, 0.0, tower.cm_height), tower.inertia),
         (nacelle.mass, (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height), nacelle.inertia),
         _rotor_body(turbine.rotor),
@@ -53,14 +54,12 @@ def _upper_bodies(platform, turbine):
 
 def top_mass_matrix(platform, turbine):
     """Return (6, 6) mass matrix of nacelle and rotor about the body origin."""
-    return assemble(_upper_bodies(platform, turbine)[1:])
+    return assemble(_bodies(platform, turbine)[2:])
 
 
 def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False, plane=None):
     """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
-    ballast = platform.ballast
-    place = (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth)
-    matrix = assemble([(ballast.mass, place, ballast.inertia), *_upper_bodies(platform, turbine)])
+    matrix = assemble(_bodies(platform, turbine))
     if plane is not None and matrix[0, 5] != 0.0:
         left = -matrix[0, 5] / matrix[0, 0]
         raise InputError(
@@ -91,15 +90,12 @@ def with_masses(modes, platform, turbine):
     """
     if modes is None:
         return None
-    ballast = platform.ballast
-    place = (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth)
-    tower, *upper = _upper_bodies(platform, turbine)
-    above = [
-        (mass, np.subtract(centre, (0.0, 0.0, modes.top_height)), inertia) for mass, centre, inertia in upper
-    ]
+    ballast, tower, *upper = _bodies(platform, turbine)
+    top = (0.0, 0.0, modes.top_height)
+    above = [(mass, np.subtract(centre, top), inertia) for mass, centre, inertia in upper]
     matrix, tilt = assemble(above), turbine.rotor.shaft_tilt
     return modes._replace(
-        lower=np.ascontiguousarray(assemble([(ballast.mass, place, ballast.inertia), tower])),
+        lower=np.ascontiguousarray(assemble([ballast, tower])),
         straight=np.ascontiguousarray(assemble([tower])),
         upper_mass=float(matrix[0, 0]),
         upper_moment=np.array([matrix[1, 5], -matrix[0, 5], matrix[0, 4]]),
@@ -116,14 +112,13 @@ def build_blade_masses(platform, turbine):
             f"rotor.blade_mass: is missing in the turbine {turbine.name!r}; pitch = 'individual' needs"
             f" {', '.join(BLADE_MASSES)} for the moments at blade roots"
         )
-    _, *upper = _upper_bodies(platform, turbine)
     return BladeMasses(
         float(rotor.hub_radius),
         float(rotor.blade_first_moment),
         float(rotor.blade_second_moment + rotor.hub_radius * rotor.blade_first_moment),
         float(rotor.cm_offset),
         float(rotor.inertia_diameter),
-        np.ascontiguousarray(assemble(upper)),
+        np.ascontiguousarray(top_mass_matrix(platform, turbine)),
     )
 
 
@@ -137,7 +132,7 @@ def build_layout(platform, turbine, individual=False):
         float(platform.tower.base_height),
         float(rotor.mass),
         float(rotor.inertia),
-        np.ascontiguousarray(assemble(_upper_bodies(platform, turbine))),
+        np.ascontiguousarray(assemble(_bodies(platform, turbine)[1:])),
         float(turbine.drivetrain.gear_ratio),
         float(turbine.drivetrain.generator_efficiency),
         int(rotor.blades),

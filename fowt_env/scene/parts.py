@@ -82,7 +82,7 @@ def build_blade_pitches(turbine, rotor, first_state):
 def build_hydro(platform, waves, current, options, dt, first_state=N_RIGID):
     """Return the Hydro of a scene with time step dt (s); states of waves and memory begin at first_state."""
     site, spar, kinematics = platform.environment, platform.hull is not None, _kinematics(platform, options)
-    strips = None
+    strips, water = None, (site.water_density, site.gravity)
     if spar:
         shape = build_strips(platform.hull, platform.hydro, **kinematics)
         strips = ExactStrips(shape, None)
@@ -93,13 +93,13 @@ def build_hydro(platform, waves, current, options, dt, first_state=N_RIGID):
     first_state += 0 if excitation is None or excitation.position is None else 2
     members = build_members(platform.members, gravity=site.gravity, **kinematics)
     return Hydro(
-        hull=build_hull(platform.hull, *_water(site)) if spar else None,
+        hull=build_hull(platform.hull, *water) if spar else None,
         strips=strips_in_waves(strips, waves, options),
         waves=waves,
         current=current,
         damping=build_damping(platform.hydro) if spar else None,
         added_inertia=build_added_inertia(platform.hydro.added_mass) if spar else None,
-        matrices=build_body_matrices(platform.potential_flow, platform.additional, *_water(site)),
+        matrices=build_body_matrices(platform.potential_flow, platform.additional, *water),
         radiation=build_radiation(platform.potential_flow, options, dt, first_state),
         members=members_in_waves(members, waves, options),
         excitation=excitation,
@@ -112,8 +112,7 @@ def hydro_in_waves(hydro, waves, platform, options):
 
     Raises: InputError for a sea beyond the fast path.
     """
-    if waves is None:
-        waves = _flat_waves_of(platform)
+    waves = _flat_waves_of(platform) if waves is None else waves
     strips, excitation = hydro.strips, still_excitation(hydro.excitation)
     if not is_flat(waves):
         position = None if excitation is None else excitation.position
@@ -142,10 +141,6 @@ def still_hydro(hydro, platform, options):
         members=members_in_waves(hydro.members, None, options),
         excitation=still_excitation(hydro.excitation),
     )
-
-
-def _water(site):
-    return site.water_density, site.gravity
 
 
 def _flat_waves_of(platform):
@@ -185,7 +180,11 @@ def strips_in_waves(strips, waves, options):
     if isinstance(strips, ExactStrips):
         part = build_strip_diffraction(waves, strips.shape) if diffracting else None
         return strips._replace(diffraction=part)
-    bands = wave_bands_of(waves, strips.shape)
+    if waves is not None and not can_use_bands(waves, strips.shape):
+        raise InputError(
+            "sea: several headings cannot be summed fast; use wave_loads = 'exact' from the start"
+        )
+    bands = None if waves is None else build_wave_bands(waves, strips.shape)
     part = build_band_diffraction(bands, strips.quadrature) if diffracting else None
     return strips._replace(bands=bands, diffraction=part)
 
@@ -202,17 +201,6 @@ def takes_wave_bands(options, waves, strips):
             " 'wheeler' or surface 'swl' with stretching 'none'; use 'exact'"
         )
     return False
-
-
-def wave_bands_of(waves, strips):
-    """Return the WaveBands, None in still water. Raises: InputError for a sea of several headings."""
-    if waves is None:
-        return None
-    if not can_use_bands(waves, strips):
-        raise InputError(
-            "sea: several headings cannot be summed fast; use wave_loads = 'exact' from the start"
-        )
-    return build_wave_bands(waves, strips)
 
 
 def check_symmetry(lines, current, members=()):
@@ -242,10 +230,8 @@ def check_symmetry(lines, current, members=()):
 
 def _shape_of(member):
     """Return (2, n) values at both ends of a Member."""
-    flow = float(member.potential_flow)
-    ends = (member.start, member.end)
-    pairs = (value for name, value in member if name not in ("start", "end", "potential_flow"))
-    return np.column_stack([ends, *(np.array(pair) for pair in pairs), (flow, flow)])
+    pairs = [np.array(value) for name, value in member if name not in ("start", "end", "potential_flow")]
+    return np.column_stack([(member.start, member.end), *pairs, 2 * (float(member.potential_flow),)])
 
 
 def _kinematics(platform, options):
@@ -273,8 +259,7 @@ def build_current(spec):
     """Return the Current part, None for zero speed. Raises: InputError."""
     if spec is None:
         return None
-    if not isinstance(spec, dict):
-        spec = {"speed": spec}
+    spec = spec if isinstance(spec, dict) else {"speed": spec}
     for key in spec:
         if key not in ("speed", "heading", "exponent"):
             raise unknown("key of current", key, ("speed", "heading", "exponent"))

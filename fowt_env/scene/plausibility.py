@@ -27,17 +27,14 @@ def wind_faults(air, turbine):
     kind = spec.get("kind") if isinstance(spec, dict) else getattr(spec, "kind", None)
     if not air.speed or not (is_number(spec) or isinstance(spec, WindBox) or kind in MEAN_WINDS):
         return []
-    if air.speed > turbine.cut_out_wind_speed:
+    said = f"the mean wind of {air.speed:.4g} m/s is"
+    low, high = turbine.cut_in_wind_speed, turbine.cut_out_wind_speed
+    if air.speed > high:
         return [
-            f"the mean wind of {air.speed:.4g} m/s is above the turbine's cut-out wind of"
-            f" {turbine.cut_out_wind_speed:.4g} m/s: a run starts with feathered blades and a rotor at rest"
+            f"{said} above the turbine's cut-out wind of {high:.4g} m/s: a run starts with feathered blades"
+            " and a rotor at rest"
         ]
-    if air.speed < turbine.cut_in_wind_speed:
-        return [
-            f"the mean wind of {air.speed:.4g} m/s is below the turbine's cut-in wind of"
-            f" {turbine.cut_in_wind_speed:.4g} m/s"
-        ]
-    return []
+    return [f"{said} below the turbine's cut-in wind of {low:.4g} m/s"] if air.speed < low else []
 
 
 def sea_faults(sea, site):
@@ -47,7 +44,8 @@ def sea_faults(sea, site):
     DNV-RP-C205, 3.4.6). Of a spectrum it is the significant height over the length at the peak, which real
     seas stay well below: 1/11.6 in the steepest of the built-in ones.
     """
-    height, period = (sea.H, sea.T) if sea.kind == "regular" else (sea.Hs, sea.Tp)
+    names = ("H", "T") if sea.kind == "regular" else ("Hs", "Tp")
+    height, period = (getattr(sea, name) for name in names)
     if not height or not period:
         return []
     depth = site.water_depth
@@ -55,7 +53,6 @@ def sea_faults(sea, site):
     length, steepest = 2.0 * pi / k, STEEPEST * tanh(k * depth)
     if height <= steepest * length:
         return []
-    names = ("H", "T") if sea.kind == "regular" else ("Hs", "Tp")
     return [
         f"waves of {names[0]} = {height:.4g} m and {names[1]} = {period:.4g} s are {length:.3g} m long: their"
         f" steepness of {height / length:.2g} is beyond that of breaking waves, {steepest:.2g}"

@@ -10,11 +10,14 @@ residues by linear least squares with Re K positive semidefinite (theory.md, 5.8
 import hashlib
 import warnings
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
+from scipy.linalg import block_diag
 from scipy.optimize import least_squares, nnls
+from scipy.sparse.csgraph import connected_components
 
 from fowt_env.caches import Cache
 from fowt_env.errors import InputError, PlantWarning, level_outside
@@ -47,13 +50,11 @@ TAPER = 1.5  # times the last frequency, where the damping has gone to zero
 IN_PLANE = (0, 2, 4)
 
 
-@dataclass(frozen=True)
-class EntryFit:
+class EntryFit(NamedTuple):
     """How well one entry of K is fitted."""
 
     order: int  # of its denominator
     error: float  # rms over BAND against the causal K, of its rms there
-    file_error: float  # the same against B + i w (A - A_inf) of the file
     passivity: float | None  # least Re K up to PASSIVE_UP_TO over the largest |K|; None off the diagonal
 
 
@@ -64,8 +65,6 @@ class RadiationFit:
     poles: dict  # {motion: (m,) complex, the upper of each pair}
     residues: dict  # {(motion, motion): (m,) complex, for the poles of the second; symmetric}
     entries: dict  # {(motion, motion): EntryFit}, first <= second
-    passivity: float  # least eigenvalue of Re K, scaled to a diagonal of rms 1 in BAND
-    asked: float  # error
 
     def response(self, omega):
         """Return (n, 6, 6) complex K(i omega), omega (n,) rad/s."""
@@ -75,20 +74,6 @@ class RadiationFit:
             pole = self.poles[j]
             result[:, i, j] = (residue / (s - pole) + residue.conj() / (s - pole.conj())).sum(axis=1)
         return result
-
-    @property
-    def states(self):
-        """Return the number of states: two for each pair of poles of each motion."""
-        return 2 * sum(pole.size for pole in self.poles.values())
-
-    def table(self):
-        """Return the text, a line for each entry: order, rms errors in BAND, passivity."""
-        lines = [f"{'entry':<24}{'order':>6}{'rms error':>11}{'of A and B':>12}{'least Re K':>12}"]
-        for (i, j), entry in sorted(self.entries.items()):
-            name = MOTIONS[i] if i == j else f"{MOTIONS[i]}, {MOTIONS[j]}"
-            passive = "" if entry.passivity is None else f"{entry.passivity:12.1e}"
-            lines.append(f"{name:<24}{entry.order:>6}{entry.error:>11.2%}{entry.file_error:>12.2%}{passive}")
-        return "\n".join(lines)
 
 
 def retardation(body):
@@ -101,8 +86,7 @@ def retardation(body):
 def retardation_kernel(body, time):
     """Return (n, 6, 6) K(t) of a PotentialFlow, 2/pi integral of B(w) cos(w t) dw, N/m ...; time (n,) s.
 
-    B goes from B(0) = 0 through the file's values by monotone cubics, and to zero within TAPER times the last
-    frequency.
+    B follows monotone cubics from B(0) = 0, and falls to zero within TAPER times the last frequency.
     """
     last = body.omega[-1]
     omega = np.arange(0.0, TAPER * last, SPACING)
@@ -147,12 +131,10 @@ def _real(a):
     return np.concatenate([a.real, a.imag])
 
 
-def _residues(s, f, w, poles):
-    """Return (fit (n, e), [residues]) of least squares with K(0) = 0."""
-    columns, free = _columns(s, poles), _free(poles)
-    base = columns @ free
-    left = _real(base * w[:, None])
-    x = np.linalg.lstsq(left, _real(f * w[:, None]), rcond=1e-12)[0]
+def _fitted(s, f, w, poles):
+    """Return (n, e) the fit of least squares with K(0) = 0."""
+    base = _columns(s, poles) @ _free(poles)
+    x = np.linalg.lstsq(_real(base * w[:, None]), _real(f * w[:, None]), rcond=1e-12)[0]
     return base @ x
 
 
@@ -203,31 +185,28 @@ def _fit_poles(omega, f, w, count, starts, wanted):
     s, band = 1j * omega, _in_band(omega)
 
     def error(poles):
-        miss = _residues(s, f, w, poles) - f
-        return float(np.sqrt((np.abs(miss[band]) ** 2).mean(axis=0)).max())
+        return float(_rms((_fitted(s, f, w, poles) - f)[band]).max())
 
     def unpacked(x):
         return -np.exp(x[:count]) + 1j * np.exp(x[count:])
 
     def residuals(x):
-        return _real((_residues(s, f, w, unpacked(x)) - f) * w[:, None]).ravel()
+        return _real((_fitted(s, f, w, unpacked(x)) - f) * w[:, None]).ravel()
 
     middle = np.linspace(BAND[0], BAND[1] + 0.1, count)
-    best = (np.inf, None)
+    found = []
     for start in (-0.1 * middle + 1j * middle, *starts):
-        poles = _bounded(start)
-        best = min(best, (error(poles), poles), key=lambda each: each[0])
-        for _ in range(ROUNDS):
-            poles = _relocated(s, f, w, poles)
-            if poles.size < count:
-                break
-            best = min(best, (error(poles), poles), key=lambda each: each[0])
+        poles, rounds = _bounded(start), 0
+        while poles.size == count and rounds <= ROUNDS:
+            found.append((error(poles), poles))
+            poles, rounds = _relocated(s, f, w, poles), rounds + 1
+    best = min(found, key=itemgetter(0))
     if best[0] > wanted:
         return best
     bounds = np.log(np.repeat([DECAY, FREQUENCY], count, axis=0)).T
     x = np.log(np.r_[-best[1].real, best[1].imag])
     polished = unpacked(least_squares(residuals, x, bounds=bounds, max_nfev=EVALUATIONS).x)
-    return min(best, (error(polished), polished), key=lambda each: each[0])
+    return min(best, (error(polished), polished), key=itemgetter(0))
 
 
 # ---------------------------------------------------------------- passivity
@@ -271,9 +250,7 @@ def _passive_residues(omega, f, w, poles, places, size, counted):
     base = _columns(s, poles) @ free
     left, m = _real(base * w[:, None]), free.shape[1]
     rights = _real(f * w[:, None])
-    whole = np.zeros((len(places) * left.shape[0], len(places) * m))
-    for k in range(len(places)):
-        whole[k * left.shape[0] : (k + 1) * left.shape[0], k * m : (k + 1) * m] = counted[k] * left
+    whole = np.kron(np.diag(counted), left)
     right = (rights * counted).T.ravel()
     grid, shape = _passive_grid()
     real = (_columns(1j * grid, poles) @ free).real / shape[:, None]
@@ -307,14 +284,9 @@ def _blocks(size):
     """Return [motions that are coupled] of the (6, 6) rms of K, those without any omitted."""
     scale = np.sqrt(np.diag(size))
     coupled = size > NEGLIGIBLE * np.outer(scale, scale)
-    left, blocks = [i for i in range(6) if size[i, i] > 0.0], []
-    while left:
-        block, last = [left[0]], []
-        while block != last:
-            last, block = block, [j for j in left if any(coupled[i, j] or i == j for i in block)]
-        blocks.append(block)
-        left = [i for i in left if i not in block]
-    return blocks, coupled
+    count, group = connected_components(coupled)
+    blocks = ([i for i in np.flatnonzero(group == g).tolist() if size[i, i] > 0.0] for g in range(count))
+    return [block for block in blocks if block], coupled
 
 
 def _fit_block(omega, k, block, coupled, w, asked, known):
@@ -325,15 +297,15 @@ def _fit_block(omega, k, block, coupled, w, asked, known):
     """
     band = _in_band(omega)
     pairs = [(i, j) for a, i in enumerate(block) for j in block[a:] if i == j or coupled[i, j]]
-    scale = {i: np.sqrt(np.sqrt((np.abs(k[band, i, i]) ** 2).mean())) for i in block}
-    own = np.array([np.sqrt((np.abs(k[band, i, j]) ** 2).mean()) for i, j in pairs])
+    scale = {i: np.sqrt(_rms(k[band, i, i])) for i in block}
+    own = np.array([_rms(k[band, i, j]) for i, j in pairs])
     f = np.array([k[:, i, j] for i, j in pairs]).T
     units = np.array([scale[i] * scale[j] for i, j in pairs])
     places = [(block.index(i), block.index(j)) for i, j in pairs]
     for normal, poles, found in known:
         if normal.shape == f.shape and len(block) < 3:
             signs = np.where((normal.conj() * f)[band].real.sum(axis=0) < 0.0, -1.0, 1.0)
-            if np.sqrt((np.abs(signs * f / own - normal)[band] ** 2).mean(axis=0)).max() < ALIKE:
+            if _rms((signs * f / own - normal)[band]).max() < ALIKE:
                 return poles, _residues_by_entry(pairs, found, signs * own)
     best, last = (np.inf, None, None), None
     for count in range(FEWEST, MOST + 1):
@@ -344,8 +316,8 @@ def _fit_block(omega, k, block, coupled, w, asked, known):
             continue  # positive Re K only adds to it
         found = _passive_residues(omega, f / units, w, last, places, len(block), units / own)
         miss = _columns(1j * omega, last) @ found.T - f / units
-        error = float((np.sqrt((np.abs(miss[band]) ** 2).mean(axis=0)) * units / own).max())
-        best = min(best, (error, last, found), key=lambda each: each[0])
+        error = float((_rms(miss[band]) * units / own).max())
+        best = min(best, (error, last, found), key=itemgetter(0))
         if best[0] <= asked:
             break
     _, poles, found = best
@@ -380,7 +352,6 @@ def fit_radiation(body, error=0.02):
 
 
 def _fit(body, asked):
-    """Return what fit_radiation gives, recomputed."""
     known = _in_band(body.omega)
     if known.sum() < FEWEST_KNOWN:
         raise InputError(
@@ -390,7 +361,7 @@ def _fit(body, asked):
     omega = np.arange(GRID, TAPER * body.omega[-1], GRID)
     k = causal_retardation(body, omega)
     band = _in_band(omega)
-    size = np.sqrt((np.abs(k[band]) ** 2).mean(axis=0))
+    size = _rms(k[band])
     # below the band by what an error is in added mass, which sets the periods of surge, sway and yaw
     w = np.where(band, 1.0, np.where(omega < BAND[0], BELOW / omega, OUTSIDE))
     blocks, coupled = _blocks(size)
@@ -399,19 +370,14 @@ def _fit(body, asked):
         own, found = _fit_block(omega, k, block, coupled, w, asked, earlier)
         poles |= dict.fromkeys(block, own)
         residues |= found
-    fit = RadiationFit(poles, residues, {}, 0.0, asked)
+    fit = RadiationFit(poles, residues, {})
     far = fit.response(np.linspace(0.0, PASSIVE_UP_TO, CHECKED)[1:])
-    own = _misses(fit, omega[band], k[band])
-    of_file = _misses(fit, body.omega[known], retardation(body)[known])
-    entries = {}
+    miss = _rms(fit.response(omega[band]) - k[band])
     for i, j in residues:
         if i <= j:
             margin = float(far[:, i, i].real.min() / np.abs(far[:, i, i]).max()) if i == j else None
-            entries[i, j] = EntryFit(2 * poles[j].size, float(own[i, j]), float(of_file[i, j]), margin)
-    scale = np.sqrt(np.where(np.diag(size) > 0.0, np.diag(size), 1.0))
-    passivity = float(np.linalg.eigvalsh(far.real / np.outer(scale, scale))[:, 0].min())
-    fit = RadiationFit(poles, residues, entries, passivity, asked)
-    _check(fit)
+            fit.entries[i, j] = EntryFit(2 * poles[j].size, float(miss[i, j] / size[i, j]), margin)
+    _check(fit, asked)
     return fit
 
 
@@ -420,14 +386,12 @@ def _in_band(omega):
     return (omega >= BAND[0] - 1e-6) & (omega <= BAND[1] + 1e-6)
 
 
-def _misses(fit, omega, k):
-    """Return (6, 6) rms error of a fit to K at omega, of the rms of K; 0 where there is none."""
-    size = np.sqrt((np.abs(k) ** 2).mean(axis=0))
-    miss = np.sqrt((np.abs(fit.response(omega) - k) ** 2).mean(axis=0))
-    return np.divide(miss, size, out=np.zeros((6, 6)), where=size > 0.0)
+def _rms(values):
+    """Return root mean squares over the first axis."""
+    return np.sqrt((np.abs(values) ** 2).mean(axis=0))
 
 
-def _check(fit):
+def _check(fit, asked):
     """Refuse a fit that makes energy, and warn of one that is coarse."""
     for (i, j), entry in fit.entries.items():
         if i == j and entry.passivity < -NOT_PASSIVE:
@@ -436,15 +400,14 @@ def _check(fit):
                 f" energy: the least Re K is {entry.passivity:.2g} of the largest;"
                 " use radiation = 'convolution'"
             )
-    coarse = {
-        f"{MOTIONS[i]}" if i == j else f"{MOTIONS[i]}-{MOTIONS[j]}": entry.error
+    coarse = [
+        f"{MOTIONS[i]}{'' if i == j else f'-{MOTIONS[j]}'} {entry.error:.1%}"
         for (i, j), entry in fit.entries.items()
-        if entry.error > 2.0 * fit.asked
-    }
+        if entry.error > 2.0 * asked
+    ]
     if coarse:
-        text = ", ".join(f"{name} {error:.1%}" for name, error in coarse.items())
         warnings.warn(
-            f"radiation_error = {fit.asked:g}: {2 * MOST} poles an entry leave {text}",
+            f"radiation_error = {asked:g}: {2 * MOST} poles an entry leave {', '.join(coarse)}",
             PlantWarning,
             stacklevel=level_outside(),
         )
@@ -461,7 +424,7 @@ def build_radiation(body, options, dt, first):
     """
     if body is None or options["radiation"] == "none":
         return None
-    motions = IN_PLANE if options["planar"] else range(6)
+    motions = _motions(options["planar"])
     if options["radiation"] == "convolution":
         return build_convolution(body, dt, motions)
     return build_state_space(fit_radiation(body, options["radiation_error"]), first, motions)
@@ -471,7 +434,11 @@ def memory_for_step(memory, body, dt, planar):
     """Return the memory part for steps of dt (s): itself, but for a convolution of another step."""
     if not isinstance(memory, ConvolutionMemory) or abs(memory.dt - dt) <= 1e-9 * dt:
         return memory
-    return build_convolution(body, dt, IN_PLANE if planar else range(6))
+    return build_convolution(body, dt, _motions(planar))
+
+
+def _motions(planar):
+    return IN_PLANE if planar else range(6)
 
 
 def build_state_space(fit, first, motions=range(6)):
@@ -493,24 +460,15 @@ def build_state_space(fit, first, motions=range(6)):
         residue = fit.residues[i, j]
         weight[e, : residue.size] = 2.0 * residue.real
         weight[e, groups[j] : groups[j] + residue.size] = -2.0 * residue.imag
-    return StateSpaceMemory(
-        int(first),
-        begin,
-        pole,
-        np.searchsorted([i for i, _ in places], np.arange(7)).astype(np.int64),
-        np.array([j for _, j in places], dtype=np.int64),
-        weight,
-    )
+    rows, columns = np.array(places, dtype=np.int64).T.copy()
+    return StateSpaceMemory(int(first), begin, pole, np.searchsorted(rows, np.arange(7)), columns, weight)
 
 
 def build_convolution(body, dt, motions=range(6)):
     """Return ConvolutionMemory of a PotentialFlow over SPAN for steps of dt (s); None without any damping."""
-    k = retardation(body)
-    size = np.sqrt((np.abs(k) ** 2).mean(axis=0))
+    size = _rms(retardation(body))
     _, coupled = _blocks(size)
-    places = [
-        (i, j) for i in motions for j in motions if size[i, i] > 0.0 and (i == j or coupled[i, j])
-    ]  # fmt: skip
+    places = [(i, j) for i in motions for j in motions if size[i, i] > 0.0 and (i == j or coupled[i, j])]
     if not places:
         return None
     steps = max(1, round(SPAN / dt))
@@ -518,21 +476,13 @@ def build_convolution(body, dt, motions=range(6)):
     time = 0.5 * dt * np.arange(2 * n + 1)
     share = np.clip((time - SPAN + FADE) / FADE, 0.0, 1.0)
     kernel = retardation_kernel(body, time) * (0.5 + 0.5 * np.cos(np.pi * share))[:, None, None]
-    now = np.zeros((6, 6))
+    now, (rows, columns) = np.zeros((6, 6)), np.array(places, dtype=np.int64).T.copy()
+    now[rows, columns] = kernel[0, rows, columns]
     half, whole = np.zeros((len(places), n)), np.zeros((len(places), n))
-    for e, (i, j) in enumerate(places):
-        now[i, j] = kernel[0, i, j]
-        half[e, :steps] = dt * kernel[1 : 2 * steps : 2, i, j]
-        half[e, 0] *= 0.75
-        whole[e, :steps] = dt * kernel[2 : 2 * steps + 2 : 2, i, j]
-    return ConvolutionMemory(
-        float(dt),
-        now,
-        np.array([i for i, _ in places], dtype=np.int64),
-        np.array([j for _, j in places], dtype=np.int64),
-        half,
-        whole,
-    )
+    half[:, :steps] = dt * kernel[1 : 2 * steps : 2, rows, columns].T
+    half[:, 0] *= 0.75
+    whole[:, :steps] = dt * kernel[2 : 2 * steps + 2 : 2, rows, columns].T
+    return ConvolutionMemory(float(dt), now, rows, columns, half, whole)
 
 
 class LinearMemory(NamedTuple):
@@ -549,18 +499,14 @@ def linear_memory(scene):
     if hydro is None or hydro.radiation is None:
         return None
     fit = fit_radiation(scene.platform.potential_flow, scene.options["radiation_error"])
-    motions = [j for j in (IN_PLANE if scene.options["planar"] else range(6)) if j in fit.poles]
-    size = 2 * sum(fit.poles[j].size for j in motions)
-    a, b, c = np.zeros((size, size)), np.zeros((size, 6)), np.zeros((6, size))
-    start = 0
-    for j in motions:
-        for k, pole in enumerate(fit.poles[j]):
-            at = slice(start, start + 2)
-            a[at, at] = [[pole.real, -pole.imag], [pole.imag, pole.real]]
-            b[start, j] = 1.0
-            for i in motions:
-                if (i, j) in fit.residues:
-                    residue = fit.residues[i, j][k]
-                    c[i, at] = 2.0 * residue.real, -2.0 * residue.imag
-            start += 2
+    motions = [j for j in _motions(scene.options["planar"]) if j in fit.poles]
+    places = [(j, k, pole) for j in motions for k, pole in enumerate(fit.poles[j])]
+    a = block_diag(*([[pole.real, -pole.imag], [pole.imag, pole.real]] for _, _, pole in places))
+    b, c = np.zeros((len(a), 6)), np.zeros((6, len(a)))
+    for start, (j, k, _) in zip(range(0, len(a), 2), places, strict=True):
+        b[start, j] = 1.0
+        for i in motions:
+            if (i, j) in fit.residues:
+                residue = fit.residues[i, j][k]
+                c[i, start : start + 2] = 2.0 * residue.real, -2.0 * residue.imag
     return LinearMemory(a, b, c)

@@ -132,13 +132,8 @@ class Scene:
         rotor = self.turbine.rotor
         if isinstance(self.wind, WindBox):
             return hub_wind(self.wind, rotor.hub_height) if self.model.aero.field is None else None
-        found = hub_series(
-            self.wind,
-            reference_height=rotor.hub_height,
-            rotor_diameter=2.0 * rotor.tip_radius,
-            seed=self.seed,
-            duration=self.options["duration"],
-        )
+        place = {"reference_height": rotor.hub_height, "rotor_diameter": 2.0 * rotor.tip_radius}
+        found = hub_series(self.wind, **place, seed=self.seed, duration=self.options["duration"])
         if found is not None and self.options["planar"]:
             found[1][:, 1] = 0.0
         return found
@@ -153,9 +148,10 @@ class Scene:
 
     def data(self) -> Data:
         """Return the fresh scratch arrays for one plant of this scene."""
-        hydro = self.model.hydro
+        hydro, bending = self.model.hydro, tower_states(self.model.tower) // 2
         strips = None if hydro is None else hydro.strips
         members = None if hydro is None else hydro.members
+        most = max((load.states for load in self.loads), default=0)
         laid = 0 if members is None else members.scratch_nodes
         nodes = 0 if members is None else laid or len(members.nodes)
         return Data(
@@ -167,14 +163,12 @@ class Scene:
             member_nodes=np.zeros((laid, N_NODE)),
             member_water=np.zeros(N_WATER * nodes),
             added_mass=np.zeros((6, 6)),
-            matrix=np.zeros((6 + tower_states(self.model.tower) // 2,) * 2),
+            matrix=np.zeros((6 + bending, 6 + bending)),
             stages=np.zeros((5, self.n_state)),
             cache=np.zeros(N_CACHE),
-            user=np.zeros(
-                user_data_size(len(self.loads), max((load.states for load in self.loads), default=0))
-            ),
+            user=np.zeros(user_data_size(len(self.loads), most)),
             history=np.zeros((4, self.n_state)),
-            elastic=np.zeros((4, tower_states(self.model.tower) // 2)),
+            elastic=np.zeros((4, bending)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, N_BLADE_LOAD)),
@@ -228,7 +222,7 @@ class Scene:
         return default_step(self.options, tower_frequency(self.model.tower))
 
     def with_step(self, dt: float) -> "Scene":
-        """Return the this scene, made to be stepped by dt (s).
+        """Return this scene, made to be stepped by dt (s).
 
         A convolution of radiation is of one step alone, and dynamic inflow has no lag too short for it.
         """
@@ -269,8 +263,9 @@ class Scene:
             ("rotor model", self.rotor),
             ("physics step", f"{self.dt:g} s"),
             ("states", str(self.n_state)),
-            *((name, str(value)) for name, value in self.options.items() if value != _default(name)),
         ]
+        default = {name: option.default for name, option in OPTIONS.items()}
+        rows += [(name, str(value)) for name, value in self.options.items() if value != default.get(name)]
         return html_table("Scene", (), rows)
 
 
@@ -281,11 +276,6 @@ def check_scene(scene: Any) -> None:
             f"scene = {short(scene)}: must be a Scene, a platform in its wind and sea:"
             " build_scene('oc3_hywind', wind='ntm:18:B', sea='jonswap:4:9')"
         )
-
-
-def _default(name):
-    """Return the default of an option, None where its fidelity decides it."""
-    return OPTIONS[name].default if name in OPTIONS else None
 
 
 def _replaced(part, path, value):

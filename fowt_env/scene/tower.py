@@ -47,9 +47,10 @@ def build_tower_modes(platform, turbine, count, first_state):
     tower, bending = platform.tower, platform.tower.modes
     if bending is None or len(bending.fore_aft) < count:
         known = "no [tower.modes]" if bending is None else "first modes alone in [tower.modes]"
+        options = list(MODES)
         raise InputError(
-            f"tower = {_option(count)!r}: the platform {platform.name!r} has {known} in its file; allowed:"
-            f" {', '.join(repr(_option(k)) for k in range(count if bending else 1))}"
+            f"tower = {options[count]!r}: the platform {platform.name!r} has {known} in its file; allowed:"
+            f" {', '.join(map(repr, options[: count if bending else 1]))}"
         )
     height = tower.top_height - tower.base_height
     shapes, fore_aft = mode_shapes(bending, count)
@@ -64,6 +65,7 @@ def build_tower_modes(platform, turbine, count, first_state):
     stiffness = _stiffness(bending, middle, curvature, fore_aft, cell, count)
     # what hangs on each element: all above it, and of its own mass that above its middle
     top = bending.top_mass + turbine.nacelle.mass + turbine.rotor.mass
+    drag_points = 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)  # those of build_tower_drag
     above = mass[::-1].cumsum()[::-1] - 0.5 * mass + top
     return TowerModes(
         first=int(first_state),
@@ -77,7 +79,7 @@ def build_tower_modes(platform, turbine, count, first_state):
         stiffness=np.ascontiguousarray(stiffness),
         damping=np.ascontiguousarray(_damping(bending, stiffness, generalised, count)),
         weight_stiffness=np.where(alike, np.einsum("k,ki,kj->ij", cell * above, slope, slope), 0.0),
-        drag_shape=np.ascontiguousarray(shape_values(shapes, _drag_points())),
+        drag_shape=np.ascontiguousarray(shape_values(shapes, drag_points)),
         count=(0,) * len(shapes),
     )
 
@@ -102,12 +104,8 @@ def tower_frequency(modes):
     moved = np.zeros((6, 6 + n))
     moved[:, :6] = np.eye(6)
     moved[0, 4], moved[1, 3] = height, -height
-    moved[0, 6:], moved[1, 6:], moved[3, 6:], moved[4, 6:] = (
-        along,
-        across,
-        -across * modes.slope,
-        along * modes.slope,
-    )
+    moved[[0, 1], 6:] = along, across
+    moved[[3, 4], 6:] = -across * modes.slope, along * modes.slope
     mass = moved.T @ upper @ moved
     mass[:6, :6] += modes.lower
     tower = np.zeros((6, n))
@@ -120,27 +118,16 @@ def tower_frequency(modes):
     return float(np.sqrt(np.linalg.eigvals(flexibility @ modes.stiffness).real.max()))
 
 
-def _option(count):
-    return list(MODES)[count]
-
-
-def _drag_points():
-    """Return the height fractions of the points of aero.tower_drag.build_tower_drag."""
-    return 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)
-
-
 def _stiffness(bending, middle, curvature, fore_aft, cell, count):
     """Return (n, n) of EI times two curvatures, with the root of the product of both modes' tuners."""
     known = bending.height_fraction
-    sides = (np.interp(middle, known, bending.side_side_stiffness),
-             np.interp(middle, known, bending.fore_aft_stiffness))  # fmt: skip
     ones = (1.0,) * count
     tuner = _each(bending.fore_aft_tuner or ones, bending.side_side_tuner or ones, count)
     found = np.zeros((2 * count, 2 * count))
-    for along in (False, True):
+    for along, side in ((False, bending.side_side_stiffness), (True, bending.fore_aft_stiffness)):
         rows = np.flatnonzero(fore_aft == along)
-        part = curvature[:, rows]
-        found[np.ix_(rows, rows)] = np.einsum("k,ki,kj->ij", cell * sides[along], part, part)
+        part, stiffness = curvature[:, rows], np.interp(middle, known, side)
+        found[np.ix_(rows, rows)] = np.einsum("k,ki,kj->ij", cell * stiffness, part, part)
     return found * np.sqrt(np.outer(tuner, tuner))
 
 
@@ -156,6 +143,4 @@ def _damping(bending, stiffness, generalised, count):
 
 def _each(fore_aft, side_side, count):
     """Return (n,) of values of the modes in the plant's order."""
-    return np.array(
-        [value for pair in zip(fore_aft[:count], side_side[:count], strict=True) for value in pair]
-    )
+    return np.column_stack([fore_aft[:count], side_side[:count]]).ravel()

@@ -3,6 +3,7 @@
 import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import update_wrapper
 from hashlib import sha256
 from math import isfinite
 from types import CodeType, FunctionType, ModuleType
@@ -37,10 +38,7 @@ class LoadKernel(types.WrapperAddressProtocol):
 
     def __init__(self, function: Callable[..., None]) -> None:
         self.function = function
-        self.__module__ = function.__module__
-        self.__name__ = function.__name__
-        self.__qualname__ = function.__qualname__
-        self.__doc__ = function.__doc__
+        update_wrapper(self, function)
         without_jit = numba.config.DISABLE_JIT  # type: ignore[attr-defined] # set when numba starts
         self._compiled: Any = None if without_jit else _compiled(function)
 
@@ -56,10 +54,10 @@ class LoadKernel(types.WrapperAddressProtocol):
         self.function(parameters, motion, force)
 
     def __reduce__(self) -> str:
-        return self.__qualname__  # pickled by name, as functions are
+        return self.function.__qualname__  # pickled by name, as functions are
 
     def __repr__(self) -> str:
-        return f"<load kernel {self.__module__}.{self.__qualname__}>"
+        return f"<load kernel {self.function.__module__}.{self.function.__qualname__}>"
 
     def fingerprint(self) -> str:
         """Return a hash of the function's code and constants, identical in every process."""
@@ -229,14 +227,14 @@ def checked_loads(loads: Any, n_lines: int, planar: bool) -> tuple[Load, ...]:
     return listed
 
 
-def _rotation(roll, pitch, yaw):
+def _rotation(position):
     """Return the rotation matrix from body to inertial axes of 3-2-1 Euler angles."""
-    return Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
+    return Rotation.from_euler("ZYX", position[:2:-1]).as_matrix()
 
 
 def _motion(load, position, rate):
     """Return motion array of a state: six positions, and velocity and angular velocity in inertial axes."""
-    turn = _rotation(*position[3:])
+    turn = _rotation(position)
     arm = turn @ load.point
     axes = turn.T if load.axes == "body" else np.eye(3)
     motion = np.zeros(N_MOTION + load.states)
@@ -272,7 +270,7 @@ def _try(load, position, rate, planar):
             f"{where}: its kernel gave force = {force.tolist()}: must be {force.size} finite numbers"
         )
     if planar:
-        arm = _rotation(*position[3:]) @ load.point if load.axes == "inertial" else np.array(load.point)
+        arm = _rotation(position) @ load.point if load.axes == "inertial" else np.array(load.point)
         moment = force[3:6] + np.cross(arm, force[:3])
         out = max(abs(force[1]), abs(moment[0]) / 100.0, abs(moment[2]) / 100.0)  # over an arm of 100 m
         if out > IN_PLANE * np.abs(force[[0, 2]]).max():

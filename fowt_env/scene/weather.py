@@ -34,19 +34,11 @@ def build_air(wind, seed, turbine, rotor, shear, duration):
     """Return the air of a wind specification."""
     wind = wind_of(wind)
     hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
+    place = {"rotor_diameter": diameter, "shear_exponent": shear, "seed": seed, "duration": duration}
     if not is_field(wind):
-        series = build_wind(
-            wind,
-            reference_height=hub,
-            rotor_diameter=diameter,
-            shear_exponent=shear,
-            seed=seed,
-            duration=duration,
-        )
+        series = build_wind(wind, reference_height=hub, **place)
         return Air(wind, series, None, None if series is None else nominal_speed(wind))
-    box = read_box(
-        wind, hub_height=hub, rotor_diameter=diameter, shear_exponent=shear, seed=seed, duration=duration
-    )
+    box = read_box(wind, hub_height=hub, **place)
     speed = hub_speed(box, hub)
     like = {"reference_height": hub, "reference_length": diameter, "shear_exponent": 0.0}
     if not ROTORS[rotor].full_field:
@@ -64,7 +56,10 @@ def build_weather(wind, sea, seed, platform, turbine, rotor, options):
     if options["planar"]:
         air = _in_plane(air)
     state = sea_state_of(sea)
-    _check_sea(state, site.water_depth)
+    if state.height > site.water_depth:
+        raise InputError(
+            f"sea: wave height {state.height:g} m: must not exceed the water depth of {site.water_depth:g} m"
+        )
     if not options["hydrodynamics"]:
         return air, None
     waves = build_waves(
@@ -102,11 +97,3 @@ def _in_plane(air):
         )
     value[:, [1, 4]] = 0.0
     return air._replace(series=air.series._replace(value=value))
-
-
-def _check_sea(state, depth):
-    """Refuse a sea that does not fit into the water."""
-    if state.height > depth:
-        raise InputError(
-            f"sea: wave height {state.height:g} m: must not exceed the water depth of {depth:g} m"
-        )

@@ -27,37 +27,26 @@ def _turned(speed, angle, value):
     return value
 
 
-def operating_gust_speed(speed, turbulence_class, turbine_class, height, diameter):
-    """Return V_gust (m/s) of the extreme operating gust."""
-    scale = length_scale(height)
-    return min(
-        1.35 * (extreme_speed(turbine_class, 1) - speed),
-        3.3 * ntm_sigma(speed, turbulence_class) / (1.0 + 0.1 * diameter / scale),
-    )
-
-
 def operating_gust(speed, *, turbulence_class, turbine_class, height, diameter):
     """Return the extreme operating gust (EOG): dip, rise and dip of the speed within 10.5 s."""
     duration = 10.5
     time, value = _rows(duration)
-    gust = operating_gust_speed(speed, turbulence_class, turbine_class, height, diameter)
+    gust = min(
+        1.35 * (extreme_speed(turbine_class, 1) - speed),
+        3.3 * ntm_sigma(speed, turbulence_class) / (1.0 + 0.1 * diameter / length_scale(height)),
+    )
     value[:, 0] = speed - 0.37 * gust * np.sin(3.0 * pi * time / duration) * (
         1.0 - np.cos(2.0 * pi * time / duration)
     )
     return duration, value
 
 
-def direction_change_angle(speed, turbulence_class, height, diameter):
-    """Return theta_e (rad) of the extreme direction change."""
-    scale = length_scale(height)
-    return 4.0 * atan(ntm_sigma(speed, turbulence_class) / (speed * (1.0 + 0.1 * diameter / scale)))
-
-
 def direction_change(speed, *, turbulence_class, height, diameter, sign):
     """Return the extreme direction change (EDC): the wind turns by theta_e within 6 s and stays."""
     duration = 6.0
     time, value = _rows(duration)
-    angle = sign * direction_change_angle(speed, turbulence_class, height, diameter)
+    part = 1.0 + 0.1 * diameter / length_scale(height)
+    angle = sign * (4.0 * atan(ntm_sigma(speed, turbulence_class) / (speed * part)))
     return duration, _turned(speed, 0.5 * angle * (1.0 - np.cos(pi * time / duration)), value)
 
 
@@ -73,12 +62,6 @@ def coherent_gust(speed, *, sign):
     return duration, _turned(speed + rise * ramp, turn * ramp, value)
 
 
-def wind_shear_amplitude(speed, turbulence_class, height, diameter):
-    """Return linear shear (m/s over one rotor diameter) that the extreme wind shear adds, times 1 - cos."""
-    ratio = diameter / length_scale(height)
-    return 2.5 + 0.2 * 6.4 * ntm_sigma(speed, turbulence_class) * ratio**0.25
-
-
 def wind_shear(speed, *, turbulence_class, height, diameter, orientation, sign):
     """Return the extreme wind shear (EWS): a linear shear over the rotor that comes and goes in 12 s.
 
@@ -87,7 +70,8 @@ def wind_shear(speed, *, turbulence_class, height, diameter, orientation, sign):
     """
     duration = 12.0
     time, value = _rows(duration)
-    amplitude = sign * wind_shear_amplitude(speed, turbulence_class, height, diameter)
+    ratio = diameter / length_scale(height)
+    amplitude = sign * (2.5 + 0.2 * 6.4 * ntm_sigma(speed, turbulence_class) * ratio**0.25)
     value[:, 0] = speed
     value[:, 3 if orientation == "vertical" else 4] = amplitude * (1.0 - np.cos(2.0 * pi * time / duration))
     return duration, value

@@ -5,7 +5,7 @@ Turbines", PhD thesis, Stuttgart 2015; Guo, Schlipf, Cheng, Wind Energ. Sci. 8, 
 speed is divided by the cosine of its beam, the last measurements of all beams and distances are averaged,
 each advanced by its travel time at the mean wind, then filtered and buffered. Sources of error:
 - v and w in the line of sight, and the finite number of points in the disc;
-- averaging along the beam: Gaussian (pulsed) or Lorentzian (focused continuous wave);
+- averaging along the beam: Gaussian (pulsed) or Lorentzian (continuous wave);
 - evolution of the wind: squared coherence exp(-a sqrt((f d/V)^2 + (b d)^2)) of points d apart along the
   wind, a = 8.4 sigma/V + 0.05 with sigma^2 = sigma_u^2 + sigma_v^2 + sigma_w^2, b = 0.25 L^-1.24 and
   L = 8.1 Lambda_1 (m) (Simley and Pao, American Control Conference 2015, Eq. 7), its root multiplied with the
@@ -18,8 +18,7 @@ In a rotor-averaged wind R the estimate is L(f) = (S_RL/S_RR) R(f) + N(f) with n
 S_LL - |S_RL|^2/S_RR from a separate random stream. A box of wind is sampled along the beams and evolves in
 addition. Gusts, steps and user series are uniform over the disc and do not evolve.
 
-Omitted: induction zone, yaw misalignment, tilt of the beams with the platform, its drift and sideways motion,
-noise of the line-of-sight speed.
+Omitted: induction zone, yaw misalignment, tilt of the beams, drift and sideways motion, noise of the speed.
 """
 
 from bisect import bisect_left
@@ -329,10 +328,10 @@ def lidar_tuning(scene, preset="four_beam_pulsed", ahead=0.0):
     """
     lidar, place = _placed(scene, preset)
     last = len(lidar.distances) - 1
-    farthest = tuning(lidar, last, *place)
-    if ahead > farthest.horizon:
+    horizon = tuning(lidar, last, *place).horizon
+    if ahead > horizon:
         raise InputError(
-            f"preview_times: {ahead:g} s ahead: must be <= {max(farthest.horizon, 0.0):.3g} s, what the lidar"
+            f"preview_times: {ahead:g} s ahead: must be <= {max(horizon, 0.0):.3g} s, what the lidar"
             f" {lidar.name!r} knows at {place[0]:g} m/s"
         )
     first = bisect_left(range(last), True, key=lambda first: tuning(lidar, first, *place).horizon >= ahead)
@@ -344,7 +343,8 @@ def _placed(scene, preset):
     lidar = read_lidar(preset)
     if scene.model.aero is None:
         raise InputError(f"lidar {lidar.name!r}: needs a scene with wind to look ahead")
-    speed = mean_speed(scene)
+    # that convects gusts to the rotor
+    speed = float(scene.wind.speed if isinstance(scene.wind, WindBox) else scene.wind_speed)
     if speed < SLOWEST:
         raise InputError(f"lidar {lidar.name!r}: mean wind = {speed:g}: must be >= {SLOWEST:g} m/s")
     rotor = scene.turbine.rotor
@@ -355,11 +355,6 @@ def _placed(scene, preset):
             " of its shots: must be at most 90 %; mount it elsewhere (behind_rotor, above_shaft)"
         )
     return lidar, (speed, rotor.hub_height, _radius(scene), blocked)
-
-
-def mean_speed(scene):
-    """Return the mean wind (m/s) that convects gusts to the rotor."""
-    return float(scene.wind.speed if isinstance(scene.wind, WindBox) else scene.wind_speed)
 
 
 def _radius(scene):

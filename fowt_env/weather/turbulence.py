@@ -113,9 +113,9 @@ def amplitudes(speed, sigma, height, diameter, samples, step, average):
     inside = slice(1, (samples + 1) // 2)  # neither the mean nor, for even samples, the Nyquist bin
     for row, (length_ratio, sigma_ratio) in enumerate(zip(LENGTH_RATIO, SIGMA_RATIO, strict=True)):
         length = length_ratio * length_scale(height)
-        fraction = _kaimal_below(frequency[inside] + half_bin, speed, length) - _kaimal_below(
-            frequency[inside] - half_bin, speed, length
-        )
+        ends = (frequency[inside] + half_bin, frequency[inside] - half_bin)
+        above, below = (_kaimal_below(end, speed, length) for end in ends)
+        fraction = above - below
         variance[row, inside] = (sigma_ratio * sigma) ** 2 * fraction / fraction.sum()
     if average == "rotor":
         kr = coherence_wave_number(frequency, speed, height) * 0.5 * diameter
@@ -164,9 +164,8 @@ def turbulence(
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
     amplitude = amplitudes(speed, sigma, height, diameter, samples, step, average)
     used = 5 if average == "rotor" and shear_turbulence else 3
-    spectrum = np.empty((used, amplitude.shape[1]), dtype=np.complex128)
-    for row in range(used):
-        spectrum[row] = 0.5 * samples * amplitude[row] * _phasor(seed, row, amplitude.shape[1])
+    count = amplitude.shape[1]
+    spectrum = [0.5 * samples * amplitude[row] * _phasor(seed, row, count) for row in range(used)]
     return samples * step, _one_period(spectrum, samples, 5)
 
 
@@ -182,10 +181,10 @@ def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
     kr = coherence_wave_number(frequency, speed, height) * 0.5 * diameter
     shared = centre_average(kr) / np.sqrt(disk_average(kr))
     rest = np.sqrt(np.maximum(1.0 - shared**2, 0.0))
-    spectrum = np.empty(point.shape, dtype=np.complex128)
+    spectrum = []
     for row in range(3):
         common, own = (_phasor(seed, component, point.shape[1]) for component in (row, OWN_PHASES + row))
-        spectrum[row] = 0.5 * samples * point[row] * (shared * common + rest * own)
+        spectrum.append(0.5 * samples * point[row] * (shared * common + rest * own))
     return samples * step, _one_period(spectrum, samples, 3)
 
 

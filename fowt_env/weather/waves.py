@@ -39,16 +39,8 @@ def jonswap(omega, significant_height, peak_period, gamma):
     sigma = np.where(omega <= peak, 0.07, 0.09)
     shape = gamma ** np.exp(-((omega - peak) ** 2) / (2.0 * sigma**2 * peak**2))
     norm = 1.0 - 0.287 * np.log(gamma)
-    return (
-        norm
-        * 5.0
-        / 16.0
-        * significant_height**2
-        * peak**4
-        * omega**-5.0
-        * np.exp(-1.25 * (peak / omega) ** 4)
-        * shape
-    )
+    short = np.exp(-1.25 * (peak / omega) ** 4)
+    return norm * 5.0 / 16.0 * significant_height**2 * peak**4 * omega**-5.0 * short * shape
 
 
 def build_waves(sea, *, depth, density, gravity, seed, duration, components=None):
@@ -60,10 +52,8 @@ def build_waves(sea, *, depth, density, gravity, seed, duration, components=None
     if sea is None or sea.kind == "still":
         return None
     if sea.kind == "regular":
-        omega = np.array([2.0 * pi / sea.T])
-        amplitude = np.array([sea.H / 2.0])
-        phase = np.array([sea.phase])
-        heading = np.array([np.radians(sea.heading)])
+        values = (2.0 * pi / sea.T, sea.H / 2.0, sea.phase, np.radians(sea.heading))
+        omega, amplitude, phase, heading = (np.array([value]) for value in values)
     elif sea.kind == "components":
         omega = np.asarray(sea.omega, dtype=np.float64)
         amplitude = np.asarray(sea.amplitude, dtype=np.float64)

@@ -52,13 +52,6 @@ def _kernel_array(values):
     return np.require(values, np.float64, "CAW")
 
 
-def _of_kernel_types(series):
-    """Return a user's WindSeries with the types of every other one; unchanged if it has them."""
-    time, value, *numbers = series
-    typed = WindSeries(_kernel_array(time), _kernel_array(value), *map(float, numbers))
-    return series if all(map(operator.is_, typed, series)) else typed
-
-
 def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, duration):
     """Return the WindSeries of what a user requested, None for no aerodynamics at all.
 
@@ -74,7 +67,9 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
     if spec is None:
         return None
     if isinstance(spec, WindSeries):
-        return _of_kernel_types(spec)
+        time, value, *numbers = spec
+        typed = WindSeries(_kernel_array(time), _kernel_array(value), *map(float, numbers))
+        return spec if all(map(operator.is_, typed, spec)) else typed
     spec = read_wind(spec)
     height = check_in_range("reference_height", reference_height, 1.0, 1000.0, "m")
     diameter = check_in_range("rotor_diameter", rotor_diameter, 1.0, 1000.0, "m")
@@ -92,13 +87,16 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
         period, value = _turbulent(spec, height, diameter, seed, duration)
         time = _even_times(period, len(value))
     elif spec.kind == "series":
-        time, value = _given(spec)
+        columns = [spec[key] for key in ("speed", "v", "w", "vertical_shear", "horizontal_shear")]
+        time, zero = spec["time"], np.zeros(spec["time"].size)
+        value = np.stack([zero if column is None else column for column in columns], axis=1)
     elif spec.kind == "steps":
         time, value = _stepped(spec)
     else:
-        time, value = np.zeros(1), np.zeros((1, 5))
-        _blow(value, nominal_speed(spec), radians(spec["direction"]))
-        value[:, 2] = spec.values.get("vertical", 0.0)
+        speed, direction = nominal_speed(spec), radians(spec["direction"])
+        vertical = spec.values.get("vertical", 0.0)
+        time = np.zeros(1)
+        value = np.array([[speed * cos(direction), speed * sin(direction), vertical, 0.0, 0.0]])
     place = {"reference_height": height, "reference_length": diameter, "shear_exponent": exponent}
     return make_series(time, value, **place, period=period)
 
@@ -149,19 +147,6 @@ def _opening_mean(time, value, length=OPENING):
     return float(np.trapezoid(np.interp(nodes, time, value), nodes) / length)
 
 
-def _blow(value, speed, direction):
-    """Write a horizontal wind of some direction (rad, from +x towards +y) into the rows."""
-    value[:, 0] = speed * cos(direction)
-    value[:, 1] = speed * sin(direction)
-
-
-def _given(spec):
-    """Return the samples of a user's series."""
-    columns = [spec[key] for key in ("speed", "v", "w", "vertical_shear", "horizontal_shear")]
-    zero = np.zeros(spec["time"].size)
-    return spec["time"], np.stack([zero if column is None else column for column in columns], axis=1)
-
-
 def _stepped(spec):
     """Return the samples of a staircase: each speed lasts `every`, then ramps to the next; the last holds."""
     speeds = spec["speeds"]
@@ -182,12 +167,7 @@ def _turbulent(spec, height, diameter, seed, duration):
     drawn = _drawn(spec, height, diameter, seed, duration)
     period, value = turbulence(**drawn, average=spec["average"], shear_turbulence=spec["shear_turbulence"])
     value[:, 0] += drawn["speed"]
-    direction = radians(spec["direction"])
-    if direction != 0.0:
-        _turn(value, direction)
-        # of the gradients of the turned wind only the part that changes u along z and y can be carried
-        value[:, 3] *= cos(direction)
-        value[:, 4] *= cos(direction) ** 2
+    _turn(value, radians(spec["direction"]))
     return period, value
 
 
@@ -217,10 +197,15 @@ def _drawn(spec, height, diameter, seed, duration):
 
 
 def _turn(value, direction):
-    """Turn u and v of the rows by a direction (rad, from +x towards +y)."""
+    """Turn the rows by a direction (rad, from +x towards +y)."""
+    if direction == 0.0:
+        return
     along, across = value[:, 0].copy(), value[:, 1].copy()
     value[:, 0] = along * cos(direction) - across * sin(direction)
     value[:, 1] = along * sin(direction) + across * cos(direction)
+    # of the gradients of the turned wind only the part that changes u along z and y can be carried
+    value[:, 3:4] *= cos(direction)
+    value[:, 4:5] *= cos(direction) ** 2
 
 
 def drawn_turbulence(spec, *, reference_height, rotor_diameter, seed, duration):
@@ -247,8 +232,7 @@ def hub_series(spec, **arguments):
         return None
     period, value = hub_turbulence(**drawn)
     value[:, 0] += drawn["speed"]
-    if (direction := read_wind(spec)["direction"]) != 0.0:
-        _turn(value, radians(direction))
+    _turn(value, radians(read_wind(spec)["direction"]))
     return _even_times(period, len(value)), value
 
 

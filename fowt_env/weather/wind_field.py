@@ -105,13 +105,11 @@ def _from_arrays(values, hub_height, rotor_diameter, shear_exponent, seed, durat
     u, y, z = values["u"], _even("y", values["y"]), _even("z", values["z"])
     if u.shape[1:] != (z.size, y.size):
         raise InputError(f"wind.u has shape {u.shape}: must be (n_time, {z.size}, {y.size}), as z and y say")
-    velocity = np.zeros((*u.shape, 3), dtype=np.float32)
-    velocity[..., 0] = u
-    for index, key in ((1, "v"), (2, "w")):
-        if values[key] is not None:
-            if values[key].shape != u.shape:
-                raise InputError(f"wind.{key} has shape {values[key].shape}: must be that of u, {u.shape}")
-            velocity[..., index] = values[key]
+    parts = [u, *(np.zeros_like(u) if values[key] is None else values[key] for key in ("v", "w"))]
+    for key, part in zip("vw", parts[1:], strict=True):
+        if part.shape != u.shape:
+            raise InputError(f"wind.{key} has shape {part.shape}: must be that of u, {u.shape}")
+    velocity = np.stack(parts, axis=-1).astype(np.float32)
     return _box(velocity, y, z, values["dt"], values["speed"], values["periodic"], values["shift"])
 
 
@@ -221,17 +219,16 @@ def _average(field, hub_height, radius, weight, azimuths, value):
         value[i, 4] /= second
 
 
-def rotor_average(box, hub_height, rotor_diameter, weights="area", chord=None):
+def rotor_average(box, hub_height, rotor_diameter, chord=None):
     """Return (time, value): the box averaged over the rotor disk at X = 0, columns as in WindSeries.
 
-    value (n, 5): means of u, v, w over the disk, and the gradients of the plane that fits u best, per
-    rotor diameter. weights: "area", or "chord" with chord = (radius, chord) of the blade: each ring then
-    counts as chord times radius, as its contribution to the thrust does at a given rotor speed.
+    value (n, 5): means of u, v, w over the area, and the gradients of the plane that fits u best, per rotor
+    diameter. chord, (radius, chord) of the blade: each ring counts as chord times radius instead.
     """
     node, weight = np.polynomial.legendre.leggauss(DISK_RADII)
     radius = 0.25 * rotor_diameter * (node + 1.0)
     weight = weight * radius
-    if weights == "chord":
+    if chord is not None:
         weight = weight * np.interp(radius, *chord)
     field = box.field()
     value = np.zeros((box.velocity.shape[0], 5))

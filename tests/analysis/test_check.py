@@ -140,9 +140,8 @@ def test_the_added_mass_is_that_of_the_modes_own_frequency():
         added_mass_zero = None
 
     mass, spring = np.diag([9e6 + 1e6] * 3 + [1e9] * 3), np.diag([-1e5, -2e5, -5e6, -1e8, -2e8, -3e8])
-    period = _at_own_frequency(
-        "heave", 2.0 * pi * sqrt(1e7 / 5e6), np.eye(6), mass, spring, 0.0, 10.0, Potential
-    )
+    same = {"moved": np.eye(6), "slopes": spring, "height": 0.0, "arm": 10.0}
+    period = _at_own_frequency("heave", 2.0 * pi * sqrt(1e7 / 5e6), mass, Potential, same)
     omega = 2.0 * pi / period
     added = 4e6 - 3e6 * (omega - 0.1) / 1.9
     assert omega == pytest.approx(sqrt(5e6 / (9e6 + added)), rel=1e-6)

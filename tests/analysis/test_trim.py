@@ -205,10 +205,6 @@ NONSENSE = {  # key, value, wind, what becomes of it, words of its message
         "cm_depth", "-89.9155", None, "warned",
         ("unstable in", "platform pitch", "of mass is at z = 88.5 m", "cm_depth = -89.9155 m is positive"),
     ),
-    "lines far too short": (
-        "length", "500.0", None, "refused",
-        ("keel 45.3 m below the sea bed", "tower base 235 m under water", SHORT),
-    ),
     "lines too short": (
         "length", "800.0", None, "refused",
         ("keel 1.63 m below the sea bed", "tower base 192 m under water", SHORT, "800 m against 884.7 m"),
@@ -225,7 +221,6 @@ NONSENSE = {  # key, value, wind, what becomes of it, words of its message
         "wet_weight", "0.698094", None, "warned",
         ("pull with 2.91 kN together", "it weighs 79101 kN", "wet_weight 0.698094 N/m"),
     ),
-    "soft lines": ("EA", "1e3", None, "warned", (SLACK, "EA 1000 N")),
     "no lines": (
         "azimuth_deg", "[]", 18.0, "refused",
         ("nothing holds it in surge and sway: it has no mooring lines", "kN left in surge: rotor"),

@@ -8,7 +8,7 @@ from fowt_env.controllers.gains import (
     derived_gains,
     floating_frequency,
     land_frequency,
-    platform_pitch_frequency,
+    platform_frequency,
     power_slope,
     published_set,
     with_gains,
@@ -52,7 +52,7 @@ def test_the_gains_of_both_sets_are_near_the_published_ones(scene, nameless):
 
 def test_the_floating_loop_is_slower_than_the_platform(scene):
     assert floating_frequency(scene) == pytest.approx(0.2, rel=0.005)  # OC3-Hywind's
-    assert floating_frequency(scene) < platform_pitch_frequency(scene)
+    assert floating_frequency(scene) < platform_frequency(scene)
     assert land_frequency(scene.turbine) == pytest.approx(0.6, rel=1e-6)
 
 
@@ -106,5 +106,5 @@ def test_a_rotor_that_never_reaches_rated_torque_is_refused(scene):
 def test_on_a_tower_that_bends_the_platform_pitches_as_slowly():
     """With the mass of nacelle and rotor; radiation memory is held, which makes it 3 % quicker."""
     scene = build_scene("iea15_volturnus_s", wind=18.0, fidelity="fast", tower="modes")
-    period = 2.0 * np.pi / platform_pitch_frequency(scene)
+    period = 2.0 * np.pi / platform_frequency(scene)
     assert period == pytest.approx(scene.platform.published["natural_periods"]["pitch"], rel=0.05)

@@ -116,8 +116,7 @@ def frozen_gain():
 )
 def test_the_gain_formula_reproduces_the_published_gains(frequency, KP, KI):
     found = gains(frequency, 0.7, 43784725.0, 122.9096 / 97.0, 97.0, -25.52e6)
-    assert found.KP == pytest.approx(KP, rel=1e-4)
-    assert found.KI == pytest.approx(KI, rel=1e-4)
+    assert found == pytest.approx((KP, KI), rel=1e-4)
 
 
 @pytest.mark.parametrize(

@@ -136,8 +136,7 @@ def test_its_warnings_stay_out_of_sight(scene, capfd):
     controller = started(scene)
     for k in range(50):  # a rotor at a tenth of its speed: the wind estimator leaves its bounds
         controller.act(RATED._replace(time=0.1 * k, generator_speed=12.0, rotor_speed=0.12))
-    module = sys.modules[Rosco.__module__]
-    module._flush()(None)
+    controller.controller._library._flush(None)
     print("afterwards")
     assert capfd.readouterr().out == "afterwards\n"
 

@@ -29,7 +29,8 @@ def test_extreme_speeds_of_the_classes():
     ],
 )
 def test_operating_gust_speed(speed, gust):
-    assert gusts.operating_gust_speed(speed, "B", "I", 90.0, 126.0) == pytest.approx(gust, rel=1e-12)
+    _, value = gusts.operating_gust(speed, turbine_class="I", **SITE)
+    assert value[:, 0].max() - speed == pytest.approx(0.74 * gust, rel=1e-12)
 
 
 def test_operating_gust_dips_rises_and_returns():

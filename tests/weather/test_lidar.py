@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from naive.lidar import field, last_values, rotor_and_lidar
+from naive.preview import add_motion
 from naive.turbulence import disk_grid
 from scipy.signal import lfilter
 
 from fowt_env import build_scene
 from fowt_env.descriptions.iec import ntm_sigma
-from fowt_env.descriptions.lidar import Lidar, lidars, read_lidar
+from fowt_env.descriptions.lidar import Lidar, read_lidar
 from fowt_env.errors import InputError
 from fowt_env.weather import lidar as lidar_module
 from fowt_env.weather.lidar import (
@@ -32,7 +33,7 @@ from fowt_env.weather.lidar import (
     shares,
     tuning,
 )
-from fowt_env.weather.preview import Preview, add_motion, exact_preview
+from fowt_env.weather.preview import Preview, exact_preview
 from fowt_env.weather.turbulence import (
     LENGTH_RATIO,
     SIGMA_RATIO,
@@ -532,19 +533,7 @@ def test_motion_gets_into_the_preview_as_it_gets_into_beams():
     np.testing.assert_allclose(formula[settled], added[settled], atol=0.02)
 
 
-def test_an_exact_preview_does_not_mind_the_motion():
-    preview = exact_preview(scene_in(), (0.0, 2.0))
-    time = np.arange(0.0, 100.0, 0.1)
-    found = add_motion(preview, time, np.sin(time))
-    assert np.array_equal(found, [np.interp(time, preview.time, value) for value in preview.values])
-
-
 # ---- what may be asked
-
-
-def test_built_in_lidars_say_where_their_figures_come_from():
-    assert set(lidars()) == set(PRESETS)
-    assert all("IEAWindTask52" in lidar.source or "as above" in lidar.source for lidar in lidars().values())
 
 
 @pytest.mark.parametrize(
@@ -582,14 +571,11 @@ def test_a_lidar_of_the_users_own_is_read_from_a_file(tmp_path):
         read_lidar("four_beam")
 
 
-def test_scenes_without_wind_or_with_next_to_none_are_refused():
+def test_scenes_without_wind_and_lidars_that_look_through_the_hub_are_refused():
     for wind, words in ((None, "needs a scene with wind"), (0.5, "mean wind = 0.5: must be >= 1 m/s")):
         scene = build_scene("oc3_hywind", wind=wind, duration=60.0, fidelity="fast")
         with pytest.raises(InputError, match=words):
             lidar_preview(scene, (1.0,))
-
-
-def test_a_lidar_that_looks_through_the_hub_is_refused():
     blind = remade("four_beam_pulsed", name="blind", above_shaft=0.0, behind_rotor=0.5)
     with pytest.raises(InputError, match="'blind': the blades of .* take away 100 % of its shots"):
         lidar_preview(scene_in(), (1.0,), blind)

@@ -36,9 +36,7 @@ def hub_wind(t, series):
 
 
 def test_absent_wind_is_exactly_zero():
-    assert build(None) is None
-    assert wind_now(3.0, None) == NO_WIND
-    assert wind_at(3.0, 0.0, 0.0, 90.0, NO_WIND, None, None) == (0.0, 0.0, 0.0)
+    assert build(None) is None and wind_now(3.0, None) == NO_WIND
     assert hub_wind(3.0, None) == (0.0, 0.0, 0.0)
 
 
@@ -54,13 +52,10 @@ def test_interpolation_equals_that_of_numpy(uniform):
         np.testing.assert_allclose(wind_now(t, series), wanted, rtol=0.0, atol=1e-11)
 
 
-def test_not_a_number_of_time_stays_inside_the_series():
+def test_not_a_number_of_time_stays_inside_the_series_and_one_sample_is_constant_wind():
     series = series_of(np.arange(4.0), np.ones((4, 5)))
     assert wind_now(np.nan, series).u == 1.0
     assert wind_now(np.nan, series._replace(period=3.0)).u == 1.0
-
-
-def test_one_sample_is_constant_wind():
     series = series_of([5.0], [[11.0, 1.0, 2.0, 3.0, 4.0]])
     assert {wind_now(t, series) for t in (-1.0, 5.0, 100.0)} == {(11.0, 1.0, 2.0, 3.0, 4.0)}
 
@@ -97,10 +92,8 @@ def test_points_at_and_below_the_water_see_the_lowest_wind():
 def test_linear_shears_add_their_speed_over_one_reference_length():
     series = series_of([0.0], [[10.0, 0.0, 0.0, 6.0, 4.0]], shear_exponent=0.0)
     now = wind_now(0.0, series)
-    assert wind_at(0.0, 0.0, 0.0, 90.0 + 63.0, now, series, None)[0] == pytest.approx(13.0)
-    assert wind_at(0.0, 0.0, 0.0, 90.0 - 63.0, now, series, None)[0] == pytest.approx(7.0)
-    assert wind_at(0.0, 0.0, 63.0, 90.0, now, series, None)[0] == pytest.approx(12.0)
-    assert wind_at(0.0, 0.0, -63.0, 90.0, now, series, None)[0] == pytest.approx(8.0)
+    for y, z, u in ((0.0, 63.0, 13.0), (0.0, -63.0, 7.0), (63.0, 0.0, 12.0), (-63.0, 0.0, 8.0)):
+        assert wind_at(0.0, 0.0, y, 90.0 + z, now, series, None)[0] == pytest.approx(u)
 
 
 # --- kinds of wind
@@ -140,6 +133,7 @@ def test_steps_hold_then_ramp():
 
 @pytest.mark.parametrize("kind", GUSTS)
 def test_gusts_wait_for_their_start_and_end_as_the_standard_says(kind):
+    assert build({"kind": kind, "speed": 12.0}).time[0] == 60.0
     series = build({"kind": kind, "speed": 12.0, "start": 20.0})
     calm = (12.0, 0.0, 0.0, 0.0, 0.0)
     assert wind_now(0.0, series) == wind_now(20.0, series) == calm
@@ -150,11 +144,6 @@ def test_gusts_wait_for_their_start_and_end_as_the_standard_says(kind):
     else:
         turn, speed = np.arctan2(end.v, end.u), np.hypot(end.u, end.v)
         assert turn > 0.4 and speed == pytest.approx(12.0 if kind == "edc" else 27.0)
-
-
-def test_gust_starts_after_a_minute_unless_told():
-    series = build({"kind": "eog", "speed": 12.0})
-    assert series.time[0] == 60.0 and series.time[-1] == pytest.approx(70.5)
 
 
 def test_horizontal_extreme_shear_acts_across_the_rotor():
@@ -225,12 +214,6 @@ def test_turbulence_lasts_at_least_as_long_as_asked():
         assert max(600.0, duration) <= series.period < 1.1 * max(600.0, duration)
         assert series.time[-1] == pytest.approx(series.period) and series.inverse_step == pytest.approx(10.0)
     assert build({"kind": "ntm", "speed": 12.0, "period": 1200.0}).period == pytest.approx(1200.0)
-
-
-def test_turbulence_of_one_length_shares_its_times_but_not_its_values():
-    one, other = (build({"kind": "ntm", "speed": 18.0, "class": "B"}, seed=seed) for seed in (1, 2))
-    assert one.time is other.time
-    assert not np.array_equal(one.value, other.value)
 
 
 def test_turned_turbulence_is_the_same_wind_along_its_own_axes():
@@ -307,9 +290,7 @@ def test_mean_of_turbulence_is_its_nominal_wind():
     assert wind_now(123.0, mean) == pytest.approx(wanted, abs=1e-9)
     assert nominal_speed(series) == pytest.approx(16.0, rel=1e-9)
     assert mean_wind(None) is None
-
-
-def test_mean_of_a_gust_is_the_wind_before_it():
+    # of a gust it is the wind before
     assert wind_now(0.0, mean_wind(build({"kind": "ecd", "speed": 12.0}))).u == pytest.approx(12.0, rel=1e-12)
 
 
@@ -321,28 +302,23 @@ def test_mean_of_a_gust_is_the_wind_before_it():
     [
         (-1.0, "wind = -1.0 [0, 100] m/s"),
         (float("nan"), "wind = nan [0, 100]"),
-        (float("inf"), "wind = inf"),
         (True, "wind = True number"),
         ("18 m/s", "wind = '18 m/s' KIND:SPEED ntm bts box mann"),
         ([18.0, 19.0], "wind KIND:SPEED"),
         ({"speed": 18.0}, "wind.kind missing steady"),
         ({"kind": "steedy", "speed": 18.0}, "'steedy' Did you mean 'steady'"),
-        ({"kind": 3}, "wind.kind 3 steady"),
         ({"kind": "steady"}, "wind.speed missing"),
         ({"kind": "steady", "sped": 18.0}, "wind.sped Did you mean 'speed'"),
         ({"kind": "steady", "speed": -2.0}, "wind.speed = -2.0 [0, 100] m/s"),
         ({"kind": "steady", "speed": "fast"}, "wind.speed = 'fast' number"),
-        ({"kind": "steady", "speed": None}, "wind.speed = None number"),
         ({"kind": "steady", "speed": 8.0, "direction": 400.0}, "wind.direction = 400.0 [-180, 180] deg"),
         ({"kind": "steady", "speed": 8.0, "shear_exponent": 1.5}, "wind.shear_exponent = 1.5 [0, 1]"),
         ({"kind": "steady", "speed": 8.0, "vertical": np.nan}, "wind.vertical = nan"),
         ({"kind": "series", "time": [], "speed": []}, "wind.time (0,) at least one"),
         ({"kind": "series", "time": [[0.0]], "speed": [1.0]}, "wind.time (1, 1)"),
         ({"kind": "series", "time": [0.0, 1.0], "speed": [1.0]}, "wind.speed 1 values 2"),
-        ({"kind": "series", "time": [0.0, 1.0], "speed": [1.0, 2.0], "w": [1.0]}, "wind.w 1 values 2"),
         ({"kind": "series", "time": [0.0, 1.0], "speed": [1.0, -2.0]}, "wind.speed[1] = -2.0 [0, 100]"),
         ({"kind": "series", "time": [0.0, 1.0], "speed": [1.0, np.nan]}, "wind.speed[1] = nan"),
-        ({"kind": "series", "time": [0.0, np.nan], "speed": [1.0, 1.0]}, "wind.time[1] = nan"),
         (
             {"kind": "series", "time": [0.0, 1.0, 1.0], "speed": [1, 1, 1]},
             "wind.time[2] = 1.0 strictly increasing",
@@ -356,17 +332,13 @@ def test_mean_of_a_gust_is_the_wind_before_it():
         ({"kind": "edc", "speed": 0.0}, "wind.speed = 0.0 [1, 100]"),
         ({"kind": "edc", "speed": 12.0, "start": -1.0}, "wind.start = -1.0"),
         ({"kind": "ecd", "speed": 12.0, "sign": 2}, "wind.sign = 2 1, -1"),
-        ({"kind": "ecd", "speed": 12.0, "sign": True}, "wind.sign = True 1, -1"),
         ({"kind": "ews", "speed": 12.0, "orientation": "horizontl"}, "Did you mean 'horizontal'"),
         ({"kind": "eog", "speed": 12.0, "turbine_class": "IV"}, "wind.turbine_class 'IV' I, II, III"),
         ({"kind": "ntm", "speed": 0.0}, "wind.speed = 0.0 [1, 100]"),
         ({"kind": "ntm", "speed": 12.0, "class": "D"}, "wind.class 'D' A, A+, B, C"),
         ({"kind": "ntm", "speed": 12.0, "sigma": "free"}, "wind.sigma 'free' 90%, drawn"),
-        ({"kind": "ntm", "speed": 12.0, "sigma": 2.0}, "wind.sigma = 2.0 90%, drawn"),
         ({"kind": "etm", "speed": 12.0, "sigma": "drawn"}, "wind.sigma unknown key"),
-        ({"kind": "ntm", "speed": 12.0, "class": 1}, "wind.class = 1 A+, A, B, C"),
         ({"kind": "ntm", "speed": 12.0, "seed": -1}, "wind.seed = -1 >= 0"),
-        ({"kind": "ntm", "speed": 12.0, "seed": 1.5}, "wind.seed = 1.5 whole"),
         ({"kind": "ntm", "speed": 12.0, "average": "disc"}, "wind.average 'disc' rotor, point"),
         ({"kind": "ntm", "speed": 12.0, "shear_turbulence": 1}, "wind.shear_turbulence = 1 True or False"),
         ({"kind": "ntm", "speed": 12.0, "period": 80.0}, "wind.period = 80.0 duration 100"),

@@ -89,7 +89,7 @@ def test_rotor_average_finds_mean_and_gradients_of_a_plane():
     assert value[:, 0] == pytest.approx(12.0, abs=1e-5)
     assert value[:, 3] == pytest.approx(0.02 * DIAMETER, abs=1e-5)
     assert value[:, 4] == pytest.approx(-0.01 * DIAMETER, abs=1e-5)
-    assert rotor_average(box, HUB, DIAMETER, "chord", ([1.0, 63.0], [4.0, 1.0]))[1][:, 0] == pytest.approx(
+    assert rotor_average(box, HUB, DIAMETER, ([1.0, 63.0], [4.0, 1.0]))[1][:, 0] == pytest.approx(
         12.0, abs=1e-5
     )
 

@@ -70,7 +70,7 @@ def _disk(study):
     blade = (np.asarray(turbine.blade.radius), np.asarray(turbine.blade.chord))
     box = read_box(box_wind(study.folder, study.bts), hub_height=hub, rotor_diameter=diameter)
     time, value = rotor_average(box, hub, diameter)
-    _, chord = rotor_average(box, hub, diameter, "chord", blade)
+    _, chord = rotor_average(box, hub, diameter, chord=blade)
     keys = ("speed", "v", "w", "vertical_shear", "horizontal_shear")
     spec = {"kind": "series", "time": time, **dict(zip(keys, value.T, strict=True)), "shear_exponent": 0.0}
     return {"hub": hub, "diameter": diameter, "box": box, "value": value, "chord": chord, "spec": spec}

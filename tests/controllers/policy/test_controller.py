@@ -163,7 +163,7 @@ def test_files_that_are_no_policies_are_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         make(f"policy:{tmp_path}/text.npz", TURBINE, 0.1)
     path = write_random_policy(tmp_path / "future.npz", format=2)
-    with pytest.raises(InputError, match="format 2: must be 1"):
+    with pytest.raises(InputError, match="format = 2: must be one of 1"):
         make(f"policy:{path}", TURBINE, 0.1)
     path = write_random_policy(tmp_path / "wide.npz", observation=["rotor_speed"])
     with pytest.raises(InputError, match="9 inputs: its observation has 3"):
