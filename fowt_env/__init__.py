@@ -33,33 +33,26 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
 
 __version__ = "0.2.0"
 
-_PUBLIC = {
-    "build_scene": "fowt_env.scene.build",
-    "Scene": "fowt_env.scene.scene",
-    "trim": "fowt_env.analysis.trim",
-    "OperatingPoint": "fowt_env.analysis.trim",
-    "simulate": "fowt_env.run.simulation",
-    "linearize": "fowt_env.analysis.linear_model",
-    "natural_periods": "fowt_env.analysis.linear_model",
-    "Measurement": "fowt_env.plant.measurement",
-    "Load": "fowt_env.scene.user_loads",
-    "Force": "fowt_env.plant.user_loads",
-    "Motion": "fowt_env.plant.user_loads",
-    "load_kernel": "fowt_env.scene.user_loads",
-    "set_quiet": "fowt_env.plant.compile.notice",
-    "InputError": "fowt_env.errors",
-    "SimulationStopped": "fowt_env.errors",
-    "PlantWarning": "fowt_env.errors",
-    "ControllerError": "fowt_env.errors",
+_MODULES = {  # the same: module -> its public names
+    "analysis.linear_model": ("linearize", "natural_periods"),
+    "analysis.trim": ("OperatingPoint", "trim"),
+    "errors": ("ControllerError", "InputError", "PlantWarning", "SimulationStopped"),
+    "plant.compile.notice": ("set_quiet",),
+    "plant.measurement": ("Measurement",),
+    "plant.user_loads": ("Force", "Motion"),
+    "run.simulation": ("simulate",),
+    "scene.build": ("build_scene",),
+    "scene.scene": ("Scene",),
+    "scene.user_loads": ("Load", "load_kernel"),
 }
+_PUBLIC = {name: module for module, names in _MODULES.items() for name in names}
 __all__ = sorted(_PUBLIC)
 
 
 def __getattr__(name: str) -> Any:
     if name in _PUBLIC:
-        value = getattr(import_module(_PUBLIC[name]), name)
-        globals()[name] = value
-        return value
+        globals()[name] = getattr(import_module(f"fowt_env.{_PUBLIC[name]}"), name)
+        return globals()[name]
     raise AttributeError(f"module 'fowt_env' has no attribute {name!r}")
 
 

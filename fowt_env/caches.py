@@ -1,8 +1,7 @@
 """What is computed once and kept in memory: every such cache is bounded, and clear_caches empties them all.
 
-Kept are values that follow from their keys alone and are never written to: tables of blades, trims, design
-models, spectra. So a value that was dropped costs its computation again and changes no figure. Not among them
-is what plant/compile keeps of this package's own sources, a hash of each.
+Kept are values that follow from their keys alone and are never written to, so that dropping one changes no
+figure. Not among them are the hashes that plant/compile keeps of this package's own sources.
 """
 
 from collections import OrderedDict
@@ -51,8 +50,7 @@ def cached(size):
 def clear_caches() -> None:
     """Forget what this process computed and keeps in memory: tables, trims, designs, spectra.
 
-    Frees their memory, such as after many turbines or platforms; what is asked for next is computed anew,
-    with the same bits. Compiled kernels stay.
+    What is asked for next is computed anew, with the same bits. Compiled kernels stay.
     """
     for cache in _CACHES:
         cache.cache_clear()

@@ -9,8 +9,7 @@ NUMBER = 'style="text-align:right;padding:0.15em 0.8em 0.15em 0"'
 def html_table(title, headings, rows):
     """HTML of a table: a title, headings (or none) and rows of texts and numbers, everything escaped.
 
-    Numbers stand to the right with four significant digits. There is no style beyond alignment, so that the
-    notebook's own colours hold, light or dark.
+    Numbers stand to the right with four significant digits. The colours are the notebook's own.
     """
     head = f"<tr>{''.join(f'<th {CELL}>{escape(text)}</th>' for text in headings)}</tr>" if headings else ""
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)

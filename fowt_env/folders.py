@@ -13,9 +13,8 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 def user_folder(own, base, usual):
     """Return the folder that the variable own names; else fowt_env in that of base, or in usual at home.
 
-    A "~" at the beginning is the home folder, which no shell has put there in a Dockerfile or an .env file. A
-    path that is not absolute begins at the working folder; in base it counts for nothing, as the XDG
-    specification has it. None for a user without a home.
+    A "~" at the beginning is the home folder. A path that is not absolute begins at the working folder; in
+    base it counts for nothing, as the XDG specification has it. None for a user without a home.
     """
     given, shared = os.environ.get(own), os.environ.get(base)
     try:

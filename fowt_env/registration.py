@@ -14,14 +14,7 @@ VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # of each of them
 
 def register_environments():
     """Add the names to Gymnasium's registry, each once however often this is called."""
-    for name, entry_point in ENVIRONMENTS.items():
+    for name, entry_point in (ENVIRONMENTS | dict.fromkeys(OTHER_PLATFORMS, ENTRY_POINT)).items():
         if name not in registry:
-            register(id=name, entry_point=entry_point, vector_entry_point=VECTOR_ENTRY_POINT)
-    for name, platform in OTHER_PLATFORMS.items():
-        if name not in registry:
-            register(
-                id=name,
-                entry_point=ENTRY_POINT,
-                vector_entry_point=VECTOR_ENTRY_POINT,
-                kwargs={"platform": platform},
-            )
+            settings = {"platform": OTHER_PLATFORMS[name]} if name in OTHER_PLATFORMS else {}
+            register(name, entry_point, vector_entry_point=VECTOR_ENTRY_POINT, kwargs=settings)

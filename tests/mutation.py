@@ -181,7 +181,7 @@ class Samples:
     def _winds(self):
         from openfast_io.turbsim_file import TurbSimFile
 
-        from fowt_env.training.cli.arguments import parse_wind
+        from fowt_env.descriptions.wind import wind_of
         from fowt_env.weather.wind import build_wind
         from fowt_env.weather.wind_field import read_box
 
@@ -212,7 +212,7 @@ class Samples:
             else:
                 wind.write_text("! time speed dir w hshr exp vshr gust\n" + rows)
             ways = BINARY if name.endswith(".parquet") else TEXT
-            self.add(f"wind {name}", wind, ways, lambda wind=wind: build_wind(parse_wind(str(wind)), **rotor))
+            self.add(f"wind {name}", wind, ways, lambda wind=wind: build_wind(wind_of(str(wind)), **rotor))
 
     def _outputs(self):
         from fowt_env.files.openfast import read_outb, write_outb

@@ -74,24 +74,18 @@ def test_the_statistics_that_the_readme_shows_are_those_of_its_program():
         assert abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(b.partition(".")[2]), again
 
 
-@pytest.mark.parametrize("page", ["index.md", "reference/environment.md"])
-def test_every_block_of_a_page_runs(folder, page):
-    found = blocks(page)
-    assert found
-    run_blocks(found, folder)
-
-
+WHOLE = ("index.md", "reference/environment.md")
 PROGRAMS = ("guides/from-control-design.md", "guides/from-gymnasium.md", "tutorials/first-agent.md")
 
 
-@pytest.mark.parametrize("page", PROGRAMS)
+@pytest.mark.parametrize("page", WHOLE + PROGRAMS)
 def test_every_program_of_a_page_runs(folder, page):
-    """Its commands train agents and evaluate, which others test."""
+    """And the commands of some; those of others train agents and evaluate, which others test."""
     if page == "guides/from-control-design.md":
         pytest.importorskip("control", reason="the extra `design` is missing")
-    programs = [block for block in blocks(page) if block.language in ("python", "text")]
-    assert len(programs) > 1
-    run_blocks(programs, folder)
+    chosen = [block for block in blocks(page) if page in WHOLE or block.language in ("python", "text")]
+    assert chosen
+    run_blocks(chosen, folder)
 
 
 @pytest.mark.parametrize("page", ["tutorials/getting-started.md", "guides/faq.md", "index.md"])

@@ -157,14 +157,7 @@ REFUSED = {  # mistake: (what is done with a scene, error, what the answer has t
         "Did you mean 'Hs' Did you mean 'Tp'",
     ),
     "no period": (built(sea={"kind": "jonswap", "Hs": 4}), InputError, "Tp is missing"),
-    "fidelity": (built(fidelity="x"), InputError, "fidelity 'x' fast, reference, standard"),
-    "seed": (built(seed=-1), InputError, "seed = -1 >= 0"),
     "option": (built(foo=1), InputError, "option of build_scene 'foo'"),
-    "platform": (
-        lambda scene: fowt_env.build_scene("oc3_hywnd", fidelity="reference"),
-        InputError,
-        "'oc3_hywnd' 'oc3_hywind'",
-    ),
     "task": (environment(task="x"), InputError, "task 'x' above_rated"),
     "reward term": (environment(reward={"x": 1}), InputError, "'x' failure"),
     "observation": (environment(observation=["x"]), InputError, "'x' Nearest of"),
@@ -196,12 +189,6 @@ WARNED = {  # mistake: (what is done, what the warning has to say)
     "regular breaking waves": (built(sea="regular:4:4"), "H = 4 m T = 4 s steepness of 0.16"),
     "above cut-out": (built(wind="ntm:30:B"), "30 m/s above cut-out wind of 25 m/s"),
     "below cut-in": (built(wind=2.0), "2 m/s below cut-in wind of 3 m/s"),
-}
-TAKEN = {  # what a newcomer tries and what works: a wind or a sea, and what it stands for
-    "ntm:18:B": ("wind", {"kind": "ntm", "speed": 18.0, "class": "B"}),
-    "18": ("wind", 18.0),
-    "jonswap:4:9": ("sea", "jonswap:4:9"),
-    "regular:3:5": ("sea", "regular:3:5"),
 }
 
 
@@ -240,13 +227,3 @@ def test_what_can_hardly_be_meant_is_warned_of_once(mistake, scene, monkeypatch)
         do(scene)
     texts = [str(warning.message) for warning in caught if warning.category is PlantWarning]
     assert len([text for text in texts if said(text, words)]) == 1, texts
-
-
-@pytest.mark.parametrize("text", TAKEN)
-def test_texts_of_the_command_line_are_winds_and_seas_in_python(text):
-    key, meant = TAKEN[text]
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        scene = fowt_env.build_scene("oc3_hywind", fidelity="standard", **{key: text})
-    assert getattr(scene, key) == meant
-    assert scene.model.aero is not None or scene.model.hydro.waves is not None

@@ -5,12 +5,12 @@ import pandas as pd
 import pytest
 
 import fowt_env
+from fowt_env.descriptions.wind import wind_of
 from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
 from fowt_env.files.openfast import read_outb, write_outb
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.plant.aero.wind import wind_at, wind_now
-from fowt_env.training.cli.arguments import parse_wind
 from fowt_env.training.evaluation.metrics import damage_equivalent_load
 from fowt_env.weather.wind import build_wind
 
@@ -81,7 +81,7 @@ def test_a_wind_file_is_an_argument_of_the_command_line_and_drives_a_scene(tmp_p
     path = write(tmp_path, "! time speed ...\n" + STILL + "100.0 12.0 0 0 0 0 0 0 ! the end\n")
     path = path.rename(tmp_path / "wind.hh")
     frame = fowt_env.simulate(
-        fowt_env.build_scene(wind=parse_wind(str(path)), rotor="table", fidelity="reference"), duration=2.0
+        fowt_env.build_scene(wind=wind_of(str(path)), rotor="table", fidelity="reference"), duration=2.0
     )
     np.testing.assert_allclose(frame["Wind1VelX_[m/s]"], 12.0)
 
@@ -109,7 +109,7 @@ def test_wind_files_that_a_series_cannot_hold_are_named(tmp_path, text, message)
 
 def test_a_missing_wind_file_is_named(tmp_path):
     with pytest.raises(InputError, match="none.wnd"):
-        parse_wind(str(tmp_path / "none.wnd"))
+        wind_of(str(tmp_path / "none.wnd"))
 
 
 @pytest.fixture(scope="module")

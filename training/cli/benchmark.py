@@ -10,24 +10,11 @@ from typer import Option
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_names
-from fowt_env.training.cli.console import (
-    app,
-    command,
-    from_a_clone,
-    note,
-    out,
-    output,
-    progress_bar,
-    show,
-    text_first,
-)
-from fowt_env.training.cli.options import CsvOption, FolderOption, PlotsOption, SuiteOption
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli.console import add_group, command, from_a_clone, progress_bar, text_progress, wrote
+from fowt_env.training.cli.options import WHOLE, CsvOption, FolderOption, PlotsOption, SuiteOption
+from fowt_env.training.cli.tables import out, print_table, show
 
-benchmarks = typer.Typer(
-    no_args_is_help=True, rich_markup_mode="rich", help="Measure speed, accuracy and stability."
-)
-app.add_typer(benchmarks, name="benchmark")
+benchmarks = add_group("benchmark", "Measure speed, accuracy and stability.")
 ScenesOption = Annotated[str, Option(help="Platform of the scenes.")]
 
 
@@ -41,12 +28,11 @@ def compile_command(out_path: CsvOption = "results/benchmark/compile.csv"):
     from fowt_env.training.benchmarks import compile_time
     from fowt_env.training.benchmarks import speed as bench
 
-    output(out_path)
-    with progress_bar("compiling", None) as update:
-        table = compile_time.session(progress=text_first(update))
+    with text_progress("compiling") as progress:
+        table = compile_time.session(progress=progress)
     rows = [(row.scene, f"{row.seconds:.1f}", f"{row.processor_seconds:.1f}") for row in table.itertuples()]
-    print_table(out, ("scene", "s", "processor s"), rows, "first run of each kind of scene")
-    note(f"wrote {bench.write_csv(table, out_path)}")
+    print_table(("scene", "s", "processor s"), rows, "first run of each kind of scene")
+    wrote(bench.write_csv(table, out_path))
 
 
 @command(benchmarks)
@@ -68,23 +54,21 @@ def speed(
     """
     from fowt_env.training.benchmarks import speed as bench
 
-    names = None if kinds is None else [name.strip() for name in kinds.split(";") if name.strip()]
-    output(out_path)
-    with progress_bar("benchmark", None) as update:
-        progress = text_first(update, "timing: ")
+    with text_progress("benchmark", "timing: ") as progress:
+        names = parse_names(kinds, ";")
         table = bench.speed(names, seconds, repeats, progress=progress, platform=platform)
         times = bench.start_times() if starts else {}
-    rows = [(column, *map(figure, table[column])) for column in table.columns.drop(["kind", "absent"])]
-    print_table(out, ("", *table["kind"]), rows, "CPU time of one thread")
+    rows = [(column, *table[column]) for column in table.columns.drop(["kind", "absent"])]
+    print_table(("", *table["kind"]), rows, "CPU time of one thread")
     remarks = [f"{name}: {value:.2f}" for name, value in times.items()]
     for line in remarks:
-        out.print(line, highlight=False)
-    note(f"wrote {bench.write_csv(table, out_path, remarks)}")
+        out.print(line)
+    wrote(bench.write_csv(table, out_path, remarks))
 
 
 @command(benchmarks)
 def accuracy(
-    seeds: Annotated[str, Option(help="1,2,3 or 1:6:1 (6 included).")] = "1,2,3",
+    seeds: Annotated[str, Option(help=f"{WHOLE}.")] = "1,2,3",
     duration: Annotated[float, Option(help="Length of each run, s.")] = 600.0,
     finest: Annotated[float, Option(help="Step of the reference, s.")] = 0.00625,
     axes: Annotated[str | None, Option(help="Axes of the sweep, comma-separated; default: all.")] = None,
@@ -110,14 +94,14 @@ def accuracy(
     from fowt_env.training.validation.openfast_cases import box_wind
 
     chosen = None if axes is None else study.select(parse_names(axes))
-    folder = Path(output(out_folder, folder=True))
+    folder = Path(out_folder)
     name = "accuracy" if platform == study.PLATFORM else f"accuracy_{platform}"
     if box and platform != study.PLATFORM:
         raise InputError(
             f"--box: the stored box is {study.PLATFORM}'s; leave it out for platform {platform!r}"
         )
     numbers = parse_whole_numbers(seeds, "seeds")
-    with progress_bar("accuracy", None) as update:
+    with text_progress("accuracy") as progress:
         table = study.accuracy(
             numbers,
             duration,
@@ -126,7 +110,7 @@ def accuracy(
             folder / f"{name}.csv",
             wind=box_wind() if box else None,
             repeats=repeats,
-            progress=text_first(update),
+            progress=progress,
             platform=platform,
         )
     rows = [
@@ -138,7 +122,7 @@ def accuracy(
     ]
     headings = ("variant", "worst", "of", "x real time", "kernel alone", "Pareto front")
     title = "rms difference over standard deviation, and speed of simulate"
-    print_table(out, headings, rows, title, left=(0, 2))
+    print_table(headings, rows, title, left=(0, 2))
     files = [folder / f"{name}.csv"]
     if plot:
         files.append(folder / f"{name}.png")
@@ -147,7 +131,7 @@ def accuracy(
             its_platform = Path(beside).stem.removeprefix("accuracy").removeprefix("_") or study.PLATFORM
             other = (its_platform, study.read_accuracy(beside))
         study.plot_accuracy(table, files[-1], openfast=platform == study.PLATFORM, beside=other)
-    note("wrote " + ", ".join(map(str, files)))
+    wrote(*files)
 
 
 @command(benchmarks)
@@ -169,14 +153,13 @@ def evaluation(
     from fowt_env.training.benchmarks import evaluation as study
     from fowt_env.training.benchmarks import speed as bench
 
-    output(out_path)
-    with progress_bar("timing runs", None):
+    with progress_bar("timing runs"):
         table = study.evaluation_cost(count, suite, controller)
         tables = [table, study.ray_cost(controller=controller, suite=suite)] if with_ray else [table]
     for frame in tables:
         show(frame)
     remarks = [f"{row[0]}: {row[1]:.4g} ms" for frame in tables[1:] for row in frame.itertuples(index=False)]
-    note(f"wrote {bench.write_csv(table, out_path, remarks)}")
+    wrote(bench.write_csv(table, out_path, remarks))
 
 
 @command(benchmarks)
@@ -208,19 +191,15 @@ def stability(
 
     if replay is not None:
         outcome = run_again(replay)
-        out.print(f"reached {outcome.time:.2f} s: {outcome.text}", highlight=False)
+        out.print(f"reached {outcome.time:.2f} s: {outcome.text}")
         raise typer.Exit(1 if outcome.failure else 0)
     sizes = stress.Sizes(cases=cases, steps=steps, hostile_steps=hostile, seed=seed)
-    output(out_folder, folder=True)
-    output(report, "--report")
-    with progress_bar("stability", None) as update:
-        results = stress.study(out_folder, parse_names(parts), sizes, progress=text_first(update))
+    with text_progress("stability") as progress:
+        results = stress.study(out_folder, parse_names(parts), sizes, progress=progress)
     claims = [claim for found in results.values() for claim in found.claims]
     for claim in claims:
         verdict = "[green]holds[/green] " if claim.holds else "[red]MISSED[/red]"
-        text = f"{claim.what} ({claim.count}): {claim.found}"
-        out.print(f"{verdict} {escape(text)}", highlight=False, soft_wrap=True)
-    path = stress.write_robustness_report(out_folder, report or Path(out_folder) / "robustness.md")
-    note(f"wrote {path}")
+        out.print(f"{verdict} {escape(f'{claim.what} ({claim.count}): {claim.found}')}")
+    wrote(stress.write_robustness_report(out_folder, report or Path(out_folder) / "robustness.md"))
     if not all(claim.holds for claim in claims):
         raise typer.Exit(1)

@@ -7,13 +7,10 @@ from rich.markup import escape
 from typer import Option
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import app, command, note, out, reported
+from fowt_env.training.cli.console import add_group, command, note, out, reported
 from fowt_env.training.cli.tables import print_table
 
-cache = typer.Typer(
-    invoke_without_command=True, rich_markup_mode="rich", help="Show or clear what is kept on disk."
-)
-app.add_typer(cache, name="cache")
+cache = add_group("cache", "Show or clear what is kept on disk.", invoke_without_command=True)
 
 
 @cache.callback()
@@ -27,9 +24,9 @@ def show(context: typer.Context):
     parts = health.cache_parts()
     if not parts:
         raise InputError("no cache: neither FOWT_CACHE_DIR nor a home folder says where")
-    out.print(escape(str(health.cache_root())), highlight=False, soft_wrap=True)
-    rows = [(part.what, str(len(part.paths)), f"{part.megabytes:.1f}") for part in parts]
-    print_table(out, ("", "folders or files", "MB"), rows, left=(0,))
+    out.print(escape(str(health.cache_root())))
+    rows = [(what, len(paths), f"{health.megabytes(paths):.1f}") for what, paths in parts.items()]
+    print_table(("", "folders or files", "MB"), rows)
 
 
 @command(cache)
@@ -48,14 +45,14 @@ def clear(
     from fowt_env.training.cli import health
 
     wanted = ["other versions", "submissions", *["this version"] * every, *["wind boxes"] * wind_boxes]
-    parts = [part for part in health.cache_parts() if part.what in wanted and part.paths]
+    parts = {what: paths for what, paths in health.cache_parts().items() if what in wanted and paths}
     if not parts:
         note("nothing to remove")
         return
-    text = " and ".join(f"{part.what} ({part.megabytes:.1f} MB)" for part in parts)
+    text = " and ".join(f"{what} ({health.megabytes(paths):.1f} MB)" for what, paths in parts.items())
     if (every or wind_boxes) and not yes and not typer.confirm(f"Remove {text}?", err=True):
         raise typer.Exit(1)
-    kept = health.remove(parts)
+    kept = health.remove([path for paths in parts.values() for path in paths])
     note(f"removed {text}")
     if kept:
         raise InputError(f"could not be removed: {', '.join(map(str, kept))}")

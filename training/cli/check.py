@@ -11,7 +11,7 @@ from typer import Argument, Option
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.console import EXIT_STOPPED, command, out
 from fowt_env.training.cli.options import OptionOption
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli.tables import print_table
 
 
 @command()
@@ -36,8 +36,7 @@ def check(
     if as_json:
         out.print_json(json.dumps(_plain(found)))
     else:
-        rows = [(name, figure(value), unit) for name, value, unit in _figures(found)]
-        print_table(out, ("at rest", "value", "unit"), rows, str(platform), left=(0, 2))
+        print_table(("at rest", "value", "unit"), _figures(found), str(platform), left=(0, 2))
         print_faults(found.faults)
     if found.faults:
         raise typer.Exit(EXIT_STOPPED)
@@ -46,7 +45,7 @@ def check(
 def print_faults(faults):
     """Print the faults of a platform, or that there are none."""
     for fault in faults:
-        out.print(f"[yellow]{escape(fault)}[/yellow]", soft_wrap=True, highlight=False)
+        out.print(f"[yellow]{escape(fault)}[/yellow]")
     if not faults:
         out.print("[green]everything fits[/green]")
 
@@ -70,10 +69,9 @@ def _figures(found):
         ("metacentric height, pitch", still.metacentric_height[1], "m"),
         *((f"tension of line {i}", value / 1e3, "kN") for i, value in enumerate(still.tension, 1)),
     ]
-    for motion, value in (found.rest or {}).items():
-        rows.append((f"rest, {motion}", value, "m" if motion in ("surge", "sway", "heave") else "deg"))
-    for motion, value in (found.periods or {}).items():
-        rows.append((f"natural period, {motion}", value, "s"))
+    units = dict.fromkeys(("surge", "sway", "heave"), "m")
+    rows += [(f"rest, {motion}", x, units.get(motion, "deg")) for motion, x in (found.rest or {}).items()]
+    rows += [(f"natural period, {motion}", period, "s") for motion, period in (found.periods or {}).items()]
     for mode, values in found.tower.items():
         rows += [(f"tower, {mode}, {base}", value, "Hz") for base, value in values._asdict().items()]
     return [row for row in rows if not np.isnan(row[1])]
@@ -84,8 +82,8 @@ def _plain(found):
     from fowt_env.training.evaluation.results import finite
 
     still = {name: np.asarray(value).tolist() for name, value in found.statics._asdict().items()}
-    whole = {"platform": found.label, "draft": found.draft, **still}
-    whole |= {"rest": found.rest, "natural_periods": found.periods}
-    whole |= {"tower_frequencies": {mode: values._asdict() for mode, values in found.tower.items()}}
-    whole |= {"faults": list(found.faults)}
-    return finite(whole)
+    tower = {mode: values._asdict() for mode, values in found.tower.items()}
+    rest = {"rest": found.rest, "natural_periods": found.periods, "tower_frequencies": tower}
+    return finite(
+        {"platform": found.label, "draft": found.draft, **still, **rest, "faults": list(found.faults)}
+    )

@@ -10,26 +10,25 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich import progress as bars
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import (
-    BarColumn,
-    Progress,
-    SpinnerColumn,
-    TaskProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-)
 from typer.core import TyperGroup
 
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
 from fowt_env.files.tables import table_path, write_table
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli.tables import out
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STUDIES = "fowt_env.training.studies"  # not in the wheel
-out = Console(emoji=False)  # no emoji for a controller module:Name:
-err = Console(stderr=True, emoji=False)
+LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal for a bar
+OUTPUTS = {  # parameters of commands that name what is written -> how they are checked ahead
+    "out_path": {},
+    "out_folder": {"folder": True},
+    "plot": {"option": "--plot"},
+    "report": {"option": "--report"},
+}
+err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
 MODULES = (  # that add their commands to the app
     "simulate", "listing", "check", "evaluate", "validate", "doctor", "warmup", "cache", "benchmark",
     "design", "plot", "report", "scores", "leaderboard", "import_deck", "hydro", "train",
@@ -55,28 +54,22 @@ class Overview(TyperGroup):
 
     def format_help(self, ctx, formatter):
         """Print the help of the whole command."""
-        out.print(f"[bold]fowt[/bold]  {self.help}  [dim](--version)[/dim]\n", highlight=False)
+        out.print(f"[bold]fowt[/bold]  {self.help}  [dim](--version)[/dim]\n")
         width = max(len(command) for command, _ in START)
         for command, text in START:
-            out.print(f"  [cyan]{command:{width}}[/cyan]  # {text}", highlight=False)
+            out.print(f"  [cyan]{command:{width}}[/cyan]  # {text}")
         names = max(map(len, self.commands))
         headings = max(map(len, GROUPS))
         for group, commands in self.by_group().items():
             out.print()
             for number, command in enumerate(commands):
-                heading = group if number == 0 else ""
-                text = summary_of(self.commands[command])
-                line = f"[bold]{heading:{headings}}[/bold]  [cyan]{command:{names}}[/cyan]  # {escape(text)}"
-                out.print(line, highlight=False)
+                first = " ".join(self.commands[command].help.split("\n\n")[0].split()).removesuffix(".")
+                heading = f"[bold]{group if number == 0 else '':{headings}}[/bold]"
+                out.print(f"{heading}  [cyan]{command:{names}}[/cyan]  # {escape(first)}")
 
     def by_group(self):
         """Return {heading: names of its commands}."""
         return {group: [name for name in names if name in self.commands] for group, names in GROUPS.items()}
-
-
-def summary_of(command):
-    """Return the first paragraph of a command's help, without its full stop."""
-    return " ".join((command.help or "").split("\n\n")[0].split()).removesuffix(".")
 
 
 new_folders: list[Path] = []  # that the running command may make
@@ -99,8 +92,15 @@ def version_option(
     if version:
         from fowt_env import __version__
 
-        out.print(__version__, highlight=False)
+        out.print(__version__)
         raise typer.Exit
+
+
+def add_group(name, text, **options):
+    """Return a new group of commands of the app, with its help text."""
+    made = typer.Typer(rich_markup_mode="rich", help=text, **(options or {"no_args_is_help": True}))
+    app.add_typer(made, name=name)
+    return made
 
 
 def command(group=app):
@@ -110,32 +110,33 @@ def command(group=app):
     below its line "Examples:" the epilog, in which lines that begin with "fowt" are examples.
     """
 
+    def coloured(line):
+        return f"[cyan]{escape(line[1])}[/cyan]{escape(line[2])}\n"
+
     def add(function):
         text, _, examples = inspect.cleandoc(function.__doc__).partition("\n\nExamples:\n")
+        epilog = re.sub(r"^(fowt .*?)((?:  # .*)?)$", coloured, examples, flags=re.M)
         name = function.__name__.removesuffix("_command").replace("_", "-")
-        return group.command(name=name, help=text, epilog=_epilog(examples))(reported(function))
+        options = {"name": name, "help": text, "epilog": f"[bold]Examples[/bold]\n\n{epilog}"}
+        return group.command(**options)(reported(function))
 
     return add
 
 
-def _epilog(examples):
-    """Return the examples of a docstring with the markup of the help page."""
-
-    def coloured(line):
-        return f"[cyan]{escape(line[1])}[/cyan]{escape(line[2])}\n"
-
-    return "[bold]Examples[/bold]\n\n" + re.sub(r"^(fowt .*?)((?:  # .*)?)$", coloured, examples, flags=re.M)
-
-
 def reported(function):
-    """Return the function of a command that prints errors in one line and sets the exit code."""
+    """Return a command that checks its OUTPUTS, prints errors in one line and sets the exit code."""
 
     @functools.wraps(function)
     def run(*args, **kwargs):
         new_folders.clear()
         try:
             with warnings.catch_warnings():
-                warnings.showwarning = _show_warning
+                warnings.showwarning = lambda message, *_: err.print(
+                    f"[yellow]Warning: {escape(str(message))}[/yellow]"
+                )
+                for name, rules in OUTPUTS.items():
+                    if isinstance(kwargs.get(name), str):
+                        output(kwargs[name], **rules)
                 return function(*args, **kwargs)
         except (SimulationStopped, ControllerError) as error:
             fail(error, EXIT_STOPPED)
@@ -176,35 +177,35 @@ def from_a_clone(command):
         ) from None
 
 
-def _show_warning(message, *where):
-    """Print a warning in yellow on stderr, without the line of code that it came from."""
-    err.print(f"[yellow]Warning: {escape(str(message))}[/yellow]", soft_wrap=True, highlight=False)
-
-
 def fail(message, code):
     """Print the message in red on stderr, as its last line, and end with the exit code."""
     announce_folders()
-    err.print(f"[red][bold]Error:[/bold] {escape(str(message))}[/red]", soft_wrap=True, highlight=False)
+    err.print(f"[red][bold]Error:[/bold] {escape(str(message))}[/red]")
     raise typer.Exit(code)
 
 
 def note(message):
     """Print a remark on stderr, so that stdout has only results."""
-    err.print(f"[dim]{escape(message)}[/dim]", soft_wrap=True, highlight=False)
+    err.print(f"[dim]{escape(message)}[/dim]")
+
+
+def wrote(*paths):
+    """Print on stderr which files have been written, but for those that are None."""
+    if any(paths):
+        note(f"wrote {', '.join(str(path) for path in paths if path is not None)}")
 
 
 def output(path, option="--out", folder=False, endings=()):
     """Return the path of an option (None: None), once its folder exists or may be made.
 
-    endings: those that the file may have; (): any. A missing folder may be made in the working folder alone;
-    elsewhere it must exist, except for the last part of an option that names a folder. Nothing is made here;
-    `reported` says at the end what has been.
+    endings: those that the file may have; (): any. A missing folder may be made in the working folder alone,
+    and so may the last part of an option that names a folder; `reported` says at the end what has been made.
     Raises: InputError that names the option, the path and the missing folder.
     """
     if path is None:
         return None
     if endings:
-        table_path(path, endings)
+        table_path(path, endings, option)
     place = Path(path) if folder else Path(path).parent
     if place.is_dir():
         return path
@@ -217,63 +218,47 @@ def output(path, option="--out", folder=False, endings=()):
             f"{option} {str(path)!r}: cannot be written: there is no folder {str(missing)!r}; make it"
             " first: folders are made in the working folder alone"
         )
-    new_folders.append(place)
+    if place not in new_folders:
+        new_folders.append(place)
     return path
 
 
-LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal for a bar
-
-
 @contextmanager
-def progress_bar(description, total, every=LINE_EVERY):
+def progress_bar(description, total=None, every=LINE_EVERY):
     """Show a bar on stderr that disappears when done; yield update(done, total=None, text=None).
 
     Without a terminal (a file, a pipe, a batch job) it is a line each `every` seconds.
     """
-    if not err.is_terminal:
-        yield _lines(description, total, every)
-        return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-    bar = Progress(*columns, TimeElapsedColumn(), console=err, transient=True)
-    with bar:
-        task = bar.add_task(description, total=total)
-
-        def update(done, total=None, text=None):
-            bar.update(task, completed=done, description=text or description, total=total)
-
-        yield update
-
-
-def _lines(description, total, every):
-    """Return update(done, total=None, text=None) that prints a line on stderr every `every` seconds."""
+    columns = (
+        *(bars.SpinnerColumn(), bars.TextColumn("{task.description}"), bars.BarColumn()),
+        *(bars.TaskProgressColumn(), bars.TimeElapsedColumn()),
+    )
+    hidden = not err.is_terminal
+    bar = bars.Progress(*columns, console=err, transient=True, disable=hidden)
+    task = bar.add_task(description, total=total)
     began = printed = time.monotonic()
-    whole = total
 
     def update(done, total=None, text=None):
-        nonlocal printed, whole
-        now, whole = time.monotonic(), total or whole
-        if now - printed >= every:
+        nonlocal printed
+        bar.update(task, completed=done, description=text or description, total=total)
+        now, whole = time.monotonic(), bar.tasks[0].total
+        if hidden and now - printed >= every:
             printed = now
             share = f", {100.0 * done / whole:.0f} %" if whole else ""
             note(f"{now - began:.0f} s{share}: {text or description}")
 
-    return update
+    with bar:
+        yield update
 
 
-def text_first(update, label=""):
-    """Return progress(text, done, total), as some studies call it, of update(done, total, text)."""
-    return lambda text, done, total: update(done, total, f"{label}{text}")
+@contextmanager
+def text_progress(description, label=""):
+    """Show a progress bar; yield progress(text, done, total), as some studies call it."""
+    with progress_bar(description) as update:
+        yield lambda text, done, total: update(done, total, f"{label}{text}")
 
 
 def save_table(frame, path):
     """Write a table to the path of an option and say so; None: nothing."""
     if path is not None:
-        note(f"wrote {write_table(frame, path)}")
-
-
-def show(frame, title=None):
-    """Print a DataFrame with left-aligned columns of texts."""
-    rows = [list(map(figure, row)) for row in frame.itertuples(index=False)]
-    texts = [i for i, name in enumerate(frame.columns) if frame[name].map(type).eq(str).any()]
-    keys = max([i + 1 for i in texts if i < 2], default=1)
-    print_table(out, list(frame.columns), rows, title, keys, left=texts)
+        wrote(write_table(frame, path))

@@ -1,42 +1,30 @@
 """The commands of linear design: fowt linearize and fowt design."""
 
-import json
 import shlex
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option, Typer
+from typer import Argument, Option
 
 from fowt_env.descriptions.checks import parse_numbers, parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.files.tables import TABLE_SUFFIXES
+from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_names, parse_pairs
-from fowt_env.training.cli.console import app, command, note, out, output, progress_bar, save_table, show
-from fowt_env.training.cli.options import (
-    AS_SIMULATE,
-    RANGE,
-    AddressOption,
-    EngineOption,
-    JobsOption,
-    PlatformOption,
-    SuiteOption,
-    TableOption,
-    ValidationSeeds,
-)
-from fowt_env.training.cli.tables import print_table
+from fowt_env.training.cli.console import add_group, command, note, output, progress_bar, save_table, wrote
+from fowt_env.training.cli.tables import out, print_table, show
 
-design = Typer(
-    no_args_is_help=True, rich_markup_mode="rich", help="Design and tune controllers, and find their limits."
-)
-app.add_typer(design, name="design")
-
+design = add_group("design", "Design and tune controllers, and find their limits.")
 WindsOption = Annotated[
-    str | None, Option(help=f"Winds, m/s: {RANGE}; default: every whole one above rated.")
+    str | None, Option(help=f"Winds, m/s: {shared.RANGE}; default: every whole one above rated.")
 ]
 SettingOption = Annotated[
     list[str] | None, Option(metavar="SETTING=VALUE", help="A setting of fowt design lqr; repeats.")
 ]
+SWEPT = f"Winds, m/s: {shared.RANGE}; default: every whole one from cut-in to cut-out."
+VARIED = "Setting and its values; repeats."
+INFORMED = "Information of the feedback, comma-separated; default: the usual (below)."
+LINEARIZED = "Modes: .csv, .parquet; models: .json, .npz, .mat (one wind); everything: a folder."
 SETTINGS = {  # of LQGSettings, in words
     "share": "weight of platform pitch in the cost; the rest: rotor speed",
     "share_growth": "growth of the share, per m/s",
@@ -51,19 +39,6 @@ SETTINGS = {  # of LQGSettings, in words
     "torque_rate": "cost of the torque's rate",
     "schedule_time": "s, over which the operating wind follows the estimate",
 }
-
-
-def save_lqr(settings, path, platform="oc3_hywind"):
-    """Write a design of lqr with settings ({name: value}) on a platform; return its path."""
-    import fowt_env
-    from fowt_env.controllers.design.saved_files import lqr_settings, save_design
-    from fowt_env.controllers.lqr.design import LQGSettings, design_models
-
-    chosen = LQGSettings().changed(**settings)
-    scene = fowt_env.build_scene(platform, wind=18.0)
-    words = ["fowt design lqr", *(f"--setting {key}={value}" for key, value in settings.items())]
-    words += [] if platform == "oc3_hywind" else [f"--platform {platform}"]
-    return save_design(path, "lqr", scene, lqr_settings(chosen, design_models(scene)), " ".join(words))
 
 
 def _scene_and_winds(platform, winds, default, **options):
@@ -89,16 +64,9 @@ def _balanced(table):
 
 @command()
 def linearize(
-    platform: PlatformOption = "oc3_hywind",
-    winds: Annotated[
-        str | None, Option(help=f"Winds, m/s: {RANGE}; default: every whole one from cut-in to cut-out.")
-    ] = None,
-    out_path: Annotated[
-        str | None,
-        Option(
-            "--out", help="Modes: .csv, .parquet; models: .json, .npz, .mat (one wind); everything: a folder."
-        ),
-    ] = None,
+    platform: shared.PlatformOption = "oc3_hywind",
+    winds: Annotated[str | None, Option(help=SWEPT)] = None,
+    target: Annotated[str | None, Option("--out", help=LINEARIZED)] = None,
 ):
     """Linear models over the wind: modes, zeros, matrices.
 
@@ -107,62 +75,53 @@ def linearize(
     fowt linearize --winds 4:25:1 --out modes.csv  # the sweep, cut-in to cut-out
     fowt linearize --out study  # a folder: tables, models, pole map, damping and Bode plots
     fowt linearize --winds 18 --out model.mat  # the matrices, for MATLAB and Simulink (write_mat)
-    fowt linearize --winds 12:24:2 --out models.npz  # those of several winds, as arrays
-
-    In Python, fowt_env.linearize(scene).to_statespace() is the same model as a control.StateSpace.
 
     Modes are those of the plant at constant torque and blade pitch. A right-half-plane zero from blade pitch
-    to rotor speed limits the bandwidth of any pitch controller that measures speed alone. Below rated wind
-    the blade pitch is at its minimum: the zeros and Bode plots of blade pitch leave those winds out.
+    to rotor speed limits the bandwidth of any pitch controller that measures speed alone.
     """
     from fowt_env.controllers.lqr.design import design_winds
     from fowt_env.files.matlab import write_mat
     from fowt_env.files.tables import write_table
     from fowt_env.training.design import sweeps
 
-    suffix, allowed = Path(out_path or "").suffix.lower(), (*TABLE_SUFFIXES, *sweeps.MODEL_SUFFIXES, ".mat")
+    suffix, allowed = Path(target or "").suffix.lower(), (*TABLE_SUFFIXES, *sweeps.MODEL_SUFFIXES, ".mat")
     if suffix and suffix not in allowed:
-        raise InputError(f"--out {out_path}: must be a folder or end with {', '.join(allowed)}")
-    output(out_path, folder=not suffix)
+        raise InputError(f"--out {target}: must be a folder or end with {', '.join(allowed)}")
+    output(target, folder=not suffix)
     scene, speeds, _ = _scene_and_winds(platform, winds, design_winds)
     if suffix == ".mat" and len(speeds) > 1:
-        raise InputError(f"--out {out_path}: a .mat holds the model of one wind, as --winds 18")
+        raise InputError(f"--out {target}: a .mat holds the model of one wind, as --winds 18")
     with progress_bar("linearising", len(speeds)) as update:
         models = sweeps.models_over(scene, speeds, update)
     modes, zeros = sweeps.mode_table(models), sweeps.zero_table(models)
     show(modes, f"{platform}: modes at constant torque and blade pitch")
-    if len(zeros):
-        show(zeros, "right-half-plane zeros, blade pitch to rotor speed")
-    else:
-        out.print("no right-half-plane zeros from blade pitch to rotor speed")
+    text = "right-half-plane zeros, blade pitch to rotor speed"
+    show(zeros, text) if len(zeros) else out.print(f"no {text}")
     resting = [wind for wind, model in models.items() if model.pitch_rests]
     if resting:
         out.print(
             f"up to {max(resting):g} m/s the blade pitch is at its minimum and pitch control is off:"
             " these winds are left out of zeros and Bode plots"
         )
-    if out_path is None:
+    if target is None:
         return
     if suffix in TABLE_SUFFIXES:
-        written = write_table(modes, out_path)
+        written = write_table(modes, target)
     elif suffix == ".mat":
-        written = write_mat(next(iter(models.values())), out_path)
+        written = write_mat(next(iter(models.values())), target)
     else:
-        written = (sweeps.save_models if suffix else sweeps.save_study)(models, out_path)
-    for path in written if isinstance(written, list) else [written]:
-        note(f"wrote {path}")
+        written = (sweeps.save_models if suffix else sweeps.save_study)(models, target)
+    wrote(*written if isinstance(written, list) else [written])
 
 
 @command(design)
 def pi(
     omega: Annotated[float, Option(help="Frequency of the rotor loop, rad/s.")] = 0.2,
     zeta: Annotated[float, Option(help="Its damping ratio.")] = 0.7,
-    schedule: Annotated[
-        str, Option(help="loop (the design's loop at every wind) or published (Jonkman's, slower).")
-    ] = "loop",
+    schedule: Annotated[str, Option(help="loop (the same at every wind) or published (Jonkman's).")] = "loop",
     winds: WindsOption = None,
-    platform: PlatformOption = "oc3_hywind",
-    out_path: Annotated[str | None, Option("--out", help="Design: .json.")] = None,
+    platform: shared.PlatformOption = "oc3_hywind",
+    out_path: shared.DesignOption = None,
 ):
     """Design a scheduled PI from frequency and damping of the rotor loop.
 
@@ -182,7 +141,6 @@ def pi(
     from fowt_env.controllers.lqr.design import winds_above_rated
     from fowt_env.training.design.sweeps import models_over
 
-    output(out_path)
     scene, speeds, winds = _scene_and_winds(platform, winds, winds_above_rated)
     with progress_bar("linearising", len(speeds)) as update:
         models = models_over(scene, speeds, update)
@@ -191,34 +149,34 @@ def pi(
     unstable = [row["wind_[m/s]"] for row in found.table if row["platform_zeta_[-]"] < 0.0]
     if unstable:
         out.print(f"the platform is unstable at {', '.join(f'{w:g}' for w in unstable)} m/s: lower omega")
-    out.print(
-        f"KP = {found.KP:.6g} s, KI = {found.KI:.6g},"
-        f" gain_schedule_pitch = {found.gain_schedule_pitch:.6g} rad"
-    )
+    gain = found.gain_schedule_pitch
+    out.print(f"KP = {found.KP:.6g} s, KI = {found.KI:.6g}, gain_schedule_pitch = {gain:.6g} rad")
     if out_path is not None:
         settings = {key: getattr(found, key) for key in ("KP", "KI", "gain_schedule_pitch")}
         words = (
             f"fowt design pi --omega {omega:g} --zeta {zeta:g} --schedule {schedule}"
             f" --winds {winds} --platform {platform}"
         )
-        note(f"wrote {save_design(out_path, 'pi', scene, settings, words, table=found.table)}")
+        wrote(save_design(out_path, "pi", scene, settings, words, table=found.table))
 
 
 @command(design)
 def bound(
-    wind: Annotated[str | None, Option(help=f"Winds above rated, m/s: {RANGE}; default: even ones.")] = None,
-    information: Annotated[
-        str | None, Option(help="Information of the feedback, comma-separated; default: the usual (below).")
+    wind: Annotated[
+        str | None, Option(help=f"Winds above rated, m/s: {shared.RANGE}; default: even ones.")
     ] = None,
+    information: Annotated[str | None, Option(help=INFORMED)] = None,
     travel: Annotated[float, Option(help="Limit of blade-pitch travel over gspi_oc3's; or inf.")] = 1.0,
     power: Annotated[float, Option(help="Limit of power deviation over gspi_oc3's; or inf.")] = 1.0,
     torque_std: Annotated[float, Option(help="Limit of the torque's deviation, %; or inf.")] = 5.0,
     previews: Annotated[str, Option(help="Preview times of the wind, s.")] = "3,11",
     sensors: Annotated[str, Option(help="Sensor chain, whose noise the feedback has.")] = "standard",
-    sea: Annotated[str | None, Option(help=f"Sea of every wind. {AS_SIMULATE} Default: the suites'.")] = None,
-    platform: PlatformOption = "oc3_hywind",
-    out_path: Annotated[str | None, Option("--out", help="Pareto fronts: .csv or .parquet.")] = None,
-    plot: Annotated[str | None, Option(help="Plot of the Pareto fronts, e.g. bound.png.")] = None,
+    sea: Annotated[
+        str | None, Option(help=f"Sea of every wind. {shared.AS_SIMULATE} Default: the suites'.")
+    ] = None,
+    platform: shared.PlatformOption = "oc3_hywind",
+    out_path: shared.TableOption = None,
+    plot: shared.PlotOption = None,
 ):
     """Compute the performance limit of linear feedback.
 
@@ -235,16 +193,14 @@ def bound(
     blade pitch); _preview_T adds the wind T s ahead, _pitch_only leaves the torque out.
     """
     import fowt_env
-    from fowt_env.descriptions.sea_state import sea_state_of
-    from fowt_env.training.cli.arguments import parse_sea
+    from fowt_env.descriptions.sea_state import sea_of, sea_state_of
     from fowt_env.training.design.bound_control import noise_of
     from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, bound_table, rounded
 
     output(out_path, endings=TABLE_SUFFIXES)
-    output(plot, "--plot")
     speeds = None if wind is None else parse_numbers(wind, "wind")
     scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0])
-    with progress_bar("designing", None) as update:
+    with progress_bar("designing") as update:
         table = bound_table(
             scene,
             speeds,
@@ -254,7 +210,7 @@ def bound(
             torque_std=0.01 * torque_std,
             previews=parse_numbers(previews, "previews"),
             noise=noise_of(sensors, scene.turbine),
-            sea=None if sea is None else sea_state_of(parse_sea(sea)),
+            sea=None if sea is None else sea_state_of(sea_of(sea)),
             progress=update,
         )
     single = speeds is not None and len(speeds) == 1
@@ -268,11 +224,15 @@ def bound(
         shown = set(table["information"])
         names = {name: INFORMATION.get(name, name) for name in PLOTTED if name in shown}
         plot_bound(table, names or {name: name for name in shown - {"gspi_oc3"}}, path=plot)
-        note(f"wrote {plot}")
+    wrote(plot)
 
 
 @command(design)
-def zeros(platform: PlatformOption = "oc3_hywind", winds: WindsOption = None, out_path: TableOption = None):
+def zeros(
+    platform: shared.PlatformOption = "oc3_hywind",
+    winds: WindsOption = None,
+    out_path: shared.TableOption = None,
+):
     """Find right-half-plane zeros that limit control by blade pitch.
 
     From blade pitch to rotor speed, with the damping under pi.
@@ -281,9 +241,8 @@ def zeros(platform: PlatformOption = "oc3_hywind", winds: WindsOption = None, ou
     fowt design zeros  # OC3-Hywind, whole winds above rated
     fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv  # another platform, as a table
 
-    At a right-half-plane zero near the platform-pitch frequency, keeping the rotor speed constant by blade
-    pitch removes the thrust that damps the platform: no feedback of rotor speed alone can be faster. pi:
-    damping ratios of platform pitch (or of the rotor, if lower) and of surge under pi; drag is left out.
+    No feedback of rotor speed alone can be faster than such a zero. pi: damping ratios of platform pitch (or
+    of the rotor, if lower) and of surge under pi; drag is left out.
     """
     from fowt_env.controllers.lqr.design import winds_above_rated
     from fowt_env.training.design.sweeps import zeros_over
@@ -291,7 +250,7 @@ def zeros(platform: PlatformOption = "oc3_hywind", winds: WindsOption = None, ou
     output(out_path, endings=TABLE_SUFFIXES)
     # the linear model of "reference" within 1e-3, at a tenth of the time
     scene, speeds, _ = _scene_and_winds(platform, winds, winds_above_rated, fidelity="standard")
-    with progress_bar("linearising", None) as update:
+    with progress_bar("linearising") as update:
         table = zeros_over(scene, speeds, update)
     show(table, f"{platform}: zeros of blade pitch to rotor speed")
     save_table(table, out_path)
@@ -301,21 +260,17 @@ def zeros(platform: PlatformOption = "oc3_hywind", winds: WindsOption = None, ou
 def front(
     runs: Annotated[str, Option(help="Table of fowt design lqr-sweep --out.")],
     bound_path: Annotated[str, Option("--bound", help="Table of fowt design bound --out.")],
-    out_path: Annotated[str | None, Option("--out", help="Ratios: .csv or .parquet.")] = None,
-    plot: Annotated[str | None, Option(help="Plot of the Pareto fronts, e.g. front.png.")] = None,
+    out_path: shared.TableOption = None,
+    plot: shared.PlotOption = None,
 ):
     """Compare simulated designs with the performance limit.
 
     Examples:
     fowt design front --runs sweep.csv --bound bound.csv --plot front.png  # lqr beside the limit
-
-    The tables are those of fowt design lqr-sweep --vary ... --out and fowt design bound --out.
     """
     from fowt_env.files.tables import read_table
     from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, ratio_table
 
-    output(out_path)
-    output(plot, "--plot")
     fronts = read_table(bound_path)
     table = ratio_table(read_table(runs), fronts)
     show(table, "over gspi_oc3; of_bound: 1 on the limit")
@@ -324,15 +279,14 @@ def front(
         from fowt_env.training.design.plots import plot_bound
 
         plot_bound(fronts, {name: INFORMATION[name] for name in PLOTTED}, table, path=plot)
-        note(f"wrote {plot}")
+    wrote(plot)
 
 
 @command(design)
 def lqr(
     setting: SettingOption = None,
-    platform: PlatformOption = "oc3_hywind",
-    out_path: Annotated[str | None, Option("--out", help="The design, .json.")] = None,
-    vary: Annotated[list[str] | None, Option(hidden=True)] = None,
+    platform: shared.PlatformOption = "oc3_hywind",
+    out_path: shared.DesignOption = None,
 ):
     """Design an LQG controller with your settings, and save it.
 
@@ -341,36 +295,40 @@ def lqr(
     fowt design lqr --setting travel=0.8 --out my.json  # a design with less blade-pitch travel
     fowt simulate --controller design:my.json --wind ntm:18:B  # run it
 
-    share: weight of platform pitch in the cost, the rest is rotor speed; travel, power, torque and shaft are
-    limits, see LQGSettings in controllers/lqr/design.py. Many values at once: fowt design lqr-sweep.
+    Many values at once: fowt design lqr-sweep.
     """
-    from fowt_env.controllers.lqr.design import LQGSettings
+    import fowt_env
+    from fowt_env.controllers.design.saved_files import lqr_settings, save_design
+    from fowt_env.controllers.lqr.design import LQGSettings, design_models
 
-    if vary or (out_path is not None and not out_path.lower().endswith(".json")):
-        wrong = f"--vary {vary[0]}" if vary else f"--out {out_path}"
-        raise InputError(f"{wrong}: fowt design lqr saves one design as .json; for a sweep: lqr-sweep")
+    output(out_path, endings=(".json",))
     fixed = parse_pairs(setting, "setting")
-    chosen, default = asdict(LQGSettings().changed(**fixed)), asdict(LQGSettings())
-    rows = [(name, f"{value:g}", f"{default[name]:g}", SETTINGS[name]) for name, value in chosen.items()]
+    default = LQGSettings()
+    chosen = default.changed(**fixed)
+    rows = [
+        (name, f"{getattr(chosen, name):g}", f"{getattr(default, name):g}", text)
+        for name, text in SETTINGS.items()
+    ]
     headings = ("setting", "value", "default", "what it is")
-    print_table(out, headings, rows, "settings of lqr", left=(0, 3), prose=(3,))
+    print_table(headings, rows, "settings of lqr", left=(0, 3), prose=(3,))
     if out_path is None:
         return
-    output(out_path)
-    with progress_bar("designing", None):
-        path = save_lqr(fixed, out_path, platform)
+    words = ["fowt design lqr", *(f"--setting {key}={value}" for key, value in fixed.items())]
+    words += [] if platform == "oc3_hywind" else [f"--platform {platform}"]
+    with progress_bar("designing"):
+        scene = fowt_env.build_scene(platform, wind=18.0)
+        settings = lqr_settings(chosen, design_models(scene))
+        path = save_design(out_path, "lqr", scene, settings, " ".join(words))
     note(f"wrote {path}; next: fowt simulate --controller {shlex.quote(f'design:{path}')} --wind ntm:18:B")
 
 
 @command(design)
 def lqr_sweep(
-    vary: Annotated[
-        list[str] | None, Option(metavar="SETTING=A,B,C", help="Setting and its values; repeats.")
-    ] = None,
+    vary: Annotated[list[str] | None, Option(metavar="SETTING=A,B,C", help=VARIED)] = None,
     setting: SettingOption = None,
     cases: Annotated[str, Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
-    seeds: ValidationSeeds = "1001,1002",
-    platform: PlatformOption = "oc3_hywind",
+    seeds: shared.ValidationSeeds = "1001,1002",
+    platform: shared.PlatformOption = "oc3_hywind",
     out_path: Annotated[str | None, Option("--out", help="All runs, .csv.")] = None,
 ):
     """Run designs of lqr over values of its settings, beside gspi_oc3.
@@ -378,7 +336,6 @@ def lqr_sweep(
     Examples:
     fowt design lqr-sweep  # the shipped settings against gspi_oc3 on validation seeds
     fowt design lqr-sweep --vary share=0.3,0.5,0.7 --out sweep.csv  # three designs
-    fowt design front --runs sweep.csv --bound bound.csv  # beside the performance limit
     """
     from fowt_env.training.design.sweeps import SHOWN, sweep
 
@@ -389,29 +346,26 @@ def lqr_sweep(
         numbers = parse_numbers(values, f"setting {name}")
         variants = [variant | {name: number} for variant in variants for number in numbers]
     numbers = parse_whole_numbers(seeds, "seeds")
-    with progress_bar("simulating", None) as update:
+    with progress_bar("simulating") as update:
         table = sweep(variants, cases, numbers, out_path, update, platform=platform)
     means = table.groupby(["case", "variant"], sort=False)[list(SHOWN)].mean().reset_index()
-    show(means, f"means over seeds {json.dumps(numbers)}")
-    if out_path is not None:
-        note(f"wrote {out_path}")
+    show(means, f"means over seeds {numbers}")
+    wrote(out_path)
 
 
 @command(design)
 def tune_command(
-    name: Annotated[
-        str, Argument(help="pi_tuned, floating_feedback, rosco_float, lqr, mpc, mpc_preview, ...")
-    ],
+    name: Annotated[str, Argument(help="pi_tuned, floating_feedback, rosco_float, lqr, mpc, ...")],
     budget: Annotated[int, Option(help="Settings that are tried.")] = 40,
-    suite: SuiteOption = "above_rated",
-    platform: PlatformOption = "oc3_hywind",
-    seeds: ValidationSeeds = "1001,1002",
+    suite: shared.SuiteOption = "above_rated",
+    platform: shared.PlatformOption = "oc3_hywind",
+    seeds: shared.ValidationSeeds = "1001,1002",
     preview: Annotated[str, Option(help="Wind ahead: exact, or a lidar by its name.")] = "exact",
-    jobs: JobsOption = 1,
-    engine: EngineOption = "processes",
-    address: AddressOption = None,
+    jobs: shared.JobsOption = 1,
+    engine: shared.EngineOption = "processes",
+    address: shared.AddressOption = None,
     keep: Annotated[bool, Option("--keep", help="Write the result to controllers/tuned.toml.")] = False,
-    out_folder: Annotated[str, Option("--out", help="Folder of the table.")] = "results/tune",
+    out_folder: shared.FolderOption = "results/tune",
 ):
     """Search the settings of a built-in controller.
 
@@ -422,19 +376,17 @@ def tune_command(
     fowt design tune rosco_float --jobs 2 --keep  # write the result to controllers/tuned.toml
 
     Cost: mean lifetime ratio of rotor-speed and platform-pitch deviation to gspi_oc3's, and penalties for
-    exceeded limits of the suite, for energy below 99.5 % and for failed or tripped runs. Written:
-    OUT/tune_NAME.csv, a row per setting as soon as it has run.
+    exceeded limits of the suite, for energy below 99.5 % and for failed or tripped runs.
     """
     from fowt_env.training.design.tune import tune, write_tuned
     from fowt_env.training.evaluation.engines import session
 
-    numbers = tuple(int(seed) for seed in parse_whole_numbers(seeds, "seeds"))
+    numbers = tuple(parse_whole_numbers(seeds, "seeds"))
     if keep and platform != "oc3_hywind":
         raise InputError(f"--keep: controllers/tuned.toml is OC3-Hywind's; {platform!r} is tuned for a table")
     asked = {"suite": suite, "seeds": numbers, "jobs": jobs, "engine": engine, "address": address}
     asked |= {} if platform == "oc3_hywind" else {"platform": platform}
     asked |= {} if preview == "exact" else {"preview": preview}
-    output(out_folder, folder=True)
     with progress_bar(f"tuning {name}", budget) as update, session(engine, jobs, address):
 
         def report(number, row):
@@ -444,5 +396,5 @@ def tune_command(
     show(table.nsmallest(10, "cost"), f"{name}: the best of {len(table)}")
     if keep:
         write_tuned(name, settings, figures, budget, asked)
-        note("wrote controllers/tuned.toml")
-    note(f"wrote tune_{name}.csv in {out_folder}")
+        wrote("controllers/tuned.toml")
+    wrote(f"{out_folder}/tune_{name}.csv")

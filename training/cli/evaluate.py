@@ -10,6 +10,7 @@ from typer import Option
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import write_table
+from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_names
 from fowt_env.training.cli.console import (
     EXIT_INTERRUPTED,
@@ -18,68 +19,44 @@ from fowt_env.training.cli.console import (
     err,
     fail,
     note,
-    out,
-    output,
     progress_bar,
 )
-from fowt_env.training.cli.options import AddressOption, EngineOption, FolderOption, JobsOption, PlotsOption
-from fowt_env.training.cli.tables import print_table, table_width
+from fowt_env.training.cli.tables import out, print_table, table_width
 
 MOST_CASES = 12  # more cases are not printed with their conditions
+CONTROLLERS = "Names, policy:NAME, design:FILE or module:Name, comma-separated."
+CASES = "Cases or suites, comma-separated; with --suite: some of its cases. Default: above_rated."
+PLATFORM = "Platform: a name or a path; winds and limits are scaled. Default: the suite's."
+SEEDS = f"{shared.WHOLE}, the same for each controller. Default: the suite's, else 1."
+DRAWN = "Hash, e.g. of the commit that fixes the entries, to draw the suite's seeds from."
+PREVIEW = "Wind ahead: exact, or measured by the lidar four_beam_pulsed or circular_cw."
+SENSORS = "exact, or the name of a sensor chain. Default: that of each case."
+BASELINE = "Controller of the paired differences. Default: gspi_oc3, else pi."
+TEXT = str | None
 
 
 @command()
 def evaluate_command(
-    controllers: Annotated[
-        str, Option(help="Names, policy:NAME, design:FILE or module:Name, comma-separated.")
-    ] = "pi",
-    suite: Annotated[
-        str | None, Option(help="Suite: a name of fowt list suites, or a path to a TOML file.")
-    ] = None,
-    cases: Annotated[
-        str | None,
-        Option(
-            help="Cases or suites, comma-separated; with --suite: some of its cases. Default: above_rated."
-        ),
-    ] = None,
-    platform: Annotated[
-        str | None,
-        Option(help="Platform: a name or a path; winds and limits are scaled. Default: the suite's."),
-    ] = None,
-    seeds: Annotated[
-        str | None,
-        Option(
-            help="1,2,3 or 1:6:1 (6 included), the same for each controller. Default: the suite's, else 1."
-        ),
-    ] = None,
-    draw_seeds: Annotated[
-        str | None,
-        Option(help="Hash, e.g. of the commit that fixes the entries, to draw the suite's seeds from."),
-    ] = None,
+    controllers: Annotated[str, Option(help=CONTROLLERS)] = "pi",
+    suite: Annotated[TEXT, Option(help="Suite: a name of fowt list suites, or a TOML file.")] = None,
+    cases: Annotated[TEXT, Option(help=CASES)] = None,
+    platform: Annotated[TEXT, Option(help=PLATFORM)] = None,
+    seeds: Annotated[TEXT, Option(help=SEEDS)] = None,
+    draw_seeds: Annotated[TEXT, Option(help=DRAWN)] = None,
     duration: Annotated[
-        float | None, Option(help="Length of each run, s. Default: the suite's, else 660.")
+        float | None, Option(help="Length of a run, s. Default: the suite's, or 660.")
     ] = None,
-    skip: Annotated[
-        float | None, Option(help="Seconds at the start not scored. Default: the suite's, else 60.")
-    ] = None,
-    preview: Annotated[
-        str, Option(help="Wind ahead: exact, or measured by the lidar four_beam_pulsed or circular_cw.")
-    ] = "exact",
-    sensors: Annotated[
-        str | None, Option(help="exact, or the name of a sensor chain. Default: that of each case.")
-    ] = None,
-    baseline: Annotated[
-        str | None, Option(help="Controller of the paired differences. Default: gspi_oc3, else pi.")
-    ] = None,
-    jobs: JobsOption = 1,
-    engine: EngineOption = "processes",
-    address: AddressOption = None,
-    time_limit: Annotated[
-        float, Option(help="Wall-clock seconds after which a run fails; 0: never.")
-    ] = 3600.0,
+    skip: Annotated[float | None, Option(help="Start not scored, s. Default: the suite's, or 60.")] = None,
+    preview: Annotated[str, Option(help=PREVIEW)] = "exact",
+    sensors: Annotated[TEXT, Option(help=SENSORS)] = None,
+    baseline: Annotated[TEXT, Option(help=BASELINE)] = None,
+    jobs: shared.JobsOption = 1,
+    engine: shared.EngineOption = "processes",
+    address: shared.AddressOption = None,
+    time_limit: Annotated[float, Option(help="Clock time, s, after which a run fails; 0: never.")] = 3600.0,
     retry_failed: Annotated[bool, Option("--retry-failed", help="Repeat failed runs of the folder.")] = False,
-    out_folder: FolderOption = "results/evaluation",
-    plot: PlotsOption = True,
+    out_folder: shared.FolderOption = "results/evaluation",
+    plot: shared.PlotsOption = True,
 ):
     """Compare controllers on load cases: a leaderboard.
 
@@ -87,7 +64,6 @@ def evaluate_command(
 
     Examples:
     fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2  # the headline comparison
-    fowt evaluate --controllers pi --cases above_rated  # the PI of Eq. (8), 12 to 24 m/s, one seed
     fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2
     fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi  # your own cases
     fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4
@@ -96,18 +72,17 @@ def evaluate_command(
     fowt evaluate --suite above_rated --draw-seeds $COMMIT --out results/drawn  # seeds from a commit
 
     [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run),
-    leaderboard.json (means, intervals, paired differences, versions), manifest.json (the settings),
-    summary.csv (means by case), pareto.png, metrics.png, boxes.png, timeseries_CASE.png, spectra_CASE.png.
-    The same command resumes an interrupted evaluation and adds further controllers, cases or seeds to the
-    folder.
+    leaderboard.json, manifest.json (the settings), summary.csv (means by case) and plots. The same command
+    resumes an interrupted evaluation and adds further controllers, cases or seeds to the folder.
     """
     from fowt_env.training.evaluation.cases import chosen_cases
     from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.evaluation.evaluate import evaluate, summary
     from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
     from fowt_env.training.evaluation.seeds import with_drawn_seeds
+    from fowt_env.training.reports.evaluation_plots import evaluation_plots
 
-    folder = Path(output(out_folder, folder=True))
+    folder = Path(out_folder)
     chosen = chosen_cases(suite, cases, platform)
     numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
     if draw_seeds is not None:
@@ -117,7 +92,7 @@ def evaluate_command(
     if baseline is not None and baseline not in (names := parse_names(controllers)):
         raise unknown("baseline among --controllers", baseline, names)
     finished = 0
-    with progress_bar("evaluating", None) as update:
+    with progress_bar("evaluating") as update:
 
         def report(done, total, _):
             nonlocal finished
@@ -130,7 +105,7 @@ def evaluate_command(
                 chosen,
                 duration=duration,
                 skip=skip,
-                seeds=None if numbers is None else [int(number) for number in numbers],
+                seeds=numbers,
                 jobs=jobs,
                 progress=report,
                 folder=folder,
@@ -151,7 +126,13 @@ def evaluate_command(
     means = summary(table)
     write_table(means, folder / "summary.csv")
     _print_evaluation(table, means, board)
-    plots = _evaluation_plots(table, board, folder) if plot else []
+    plots = []
+    if plot:
+        try:
+            with progress_bar("plotting"):
+                plots = evaluation_plots(table, board, folder)
+        except InputError as error:  # without matplotlib
+            note(f"no plots: {error}")
     if draw_seeds is not None:
         note(f"seeds drawn from {chosen.drawn['hash']}: {chosen.drawn['rule']}")
     note(f"wrote results.csv, leaderboard.json, summary.csv, runs/ and {len(plots)} plots in {folder}")
@@ -165,8 +146,8 @@ def _print_conditions(folder, suite):
     if len(cases) > MOST_CASES:
         note(f"wind and sea of the {len(cases)} cases: fowt list cases {suite or ''}".rstrip())
         return
-    rows = [(name, *described_texts(about), f"{about['duration']:g}") for name, about in cases.items()]
-    print_table(out, ("case", "wind", "sea", "s"), rows, left=(0, 1, 2), prose=(1, 2))
+    rows = [(name, *described_texts(about), about["duration"]) for name, about in cases.items()]
+    print_table(("case", "wind", "sea", "s"), rows, left=(0, 1, 2), prose=(1, 2))
     out.print()
 
 
@@ -174,39 +155,21 @@ def _print_evaluation(table, means, board):
     """Print metrics by case and the leaderboard; on stderr lost runs and why a score is invalid."""
     from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
-    width = table_width(out) or float("inf")
-    headings, rows, failures = summary_rows(means, width)
-    print_table(out, headings, rows, keys=2, left=(0, 1), red=_places(failures))
+    headings, rows, failures = summary_rows(means, table_width())
+    print_table(headings, rows, keys=2, left=(0, 1), red=[i for i, lost in enumerate(failures) if lost])
     out.print()
-    title, headings, rows, remarks = leaderboard_rows(board, width)
-    print_table(out, headings, rows, title, red=_places(entry["lost"] for entry in board["controllers"]))
+    title, headings, rows, remarks = leaderboard_rows(board, table_width())
+    lost = [i for i, entry in enumerate(board["controllers"]) if entry["lost"]]
+    print_table(headings, rows, title, red=lost)
     for remark in remarks:
-        out.print(remark, markup=False, highlight=False, soft_wrap=True)
+        out.print(remark, markup=False)
     for row in table[table["status"] != "ok"].to_dict("records"):
         run = f"{row['controller']}, {row['case']}, seed {row['seed']}"
         reason = row["reason"].removeprefix(f"{row['status']}: ")
-        text = f"[red]{row['status']}: {escape(run)}: {escape(reason)}[/red]"
-        err.print(text, soft_wrap=True, highlight=False)
+        err.print(f"[red]{row['status']}: {escape(run)}: {escape(reason)}[/red]")
     eventful = table[table["events"] != ""]
     if len(eventful):
         note(f"{len(eventful)} of {len(table)} runs had rare numerical events: column events of results.csv")
     for entry in board["controllers"]:
         if entry["score"] and not entry["score"]["valid"]:
             note(f"no valid score of {entry['controller']}: {entry['score']['why']}")
-
-
-def _places(flags):
-    """Return the indices of the flags that are set."""
-    return [index for index, flag in enumerate(flags) if flag]
-
-
-def _evaluation_plots(table, board, folder):
-    """Return the paths of the plots; none, with a note, if matplotlib is missing."""
-    from fowt_env.training.reports.evaluation_plots import evaluation_plots
-
-    try:
-        with progress_bar("plotting", None):
-            return evaluation_plots(table, board, folder)
-    except InputError as error:
-        note(f"no plots: {error}")
-        return []

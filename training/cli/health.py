@@ -6,10 +6,8 @@ import re
 import shutil
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
 
 import numba
 
@@ -31,34 +29,6 @@ EXPECTED = {
 TOLERANCE = 1e-3  # relative; half the step changes the values by 1.4e-4
 
 
-@dataclass(frozen=True)
-class CacheState:
-    """Folder and content of the cache of compiled kernels."""
-
-    folder: Path | None  # None: neither FOWT_CACHE_DIR nor a home folder exists
-    read: bool  # whether cached kernels are used; False: all are compiled at each start
-    written: bool  # whether compiled kernels are cached
-    compiled: bool  # at least one kind of scene of this version
-    megabytes: float  # of this version
-    others: int  # folders of other source versions
-
-    @property
-    def advice(self):
-        """Advice on a problem of the cache, "" for none."""
-        if not self.read:
-            return "kernels are compiled at each start: set FOWT_CACHE_DIR to a folder that can be written"
-        return "" if self.written else "read only: missing kernels are compiled at each start"
-
-
-class SelfTest(NamedTuple):
-    """The result of a short run, compared with EXPECTED."""
-
-    found: dict  # {channel: last value}
-    worst: float  # largest relative difference from EXPECTED
-    seconds: float  # of the clock, without compiling
-    passed: bool
-
-
 def machine():
     """Return a line on the machine and the compiler's settings."""
     jit = "switched off (NUMBA_DISABLE_JIT)" if numba.config.DISABLE_JIT else "on"
@@ -69,58 +39,50 @@ def machine():
 
 
 def cache_state():
-    """Return the CacheState of this process."""
-    root = cache_root()
+    """Return (line on the cache of compiled kernels, advice on a problem of it or "")."""
+    root, size, others = cache_root(), 0.0, 0
+    folder = CACHE_FOLDER or (root / "kernels" if root else "no home folder, and no FOWT_CACHE_DIR")
+    with suppress(OSError):  # removed meanwhile, or not readable
+        if CACHE_FOLDER is not None:
+            size = megabytes([CACHE_FOLDER])
+            others = sum(path != CACHE_FOLDER for path in own_folders(CACHE_FOLDER.parent))
+    text = f"{folder}: " + (
+        f"{size:.1f} MB of compiled kernels" if kernels_compiled() else "nothing compiled yet"
+    )
+    text += f", {others} folders of other versions" if others else ""
     if CACHE_FOLDER is None:
-        return CacheState(root and root / "kernels", False, False, kernels_compiled(), 0.0, 0)
+        return text, "kernels are compiled at each start: set FOWT_CACHE_DIR to a folder that can be written"
     written = os.access(CACHE_FOLDER, os.W_OK | os.X_OK)
-    size, others = 0, 0
-    try:
-        size = _bytes(CACHE_FOLDER)
-        others = sum(path != CACHE_FOLDER for path in own_folders(CACHE_FOLDER.parent))
-    except OSError:
-        pass  # removed meanwhile, or not readable
-    return CacheState(CACHE_FOLDER, True, written, kernels_compiled(), size / 1e6, others)
+    return text, "" if written else "read only: missing kernels are compiled at each start"
 
 
-class CachePart(NamedTuple):
-    """A part of the cache on disk."""
-
-    what: str  # "this version", "other versions" (of compiled kernels), "wind boxes" or "submissions"
-    paths: list[Path]  # folders, or files of wind
-    megabytes: float
-
-
-def cache_parts() -> list[CachePart]:
-    """Return the CacheParts of this user that this package made; [] without a cache folder."""
+def cache_parts() -> dict[str, list[Path]]:
+    """Return {part of the cache: its folders or files} that this package made; {} without a cache folder."""
     root = cache_root()
     if root is None:
-        return []
+        return {}
     kernels, boxes, submissions = root / "kernels", root / "wind_boxes", root / "submissions"
     folders = own_folders(kernels) if _ours(kernels) else []
-    files = [path for path in boxes.glob("*.npz") if BOX_NAME.fullmatch(path.name)] if _ours(boxes) else []
-    found = {
+    named = [path for path in boxes.glob("*.npz") if BOX_NAME.fullmatch(path.name)] if _ours(boxes) else []
+    inner = submissions.iterdir() if _ours(submissions) else ()
+    judged = [path for path in inner if SUBMISSION_NAME.fullmatch(path.name)]
+    return {
         "this version": [path for path in folders if path == CACHE_FOLDER],
         "other versions": [path for path in folders if path != CACHE_FOLDER],
-        "wind boxes": [path for path in files if path.is_file() and not path.is_symlink()],
-        "submissions": [
-            path
-            for path in (submissions.iterdir() if _ours(submissions) else ())
-            if SUBMISSION_NAME.fullmatch(path.name) and path.is_dir() and not path.is_symlink()
-        ],
+        "wind boxes": [path for path in named if path.is_file() and not path.is_symlink()],
+        "submissions": [path for path in judged if path.is_dir() and not path.is_symlink()],
     }
-    return [CachePart(what, paths, sum(map(_bytes, paths)) / 1e6) for what, paths in found.items()]
 
 
-def remove(parts: list[CachePart]) -> list[Path]:
+def remove(paths: list[Path]) -> list[Path]:
     """Remove parts of the cache; return the paths that could not be removed."""
-    for path in (path for part in parts for path in part.paths):
+    for path in paths:
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)
         else:
             with suppress(OSError):
                 path.unlink()
-    return [path for part in parts for path in part.paths if path.exists()]
+    return [path for path in paths if path.exists()]
 
 
 def _ours(folder):
@@ -131,13 +93,13 @@ def _ours(folder):
         return False
 
 
-def _bytes(path):
-    """Return the size of a file or of all files in a folder, without those removed meanwhile."""
+def megabytes(paths: list[Path]) -> float:
+    """Return the size of files and of all files in folders, without those removed meanwhile."""
     total = 0
-    for file in (path, *path.rglob("*")):
+    for file in (file for path in paths for file in (path, *path.rglob("*"))):
         with suppress(OSError):
             total += file.stat().st_size if file.is_file() else 0
-    return total
+    return total / 1e6
 
 
 def reference_run():
@@ -150,11 +112,11 @@ def reference_run():
 
 
 def self_test():
-    """Return the SelfTest of reference_run, timed once its kernels are compiled."""
+    """Return ({channel: last value}, largest relative difference from EXPECTED, s without compiling)."""
     reference_run()
     start = perf_counter()
     last = reference_run().iloc[-1]
     seconds = perf_counter() - start
     found = {name: float(last[name]) for name in EXPECTED}
     worst = max(abs(found[name] / value - 1.0) for name, value in EXPECTED.items())
-    return SelfTest(found, worst, seconds, worst <= TOLERANCE)
+    return found, worst, seconds

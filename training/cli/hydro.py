@@ -7,8 +7,7 @@ import numpy as np
 from typer import Argument, Option
 
 from fowt_env.descriptions.checks import check_number, parse_numbers
-from fowt_env.errors import InputError
-from fowt_env.training.cli.console import command, note, out, output, progress_bar, text_first
+from fowt_env.training.cli.console import command, output, text_progress, wrote
 from fowt_env.training.cli.options import RANGE
 from fowt_env.training.cli.tables import print_table
 
@@ -22,9 +21,7 @@ def hydro(
     heading: Annotated[str, Option(help=f"Wave directions (of travel), deg: {RANGE}.")] = "-180:180:30",
     density: Annotated[float, Option(help="Density of the water, kg/m3.")] = 1025.0,
     gravity: Annotated[float, Option(help="Gravity, m/s2.")] = 9.80665,
-    lid: Annotated[
-        bool, Option("--lid/--no-lid", help="Close the inner water plane (irregular frequencies).")
-    ] = True,
+    lid: Annotated[bool, Option("--lid/--no-lid", help="Close the inner water plane.")] = True,
 ):
     """Wave loads of a hull from its panel mesh (Capytaine).
 
@@ -36,16 +33,15 @@ def hydro(
 
     In the platform file: \\[potential_flow] coefficients = "hydro.npz" and displaced_volume, which is
     printed. A problem takes a second with 3000 panels; there are six and one per heading at each frequency.
+    A lid on the inner water plane removes irregular frequencies.
     """
     from fowt_env.analysis.panel_method import solve_mesh
     from fowt_env.descriptions.potential_flow import coefficient_arrays
     from fowt_env.files.atomic import replacing
 
-    if out_file.suffix != ".npz":
-        raise InputError(f"--out {str(out_file)!r}: must end with .npz")
-    output(out_file)
+    output(out_file, endings=(".npz",))
     check_number("--depth", depth, 0.0, low_open=True)
-    with progress_bar("solving", None) as update:
+    with text_progress("solving", "solving: ") as report:
         body = solve_mesh(
             mesh,
             parse_numbers(omega, "--omega"),
@@ -54,19 +50,20 @@ def hydro(
             water_density=check_number("--density", density, 0.0, low_open=True),
             gravity=check_number("--gravity", gravity, 0.0, low_open=True),
             lid=lid,
-            report=text_first(update, "solving: "),
+            report=report,
         )
     with replacing(out_file) as path, path.open("wb") as file:
         np.savez_compressed(file, **coefficient_arrays(body))
+    added = ((0, "surge", "kg"), (2, "heave", "kg"), (4, "platform pitch", "kg m2"))
     rows = [
         ("displaced_volume", f"{body.volume:.6g}", "m3"),
         ("centre_of_buoyancy", f"{body.centre_of_buoyancy[0]:.4g}, {body.centre_of_buoyancy[1]:.4g}", "m"),
-        ("draft", f"{body.draft:.4g}", "m"),
+        ("draft", body.draft, "m"),
         ("stiffness in heave", f"{body.stiffness[2, 2]:.5g}", "N/m"),
-        *(
-            (f"added mass {name} at infinite frequency", f"{body.added_mass_infinite[i, i]:.5g}", unit)
-            for i, name, unit in ((0, "surge", "kg"), (2, "heave", "kg"), (4, "platform pitch", "kg m2"))
-        ),
     ]
-    print_table(out, ("quantity", "value", "unit"), rows, None, 1)
-    note(f"written: {out_file}")
+    for i, name, unit in added:
+        rows.append(
+            (f"added mass {name} at infinite frequency", f"{body.added_mass_infinite[i, i]:.5g}", unit)
+        )
+    print_table(("quantity", "value", "unit"), rows)
+    wrote(out_file)

@@ -8,16 +8,17 @@ from typer import Argument, Option
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli.check import print_faults
-from fowt_env.training.cli.console import EXIT_STOPPED, command, note, out, output
+from fowt_env.training.cli.console import EXIT_STOPPED, command, note, out
 from fowt_env.training.cli.tables import print_table
 
 Part = Annotated[str | None, Option(help="This part file, in place of the one that the .fst names.")]
+PARTS = ("elastodyn", "aerodyn", "servodyn", "hydrodyn", "seastate", "mooring", "inflow")
 
 
 @command()
 def import_command(
     deck: Annotated[str | None, Argument(help="The .fst file; optional with part files.")] = None,
-    out_path: Annotated[str, Option("--out", help="Folder for the files, made if missing.")] = "imported",
+    out_folder: Annotated[str, Option("--out", help="Folder for the files, made if missing.")] = "imported",
     name: Annotated[str | None, Option(help="Name of platform and turbine; default: the folder's.")] = None,
     elastodyn: Part = None,
     aerodyn: Part = None,
@@ -27,9 +28,7 @@ def import_command(
     mooring: Part = None,
     inflow: Part = None,
     discon: Annotated[str | None, Option(help="A DISCON.IN of ROSCO, in place of the deck's.")] = None,
-    search: Annotated[
-        list[str] | None, Option(help="Further folder to search for files of the deck; repeatable.")
-    ] = None,
+    search: Annotated[list[str] | None, Option(help="Further folder to search; repeatable.")] = None,
     overwrite: Annotated[bool, Option(help="Replace the files of an earlier import.")] = False,
     check: Annotated[bool, Option(help="Check the imported platform at rest, as fowt check does.")] = True,
 ) -> None:
@@ -49,30 +48,27 @@ def import_command(
     from fowt_env.analysis.check import check_platform
     from fowt_env.files.openfast_deck.importer import import_deck
 
-    parts = {
-        "elastodyn": elastodyn, "aerodyn": aerodyn, "servodyn": servodyn, "hydrodyn": hydrodyn,
-        "seastate": seastate, "mooring": mooring, "inflow": inflow,
-    }  # fmt: skip
+    given = (elastodyn, aerodyn, servodyn, hydrodyn, seastate, mooring, inflow)
+    parts = dict(zip(PARTS, given, strict=True))
     if deck is None and not any(parts.values()):
         raise InputError(
             "fowt import: needs an .fst file, or part files such as --elastodyn, --aerodyn, --hydrodyn"
         )
-    output(out_path, folder=True)
     report = import_deck(
-        deck, out_path, parts=parts, search=search or (), discon=discon, name=name, replace_files=overwrite
+        deck, out_folder, parts=parts, search=search or (), discon=discon, name=name, replace_files=overwrite
     )
-    print_table(out, ("figure", "value"), report.figures, report.title, left=(0, 1))
+    print_table(("figure", "value"), report.figures, report.title, left=(0, 1))
     out.print()
     for columns, rows, title in (
         (("in the deck", "here"), report.differences, "Differences from the deck"),
         (("the deck", "consequence"), report.contradictions, "Contradictions in the deck"),
     ):
         if rows:
-            print_table(out, columns, rows, title, left=(0, 1), prose=(0, 1))
+            print_table(columns, rows, title, left=(0, 1), prose=(0, 1))
             out.print()
     for line in report.suggestions:
-        out.print(escape(line), soft_wrap=True, highlight=False)
-    platform = f"{out_path}/platform.toml"
+        out.print(escape(line))
+    platform = f"{out_folder}/platform.toml"
     note(f"wrote {platform}, turbine/ and report.md")
     if check:
         try:

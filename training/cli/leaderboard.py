@@ -4,15 +4,17 @@ import shlex
 from pathlib import Path
 from typing import Annotated
 
-from typer import Argument, Option, Typer
+from typer import Argument, Option
 
-from fowt_env.training.cli.console import app, command, note, out, output, progress_bar
+from fowt_env.training.cli.console import add_group, command, note, out, output, progress_bar
 from fowt_env.training.cli.options import JobsOption
 from fowt_env.training.cli.tables import print_table
 
-board_app = Typer(help="Keep a public ranking of submitted controllers.", no_args_is_help=True)
-app.add_typer(board_app, name="leaderboard")
+board_app = add_group("leaderboard", "Keep a public ranking of submitted controllers.")
 
+PLATFORM = "Platform of a new board: a name or a path, to which its suites are scaled."
+DRAWN = "Hash from which the public seeds are drawn, in place of the board's."
+WITHIN = "Command that starts each Python file, e.g. a container; {folder}: its folder."
 BoardOption = Annotated[Path, Option("--board", help="Folder of the board.")]
 
 
@@ -20,9 +22,7 @@ BoardOption = Annotated[Path, Option("--board", help="Folder of the board.")]
 def add_command(
     submissions: Annotated[list[Path], Argument(help="Folders, each with a card.toml.")],
     board: BoardOption = Path("board"),
-    platform: Annotated[
-        str | None, Option(help="Platform of a new board: a name or a path, to which its suites are scaled.")
-    ] = None,
+    platform: Annotated[str | None, Option(help=PLATFORM)] = None,
 ):
     """Check submissions and copy them into the board.
 
@@ -68,7 +68,7 @@ def seeds_command(
     from fowt_env.training.board.folder import write_secret_seeds
 
     digest = write_secret_seeds(path, count)
-    out.print(digest, highlight=False)
+    out.print(digest)
     note(f"wrote {count} seeds to {path}; publish the SHA-256 above, which does not reveal them")
 
 
@@ -76,18 +76,11 @@ def seeds_command(
 def run_command(
     board: BoardOption = Path("board"),
     jobs: JobsOption = 1,
-    draw_seeds: Annotated[
-        str | None, Option(help="Hash from which the public seeds are drawn, in place of the board's.")
-    ] = None,
+    draw_seeds: Annotated[str | None, Option(help=DRAWN)] = None,
     secret: Annotated[Path | None, Option(help="File of fowt leaderboard seeds; -: standard input.")] = None,
     private: Annotated[Path | None, Option(help="Folder for the runs of the secret seeds.")] = None,
-    trust_code: Annotated[
-        bool, Option("--trust-code", help="Run submissions that are Python files.")
-    ] = False,
-    within: Annotated[
-        str | None,
-        Option(help="Command that starts each Python file, e.g. a container; {folder}: its folder."),
-    ] = None,
+    trust_code: Annotated[bool, Option("--trust-code", help="Run submitted Python files.")] = False,
+    within: Annotated[str | None, Option(help=WITHIN)] = None,
 ):
     """Run every submission on the board's frozen suites and write its page.
 
@@ -98,8 +91,7 @@ def run_command(
 
     Python files run only with [bold]--trust-code[/bold], each in a separate process, with your user's rights:
     read them first, or run them in a container with [bold]--within[/bold] (docs/guides/leaderboard.md). The
-    same command resumes an interrupted judging. Written: index.html, board.csv, history.csv and runs/ in the
-    board's folder; runs of secret seeds in the folder --private.
+    same command resumes an interrupted judging.
     """
     from fowt_env.training.board.folder import Board
     from fowt_env.training.board.judge import judge
@@ -108,7 +100,7 @@ def run_command(
     holder = Board(board)
     output(private, "--private", folder=True)
     words = shlex.split(within or "")
-    with progress_bar("judging", None) as update:
+    with progress_bar("judging") as update:
         judged = judge(holder, jobs, secret, private, trust_code, update, draw_seeds, words)
     written = write_board(judged)
     for name, why in judged.left_out.items():
@@ -129,4 +121,4 @@ def show_command(
     from fowt_env.training.board.page import board_rows
 
     title, headings, rows = board_rows(board, regime)
-    print_table(out, headings, rows, title)
+    print_table(headings, rows, title)

@@ -4,10 +4,12 @@ import json
 from collections.abc import Callable
 from typing import Annotated, NamedTuple
 
-import typer
+from rich.text import Text
+from typer import Argument, Option
 
+from fowt_env.descriptions.checks import parse_number
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cli.console import app, out, reported
+from fowt_env.training.cli.console import command, out
 from fowt_env.training.cli.tables import figure, print_table
 
 LAST = ("DEMONSTRATION", "comparison only")  # in the summaries of controllers that nobody should choose
@@ -20,23 +22,21 @@ class Kind(NamedTuple):
     use: str
     headings: tuple[str, ...]
     rows: Callable[[], list]
-    prose: tuple[int, ...] = ()
-    right: tuple[int, ...] = ()
+    remark: str = ""
     extra: tuple[str, ...] = ()  # further keys of the JSON, whose texts stand at the end of the rows
     notes: int | None = None  # column whose texts stand below the table, once each
-    remark: str = ""
 
 
 def _platforms():
     from fowt_env.descriptions.platform import platform_names, read_platform
 
-    rows = []
-    for name in platform_names():
-        platform = read_platform(name)
-        hull = "strips" if platform.hull is not None else "panels"
-        depth = f"{platform.environment.water_depth:.4g}"
-        rows.append((name, hull, platform.turbine, depth, _one_line(platform.source)))
-    return rows
+    return [
+        (
+            *(name, "strips" if platform.hull is not None else "panels", platform.turbine),
+            *(f"{platform.environment.water_depth:.4g}", _one_line(platform.source)),
+        )
+        for name, platform in ((name, read_platform(name)) for name in platform_names())
+    ]
 
 
 def _one_line(text):
@@ -49,11 +49,10 @@ def _turbines():
     from fowt_env.descriptions.units import RPM
 
     rows = []
-    for name in turbine_names():
-        turbine = read_turbine(name)
-        power = turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
-        values = (turbine.rated_wind_speed, turbine.rated_rotor_speed / RPM)
-        rows.append((name, f"{1e-3 * power:.5g}", *map(figure, values), _one_line(turbine.source)))
+    for turbine in map(read_turbine, turbine_names()):
+        power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
+        values = (figure(turbine.rated_wind_speed), figure(turbine.rated_rotor_speed / RPM))
+        rows.append((turbine.name, f"{power:.5g}", *values, _one_line(turbine.source)))
     return rows
 
 
@@ -103,9 +102,8 @@ def _agents():
     rows = []
     for name in shipped_agents():
         settings, _ = read_policy(AGENTS / f"{name}.npz")
-        about = settings["about"]
+        about, ahead = settings["about"], settings["wind_preview"]
         acts = f"adds to {settings['baseline']}" if settings["action_mode"] == "residual" else "acts alone"
-        ahead = settings["wind_preview"]
         sees = f"wind {max(ahead):g} s ahead" if ahead else "measurements, estimates"
         trained = f"{about['algo'].upper()}, seed {about['seed']}, {about['steps']:,} decisions"
         rows.append((f"{POLICY_PREFIX}{name}", acts, sees, trained))
@@ -115,25 +113,21 @@ def _agents():
 def _suites():
     from fowt_env.training.evaluation.cases import read_suite, suite_names
 
-    rows = []
-    for name in suite_names():
-        suite = read_suite(name)
-        seeds = f"{len(suite.seeds)} x {suite.duration:g} s"
-        rows.append((name, str(len(suite.cases)), seeds, suite.description))
-    return rows
+    return [
+        (name, str(len(suite.cases)), f"{len(suite.seeds)} x {suite.duration:g} s", suite.description)
+        for name, suite in ((name, read_suite(name)) for name in suite_names())
+    ]
 
 
 def _cases():
     from fowt_env.training.evaluation.cases import described, read_suite, suite_names
     from fowt_env.training.evaluation.conditions import described_texts
 
-    rows = []
-    for name in suite_names():
-        suite = read_suite(name)
-        for case in suite.cases:
-            length = figure(case.duration or suite.duration)
-            rows.append((case.name, name, *described_texts(described(case)), length))
-    return rows
+    return [
+        (case.name, name, *described_texts(described(case)), figure(case.duration or suite.duration))
+        for name, suite in ((name, read_suite(name)) for name in suite_names())
+        for case in suite.cases
+    ]
 
 
 def _tasks():
@@ -142,11 +136,11 @@ def _tasks():
 
     rows = []
     for name, task in TASKS.items():
-        weathers = task.weathers
-        speeds = {f"{wind['speed'][0]:g} to {wind['speed'][1]:g} m/s" for _, wind, _ in weathers}
-        kinds = ", ".join(dict.fromkeys(wind["kind"] for _, wind, _ in weathers))
-        sea = STILL if all(sea is None for *_, sea in weathers) else "of the site, by the wind"
-        rows.append((name, task.summary, f"{kinds}, {', '.join(speeds)}", sea, f"{task.duration:g}"))
+        winds = [wind for _, wind, _ in task.weathers]
+        speeds = {f"{wind['speed'][0]:g} to {wind['speed'][1]:g} m/s" for wind in winds}
+        kinds = dict.fromkeys(wind["kind"] for wind in winds)
+        sea = STILL if all(sea is None for *_, sea in task.weathers) else "of the site, by the wind"
+        rows.append((name, task.summary, ", ".join([*kinds, *speeds]), sea, f"{task.duration:g}"))
     return rows
 
 
@@ -163,10 +157,7 @@ def _channels():
     scenes = dict.fromkeys(channels(1), "")
     scenes |= dict.fromkeys(TOWER_CHANNELS, "; with --option tower=modes")
     scenes |= dict.fromkeys(BLADE_CHANNELS, "; with --option pitch=individual")
-    return [
-        (channel.name, channel.unit, channel_meaning(channel.name) + scene)
-        for channel, scene in scenes.items()
-    ]
+    return [(one.name, one.unit, channel_meaning(one.name) + scene) for one, scene in scenes.items()]
 
 
 def _options():
@@ -198,160 +189,144 @@ def _sensors():
 def _lidars():
     from fowt_env.descriptions.lidar import lidars
 
-    rows = [(name, _one_line(lidar.source)) for name, lidar in lidars().items()]
-    return [("exact", "the wind itself, averaged over the rotor"), *rows]
+    exact = ("exact", "the wind itself, averaged over the rotor")
+    return [exact, *((name, _one_line(lidar.source)) for name, lidar in lidars().items())]
 
 
 KINDS = {
     "platforms": Kind(
         "--platform", "floating platforms with turbine, water depth, source",
-        ("name", "hull", "turbine", "depth\nm", "source"), _platforms, prose=(4,), right=(3,),
-        remark="hull: wave loads by strips (Morison) or from panels (potential flow)."
+        ("name", "hull", "turbine", "depth\nm", "source"), _platforms,
+        "hull: wave loads by strips (Morison) or from panels (potential flow)."
         " A file of your own: --platform mine.toml",
     ),
     "turbines": Kind(
         "--option turbine=", "turbines, of which every platform has one",
         ("name", "power\nkW", "rated\nwind m/s", "rated\nrpm", "source"), _turbines,
-        prose=(4,), right=(1, 2, 3),
     ),
     "winds": Kind(
-        "--wind", "kinds of wind, and how each is written",
-        ("kind", "--wind", "what it is"), _winds,
-        prose=(1, 2), remark="Any of them as JSON, with further keys. Speeds in m/s at hub height.",
+        "--wind", "kinds of wind, and how each is written", ("kind", "--wind", "what it is"), _winds,
+        "Any of them as JSON, with further keys. Speeds in m/s at hub height.",
     ),
     "seas": Kind(
         "--sea", "sea states with Hs, Tp, source",
-        ("name", "kind", "Hs or H\nm", "Tp or T\ns", "wind\nm/s", "source"), _seas,
-        prose=(5,), right=(2, 3, 4, 5), notes=5,
+        ("name", "kind", "Hs or H\nm", "Tp or T\ns", "wind\nm/s", "source"), _seas, notes=5,
         remark="Also jonswap:HS:TP[:GAMMA], regular:H:T (m, s), JSON, or none. wind: that belongs to it.",
     ),
     "controllers": Kind(
-        "--controller", "built-in control laws",
-        ("name", "what it is", "also uses"), _controllers, prose=(1,),
-        extra=("measurements and models",),
-        remark="Also policy:NAME (fowt list agents), design:FILE (fowt design) and module:Name (your own).\n"
+        "--controller", "built-in control laws", ("name", "what it is", "also uses"), _controllers,
+        "Also policy:NAME (fowt list agents), design:FILE (fowt design) and module:Name (your own).\n"
         "All use generator speed, torque and blade pitch; motion: nacelle and platform. All of it: --json.",
+        extra=("measurements and models",),
     ),
     "agents": Kind(
         "--controller", "trained agents that come with the package",
-        ("name", "how it acts", "what it sees", "training"), _agents, prose=(1, 2, 3),
-        remark="An agent of your own: policy:PATH/best.npz",
+        ("name", "how it acts", "what it sees", "training"), _agents,
+        "An agent of your own: policy:PATH/best.npz",
     ),
     "suites": Kind(
         "--suite", "sets of load cases with seeds and rules",
-        ("name", "cases", "seeds", "what it is"), _suites, prose=(3,), right=(1,),
-        remark="The cases of one:  fowt list cases above_rated",
+        ("name", "cases", "seeds", "what it is"), _suites, "The cases of one:  fowt list cases above_rated",
     ),
     "cases": Kind(
-        "--cases", "load cases: wind, sea, duration",
-        ("name", "suite", "wind", "sea", "s"), _cases, prose=(2, 3), right=(4,),
+        "--cases", "load cases: wind, sea, duration", ("name", "suite", "wind", "sea", "s"), _cases
     ),
     "tasks": Kind(
         "make(ID, task=)", "tasks of the Gymnasium environments",
-        ("name", "what is to be done", "wind", "sea", "s"), _tasks, prose=(1, 2, 3), right=(4,),
+        ("name", "what is to be done", "wind", "sea", "s"), _tasks,
     ),
     "metrics": Kind(
-        "results.csv", "what runs are judged by",
-        ("name", "unit", "meaning", "better"), _metrics, prose=(2,),
-        remark='A column is NAME_[UNIT]: "RotSpeed_std_[rpm]".',
+        "results.csv", "what runs are judged by", ("name", "unit", "meaning", "better"), _metrics,
+        'A column is NAME_[UNIT]: "RotSpeed_std_[rpm]".',
     ),
     "channels": Kind(
-        "--initial", "outputs of a run, by OpenFAST's names",
-        ("name", "unit", "meaning"), _channels, prose=(2,),
-        remark='A column is NAME_[UNIT]: "RotSpeed_[rpm]". FAIRTEN2, ...: further lines.',
+        "--initial", "outputs of a run, by OpenFAST's names", ("name", "unit", "meaning"), _channels,
+        'A column is NAME_[UNIT]: "RotSpeed_[rpm]". FAIRTEN2, ...: further lines.',
     ),
     "options": Kind(
         "--option", "parts of the model, as of build_scene",
-        ("option", "what it is", "values, default first"), _options, prose=(1, 2),
-        remark="None: that of the fidelity, the platform or the turbine. What is no text is JSON: null.",
+        ("option", "what it is", "values, default first"), _options,
+        "None: that of the fidelity, the platform or the turbine. What is no text is JSON: null.",
     ),
     "faults": Kind(
-        "--fault", "what goes wrong in a run",
-        ("kind", "--fault", "what happens"), _faults, prose=(2,),
-        remark='As JSON: {"kind": "pitch_offset", "time": 100, "offset": 2}',
+        "--fault", "what goes wrong in a run", ("kind", "--fault", "what happens"), _faults,
+        'As JSON: {"kind": "pitch_offset", "time": 100, "offset": 2}',
     ),
     "sensors": Kind(
-        "--sensors", "what stands between plant and controller", ("name", "what it is"), _sensors, prose=(1,)
+        "--sensors", "what stands between plant and controller", ("name", "what it is"), _sensors
     ),
-    "lidars": Kind(
-        "--preview", "what sees the wind ahead", ("name", "what it is, and its source"), _lidars, prose=(1,)
-    ),
+    "lidars": Kind("--preview", "what sees the wind ahead", ("name", "what it is, and its source"), _lidars),
 }  # fmt: skip
-LIST_EXAMPLES = """[bold]Examples[/bold]
-
-[cyan]fowt list[/cyan]  # the kinds of names, how many there are of each, and where they are used
-
-[cyan]fowt list seas[/cyan]  # sea states with Hs, Tp and source
-
-[cyan]fowt list cases above_rated[/cyan]  # wind, sea and duration of the cases of a suite
-
-[cyan]fowt list channels tower[/cyan]  # rows with "tower" in them
-
-[cyan]fowt list metrics --json[/cyan]  # for a program"""
 
 
-@app.command(name="list", epilog=LIST_EXAMPLES)
-@reported
-def list_names(
-    kind: Annotated[str | None, typer.Argument(help=f"{', '.join(KINDS)}; or all.")] = None,
-    part: Annotated[str | None, typer.Argument(help="Show the rows with this text in them.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+@command()
+def list_command(
+    kind: Annotated[str | None, Argument(help=f"{', '.join(KINDS)}; or all.")] = None,
+    part: Annotated[str | None, Argument(help="Show the rows with this text in them.")] = None,
+    as_json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
 ):
-    """Names that the other commands take, with what each is."""
-    if kind is None:
-        _print_overview(as_json)
-        return
-    if kind != "all" and kind not in KINDS:
+    """Names that the other commands take, with what each is.
+
+    Examples:
+    fowt list  # the kinds of names, how many there are of each, and where they are used
+    fowt list seas  # sea states with Hs, Tp and source
+    fowt list cases above_rated  # wind, sea and duration of the cases of a suite
+    fowt list channels tower  # rows with "tower" in them
+    fowt list metrics --json  # for a program
+    """
+    if kind is not None and kind != "all" and kind not in KINDS:
         raise unknown("kind of name", kind, ("all", *KINDS))
-    chosen = list(KINDS) if kind == "all" else [kind]
-    found = {name: _rows_with(KINDS[name].rows(), part) for name in chosen}
-    if part is not None and not any(found.values()):
+    if kind is None:
+        headings = ("kind", "names", "used in", "what")
+        found = [(name, str(len(each.rows())), each.option, each.use) for name, each in KINDS.items()]
+        if as_json:
+            out.print_json(json.dumps(_as_mappings(headings, found)))
+            return
+        print_table(headings, found, left=(0, 2, 3), prose=(3,))
+        out.print("\nfowt list KIND  shows one kind,  fowt list KIND TEXT  its rows with that text")
+        return
+    wanted = (part or "").lower()
+    tables = {
+        name: [row for row in KINDS[name].rows() if any(wanted in cell.lower() for cell in row)]
+        for name in (KINDS if kind == "all" else [kind])
+    }
+    if part is not None and not any(tables.values()):
         raise InputError(f"no {kind} with {part!r} in them: fowt list {kind} shows them all")
     if as_json:
-        tables = {name: _as_mappings(KINDS[name], rows) for name, rows in found.items()}
-        out.print_json(json.dumps(tables if kind == "all" else tables[kind]))
+        found = {
+            name: _as_mappings((*KINDS[name].headings, *KINDS[name].extra), rows)
+            for name, rows in tables.items()
+        }
+        out.print_json(json.dumps(found if kind == "all" else found[kind]))
         return
-    for number, (name, rows) in enumerate(item for item in found.items() if item[1]):
+    for number, (name, rows) in enumerate(item for item in tables.items() if item[1]):
         if number:
             out.print()
-        _print_kind(name, rows)
+        _print_kind(name, KINDS[name], rows)
 
 
-def _rows_with(rows, part):
-    """Return the rows in which a text is found; all for None."""
-    wanted = (part or "").lower()
-    return [row for row in rows if any(wanted in cell.lower() for cell in row)]
-
-
-def _as_mappings(kind, rows):
-    """Return [{heading: text}] of the rows of a Kind."""
-    keys = [" ".join(heading.split()) for heading in (*kind.headings, *kind.extra)]
+def _as_mappings(headings, rows):
+    """Return [{heading: text}] of rows of texts."""
+    keys = [" ".join(heading.split()) for heading in headings]
     return [dict(zip(keys, row, strict=True)) for row in rows]
 
 
-def _print_overview(as_json):
-    headings = ("kind", "names", "used in", "what")
-    rows = [(name, str(len(kind.rows())), kind.option, kind.use) for name, kind in KINDS.items()]
-    if as_json:
-        out.print_json(json.dumps([dict(zip(headings, row, strict=True)) for row in rows]))
-        return
-    print_table(out, headings, rows, left=(0, 2, 3), prose=(3,))
-    out.print("\nfowt list KIND  shows one kind,  fowt list KIND TEXT  its rows with that text")
-
-
-def _print_kind(name, rows):
-    kind = KINDS[name]
-    left = [i for i in range(len(kind.headings)) if i not in kind.right]
-    rows, found = [row[: len(kind.headings)] for row in rows], {}
+def _print_kind(name, kind, rows):
+    """Print rows of a Kind: columns of numbers to the right, those of texts with blanks as prose."""
+    columns = [[row[i] for row in rows] for i in range(len(kind.headings))]
+    numbered = {}
     if kind.notes is not None:
-        found = {row[kind.notes]: "" for row in rows}
-        found = {text: str(number) for number, text in enumerate(found, 1)}
-        rows = [(*row[: kind.notes], found[row[kind.notes]], *row[kind.notes + 1 :]) for row in rows]
+        numbered = {text: str(number) for number, text in enumerate(dict.fromkeys(columns[kind.notes]), 1)}
+        columns[kind.notes] = [numbered[text] for text in columns[kind.notes]]
+    texts = [
+        i for i, column in enumerate(columns) if any(cell and parse_number(cell) is None for cell in column)
+    ]
+    prose = [i for i in texts if any(" " in cell for cell in columns[i])]
     title = f"{name}: {kind.use} ({kind.option})"
-    print_table(out, kind.headings, rows, title, left=left, prose=kind.prose)
-    if found:
+    print_table(kind.headings, zip(*columns, strict=True), title, left=texts, prose=prose)
+    if numbered:
         out.print()
-        notes = [(number, text) for text, number in found.items()]
-        print_table(out, (kind.headings[kind.notes], ""), notes, left=(1,), prose=(1,))
+        notes = [(number, text) for text, number in numbered.items()]
+        print_table((kind.headings[kind.notes], ""), notes, left=(1,), prose=(1,))
     if kind.remark:
-        out.print(kind.remark, style="dim", markup=False, highlight=False)
+        out.print(Text(kind.remark, style="dim"), soft_wrap=False)

@@ -6,6 +6,7 @@ from typer import Option
 
 RANGE = "a list (8,12,18) or START:STOP[:STEP], STOP included"
 AS_SIMULATE = "As of fowt simulate --help."
+WHOLE = "1,2,3 or 1:6:1 (6 included)"
 
 PlatformOption = Annotated[
     str, Option(help="Platform: a name of fowt list platforms, or a path to a TOML file.")
@@ -25,9 +26,11 @@ EngineOption = Annotated[str, Option(help="Where the runs are done: processes or
 AddressOption = Annotated[str | None, Option(help="Address of a running Ray cluster.")]
 SuiteOption = Annotated[str, Option(help="Suite whose cases are run.")]
 ValidationSeeds = Annotated[
-    str, Option(help="Validation seeds, 1000 and above: 1001,1002 or 1001:1006:1 (1006 included).")
+    str, Option(help="Validation seeds, 1000 and above: 1001,1002 or 1001:1006:1 (6 included).")
 ]
 FolderOption = Annotated[str, Option("--out", help="Folder for the output.")]
 CsvOption = Annotated[str, Option("--out", help="CSV to write.")]
 TableOption = Annotated[str | None, Option("--out", help="Table: .csv or .parquet.")]
+DesignOption = Annotated[str | None, Option("--out", help="Design: .json.")]
 PlotsOption = Annotated[bool, Option("--plot/--no-plot", help="Make the plots.")]
+PlotOption = Annotated[str | None, Option(help="Plot to write, e.g. plot.png.")]

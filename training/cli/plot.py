@@ -6,7 +6,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cli.console import command, note, output
+from fowt_env.training.cli.console import command, wrote
 
 PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 
@@ -15,14 +15,10 @@ PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 def plot(
     kind: Annotated[str, Argument(help="series, spectra, boxes, raos or schedule.")],
     files: Annotated[list[str], Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")],
-    out_path: Annotated[
-        str | None, Option("--out", help="Picture: .png, .svg, .pdf ...; default: KIND.png.")
-    ] = None,
+    out_path: Annotated[str | None, Option("--out", help="Picture; default: KIND.png.")] = None,
     skip: Annotated[float, Option(min=0.0, help="Seconds at the start left out; not of series.")] = 0.0,
     title: Annotated[str | None, Option(help="Heading.")] = None,
-    platform: Annotated[
-        str, Option(help="Platform of rated values and of the marked pitch period; or none.")
-    ] = "oc3_hywind",
+    platform: Annotated[str, Option(help="Platform of rated values and periods; or none.")] = "oc3_hywind",
 ):
     """Plot saved runs: time series, spectra, box plots.
 
@@ -38,16 +34,31 @@ def plot(
 
     Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST.
     """
+    from fowt_env.descriptions.platform import read_platform, turbine_of
+    from fowt_env.descriptions.ratings import ratings
     from fowt_env.files.tables import read_series
+    from fowt_env.visual import response, time_series
 
     if kind not in PLOTS:
         raise unknown("kind of plot", kind, PLOTS)
-    out_path = f"{kind}.png" if out_path is None else output(out_path)
-    frames = {name: read_series(path) for name, path in _names(files).items()}
+    path = f"{kind}.png" if out_path is None else out_path
+    frames = {name: read_series(file) for name, file in _names(files).items()}
     if len(frames) == 1:  # no legend
         frames = {"": next(iter(frames.values()))}
-    _draw(kind, frames, out_path, title, skip, platform)
-    note(f"wrote {out_path}")
+    known = None if platform.lower() == "none" else read_platform(platform)
+    levels = {} if known is None else ratings(turbine_of(known))
+    period = known and known.published.get("natural_periods", {}).get("pitch")
+    if kind == "series":
+        time_series.plot_runs(frames, path, title, skip=skip, ratings=levels)
+    elif kind == "spectra":
+        time_series.plot_spectra(frames, path, title, skip, platform_pitch_period=period)
+    elif kind == "boxes":
+        response.plot_boxes({"": frames}, path, title, skip)
+    elif kind == "raos":
+        response.plot_raos(frames, path, title, skip, platform_pitch_period=period)
+    else:
+        response.plot_schedule(frames, path, title, rated_wind=levels.get("rated_wind_speed_[m/s]"))
+    wrote(path)
 
 
 def _names(files):
@@ -63,24 +74,3 @@ def _names(files):
     if len(set(names)) < len(names):  # the same run as .csv and as .parquet
         names = files
     return dict(zip(names, files, strict=True))
-
-
-def _draw(kind, frames, path, title, skip, platform):
-    """Write the picture of a kind; platform: of its ratings and pitch period, or "none"."""
-    from fowt_env.descriptions.platform import read_platform, turbine_of
-    from fowt_env.descriptions.ratings import ratings
-    from fowt_env.visual import response, time_series
-
-    known = None if platform.lower() == "none" else read_platform(platform)
-    levels = {} if known is None else ratings(turbine_of(known))
-    period = known and known.published.get("natural_periods", {}).get("pitch")
-    if kind == "series":
-        time_series.plot_runs(frames, path, title, skip=skip, ratings=levels)
-    elif kind == "spectra":
-        time_series.plot_spectra(frames, path, title, skip, platform_pitch_period=period)
-    elif kind == "boxes":
-        response.plot_boxes({"": frames}, path, title, skip)
-    elif kind == "raos":
-        response.plot_raos(frames, path, title, skip, platform_pitch_period=period)
-    else:
-        response.plot_schedule(frames, path, title, rated_wind=levels.get("rated_wind_speed_[m/s]"))

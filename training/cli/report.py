@@ -7,7 +7,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fowt_env.descriptions.checks import parse_whole_numbers
-from fowt_env.training.cli.arguments import parse_names, parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.arguments import parse_names, parse_pairs
 from fowt_env.training.cli.console import command, note, output, progress_bar
 from fowt_env.training.cli.options import FidelityOption, OptionOption, SeaOption, WindOption
 
@@ -16,18 +16,10 @@ from fowt_env.training.cli.options import FidelityOption, OptionOption, SeaOptio
 def report(
     folder: Annotated[str, Argument(help="Folder that fowt evaluate wrote.")],
     out_path: Annotated[str | None, Option("--out", help="Default: report.html in the folder.")] = None,
-    cases: Annotated[
-        str | None, Option(help="Cases with time series, comma-separated; default: all, up to 120 runs.")
-    ] = None,
-    seeds: Annotated[
-        str | None, Option(help="Seeds with time series: 1,2 or 1:6:1 (6 included); default: all.")
-    ] = None,
-    rate: Annotated[
-        float | None, Option(help="Samples per second of the series; default: 2 or less.")
-    ] = None,
-    platform: Annotated[
-        str | None, Option(help="Platform of the steady schedule; default: that of the evaluation.")
-    ] = None,
+    cases: Annotated[str | None, Option(help="Cases with time series; default: all, up to 120 runs.")] = None,
+    seeds: Annotated[str | None, Option(help="Seeds with time series: 1,2 or 1:6:1; default: all.")] = None,
+    rate: Annotated[float | None, Option(help="Samples per second of the series; default: up to 2.")] = None,
+    platform: Annotated[str | None, Option(help="Of the steady schedule; default: the evaluation's.")] = None,
     schedule: Annotated[bool, Option("--schedule/--no-schedule", help="Show the steady schedule.")] = True,
 ):
     """Write an HTML page of an evaluation for offline use.
@@ -39,14 +31,12 @@ def report(
     fowt report results/suite --cases ntm_12,ntm_24 --seeds 1,2 --rate 5 --out page.html
     fowt report results/suite --platform mine.toml  # the steady schedule of another platform
 
-    The page contains plotly.js and all data: 5 MB and 25 kB for each run of 10 minutes that it shows. It
-    begins with a verdict on the paired differences, which needs 4 seeds or more.
+    The page contains plotly.js and all data: 5 MB and 25 kB for each run of 10 minutes that it shows.
     """
     from fowt_env.training.reports.html_page import write_report
 
-    output(out_path)
     numbers = None if seeds is None else parse_whole_numbers(seeds, "seeds")
-    with progress_bar("report", None) as update:
+    with progress_bar("report") as update:
         path = write_report(
             Path(folder), out_path, parse_names(cases), numbers, rate, platform, schedule, update
         )
@@ -55,10 +45,8 @@ def report(
 
 @command()
 def animate(
-    out_path: Annotated[str, Argument(help="The animation: .gif or .mp4.")],
-    controllers: Annotated[
-        str, Option(help="One to four, comma-separated; see fowt list controllers.")
-    ] = "pi,pi_land",
+    out_file: Annotated[str, Argument(help="The animation: .gif or .mp4.")],
+    controllers: Annotated[str, Option(help="One to four, with commas.")] = "pi,pi_land",
     platform: Annotated[str, Option(help="Platform: a name or a path.")] = "oc3_hywind",
     wind: WindOption = '{"kind": "eog", "speed": 18, "start": 20}',
     sea: SeaOption = "jonswap:4:10",
@@ -79,20 +67,15 @@ def animate(
     fowt animate gust.gif  # OC3 and land gains in an extreme operating gust at 18 m/s
     fowt animate run.mp4 --controllers pi --wind ntm:14:B --sea jonswap:4:9 --duration 120
     """
-    import fowt_env
+    from fowt_env.training.cli.simulate import compared_runs
     from fowt_env.visual.animation import animate as animate_runs
     from fowt_env.visual.animation import animation_path
 
-    path = animation_path(output(out_path, "OUT_PATH"))  # check the ending before the runs
-    names = list(dict.fromkeys(parse_names(controllers)))
-    options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
-    scene = fowt_env.build_scene(
-        platform, wind=parse_wind(wind), sea=parse_sea(sea), seed=seed, fidelity=fidelity, **options
-    )
-    runs = {}
-    with progress_bar("simulating", None) as update:
-        for name in names:
-            runs[name] = fowt_env.simulate(scene, controller=name, duration=duration)
+    path = animation_path(output(out_file, "OUT_FILE"))  # check the ending before the runs
+    options = {"platform": platform, "wind": wind, "sea": sea, "seed": seed, "fidelity": fidelity}
+    options |= parse_pairs(option, "option")
+    with progress_bar("simulating") as update:
+        scene, runs = compared_runs(controllers, duration, update, **options)
         progress = partial(update, text="drawing")
         animate_runs(scene, runs, path, speed=speed, fps=fps, size=(width, height), progress=progress)
     note(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -2,6 +2,7 @@
 
 import platform
 import re
+from importlib import metadata
 
 from packaging.requirements import Requirement
 
@@ -12,33 +13,10 @@ DISTRIBUTION = "fowt-env"
 
 
 def _found(name, needed=""):
-    from importlib import metadata
-
     try:
         return Package(name, metadata.version(name), needed)
     except metadata.PackageNotFoundError:
         return Package(name, None, needed)
-
-
-def requirements() -> dict[str, list[Package]]:
-    """Return {extra or "": [Package]} of the installed package, without [dev].
-
-    Raises: InputError if the package runs from a folder and was never installed.
-    """
-    from importlib import metadata
-
-    try:
-        lines = metadata.requires(DISTRIBUTION) or []
-    except metadata.PackageNotFoundError:
-        raise InputError(f"{DISTRIBUTION} is not installed here: pip install -e . in its folder") from None
-    found: dict[str, list[Package]] = {}
-    for line in lines:
-        wanted = Requirement(line)
-        extra = re.search('extra == "(.+?)"', str(wanted.marker))
-        key = extra.group(1) if extra else ""
-        if key != "dev" and wanted.name != DISTRIBUTION:
-            found.setdefault(key, []).append(_found(wanted.name, str(wanted.specifier)))
-    return found
 
 
 def installed(name: str) -> bool:
@@ -46,15 +24,22 @@ def installed(name: str) -> bool:
     return _found(name).version is not None
 
 
-def _python() -> Package:
-    """Return this Python, with the versions that the package supports."""
-    from importlib import metadata
+def requirements() -> dict[str, list[Package]]:
+    """Return {extra or "": [Package]} of the installed package, without [dev].
 
+    Raises: InputError if the package runs from a folder and was never installed.
+    """
     try:
-        needed = metadata.metadata(DISTRIBUTION).get("Requires-Python", "")
+        lines = metadata.requires(DISTRIBUTION) or []
     except metadata.PackageNotFoundError:
-        needed = ""
-    return Package("Python", platform.python_version(), needed)
+        raise InputError(f"{DISTRIBUTION} is not installed here: pip install -e . in its folder") from None
+    found: dict[str, list[Package]] = {}
+    for wanted in map(Requirement, lines):
+        extra = re.search('extra == "(.+?)"', str(wanted.marker))
+        key = extra.group(1) if extra else ""
+        if key != "dev" and wanted.name != DISTRIBUTION:
+            found.setdefault(key, []).append(_found(wanted.name, str(wanted.specifier)))
+    return found
 
 
 def versions() -> list[Package]:
@@ -63,11 +48,12 @@ def versions() -> list[Package]:
 
     try:
         needed = requirements().get("", [])
-    except InputError:
-        needed = [_found(name) for name in ("numpy", "scipy", "numba", "gymnasium", "pandas")]
+        pythons = metadata.metadata(DISTRIBUTION).get("Requires-Python", "")
+    except (InputError, metadata.PackageNotFoundError):
+        needed, pythons = [_found(name) for name in ("numpy", "scipy", "numba", "gymnasium", "pandas")], ""
     needed = [_found("numba", NUMBA) if package.name == "numba" else package for package in needed]
-    head = [Package(DISTRIBUTION, __version__), _python()]
-    return [*head, *needed, _found("llvmlite")]
+    python = Package("Python", platform.python_version(), pythons)
+    return [Package(DISTRIBUTION, __version__), python, *needed, _found("llvmlite")]
 
 
 def optional_parts() -> dict[str, list[Package]]:

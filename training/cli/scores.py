@@ -2,31 +2,26 @@
 
 from typing import Annotated
 
-from typer import Argument, Option, Typer
+from typer import Argument, Option
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.arguments import parse_names, parse_sea, parse_wind
-from fowt_env.training.cli.console import app, command, note, out, output, progress_bar
-from fowt_env.training.cli.options import FidelityOption, SeaOption, WindOption
+from fowt_env.training.cli import options as shared
+from fowt_env.training.cli.arguments import parse_names
+from fowt_env.training.cli.console import add_group, command, out, output, progress_bar, wrote
 
-scores = Typer(
-    no_args_is_help=True,
-    rich_markup_mode="rich",
-    help="Compare agents with baselines, from saved evaluations.",
-)
-app.add_typer(scores, name="scores")
-
+scores = add_group("scores", "Compare agents with baselines, from saved evaluations.")
 FoldersArgument = Annotated[
     list[str], Argument(metavar="RESULTS...", help="Folders or results.csv of fowt evaluate.")
 ]
 GroupOption = Annotated[
-    list[str] | None,
-    Option("--group", metavar="NAME=LABEL,LABEL", help="Training seeds of one configuration; repeatable."),
+    list[str] | None, Option(metavar="NAME=LABEL,LABEL", help="Training seeds of one agent; repeatable.")
 ]
-AgentsOption = Annotated[
-    str | None, Option(help="Controllers to score, comma-separated; default: all except the baselines.")
-]
+AgentsOption = Annotated[str | None, Option(help="Controllers to score; default: all but the baselines.")]
 CasesOption = Annotated[str | None, Option(help="Cases to score, comma-separated; default: all.")]
+OutOption = Annotated[str | None, Option("--out", metavar="STEM", help="Write STEM.md and tables STEM*.csv.")]
+LIMIT = "Limit: CSV of fowt design bound; default: the package's."
+FIGURES = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL"
+GUST = '{"kind": "eog", "speed": 18, "class": "B", "start": 200}'
 
 
 def _groups(texts):
@@ -50,22 +45,17 @@ def _runs(results, cases):
     return read_results(results, METRICS, parse_names(cases), parked=False)
 
 
-def _shown(text, tables, out_path):
+def _shown(text, out_path, found, counts=None):
     """Print the markdown text; with a path, write it and its tables."""
     from fowt_env.training.reports.scores import write_scores
 
-    out.print(text, highlight=False, markup=False, soft_wrap=True)
+    out.print(text, markup=False)
     if out_path is not None:
-        note("wrote " + ", ".join(str(path) for path in write_scores(tables, text, out_path)))
-
-
-OutOption = Annotated[
-    str | None, Option("--out", metavar="STEM", help="Write STEM.md and the tables as STEM*.csv.")
-]
+        tables = {"": found} if counts is None else {"": found, "counts": counts}
+        wrote(*write_scores(tables, text, out_path))
 
 
 @command(scores)
-@scores.command(name="rivals", hidden=True)  # the former name
 def baselines_command(
     results: FoldersArgument,
     against: Annotated[str, Option(help="Baselines, comma-separated.")] = "gspi_oc3,rosco_float",
@@ -87,11 +77,10 @@ def baselines_command(
     """
     from fowt_env.training.reports.scores import agent_counts, agent_scores, scores_markdown
 
-    output(out_path)
     table = _runs(results, cases)
     chosen = parse_names(against), _groups(group), parse_names(agents)
     found, counts = agent_scores(table, *chosen), agent_counts(table, *chosen)
-    _shown(scores_markdown(found, counts), {"": found, "counts": counts}, out_path)
+    _shown(scores_markdown(found, counts), out_path, found, counts)
 
 
 @command(scores)
@@ -101,12 +90,8 @@ def cases_command(
     group: GroupOption = None,
     agents: AgentsOption = None,
     cases: CasesOption = None,
-    figures: Annotated[
-        str, Option(help="Short names or metrics that get a table, comma-separated.")
-    ] = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL",
-    each: Annotated[
-        bool, Option("--each", help="A row per case; default: winds of a kind together.")
-    ] = False,
+    figures: Annotated[str, Option(help="Short names or metrics that get a table, with commas.")] = FIGURES,
+    each: Annotated[bool, Option("--each", help="A row per case, not one per kind of wind.")] = False,
     out_path: OutOption = None,
 ):
     """Score agents against one baseline on each kind of case.
@@ -115,16 +100,14 @@ def cases_command(
 
     Examples:
     fowt evaluate --suite shifted --controllers policy:ppo_lqr,gspi_oc3 --out results/shifted
-    fowt scores cases results/shifted --out results/shifted/scores  # a row per shifted plant
     fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"  # any metric
     fowt scores cases results/sea_states --each  # one row per sea state
     """
     from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown
 
-    output(out_path)
     table, chosen = _runs(results, cases), figures_named(parse_names(figures))
     found, counts = by_kind(table, against, _groups(group), parse_names(agents), chosen, each)
-    _shown(kinds_markdown(found, counts), {"": found, "counts": counts}, out_path)
+    _shown(kinds_markdown(found, counts), out_path, found, counts)
 
 
 @command(scores)
@@ -133,10 +116,8 @@ def bound(
     group: GroupOption = None,
     agents: AgentsOption = None,
     cases: CasesOption = None,
-    table_path: Annotated[
-        str | None, Option("--bound", help="Limit: CSV of fowt design bound; default: the package's.")
-    ] = None,
-    plot: Annotated[str | None, Option(help="Plot of all controllers and Pareto fronts.")] = None,
+    table_path: Annotated[str | None, Option("--bound", help=LIMIT)] = None,
+    plot: shared.PlotOption = None,
     out_path: OutOption = None,
 ):
     """Score controllers against the limit of linear control.
@@ -144,20 +125,17 @@ def bound(
     Examples:
     fowt scores bound results/rl --plot results/rl/bound.png --out results/rl/bound
 
-    Limit: that of the controller's information and actuators, by its name in fowt design bound --help. In
-    brackets: more blade-pitch travel or power deviation than gspi_oc3, which the limit excludes.
+    In brackets: more blade-pitch travel or power deviation than gspi_oc3, which the limit excludes.
     """
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
     from fowt_env.training.reports.score_plots import plot_fractions
 
-    output(out_path)
-    output(plot, "--plot")
     fronts = read_bound(table_path)
     found = bound_fractions(_runs(results, cases), fronts, _groups(group), parse_names(agents))
-    _shown(bound_markdown(found), {"": found}, out_path)
+    _shown(bound_markdown(found), out_path, found)
     if plot is not None:
         plot_fractions(found, fronts, plot)
-        note(f"wrote {plot}")
+    wrote(plot)
 
 
 @command(scores)
@@ -170,48 +148,38 @@ def faults(results: FoldersArgument, cases: CasesOption = None, out_path: OutOpt
     fowt evaluate --suite faults --controllers pi,gspi_oc3,rosco_float,lqr --out results/faults
     fowt scores faults results/faults
 
-    Survived: no capsize, blow-up or error, and within the suite's limits of rotor speed and platform pitch. A
-    trip is no failure here; the last table counts them.
+    Survived: no capsize, blow-up or error, and within the suite's limits. A trip is no failure here.
     """
     from fowt_env.training.reports.survival import survival, survival_markdown
 
-    output(out_path)
     found = survival(_runs(results, cases))
-    _shown(survival_markdown(found), {"": found}, out_path)
+    _shown(survival_markdown(found), out_path, found)
 
 
 @command(scores)
 def gust(
-    plot: Annotated[str, Argument(help="Image file.")],
-    controllers: Annotated[
-        str, Option(help="Comma-separated; see fowt list controllers.")
-    ] = "gspi_oc3,rosco_float,lqr",
-    wind: WindOption = '{"kind": "eog", "speed": 18, "class": "B", "start": 200}',
-    sea: SeaOption = "jonswap:4:10",
+    image: Annotated[str, Argument(help="Image file.")],
+    controllers: Annotated[str, Option(help="Names, with commas.")] = "gspi_oc3,rosco_float,lqr",
+    wind: shared.WindOption = GUST,
+    sea: shared.SeaOption = "jonswap:4:10",
     seed: Annotated[int, Option(help="Seed of the waves.")] = 1,
     start: Annotated[float, Option(help="Start of the time axis, s.")] = 190.0,
     end: Annotated[float, Option(help="End of the time axis and of the runs, s.")] = 280.0,
-    fidelity: FidelityOption = "standard",
+    fidelity: shared.FidelityOption = "standard",
 ):
     """Plot a gust under several controllers.
 
     Examples:
     fowt scores gust gust.png --controllers pi,gspi_oc3,rosco_float,lqr,policy:ppo_lqr
     """
-    import fowt_env
+    from fowt_env.training.cli.simulate import compared_runs
     from fowt_env.training.reports.score_plots import plot_gust
 
-    output(plot, "PLOT")
-    names = list(dict.fromkeys(parse_names(controllers)))
+    output(image, "IMAGE")
     if not 0.0 <= start < end:
         raise InputError(f"start = {start:g} s: must be 0 or more and below end = {end:g} s")
-    scene = fowt_env.build_scene(
-        wind=parse_wind(wind), sea=parse_sea(sea), seed=seed, fidelity=fidelity, duration=max(700.0, end)
-    )
-    runs = {}
-    with progress_bar("simulating", len(names)) as update:
-        for number, name in enumerate(names, 1):
-            runs[name] = fowt_env.simulate(scene, controller=name, duration=end)
-            update(number, text=name)
-    plot_gust(runs, plot, start=start, end=end)
-    note(f"wrote {plot}")
+    with progress_bar("simulating") as update:
+        options = {"wind": wind, "sea": sea, "seed": seed, "fidelity": fidelity}
+        _, runs = compared_runs(controllers, end, update, **options)
+    plot_gust(runs, image, start=start, end=end)
+    wrote(image)

@@ -5,63 +5,55 @@ from typing import Annotated
 from typer import Option
 
 from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.descriptions.sea_state import sea_of
+from fowt_env.descriptions.wind import wind_of
 from fowt_env.errors import SimulationStopped
 from fowt_env.files.tables import SERIES_SUFFIXES, TABLE_SUFFIXES, write_table
-from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection, parse_sea, parse_wind
-from fowt_env.training.cli.console import command, note, out, output, progress_bar, save_table
-from fowt_env.training.cli.options import RANGE, OptionOption, PlatformOption, RotorOption
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli import options as shared
+from fowt_env.training.cli.arguments import parse_fault, parse_names, parse_pairs, parse_protection
+from fowt_env.training.cli.console import command, note, output, progress_bar, save_table, wrote
+from fowt_env.training.cli.tables import print_table
 
 ROUNDING = 1e-9  # fraction of the mean below which a standard deviation is rounding
 OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
+LEAST_WAVES = 700.0  # s, of the waves of a shorter run
+WIND = (
+    "m/s; KIND:SPEED[:CLASS] as ntm:18:B, eog:18 or (full-field) mann:18:B; a file: .csv of time and speed,"
+    " .bts, .wnd, .hh; JSON, e.g. kind box; or none. See fowt list winds."
+)
+SEA = "Name of fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
+CONTROLLER = (
+    "Name of fowt list controllers, policy:NAME of fowt list agents, policy:FILE.npz, design:FILE.json, or"
+    " your module:Name. none: constant rotor speed and blade pitch (at rest without wind); constant: constant"
+    " torque and blade pitch, the rotor turns freely."
+)
+FIDELITY = "reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table)."
+INITIAL = "Start value, OpenFAST units; repeats."
+FAULT = "Fault, e.g. grid_loss:100; repeats."
+PROTECTION = "Trips: none, turbine (those of its file), or JSON of single ones."
+REPEATED = list[str] | None
 
 
 @command()
 def simulate(
-    platform: PlatformOption = "oc3_hywind",
-    wind: Annotated[
-        str,
-        Option(
-            help="m/s; KIND:SPEED[:CLASS] as ntm:18:B, eog:18 or (full-field) mann:18:B; a file: .csv of time"
-            " and speed, .bts, .wnd, .hh; JSON, e.g. kind box; or none. See fowt list winds."
-        ),
-    ] = "18",
-    sea: Annotated[
-        str,
-        Option(
-            help="Name of fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
-        ),
-    ] = "none",
-    controller: Annotated[
-        str,
-        Option(
-            help="Name of fowt list controllers, policy:NAME of fowt list agents, policy:FILE.npz,"
-            " design:FILE.json, or your module:Name. none: constant rotor speed and blade pitch (at rest"
-            " without wind); constant: constant torque and blade pitch, the rotor turns freely."
-        ),
-    ] = "pi",
+    platform: shared.PlatformOption = "oc3_hywind",
+    wind: Annotated[str, Option(help=WIND)] = "18",
+    sea: Annotated[str, Option(help=SEA)] = "none",
+    controller: Annotated[str, Option(help=CONTROLLER)] = "pi",
     duration: Annotated[float, Option(help="Length of the run, s.")] = 600.0,
     dt: Annotated[float | None, Option(help="Physics step, s; default: that of the fidelity.")] = None,
     control_dt: Annotated[float, Option(help="Control period, s; a multiple of dt.")] = 0.1,
     output_dt: Annotated[float, Option(help="Output period, s; a multiple of dt.")] = 0.1,
     seed: Annotated[int, Option(help="Seed of wind and waves.")] = 0,
-    fidelity: Annotated[
-        str, Option(help="reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table).")
-    ] = "standard",
-    rotor: RotorOption = None,
+    fidelity: Annotated[str, Option(help=FIDELITY)] = "standard",
+    rotor: shared.RotorOption = None,
     start: Annotated[str, Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
-    initial: Annotated[
-        list[str] | None, Option(metavar="CHANNEL=VALUE", help="Start value, OpenFAST units; repeats.")
-    ] = None,
-    fault: Annotated[
-        list[str] | None, Option(metavar="KIND:TIME or JSON", help="Fault, e.g. grid_loss:100; repeats.")
-    ] = None,
-    protection: Annotated[
-        str, Option(help="Trips: none, turbine (those of its file), or JSON of single ones.")
-    ] = "none",
-    option: OptionOption = None,
+    initial: Annotated[REPEATED, Option(metavar="CHANNEL=VALUE", help=INITIAL)] = None,
+    fault: Annotated[REPEATED, Option(metavar="KIND:TIME or JSON", help=FAULT)] = None,
+    protection: Annotated[str, Option(help=PROTECTION)] = "none",
+    option: shared.OptionOption = None,
     out_path: Annotated[str | None, Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
-    plot: Annotated[str | None, Option(help="Stacked plot of the run, e.g. run.png.")] = None,
+    plot: shared.PlotOption = None,
 ):
     """Simulate one run: statistics, time series and a plot.
 
@@ -77,11 +69,10 @@ def simulate(
     """
     import fowt_env
 
-    options = {"duration": max(700.0, duration), **parse_pairs(option, "option")}
+    options = {"duration": max(LEAST_WAVES, duration), **parse_pairs(option, "option")}
     output(out_path, endings=SERIES_SUFFIXES)  # before the run
-    output(plot, "--plot")
     options |= {"seed": seed, "rotor": rotor, "fidelity": fidelity}
-    scene = fowt_env.build_scene(platform, wind=parse_wind(wind), sea=parse_sea(sea), **options)
+    scene = fowt_env.build_scene(platform, wind=wind_of(wind), sea=sea_of(sea), **options)
     title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
     with progress_bar("simulating", 1.0) as update:
         try:
@@ -98,20 +89,25 @@ def simulate(
                 progress=update,
             )
         except (SimulationStopped, KeyboardInterrupt) as error:
-            rows = getattr(error, "frame", None)  # the rows so far
-            if rows is not None and len(rows):
-                _save_run(rows, out_path, None, title)
+            _save_run(getattr(error, "frame", None), out_path)  # the rows so far
             raise
     _print_channels(frame, title)
     _note_limits(frame, scene.turbine)
-    if frame.attrs.get("trip") is not None:
-        trip = frame.attrs["trip"].replace("_", " ")
-        note(f"{trip} trip at {frame.attrs['tripped']:.1f} s: {frame.attrs['stop']} stop")
-    _save_run(frame, out_path, plot, title)
+    _save_run(frame, out_path)
+    if plot is not None:
+        from fowt_env.visual.time_series import plot_run
+
+        plot_run(frame, plot, title)
+    wrote(plot)
+
+
+def _save_run(frame, path):
+    if path is not None and frame is not None and len(frame):
+        note(f"wrote {write_table(frame, path)} ({len(frame)} rows)")
 
 
 def _note_limits(frame, turbine):
-    """Print notes on torque at the generator's limits and on rotor speeds above the turbine's overspeed."""
+    """Print notes on torque at its limits, on rotor speeds above the overspeed, and on a trip."""
     from fowt_env.descriptions.units import RPM
 
     limited = frame["GenTqLim_[-]"].mean()
@@ -126,34 +122,35 @@ def _note_limits(frame, turbine):
             f"rotor speed of up to {fastest:.2f} rpm is above the turbine's overspeed of {limit:g} rpm,"
             " at which an environment ends and an evaluation counts the run as failed"
         )
-
-
-def _save_run(frame, out_path, plot, title):
-    """Write the requested time series and plot, and print their paths."""
-    if out_path is not None:
-        note(f"wrote {write_table(frame, out_path)} ({len(frame)} rows)")
-    if plot is not None:
-        from fowt_env.visual.time_series import plot_run
-
-        plot_run(frame, plot, title)
-        note(f"wrote {plot}")
+    if frame.attrs.get("trip") is not None:
+        trip = frame.attrs["trip"].replace("_", " ")
+        note(f"{trip} trip at {frame.attrs['tripped']:.1f} s: {frame.attrs['stop']} stop")
 
 
 def _print_channels(frame, title):
     """Print mean, standard deviation and range of the main channels."""
     from fowt_env.visual.time_series import PANELS
 
-    rows = []
     main = (*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]", *OF_BLADES)
-    for channel in dict.fromkeys(main):
-        if channel in frame.columns:
-            x = frame[channel]
-            mean, deviation = x.mean(), x.std(ddof=0)
-            if deviation < ROUNDING * abs(mean):
-                deviation = 0.0  # rounding errors of a constant
-            values = (mean, deviation, x.min(), x.max())
-            rows.append((channel.replace("_", " "), *map(figure, values)))
-    print_table(out, ("channel", "mean", "std", "min", "max"), rows, title)
+    x = frame[[channel for channel in dict.fromkeys(main) if channel in frame.columns]]
+    mean, deviation = x.mean(), x.std(ddof=0)
+    deviation[deviation < ROUNDING * mean.abs()] = 0.0  # rounding errors of a constant
+    names = [channel.replace("_", " ") for channel in x.columns]
+    rows = zip(names, mean, deviation, x.min(), x.max(), strict=True)
+    print_table(("channel", "mean", "std", "min", "max"), rows, title)
+
+
+def compared_runs(controllers, duration, progress, platform="oc3_hywind", wind=None, sea=None, **options):
+    """Return (scene, {controller: run}) of controllers with commas, all in the same wind and waves."""
+    import fowt_env
+
+    options = {"duration": max(LEAST_WAVES, duration)} | options
+    names, runs = list(dict.fromkeys(parse_names(controllers))), {}
+    scene = fowt_env.build_scene(platform, wind=wind_of(wind), sea=sea_of(sea), **options)
+    for number, name in enumerate(names, 1):
+        runs[name] = fowt_env.simulate(scene, controller=name, duration=duration)
+        progress(number, len(names), name)
+    return scene, runs
 
 
 TRIM_CHANNELS = (
@@ -164,13 +161,13 @@ TRIM_CHANNELS = (
 
 @command()
 def trim(
-    platform: PlatformOption = "oc3_hywind",
-    winds: Annotated[str, Option(help=f"Steady winds, m/s: {RANGE}.")] = "4:24:1",
+    platform: shared.PlatformOption = "oc3_hywind",
+    winds: Annotated[str, Option(help=f"Steady winds, m/s: {shared.RANGE}.")] = "4:24:1",
     fixed: Annotated[bool, Option("--fixed", help="Fix the platform.")] = False,
-    rotor: RotorOption = None,
-    option: OptionOption = None,
-    out_path: Annotated[str | None, Option("--out", help="All channels: .csv or .parquet.")] = None,
-    plot: Annotated[str | None, Option(help="Plot of the schedule, e.g. schedule.png.")] = None,
+    rotor: shared.RotorOption = None,
+    option: shared.OptionOption = None,
+    out_path: shared.TableOption = None,
+    plot: shared.PlotOption = None,
 ):
     """Compute steady operating points over the wind speed.
 
@@ -184,10 +181,7 @@ def trim(
     import fowt_env
 
     output(out_path, endings=TABLE_SUFFIXES)
-    output(plot, "--plot")
-    speeds = parse_numbers(winds, "winds")
-    options = parse_pairs(option, "option")
-    rows = []
+    speeds, options, rows = parse_numbers(winds, "winds"), parse_pairs(option, "option"), []
     with progress_bar("trimming", len(speeds)) as update:
         for number, speed in enumerate(speeds, 1):
             scene = fowt_env.build_scene(platform, wind=speed, rotor=rotor, **options)
@@ -198,8 +192,8 @@ def trim(
     title = f"{platform}, {'fixed' if fixed else 'floating'}, steady wind"
     shown = [name for name in TRIM_CHANNELS if name in rows[0]]
     headings = ["wind\nm/s", *(f"{name}\n{units.get(name, '')}" for name in shown)]
-    lines = [(f"{row['wind']:g}", *(figure(row[name]) for name in shown)) for row in rows]
-    print_table(out, headings, lines, title, left=())
+    lines = [(f"{row['wind']:g}", *(row[name] for name in shown)) for row in rows]
+    print_table(headings, lines, title, left=())
     names = {"wind": "Wind_[m/s]"} | {name: f"{name}_[{unit}]" for name, unit in units.items()}
     points = pd.DataFrame(rows).rename(columns=names)
     save_table(points, out_path)
@@ -207,4 +201,4 @@ def trim(
         from fowt_env.visual.response import plot_schedule
 
         plot_schedule(points, plot, title, rated_wind=scene.turbine.rated_wind_speed)
-        note(f"wrote {plot}")
+    wrote(plot)

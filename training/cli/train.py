@@ -10,20 +10,12 @@ from typer import Argument, Option
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.benchmark import benchmarks
-from fowt_env.training.cli.console import (
-    EXIT_INTERRUPTED,
-    announce_folders,
-    command,
-    err,
-    note,
-    out,
-    output,
-    progress_bar,
-    show,
-)
+from fowt_env.training.cli.console import EXIT_INTERRUPTED, command, err, note, output, progress_bar, wrote
 from fowt_env.training.cli.options import CsvOption
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli.tables import print_table, show
 
+TrustOption = Annotated[bool, Option("--trust-zip", help="Load the checkpoint, which executes code from it.")]
+CHANGE = "Change a setting; repeatable."
 LINE_EVERY = 10.0  # s between lines of progress without a terminal
 WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
 
@@ -36,12 +28,8 @@ def train(
     steps: Annotated[int | None, Option(help="Decisions; default 2000000, or as before.")] = None,
     out_folder: Annotated[str | None, Option("--out", help="Folder of the run.")] = None,
     resume: Annotated[bool, Option("--resume", help="Continue from the newest checkpoint.")] = False,
-    trust_zip: Annotated[
-        bool, Option("--trust-zip", help="With --resume: load a checkpoint of others, executing its code.")
-    ] = False,
-    change: Annotated[
-        list[str] | None, Option("--set", metavar="KEY=VALUE", help="Change a setting; repeatable.")
-    ] = None,
+    trust_zip: TrustOption = False,
+    change: Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE", help=CHANGE)] = None,
 ):
     """Train an agent with stable-baselines3 (PPO, SAC, TQC).
 
@@ -56,13 +44,10 @@ def train(
     [bold]Steps[/bold] are decisions of the agent, each several control periods (decisions.hold). [bold]Files
     written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png, settings.yml,
     versions.json, checkpoints/, tensorboard/. A policy runs as the controller policy:runs/ppo_0/best.npz.
-    Without a terminal a line of progress is printed every 10 s.
     """
     from fowt_env.training.rl.train import Training, resolve
 
     folder = Path(out_folder or f"runs/{task}_{algo}_{seed}")
-    if not resume:
-        output(folder, folder=True)
     if resume:
         if change:
             raise InputError("--set: a resumed run keeps its settings; only --steps may grow")
@@ -70,17 +55,15 @@ def train(
         if trust_zip:
             note(f"warning: executing code from the checkpoint in {folder}, as requested")
     else:
-        settings = resolve(
-            algo, task, seed, 2_000_000 if steps is None else steps, parse_pairs(change, "set")
-        )
-        run = Training(settings, folder)
-    with progress_bar("training", None, every=LINE_EVERY) as update:
+        output(folder, folder=True)
+        decisions = 2_000_000 if steps is None else steps
+        run = Training(resolve(algo, task, seed, decisions, parse_pairs(change, "set")), folder)
+    with progress_bar("training", every=LINE_EVERY) as update:
 
         def report(done, total, text):
             update(done, total, text if err.is_terminal else f"{done:,} of {total:,}, {text}")
 
         finished = run.run(report)
-    announce_folders()
     if run.rows:
         _print_validations(run)
     place = shlex.quote(str(folder))
@@ -106,19 +89,17 @@ def _print_validations(run):
     ratios = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio", "failed")
     headings = ("validation", "decisions", "score", *ratios)
     rows = [
-        (name, f"{row['decisions']:,}", *(figure(row[key]) for key in ("score", *ratios)))
+        (name, f"{row['decisions']:,}", *(row[key] for key in ("score", *ratios)))
         for name, row in chosen.items()
     ]
-    print_table(out, headings, rows, f"over {run.reference_name}, whose score is 1; less is better")
+    print_table(headings, rows, f"over {run.reference_name}, whose score is 1; less is better")
 
 
 @command()
 def export_policy(
     folder: Annotated[str, Argument(help="Folder of a run of fowt train.")],
     out_path: Annotated[str, Option("--out", help="The policy file, .npz.")],
-    trust_zip: Annotated[
-        bool, Option("--trust-zip", help="Load the checkpoint, which executes code from it.")
-    ] = False,
+    trust_zip: TrustOption = False,
 ):
     """Turn a training run's checkpoint into a policy file.
 
@@ -130,16 +111,14 @@ def export_policy(
     """
     from fowt_env.training.rl.export import export_run
 
-    if Path(out_path).suffix != ".npz":
-        raise InputError(f"--out {out_path!r}: must end with .npz")
-    output(out_path)
+    output(out_path, endings=(".npz",))
     if not trust_zip:
         raise InputError(
             f"{folder}: loading a stable-baselines3 checkpoint executes code from it; if it is yours, or you"
             " trust whoever made it, add --trust-zip"
         )
     note(f"warning: executing code from the checkpoint in {folder}, as requested")
-    note(f"wrote {export_run(folder, out_path)}")
+    wrote(export_run(folder, out_path))
 
 
 @command(benchmarks)
@@ -158,8 +137,7 @@ def training(
     from fowt_env.training.benchmarks.speed import write_csv
     from fowt_env.training.benchmarks.training import benchmark_training
 
-    output(out_path)
-    with progress_bar("training speed", None) as update:
+    with progress_bar("training speed") as update:
         table = benchmark_training(envs, steps, progress=update)
     show(table.round(3))
-    note(f"wrote {write_csv(table, out_path)}")
+    wrote(write_csv(table, out_path))

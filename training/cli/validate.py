@@ -7,33 +7,20 @@ from typer import Argument, Option
 
 from fowt_env.errors import unknown
 from fowt_env.training.cli.arguments import parse_names
-from fowt_env.training.cli.console import command, from_a_clone, note, out, output, progress_bar, text_first
+from fowt_env.training.cli.console import command, from_a_clone, out, text_progress, wrote
 from fowt_env.training.cli.options import FolderOption, PlotsOption
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli.tables import print_table
+
+PLATFORM = "oc3_hywind, iea15_volturnus_s, nrel5mw_iti_barge or nrel5mw_oc4_semi."
+CASE = "Groups of comparisons of docs/results/validation.md, with commas; or all. Default: all but costs."
+FOLDER = "Folder; default: results/validation, for others than OC3 its subfolder PLATFORM."
 
 
 @command()
 def validate(
-    platform: Annotated[
-        str,
-        Option(
-            help="oc3_hywind, iea15_volturnus_s, nrel5mw_iti_barge or nrel5mw_oc4_semi;"
-            " docs/results/validation.md lists the references of each."
-        ),
-    ] = "oc3_hywind",
-    case: Annotated[
-        str | None,
-        Option(
-            help="Groups of comparisons, comma-separated; or all. Those of oc3_hywind: decays, steady,"
-            " floating, waves, steps, turbulence, tower, costs. Default: all except costs."
-        ),
-    ] = None,
-    out_folder: Annotated[
-        str | None,
-        Option(
-            "--out", help="Folder; default: results/validation, for others than OC3 its subfolder PLATFORM."
-        ),
-    ] = None,
+    platform: Annotated[str, Option(help=PLATFORM)] = "oc3_hywind",
+    case: Annotated[str | None, Option(help=CASE)] = None,
+    out_folder: Annotated[str | None, Option("--out", help=FOLDER)] = None,
     reference: Annotated[str | None, Option(help="Folder of the OpenFAST series.")] = None,
     bts: Annotated[str | None, Option(help="Full TurbSim box instead of the stored region.")] = None,
     plot: PlotsOption = True,
@@ -58,21 +45,19 @@ def validate(
     names = list(PLATFORMS[platform]()[0]) if case == "all" else parse_names(case)
     if out_folder is None:
         out_folder = "results/validation" + ("" if platform == "oc3_hywind" else f"/{platform}")
-    output(out_folder, folder=True)
-    with progress_bar("validating", None) as update:
-        report = text_first(update, "validating: ")
+    with text_progress("validating", "validating: ") as report:
         study = validate_cases(names, folder=reference, bts=bts, report=report, platform=platform)
     lines = []
     for name, rows in study.table().groupby("case", sort=False):
         counts = [int((rows["verdict"] == verdict).sum()) for verdict in ("met", "MISSED", "reported")]
-        lines.append((name, str(len(rows)), *map(str, counts)))
-    missed = [number for number, line in enumerate(lines) if line[3] != "0"]
-    print_table(out, ("case", "figures", "met", "missed", "reported"), lines, platform, red=missed)
+        lines.append((name, len(rows), *counts))
+    missed = [number for number, line in enumerate(lines) if line[3]]
+    print_table(("case", "figures", "met", "missed", "reported"), lines, platform, red=missed)
     for row in study.rows:
         if row.verdict == "MISSED":
             text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"
-            out.print(f"[red]missed[/red]  {escape(text)}", highlight=False, soft_wrap=True)
-    note("wrote " + ", ".join(str(path) for path in write_validation_report(study, out_folder, plot)))
+            out.print(f"[red]missed[/red]  {escape(text)}")
+    wrote(*write_validation_report(study, out_folder, plot))
 
 
 @command()
@@ -96,19 +81,15 @@ def paper(
         from fowt_env.training.studies.paper.load_cases import run_paper, statistics, wanted_cases
         from fowt_env.training.studies.paper.report import write_paper_report
 
-    output(out_folder, folder=True)
     names = wanted_cases(case)
-    with progress_bar("paper", None) as update:
-        study = run_paper(names, text_first(update, "paper: "))
+    with text_progress("paper", "paper: ") as report:
+        study = run_paper(names, report)
     if study.runs:
-        values, names = statistics(study.runs), ("mean", "std", "min", "max")
-        rows = [
-            (row["case"], row["channel"].replace("_", " "), *(figure(row[name]) for name in names))
-            for row in values[values["channel"].isin(("PtfmSurge_[m]", "PtfmPitch_[deg]"))].to_dict("records")
-        ]
-        print_table(out, ("case", "channel", *names), rows, "model scale", keys=2, left=(0, 1))
+        values, names = statistics(study.runs), ["case", "channel", "mean", "std", "min", "max"]
+        rows = values[values["channel"].isin(("PtfmSurge_[m]", "PtfmPitch_[deg]"))][names]
+        rows = rows.assign(channel=rows["channel"].str.replace("_", " ")).itertuples(index=False)
+        print_table(names, rows, "model scale", keys=2, left=(0, 1))
     for claim in study.claims:
         verdict = "[green]holds[/green]" if claim.holds else "[red]FAILS[/red]"
-        text = f"Fig. {claim.figure}: {claim.text}: {claim.found}"
-        out.print(f"{verdict}  {escape(text)}", highlight=False, soft_wrap=True)
-    note("wrote " + ", ".join(str(path) for path in write_paper_report(study, out_folder, plot)))
+        out.print(f"{verdict}  {escape(f'Fig. {claim.figure}: {claim.text}: {claim.found}')}")
+    wrote(*write_paper_report(study, out_folder, plot))

@@ -5,7 +5,7 @@ from typing import Annotated
 from typer import Option
 
 from fowt_env.training.cli.arguments import parse_names
-from fowt_env.training.cli.console import command, err, note, out, progress_bar
+from fowt_env.training.cli.console import command, err, note, progress_bar
 from fowt_env.training.cli.options import PlatformOption
 from fowt_env.training.cli.tables import print_table
 
@@ -40,7 +40,5 @@ def warmup(
 
         show.done = 0
         table = compile_kinds(platform, names, jobs, show)
-    rows = [
-        (row.kind, KINDS[row.kind][0], str(row.kernels), f"{row.seconds:.1f}") for row in table.itertuples()
-    ]
-    print_table(out, ("kind", "what it is for", "compiled", "s"), rows, platform, left=(0, 1))
+    rows = [(row.kind, KINDS[row.kind][0], row.kernels, f"{row.seconds:.1f}") for row in table.itertuples()]
+    print_table(("kind", "what it is for", "compiled", "s"), rows, platform, left=(0, 1))

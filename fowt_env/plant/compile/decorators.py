@@ -1,10 +1,8 @@
 """The house decorators for compiled code, and the disk cache keyed by the package's sources.
 
-Numba's own cache watches only the file of the function itself: after an edit of a callee in
-another file a cached caller would go on returning the old result. So the cache lives in a folder
-named by a hash of the code of every source of the plant, without its texts (sources.py). A kernel of another
-package (an environment's, a controller's) carries the hash of what its module imports besides. A user's
-function is compiled anew in each process.
+Numba's own cache watches the file of the function alone, not those of its callees. So the cache lives in a
+folder named by a hash of the code of every source of the plant (sources.py); a kernel of another package
+carries the hash of what its module imports besides. A user's function is compiled anew in each process.
 """
 
 import hashlib
@@ -80,8 +78,8 @@ def _places(folder):
 def _cache_folder(sources):
     """Return the folder of this source version's kernels, made if need be; the oldest others are dropped.
 
-    One that cannot be written, but is there, is read all the same. None, and kernels are then compiled in
-    each process, where there is none or, after a warning, where somebody else may have put files into it.
+    None, and kernels are then compiled in each process, where there is none or, after a warning, where
+    somebody else may have put files into it.
     """
     root = cache_root()
     if root is None:
@@ -120,10 +118,7 @@ def kernels_compiled():
 
 @cache
 def _stamp(path):
-    """Return the hash of a source outside the plant and of all that it imports there.
-
-    "" for a source of the plant, which CACHE_FOLDER stands for; None for one that is not of this package.
-    """
+    """Return the hash of a source and its imports outside the plant; "" for one in it, None for a user's."""
     path = Path(path)
     if installed_path(path) is None:
         return None
@@ -131,10 +126,7 @@ def _stamp(path):
 
 
 def _keep(compiled, function):
-    """Have what numba made of a function kept on disk, if all that it can depend on is in its key.
-
-    A user's function is not: it may use helpers and numbers of any file.
-    """
+    """Have what numba made of a function kept on disk, if all that it can depend on is in its key."""
     stamp = CACHE_FOLDER and _stamp(os.path.abspath(function.__code__.co_filename))
     if stamp is not None:
         compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, isinstance(compiled, LinkedDispatcher))
@@ -205,7 +197,6 @@ def control_kernel(function):
     """Return a ControlKernel: a law as a first-class function, so that one compiled loop serves all.
 
     function(parameters, memory, measurement, command): four (n,) float64 arrays; it reads the
-    first and third and writes the second and fourth. A user's law is compiled in each process, a fifth
-    of a second.
+    first and third and writes the second and fourth.
     """
     return ControlKernel(function)

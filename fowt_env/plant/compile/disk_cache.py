@@ -1,11 +1,9 @@
 """Numba's cache of compiled functions, made fit for several processes, broken files and full disks.
 
-Numba reads a function's index, adds an entry and writes it back without a lock, and numbers the files of
-machine code by what it read: of two processes that compile at once one loses its entry, or finds the other's
-code under it. A broken file, or a full disk, ends the program. Here entries are added under a lock,
-a broken file is as good as none, and what cannot be kept is compiled again the next time.
-
-The files are pickles, which run code as they are read: one that may be from somebody else is not.
+Numba adds entries to a function's index without a lock, and a broken file or a full disk ends the program.
+Here entries are added under a lock, a broken file is as good as none, and what cannot be kept is compiled
+again the next time. The files are pickles, which run code as they are read: one that may be from somebody
+else is not.
 """
 
 import fcntl
@@ -79,11 +77,7 @@ def _check(path):
 
 
 class _Locator(caching.UserProvidedCacheLocator):
-    """Where a kernel's files are: in the folder that it is given, and not where numba's settings say.
-
-    Named by the package, not by the path or the line: other installations of the same code load what one
-    compiled, and so does this one when a text has moved a function.
-    """
+    """Where a kernel's files are: in its folder, named by the package, not by the path or the line."""
 
     def __init__(self, function, path, folder, stamp):
         self._py_file = path

@@ -1,8 +1,7 @@
 """What Python holds and hands to kernels: a model, which never changes, and data, which does.
 
-Inside kernels both go by reference. A NamedTuple goes by value, one machine word of each number and seven of
-each array: some 400 for a model, in every call from one kernel to the next. A reference is one word, and a
-field is read where it is used. So a class of NamedTuples that is marked by_reference is seen by kernels as a
+A NamedTuple goes by value, some 400 machine words for a model, in every call from one kernel to the next; a
+reference is one word. So a class of NamedTuples that is marked by_reference is seen by kernels as a
 Reference, in a Handle and as a field of another such class; its parts are plain values.
 
 A Reference does not keep what it refers to alive. It is made in an entry, whose caller holds the Handle.

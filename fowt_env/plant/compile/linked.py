@@ -1,9 +1,8 @@
 """Kernels for kernels: typed and lowered once, and linked into their callers, without machine code.
 
-Numba optimises every function that it compiles with a copy of all that it calls, and makes machine code of
-it. That of a kernel which kernels alone call is never run, since each caller has a copy: 40 % of the time of
-compiling a scene. Here such a kernel ends as LLVM's code, which callers link, and which the disk cache keeps
-instead. Called from Python, as in tests, it is compiled once more as numba does it.
+Numba makes machine code of each kernel, which is never run where kernels alone call it, since each caller
+has a copy: 40 % of the time of compiling a scene. Here such a kernel ends as LLVM's code, which callers link
+and the disk cache keeps. Called from Python, as in tests, it is compiled once more as numba does it.
 """
 
 from functools import cached_property

@@ -1,10 +1,8 @@
 """What users are told while kernels are compiled, wherever they call from, and a slower collector meanwhile.
 
-Nothing is printed, and no thread runs, unless kernels of this project are compiled: those on disk are
-silent. The environment variable FOWT_QUIET and set_quiet switch it off. It goes to stderr alone: a line at
-the start, one at the end, and between them a line that counts. A terminal has it drawn over every REDRAW
-seconds; a log, a pipe or a notebook, which keeps each write as an output, gets one every REPEAT seconds.
-How many kernels are left is not known before the last one is compiled, so what is shown is how many are done.
+It goes to stderr: a line at the start, one at the end, and between them a line that counts, which a terminal
+has drawn over every REDRAW seconds and a log, a pipe or a notebook gets every REPEAT seconds. The
+environment variable FOWT_QUIET and set_quiet switch it off.
 """
 
 import atexit

@@ -1,8 +1,7 @@
 """What a source file holds for the compiler: a hash of its code, without its texts, and what it imports.
 
-The hash is of the syntax tree without comments, docstrings and the metadata of `Annotated`, none of which a
-kernel can depend on: texts may lie beside the code that they describe. Parsing takes some ms a file, so a
-small file in the cache folder keeps the result by a hash of the source's bytes.
+The hash is of the syntax tree without comments, docstrings and the metadata of `Annotated`. Parsing takes
+some ms a file, so a small file in the cache folder keeps the result by a hash of the source's bytes.
 """
 
 import ast
@@ -28,9 +27,6 @@ class Source(NamedTuple):
 
     code: str  # hash of its code, 32 hexadecimal digits
     top: tuple[str, ...]  # modules of this project that statements at its top import
-
-
-# --------------------------------------------------------------------------- one file
 
 
 def read_source(path):
@@ -100,9 +96,6 @@ def _all_imports(path, time):
         return ()
 
 
-# --------------------------------------------------------------------------- what sources import
-
-
 def imported_files(starts, roots, inside):
     """Return the files `starts` and the Python files that they import, directly or not, in order.
 
@@ -122,11 +115,7 @@ def imported_files(starts, roots, inside):
 
 
 def imported_at_top(path, but):
-    """Return the paths of a source of this project and of all that it imports at its top: what a kernel in it
-    can depend on, which freezes what its module's globals hold when it is compiled.
-
-    but: a folder whose sources are neither followed nor among them.
-    """
+    """Return a source of this project and all that it imports at its top, none of the folder `but`."""
     return _followed([path], lambda found: but not in found.parents, _imported_at_top)
 
 
@@ -175,9 +164,6 @@ def _found_files(folder, name):
             break
         folder = folder / part
     return files
-
-
-# --------------------------------------------------------------------------- what is kept on disk
 
 
 def _store():

@@ -1,10 +1,8 @@
 """One kernel out of several, chosen by the class of a part when its caller is compiled.
 
-Numba leaves out the branch `else` of `if part is None` where the part is None, but keeps the other one where
-it is not: both are then compiled, though the second can never run. Neither does it prune on a field
-(`model.part is None`), but on a function's own argument alone. So absence is tested first thing in a function
-that takes the part as an argument, and what has several forms is several classes: chosen_by_class compiles
-the kernel of one.
+Numba prunes a branch on `part is None` for a function's own argument alone, not for a field. So absence is
+tested first thing in a function that takes the part as an argument, and what has several forms is several
+classes: chosen_by_class compiles the kernel of one.
 """
 
 import inspect

@@ -48,23 +48,6 @@ def test_python_calls_it_with_the_same_bits():
     assert slope.twin.signatures and slope(2) == slope.py_func(2)  # of another type: compiled for it
 
 
-def test_callers_of_another_process_link_what_is_on_disk(tmp_path):
-    code = (
-        "from fowt_env.plant.compile.decorators import entry\n"
-        "from fowt_env.plant.hydro.waves import ramp_factor\n"
-        "@entry\ndef factor(t):\n    return ramp_factor(t, 4.0)\n"
-        "print(factor(1.0), sum(ramp_factor.stats.cache_hits.values()))\n"
-    )
-    environment = {**os.environ, "FOWT_CACHE_DIR": str(tmp_path)}
-    found = [
-        subprocess.run(
-            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
-        ).stdout.split()
-        for _ in range(2)
-    ]
-    assert found == [["0.25", "0"], ["0.25", "1"]]
-
-
 def test_a_kernel_may_print_for_whoever_looks_for_a_fault(tmp_path):
     code = (
         "from fowt_env.plant.compile.decorators import entry, kernel\n"

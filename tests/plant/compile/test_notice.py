@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import pytest
@@ -56,19 +57,12 @@ def watched(monkeypatch):
     return compile
 
 
-def test_two_lines_where_it_takes_long(watched):
+def test_two_lines_where_kernels_of_ours_take_long_and_none_otherwise(watched):
     lines = watched(0.2, times=3).splitlines()
     assert lines[0] == f"fowt_env: {COMPILING_MESSAGE}"
     assert len(lines) == 2 and lines[1].startswith("fowt_env: 6 kernels compiled in ")
-
-
-def test_a_kernel_or_two_take_no_words(watched):
-    assert watched(0.001) == ""
-
-
-def test_kernels_of_others_count_for_nothing(watched):
     told = Notice()
-    assert watched(0.2, told=told, module="numba.np.arraymath") == "" and told.count == 0
+    assert watched(0.001) == "" == watched(0.2, told=told, module="numba.np.arraymath") and told.count == 0
 
 
 def test_a_terminal_counts_between_them_and_is_left_clean(watched):
@@ -98,18 +92,14 @@ def test_a_live_display_that_waits_for_whole_lines_gets_no_counting(watched):
 @pytest.mark.parametrize("how", ["variable", "function", "worker", "context"])
 def test_it_can_be_silenced(watched, monkeypatch, how):
     told = Notice()
+    monkeypatch.setattr(notice, "NOTICE", told)
     if how == "variable":
         monkeypatch.setenv("FOWT_QUIET", "1")
     elif how == "function":
-        monkeypatch.setattr(notice, "NOTICE", told)
         notice.set_quiet()
     elif how == "worker":
         monkeypatch.setattr(notice.multiprocessing, "parent_process", lambda: object())
-    else:
-        monkeypatch.setattr(notice, "NOTICE", told)
-        with compilation_reported(lambda count: None):
-            assert watched(0.2, told=told) == ""
-    if how != "context":
+    with compilation_reported(lambda count: None) if how == "context" else nullcontext():
         assert watched(0.2, told=told) == ""
     assert told.thread is None
 

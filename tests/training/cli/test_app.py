@@ -1,9 +1,9 @@
 import json
-import os
 import re
 import shlex
 import subprocess
 import sys
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -14,11 +14,12 @@ from typer.testing import CliRunner
 
 import fowt_env
 from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.descriptions.sea_state import sea_of
+from fowt_env.descriptions.wind import wind_of
 from fowt_env.errors import InputError, SimulationStopped
-from fowt_env.plant.compile.notice import COMPILING_MESSAGE
 from fowt_env.training.cli import console
 from fowt_env.training.cli.app import app
-from fowt_env.training.cli.arguments import parse_pairs, parse_sea, parse_wind
+from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.console import GROUPS, output
 
 SHORT = ("--duration", "10", "--wind", "18")
@@ -58,19 +59,14 @@ def test_a_run_with_harmful_rare_events_says_so_in_one_line():
     assert line.startswith("Warning: oc3_hywind: ROTOR_TABLE_CLAMPED") and line.endswith("needs it")
 
 
-def test_initial_values_and_locked_rotor_reach_the_run(tmp_path):
-    out = tmp_path / "decay.csv"
+def test_initial_values_a_locked_rotor_and_a_wind_series_reach_the_run(tmp_path):
+    out, series = tmp_path / "run.csv", tmp_path / "wind.csv"
     words = "simulate --wind none --controller none --start zero --duration 5 --initial PtfmSurge=10 --out"
     fowt(*words.split(), str(out))
     frame = pd.read_csv(out)
     assert frame["PtfmSurge_[m]"].iloc[0] == 10.0
     assert (frame["RotSpeed_[rpm]"] == 0.0).all()
-
-
-def test_a_wind_series_file_drives_the_run(tmp_path):
-    series = tmp_path / "wind.csv"
     series.write_text("time,speed\n0,15\n10,17\n")
-    out = tmp_path / "run.csv"
     fowt("simulate", "--wind", str(series), "--duration", "10", "--out", str(out))
     frame = pd.read_csv(out)
     np.testing.assert_allclose(frame["Wind1VelX_[m/s]"], 15.0 + 0.2 * frame["Time_[s]"], rtol=1e-9)
@@ -116,40 +112,14 @@ def test_a_user_error_is_one_clear_line_and_exit_code_2(arguments, message, tmp_
     assert not [path for path in tmp_path.rglob("*") if path.suffix in (".csv", ".parquet", ".xls")]
 
 
-def test_a_stopped_run_gives_its_reason_and_its_rows(tmp_path, monkeypatch):
+def test_a_stopped_run_gives_its_reason_and_its_rows_and_an_interrupted_one_no_file(tmp_path, monkeypatch):
     rows = pd.DataFrame({"Time_[s]": [0.0, 0.1], "PtfmPitch_[deg]": [0.5, 89.5]})
-
-    def stop(*arguments, **options):
-        raise SimulationStopped("stopped at t = 0.100 s: capsize", "capsize", 0.1, rows)
-
-    monkeypatch.setattr(fowt_env, "simulate", stop)
-    out = tmp_path / "run.csv"
-    _, stderr = fowt("simulate", *SHORT, "--out", str(out), code=1)
-    assert "capsize" in stderr
-    pd.testing.assert_frame_equal(pd.read_csv(out), rows)
-
-
-@pytest.mark.slow
-@pytest.mark.nightly
-def test_compiling_is_announced_once_and_only_when_it_happens(tmp_path):
-    code = "from fowt_env.training.cli.app import main; main()"
-    arguments = ["simulate", "--duration", "1", "--wind", "none", "--controller", "none"]
-    environment = os.environ | {"FOWT_CACHE_DIR": str(tmp_path), "COLUMNS": "200", "FOWT_QUIET": "0"}
-    options = {"env": environment, "capture_output": True}
-    said = []
-    for _ in range(2):
-        done = subprocess.run([sys.executable, "-c", code, *arguments], text=True, check=True, **options)
-        said.append(done.stderr.count(COMPILING_MESSAGE))
-    assert said == [1, 0]
-
-
-def test_ctrl_c_ends_with_130_and_without_a_half_file(tmp_path, monkeypatch):
-    def interrupt(*arguments, **options):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(fowt_env, "simulate", interrupt)
-    _, stderr = fowt("simulate", *SHORT, "--out", str(tmp_path / "run.csv"), code=130)
-    assert "interrupted" in stderr and not list(tmp_path.iterdir())
+    stopped = SimulationStopped("stopped at t = 0.100 s: capsize", "capsize", 0.1, rows)
+    for error, code, said in ((KeyboardInterrupt, 130, "interrupted"), (stopped, 1, "capsize")):
+        monkeypatch.setattr(fowt_env, "simulate", Mock(side_effect=error))
+        _, stderr = fowt("simulate", *SHORT, "--out", str(tmp_path / "run.csv"), code=code)
+        assert said in stderr and (tmp_path / "run.csv").exists() is (code == 1)
+    pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "run.csv"), rows)
 
 
 def test_an_interrupted_evaluation_says_where_its_rows_are(tmp_path, monkeypatch):
@@ -278,16 +248,8 @@ def test_evaluate_takes_a_suite_of_the_users_own_compares_and_resumes(tmp_path):
         'duration = 15.0\nskip = 5.0\n[[case]]\nname = "gusty"\nwind = {kind = "ntm", speed = 18.0}\n'
     )
     out = tmp_path / "out"
-    arguments = (
-        "evaluate",
-        "--controllers",
-        "pi,pi_land",
-        "--no-plot",
-        "--suite",
-        str(suite),
-        "--out",
-        str(out),
-    )
+    words = f"evaluate --controllers pi,pi_land --no-plot --suite {suite} --out {out}"
+    arguments = words.split()
     stdout, _ = fowt(*arguments)
     assert "suite mine 2" in stdout and "difference from pi" in stdout
     assert stdout.count("3 seeds: no interval") == 1
@@ -315,6 +277,7 @@ def test_trim_prints_the_operating_points_of_trim(tmp_path):
 
 @pytest.mark.installation
 def test_list_names_everything_that_the_other_commands_take():
+    assert fowt("--version")[0].strip() == fowt_env.__version__
     stdout, _ = fowt("list")
     assert "platforms" in stdout and "--platform" in stdout
     stdout, _ = fowt("list", "all")
@@ -361,11 +324,6 @@ def test_what_reads_only_the_first_lines_of_a_list_is_no_error():
     command = f"{shlex.quote(sys.executable)} -c '{code}' list metrics | head -1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True)
     assert done.stdout.startswith("metrics") and "Error" not in done.stderr
-
-
-@pytest.mark.installation
-def test_version_is_that_of_the_package():
-    assert fowt("--version")[0].strip() == fowt_env.__version__
 
 
 # ------------------------------------------------------------------ where files go
@@ -420,17 +378,17 @@ def test_without_a_terminal_progress_is_a_line_now_and_then(monkeypatch, capsys)
 @pytest.mark.parametrize(
     ("parse", "text", "expected"),
     [
-        (parse_wind, "18", 18.0),
-        (parse_wind, "0", 0.0),
-        (parse_wind, "none", None),
-        (parse_wind, "ntm:18:B", {"kind": "ntm", "speed": 18.0, "class": "B"}),
-        (parse_wind, "eog:11.4", {"kind": "eog", "speed": 11.4}),
-        (parse_wind, '{"kind": "steady", "speed": 9}', {"kind": "steady", "speed": 9}),
-        (parse_sea, "none", None),
-        (parse_sea, "paper_wind_wave", "paper_wind_wave"),
-        (parse_sea, "jonswap:7.5:10:3.3", {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}),
-        (parse_sea, "regular:3:5", {"kind": "regular", "H": 3.0, "T": 5.0}),
-        (parse_sea, '{"kind": "still"}', {"kind": "still"}),
+        (wind_of, "18", 18.0),
+        (wind_of, "0", 0.0),
+        (wind_of, "none", None),
+        (wind_of, "ntm:18:B", {"kind": "ntm", "speed": 18.0, "class": "B"}),
+        (wind_of, "eog:11.4", {"kind": "eog", "speed": 11.4}),
+        (wind_of, '{"kind": "steady", "speed": 9}', {"kind": "steady", "speed": 9}),
+        (sea_of, "none", None),
+        (sea_of, "paper_wind_wave", "paper_wind_wave"),
+        (sea_of, "jonswap:7.5:10:3.3", {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0, "gamma": 3.3}),
+        (sea_of, "regular:3:5", {"kind": "regular", "H": 3.0, "T": 5.0}),
+        (sea_of, '{"kind": "still"}', {"kind": "still"}),
     ],
 )
 def test_winds_and_seas_are_read_from_texts(parse, text, expected):
@@ -440,7 +398,7 @@ def test_winds_and_seas_are_read_from_texts(parse, text, expected):
 @pytest.mark.parametrize("text", ["nan", "inf", "", "ntm", "ntm:fast", "ntm:18:B:1", "18 m/s"])
 def test_wind_texts_that_mean_nothing_are_refused(text):
     with pytest.raises(InputError, match="wind"):
-        parse_wind(text)
+        wind_of(text)
 
 
 def test_a_wind_series_needs_two_columns_of_numbers(tmp_path):
@@ -448,7 +406,7 @@ def test_a_wind_series_needs_two_columns_of_numbers(tmp_path):
     for content in ("a,b,c\n1,2,3\n", "time,speed\n0,fast\n", "time\n1\n"):
         path.write_text(content)
         with pytest.raises(InputError, match="wind series"):
-            parse_wind(str(path))
+            wind_of(str(path))
 
 
 def test_numbers_and_pairs():

@@ -1,38 +1,24 @@
-"""Tables of the command line: every figure stands in full, at 80 columns and in a pipe, in every command."""
+"""Tables of the command line: every figure stands in full, at 80 columns and in a pipe."""
 
 import json
 
 import numpy as np
 import pandas as pd
 import pytest
-from rich.console import Console
 from typer.testing import CliRunner
 
 import fowt_env
-from fowt_env.layout import FOLDERS, PACKAGE
 from fowt_env.training.cli import app as cli
-from fowt_env.training.cli import console
-from fowt_env.training.cli import tables as cli_tables
-from fowt_env.training.cli.evaluate import _print_evaluation
-
-WIDTHS = {"80 columns": {"COLUMNS": "80"}, "a pipe": {}}
+from fowt_env.training.cli import tables
 
 
-@pytest.fixture(params=WIDTHS)
+@pytest.fixture(params=[80, None], ids=["80 columns", "a pipe"])
 def width(request, monkeypatch):
     """80, or None for a pipe: what the tables of this test are printed to."""
     monkeypatch.delenv("COLUMNS", raising=False)
-    for key, value in WIDTHS[request.param].items():
-        monkeypatch.setenv(key, value)
-    return 80 if request.param == "80 columns" else None
-
-
-def frame_of(columns, rows, **texts):
-    """DataFrame of texts and of figures that take long to write: -0.01234, 5.678e+05, ..."""
-    rng = np.random.default_rng(1)
-    sizes = 10.0 ** rng.integers(-3, 6, (rows, len(columns)))
-    values = pd.DataFrame(-rng.uniform(1.0, 9.0, sizes.shape) * sizes, columns=columns)
-    return pd.concat([pd.DataFrame(texts, index=range(rows)), values], axis=1)
+    if request.param:
+        monkeypatch.setenv("COLUMNS", str(request.param))
+    return request.param
 
 
 def assert_whole(printed, wanted, width):
@@ -49,40 +35,15 @@ def printed_by(*words):
     return done.stdout
 
 
-# ------------------------------------------------------------------ what commands print
-
-
 def test_a_frame_is_printed_with_every_figure_in_full(width, capsys):
-    table = frame_of(["wind_[m/s]", "period_[s]", "damping_ratio_[-]", *"abcdefgh"], 3)
-    table.insert(1, "mode", ["surge", "platform_pitch", "heave"])
-    table["runs"] = [1234567, 3, 4]
-    console.show(table, "modes")
-    wanted = [f"{value:.4g}" for value in table.select_dtypes(float).to_numpy().ravel()]
-    assert_whole(capsys.readouterr().out, [*wanted, "1234567", *table["mode"]], width)
-
-
-def test_evaluate_prints_every_figure_of_what_it_shows_in_full(width, capsys):
-    from fowt_env.training.evaluation.evaluate import COLUMNS, summary
-    from fowt_env.training.evaluation.leaderboard import leaderboard
-    from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
-
-    rng = np.random.default_rng(0)
-    rows = [
-        {name: rng.uniform(100.0, 1000.0) for name in COLUMNS}  # no wider than what is measured
-        | {"controller": name, "case": f"ntm_{wind}", "seed": seed}
-        | {"status": "ok", "reason": "", "events": ""}
-        for name in ("pi", "policy:runs/a_long_name_of_a_run/best.npz")
-        for wind in (12, 18)
-        for seed in range(5)
-    ]
-    table = pd.DataFrame(rows)
-    means, board = summary(table), leaderboard(table)
-    _print_evaluation(table, means, board)
-    printed = capsys.readouterr().out
-    wanted = [*summary_rows(means, width or 999)[1], *leaderboard_rows(board, width or 999)[2]]
-    assert_whole(printed, " ".join(" ".join(row) for row in wanted).split(), None)
-    title = next(line for line in printed.splitlines() if line.startswith("2 cases"))
-    assert width is None or max(len(line) for line in printed.splitlines() if line != title) <= width
+    rng = np.random.default_rng(1)  # of figures that take long to write: -0.01234, 5.678e+05
+    values = -rng.uniform(1.0, 9.0, (3, 11)) * 10.0 ** rng.integers(-3, 6, (3, 11))
+    frame = pd.DataFrame(values, columns=["wind_[m/s]", "period_[s]", "damping_ratio_[-]", *"abcdefgh"])
+    frame.insert(1, "mode", ["surge", "platform_pitch", "heave"])
+    frame["runs"] = [1234567, 3, 4]
+    tables.show(frame, "modes")
+    wanted = [f"{value:.4g}" for value in values.ravel()]
+    assert_whole(capsys.readouterr().out, [*wanted, "1234567", *frame["mode"]], width)
 
 
 def test_list_breaks_texts_between_words_and_nowhere_else(width):
@@ -96,12 +57,6 @@ def test_list_breaks_texts_between_words_and_nowhere_else(width):
     assert used == {name: list(information(name)) for name in CONTROLLERS}
 
 
-def test_a_path_in_prose_is_broken_after_a_slash_and_nothing_is_lost(monkeypatch, capsys):
-    rows = [["x", "see OpenFAST/r-test_of_a_long_name now"]]
-    lines = lines_of(monkeypatch, capsys, 20, ["n", "source"], rows, prose=(1,))
-    assert lines[2:] == ["x  see OpenFAST/", "   r-test_of_a_long_", "   name now"]
-
-
 def test_a_constant_has_no_deviation_and_a_small_one_is_not_lost(monkeypatch):
     constant = 43.09355 * np.ones(4) + 7e-15 * np.array([1.0, -1.0, 1.0, 0.0])
     small = 12.1 + 1e-6 * np.array([1.0, -1.0, 1.0, -1.0])
@@ -113,52 +68,60 @@ def test_a_constant_has_no_deviation_and_a_small_one_is_not_lost(monkeypatch):
     assert rows["RotSpeed"] == ["12.1", "1e-06", "12.1", "12.1"]
 
 
-# ------------------------------------------------------------------ the writer itself
+HEADINGS, ROWS = ["name", "mean_speed_[rpm]", "n"], [["a", 1.5, 7]]
 
 
-def lines_of(monkeypatch, capsys, columns, headings, rows, **options):
+@pytest.mark.parametrize(
+    ("columns", "headings", "rows", "options", "expected"),
+    [
+        (  # headings are in one line where they fit, are wrapped, and then columns are parted into blocks
+            *(40, ["name", "mean speed"], [["a", 1.5], ["bcdef", -22]], {}),
+            ["name   mean speed", "─" * 17, "a             1.5", "bcdef         -22"],
+        ),
+        (
+            14,
+            HEADINGS,
+            ROWS,
+            {},
+            ["       mean", "      speed", "name  [rpm]  n", "─" * 14, "a       1.5  7"],
+        ),
+        (
+            *(12, HEADINGS, ROWS, {}),
+            [
+                "       mean",
+                "      speed",
+                "name  [rpm]",
+                "─" * 11,
+                "a       1.5",
+                "",
+                "name  n",
+                "─" * 7,
+                "a     7",
+            ],
+        ),
+        (  # every block has the first columns and at least one more
+            *(5, list("abc"), [["case", "name", "-0.1234"]], {"keys": 2, "left": (0, 1)}),
+            ["a     b           c", "─" * 19, "case  name  -0.1234"],
+        ),
+        (  # prose is broken between words
+            *(18, ["n", "text", "v"], [["x", "one two three", 1.5], ["y", "four", 2]], {"prose": (1,)}),
+            ["n  text          v", "─" * 18, "x  one two     1.5", "   three", "y  four          2"],
+        ),
+        (
+            40,
+            ["[red]"],
+            [["[bold]x[/bold]"]],
+            {"title": "[dim]t"},
+            ["[dim]t", "[red]", "─" * 14, "[bold]x[/bold]"],
+        ),
+    ],
+)
+def test_a_table_is_fitted_to_the_terminal(columns, headings, rows, options, expected, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", str(columns))
-    cli_tables.print_table(Console(), headings, rows, **options)
-    return capsys.readouterr().out.splitlines()
-
-
-def test_a_table_that_fits_has_its_headings_in_one_line(monkeypatch, capsys):
-    lines = lines_of(monkeypatch, capsys, 40, ["name", "mean speed"], [["a", "1.5"], ["bcdef", "-22"]])
-    assert lines == ["name   mean speed", "─" * 17, "a             1.5", "bcdef         -22"]
-
-
-def test_headings_are_wrapped_before_columns_are_parted_into_blocks(monkeypatch, capsys):
-    headings, rows = ["name", "mean_speed_[rpm]", "n"], [["a", "1.5", "7"]]
-    lines = lines_of(monkeypatch, capsys, 14, headings, rows)
-    assert lines == ["       mean", "      speed", "name  [rpm]  n", "─" * 14, "a       1.5  7"]
-    lines = lines_of(monkeypatch, capsys, 12, headings, rows)
-    assert lines[3:] == ["─" * 11, "a       1.5", "", "name  n", "─" * 7, "a     7"]
-
-
-def test_every_block_has_the_first_columns_and_at_least_one_more(monkeypatch, capsys):
-    headings, rows = list("abcd"), [["case", "name", "1.234e+05", "-0.1234"]]
-    lines = lines_of(monkeypatch, capsys, 5, headings, rows, keys=2, left=(0, 1))
-    assert [line.split() for line in lines if "case" in line] == [rows[0][:3], rows[0][:2] + rows[0][3:]]
-
-
-def test_prose_is_broken_between_words_where_a_line_is_too_long(monkeypatch, capsys):
-    rows = [["x", "one two three", "1.5"], ["y", "four", "2"]]
-    lines = lines_of(monkeypatch, capsys, 18, ["n", "text", "v"], rows, prose=(1,))
-    assert lines[2:] == ["x  one two  1.5", "   three", "y  four       2"]
-
-
-def test_markup_in_names_is_printed_as_it_is(monkeypatch, capsys):
-    lines = lines_of(monkeypatch, capsys, 40, ["[red]"], [["[bold]x[/bold]"]], title="[dim]t")
-    assert lines[0] == "[dim]t" and lines[1] == "[red]" and lines[3] == "[bold]x[/bold]"
+    tables.print_table(headings, rows, **options)
+    assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == expected
 
 
 def test_whole_numbers_are_whole_and_others_have_four_digits():
-    texts = [cli_tables.figure(x) for x in (1234567, np.int64(1234567), 1234.567, -0.0, float("nan"), "a")]
+    texts = [tables.figure(x) for x in (1234567, np.int64(1234567), 1234.567, -0.0, float("nan"), "a")]
     assert texts == ["1234567", "1234567", "1235", "0", "nan", "a"]
-
-
-def test_no_module_makes_tables_of_its_own():
-    sources = [path for folder in (PACKAGE, *FOLDERS.values()) for path in folder.rglob("*.py")]
-    texts = {path: path.read_text(encoding="utf-8") for path in sources}
-    assert not [path for path, text in texts.items() if "rich.table" in text]
-    assert not [path for path, text in texts.items() if ".to_string(" in text and path.parent.name == "cli"]

@@ -34,10 +34,6 @@ from fowt_env.training.evaluation.results import (
     run_file,
     write_run,
 )
-<<<<<<< HEAD
-=======
-from fowt_env.training.reports.evaluation_plots import evaluation_plots
->>>>>>> reports
 
 CALM = Case("calm", 16.0)
 SHORT = {"duration": 4.0, "skip": 1.0}
