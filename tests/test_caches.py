@@ -1,17 +1,9 @@
-import ast
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+from fresh_python import fresh_python
 
 import fowt_env
 from fowt_env.caches import _CACHES, Cache, cached, clear_caches
-
-ROOT = Path(fowt_env.__file__).resolve().parents[1]
-FOLDERS = ("fowt_env", "controllers", "training")
-SOURCES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.py"))
 
 
 @pytest.fixture
@@ -53,56 +45,10 @@ def test_what_is_computed_anew_has_the_same_bits():
     assert run().equals(before)
 
 
-def unbounded_caches(source):
-    """Return the lines that keep values without a bound: functools' caches, an empty dict of a module."""
-    tree = ast.parse(source)
-    modules = {"functools"}  # the names that it goes by
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            modules |= {alias.asname for alias in node.names if alias.name == "functools" and alias.asname}
-    lines = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module == "functools":
-            lines += [node.lineno for alias in node.names if alias.name in ("lru_cache", "cache")]
-        elif isinstance(node, ast.Attribute) and node.attr in ("lru_cache", "cache"):
-            lines += [node.lineno] if isinstance(node.value, ast.Name) and node.value.id in modules else []
-    for node in tree.body:
-        if isinstance(node, ast.Assign | ast.AnnAssign) and isinstance(node.value, ast.Dict):
-            lines += [] if node.value.keys else [node.lineno]
-    return lines
-
-
-def test_values_are_kept_in_bounded_caches_alone():
-    """But for what the compiler's own modules keep of this package's sources."""
-    apart = ("caches.py", "plant/compile/decorators.py", "plant/compile/sources.py")
-    found = [
-        f"{path.relative_to(ROOT)}:{line}"
-        for path in SOURCES
-        if not path.as_posix().endswith(apart)
-        for line in unbounded_caches(path.read_text(encoding="utf-8"))
-    ]
-    assert not found and len(SOURCES) > 300
-
-
-@pytest.mark.parametrize(
-    "source",
-    [
-        "from functools import cache",
-        "from functools import lru_cache as kept",
-        "import functools\n@functools.cache\ndef f(): pass",
-        "import functools as tools\ndef g():\n    return tools.lru_cache(maxsize=None)",
-        "_KEPT = {}",
-        "_KEPT: dict[str, float] = {}",
-    ],
-)
-def test_an_unbounded_cache_is_found(source):
-    assert unbounded_caches(source)
-    assert not unbounded_caches("import functools\nNAMES = {'a': 1}\nf = functools.partial(print)")
-
-
 def test_the_import_changes_neither_environment_variables_nor_numba():
     code = (
-        "import os, numba\n"
+        "import os\n"
+        "for name in [n for n in os.environ if n.startswith(('OMP', 'GOMP'))]: del os.environ[name]\n"
         "from numba import config\n"
         "settings = {name: getattr(config, name) for name in dir(config) if name.isupper()}\n"
         "variables = dict(os.environ)\n"
@@ -112,6 +58,4 @@ def test_the_import_changes_neither_environment_variables_nor_numba():
         "after = {name: getattr(config, name) for name in settings}\n"
         "assert after == settings, {name for name in after if after[name] != settings[name]}\n"
     )
-    environment = {key: value for key, value in os.environ.items() if not key.startswith(("OMP", "GOMP"))}
-    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    fresh_python(code)
