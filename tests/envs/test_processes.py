@@ -51,10 +51,10 @@ def batch_rewards(seed):
 
 @pytest.mark.parametrize("work", [episode, batch_rewards])
 def test_threads_that_each_step_their_own_give_the_bits_of_one_after_the_other(work):
-    together = threading.Barrier(len(SEEDS))
+    together, expected = threading.Barrier(len(SEEDS)), [work(seed) for seed in SEEDS]
     with ThreadPoolExecutor(len(SEEDS)) as pool:
         found = list(pool.map(lambda seed: (together.wait(), work(seed))[1], SEEDS))
-    same(found, [work(seed) for seed in SEEDS])
+    same(found, expected)
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn", pytest.param("forkserver", marks=pytest.mark.slow)])
