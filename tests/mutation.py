@@ -407,10 +407,6 @@ def work(folder, seed, first, last):
             told = "refused" if len(str(error)) > 10 else f"FAILED: says nothing: {error!r}"
         except BaseException as error:
             told = f"FAILED: {type(error).__name__}: {str(error)[:300]}"
-            if os.environ.get("FOWT_MUTATION_TRACE"):
-                import traceback
-
-                traceback.print_exc()
         finally:
             signal.alarm(0)
             signal.setitimer(signal.ITIMER_PROF, 0)

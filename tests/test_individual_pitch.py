@@ -1,35 +1,30 @@
 """Individual pitch between the plant and its users."""
 
-import warnings
 from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
+from laws import PITCH, TORQUE, Recorder
 from naive.sensors import NaiveSensors
 
 import fowt_env
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.multiblade import linearize_blades
-from fowt_env.control import CompiledController, view_of
+from fowt_env.control import view_of
 from fowt_env.descriptions.sensors import Sensor, SensorChain, built_in_chains
 from fowt_env.envs.env import FowtEnv
 from fowt_env.envs.observations import BLADE_CHANNELS
 from fowt_env.envs.safety import SafetyLayer
 from fowt_env.envs.vector_env import FowtVectorEnv
 from fowt_env.errors import ControllerError, InputError
-from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.measurement import (
     N_BLADE_MEASUREMENTS,
     N_MEASUREMENTS,
-    BladeMeasure,
     BladeMeasurement,
-    Measure,
     Measurement,
 )
 from fowt_env.weather.sensor_noise import draw_noise
 
-TORQUE, PITCH = 43093.55, 0.26
 CYCLE = 0.01  # rad
 TRIP = dict.fromkeys(("overpower", "acceleration", "pitch_deviation"), False) | {
     "overspeed": {"limit": 1.0001}
@@ -70,37 +65,9 @@ class Cyclic:
         return (self.torque, *(self.pitch + self.tilt * cos(a) + self.yaw * sin(a) for a in psi))
 
 
-@control_kernel
-def cycle(parameters, memory, measurement, command):
-    """As Cyclic; keeps what it reads and the command in force, one after another."""
-    leads, size = int(parameters[2]), 36 + int(parameters[2])
-    first = 1 + int(memory[0]) * (size + 4)
-    memory[0] += 1.0
-    for i in range(size):
-        memory[first + i] = measurement[i]
-    for i in range(4):
-        memory[first + size + i] = command[i]
-    azimuth = measurement[22 + leads]
-    command[0] = parameters[0]
-    for blade in range(3):
-        command[1 + blade] = parameters[1] + parameters[3] * cos(azimuth + 0.0 + 2.0 * pi * blade / 3.0)
-
-
-class CompiledCyclic(CompiledController):
-    kernel = staticmethod(cycle)
-    individual = True
-
+class CompiledCyclic(Recorder):
     def __init__(self, information=("azimuth",), preview_times=(), size=CYCLE):
-        self.information, self.preview_times = information, preview_times
-        self.size = N_MEASUREMENTS + len(preview_times) + N_BLADE_MEASUREMENTS
-        super().__init__("cyclic", [TORQUE, PITCH, len(preview_times), size], 1 + 61 * (self.size + 4))
-
-    def reset(self, measurement):
-        self.memory[:] = 0.0
-
-    def seen(self):
-        """(calls, readings and the command in force)."""
-        return self.memory[1:].reshape(61, self.size + 4)[: int(self.memory[0])]
+        super().__init__(information, preview_times, 61, size)
 
 
 class Baseline(CompiledCyclic):
@@ -173,7 +140,7 @@ def test_what_needs_single_blades_is_refused_where_there_is_one_pitch(collective
 
     with pytest.raises(InputError, match="'Eager': commands the pitch of each blade.*pitch='individual'"):
         run(collective_scene, Eager())
-    with pytest.raises(InputError, match="'cyclic': commands the pitch of each blade"):
+    with pytest.raises(InputError, match="'recorder': commands the pitch of each blade"):
         FowtEnv(
             **ENV | {"pitch": "collective", "action_mode": "residual", "baseline": f"{__name__}:Baseline"}
         )
@@ -201,24 +168,6 @@ def test_answers_that_are_not_four_numbers_are_refused(scene, returned):
 
 
 # Measurements
-
-
-def test_measured_azimuth_pitches_and_moments_are_those_of_the_output(scene):
-    law = Cyclic()
-    frame = run(scene, law)
-    rows = np.array(law.rows)[:, N_MEASUREMENTS:]
-    out = frame.iloc[: len(rows)]
-    for field, channel, scale in (
-        ("azimuth", "Azimuth_[deg]", pi / 180.0),
-        *((f"blade_pitch_{i}", f"BldPitch{i}_[deg]", pi / 180.0) for i in (1, 2, 3)),
-        *((f"root_out_of_plane_{i}", f"RootMyc{i}_[kN-m]", 1e3) for i in (1, 2, 3)),
-        *((f"root_in_plane_{i}", f"RootMxc{i}_[kN-m]", 1e3) for i in (1, 2, 3)),
-    ):
-        measured = rows[:, BladeMeasure[field.upper()]]
-        np.testing.assert_allclose(measured, out[channel] * scale, rtol=1e-9, atol=1e-9, err_msg=field)
-        assert np.ptp(measured) > 0.0
-    mean = np.radians(out[list(BLADE_PITCHES)].mean(axis=1))
-    np.testing.assert_allclose(np.array(law.rows)[:, Measure.BLADE_PITCH], mean, rtol=1e-12)
 
 
 def test_a_compiled_law_reads_fields_of_blades_behind_the_wind_ahead_and_only_those_it_declares(scene):
@@ -297,17 +246,6 @@ def individual(**settings):
     return FowtEnv(**ENV | {"action_mode": "individual"} | settings)
 
 
-def test_checkers_find_nothing_with_every_channel_of_blades():
-    from stable_baselines3.common.env_checker import check_env as sb3_check_env
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        names = ("default", "azimuth", "previous_action", *BLADE_CHANNELS)
-        env = individual(observation=names, sensors={"noise": 0.01, "delay": 1})
-        check_env(env, skip_render_check=True)
-        sb3_check_env(env)
-
-
 def test_actions_are_the_torque_and_the_pitch_of_each_blade():
     env = individual(observation=("previous_action", *BLADE_CHANNELS), action_mode="individual")
     start, _ = env.reset(seed=1)
@@ -333,18 +271,9 @@ def test_actions_are_the_torque_and_the_pitch_of_each_blade():
     assert travel == pytest.approx(-moved / (radians(8.0) * 0.1), rel=1e-9)
 
 
-def test_a_snapshot_and_a_batch_give_the_same_bits():
+def test_actions_of_another_size_are_refused():
     env, batch = individual(), FowtVectorEnv(1, threads=1, **ENV | {"action_mode": "individual"})
-    rng = np.random.default_rng(0)
-    actions = rng.uniform(-1.0, 1.0, (6, 4))
     env.reset(seed=3), batch.reset(seed=3)
-    rows = []
-    for action in actions:
-        state = env.get_state()
-        rows.append(env.step(action)[0])
-        np.testing.assert_array_equal(rows[-1], batch.step(action[None])[0][0])
-    env.set_state(state)
-    np.testing.assert_array_equal(env.step(actions[-1])[0], rows[-1])
     with pytest.raises(InputError, match="must be \\(1, 4\\)"):
         batch.step(np.zeros((1, 2)))
     with pytest.raises(InputError, match="action has shape \\(2,\\): must be \\(4,\\)"):

@@ -7,6 +7,7 @@ import numba
 import numpy as np
 import pandas as pd
 import pytest
+from laws import Recorder
 from naive.preview import add_motion
 from naive.sensors import NaiveSensors
 from potential_body import made_up_body
@@ -14,7 +15,6 @@ from potential_body import made_up_body
 import fowt_env
 from fowt_env.control import (
     PRIVILEGED_INPUTS,
-    CompiledController,
     MeasurementView,
     hidden,
     known_scene,
@@ -35,7 +35,6 @@ from fowt_env.plant.measurement import (
     Measurement,
     measurement_rows,
 )
-from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Motion, Preview, exact_preview, rotor_wind_series
 from fowt_env.weather.sensor_noise import draw_noise
 
@@ -52,37 +51,6 @@ def gust_scene():
 
 def run(scene, controller, **options):
     return fowt_env.simulate(scene, controller, **{"duration": 6.0} | options)
-
-
-@control_kernel
-def remember(parameters, memory, measurement, command):
-    """Keep each reading and the command in force, one after another, and hold a sound command."""
-    size = int(parameters[0])
-    place = 1 + int(memory[0]) * (size + 2)
-    memory[0] += 1.0
-    for i in range(size):
-        memory[place + i] = measurement[i]
-    memory[place + size], memory[place + size + 1] = command[0], command[1]
-    command[0], command[1] = 43093.55, 0.26
-
-
-class Recorder(CompiledController):
-    """A compiled law that keeps what it reads."""
-
-    kernel = staticmethod(remember)
-
-    def __init__(self, information, preview_times=(), calls=60):
-        self.information, self.preview_times = tuple(information), tuple(preview_times)
-        size = N_MEASUREMENTS + len(self.preview_times)
-        super().__init__("recorder", [float(size)], 1 + calls * (size + 2))
-        self.shape = calls, size + 2
-
-    def reset(self, measurement):
-        self.first = measurement
-
-    def seen(self):
-        """(calls, readings and the command in force)."""
-        return self.memory[1:].reshape(self.shape)[: int(self.memory[0])]
 
 
 class Watcher:
@@ -107,23 +75,19 @@ class Watcher:
 
 
 def test_a_compiled_law_reads_nothing_but_what_it_declares_and_the_time(gust_scene):
-    declared = ("rotor_speed", "blade_pitch")
-    some, every = Recorder(declared), Recorder(Measurement._fields)
+    """Of the command in force too; and the same of act(), called from Python."""
+    some, every = Recorder(("rotor_speed", "blade_pitch")), Recorder(Measurement._fields)
     run(gust_scene, some)
     run(gust_scene, every)
-    shown = [Measure[name.upper()] for name in ("time", *declared)]
-    rest = [i for i in range(N_MEASUREMENTS) if i not in shown]
-    assert np.isnan(some.seen()[:, rest]).all()
+    shown = [Measure.TIME, Measure.ROTOR_SPEED, Measure.BLADE_PITCH, N_MEASUREMENTS + 1]
+    assert np.isnan(np.delete(some.seen(), shown, axis=1)).all()
     assert np.array_equal(some.seen()[:, shown], every.seen()[:, shown])
     assert np.isfinite(every.seen()).all()
-
-
-def test_the_command_in_force_is_part_of_what_is_declared(gust_scene):
-    torque, pitch = Recorder(("generator_torque",)), Recorder(("blade_pitch",))
-    run(gust_scene, torque)
-    run(gust_scene, pitch)
-    assert np.isfinite(torque.seen()[:, -2]).all() and np.isnan(torque.seen()[:, -1]).all()
-    assert np.isnan(pitch.seen()[:, -2]).all() and np.isfinite(pitch.seen()[:, -1]).all()
+    some.reset(ONES)
+    some.act(ONES)
+    assert np.flatnonzero(np.isfinite(some.seen()[0, :N_MEASUREMENTS])).tolist() == sorted(shown[:3])
+    with pytest.raises(InputError, match=r"measurement has shape \(22,\): must be \(24,\)"):
+        Recorder(("wind_preview",), (1.0, 2.0)).act(ONES)
 
 
 def test_python_and_compiled_controllers_are_given_the_same(gust_scene):
@@ -192,14 +156,6 @@ def test_a_controller_that_declares_nothing_is_given_the_turbine_s_own_sensors(g
     shown = np.flatnonzero(np.isfinite(watcher.rows[3]))
     assert shown.tolist() == sorted(Measure[name.upper()] for name in SENSOR_FIELDS)
     assert not {"wind_speed", "wave_elevation", "surge"} & set(SENSOR_FIELDS)
-
-
-def test_act_of_a_compiled_law_hides_what_the_compiled_loop_hides():
-    law = Recorder(("rotor_speed",))
-    law.act(ONES)
-    assert np.array_equal(np.flatnonzero(np.isfinite(law.seen()[0, :N_MEASUREMENTS])), [0, 1])
-    with pytest.raises(InputError, match=r"measurement has shape \(22,\): must be \(24,\)"):
-        Recorder(("wind_preview",), (1.0, 2.0)).act(ONES)
 
 
 def test_a_law_that_works_with_what_it_was_not_given_is_stopped_with_the_reason(gust_scene):
@@ -341,14 +297,6 @@ def test_prepare_is_given_the_turbine_alone_where_it_is_not(storm_scene):
         _ = asking.scene.model
 
 
-def test_no_design_depends_on_the_weather_that_prepare_is_not_given(storm_scene):
-    for name in ("lqr", "preview"):
-        told, known = (make(name, storm_scene.turbine, 0.1) for _ in range(2))
-        told.prepare(storm_scene)
-        known.prepare(known_scene(storm_scene, known))
-        assert np.array_equal(told.parameters, known.parameters)
-
-
 def test_a_controller_is_prepared_for_the_nominal_scene_where_there_is_one(gust_scene, storm_scene):
     asking = Asking(("plant_model",))
     run(gust_scene, asking, duration=0.5, nominal=storm_scene)
@@ -404,18 +352,6 @@ def test_the_nacelle_s_own_motion_gets_into_the_preview_of_a_lidar_on_it(gust_sc
     np.testing.assert_allclose(seen[:, N_MEASUREMENTS:].T, wanted, rtol=0.0, atol=1e-12)
     assert np.ptp(wanted) > 0.1
     assert np.array_equal(np.array(plain.rows), seen, equal_nan=True)
-
-
-def test_a_lidar_s_preview_is_given_with_its_motion(gust_scene):
-    scene = fowt_env.build_scene(
-        "oc3_hywind", wind={"kind": "ntm", "speed": 16.0, "class": "B"}, seed=1001, duration=60.0,
-        fidelity="standard",
-    )  # fmt: skip
-    law = Recorder(("nacelle_velocity", "wind_preview"), (2.0,), calls=300)
-    run(scene, law, preview=lidar_preview, duration=30.0)
-    seen = law.seen()
-    wanted = add_motion(lidar_preview(scene, (2.0,)), seen[:, 0], seen[:, Measure.NACELLE_VELOCITY])
-    np.testing.assert_allclose(seen[:, N_MEASUREMENTS], wanted[0], rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -495,12 +431,10 @@ def test_readings_are_those_of_the_chain_taken_one_by_one(gust_scene, chain):
         wanted = twin.read(dict(zip(Measurement._fields, measured[:N_MEASUREMENTS], strict=True)))
         got = dict(zip(Measurement._fields, reading[:N_MEASUREMENTS], strict=True))
         for name in Measurement._fields:
-            assert got[name] == pytest.approx(wanted.get(name, np.nan), rel=1e-12, abs=1e-12, nan_ok=True), (
-                name
-            )
-    pd.testing.assert_frame_equal(
-        frame, run(gust_scene, Recorder((), calls=200), duration=20.0), check_exact=True
-    )
+            expected = pytest.approx(wanted.get(name, np.nan), rel=1e-12, abs=1e-12, nan_ok=True)
+            assert got[name] == expected, name
+    plain = run(gust_scene, Recorder((), calls=200), duration=20.0)
+    pd.testing.assert_frame_equal(frame, plain, check_exact=True)
 
 
 def test_exact_sensors_change_no_bit(storm_scene):

@@ -1,8 +1,7 @@
 """The solution of the equation of motion: accelerations of platform, rotor and tower under given loads.
 
-Unknowns of a rigid tower are (v', w', w_b'): one symmetric positive-definite system. The rotor row is
-eliminated, which leaves a 6x6 solve (theory.md, Eqs 9, 10 and 13). A tower that bends adds a row for each
-mode, which is eliminated first. The sum of the loads is in dynamics.py.
+Unknowns of a rigid tower are (v', w', w_b'); the rotor row is eliminated, which leaves a symmetric 6x6 solve
+(theory.md, Eqs 9, 10 and 13). A tower that bends adds a row for each mode, which is eliminated first.
 """
 
 from math import sqrt

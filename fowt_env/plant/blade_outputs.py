@@ -108,9 +108,8 @@ def blade_load(blade, blades):
 def root_moments(psi, load, hub, masses, layout):
     """RootMoments of the blade at the azimuth psi under a BladeLoad.
 
-    Weight and inertia: the integral of s a x (g - acceleration) over the blade's mass, a the direction of the
-    pitch axis, s the distance from the root; the acceleration is that of the rotor centre and of a rotation
-    about it.
+    Weight and inertia: the integral of s a x (g - acceleration) over the blade's mass, a the direction of
+    the pitch axis, s the distance from the root.
     """
     c, s = layout.reach, layout.lean
     ey, ez = -sin(psi), cos(psi)

@@ -1,10 +1,8 @@
 """Fixed-step integrators of one plant: a class, a step and a row of INTEGRATORS each.
 
-Blade pitch and generator torque follow their own laws exactly within a step (constant command), so the
-stiffest parts of the plant do not limit the multistep methods. Nor does the rotor in a box of wind, whose
-blades pass a cell of the grid in a tenth of a second: its load alone is evaluated several times a step
-(rotor_substeps.py). The states of radiation memory, the last of the vector, have no rates: they follow
-exactly from velocities that are linear over the step (hydro/radiation.py).
+Blade pitch and generator torque follow their own laws exactly within a step (constant command), the states of
+radiation memory follow exactly from velocities that are linear over it (hydro/radiation.py), and the rotor's
+load in a box of wind is evaluated several times a step (rotor_substeps.py), so that none of these limits it.
 """
 
 from typing import NamedTuple

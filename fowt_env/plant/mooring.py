@@ -244,16 +244,12 @@ def solve_touchdown(X, Z, kappa, friction, s, excess, high, h0):
 
 @kernel
 def catenary(x_f, z_f, length, weight, EA, friction, h0):
-    """Catenary of one line whose anchor lies on a flat seabed, for any finite spans.
+    """Catenary of one line whose anchor lies on a flat seabed, for any finite spans (theory.md, 5.5).
 
-    x_f >= 0, z_f: horizontal and vertical distance from anchor to fairlead, m. h0: horizontal
-    tension to start from, N (0: none); it changes the effort, not the result beyond 1e-12 (or beyond
-    what the rounding of the spans does, in a line that lies on the seabed a hair from slack).
-    The fairlead at or below the anchor (z_f <= 0) counts as lying on the seabed: V = 0 and the line
-    pulls horizontally. A fairlead straight above the anchor gives H = 0: hanging or stretched
-    vertically. Slack: the rest of the line lies without tension. x_f beyond the stretch of any real
-    line is answered with the tension that linear elasticity gives.
-    NaN in gives NaN out, not converged. theory.md, 5.5.
+    x_f >= 0, z_f: horizontal and vertical distance from anchor to fairlead, m. h0: horizontal tension to
+    start from, N (0: none); the result depends on it by 1e-12 at most. A fairlead at or below the anchor
+    counts as lying on the seabed (V = 0); one straight above it gives H = 0. The rest of a slack line lies
+    without tension; beyond any real stretch the tension is that of linear elasticity. NaN in, NaN out.
     """
     kappa = weight * length / EA
     W = weight * length
@@ -353,9 +349,8 @@ def line_state(x_f, z_f, i, mooring, table, start):
 def mooring_load(pose, mooring, lines, counters):
     """Wrench of all mooring lines on the platform, body axes, about the body origin (theory.md, 5.5).
 
-    lines: (n, 6), carried between calls: H, V, fairlead tension, anchor tension, length on the
-    seabed, regime (0 slack, 1 touchdown, 2 suspended). H is where the next call starts; zeros are
-    a cold start. counters[MOORING_UNCONVERGED] counts lines that missed the tolerance.
+    lines: (n, N_LINE), carried between calls, as H is where the next one starts; zeros are a cold start.
+    counters[MOORING_UNCONVERGED] counts lines that missed the tolerance.
     """
     if mooring is None:
         return NO_LOAD

@@ -2,11 +2,9 @@
 
     pitch'' = w^2 (target - pitch) - 2 zeta w pitch' - w^2 friction sign(pitch')
 
-The command is constant over a control period, so the drive is solved by itself: in one piece where it can
-meet no limit, else piece by piece from one event to the next. What comes out depends on the plant's step by
-rounding alone. Friction is Coulomb's with an equal force to break away
-(Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30 (1994) 1083): a blade at rest stays there until
-the drive pulls harder, so that to slow commands the drive is a play of half width `friction`.
+The command is constant over a control period, so the drive is solved by itself, piece by piece from one event
+(a limit, a stop) to the next. Friction is Coulomb's with an equal force to break away (Armstrong-Helouvry,
+Dupont and Canudas de Wit, Automatica 30 (1994) 1083): to slow commands a play of half width `friction`.
 """
 
 from math import cos, cosh, exp, sin, sinh, sqrt

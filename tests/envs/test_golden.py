@@ -48,13 +48,3 @@ def test_a_thousandth_more_drag_does_not_pass(platform):
 
 def test_every_registered_environment_has_a_stored_trajectory():
     assert set(ENVIRONMENTS) == set(registration.ENVIRONMENTS)
-
-
-@pytest.mark.parametrize("column", ["reward", "observation_4"])
-def test_a_change_beyond_the_tolerance_is_told_with_what_to_do(column):
-    stored = pd.read_csv(path_of(ENVIRONMENTS[0], "steady"))
-    moved = stored.copy()
-    moved.loc[3, column] *= 1.0 + 3e-6
-    compare(ENVIRONMENTS[0], "steady", stored, stored.copy())
-    with pytest.raises(AssertionError, match=f"(?s){column} moved.*-vN.*golden.py"):
-        compare(ENVIRONMENTS[0], "steady", stored, moved)

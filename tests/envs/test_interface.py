@@ -1,21 +1,18 @@
 """The interface of an environment is that of simulate: information, trips, faults, wind ahead."""
 
-import pickle
-from copy import deepcopy
-
 import numpy as np
 import pandas as pd
 import pytest
+from episodes import NTM
+from laws import PITCH, TORQUE, Recorder
 
 import fowt_env
-from fowt_env.control import CompiledController
 from fowt_env.controllers import make
 from fowt_env.descriptions.faults import Fault
 from fowt_env.envs import EpisodeSettings, FowtEnv, FowtVectorEnv, InterfaceSettings
 from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError
-from fowt_env.plant.compile.decorators import control_kernel
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.training.evaluation.case_environment import environment_settings
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.run_case import Run, run_metrics, scored
@@ -24,61 +21,34 @@ STILL = {"task": "steady", "wind": 16.0, "duration": 20.0, "fidelity": "fast"}
 RUNAWAY = {"kind": "pitch_runaway", "time": 0.0, "towards": "fine"}
 
 
-@control_kernel
-def keep_input(parameters, memory, measurement, command):
-    """Keep the command in force and two measured quantities, and command rated torque at 0.26 rad."""
-    memory[0], memory[1] = command[0], command[1]
-    memory[2], memory[3] = measurement[Measure.ROTOR_SPEED], measurement[Measure.PLATFORM_PITCH]
-    command[0], command[1] = 43093.55, 0.26
-
-
-class RotorSpeedLaw(CompiledController):
-    """A law that declares the rotor speed alone, and keeps what it reads."""
-
-    kernel = staticmethod(keep_input)
-    information = ("rotor_speed",)
-
-    def __init__(self):
-        super().__init__("rotor speed law", np.zeros(1), 4)
-
-    def reset(self, measurement):
-        """Forget what was read."""
-        self.memory[:] = 0.0
-
-
-class CommandLaw(RotorSpeedLaw):
-    """The same law, which declares the command in force too."""
-
-    information = ("rotor_speed", "generator_torque", "blade_pitch")
-
-
 @pytest.mark.parametrize("protection", [None, "turbine"])
-def test_the_baseline_of_an_environment_reads_nan_where_it_does_not_declare(protection):
-    for law, declared in ((RotorSpeedLaw, False), (CommandLaw, True)):
-        env = FowtEnv(**STILL, action_mode="residual", baseline=law(), protection=protection)
-        env.reset(seed=1)
-        env.step(np.zeros(2))
-        read = env.view().baseline_memory
-        assert np.isfinite(read).tolist() == [declared, declared, True, False]
+@pytest.mark.parametrize("commands", [(), ("generator_torque", "blade_pitch")])
+def test_the_baseline_of_an_environment_reads_nan_where_it_does_not_declare(protection, commands):
+    law = Recorder(("rotor_speed", *commands))
+    env = FowtEnv(**STILL, action_mode="residual", baseline=law, protection=protection)
+    env.reset(seed=1)
+    env.step(np.zeros(2))
+    read = law.seen(env.view().baseline_memory)[-1, [-2, -1, Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH]]
+    assert np.isfinite(read).tolist() == [bool(commands)] * 2 + [True, False]
 
 
 def test_environments_of_a_batch_do_not_share_the_memory_of_a_baseline():
-    batch = FowtVectorEnv(2, **STILL, action_mode="residual", baseline=RotorSpeedLaw())
+    batch = FowtVectorEnv(2, **STILL, action_mode="residual", baseline=Recorder(("rotor_speed",)))
     memories = [env._episode.memory for env in batch.envs]
     assert not np.shares_memory(*memories)
 
 
 def test_a_law_reads_its_last_command_and_not_what_a_fault_made_of_it():
     """lqr predicts with the command in force; a drive that runs away does not show it another one."""
-    law, scene = CommandLaw(), fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="fast")
+    law, other = (Recorder(("rotor_speed", "generator_torque", "blade_pitch")) for _ in range(2))
+    scene = fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="fast")
     fowt_env.simulate(scene, law, 1.0, faults=RUNAWAY)
-    env = FowtEnv(**STILL, action_mode="residual", baseline=CommandLaw(), faults=RUNAWAY)
+    env = FowtEnv(**STILL, action_mode="residual", baseline=other, faults=RUNAWAY)
     env.reset(seed=1)
     for _ in range(3):
         env.step(np.zeros(2))
-    assert law.memory[1] == env.view().baseline_memory[1] == 0.26
-    drive = env.scene.turbine.pitch_drive
-    assert env.view().in_force[1] == drive.minimum
+    assert law.seen()[-1, -1] == other.seen(env.view().baseline_memory)[-1, -1] == PITCH
+    assert env.view().in_force[1] == env.scene.turbine.pitch_drive.minimum
 
 
 STOPPED = Fault(kind="grid_loss", time=20.0, delay=0.3)
@@ -150,88 +120,64 @@ def test_faults_are_drawn_in_their_ranges_and_replayed_from_the_info():
         FowtEnv(**STILL).reset(seed=1, options={"faults": [drawn[0]]})
 
 
-DRIVES = {"pitch_drive": "second_order", "fidelity": "fast"}
 LIDAR = {"wind": {"kind": "ntm", "speed": 16.0, "class": "B"}, "duration": 20.0, "fidelity": "fast"}
 LEADS = (1.5, 4.0)
 
 
 @pytest.mark.parametrize("preview", ["exact", "four_beam_pulsed"])
 def test_the_wind_ahead_of_observation_and_baseline_is_that_of_simulate(preview):
-    task = Task(name="ahead", wind=LIDAR["wind"], duration=20.0, offsets={}, wind_preview=LEADS,
+    task = Task("ahead", wind=LIDAR["wind"], duration=20.0, offsets={}, wind_preview=LEADS,
                 observation=("rotor_speed", "wind_preview"))  # fmt: skip
     env = FowtEnv(task, fidelity="fast", preview=preview)
-    _, info = env.reset(seed=1)
-    seen = [env.measurement().time]
-    ahead = [env.view().ahead]
-
-    class Follow:
-        """Commands of the environment, and the wind ahead that simulate gives."""
-
-        information, preview_times = ("wind_preview",), LEADS
-
-        def __init__(self):
-            self.ahead = []
-
-        def reset(self, measurement):
-            pass
-
-        def act(self, measurement):
-            self.ahead.append(measurement.wind_preview)
-            return 43093.55, 0.26
-
+    env.reset(seed=1)
+    ahead = []
     for _ in range(200):
-        env.step_physical(43093.55, 0.26)
         ahead.append(env.view().ahead)
-    scene = env.scene
-    law = Follow()
-    fowt_env.simulate(scene, law, 20.0, preview=preview)
-    np.testing.assert_array_equal(np.array(ahead[:200]), np.array(law.ahead))
-    assert len(seen) == 1
+        env.step_physical(TORQUE, PITCH)
+    law = Recorder(("wind_preview",), LEADS, calls=200)
+    fowt_env.simulate(env.scene, law, 20.0, preview=preview)
+    np.testing.assert_array_equal(np.array(ahead), law.seen()[:, N_MEASUREMENTS:-2])
     if preview == "exact":
         hub = FowtEnv(task, fidelity="fast")
         hub.reset(seed=1)
         assert np.abs(hub.view().ahead - ahead[0]).max() < 1e-9  # rotor-averaged wind is that at the hub
 
 
-def test_copies_snapshots_and_batches_keep_trips_faults_and_lidar():
-    settings = {"task": Task(name="ahead", wind=LIDAR["wind"], duration=20.0, wind_preview=LEADS,
-                             observation=("rotor_speed", "wind_preview")),
-                "fidelity": "fast", "preview": "four_beam_pulsed", "protection": "turbine",
-                "faults": [RUNAWAY | {"time": (0.5, 6.0)}], "sensors": "standard",
-                "record": True}  # fmt: skip
-    env = FowtEnv(**settings)
-    env.reset(seed=5)
-    rng = np.random.default_rng(1)
-    for _ in range(30):
-        env.step(rng.uniform(-1.0, 1.0, 2))
-    snapshot, copy = env.get_state(), deepcopy(env)
-    again = pickle.loads(pickle.dumps(env))
-    actions = rng.uniform(-1.0, 1.0, (60, 2))
-    wanted = [env.step(action)[0] for action in actions]
-    assert env.is_stopping
-    for other in (copy, again):
-        np.testing.assert_array_equal([other.step(action)[0] for action in actions], wanted)
-    env.set_state(snapshot)
-    np.testing.assert_array_equal([env.step(action)[0] for action in actions], wanted)
-    batch = FowtVectorEnv(2, **settings)
-    batch.reset(seed=[5, 6])
-    single = FowtEnv(**settings)
-    single.reset(seed=6)
-    for action in actions:
-        observations, *_, infos = batch.step(np.array([action, action]))
-        np.testing.assert_array_equal(observations[1], single.step(action)[0])
-        assert infos["stopping"][1] == single.is_stopping
+SLOW = {"kind": "ntm", "speed": 8.0, "class": "B"}
+DRIVES = {"pitch_drive": "second_order", "fidelity": "fast", "wind": 16.0}
 
 
-def test_second_order_drives_and_a_lagging_generator_are_those_of_simulate():
-    scene = fowt_env.build_scene("oc3_hywind", wind=16.0, **DRIVES)
-    frame = fowt_env.simulate(scene, "pi", 20.0)
-    task = Task(name="drives", wind=16.0, duration=20.0, offsets={})
-    env = FowtEnv(task, action_mode="residual", record=True, **DRIVES)
-    env.reset(seed=1)
-    while not env.step(np.zeros(2))[3]:
-        pass
-    pd.testing.assert_frame_equal(env.frame(), frame, check_exact=True)
+@pytest.mark.parametrize(
+    ("law", "as_baseline", "settings"),
+    [
+        ("pi", False, {"rotor": "bem", "fidelity": "reference", "wind": SLOW}),
+        ("pi", False, {"rotor": "table", "fidelity": "reference"}),
+        ("pi", False, {"fidelity": "standard"}),
+        ("pi", True, {"fidelity": "fast"}),
+        ("pi", True, DRIVES),
+        ("lqr", True, {"rotor": "table"}),
+    ],
+)
+def test_the_commands_of_a_law_and_none_beside_a_baseline_give_the_rows_of_simulate(
+    law, as_baseline, settings
+):
+    settings = {"duration": 10.0, "wave_components": 20, "wind": NTM, "record": True} | settings
+    envs = [FowtEnv(**settings)]
+    if as_baseline:
+        envs.append(FowtEnv(action_mode="residual", baseline=law, **settings))
+    for env in envs:
+        env.reset(seed=1, options={"weather_seed": 7, "offsets": {}})
+    hand = envs[0]
+    controller = make(law, hand.scene.turbine, 0.1)
+    controller.prepare(hand.scene)
+    controller.reset(hand.measurement())
+    for _ in range(100):
+        hand.step_physical(*controller.act(hand.measurement()))
+        for base in envs[1:]:
+            base.step(np.zeros(2))
+    frame = fowt_env.simulate(hand.scene, law, 10.0)
+    for env in envs:
+        pd.testing.assert_frame_equal(env.frame(), frame, check_exact=True)
 
 
 def test_records_and_keywords_are_the_same_settings():

@@ -7,37 +7,33 @@ from pathlib import Path
 
 import gymnasium
 import pytest
+from episodes import NAME
+from fresh_python import ROOT, fresh_python
 
-import fowt_env
 from fowt_env.descriptions.platform import platform_names
 from fowt_env.registration import OTHER_PLATFORMS
 
 pytestmark = pytest.mark.installation
 
-ROOT = Path(fowt_env.__file__).resolve().parent.parent
-NAME = "fowt_env/OC3Hywind-v1"
-
-
-def python(code, *options):
-    """What a fresh Python prints."""
-    done = subprocess.run(
-        [sys.executable, *options, "-c", code], capture_output=True, text=True, cwd=ROOT, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
-    assert "warn" not in done.stderr.lower(), done.stderr
-    return done.stdout.strip()
-
-
-@pytest.mark.parametrize("imports", ["fowt_env, gymnasium", "gymnasium, fowt_env"])
-def test_import_registers_and_loads_no_environment(imports):
-    code = f"import sys, {imports}; spec = gymnasium.spec({NAME!r})\n"
-    code += "print(spec.entry_point, 'fowt_env.envs' in sys.modules)"
-    assert python(code) == "fowt_env.envs:FowtEnv False"
+@pytest.mark.parametrize(
+    ("imports", "loaded"),
+    [
+        ("fowt_env, gymnasium", False),
+        ("gymnasium, fowt_env", False),
+        ("gymnasium, fowt_env, fowt_env.envs", True),
+        ("fowt_env.envs, fowt_env, gymnasium", True),
+    ],
+)
+def test_import_registers_once_and_loads_no_environment(imports, loaded):
+    code = f"import sys, warnings; warnings.simplefilter('error'); import {imports}\n"
+    code += "from fowt_env.registration import register_environments; register_environments()\n"
+    code += f"print(gymnasium.spec({NAME!r}).entry_point, 'fowt_env.envs' in sys.modules)"
+    assert fresh_python(code) == f"fowt_env.envs:FowtEnv {loaded}"
 
 
 def test_a_name_with_the_module_needs_no_import():
     code = f"import gymnasium; env = gymnasium.make('fowt_env:{NAME}', wind=None); print(env.spec.id)"
-    assert python(code) == NAME
+    assert fresh_python(code) == NAME
 
 
 @pytest.mark.parametrize(("name", "platform"), OTHER_PLATFORMS.items())
@@ -47,14 +43,9 @@ def test_names_of_other_platforms_make_environments_of_them(name, platform):
     assert gymnasium.spec(NAME).entry_point == spec.entry_point
 
 
-def test_registering_twice_is_silent():
-    code = "from fowt_env.registration import register_environments as r; r(); r(); print('done')"
-    assert python(code) == "done"
-
-
 def test_python_starts_without_a_line_of_this_project():
     code = "import sys; print(any(name.startswith('fowt') for name in sys.modules))"
-    assert python(code) == "False"
+    assert fresh_python(code) == "False"
 
 
 LAW = """
@@ -76,6 +67,7 @@ USES = {
         "run = fowt_env.simulate(scene, controller='controllers:Law', duration=0.2)\n"
         "print('done' if run['GenTq_[kN-m]'].iloc[-1] > 0.0 else run)"
     ),
+    "command": "",
     "help": (
         "import sys; from fowt_env.training.cli.app import main; sys.argv = ['fowt', 'evaluate', '--help']\n"
         "try: main()\nexcept SystemExit as end: print('done' if not end.code else end)"
@@ -83,38 +75,27 @@ USES = {
 }
 
 
-def in_users_folder(folder, *command):
-    """Last line of what a command prints in a folder with a controllers.py and a training/ of the user's."""
-    (folder / "controllers.py").write_text(LAW)
-    (folder / "training").mkdir()
-    (folder / "training" / "__init__.py").write_text("raise RuntimeError('a folder of the user')")
-    variables = os.environ | {"NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run(command, env=variables, capture_output=True, text=True, cwd=folder, timeout=120)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip().splitlines()[-1]
-
-
 @pytest.mark.parametrize("use", USES)
 def test_modules_of_a_user_s_folder_do_not_hide_the_installed_ones(tmp_path, use):
-    assert in_users_folder(tmp_path, sys.executable, "-c", USES[use]) == "done"
-
-
-def test_nor_do_they_for_the_installed_command(tmp_path):
-    fowt = Path(sys.executable).with_name("fowt")
-    if not fowt.exists():
+    (tmp_path / "controllers.py").write_text(LAW)
+    (tmp_path / "training").mkdir()
+    (tmp_path / "training" / "__init__.py").write_text("raise RuntimeError('a folder of the user')")
+    command = [Path(sys.executable).with_name("fowt"), "list", "controllers"]
+    if use != "command":
+        command = [sys.executable, "-c", USES[use]]
+    elif not command[0].exists():
         pytest.skip("the command is not installed beside this Python")
-    assert in_users_folder(tmp_path, str(fowt), "list", "controllers")
+    variables = os.environ | {"NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run(command, env=variables, capture_output=True, text=True, cwd=tmp_path, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert use == "command" or done.stdout.strip().splitlines()[-1] == "done"
 
 
 def test_what_is_installed_has_one_name_alone(tmp_path):
     """Also where it is installed editable: nothing of a clone but fowt_env can be imported."""
     names = "('controllers', 'training', 'tests')"
     code = f"from importlib.util import find_spec; print([name for name in {names} if find_spec(name)])"
-    variables = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    done = subprocess.run(
-        [sys.executable, "-c", code], env=variables, capture_output=True, text=True, cwd=tmp_path
-    )
-    assert done.stdout.strip() == "[]", done.stderr
+    assert fresh_python(code, cwd=tmp_path, PYTHONPATH="") == "[]"
 
 
 @pytest.mark.parametrize("name", ["controllers", "training"])

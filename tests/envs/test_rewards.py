@@ -60,32 +60,23 @@ def at_rated():
     return m
 
 
-def test_tolerance_is_one_inside_and_a_tenth_one_margin_outside():
-    assert tolerance(0.0, (-1.0, 1.0), 0.5) == 1.0
-    assert tolerance(1.0, (-1.0, 1.0), 0.5) == 1.0
+def test_tolerance_is_one_inside_falls_to_a_tenth_one_margin_outside_and_is_none_of_what_is_not_finite():
+    assert tolerance(0.0, (-1.0, 1.0), 0.5) == tolerance(1.0, (-1.0, 1.0), 0.5) == 1.0
     assert tolerance(1.5, (-1.0, 1.0), 0.5) == pytest.approx(AT_MARGIN, rel=1e-14)
     assert tolerance(-1.5, (-1.0, 1.0), 0.5) == pytest.approx(AT_MARGIN, rel=1e-14)
     assert tolerance(1.0001, (-1.0, 1.0), 0.0) == 0.0
+    values = np.array([tolerance(x, (0.0, 1.0), 0.5) for x in np.linspace(1.0, 3.0, 200)])
+    assert np.all(np.diff(values) < 0.0) and np.all((values >= 0.0) & (values <= 1.0))
+    assert [tolerance(x, (-1.0, 1.0), 0.5) for x in (np.nan, np.inf, -np.inf)] == [0.0] * 3
 
 
-@pytest.mark.parametrize("x", [np.nan, np.inf, -np.inf])
-def test_tolerance_gives_nothing_for_what_is_not_finite(x):
-    assert tolerance(x, (-1.0, 1.0), 0.5) == 0.0
-
-
-def test_tolerance_falls_with_the_distance():
-    x = np.linspace(1.0, 3.0, 200)
-    values = np.array([tolerance(v, (0.0, 1.0), 0.5) for v in x])
-    assert np.all(np.diff(values) < 0.0)
-    assert np.all((values >= 0.0) & (values <= 1.0))
-
-
-def test_rated_operation_at_rest_earns_every_term():
+@pytest.mark.parametrize("failed", [False, True])
+def test_rated_operation_at_rest_earns_every_term_and_failure_costs_one(failed):
     m = at_rated()
-    terms = terms_of(m, m)
     best = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0])  # but that of a rotor at rest
+    best[TermIndex.FAILURE] = -1.0 * failed
     # rated torque times rated speed is rated power to the digits that the turbine file prints
-    np.testing.assert_allclose(terms, best, atol=1e-5)
+    np.testing.assert_allclose(terms_of(m, m, failed=failed), best, atol=1e-5)
 
 
 def test_power_term_is_the_share_below_rated_and_falls_above():
@@ -126,12 +117,6 @@ def test_travel_terms_cost_one_at_the_rate_limit():
     assert travel_term(0.1, 0.1 - 0.5 * most, SCALES.max_pitch_increment) == pytest.approx(-0.5, rel=1e-12)
     assert travel_term(0.0, 1e9, SCALES.max_torque_increment) == -1.0
     assert travel_term(0.3, 0.3, SCALES.max_pitch_increment) == 0.0
-
-
-def test_failure_costs_one():
-    m = at_rated()
-    assert terms_of(m, m, failed=True)[TermIndex.FAILURE] == -1.0
-    assert terms_of(m, m, failed=False)[TermIndex.FAILURE] == 0.0
 
 
 def test_terms_stay_in_their_ranges_whatever_is_measured():

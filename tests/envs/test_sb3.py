@@ -7,19 +7,12 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from episodes import QUICK, same
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor, VecNormalize
 
 from fowt_env.envs import FowtEnv
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
-
-QUICK = {"rotor": "table", "wave_components": 20}
-
-
-def same(one, other):
-    if isinstance(one, dict):
-        return one.keys() == other.keys() and all(same(one[k], other[k]) for k in one)
-    return type(one) is type(other) and np.array_equal(one, other)
 
 
 def test_it_is_sb3_s_dummy_environment_bit_for_bit_through_failures_and_time_limits():

@@ -1,20 +1,19 @@
 """Degraded sensors and a plant that controllers do not know: one reading for all, and nothing else."""
 
-from collections import namedtuple
 
 import numpy as np
 import pytest
+from episodes import DEGRADED
 
 from fowt_env import build_scene, simulate
 from fowt_env.control import call_law
 from fowt_env.controllers import make
 from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.envs import FowtEnv, FowtVectorEnv
-from fowt_env.envs import sensors as envs_sensors
 from fowt_env.envs.safety import SafetyLayer
-from fowt_env.envs.sensors import draw_sensors, reading_scales
+from fowt_env.envs.sensors import reading_scales
 from fowt_env.errors import InputError
-from fowt_env.plant.measurement import MEASURED, N_MEASUREMENTS, Measure, Measured, Measurement
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure, Measurement
 from fowt_env.training.evaluation.plant_perturbation import (
     PlantPerturbation,
     perturbed_sensors,
@@ -24,7 +23,6 @@ from fowt_env.training.evaluation.plant_perturbation import (
 QUICK = {"rotor": "table", "wave_components": 20, "wind": {"kind": "ntm", "speed": 18.0, "class": "B"}}
 NAMES = ("rotor_speed", "platform_pitch_rate", "previous_action", "estimated_wind", "estimated_waves")
 ON_LQR = {"action_mode": "residual", "baseline": "lqr", "observation": NAMES}
-DEGRADED = {"noise": 0.02, "delay": 2}
 SHIFTED = plant_settings({"added_mass": 1.2, "mooring_stiffness": 0.8, "upper_mass": 1.05})
 NOMINAL = {"platform": "oc3_hywind"}
 
@@ -39,19 +37,21 @@ def run(env, steps=40, seed=3, reset_seed=4, reach=1.0):
     return [np.array(column) for column in zip(*rows, strict=True)]
 
 
-@pytest.mark.parametrize("settings", [ON_LQR, {"action_mode": "setpoint"}, {"action_mode": "direct"}])
-def test_sensors_without_noise_and_delay_change_no_bit(settings):
-    plain, exact = FowtEnv(**settings, **QUICK), FowtEnv(**settings, sensors={}, **QUICK)
+@pytest.mark.parametrize(
+    ("settings", "told"),
+    [
+        (ON_LQR, {"sensors": {}}),
+        ({"action_mode": "setpoint"}, {"sensors": {}}),
+        ({"action_mode": "direct"}, {"sensors": {}}),
+        (ON_LQR, {"nominal_plant": NOMINAL}),
+    ],
+)
+def test_exact_sensors_and_a_design_on_the_very_plant_change_no_bit(settings, told):
+    plain, exact = FowtEnv(**settings, **QUICK), FowtEnv(**settings, **told, **QUICK)
     for one, other in zip(run(plain), run(exact), strict=True):
         assert np.array_equal(one, other)
     assert np.array_equal(plain.view().state, exact.view().state)
     assert np.array_equal(plain.view().in_force, exact.view().in_force)
-
-
-def test_designing_on_the_very_plant_changes_no_bit():
-    plain, told = FowtEnv(**ON_LQR, **QUICK), FowtEnv(**ON_LQR, nominal_plant=NOMINAL, **QUICK)
-    for one, other in zip(run(plain), run(told), strict=True):
-        assert np.array_equal(one, other)
 
 
 def test_a_reading_is_what_was_measured_before_and_noise_of_the_stated_size():
@@ -67,19 +67,6 @@ def test_a_reading_is_what_was_measured_before_and_noise_of_the_stated_size():
     seen = env._episode.observation[0] * 0.2 * rated + rated
     assert seen == pytest.approx(read[-1, Measure.ROTOR_SPEED], rel=1e-6)
     assert env.measurement() == Measurement(*read[-1].tolist())
-
-
-def test_a_new_field_of_a_measurement_has_a_scale_without_an_observation_channel(turbine, monkeypatch):
-    """That of the channels in its unit; the scales of the others are as they were."""
-    known = dict(zip(Measurement._fields, reading_scales(turbine), strict=True))
-    longer = namedtuple("Measurement", (*Measurement._fields, "nacelle_yaw", "oil_temperature"))
-    monkeypatch.setattr(envs_sensors, "Measurement", longer)
-    for name, unit in (("nacelle_yaw", "rad"), ("oil_temperature", "K")):
-        monkeypatch.setitem(MEASURED, name, Measured(unit, "", "added by this test"))
-    scales = dict(zip(longer._fields, reading_scales(turbine), strict=True))
-    assert scales == known | {"nacelle_yaw": known["roll"], "oil_temperature": 1.0}
-    assert known["generator_speed"] == turbine.drivetrain.gear_ratio * known["rotor_speed"]
-    assert known["time"] == 0.0 and all(scale > 0.0 for name, scale in known.items() if name != "time")
 
 
 @pytest.mark.parametrize("sensors", [{"noise": 0.02}, {"delay": 3}, DEGRADED])
@@ -132,19 +119,6 @@ def test_readings_repeat_with_the_weather_and_differ_in_another():
     assert np.array_equal(first, env.reset(options=info["sampled"])[0])
 
 
-@pytest.mark.parametrize("sensors", [DEGRADED, {"noise": 0.01}])
-def test_the_batch_with_sensors_is_the_single_environment_bit_for_bit(sensors):
-    settings = ON_LQR | QUICK | SHIFTED | {"sensors": sensors, "nominal_plant": NOMINAL}
-    batch, single = FowtVectorEnv(2, threads=1, **settings), FowtEnv(**settings)
-    given = np.random.default_rng(1).uniform(-1.0, 1.0, (30, 2, 2))
-    first = batch.reset(seed=9)[0]
-    seen = [batch.step(row)[0] for row in given]
-    for i in range(2):
-        assert np.array_equal(first[i], single.reset(seed=9 + i)[0])
-        for k, row in enumerate(given):
-            assert np.array_equal(seen[k][i], single.step(row[i])[0])
-
-
 def test_environments_of_a_batch_may_differ_in_noise_and_delay_but_not_in_having_sensors():
     per_env = [{"sensors": DEGRADED}, {"sensors": {"noise": 0.0}}]
     batch = FowtVectorEnv(2, threads=1, per_env=per_env, **ON_LQR, **QUICK)
@@ -152,19 +126,6 @@ def test_environments_of_a_batch_may_differ_in_noise_and_delay_but_not_in_having
     assert np.array_equal(seen[1], FowtEnv(**ON_LQR, **QUICK).reset(seed=2)[0])
     with pytest.raises(InputError, match="sensors"):
         FowtVectorEnv(2, threads=1, per_env=[{"sensors": DEGRADED}, {}], **ON_LQR, **QUICK)
-
-
-def test_a_snapshot_goes_on_with_the_same_readings():
-    env, other = (FowtEnv(sensors=DEGRADED, **ON_LQR, **QUICK) for _ in range(2))
-    env.reset(seed=2)
-    for _ in range(7):
-        env.step([0.3, -0.2])
-    saved = env.get_state()
-    expected = [env.step([0.0, 0.5])[0] for _ in range(10)]
-    other.set_state(saved)
-    assert np.array_equal([other.step([0.0, 0.5])[0] for _ in range(10)], expected)
-    with pytest.raises(InputError, match="another plant"):
-        FowtEnv(sensors={"noise": 0.03}, **ON_LQR, **QUICK).set_state(saved)
 
 
 def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer():
@@ -194,80 +155,42 @@ def test_the_drawn_plant_is_not_leaked_to_lqr_estimator_preview_and_safety_layer
     assert np.array_equal(guarded._baseline.parameters, law.parameters)
 
 
-def test_environment_and_load_case_give_a_controller_the_same_readings():
-    """sensors of FowtEnv and noise of a suite's case are the same numbers for the same weather."""
-    weather = {"wind": QUICK["wind"], "sea": None, "weather_seed": 5, "offsets": {}}
-    env = FowtEnv(sensors=DEGRADED, nominal_plant=NOMINAL, action_mode="direct", **SHIFTED, **QUICK)
-    env.reset(options=weather)
-    scene = env.scene
-    known = build_scene(wind=QUICK["wind"], seed=5, fidelity="standard", rotor="table")
-    kept = []
-
-    class Watched:
-        information = Measurement._fields
-
-        def __init__(self):
-            self.law = make("gspi_oc3", known.turbine, 0.1)
-            self.reset = self.law.reset
-
-        def act(self, measurement):
-            kept.append(measurement)
-            return self.law.act(measurement)
-
-    sensors = perturbed_sensors(PlantPerturbation(**DEGRADED), known.turbine, 0.1)
-    simulate(scene, Watched(), duration=3.0, nominal=known, sensors=sensors)
-    law = make("gspi_oc3", scene.turbine, 0.1)
-    law.reset(env.measurement())
-    for reading in kept[:30]:
-        seen = env.measurement()
-        np.testing.assert_allclose(seen, reading, rtol=1e-9, atol=1e-9)
-        env.step_physical(*law.act(seen))
-
-
-def test_noise_is_drawn_from_the_seed_alone(turbine):
-    scales = reading_scales(turbine)
-    rows = [draw_sensors({"noise": 0.02, "delay": 0}, scales, 0.1, seed, 50).noise for seed in (1, 1, 2)]
-    assert np.array_equal(rows[0], rows[1]) and not np.array_equal(rows[0], rows[2])
-    assert draw_sensors({"noise": 0.0, "delay": 4}, scales, 0.1, 1, 50).noise.shape == (1, N_MEASUREMENTS)
-
-
 BY_NAME = {"observation": ("rotor_speed", "platform_pitch"), "sensors": "standard"}
 
 
-def test_a_chain_by_name_gives_environment_and_run_the_same_readings():
-    weather = {"wind": QUICK["wind"], "sea": None, "weather_seed": 5, "offsets": {}}
-    env = FowtEnv(action_mode="direct", **BY_NAME, **QUICK)
-    env.reset(options=weather)
+@pytest.mark.parametrize(
+    "settings", [SHIFTED | {"sensors": DEGRADED, "nominal_plant": NOMINAL}, BY_NAME], ids=["noise", "chain"]
+)
+def test_environment_and_run_give_a_controller_the_same_readings(settings):
+    """sensors of FowtEnv, and a chain or noise of simulate: the same numbers for the same weather."""
+    env = FowtEnv(action_mode="direct", **settings, **QUICK)
+    env.reset(options={"wind": QUICK["wind"], "sea": None, "weather_seed": 5, "offsets": {}})
+    known = build_scene(wind=QUICK["wind"], seed=5, fidelity="standard", rotor="table")
+    noise = perturbed_sensors(PlantPerturbation(**DEGRADED), known.turbine, 0.1)
+    told = {"sensors": "standard"} if settings is BY_NAME else {"nominal": known, "sensors": noise}
     kept = []
 
     class Watched:
         def __init__(self):
-            self.law = make("gspi_oc3", env.scene.turbine, 0.1)
+            self.law = make("gspi_oc3", known.turbine, 0.1)
             self.reset = self.law.reset
+            if settings is not BY_NAME:
+                self.information = Measurement._fields
 
         def act(self, measurement):
             kept.append(np.array(measurement))
             return self.law.act(measurement)
 
-    simulate(env.scene, Watched(), duration=3.0, sensors="standard")
+    simulate(env.scene, Watched(), duration=3.0, **told)
     law = make("gspi_oc3", env.scene.turbine, 0.1)
     law.reset(env.measurement())
     for reading in kept:
         seen = env.measurement()
-        both = np.isfinite(reading)
-        np.testing.assert_allclose(np.array(seen)[both], reading[both], rtol=1e-9, atol=1e-9)
+        shown = np.isfinite(reading)
+        assert shown.any() and (settings is BY_NAME or shown.all())
+        np.testing.assert_allclose(np.array(seen)[shown], reading[shown], rtol=1e-9, atol=1e-9)
         env.step_physical(*law.act(seen))
-    assert np.isnan(env.measurement().surge)  # no sensor of the chain shows it
-
-
-def test_the_baseline_is_given_what_it_declares(turbine):
-    plain, told = (FowtEnv(action_mode="residual", baseline="pi", **BY_NAME, **QUICK) for _ in range(2))
-    plain.reset(seed=3), told.reset(seed=3)
-    shown = np.isfinite(plain._episode.link.law_reading)
-    names = {name for name, given in zip(Measurement._fields, shown, strict=True) if given}
-    assert names == {"time", *make("pi", turbine, 0.1).information}
-    plain.step([0.1, 0.2])
-    assert np.array_equal(shown, np.isfinite(plain._episode.link.law_reading))
+    assert np.isnan(env.measurement().surge) == (settings is BY_NAME)  # which no sensor of the chain shows
 
 
 def test_a_preview_baseline_is_given_the_wind_ahead_as_in_a_run():
@@ -291,20 +214,10 @@ def test_a_preview_baseline_is_given_the_wind_ahead_as_in_a_run():
 
 
 @pytest.mark.parametrize(
-    "settings, message",
-    [
-        ({"observation": ("surge",)}, "observation: 'surge': the sensor chain 'standard' does not have it"),
-        ({"sensors": "standart"}, "unknown sensor chain"),
-    ],
-)
-def test_what_a_chain_does_not_show_is_refused(settings, message):
-    with pytest.raises(InputError, match=message):
-        FowtEnv(**(BY_NAME | settings), **QUICK)
-
-
-@pytest.mark.parametrize(
     ("settings", "message"),
     [
+        (BY_NAME | {"observation": ("surge",)}, "'surge': the sensor chain 'standard' does not have it"),
+        ({"sensors": "standart"}, "unknown sensor chain"),
         ({"sensors": 0.02}, "must be a dict with noise and delay"),
         ({"sensors": {"nosie": 0.02}}, "Did you mean 'noise'"),
         ({"sensors": {"noise": -0.1}}, r"sensors.noise = -0.1"),

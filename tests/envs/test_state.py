@@ -8,29 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from episodes import BOX, DEGRADED, INDIVIDUAL, ON_LQR, WATCHED, actions, quick, record
 from gymnasium.error import ResetNeeded
 
-from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
 
-QUICK = {"rotor": "table", "wave_components": 20}
-
-
-def quick(**settings):
-    return FowtEnv(**(QUICK | settings))
-
-
-def actions(n, seed=0):
-    return np.random.default_rng(seed).uniform(-1.0, 1.0, (n, 2))
-
-
-def record(env, given):
-    """Bytes of everything that the steps under the given actions return."""
-    parts = []
-    for action in given:
-        observation, reward, terminated, truncated, info = env.step(action)
-        parts.append((observation.tobytes(), reward, terminated, truncated, str(info)))
-    return parts
+WAKE = {"rotor": "bem", "dynamic_inflow": True, "wind": 18.0, "sea": "still"}  # compiled here alone
 
 
 @pytest.mark.parametrize(
@@ -40,47 +23,32 @@ def record(env, given):
         {"action_mode": "setpoint"},
         {"action_mode": "residual"},
         {"action_mode": "direct", "fidelity": "fast"},  # Adams-Bashforth: past derivatives carry over
+        ON_LQR,
+        ON_LQR | {"sensors": DEGRADED},
+        {"task": "shutdown", "duration": 60.0},
+        INDIVIDUAL,
+        WATCHED,
+        BOX,
+        pytest.param(WAKE, marks=(pytest.mark.slow, pytest.mark.nightly)),
     ],
 )
 def test_continuing_after_restore_is_the_uninterrupted_run_bit_for_bit(settings):
     env, other = quick(**settings), quick(**settings)
+    size = env.action_space.shape[0] // 2
+    first, then = (actions(n, size, seed=n).reshape(n, -1) for n in (7, 25))
     env.reset(seed=3)
-    record(env, actions(7, seed=1))
-    saved = env.get_state()
-    expected = record(env, actions(25))
-    env.set_state(saved)
-    assert record(env, actions(25)) == expected
-    env.reset(seed=99)  # other weather in between
-    env.set_state(saved)
-    assert record(env, actions(25)) == expected
-    other.set_state(saved)  # an environment that was never reset
-    assert record(other, actions(25)) == expected
-    assert other.measurement() == env.measurement() and other.channels() == env.channels()
-
-
-@pytest.mark.slow  # a kind of scene that nothing else compiles
-@pytest.mark.nightly
-def test_wake_states_are_part_of_a_snapshot():
-    settings = {"rotor": "bem", "dynamic_inflow": True}
-    env = quick(**settings, wind=18.0, sea="still")
-    env.reset(seed=0)
-    record(env, actions(3))
-    saved = env.get_state()
-    expected = record(env, actions(4))
-    env.reset(seed=5)
-    env.set_state(saved)
-    assert record(env, actions(4)) == expected
-
-
-def test_a_snapshot_stays_as_it_is_and_survives_pickling():
-    env = quick()
-    env.reset(seed=3)
+    record(env, first)
     saved = env.get_state()
     copied = pickle.loads(pickle.dumps(saved))
-    expected = record(env, actions(10))
-    for snapshot in (saved, copied, saved):
-        env.set_state(snapshot)
-        assert record(env, actions(10)) == expected
+    expected = record(env, then)
+    env.set_state(saved)
+    assert record(env, then) == expected
+    env.reset(seed=99)  # other weather in between
+    env.set_state(copied)
+    assert record(env, then) == expected
+    other.set_state(saved)  # an environment that was never reset
+    assert record(other, then) == expected
+    assert str(other.measurement()) == str(env.measurement()) and other.channels() == env.channels()
 
 
 def test_the_next_episode_after_restore_is_the_same_too():
@@ -119,6 +87,7 @@ def test_snapshots_of_other_settings_are_refused():
         {"duration": 60.0},
         {"observation": ("surge",)},
         {"dt": 0.05},
+        {"sensors": {"noise": 0.03}},
     ):
         with pytest.raises(InputError, match="state: is of an environment with another"):
             quick(**settings).set_state(saved)

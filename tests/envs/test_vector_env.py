@@ -4,38 +4,20 @@ import gymnasium
 import numba
 import numpy as np
 import pytest
+from episodes import BOX, DEGRADED, INDIVIDUAL, NAME, ON_LQR, QUICK, WATCHED, actions, quick, same
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.vector_env import of_one
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.plant_perturbation import plant_settings
 
-QUICK = {"rotor": "table", "wave_components": 20}
 THREADS = min(2, numba.config.NUMBA_NUM_THREADS)
 
 
 def vector(n, **settings):
     return FowtVectorEnv(n, **(QUICK | {"threads": 1} | settings))
-
-
-def actions(steps, n, seed=0):
-    return np.random.default_rng(seed).uniform(-1.1, 1.1, (steps, n, 2))
-
-
-def same(one, other):
-    """Whether two infos are equal in keys, values and masks."""
-    if isinstance(one, dict):
-        return (
-            isinstance(other, dict)
-            and one.keys() == other.keys()
-            and all(same(one[k], other[k]) for k in one)
-        )
-    if isinstance(one, np.ndarray):
-        if one.dtype != other.dtype or one.shape != other.shape:
-            return False
-        return all(same(a, b) for a, b in zip(one, other, strict=True)) if one.ndim else bool(one == other)
-    return type(one) is type(other) and bool(one == other)
 
 
 def same_infos(got, expected):
@@ -49,6 +31,14 @@ def same_infos(got, expected):
     return same(got, expected)
 
 
+OTHER_PLANT = plant_settings({"added_mass": 1.2, "mooring_stiffness": 0.8, "upper_mass": 1.05})
+OWN = [
+    {"wind": 10.0, "sea": {"kind": "regular", "H": 2.0, "T": 8.0}},
+    {"wind": {"kind": "ntm", "speed": 20.0, "class": "A"}},
+    {"reward": {"power": 5.0}},
+]
+
+
 @pytest.mark.parametrize(
     ("settings", "threads"),
     [
@@ -59,13 +49,20 @@ def same_infos(got, expected):
         ({"action_mode": "residual"}, THREADS),
         ({"fidelity": "fast", "rotor": None}, THREADS),
         ({"fidelity": "standard", "rotor": None}, THREADS),
+        ({"per_env": OWN}, 1),
+        (ON_LQR, 1),
+        (ON_LQR | {"action_mode": "direct", "baseline": "pi"}, 1),
+        (ON_LQR | OTHER_PLANT | {"sensors": DEGRADED, "nominal_plant": {"platform": "oc3_hywind"}}, 1),
+        (ON_LQR | {"sensors": {"noise": 0.01}}, 1),
+        (INDIVIDUAL, 1),
+        (WATCHED, 1),
+        pytest.param(BOX, 2, marks=(pytest.mark.slow, pytest.mark.nightly)),
     ],
 )
 def test_each_of_the_batch_is_the_single_environment_bit_for_bit(settings, threads):
     n, steps = 3, 30
     batch = vector(n, threads=threads, **settings)
-    single = FowtEnv(**(QUICK | settings))
-    given = actions(steps, n)
+    given = np.random.default_rng(0).uniform(-1.1, 1.1, (steps, *batch.action_space.shape))
     seen = [batch.reset(seed=5)[0]]
     rewards, infos = [], []
     for row in given:
@@ -74,7 +71,9 @@ def test_each_of_the_batch_is_the_single_environment_bit_for_bit(settings, threa
         seen.append(observations)
         rewards.append(reward)
         infos.append(info)
+    each = settings.get("per_env", [{}] * n)
     for i in range(n):
+        single = quick(**{name: value for name, value in settings.items() if name != "per_env"} | each[i])
         assert np.array_equal(seen[0][i], single.reset(seed=5 + i)[0])
         for k in range(steps):
             observation, reward, _, _, info = single.step(given[k, i])
@@ -95,7 +94,7 @@ def test_resets_values_and_infos_are_those_of_gymnasium_s_own_vector_environment
     first, other = batch.reset(seed=2), sync.reset(seed=2)
     assert np.array_equal(first[0], other[0]) and same_infos(first[1], other[1])
     ends = np.zeros(2, dtype=int)
-    for k, row in enumerate(actions(170, n)):
+    for k, row in enumerate(actions(170, n, reach=1.1)):
         row[0] = (-1.0, -1.0)  # no torque, blades flat
         got, expected = batch.step(row), sync.step(row)
         for a, b in zip(got[:4], expected[:4], strict=True):
@@ -108,7 +107,7 @@ def test_resets_values_and_infos_are_those_of_gymnasium_s_own_vector_environment
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
 def test_an_episode_that_fails_in_its_last_step_is_terminated_and_not_truncated(mode):
     options = {"offsets": {"PtfmPitch": 78.0, "RotSpeed": 1.0}}  # it falls over, or turns too fast
-    single = FowtEnv(**QUICK)
+    single = quick()
     single.reset(seed=0, options=options)
     steps = next(k for k in range(1, 100) if single.step((0.0, 0.0))[2])
     settings = QUICK | {"duration": round(0.1 * steps, 1)}
@@ -122,30 +121,12 @@ def test_an_episode_that_fails_in_its_last_step_is_terminated_and_not_truncated(
     assert terminations.tolist() == [True, False] and truncations.tolist() == [False, True]
 
 
-@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
-def test_rare_events_of_each_are_in_the_infos_of_its_end(mode):
-    env = vector(2, autoreset_mode=mode, duration=0.2)
-    single = FowtEnv(**QUICK, duration=0.2)
-    options = [{"offsets": {"PtfmHeave": -60.0}}, {}]
-    _, infos = env.reset(seed=0, options=options)
-    expected = [single.reset(seed=i, options=options[i])[1] for i in range(2)]
-    assert [of_one(infos, i)["events"] for i in range(2)] == [info["events"] for info in expected]
-    assert "events" not in env.step(np.zeros((2, 2)))[4]
-    infos = env.step(np.zeros((2, 2)))[4]
-    infos = infos["final_info"] if mode == "SameStep" else infos
-    single.reset(seed=0, options=options[0])
-    single.step((0.0, 0.0))
-    events = single.step((0.0, 0.0))[4]["events"]
-    assert events["HYDROSTATIC_FALLBACK"] > 1
-    assert [of_one(infos, i)["events"] for i in range(2)] == [events, {}]
-
-
 def test_disabled_autoreset_leaves_the_resets_to_the_caller():
     env = vector(3, autoreset_mode="Disabled", duration=0.2)
     env.reset(seed=0)
     other = vector(3, autoreset_mode="Disabled", duration=0.3)
     other.reset(seed=0)
-    for row in actions(2, 3):
+    for row in actions(2, 3, reach=1.1):
         observations, _, _, truncated, _ = env.step(row)
     assert truncated.all()
     with pytest.raises(
@@ -159,36 +140,6 @@ def test_disabled_autoreset_leaves_the_resets_to_the_caller():
     for mask in (np.zeros(3, dtype=bool), np.ones(2, dtype=bool), [True] * 3, np.ones(3)):
         with pytest.raises(InputError, match="reset_mask"):
             env.reset(options={"reset_mask": mask})
-
-
-def test_gymnasium_makes_it_through_the_registered_entry_point():
-    env = gymnasium.make_vec(
-        "fowt_env/OC3Hywind-v1", num_envs=2, vectorization_mode="vector_entry_point", threads=1, **QUICK
-    )
-    assert isinstance(env, FowtVectorEnv) and env.num_envs == 2
-    observations, _ = env.reset(seed=1)
-    assert observations in env.observation_space
-    got = env.step(env.action_space.sample())
-    assert got[0] in env.observation_space and got[1].shape == (2,)
-    env.close()
-
-
-def test_environments_may_have_their_own_weather_turbine_and_weights():
-    own = [
-        {"wind": 10.0, "sea": {"kind": "regular", "H": 2.0, "T": 8.0}},
-        {"wind": {"kind": "ntm", "speed": 20.0, "class": "A"}},
-        {"reward": {"power": 5.0}},
-    ]
-    batch = vector(3, per_env=own)
-    batch.reset(seed=[4, 5, 6])
-    given = actions(10, 3)
-    results = [batch.step(row) for row in given]
-    for i, extra in enumerate(own):
-        single = FowtEnv(**(QUICK | extra))
-        single.reset(seed=4 + i)
-        for k in range(10):
-            observation, reward, *_ = single.step(given[k, i])
-            assert np.array_equal(results[k][0][i], observation) and results[k][1][i] == reward
 
 
 @pytest.mark.parametrize(
@@ -254,7 +205,7 @@ def test_the_thread_setting_of_numba_is_left_as_it_was():
 def test_states_of_the_batch_are_saved_and_spread():
     batch = vector(3)
     batch.reset(seed=0)
-    given = actions(6, 3)
+    given = actions(6, 3, reach=1.1)
     batch.step(given[0])
     saved = batch.get_state()
     expected = [batch.step(row)[0] for row in given]
@@ -273,7 +224,7 @@ def test_a_single_environment_moved_through_call_stays_in_the_batch():
     batch = vector(2)
     batch.reset(seed=0)
     batch.call("reset", seed=8, indices=[1])
-    single = FowtEnv(**QUICK)
+    single = quick()
     single.reset(seed=8)
     assert np.array_equal(batch.step(np.zeros((2, 2)))[0][1], single.step((0.0, 0.0))[0])
 
@@ -281,3 +232,18 @@ def test_a_single_environment_moved_through_call_stays_in_the_batch():
 def test_no_step_before_the_first_reset():
     with pytest.raises(ResetNeeded):
         vector(2).step(np.zeros((2, 2)))
+
+
+def test_an_unknown_setting_is_a_keyword_that_python_would_refuse():
+    """TorchRL's GymEnv gives every environment `frameskip`, and makes it without where it is refused so."""
+    rule = "unexpected keyword argument 'frameskip'"
+    for make in (gymnasium.make, lambda name, **given: gymnasium.make_vec(name, 2, **given)):
+        with pytest.raises(TypeError, match=rule) as refused:
+            make(NAME, frameskip=1, **QUICK)
+        assert isinstance(refused.value, InputError)
+
+
+@pytest.mark.parametrize("name", ["same_step", "SAME_STEP", "SameStep", AutoresetMode.SAME_STEP])
+def test_an_autoreset_mode_goes_by_either_of_its_names(name):
+    env = FowtVectorEnv(2, autoreset_mode=name, duration=0.2, **QUICK)
+    assert env.autoreset_mode is env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP

@@ -3,6 +3,7 @@
 import numba
 import numpy as np
 import pytest
+from episodes import QUICK, quick
 from gymnasium.error import ResetNeeded
 
 from fowt_env.analysis.trim import mean_derivative
@@ -14,7 +15,6 @@ from fowt_env.envs.tasks import Task
 from fowt_env.errors import InputError, PlantWarning
 from fowt_env.plant.compile import handle
 
-QUICK = {"rotor": "table", "wave_components": 20}
 NTM = {"kind": "ntm", "speed": 16.0, "class": "B"}
 JONSWAP = {"kind": "jonswap", "Hs": 4.0, "Tp": 9.0}
 CROSSING = {"kind": "components", "omega": [0.6, 0.9], "amplitude": [1.0, 0.5], "heading": [0.0, 30.0]}
@@ -33,10 +33,6 @@ EPISODES = [
     {"wind": BOX, "sea": JONSWAP},  # rotor-averaged for the table: a series
 ]
 ENTRIES = (act, act_physical, act_all, start_episode, mean_derivative)
-
-
-def quick(**settings):
-    return FowtEnv(**(QUICK | settings))
 
 
 def compiled():
@@ -84,6 +80,9 @@ REFUSED = [
     ({"sea": {"kind": "regular", "H": 400.0, "T": 12.0}}, "water depth"),
     ({"wind": {"kind": "series", "time": [0.0, 60.0], "speed": [12.0, 12.0]}}, "ends at 60 s"),
     ({"wind": 18.0, "offsets": {"PtfmPitch": 100.0}}, "must stay inside"),
+    ({"wind": NTM | {"speed": (13.0, 11.0)}}, "the low end must not exceed the high end"),
+    ({"wind": NTM, "sea": JONSWAP | {"Hs": (2.0, -1.0)}}, "sea.Hs"),
+    ({"offsets": {"PtfmPitch": (3.0, 2.0)}}, "offsets"),
 ]
 
 

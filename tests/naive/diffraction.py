@@ -1,11 +1,13 @@
 """Slow, obvious twins of plant/hydro/diffraction.py: the wave around a cylinder, and the force on strips.
 
-A complex number stands for the real part of itself times exp(-i omega t).
+A complex number stands for the real part of itself times exp(-i omega t). A sea is as in naive/waves.py.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from naive import waves
-from scipy.special import h1vp, hankel1, jv, jvp, yvp
+from scipy.special import h1vp, hankel1, jv, jvp
 
 
 def total_wave(k, a, r, angle, terms=40):
@@ -17,16 +19,44 @@ def total_wave(k, a, r, angle, terms=40):
     return total
 
 
-def coefficient(ka):
-    """(magnitude, lag) of the inertia coefficient from the derivatives of the real Bessel functions."""
-    j, y = jvp(1, ka), yvp(1, ka)
-    return 4.0 / (np.pi * ka**2 * np.hypot(j, y)), np.arctan2(j, y)
+class Spar(NamedTuple):
+    """Coefficient, site and switches of a hull."""
+
+    added_mass: float  # C_A
+    density: float
+    gravity: float
+    depth: float
+    position: str = "instantaneous"
+    surface: str = "instantaneous"
+    stretching: str = "wheeler"
+
+
+def spar_of(platform, *switches):
+    """Spar of a descriptions.platform.Platform with the switches from position on."""
+    site = platform.environment
+    water = site.water_density, site.gravity, site.water_depth
+    return Spar(platform.hydro.added_mass_coefficient, *water, *switches)
+
+
+def surface_on_axis(t, r, R, sea, spar):
+    """(body z where the axis meets the surface, elevation there), by plain iteration."""
+    if spar.position == "fixed":
+        eta = waves.elevation(t, 0.0, 0.0, sea, spar.depth, spar.gravity)
+        return (eta if spar.surface == "instantaneous" else 0.0), eta
+    z, eta = -r[2] / R[2, 2], 0.0
+    for _ in range(60):
+        at = r + R[:, 2] * z
+        eta = waves.elevation(t, at[0], at[1], sea, spar.depth, spar.gravity)
+        if spar.surface == "swl":
+            break
+        z = (eta - r[2]) / R[2, 2]
+    return z, eta
 
 
 def excitation(t, r, R, eta, sea, spar, nodes, inertia):
     """(F, M) in body axes of the waves' inertia load; inertia: function of ka to a complex coefficient.
 
-    nodes: (z, weight, diameter, ...) as naive/morison.py has them; eta from its surface_on_axis.
+    nodes: (z, weight, diameter, ...); eta from surface_on_axis.
     """
     F, M = np.zeros(3), np.zeros(3)
     for z, weight, d in zip(*nodes[:3], strict=True):

@@ -1,4 +1,4 @@
-"""Rotor loads with dynamic inflow: straight blades swept station by station, in numpy, theory.md, 5.1."""
+"""Rotor loads, with dynamic inflow or without: straight blades station by station (theory.md, 5.1)."""
 
 import numpy as np
 from naive.rotor import coefficients, solve, span_integrals
@@ -15,7 +15,8 @@ def rates(steady, state, a, wind_speed, span, tip_radius):
 def loads(turbine, rotor, R, origin, velocity, rate, azimuth, speed, pitches, wake, wind):
     """(force, moment about the body origin, torque, rates (blades, n, 4)).
 
-    pitches: of each blade, rad. wake: (blades, n, 4), first stage and velocity, normal then tangential.
+    pitches: of each blade, rad. wake: (blades, n, 4), first stage and velocity, normal then tangential; None:
+    induction without lag, and no rates.
     wind(point) -> (3,), inertial.
     """
     blade = turbine.blade
@@ -23,7 +24,7 @@ def loads(turbine, rotor, R, origin, velocity, rate, azimuth, speed, pitches, wa
     ex = np.array([1.0, 0.0, 0.0])
     speed_at_hub = np.linalg.norm(R.T @ wind(origin + R @ hub) - velocity - np.cross(rate, hub))
     force, moment, torque = np.zeros(3), np.zeros(3), 0.0
-    found = np.zeros_like(wake)
+    found = None if wake is None else np.zeros_like(wake)
     for i in range(rotor.blades):
         psi = azimuth + 2 * np.pi * i / rotor.blades
         er = np.array([0.0, -np.sin(psi), np.cos(psi)])
@@ -34,7 +35,11 @@ def loads(turbine, rotor, R, origin, velocity, rate, azimuth, speed, pitches, wa
             rho = hub + radius * er
             W = R.T @ wind(origin + R @ rho) - velocity - np.cross(rate, rho) - speed * radius * et
             normal, tangential = W @ ex, -W @ et
-            _, a, ap, _, _ = solve(normal, tangential, theta, radius, blade.chord[j], polar, rotor)
+            _, a, ap, *line = solve(normal, tangential, theta, radius, blade.chord[j], polar, rotor)
+            if wake is None:
+                fn.append(line[0])
+                ft.append(line[1])
+                continue
             span = radius / rotor.tip_radius
             for k, steady in ((0, -a * normal), (2, ap * tangential)):
                 found[i, j, k : k + 2] = rates(

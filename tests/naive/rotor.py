@@ -107,35 +107,6 @@ def span_integrals(radius, load, rotor):
     return force, moment
 
 
-def rotor_wrench(turbine, rotor, R, origin, velocity, rate, azimuth, speed, blade_pitch, wind):
-    """(force, moment, torque) about the body origin, body components. wind(point) -> (3,), inertial."""
-    blade = turbine.blade
-    hub = np.array([-rotor.overhang, 0.0, rotor.hub_height])
-    ex = np.array([1.0, 0.0, 0.0])
-    force, moment, torque = np.zeros(3), np.zeros(3), 0.0
-    for i in range(rotor.blades):
-        psi = azimuth + 2 * np.pi * i / rotor.blades
-        er = np.array([0.0, -np.sin(psi), np.cos(psi)])
-        et = np.cross(ex, er)
-        fn, ft = [], []
-        for radius, chord, twist, name in zip(
-            blade.radius, blade.chord, blade.twist, blade.airfoil, strict=True
-        ):
-            rho = hub + radius * er
-            section_velocity = velocity + np.cross(rate, rho) + speed * radius * et
-            W = R.T @ wind(origin + R @ rho) - section_velocity
-            solution = solve(W @ ex, -W @ et, twist + blade_pitch, radius, chord, blade.polars[name], rotor)
-            fn.append(solution[3])
-            ft.append(solution[4])
-        normal, normal_moment = span_integrals(blade.radius, np.array(fn), rotor)
-        tangential, tangential_moment = span_integrals(blade.radius, np.array(ft), rotor)
-        blade_force = normal * ex + tangential * et
-        force += blade_force
-        moment += np.cross(hub, blade_force) + np.cross(er, normal_moment * ex + tangential_moment * et)
-        torque += tangential_moment
-    return force, moment, torque
-
-
 def tower_wrench(tower, air_density, R, origin, velocity, rate, wind, points=2000):
     """(force, moment) of the tower drag by the midpoint rule."""
     height = (tower.top_height - tower.base_height) / points

@@ -1,17 +1,12 @@
 """Each row of INTEGRATORS against what the compiled step does, and that a new one is a row."""
 
-import ast
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from copied_code import copied_code
+from fresh_python import fresh_python
 from plant_helpers import integrate, state
 
-import fowt_env
 from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel, simulate
 from fowt_env.analysis.linear_model import STATES
 from fowt_env.descriptions.turbine import read_turbine
@@ -21,7 +16,6 @@ from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State
 
-PACKAGE = Path(fowt_env.__file__).parent
 MASS = 1e6  # kg, of the body under the spring
 OSCILLATIONS = [name for name, method in INTEGRATORS.items() if method.oscillation_limit]
 NO_OSCILLATIONS = [name for name in INTEGRATORS if name not in OSCILLATIONS]
@@ -139,18 +133,9 @@ for name in INTEGRATORS:
 """
 
 
-def without_compiling(program, *paths):
-    """Run a program in a process whose kernels are plain Python, with these folders to import from."""
-    variables = os.environ | {"PYTHONPATH": os.pathsep.join(map(str, paths)), "NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, "-c", program]
-    options = {"env": variables, "cwd": paths[0], "timeout": 600}
-    ran = subprocess.run(command, capture_output=True, text=True, **options)
-    assert ran.returncode == 0, ran.stderr
-
-
 def test_loads_are_evaluated_as_often_as_it_says():
     """As plain Python: a scene of each integrator is a kind of its own."""
-    without_compiling(COUNT, PACKAGE.parent, PACKAGE.parent / "tests")
+    fresh_python(COUNT, paths=[Path(__file__).parents[1]], NUMBA_DISABLE_JIT="1")
 
 
 @pytest.mark.parametrize("name", ["ab4", pytest.param("abm4", marks=(pytest.mark.slow, pytest.mark.nightly))])
@@ -166,91 +151,3 @@ def test_a_blade_pitch_that_jumps_to_its_command_leaves_the_step_its_accuracy(na
     for channel in ("RotSpeed_[rpm]", "PtfmPitch_[deg]", "PtfmSurge_[m]"):
         error = np.sqrt(np.mean((whole[channel] - fine[channel]) ** 2)) / fine[channel].std()
         assert error < 4e-4  # else 2e-3 to 4e-3 under the plain method and 6e-4 to 9e-4 under the corrected
-
-
-def test_integrators_of_one_class_share_one_compiled_step():
-    before = len(advance.signatures)
-    for name in INTEGRATORS:
-        scene = mode(name, 1.0, 0.0)
-        advance(scene.handle(), state(surge=1.0), np.zeros(2), 0, 1, 0.05)
-    compiled = len(advance.signatures)
-    assert compiled - before <= len({type(method.part) for method in INTEGRATORS.values()})
-    for name in INTEGRATORS:
-        advance(mode(name, 2.0, 0.1).handle(), state(surge=1.0), np.zeros(2), 0, 1, 0.05)
-    assert len(advance.signatures) == compiled
-
-
-# A new integrator is a class, a step and a row of integrators.py
-
-MIDPOINT = """
-
-class Midpoint(NamedTuple):
-    \"\"\"Explicit midpoint rule.\"\"\"
-
-    stages: int = 2
-
-
-@inlined_kernel
-def midpoint(t, x, u, dt, model, method, data):
-    \"\"\"One step of the explicit midpoint rule, blade pitch exact.\"\"\"
-    k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
-    rates(t, x, u, model, data, k1)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + 0.5 * dt * k1[i]
-    advance_actuators(x, u, 0.5 * dt, model, y)
-    derivative(t + 0.5 * dt, y, u, model, data, k2)
-    for i in range(x.shape[0]):
-        y[i] = x[i] + dt * k2[i]
-    advance_actuators(x, u, dt, model, y)
-    for i in range(x.shape[0]):
-        x[i] = y[i]
-
-
-"""
-ROW = """    "midpoint": Method(
-        order=2, evaluations=2, dt=0.05, decay_limit=2.0, oscillation_limit=0.0,
-        part=Midpoint(), step=midpoint,
-    ),
-"""
-USE = """
-import numpy as np
-import fowt_env
-from fowt_env import build_scene, simulate
-
-assert fowt_env.__file__.startswith({folder!r})
-scene = build_scene(integrator="midpoint", hydrodynamics=False)
-assert scene.dt == 0.05
-fine = build_scene(integrator="rk4", hydrodynamics=False)
-start = {{"start": "zero", "PtfmSurge": 1.0, "PtfmHeave": -20.0}}
-ends = [
-    simulate(of, None, duration=0.4, dt=dt, control_dt=0.4, output_dt=0.4, initial=start)
-    for of, dt in ((fine, 0.0125), (scene, 0.1), (scene, 0.05))
-]
-exact, coarse, half = (frame["PtfmHeave_[m]"].iloc[-1] for frame in ends)
-assert 1.7 < np.log2((coarse - exact) / (half - exact)) < 2.3
-"""
-
-
-def test_a_new_integrator_is_a_row_of_one_file(tmp_path):
-    code = copied_code(tmp_path)
-    file = code / "fowt_env" / "plant" / "integrators.py"
-    text = file.read_text()
-    for mark, new in (("class Method(NamedTuple)", MIDPOINT.lstrip()), ('    "heun": Method(', ROW)):
-        assert text.count(mark) == 1
-        text = text.replace(mark, new + mark)
-    file.write_text(text)
-    without_compiling(USE.format(folder=str(code)), code)
-
-
-def test_no_module_of_the_simulator_but_the_fidelities_names_an_integrator():
-    allowed = {"plant/integrators.py", "scene/options.py"}
-    rooms = [path for path in PACKAGE.iterdir() if path.name not in ("controllers", "training")]
-    files = [file for room in rooms for file in ([room] if room.suffix == ".py" else room.rglob("*.py"))]
-    assert len(files) > 50
-    naming = {
-        file.relative_to(PACKAGE).as_posix()
-        for file in files
-        for node in ast.walk(ast.parse(file.read_text()))
-        if isinstance(node, ast.Constant) and node.value in tuple(INTEGRATORS)
-    }
-    assert naming <= allowed

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, simulate
-from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.errors import InputError
 from fowt_env.plant.integrators import build_integrator, rotor_samples
 from fowt_env.plant.model import LoadCache
@@ -104,27 +103,3 @@ def test_a_step_of_standard_in_a_box_errs_by_less_than_a_thousandth_and_a_sixth_
         for name in ("one", "three")
     }
     assert errors["three"] < 1e-3 and errors["three"] < errors["one"] / 6.0, errors
-
-
-@pytest.mark.parametrize("vector", [False, pytest.param(True, marks=(pytest.mark.slow, pytest.mark.nightly))])
-def test_environments_in_a_box_go_on_from_a_snapshot_and_agree_with_the_vector_form_bit_for_bit(vector):
-    settings = {"wind": box_wind(), "sea": SEA, "fidelity": "standard", "duration": 60.0}
-    actions = np.random.default_rng(0).uniform(-1.0, 1.0, (30, 2))
-    env = FowtEnv(**settings)
-    first, _ = env.reset(seed=4)
-    seen, rewards = [], []
-    for number, action in enumerate(actions):
-        if number == 12:
-            saved = env.get_state()
-        observation, reward, *_ = env.step(action)
-        seen.append(observation)
-        rewards.append(reward)
-    env.set_state(saved)
-    for action, expected in zip(actions[12:], seen[12:], strict=True):
-        assert np.array_equal(env.step(action)[0], expected)
-    if vector:
-        together = FowtVectorEnv(2, threads=2, **settings)
-        assert np.array_equal(first, together.reset(seed=[4, 5])[0][0])
-        for action, observation, reward in zip(actions, seen, rewards, strict=True):
-            observations, several, *_ = together.step(np.stack([action, -action]))
-            assert np.array_equal(observation, observations[0]) and reward == several[0]

@@ -1,8 +1,5 @@
 """One blade station: blade element momentum, inflow in, loads and induced flow out (theory.md, 5.1).
 
-A station is `blade_section`; its scalar residual is `bem_residual`, and the rest finds the root of that.
-`build_blade_elements` prepares a turbine's stations; bem_rotor.py integrates them over blades and span.
-
 At very high tip-speed ratios (above about 20: spinning in little or no wind) the published equations have
 their root on a pole, where drag with no flow through the disk makes endless swirl, and the load vanishes.
 Here the residual is one continuous function of the inflow angle f from -pi/2 to pi/2:
@@ -11,18 +8,10 @@ Here the residual is one continuous function of the inflow angle f from -pi/2 to
 * f < 0 (propeller brake): the thrust is the larger of Buhl's curve continued beyond a = 1 and the
   momentum value 4 F a (a - 1), so that the root passes through f = 0 without a jump.
 
-So loads are continuous from the wind through still air to reversed flow, and oppose its change.
-
-Degenerate inflows, by name:
-
-* no inflow at all: zero load;
-* in-plane inflow from behind (v_tangential <= 0: reverse rotation, strong cross wind at the root):
-  no induction; it fades in between two small ratios v_tangential/|v_normal|, so that loads are continuous;
-* reversed flow (v_normal < 0): the mirrored problem, solved by the same equations;
-* no root (never met with a finite polar): no induction at that station, and the event is counted.
-
-The blade pitching moment (cm) is included for curved blades alone (blade_shape.py): on straight blades in the
-rotor plane it does next to nothing.
+Degenerate inflows: none at all, zero load; in the plane from behind (v_tangential <= 0), no induction, faded
+in between two small ratios v_tangential/|v_normal|; reversed (v_normal < 0), the mirrored problem; no root
+(never met with a finite polar), no induction at that station, which is counted. The pitching moment (cm) is
+included for curved blades alone (blade_shape.py): on straight ones it does next to nothing.
 """
 
 from math import acos, atan2, cos, exp, floor, nan, pi, sin, sqrt

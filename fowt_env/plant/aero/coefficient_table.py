@@ -1,15 +1,12 @@
 """Rotor loads from one table of the blade element momentum solution, expanded about uniform axial flow.
 
-Much faster than a sweep over all stations (bem_rotor.py, section_table.py). To first order in what varies
-over the disk, the sum over three or more evenly spaced blades does not depend on the azimuth, and rotational
-symmetry leaves one real coefficient for each of the in-plane force and the in-plane moment per gradient
-of the axial wind (shear, platform pitch and yaw rate), and one for each per cross wind (misalignment,
-platform pitch, motion of the hub). Thrust and torque change to second order in both. All of these are
-integrals along the blade of the derivatives of its line load, tabulated beside thrust and torque over the
-inflow angle and the blade pitch.
+To first order in what varies over the disk the sum over three or more blades does not depend on the azimuth:
+in-plane force and moment have one coefficient each per gradient of the axial wind (shear, platform pitch and
+yaw rate) and per cross wind (misalignment, platform pitch, motion of the hub). Thrust and torque change to
+second order in both. All are integrals of derivatives of the line load, over inflow angle and blade pitch.
 
-Left out: what fluctuates with the azimuth (three times per turn and faster), and the change of the cross
-wind over the disk. A box of full-field wind has to be averaged over the rotor first (scene/build.py does).
+Left out: what fluctuates with the azimuth, and the change of the cross wind over the disk. A box of
+full-field wind has to be averaged over the rotor first (scene/build.py does).
 """
 
 from math import atan2, cos, sin, sqrt

@@ -68,9 +68,7 @@ class DynamicSections(NamedTuple):
 def _fill(induced, load, blade_pitch, elements, shape):
     """Put into induced the quasi-steady induced velocities over the inflow's v_normal + |v_tangential|.
 
-    Into load go each station's part of the blade's force, normal and tangential, and, where there is room,
-    its pitching moment, over the air density and the square of |v_normal| + |v_tangential| of the flow that
-    has its induced velocity already.
+    Into load go the columns of section_table._fill, of the flow that has its induced velocity already.
     """
     for i in range(load.shape[0]):
         for j in range(load.shape[1]):
@@ -174,15 +172,9 @@ def _tabled_load(flow, x, rotor, dx, pitches, blades):
 
 @kernel
 def dynamic_sections_load(t, pose, x, now, series, field, rotor, dx, counters, pitches, blades):
-    """Return the RotorLoad of the state x at time t with its wake states, in rotor axes.
+    """Return the RotorLoad of the state x at time t with its wake states; arguments as in rotor_load.
 
-    No rotor or no wind series: zero.
-    pose                in rotor axes (tilt.py)
-    now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
-    dx                  derivative of the state: only the wake states are written
-    counters            as in rotor_load, which computes the whole load of other than three blades, and
-                        where a station lies outside the tables
-    pitches, blades     as in rotor_load
+    rotor_load computes the load of other than three blades, and where a station lies outside the tables.
     """
     if rotor is None:
         return NO_ROTOR_LOAD

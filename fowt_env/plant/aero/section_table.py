@@ -1,18 +1,11 @@
 """Rotor loads from a table per blade station: every blade, station and wind sample, without iteration.
 
-Quasi-steady blade element momentum is local (blade_elements.py): the load of a station over the square
-of its inflow depends on the direction of the inflow and on the blade pitch alone. Both components are
-tabulated once per blade from the kernels there, and interpolated linearly in both. Geometry, wind sampling,
-integration and outputs are those of rotor_load.
-
-The table spans the inflows from upwind (v_normal > 0) at any v_tangential, and blade pitches from -5 to
-90 deg. Elsewhere the exact solution is taken, so nothing is lost but time: station by station in
-reversed flow, by rotor_load on a slow or parked rotor (where the induction fades out) and at other blade
-pitches. Where the exact load jumps from one root of the momentum balance to another (deep stall), and
-where it fades within a few hundredths of an angle (a root in nearly axial flow), the table smooths it
-over one cell.
-
-The induction is not tabulated: dynamic inflow needs section_inflow.py, a skewed wake rotor_load.
+The quasi-steady load of a station over the square of its inflow depends on the direction of the inflow and
+on the blade pitch alone (blade_elements.py). It is tabulated once per blade and interpolated linearly in
+both; all else is as in rotor_load. The table spans inflows from upwind (v_normal > 0) and blade pitches from
+-5 to 90 deg; elsewhere, and on a slow or parked rotor, the exact solution is taken. Where that jumps between
+roots of the momentum balance (deep stall), or fades within hundredths of an angle, the table smooths it over
+a cell. The induction is not tabulated: dynamic inflow needs section_inflow.py, a skewed wake rotor_load.
 """
 
 from math import pi
@@ -207,15 +200,9 @@ def sampled_force(blade, flow, elements, counters):
 
 @kernel
 def section_table_load(t, pose, x, now, series, field, table, counters, pitches, blades):
-    """Return the RotorLoad of the state x at time t from the tables of the stations, in rotor axes.
+    """Return the RotorLoad of the state x at time t by the tables of stations; arguments as in rotor_load.
 
-    No table or no wind series: zero.
-    pose                in rotor axes (tilt.py)
-    now, series, field  wind (weather/wind.py); every station has the wind of where it is at this instant
-    counters            as in rotor_load, for the exact solutions outside the table
-    pitches, blades     as in rotor_load
-    Against rotor_load: rms 1e-4 of the load's standard deviation over all operating states, for thrust and
-    torque; tests/plant/aero/test_section_table.py has the figures.
+    Against rotor_load: rms 1e-4 of the standard deviation of thrust and torque over all operating states.
     """
     if table is None:
         return NO_ROTOR_LOAD

@@ -1,9 +1,8 @@
 """Which stations of a blade to keep when fewer are wanted, and the lengths that they then stand for.
 
-A line load of a blade has a few shapes over its operating states, which a few stations tell apart. Stations
-are picked one by one, each where the part of the line loads that those before cannot tell is largest (a QR
-factorisation with pivoting); force and first moments of the whole blade are then sums over these stations,
-with factors fitted to all stations in those states and held near those of a line load linear in between.
+Each is picked where the part of the line loads over the operating states that those before cannot tell is
+largest (QR with pivoting); force and first moments of the blade are sums over these stations, with factors
+fitted to all stations in those states and held near those of a line load linear in between.
 """
 
 from typing import NamedTuple

@@ -109,10 +109,9 @@ def interval_at(time, t):
 def wind_at(t, X, Y, Z, now, series, field):
     """Return (u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
 
-    The horizontal wind follows the power law (Z/reference_height)**shear_exponent; the linear shears
-    add to u, m/s per reference_length above and to the left (+y) of the reference point. Points below
-    LOWEST_HEIGHT take its wind. now: wind_now(t, series). field: None, or a box of full-field wind
-    (wind_field.WindField) that replaces the series.
+    The horizontal wind follows the power law of Z/reference_height; the linear shears add to u, m/s per
+    reference_length above and to the left (+y). Points below LOWEST_HEIGHT take its wind. now: wind_now(t,
+    series). field: None, or the wind_field.WindField that replaces the series.
     """
     if series is None:
         return 0.0, 0.0, 0.0

@@ -1,11 +1,9 @@
 """Wave force on a potential-flow body, first and second order (theory.md, 5.9).
 
-Linear theory knows the body in its undisplaced position and attitude alone, so the forces are functions of
-time, in inertial axes about the body origin. First-order forces are a sum over the wave components, or the
-same sum tabulated over time; second-order forces are tabulated always. A table holds the coefficients of a
-cubic B-spline: four rows, of eight numbers each, make a value. Where the waves are to meet the body at its
-slowly varying position, first-order forces are summed with the phases of a low-passed surge and sway, two
-states.
+Linear theory knows the body in its undisplaced pose alone, so the forces are functions of time, in inertial
+axes about the body origin: the first order summed over components or tabulated over time, the second
+tabulated always, as coefficients of cubic B-splines. Where the waves are to meet the body at its slowly
+varying position, phases are those at a low-passed surge and sway, two states.
 """
 
 from math import cos, floor, pi, sin

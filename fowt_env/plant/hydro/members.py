@@ -1,12 +1,9 @@
 """Strip (Morison) loads on straight cylinders of any place, direction and taper (theory.md, 5.10).
 
 A member has cells of two Gauss points along its wet part and a node at each end. Every node has an axis, what
-acts across it (drag, added mass, fluid inertia) and what acts along it (the same of an end, and the area that
-wave pressure pushes on), so that one loop makes the load of all members.
-
-Where members stand still and end at still water, the nodes and their added mass are always the same, and the
-water's motion there can come from a table over the record (member_series.py). Else the nodes are laid anew at
-each evaluation, on the part of each member that is wet.
+acts across it and what acts along it, so that one loop makes the load of all members. Where members stand
+still and end at still water, the nodes and their added mass are always the same, and the water's motion there
+can come from a table (member_series.py); else the nodes are laid anew at each evaluation.
 """
 
 from math import pi, sqrt

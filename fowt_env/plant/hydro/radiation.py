@@ -2,10 +2,9 @@
 
     F(t) = -integral of K(tau) q'(t - tau), tau from 0 to infinity
 
-about the body origin and in inertial axes, q' being R v and R w. Two forms: a sum of exponentials with states
-of their own, which are advanced exactly while the velocities change linearly over a step; and the integral
-itself by the trapezoid rule over past velocities. The states are the last of the state vector and have no
-rates: integrators advance what is before them, and call the functions here for the rest.
+about the body origin and in inertial axes, q' being R v and R w. Two forms: a sum of exponentials, with
+states that are advanced exactly while the velocities are linear over a step; and the integral itself by the
+trapezoid rule. The states are the last of the state vector and have no rates: integrators call what is here.
 """
 
 from cmath import exp as complex_exp

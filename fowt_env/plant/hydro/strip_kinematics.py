@@ -1,8 +1,7 @@
 """Water velocity, acceleration and dynamic pressure at the strips' nodes: the sum over all wave components.
 
-Along the axis a component is exp(kappa z) with a complex kappa, so it is carried from a node to the next by
-a multiplication in place of an exponential, a sine and a cosine each. The seabed's reflection runs down the
-axis with the same phase, growing: it is carried as a magnitude and a direction.
+Along the axis a component is exp(kappa z), kappa complex, carried from node to node by a multiplication. The
+seabed's reflection runs down the axis with the same phase, growing, as a magnitude and a direction.
 """
 
 from math import cos, exp, sin

@@ -38,6 +38,12 @@ def from_sections(x, series):
     )
 
 
+def both(speed, blade_pitch, wind):
+    """(load of the table, of the sections) in a uniform wind."""
+    x, series = state(speed, blade_pitch), wind_series(wind)
+    return from_table(x, series), from_sections(x, series)
+
+
 def over_azimuth(x, series, points=8):
     """Mean wrench and torque of the sections over a third of a turn."""
     loads = []
@@ -70,12 +76,6 @@ def test_same_rotor_is_tabulated_once():
     assert build_coefficient_table(again) is build_coefficient_table(one)
 
 
-def test_every_coefficient_is_finite_and_bounded():
-    assert np.all(np.isfinite(TABLE.load))
-    assert np.abs(TABLE.load[:, :, :2]).max() < np.pi  # twice the area and the dynamic pressure
-    assert np.abs(TABLE.load[:, :, 2:]).max() < 10.0
-
-
 def test_table_is_the_blade_element_momentum_solution_at_its_points():
     rng = np.random.default_rng(0)
     for _ in range(200):
@@ -83,10 +83,7 @@ def test_table_is_the_blade_element_momentum_solution_at_its_points():
         if abs(theta) == np.pi or np.cos(theta) == 0.0:
             continue
         wind, speed = 20 * np.cos(theta), 20 * np.sin(theta) / ROTOR.tip_radius
-        a, b = (
-            from_table(state(speed, beta), wind_series(wind)),
-            from_sections(state(speed, beta), wind_series(wind)),
-        )
+        a, b = both(speed, beta, wind)
         q = 0.5 * 1.225 * np.pi * 63.0**2 * 400.0
         assert a.thrust == pytest.approx(b.thrust, abs=1e-9 * q)
         assert a.torque == pytest.approx(b.torque, abs=1e-9 * q * 63.0)
@@ -98,15 +95,9 @@ def test_table_is_within_a_tenth_of_a_percent_around_operation():
     thrust, torque = [], []
     for _ in range(500):
         U, speed, beta = OPERATION[rng.integers(len(OPERATION))]
-        U, speed, beta = (
-            U * rng.uniform(0.85, 1.15),
-            speed * rng.uniform(0.9, 1.1),
-            beta + rng.uniform(-0.03, 0.05),
-        )
-        a, b = (
-            from_table(state(speed, beta), wind_series(U)),
-            from_sections(state(speed, beta), wind_series(U)),
-        )
+        factors = rng.uniform([0.85, 0.9], [1.15, 1.1])
+        U, speed, beta = U * factors[0], speed * factors[1], beta + rng.uniform(-0.03, 0.05)
+        a, b = both(speed, beta, U)
         thrust.append(abs(a.thrust - b.thrust) / RATED_THRUST)
         torque.append(abs(a.torque - b.torque) / RATED_TORQUE)
     assert max(thrust) < 1e-3
@@ -119,26 +110,11 @@ def test_table_covers_standstill_overspeed_feather_and_reversed_wind():
     worst = 0.0
     for _ in range(2000):
         U, speed, beta = rng.uniform(-25, 40), rng.uniform(-0.5, 2.2), rng.uniform(-0.1, 1.65)
-        a, b = (
-            from_table(state(speed, beta), wind_series(U)),
-            from_sections(state(speed, beta), wind_series(U)),
-        )
+        a, b = both(speed, beta, U)
         q = 0.5 * 1.225 * np.pi * 63.0**2 * (U**2 + (63.0 * speed) ** 2)
         worst = max(worst, abs(a.thrust - b.thrust) / q, abs(a.torque - b.torque) / (63.0 * q))
     assert worst < 2e-3
     assert np.all(np.array(from_table(state(0.0, 0.3), wind_series(0.0)).wrench) == 0.0)
-
-
-@pytest.mark.parametrize("U, speed, beta", OPERATION)
-def test_shear_is_seen_in_the_mean_and_in_the_tilting_moment(U, speed, beta):
-    series, x = wind_series(U, shear=0.14), state(speed, beta)
-    mean, table = over_azimuth(x.copy(), series), from_table(x, series)
-    assert table.thrust == pytest.approx(mean[6], rel=0.002)
-    assert table.torque == pytest.approx(mean[7], rel=0.002, abs=0.002 * RATED_TORQUE)
-    tilt_mean = mean[4] - ROTOR.hub_height * mean[6]
-    tilt_table = table.wrench.my - ROTOR.hub_height * table.thrust
-    assert tilt_table == pytest.approx(tilt_mean, rel=0.04)
-    assert table.wrench.fy == pytest.approx(mean[1], rel=0.04, abs=50.0)
 
 
 def hub_loads(wrench):
@@ -163,30 +139,6 @@ def test_random_gusts_and_motions_give_the_loads_of_the_sections_over_a_turn():
         sections.append(hub_loads(over_azimuth(x.copy(), series, 16)))
     error = np.std(np.subtract(table, sections), axis=0) / np.std(sections, axis=0)
     assert np.all(error < [0.01, 0.02, 0.02, 0.01, 0.015, 0.01])
-
-
-@pytest.mark.parametrize("U, speed, beta", OPERATION)
-def test_cross_wind_pushes_and_tilts_as_by_the_sections(U, speed, beta):
-    series, x = wind_series(U, v=0.03 * U), state(speed, beta)
-    table, mean = hub_loads(from_table(x, series).wrench), hub_loads(over_azimuth(x.copy(), series))
-    scale = np.array([RATED_THRUST] * 3 + [RATED_TORQUE] * 3)
-    assert np.all(np.abs(table - mean) < 1e-3 * scale)
-    assert table[4] == pytest.approx(mean[4], rel=0.1)
-
-
-def test_turning_the_disturbance_about_the_shaft_turns_the_loads():
-    """Horizontal shear and vertical wind are vertical shear and cross wind a quarter of a turn on."""
-    x = state(1.267, 0.18)
-    a = hub_loads(from_table(x, wind_series(15.0, 1.0, 0.0, 0.0, 3.0)).wrench)
-    b = hub_loads(from_table(x, wind_series(15.0, 0.0, 1.0, 3.0, 0.0)).wrench)
-    c = hub_loads(from_table(x, wind_series(15.0, 0.0, 1.0, -3.0, 0.0)).wrench)
-    d = hub_loads(from_table(x, wind_series(15.0, -1.0, 0.0, 0.0, -3.0)).wrench)
-    # y of the disk goes to z, z to -y
-    turned = hub_loads(from_table(x, wind_series(15.0, -1.0, 0.0, 0.0, 3.0)).wrench)
-    assert np.allclose(a[[0, 3]], d[[0, 3]], rtol=1e-12)
-    assert np.allclose(a[[1, 2, 4, 5]], -d[[1, 2, 4, 5]], atol=1e-6)
-    assert np.allclose(b, [a[0], -a[2], a[1], a[3], -a[5], a[4]], atol=1e-6)
-    assert not np.allclose(b[1:3], c[1:3]) and not np.allclose(a[1:3], turned[1:3])
 
 
 @pytest.mark.parametrize("U, speed, beta", OPERATION)

@@ -5,10 +5,10 @@ import pytest
 from naive import inflow
 from naive.rigid_body import rotation
 from numba import config, njit
-from rotor_helpers import move_platform, put_load, series_of
+from rotor_helpers import move_platform, put_load, rough_field, series_of
 
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.plant.aero.bem_rotor import NO_ROTOR_LOAD, rotor_load
+from fowt_env.plant.aero.bem_rotor import rotor_load
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.load import Aero, settled_wake
 from fowt_env.plant.aero.section_inflow import build_dynamic_sections, dynamic_sections_load
@@ -16,7 +16,6 @@ from fowt_env.plant.aero.section_table import build_section_table, section_table
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.wake import PER_ELEMENT, build_dynamic_inflow, n_wake_states, time_constants
 from fowt_env.plant.aero.wind import wind_at, wind_now
-from fowt_env.plant.aero.wind_field import WindField
 from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
@@ -32,17 +31,6 @@ ROTORS = {"straight": STRAIGHT, "curved": CURVED}
 SCHEDULE = np.array(
     [(5, 9.0, 0), (8, 8.3, 0), (11.4, 7.0, 0), (14, 5.7, 8.7), (18, 4.4, 14.9), (24, 3.3, 22.5)]
 )
-GRID = np.linspace(-150.0, 150.0, 31), np.linspace(5.0, 305.0, 31)
-
-
-def rough_field():
-    """A box of wind whose cells the rotor cuts through."""
-    rng = np.random.default_rng(5)
-    velocity = rng.normal(0.0, 1.0, (24, 31, 31, 3)).astype(np.float32)
-    velocity[..., 0] += 14.0
-    return WindField(velocity, 2.0, 10.0, 1.0 / 15.0, GRID[0][0], GRID[1][0], 0.1, 0.1, True)
-
-
 @njit
 def _many(states, winds, series, field, rotor, counters, pitches, out, rates, blades):
     """out (2, n, 8): loads solved and looked up, rates (2, n, n_state), blades (2, n, 3, 6)."""
@@ -133,7 +121,7 @@ def test_loads_and_rates_are_those_of_blade_element_momentum(rotor):
 
 def test_in_a_box_of_wind_too(rotor):
     states, winds = operating(100, rotor, seed=2)
-    (solved, found), (exact, rates) = both(states, winds, rotor, rough_field())
+    (solved, found), (exact, rates) = both(states, winds, rotor, rough_field(5, 14.0, 1.0, (-150.0, 5.0), 31))
     assert worst(solved[:, 6:], found[:, 6:]) < 1e-3
     assert worst(outer(exact, rotor), outer(rates, rotor)) < 2e-2
 
@@ -272,20 +260,10 @@ def test_blades_with_pitches_of_their_own(rotor):
     assert alike == pytest.approx(found, rel=1e-9, abs=1e-9 * np.abs(found).max())
     assert rates == pytest.approx(together, rel=1e-9, abs=1e-9)
     states[:, first:] += np.radians([2.0, -1.0])
-    for field in (None, rough_field()):
+    for field in (None, rough_field(5, 14.0, 1.0, (-150.0, 5.0), 31)):
         (solved, found), (exact, rates) = both(states, winds, rotor, field, pitches)
         assert worst(solved[:, 6:], found[:, 6:]) < 1e-3
         assert worst(outer(exact, rotor), outer(rates, rotor)) < 0.02
-
-
-def test_absent_rotor_or_wind_gives_exactly_zero():
-    x = np.zeros(N_RIGID)
-    series = series_of([8.0, 0.0, 0.0, 0.0, 0.0])
-    end = (x.copy(), np.zeros(N_COUNTERS), None, np.zeros((3, 6)))
-    start = (0.0, pose_of(x), x, wind_now(0.0, series))
-    assert dynamic_sections_load(*start, series, None, None, *end) == NO_ROTOR_LOAD
-    rotor = build_dynamic_sections(STRAIGHT, WAKE)
-    assert dynamic_sections_load(*start, None, None, rotor, *end) == NO_ROTOR_LOAD
 
 
 def test_no_time_constant_is_shorter_than_the_least():

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from rotor_helpers import state as rigid_state
 from rotor_helpers import wind_series
 
 from fowt_env.descriptions.turbine import read_turbine
@@ -28,10 +29,8 @@ N_WAKE = n_wake_states(ROTOR, WAKE)
 
 
 def state(speed=1.267, blade_pitch=0.05, azimuth=0.4, platform_pitch=0.0):
-    x = np.zeros(N_RIGID + N_WAKE)
-    x[State.AZIMUTH], x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = azimuth, speed, blade_pitch
-    x[State.PLATFORM_PITCH] = platform_pitch
-    return x
+    x = rigid_state(speed, blade_pitch, azimuth, (0.0, 0.0, 0.0, 0.0, platform_pitch, 0.0))
+    return np.append(x, np.zeros(N_WAKE))
 
 
 def load(x, series, skew=None, wake=None):
@@ -158,12 +157,3 @@ def test_pitch_step_decays_with_two_time_constants(direction):
             share = -0.4 * tau1 / (tau1 - tau2)
             expected = W1 + (W1 - W0) * (share * np.exp(-t / tau1) - (1 + share) * np.exp(-t / tau2))
             assert x[i + 1] == pytest.approx(expected, abs=1e-7 * abs(W1 - W0))
-
-
-def test_thrust_overshoots_after_a_pitch_step():
-    """The wake lags: the thrust first falls below its new steady value."""
-    x, series, *_ = element_after_a_step()
-    first = load(x, series, None, WAKE)[0].thrust
-    steady = load(x, series)[0].thrust
-    before = load(state(blade_pitch=0.05), series)[0].thrust
-    assert first < steady < before

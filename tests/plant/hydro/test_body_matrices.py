@@ -85,8 +85,3 @@ def test_buoyancy_acts_at_the_centre_of_buoyancy_of_the_undisplaced_body():
     part = build_body_matrices(Body, None, density=1000.0, gravity=10.0)
     force = np.array([0.0, 0.0, 2e4])
     assert part.constant == pytest.approx(np.r_[force, np.cross([3.0, 5.0, 0.0], force)])
-
-
-def test_a_platform_without_them_has_no_such_part():
-    assert build_body_matrices(None, None, 1025.0, 9.81) is None
-    assert build_scene("oc3_hywind", fidelity="reference").model.hydro.matrices is None

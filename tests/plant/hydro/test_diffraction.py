@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from naive import diffraction as naive
-from naive import morison as naive_strips
-from naive.morison import spar_of
 from naive.rigid_body import rotation
 from plant_helpers import make_pose
 from spar_in_waves import SEAS, STILL, motion, nodes_of, strips_of, waves_of
@@ -81,14 +79,6 @@ def test_coefficient_is_the_pressure_integral_of_a_wave_that_does_not_enter_the_
     assert inertia_coefficient(ka) == pytest.approx(force / undisturbed, rel=1e-10)
 
 
-def test_coefficient_has_the_magnitude_and_lag_of_the_hankel_formula():
-    ka = np.geomspace(1e-3, 20.0, 50)
-    magnitude, lag = naive.coefficient(ka)
-    assert np.allclose(np.abs(inertia_coefficient(ka)), magnitude, rtol=1e-12, atol=0.0)
-    turn = np.exp(1j * (np.angle(inertia_coefficient(ka)) - lag))
-    assert np.allclose(turn, 1.0, rtol=0.0, atol=1e-12)
-
-
 def test_long_waves_give_two_without_lag_and_short_ones_the_limit_of_geometric_optics():
     ka = np.array([1e-6, 1e-3, 0.02])
     assert np.allclose(np.abs(inertia_coefficient(ka)), 2.0, rtol=5e-3)
@@ -119,14 +109,15 @@ def test_series_of_a_taper_is_the_coefficient_at_its_local_diameter(site):
 
 @pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
 def test_exact_load_is_the_complex_sum_over_components(switches, platform, site):
-    strips, waves, spar = strips_of(platform, *switches), waves_of(SEA, site), spar_of(platform, *switches)
+    strips, waves = strips_of(platform, *switches), waves_of(SEA, site)
+    spar = naive.spar_of(platform, *switches)
     part = build_strip_diffraction(waves, strips)
     rng = np.random.default_rng(2)
     for _ in range(3):
         t, moving = rng.uniform(0.0, 100.0), slow_motion(rng)
         got, plain = exact(t, moving, strips, waves, part), exact(t, moving, strips, waves)
         assert got[1:] == plain[1:]  # the added mass of the hull's own motion is left alone
-        top, eta = naive_strips.surface_on_axis(t, moving[0], moving[1], SEA, spar)
+        top, eta = naive.surface_on_axis(t, moving[0], moving[1], SEA, spar)
         place = t, moving[0], moving[1], eta, SEA, spar, nodes_of(strips, top)
         expected = np.r_[naive.excitation(*place, inertia_coefficient)]
         expected -= np.r_[naive.excitation(*place, lambda ka: 1.0 + spar.added_mass)]
@@ -139,14 +130,14 @@ def test_exact_load_is_the_complex_sum_over_components(switches, platform, site)
 
 def test_cut_taper_follows_the_surface(platform, site):
     # a hull lifted by 7 m: the surface meets the taper, whose nodes move and change their diameter
-    strips, waves, spar = strips_of(platform), waves_of(ONE_WAY, site), spar_of(platform)
+    strips, waves, spar = strips_of(platform), waves_of(ONE_WAY, site), naive.spar_of(platform)
     part = build_strip_diffraction(waves, strips)
     rng = np.random.default_rng(3)
     expected, full, quick = [], [], []
     for t in (1.0, 2.5, 4.0):
         moving = slow_motion(rng, tilt=0.02)
         moving[0][2] = 7.0
-        top, eta = naive_strips.surface_on_axis(t, moving[0], moving[1], ONE_WAY, spar)
+        top, eta = naive.surface_on_axis(t, moving[0], moving[1], ONE_WAY, spar)
         assert -12.0 < top < -4.0
         place = t, moving[0], moving[1], eta, ONE_WAY, spar, nodes_of(strips, top)
         diffracted = np.r_[naive.excitation(*place, inertia_coefficient)]
@@ -209,17 +200,6 @@ def test_seabed_reflection_is_turned_with_its_wave(platform, site):
         full = exact(t, tilted, strips, waves, part).wrench
         assert np.allclose(quick[:2], full[:2], rtol=0.0, atol=2e-4 * np.abs(full[:2]).max())
         assert np.allclose(quick[3:5], full[3:5], rtol=0.0, atol=2e-4 * np.abs(full[3:5]).max())
-
-
-def test_long_wave_only_exchanges_the_coefficient(platform, site):
-    strips = strips_of(platform, "fixed", "swl", "none")._replace(drag_coefficient=0.0)
-    waves = waves_of({"kind": "regular", "H": 2.0, "T": 80.0}, site)
-    part = build_strip_diffraction(waves, strips)
-    share = 2.0 / (1.0 + strips.added_mass_coefficient)
-    for t in (10.0, 20.0, 55.0):
-        plain = np.array(exact(t, STILL, strips, waves).wrench)
-        for got in (exact(t, STILL, strips, waves, part), fast(t, STILL, platform, strips, waves)):
-            assert np.allclose(np.array(got.wrench)[[0, 4]], share * plain[[0, 4]], rtol=1e-3)
 
 
 def published_rows():

@@ -119,20 +119,6 @@ def test_forces_are_turned_into_body_axes_at_any_pose():
     assert np.allclose(np.array(add_excitation(2.0, pose, x, load, part, SCRATCH)), expected, rtol=1e-12)
 
 
-def test_without_the_part_a_load_stays_as_it_is():
-    x = np.zeros(15)
-    pose = pose_of(x)
-    assert add_excitation(1.0, pose, x, Wrench(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), None, SCRATCH) == (
-        1,
-        2,
-        3,
-        4,
-        5,
-        6,
-    )
-    assert add_second_order(1.0, NO_LOAD, None) == NO_LOAD
-
-
 @pytest.mark.parametrize("sea", SEAS)
 def test_the_sum_at_a_position_is_that_of_shifted_waves_in_both_forms(sea):
     waves, exact = parts(SEAS[sea], fast=False)

@@ -4,11 +4,9 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from floaters import spar_members
 from naive import members as naive
-from naive.rigid_body import rotation
 from plant_helpers import make_pose
-from spar_in_waves import STILL, SWITCHES, motion, strips_of, waves_of
+from spar_in_waves import STILL, SWITCHES, motion, waves_of
 
 from fowt_env.descriptions.platform import Environment, Member
 from fowt_env.plant.hydro.member_buoyancy import add_member_buoyancy, displaced
@@ -21,7 +19,7 @@ from fowt_env.plant.hydro.members import (
     lay_nodes,
     node_loads,
 )
-from fowt_env.plant.hydro.morison import Current, morison_load
+from fowt_env.plant.hydro.morison import Current
 from fowt_env.plant.hydro.waves import wave_kinematics
 from fowt_env.plant.state import NO_LOAD
 
@@ -129,24 +127,6 @@ def test_the_heave_plates_of_oc4_damp_as_published():
     assert found[2] == pytest.approx(-0.5 * 1025.0 * 3.0 * pi * 144.0 * 4.8 * 0.25, rel=1e-12)
 
 
-@pytest.mark.parametrize("switches", [SWITCHES[0], SWITCHES[-1]])
-def test_a_spar_of_members_has_the_loads_of_its_hull(platform, switches):
-    site = platform.environment
-    members = build(spar_members(platform), *switches, site=site, cell=1.0)
-    strips = strips_of(platform, *switches, cell=1.0)
-    waves, rng = waves_of(SEA, site), np.random.default_rng(8)
-    for t in (3.0, 50.0):
-        where = motion(rng)
-        spar = morison_load(t, make_pose(*where), strips, waves, None, np.zeros((7, strips.nodes)))
-        found, added = load_of(t, where, members, waves)
-        scale = np.repeat(
-            [np.hypot(spar.wrench.fx, spar.wrench.fy), np.hypot(spar.wrench.mx, spar.wrench.my)], 3
-        )
-        assert np.abs((found - np.array(spar.wrench)) / scale).max() < 2e-4
-        mass = [added[0, 0], added[0, 4], added[4, 4], added[2, 2]]
-        assert mass == pytest.approx([spar.s0, spar.s1, spar.s2, spar.a33], rel=2e-4)
-
-
 # buoyancy
 
 
@@ -175,19 +155,6 @@ def test_a_sunken_cone_displaces_its_volume_and_a_dry_one_nothing():
     assert np.array([qx, qy, qz]) / volume == pytest.approx(centre, rel=1e-14)
     up = make_pose(np.array([0.0, 0.0, 40.0]), np.eye(3), np.zeros(3), np.zeros(3))
     assert displaced(up, bodies) == (0.0, 0.0, 0.0, 0.0)
-
-
-@pytest.mark.parametrize("flip", [False, True])
-def test_slices_and_closed_form_of_a_cut_cylinder_agree(flip):
-    """A taper of nothing but rounding takes the slices; whichever end of the member is the lower one."""
-    ends = [(1.0, 2.0, -20.0), (3.0, 1.0, 10.0)]
-    start, end = ends[::-1] if flip else ends
-    pose = make_pose(np.array([0.0, 0.0, 0.4]), rotation(0.2, -0.1, 0.5), np.zeros(3), np.zeros(3))
-    straight, sliced = (
-        displaced(pose, build((Member(start=start, end=end, diameter=d, drag_coefficient=(0, 0)),)).bodies)
-        for d in ((6.0, 6.0), (6.0, 6.0 + 1e-12))
-    )
-    assert sliced == pytest.approx(straight, rel=1e-6)
 
 
 def test_force_is_the_slope_of_the_potential_energy():

@@ -9,7 +9,6 @@ from plant_helpers import random_state
 from potential_body import made_up_body
 
 from fowt_env.plant.compile.decorators import entry
-from fowt_env.plant.hydro import radiation
 from fowt_env.plant.hydro.load import Hydro
 from fowt_env.plant.hydro.radiation import (
     add_radiation,
@@ -219,9 +218,3 @@ def test_a_convolution_refuses_steps_that_it_is_not_made_for(past):
     x = moving(15)
     with pytest.raises(ValueError, match="of another time step: use Scene.with_step"):
         step(x, x.copy(), x.copy(), 0.05, False, False, water, data)
-
-
-def test_rows_of_the_data_do_not_overlap(past):
-    assert radiation.HALF - radiation.WHOLE == radiation.STEP - radiation.HALF == 6
-    head = [radiation.TAIL, radiation.TAIL_HALF, radiation.TAIL_WHOLE, radiation.N_HEAD]
-    assert np.diff(head).tolist() == [6, 6, 6] and memory_data(hydro(past)).shape[1] >= radiation.N_HEAD
