@@ -13,6 +13,7 @@ from llvmlite import ir
 from numba.core import sigutils
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
@@ -112,11 +113,12 @@ class LinkedDispatcher(CPUDispatcher):
         self.overloads[tuple(cres.signature.args)] = cres
 
     def _compile_for_args(self, *args, **kws):
-        self._called_from_python = True
-        try:
-            return super()._compile_for_args(*args, **kws)
-        finally:
-            self._called_from_python = False
+        with global_compiler_lock:  # numba's, which can be taken twice: another thread compiles for kernels
+            self._called_from_python = True
+            try:
+                return super()._compile_for_args(*args, **kws)
+            finally:
+                self._called_from_python = False
 
     def compile(self, sig):
         """The Key of a signature's code or, called from Python, its function."""

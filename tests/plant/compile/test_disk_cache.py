@@ -452,6 +452,8 @@ def test_the_plant_imports_nothing_of_this_project_that_could_be_compiled_into_i
     assert outside == {"fowt_env.errors", "fowt_env.folders", "fowt_env.caches", "fowt_env.layout"}
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_broken_files_are_compiled_anew(tmp_path):
     folder = tmp_path / "cache"
     assert output(start(SMALL, folder)) == ["0.25"]

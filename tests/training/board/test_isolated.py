@@ -221,6 +221,8 @@ def test_what_a_controller_starts_ends_with_its_run(tmp_path):
     assert gone(int(Path(note).read_text()))
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_a_controller_starts_ends_with_a_judge_that_is_killed(tmp_path, temporary):
     note, submission = str(tmp_path / "pid"), tmp_path / "submission"
     submission.mkdir()

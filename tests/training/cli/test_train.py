@@ -89,6 +89,7 @@ def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on
     assert [p.name for p in (folder / "checkpoints").iterdir()] == ["step_96"]
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_benchmark_training_writes_a_row_per_kind_of_environment(tmp_path):
     path = tmp_path / "training.csv"

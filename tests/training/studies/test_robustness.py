@@ -33,6 +33,8 @@ from fowt_env.training.studies.robustness import (
 FOUND = Path(__file__).parents[2] / "reference" / "stability"
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "integrator"),
     [
@@ -168,6 +170,8 @@ def test_euler_angles_of_a_tumbling_body_follow_a_quaternion_and_bodies_one_by_o
     assert np.abs(rigid_body.rotation(*x[3:6]) - R).max() < 1e-6
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_without_the_compiler_a_scene_gives_the_same_numbers():
     jobs = without_compiler.jobs(
         {"still water": {}, "empty space": without_compiler.SCENES["empty space"]}, False

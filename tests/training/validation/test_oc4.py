@@ -15,6 +15,8 @@ def by_name(targets):
     return lambda row: next(percent for part, percent in targets.items() if part in row.quantity)
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_heave_of_a_hull_with_heave_plates_decays_as_with_openfasts_members():
     """Most of the damping is that of the plates; without members' drag the decay is far off."""
     run = oc4.RUNS["decay_heave"]
@@ -43,6 +45,7 @@ def test_motions_of_a_hull_with_members_in_a_sea_are_openfasts():
     assert len(rows) == 3 * 9
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_wake_answers_steps_of_wind_and_blade_pitch_as_aerodyns_dbemt_does():
     targets = by_name({"before": 0.5, "long after": 0.5, "time of": 10.0, ", overshoot": 5.0, "rms": None})
