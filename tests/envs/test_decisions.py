@@ -24,6 +24,15 @@ def shaped(**changes):
     return decisions
 
 
+def test_a_constant_decision_comes_to_nothing_through_the_washout():
+    decisions = shaped(washout=20.0, smoothing=0.0)
+    actions = np.array([decisions.smooth(np.array([[0.8, -0.3]]))[0].copy() for _ in range(3000)])
+    time = DT * np.arange(3000)
+    expected = np.exp(-time / 20.0)[:, None] * [0.8, -0.3]
+    assert np.abs(actions - expected).max() < 1e-12
+    assert np.abs(actions[-1]).max() < 1e-6
+
+
 def test_the_sum_of_what_is_applied_is_bounded_whatever_is_decided():
     """Also of decisions that gain by the clipping at +-1: up all the time, down for moments."""
     decisions = shaped(washout=20.0, smoothing=0.0)
@@ -65,6 +74,14 @@ def test_nothing_is_added_in_a_wind_that_does_not_move():
     for _ in range(500):
         decisions.append(np.array([[(18.0 + 0.2 * rng.normal()) / 15.0]]))
         assert np.all(decisions.smooth(rng.uniform(-1.0, 1.0, (1, 2))) == 0.0)
+
+
+def test_without_either_the_action_is_the_smoothed_decision_alone():
+    plain, other = Decisions(1, 1, DecisionSettings(history=0), DT), shaped(authority=(1e-9, 1e-8))
+    other.memory[:, -1] = 1.0
+    decision = np.array([[0.4, -0.2]])
+    for _ in range(20):
+        assert np.abs(plain.smooth(decision) - other.smooth(decision)).max() < 1e-15
 
 
 def test_a_restart_forgets_what_was_applied_and_how_the_wind_moved():

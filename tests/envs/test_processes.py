@@ -2,7 +2,6 @@
 
 import multiprocessing
 import threading
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -42,19 +41,37 @@ def same(found, expected):
         np.testing.assert_array_equal(one, other)
 
 
-def batch_rewards(seed):
-    batch = FowtVectorEnv(3, threads=1, **QUICK)
-    batch.reset(seed=seed)
-    actions = np.random.default_rng(seed).uniform(-1.0, 1.0, (30, 3, 2))
-    return np.array([batch.step(action)[1] for action in actions])
+def test_threads_that_each_step_their_own_give_the_bits_of_one_after_the_other(serial):
+    found = [None] * len(SEEDS)
+    together = threading.Barrier(len(SEEDS))
+
+    def work(place):
+        together.wait()
+        found[place] = episode(SEEDS[place])
+
+    workers = [threading.Thread(target=work, args=(place,)) for place in range(len(SEEDS))]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    same(found, serial)
 
 
-@pytest.mark.parametrize("work", [episode, batch_rewards])
-def test_threads_that_each_step_their_own_give_the_bits_of_one_after_the_other(work):
-    together, expected = threading.Barrier(len(SEEDS)), [work(seed) for seed in SEEDS]
-    with ThreadPoolExecutor(len(SEEDS)) as pool:
-        found = list(pool.map(lambda seed: (together.wait(), work(seed))[1], SEEDS))
-    same(found, expected)
+def test_threads_that_each_step_their_own_batch_give_the_bits_of_one_after_the_other():
+    def rewards(seed):
+        batch = FowtVectorEnv(3, threads=1, **QUICK)
+        batch.reset(seed=seed)
+        actions = np.random.default_rng(seed).uniform(-1.0, 1.0, (30, 3, 2))
+        return np.array([batch.step(action)[1] for action in actions])
+
+    found = {}
+    workers = [threading.Thread(target=lambda s=seed: found.update({s: rewards(s)})) for seed in SEEDS]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    for seed in SEEDS:
+        np.testing.assert_array_equal(found[seed], rewards(seed))
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn", pytest.param("forkserver", marks=pytest.mark.slow)])
@@ -62,6 +79,23 @@ def test_processes_of_every_kind_give_the_bits_of_this_one(serial, method):
     """Forked ones have this process's kernels and environments, the others nothing."""
     with multiprocessing.get_context(method).Pool(2) as pool:
         same(pool.map(episode, SEEDS, chunksize=1), serial)
+
+
+def test_an_environment_goes_on_in_a_forked_process_as_it_does_here():
+    env = make()
+    env.reset(seed=5)
+    env.step(np.zeros(2))
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+
+    def work():
+        sender.send([env.step(np.full(2, 0.3))[0] for _ in range(10)])
+
+    process = multiprocessing.get_context("fork").Process(target=work)
+    process.start()
+    there = receiver.recv()
+    process.join()
+    here = [env.step(np.full(2, 0.3))[0] for _ in range(10)]
+    np.testing.assert_array_equal(there, here)
 
 
 @pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.slow)])
@@ -77,5 +111,19 @@ def test_stable_baselines3_s_processes_give_the_bits_of_its_dummy(method):
             (seen, rewards, ended, _), expected = apart.step(action), plain.step(action)
             for one, other in zip((seen, rewards.astype(np.float32), ended), expected[:3], strict=True):
                 np.testing.assert_array_equal(one, other)  # the dummy keeps rewards in single precision
+    finally:
+        apart.close()
+
+
+def test_gymnasium_s_processes_give_the_bits_of_its_serial_environments():
+    from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
+
+    plain, apart = SyncVectorEnv([make] * 2), AsyncVectorEnv([make] * 2, context="spawn")
+    try:
+        np.testing.assert_array_equal(apart.reset(seed=2)[0], plain.reset(seed=2)[0])
+        for action in np.random.default_rng(0).uniform(-1.0, 1.0, (30, 2, 2)).astype(np.float32):
+            got, expected = apart.step(action), plain.step(action)
+            for one, other in zip(got[:4], expected[:4], strict=True):
+                np.testing.assert_array_equal(one, other)
     finally:
         apart.close()

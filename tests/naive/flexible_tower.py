@@ -177,6 +177,9 @@ class Turbine:
                 total = total + square * self.tower.stiffness[i, j] - square * fall
         return total
 
+    def kinetic(self, c):
+        return 0.5 * sum(np.sum(m * (x.first**2)) for m, place in self.bodies(c) for x in place)
+
     def path(self, x, blocks):
         """Coordinates [Path] of a plant's state, no second derivatives; blocks: index of q, of its rates."""
         n = self.n

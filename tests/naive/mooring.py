@@ -20,6 +20,25 @@ def spans(H, V, L, w, EA, CB=0.0):
     return x, z
 
 
+def jacobian(H, V, L, w, EA, CB=0.0):
+    """d(x_F, z_F)/d(H, V), (2, 2), each branch differentiated by hand."""
+    a = np.hypot(H, V)
+    if V >= w * L:
+        V_a = V - w * L
+        b = np.hypot(H, V_a)
+        x_H = (np.arcsinh(V / H) - np.arcsinh(V_a / H) - V / a + V_a / b) / w + L / EA
+        x_V = H / w * (1 / a - 1 / b)
+        return np.array([[x_H, x_V], [x_V, (V / a - V_a / b) / w + L / EA]])
+    x_H = (np.arcsinh(V / H) - V / a) / w + L / EA
+    x_V = z_H = (H / a - 1) / w
+    if CB > 0:
+        L_B = L - V / w
+        slack = max(L_B - H / (CB * w), 0.0)
+        x_H -= slack / EA
+        x_V += CB * (L_B - slack) / EA
+    return np.array([[x_H, x_V], [z_H, V / (a * w) + V / (EA * w)]])
+
+
 def catenary(x_f, z_f, L, w, EA, CB=0.0):
     """(H, V) by bisection in bisection: V(H) from the height, then H from the distance."""
     hanging = EA / w * (np.sqrt(1 + 2 * z_f * w / EA) - 1)
@@ -37,6 +56,11 @@ def catenary(x_f, z_f, L, w, EA, CB=0.0):
     high = EA * (abs(x_f / L) + 1) + CB * w * L
     H = np.exp(brentq(miss, np.log(1e-9 * w), np.log(high), xtol=1e-15, rtol=1e-15))
     return H, vertical(H)
+
+
+def anchor_tension(H, V, L, w, CB=0.0):
+    """Tension at the anchor."""
+    return np.hypot(H, V - w * L) if V >= w * L else max(H - CB * (w * L - V), 0.0)
 
 
 def load(position, R, anchors, fairleads, L, w, EA, CB=0.0):

@@ -18,6 +18,32 @@ def test_the_parabola_meets_the_slip_line_at_the_published_speed():
     assert curve.synchronous_speed == pytest.approx(110.6186, abs=5e-5)
 
 
+@pytest.mark.parametrize(
+    "speed, torque",
+    [
+        (0.0, 0.0),
+        (70.16224, 0.0),
+        (80.0, 2.332287 * 91.21091**2 / (91.21091 - 70.16224) * (80.0 - 70.16224)),
+        (91.21091, 2.332287 * 91.21091**2),
+        (110.0, 2.332287 * 110.0**2),
+        (120.0, 43093.55 / (121.6805 - 110.6186) * (120.0 - 110.6186)),
+        (121.6805, 43093.55),
+        (122.9096, 43093.55),
+        (150.0, 43093.55),
+    ],
+)
+def test_oc3_torque_follows_the_table_of_regions(speed, torque):
+    # 1e-5: the table rounds the synchronous speed to 7 digits
+    assert generator_torque(speed, 0.0, build_torque_curve(torque_law())) == pytest.approx(torque, rel=1e-5)
+
+
+def test_land_torque_gives_rated_power_above_rated_and_is_capped():
+    curve = build_torque_curve(torque_law(), "constant_power")
+    for speed in (121.6805, 122.9096, 135.0):
+        assert generator_torque(speed, 0.0, curve) * speed == pytest.approx(5296610.0, rel=1e-12)
+    assert generator_torque(90.0, 0.1, curve) == 47402.91  # region 3 forced by the blade pitch
+
+
 @pytest.mark.parametrize("region3", ["constant_torque", "constant_power"])
 def test_torque_is_continuous_at_every_region_border(region3):
     curve = build_torque_curve(torque_law(), region3)
@@ -30,6 +56,12 @@ def test_torque_is_continuous_at_every_region_border(region3):
     for speed in borders:
         below, above = (generator_torque(speed * (1.0 + side * 1e-12), 0.0, curve) for side in (-1, 1))
         assert abs(above - below) < 1e-5  # N m; the steepest slope, 3935 N m s, times 2.4e-10 rad/s
+
+
+def test_blade_pitch_above_its_threshold_forces_region_3():
+    curve = build_torque_curve(torque_law())
+    assert generator_torque(100.0, 0.0174, curve) == pytest.approx(2.332287 * 100.0**2)
+    assert generator_torque(100.0, 0.01745329, curve) == 43093.55
 
 
 @pytest.mark.parametrize("region3", ["constant_torque", "constant_power"])
@@ -92,6 +124,15 @@ def test_losses_never_give_power():
 def test_a_motoring_generator_delivers_its_torque_less_the_mesh_loss():
     drivetrain = build_drivetrain(turbine(mesh_loss=0.05))
     assert shaft_torque(0.0, -1e4, 1.0, drivetrain) == pytest.approx(97.0 * 1e4 / 1.05, rel=1e-12)
+
+
+def test_actuator_lags_by_its_time_constant_and_keeps_its_limits():
+    actuator = build_pitch_actuator(turbine().pitch_drive)
+    assert pitch_rate(0.1, 0.101, actuator) == pytest.approx(0.001 / 0.2, rel=1e-9)
+    assert pitch_rate(0.1, 1.0, actuator) == 0.1396263
+    assert pitch_rate(1.0, 0.1, actuator) == -0.1396263
+    assert pitch_rate(0.0, -1.0, actuator) == 0.0  # the command is limited, not only the rate
+    assert pitch_rate(1.57, 9.9, actuator) == pytest.approx((1.570796 - 1.57) / 0.2)
 
 
 def test_actuator_rate_equals_the_plain_formula():

@@ -9,7 +9,9 @@ from scipy.integrate import solve_ivp
 from fowt_env.errors import InputError
 from fowt_env.plant.accelerations import accelerate, factor_spd, substitute_spd
 from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
+from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.model import N_CACHE
+from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import gravity_load, momentum_rate
 from fowt_env.plant.state import N_RIGID, State, Wrench, add, pose_of
 from fowt_env.scene.mass import build_rigid_body
@@ -227,8 +229,63 @@ def test_euler_angles_and_a_quaternion_lead_to_the_same_place(bare_scene):
         assert np.abs(rigid_body.rotation(*x[3:6]) - rigid_body.quaternion_rotation(q)).max() < 1e-9
 
 
+def line_energy(H, V, length, weight, EA):
+    """Elastic and gravity energy of one frictionless line on the seabed or clear of it, by quadrature."""
+    lying = max(0.0, length - V / weight)
+    x, w = np.polynomial.legendre.leggauss(60)
+    s = lying + (length - lying) * (x + 1.0) / 2.0
+    vertical = V - weight * (length - s)
+    start = V - weight * (length - lying)
+    tension = np.hypot(H, vertical)
+    height = (tension - np.hypot(H, start)) / weight + (vertical**2 - start**2) / (2.0 * EA * weight)
+    hanging = np.sum(w * (length - lying) / 2.0 * (tension**2 / (2.0 * EA) + weight * height))
+    return hanging + lying * H * H / (2.0 * EA)
+
+
+def test_floating_body_on_its_lines_keeps_its_energy_without_fluid_inertia(still_scene, platform, turbine):
+    model = still_scene.model
+    strips = model.hydro.strips.shape._replace(
+        added_mass_coefficient=0.0, drag_coefficient=0.0, heave_added_mass=0.0,
+    )  # fmt: skip
+    damping = type(model.hydro.damping)(*(0.0,) * 7)
+    scene = still_scene.with_model({"hydro.strips.shape": strips, "hydro.damping": damping})
+    x0 = state(
+        surge=5.0, sway=2.0, heave=0.5, roll=0.02, platform_pitch=0.06, yaw=0.03,
+        vx=0.3, vy=-0.1, vz=0.05, wx=0.002, wy=0.004, wz=-0.001, rotor_speed=1.2671,
+    )  # fmt: skip
+    times, states = integrate(scene, x0, 100.0, samples=26, rtol=1e-12, atol=1e-13)
+    gravity = platform.environment.gravity
+    energy, _, _ = invariants(scene, platform, turbine, states, gravity)
+    data = scene.data()
+    outside = []
+    for x in states:
+        pose = pose_of(x)
+        mooring_load(pose, model.mooring, data.lines, data.counters)
+        lines = zip(data.lines, model.mooring.length, model.mooring.weight, model.mooring.EA, strict=True)
+        total = sum(line_energy(row[0], row[1], *line) for row, *line in lines)
+        volume, qx, qy, qz = submerged(pose, model.hydro.hull, data.counters)
+        height = volume * pose.z + qx * pose.r31 + qy * pose.r32 + qz * pose.r33
+        outside.append(total - model.hydro.hull.specific_weight * height)
+    total = energy.sum(axis=1) + outside
+    spin = 0.5 * model.rigid_body.rotor_row * x0[State.ROTOR_SPEED] ** 2
+    moving = np.abs(energy[:, 0] - spin).max()
+    assert np.abs(states[:, State.SURGE]).max() > 4.0
+    assert np.abs(total - total[0]).max() < 1e-8 * moving
+
+
 # Symmetries
 
+MIRROR = np.ones(15)
+MIRROR[[State.SWAY, State.ROLL, State.YAW, State.VY, State.WX, State.WZ, State.ROTOR_SPEED]] = -1.0
+
+
+def test_left_and_right_are_mirror_images(wave_scene):
+    rng = np.random.default_rng(8)
+    for _ in range(30):
+        x, t = random_state(rng), rng.uniform(0.0, 20.0)
+        here = rates(wave_scene, x, t=t)
+        there = rates(wave_scene, MIRROR * x, t=t)
+        assert np.abs(there - MIRROR * here)[SPEEDS].max() < 1e-12
 
 
 def turned_scene(scene, angle):

@@ -7,7 +7,6 @@ import naive.mooring as naive
 import numpy as np
 import pytest
 from floaters import TENDON, tendons
-from naive import rigid_body
 
 from fowt_env.descriptions.platform import Line
 from fowt_env.plant.events import N_COUNTERS, Counter
@@ -20,8 +19,10 @@ from fowt_env.plant.mooring import (
     catenary,
     line_shape,
     mooring_load,
+    suspended_residual,
+    touchdown_residual,
 )
-from fowt_env.plant.state import N_RIGID, pose_of
+from fowt_env.plant.state import N_RIGID, NO_LOAD, State, pose_of
 
 pytestmark = pytest.mark.installation
 
@@ -31,17 +32,22 @@ Z_REST, X_REST = 250.0, 848.67
 LINE = (L, W, EA)
 
 
-def oc3_lines(friction=0.0):
-    """Line records of OC3-Hywind."""
-    azimuths = np.radians([0.0, 120.0, 240.0])
-    return tuple(
-        Line(
-            anchor=(853.87 * np.cos(a), 853.87 * np.sin(a), -320.0),
-            fairlead=(5.2 * np.cos(a), 5.2 * np.sin(a), -70.0),
-            length=L, wet_weight=W, EA=EA, seabed_friction=friction,
+def oc3_lines(friction=0.0, turned=0.0):
+    """Line records of OC3-Hywind, the anchors turned about the vertical by an angle."""
+    records = []
+    for azimuth in np.radians([0.0, 120.0, 240.0]):
+        far, near = azimuth + turned, azimuth
+        records.append(
+            Line(
+                anchor=(853.87 * np.cos(far), 853.87 * np.sin(far), -320.0),
+                fairlead=(5.2 * np.cos(near), 5.2 * np.sin(near), -70.0),
+                length=L,
+                wet_weight=W,
+                EA=EA,
+                seabed_friction=friction,
+            )
         )
-        for a in azimuths
-    )  # fmt: skip
+    return tuple(records)
 
 
 def wrench(motion, mooring, lines=None, counters=None):
@@ -55,7 +61,9 @@ def wrench(motion, mooring, lines=None, counters=None):
 
 def rotation(motion):
     """(3, 3) body to inertial."""
-    return rigid_body.rotation(*motion[3:6])
+    x = np.zeros(N_RIGID)
+    x[:6] = motion
+    return np.array(pose_of(x)[3:12]).reshape(3, 3)
 
 
 def random_spans(rng, n, longest=1.2):
@@ -71,6 +79,14 @@ def random_motions(rng, n):
     return rng.uniform(-reach, reach, (n, 6))
 
 
+def test_absent_mooring_is_exactly_no_load():
+    x = np.zeros(N_RIGID)
+    x[State.SURGE] = 20.0
+    lines, counters = np.zeros((0, N_LINE)), np.zeros(N_COUNTERS)
+    assert mooring_load(pose_of(x), None, lines, counters) == NO_LOAD
+    assert build_mooring(()) is None
+
+
 def test_rest_matches_published_tensions():
     """MAP++ summary of the OC3-Hywind OpenFAST model: 736939, 535728, 911089 N, 134.785 m on the seabed."""
     line = catenary(X_REST, Z_REST, *LINE, 0.0, 0.0)
@@ -82,8 +98,14 @@ def test_rest_matches_published_tensions():
 def test_regimes_change_where_theory_says():
     assert catenary(652.2, Z_REST, *LINE, 0.0, 0.0).regime == SLACK
     assert catenary(652.3, Z_REST, *LINE, 0.0, 0.0).regime == TOUCHDOWN
-    assert catenary(858.0, Z_REST, *LINE, 0.0, 0.0).regime == TOUCHDOWN  # published: lifts off at about 858.5
-    assert catenary(858.1, Z_REST, *LINE, 0.0, 0.0).regime == SUSPENDED
+    low, high = 850.0, 865.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if catenary(middle, Z_REST, *LINE, 0.0, 0.0).regime == TOUCHDOWN:
+            low = middle
+        else:
+            high = middle
+    assert low == pytest.approx(858.05, abs=0.05)  # published: about 858.5
 
 
 def test_stiffness_matches_published_matrix():
@@ -120,6 +142,15 @@ def test_hanging_line_carries_its_own_weight():
         assert line.seabed_length == pytest.approx(L - hanging, rel=1e-14)
 
 
+def test_fairlead_straight_above_the_anchor_stretches_the_line_vertically():
+    line = catenary(0.0, 905.0, *LINE, 0.0, 0.0)
+    assert line.H == 0.0 and line.regime == SUSPENDED
+    assert line.V == pytest.approx(0.5 * W * L + EA * (905.0 / L - 1.0), rel=1e-13)
+    assert line.anchor_tension == pytest.approx(line.V - W * L, rel=1e-13)
+    aside = catenary(1e-3, 905.0, *LINE, 0.0, 0.0)
+    assert aside.V == pytest.approx(line.V, rel=1e-9) and 0.0 < aside.H < 1e-4 * line.V
+
+
 def test_line_on_the_seabed_is_a_bar_under_friction():
     """z_F = 0: no vertical force; with friction the tension falls by C_B w per metre."""
     bar = catenary(910.0, 0.0, *LINE, 0.0, 0.0)
@@ -136,6 +167,23 @@ def test_line_on_the_seabed_is_a_bar_under_friction():
 def test_fairlead_below_the_anchor_counts_as_on_the_seabed():
     for x_f in (500.0, 902.5, 950.0):
         assert catenary(x_f, -5.0, *LINE, 0.4, 0.0) == catenary(x_f, 0.0, *LINE, 0.4, 0.0)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.001, 1.0])
+def test_line_matches_naive_twin(friction):
+    rng = np.random.default_rng(11)
+    seen = set()
+    for x_f, z_f in random_spans(rng, 60):
+        line = catenary(x_f, z_f, *LINE, friction, 0.0)
+        H, V = naive.catenary(x_f, z_f, *LINE, friction)
+        seen.add(line.regime)
+        # 1e-9: the twin's differences of asinh cancel in taut lines
+        assert [line.H, line.V] == pytest.approx([H, V], rel=1e-9, abs=1e-9 * V)
+        assert line.fairlead_tension == pytest.approx(np.hypot(H, V), rel=1e-9)
+        anchor = naive.anchor_tension(H, V, L, W, friction) if H > 0 else 0.0
+        assert line.anchor_tension == pytest.approx(anchor, rel=1e-9, abs=1e-9 * V)
+        assert line.seabed_length == pytest.approx(max(L - V / W, 0.0), abs=1e-9 * L)
+    assert seen == {SLACK, TOUCHDOWN, SUSPENDED}
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
@@ -190,6 +238,44 @@ def test_lines_hold_what_each_line_does():
     assert list(lines[:, 5]) == [TOUCHDOWN, SUSPENDED, SUSPENDED]
 
 
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_force_is_continuous_where_the_line_lifts_off(friction):
+    def at(x):
+        return catenary(x, Z_REST, *LINE, friction, 0.0)
+
+    low, high = 850.0, 865.0
+    while high - low > 1e-12:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if at(middle).regime == TOUCHDOWN else (low, middle)
+        if middle in (low, high) and np.nextafter(low, high) == high:
+            break
+    below, above = at(low), at(high)
+    assert (below.regime, above.regime) == (TOUCHDOWN, SUSPENDED)
+    assert below.V == pytest.approx(W * L, rel=1e-11)
+    for name in ("H", "V", "fairlead_tension", "anchor_tension"):
+        assert getattr(above, name) == pytest.approx(getattr(below, name), rel=1e-11)
+    step = 1e-4  # the stiffness is continuous too, without friction
+    if friction == 0.0:
+        left = (at(low).H - at(low - step).H) / step
+        right = (at(high + step).H - at(high).H) / step
+        assert right == pytest.approx(left, rel=1e-3)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.5])
+def test_force_is_continuous_where_the_line_goes_slack(friction):
+    hanging = EA / W * (np.sqrt(1 + 2 * Z_REST * W / EA) - 1)
+    edge = L - hanging
+    slack = catenary(edge - 1e-9, Z_REST, *LINE, friction, 0.0)
+    assert slack.regime == SLACK
+    previous = 0.0
+    for distance in (1e-9, 1e-7, 1e-5, 1e-3):
+        line = catenary(edge + distance, Z_REST, *LINE, friction, 0.0)
+        assert line.regime == TOUCHDOWN and line.converged
+        assert previous < line.H < 100.0 * distance  # N: the stiffness at the edge is below 100 N/m
+        assert line.V == pytest.approx(slack.V, abs=100.0 * distance)
+        previous = line.H
+
+
 @pytest.mark.parametrize("share", [0.5, 0.995, 1.0, 1.005, 2.0])
 @pytest.mark.parametrize("friction", [0.5, 2.0])
 def test_tensions_are_recovered_from_their_spans_around_full_grip(friction, share):
@@ -209,6 +295,63 @@ def test_pull_of_a_nearly_vertical_line_points_at_its_anchor():
     H = catenary(0.5, 905.0, *LINE, 0.0, 0.0).H
     assert load_of(0.3, -0.4)[:2] == pytest.approx([0.6 * H, -0.8 * H], rel=1e-12)
     assert list(load_of(0.0, 0.0)[[0, 1, 3, 4, 5]]) == [0.0] * 5
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.001, 0.5, 5.0])
+@pytest.mark.parametrize(
+    "x_f, z_f", [(700.0, 250.0), (848.67, 250.0), (857.0, 250.0), (866.0, 250.0), (905.0, 300.0)]
+)
+def test_stiffness_is_the_inverse_of_the_printed_jacobian(x_f, z_f, friction):
+    step = 1e-3
+    K = np.empty((2, 2))
+    for j, (dx, dz) in enumerate([(step, 0.0), (0.0, step)]):
+        a = catenary(x_f + dx, z_f + dz, *LINE, friction, 0.0)
+        b = catenary(x_f - dx, z_f - dz, *LINE, friction, 0.0)
+        K[:, j] = (a.H - b.H) / (2 * step), (a.V - b.V) / (2 * step)
+    line = catenary(x_f, z_f, *LINE, friction, 0.0)
+    expected = np.linalg.inv(naive.jacobian(line.H, line.V, *LINE, friction))
+    assert K == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
+
+
+def test_derivatives_of_the_solved_equations_match_differences():
+    rng = np.random.default_rng(9)
+    checked = {touchdown_residual: 0, suspended_residual: 0}
+    for _ in range(300):
+        Z, kappa = rng.uniform(0.05, 0.9), 10.0 ** rng.uniform(-4, 0)
+        friction = rng.choice([0.0, 10.0 ** rng.uniform(-3, 1)])
+        s = 2 * Z / (1 + np.sqrt(1 + 2 * kappa * Z))
+        mu, X = 10.0 ** rng.uniform(-2, 0.5), rng.uniform(0.1, 1.2)
+        h = 10.0 ** rng.uniform(-3, 1)
+        known_touchdown, known_suspended = (Z, kappa, friction, s, 0.1), (X, Z, 0.5 * kappa)
+        for residual, x, rest in (
+            (touchdown_residual, h, known_touchdown),
+            (suspended_residual, mu, known_suspended),
+        ):
+            step = 1e-6 * x
+            _, slope, v, dv = residual(x, *rest)
+            if residual is touchdown_residual and v >= 1.0:
+                continue  # the iteration stays below lift-off
+            checked[residual] += 1
+            up, down = residual(x + step, *rest), residual(x - step, *rest)
+            # 1e-7 absolute covers the rounding of f and v over the step, and a kink of friction inside it
+            assert slope * x == pytest.approx((up[0] - down[0]) / 2e-6, rel=2e-6, abs=1e-9)
+            assert dv * x == pytest.approx((up[2] - down[2]) / 2e-6, rel=2e-6, abs=1e-9)
+            assert slope > 0.0
+    assert min(checked.values()) > 100
+
+
+def test_load_does_not_depend_on_the_heading_of_the_world():
+    rng = np.random.default_rng(2)
+    here = build_mooring(oc3_lines(0.1))
+    for motion in random_motions(rng, 100):
+        turn = rng.uniform(-np.pi, np.pi)
+        c, s = np.cos(turn), np.sin(turn)
+        there = build_mooring(oc3_lines(0.1, turned=turn))
+        turned = motion.copy()
+        turned[:2] = c * motion[0] - s * motion[1], s * motion[0] + c * motion[1]
+        turned[5] += turn
+        load = wrench(motion, here)
+        assert wrench(turned, there) == pytest.approx(load, abs=1e-12 * np.abs(load).max())
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.001, 1.0])
@@ -238,6 +381,21 @@ def test_line_matches_moorpy(friction):
         if info["ProfileType"] in (1, 2, 3, 4):
             assert line.seabed_length == pytest.approx(info["LBot"], abs=1e-6)
     assert (regimes > 100).all()
+
+
+def test_moorpy_differs_only_where_it_rounds_the_geometry_off():
+    """MoorPy lays a fairlead below 1e-5 L on the seabed, and makes x_F < 1e-4 z_F a vertical line.
+
+    There the printed equations say which side is right: ours satisfies them, and the tension that
+    MoorPy drops is small (31 N of a line of 630 kN; 4e-7 of the tension).
+    """
+    moorpy = pytest.importorskip("moorpy.Catenary")
+    for x_f, z_f, difference in ((L, 1e-3, 31.05), (0.05, 905.0, 0.6023)):
+        line = catenary(x_f, z_f, *LINE, 0.0, 0.0)
+        HA, VA, HF, VF, info = moorpy.catenary(x_f, z_f, L, EA, W, Tol=1e-9)
+        assert naive.spans(line.H, line.V, *LINE) == pytest.approx((x_f, z_f), abs=1e-12)
+        assert HF == 0.0 and line.H > 0.0
+        assert line.fairlead_tension - np.hypot(HF, VF) == pytest.approx(difference, rel=1e-3)
 
 
 @pytest.mark.parametrize("friction", [0.0, 1e-6, 0.5, 1e3])
@@ -353,15 +511,13 @@ def test_tendons_have_the_tensions_of_map():
     assert load == pytest.approx([0.0, 0.0, -8 * lines[0, 2], 0.0, 0.0, 0.0], abs=1e-6)
 
 
-def test_a_vertical_line_is_a_spring():
-    for line_of in ((TENDON, 152.11), (TENDON, 151.9), (TENDON, 155.0), (LINE, 905.0)):
-        (length, weight, stiffness), height = line_of
-        line = catenary(0.0, height, *line_of[0], 0.0, 0.0)
-        assert line.H == 0.0 and line.regime == SUSPENDED
+def test_a_vertical_tendon_is_a_spring():
+    length, weight, stiffness = TENDON
+    for height in (152.11, 151.9, 155.0):
+        line = catenary(0.0, height, *TENDON, 0.0, 0.0)
         strain = height / length - 1.0
         assert line.fairlead_tension == pytest.approx(stiffness * strain + 0.5 * weight * length, rel=1e-12)
-        assert line.anchor_tension == pytest.approx(line.fairlead_tension - weight * length, rel=1e-12)
-        near = catenary(1e-6, height, *line_of[0], 0.0, 0.0)
+        near = catenary(1e-6, height, *TENDON, 0.0, 0.0)
         assert near.fairlead_tension == pytest.approx(line.fairlead_tension, rel=1e-12)
         # Eq. (18) where H vanishes: x = H (log(V / V_anchor) / w + L / EA)
         slope = np.log(line.fairlead_tension / line.anchor_tension) / weight + length / stiffness

@@ -41,6 +41,14 @@ def test_without_limits_it_is_the_matrix_exponential(zeta):
             assert got == pytest.approx((target + error, speed), rel=1e-9, abs=1e-11)
 
 
+def test_a_step_is_overshot_as_textbooks_say():
+    made = drive()
+    peak = np.pi / (W * np.sqrt(1.0 - ZETA**2))
+    pitch, rate = drive_after(0.0, 0.0, 0.1, peak, made)
+    assert pitch == pytest.approx(0.1 * (1.0 + exp(-np.pi * ZETA / np.sqrt(1.0 - ZETA**2))), rel=1e-12)
+    assert rate == pytest.approx(0.0, abs=1e-12)
+
+
 CASES = {  # limits that act in commands that leap by up to 0.3 rad
     "rate": {"rate": 0.14},
     "acceleration": {"acceleration": 0.8},
@@ -85,6 +93,22 @@ def test_no_limit_is_passed(name):
     change = np.abs(np.diff(rate)) / 0.002
     running = (pitch[1:] > made.minimum) & (pitch[1:] < made.maximum)  # a stop is met with a shock
     assert change[running].max() <= made.acceleration_limit * 1.002
+
+
+def test_without_an_acceleration_limit_a_held_command_never_gains_energy():
+    rng = np.random.default_rng(7)
+    for name in ("rate", "friction", "stops", "slow and stiff"):
+        made = drive(**CASES[name])
+        low, high = max(made.minimum, -0.5), min(made.maximum, 0.5)
+        for _ in range(20):
+            target, pitch = rng.uniform(low, high, 2)
+            rate = min(made.rate_limit, 1.0) * rng.uniform(-1.0, 1.0)
+            energy = (made.natural_frequency * (pitch - target)) ** 2 + rate**2
+            for _ in range(30):
+                pitch, rate = drive_after(pitch, rate, target, 0.02, made)
+                now = (made.natural_frequency * (pitch - target)) ** 2 + rate**2
+                assert now <= energy * (1.0 + 1e-12) + 1e-20
+                energy = now
 
 
 def test_the_end_of_a_slewing_is_passed_whatever_rounding_leaves():

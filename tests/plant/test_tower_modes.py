@@ -77,14 +77,21 @@ def modes_of(tower):
 class Bending:
     """A leaning turbine in empty space with n modes and two loads of the user's, and its twin."""
 
-    def __init__(self, platform, turbine, n, loads, **options):
+    def __init__(self, platform, turbine, n, loads, damped=True, **options):
         platform, turbine = leaning(platform, turbine)
         self.tower, self.n = lumps(n, np.random.default_rng(n), platform.tower.top_height), n
+        if not damped:
+            self.tower.damping[:] = 0.0
         self.twin = flexible_tower.Turbine(platform, turbine, self.tower)
         scene = build_scene(
-            platform, turbine=turbine, tower="modes", hydrodynamics=False, mooring=False, loads=loads,
+            platform,
+            turbine=turbine,
+            tower="modes",
+            hydrodynamics=False,
+            mooring=False,
+            loads=loads,
             **{"fidelity": "reference"} | options,
-        )  # fmt: skip
+        )
         self.scene = scene.with_model(tower=with_masses(modes_of(self.tower), platform, turbine))
         self.blocks = N_RIGID, N_RIGID + n
 
@@ -180,6 +187,33 @@ def swinging(case):
     return x
 
 
+@pytest.mark.slow
+def test_energy_is_kept_over_a_million_steps(platform, turbine):
+    case = Bending(platform, turbine, 2, springs(), damped=False, integrator="rk4")
+    x, u, dt, parts = swinging(case), np.zeros(2), 0.001, 20
+    handle = case.scene.handle()
+
+    def energy():
+        path = case.twin.path(x, case.blocks)
+        held = 0.0
+        for pin in PINS:
+            place = [
+                float(X.value) for X in case.twin.on_platform(path, [flexible_tower.Path(p) for p in pin])
+            ]
+            held += 0.5 * SPRING * np.sum((place - pin) ** 2)
+        return case.twin.kinetic(path), case.twin.potential(path).value + held
+
+    kinetic, total, spin = [], [], 0.5 * case.scene.model.rigid_body.rotor_row * x[State.ROTOR_SPEED] ** 2
+    forget(handle)
+    for part in range(parts + 1):
+        T, V = energy()
+        kinetic.append(T - spin)
+        total.append(T + V)
+        if part < parts:
+            assert advance(handle, x, u, part * 1_000_000 // parts, 1_000_000 // parts, dt) == 0
+    assert np.ptp(total) < 1e-9 * max(kinetic)
+
+
 @pytest.fixture(scope="module")
 def pinned(platform, turbine):
     """{integrator: Bending on springs}."""
@@ -243,9 +277,17 @@ def test_an_impulse_of_the_rotor_is_that_of_a_short_push(platform, turbine):
     cache = np.zeros(N_CACHE)
     fill_impulse(load, x, bend, tower, still, rates_of, cache)
     accelerate_bending(
-        pose_of(still), still, carried(load, bend), torque, np.zeros((6, 6)), body, tower, np.zeros((8, 8)),
-        cache, rates_of,
-    )  # fmt: skip
+        pose_of(still),
+        still,
+        carried(load, bend),
+        torque,
+        np.zeros((6, 6)),
+        body,
+        tower,
+        np.zeros((8, 8)),
+        cache,
+        rates_of,
+    )
     x[7:14] = x[N_RIGID + 2 :] = 0.0  # at rest the twin knows no other forces of velocity
     path, push = case.twin.path(x, case.blocks), (True, np.zeros(3), np.array(load[:3]), np.array(load[3:]))
     none = case.twin.fall(path, 0.0, [], np.zeros((6, 6)))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from naive import rotor as naive
-from rotor_helpers import state, wind_series
+from rotor_helpers import wind_series
 
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.plant.aero.tower_drag import bent_tower_load, build_tower_drag, tower_load
@@ -18,6 +18,12 @@ PART = build_tower_drag(TOWER, 1.225)
 
 def load(x, series, part=PART):
     return tower_load(0.0, pose_of(x), wind_now(0.0, series), series, None, part)
+
+
+def state(position=(0,) * 6, velocity=(0,) * 6):
+    x = np.zeros(N_RIGID)
+    x[:6], x[7:13] = position, velocity
+    return x
 
 
 def test_absent_tower_or_wind_gives_exactly_zero():
@@ -40,8 +46,7 @@ def test_moving_tower_in_sheared_wind_agrees_with_the_naive_twin(seed):
     rng = np.random.default_rng(seed)
     series = wind_series(*rng.uniform(-20, 20, 3), vertical=rng.uniform(-3, 3), shear=0.14)
     scale = np.array([5, 5, 3, 0.1, 0.1, 0.5])
-    velocity = (1, 1, 1, 0.03, 0.03, 0.03)
-    x = state(position=rng.normal(0, 1, 6) * scale, velocity=rng.normal(0, 1, 6) * velocity)
+    x = state(rng.normal(0, 1, 6) * scale, rng.normal(0, 1, 6) * (1, 1, 1, 0.03, 0.03, 0.03))
     pose, now = pose_of(x), wind_now(0.0, series)
     R = np.array(pose[3:12]).reshape(3, 3)
 
@@ -82,12 +87,22 @@ def test_still_air_never_adds_energy():
     still = wind_series(0.0)
     for _ in range(1000):
         velocity = rng.normal(0, 1, 6) * (2, 2, 2, 0.1, 0.1, 0.1)
-        x = state(position=rng.normal(0, 1, 6) * (5, 5, 3, 0.3, 0.3, 2.0), velocity=velocity)
+        x = state(rng.normal(0, 1, 6) * (5, 5, 3, 0.3, 0.3, 2.0), velocity)
         assert np.dot(load(x, still), velocity) < 0.0
+
+
+def test_tower_moving_with_the_wind_has_no_drag():
+    assert np.all(np.array(load(state(velocity=(7, 0, 0, 0, 0, 0)), wind_series(7.0))) == 0.0)
+
+
+def test_drag_is_mirror_symmetric():
+    a = np.array(load(state((0, 1, 0, 0.1, 0.05, 0.2), (1, 0.5, 0, 0.01, 0.02, 0.03)), wind_series(15, 4)))
+    b = load(state((0, -1, 0, -0.1, 0.05, -0.2), (1, -0.5, 0, -0.01, 0.02, -0.03)), wind_series(15, -4))
+    assert np.array(b) * (1, -1, 1, -1, 1, -1) == pytest.approx(a, rel=1e-12, abs=1e-9)
 
 
 def test_six_points_are_enough():
     many = build_tower_drag(TOWER, 1.225, points=40)
     series = wind_series(18.0, 3.0, vertical=2.0, shear=0.2)
-    x = state(position=(0, 0, 0, 0.02, 0.08, 0.1), velocity=(1, 0.5, 0.2, 0.01, 0.03, 0.0))
+    x = state((0, 0, 0, 0.02, 0.08, 0.1), (1, 0.5, 0.2, 0.01, 0.03, 0.0))
     assert np.array(load(x, series)) == pytest.approx(np.array(load(x, series, many)), rel=1e-5, abs=1e-3)

@@ -6,6 +6,7 @@ from plant_helpers import make_pose
 
 from fowt_env.plant.events import N_COUNTERS, Counter
 from fowt_env.plant.hydro.hydrostatics import build_hull, hydrostatic_load, sliced, submerged
+from fowt_env.plant.state import NO_LOAD
 
 pytestmark = pytest.mark.installation
 
@@ -28,6 +29,11 @@ def volume_and_moment(r, R, hull):
 
 def load(r, R, hull):
     return np.array(hydrostatic_load(posed(r, R), hull, np.zeros(N_COUNTERS)))
+
+
+def test_no_hull_no_load():
+    pose = posed([1.0, 2.0, 3.0], rotation(0.1, 0.2, 0.3))
+    assert hydrostatic_load(pose, None, np.zeros(N_COUNTERS)) == NO_LOAD
 
 
 def test_closed_form_is_the_integral_over_the_wet_hull(hull):
@@ -81,6 +87,16 @@ def test_load_is_continuous_where_the_fallback_takes_over(hull):
         jump = load(inside, R, hull) - load(outside, R, hull)
         assert np.abs(jump[:3]).max() < 1e-6 * np.abs(load(inside, R, hull)[:3]).max()
         assert np.abs(jump[3:]).max() < 1e-6 * np.abs(load(inside, R, hull)[3:]).max()
+
+
+def test_fallback_is_counted_only_when_the_plane_leaves_the_cylinder(hull):
+    counters = np.zeros(N_COUNTERS)
+    upright = rotation(0.0, 0.1, 0.0)
+    hydrostatic_load(posed(np.zeros(3), upright), hull, counters)
+    assert np.all(counters == 0.0)
+    for heave in (12.0, -13.0, 5.0):
+        hydrostatic_load(posed([0.0, 0.0, heave], upright), hull, counters)
+    assert counters[Counter.HYDROSTATIC_FALLBACK] == 3.0
 
 
 def potential(r, R, hull):

@@ -1,11 +1,15 @@
 import numpy as np
 import pytest
-from naive.strips import strip_load
+from naive import morison as naive
+from naive.morison import spar_of
 from plant_helpers import make_pose
-from spar_in_waves import STILL, SWITCHES, motion, strips_of, waves_of
+from spar_in_waves import STILL, SWITCHES, motion, nodes_of, strips_of, waves_of
 
 from fowt_env.plant.hydro.load import fill_added_mass
 from fowt_env.plant.hydro.morison import Current, morison_load
+from fowt_env.plant.hydro.strip_kinematics import strip_kinematics
+from fowt_env.plant.hydro.strips import axis_surface
+from fowt_env.plant.hydro.waves import wave_kinematics
 
 pytestmark = pytest.mark.installation
 
@@ -29,25 +33,85 @@ def load(t, motion, strips, waves, current=None):
     return morison_load(t, make_pose(*motion), strips, waves, current, kin)
 
 
-@pytest.mark.parametrize("stream", [None, Current(0.8, -0.4, 1.0 / 7.0)])
-@pytest.mark.parametrize("switches", [None, *SWITCHES], ids=lambda switches: "-".join(switches or ["still"]))
-def test_load_is_the_plain_integral_for_any_motion(switches, stream, platform, site):
-    """switches None: still water."""
-    strips, waves = strips_of(platform, *(switches or ())), waves_of(SEA, site) if switches else None
+def test_no_strips_no_load():
+    empty = morison_load(
+        1.0, make_pose(*motion(np.random.default_rng(0))), None, None, None, np.zeros((7, 0))
+    )
+    assert all(value == 0.0 for value in (*empty.wrench, *empty[1:]))
+
+
+@pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
+def test_strip_kinematics_are_the_plain_sum_at_the_nodes(switches, platform, site):
+    strips, waves = strips_of(platform, *switches), waves_of(SEA, site)
+    rng = np.random.default_rng(1)
+    for _ in range(12):
+        t, moving = rng.uniform(0.0, 100.0), motion(rng)
+        pose = make_pose(*moving)
+        top, eta = axis_surface(t, pose, strips, waves)
+        kin = np.zeros((7, strips.nodes))
+        keel = strip_kinematics(t, pose, top, eta, strips, waves, kin)
+        z = np.r_[nodes_of(strips, top)[0], strips.keel_z]
+        r, R = (moving[0], moving[1]) if switches[0] == "instantaneous" else (np.zeros(3), np.eye(3))
+        points = r + np.outer(z, R[:, 2])
+        if switches[2] == "wheeler":
+            points[:, 2] = site.water_depth * (points[:, 2] - eta) / (site.water_depth + eta)
+        expected = np.array([wave_kinematics(t, *point, waves) for point in points]).T
+        scale = np.abs(expected).max(axis=1)
+        assert np.all(np.abs(kin - expected[:, :-1]).max(axis=1) < 1e-11 * scale)
+        got = np.array(keel)
+        assert np.all(np.abs(got - expected[:, -1]) < 1e-11 * scale)
+
+
+@pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
+def test_load_is_the_plain_integral_for_any_motion(switches, platform, site):
+    strips, waves, spar = strips_of(platform, *switches), waves_of(SEA, site), spar_of(platform, *switches)
+    rng = np.random.default_rng(2)
+    for _ in range(3):
+        t, moving = rng.uniform(0.0, 100.0), motion(rng)
+        got = load(t, moving, strips, waves)
+        top, eta = naive.surface_on_axis(t, moving[0], moving[1], SEA, spar)
+        assert np.allclose(
+            axis_surface(t, make_pose(*moving), strips, waves), (top, eta), rtol=0.0, atol=1e-8
+        )
+        # at the same nodes: the same sum; at many nodes: what the quadrature costs
+        for at, tolerance in ((nodes_of(strips, top), 1e-8), (None, 1e-5)):
+            F, M, S = naive.load(t, *moving, SEA, spar, at=at)
+            wrench = np.array(got.wrench)
+            assert np.abs(wrench[:3] - F).max() < tolerance * np.abs(F).max()
+            assert np.abs(wrench[3:] - M).max() < tolerance * np.abs(M).max()
+            assert np.allclose((got.s0, got.s1, got.s2), S, rtol=1e-5, atol=0.0)
+
+
+@pytest.mark.parametrize("with_waves", [False, True])
+def test_load_in_a_current_is_the_plain_integral(with_waves, platform, site):
+    strips, spar = strips_of(platform), spar_of(platform)
+    sea = SEA if with_waves else None
+    waves = waves_of(SEA, site) if with_waves else None
+    current = Current(0.8, -0.4, 1.0 / 7.0)
 
     def profile(height):
         share = np.clip((site.water_depth + height) / site.water_depth, 0.0, 1.0) ** (1.0 / 7.0)
         return np.array([0.8, -0.4]) * share
 
-    rng = np.random.default_rng(2)
+    rng = np.random.default_rng(3)
     for _ in range(3):
         t, moving = rng.uniform(0.0, 100.0), motion(rng)
-        got = load(t, moving, strips, waves, stream)
-        wanted, S = strip_load(t, *moving, platform.hull, strips, waves, stream and profile)
-        wrench = np.array(got.wrench)
-        assert np.abs(wrench[:3] - wanted[:3]).max() < 1e-5 * np.abs(wanted[:3]).max()
-        assert np.abs(wrench[3:] - wanted[3:]).max() < 1e-5 * np.abs(wanted[3:]).max()
-        assert np.allclose((got.s0, got.s1, got.s2), S, rtol=1e-5, atol=0.0)
+        got = load(t, moving, strips, waves, current)
+        top, _ = naive.surface_on_axis(t, moving[0], moving[1], sea, spar)
+        at = nodes_of(strips, top)
+        F, M, _ = naive.load(t, *moving, sea, spar, current=profile, at=at)
+        assert np.abs(np.array(got.wrench) - np.r_[F, M]).max() < 1e-8 * np.abs(np.r_[F, M]).max()
+
+
+def test_drag_quadrature_converges(platform, site):
+    waves = waves_of([(1.2566, 1.5, 0.4, 0.0)], site)
+    rng = np.random.default_rng(4)
+    for _ in range(10):
+        t, moving = rng.uniform(0.0, 10.0), motion(rng)
+        loads = [load(t, moving, strips_of(platform, cell=cell), waves) for cell in (4.0, 2.0, 0.25)]
+        coarse, fine, finest = (np.array(found.wrench) for found in loads)
+        assert np.abs(fine - finest).max() < 1e-4 * np.abs(finest).max()
+        assert np.abs(coarse - finest).max() < 1e-3 * np.abs(finest).max()
 
 
 def test_load_is_continuous_in_time(platform, site):
@@ -80,6 +144,29 @@ def test_the_matrix_of_the_added_mass_is_that_of_slices_that_take_water_across_t
     assert matrix == pytest.approx(expected, rel=1e-12, abs=1e-12 * got.s2)
 
 
+def test_no_waves_equals_waves_of_no_height(platform, site):
+    strips, waves = strips_of(platform), waves_of(SEA, site)
+    flat = waves._replace(amplitude=0.0 * waves.amplitude, velocity=0.0 * waves.velocity)
+    rng = np.random.default_rng(6)
+    for _ in range(20):
+        moving = motion(rng)
+        without, zero = load(3.0, moving, strips, None), load(3.0, moving, strips, flat)
+        scale = np.abs(np.array(without.wrench)).max()
+        assert np.abs(np.array(without.wrench) - np.array(zero.wrench)).max() < 1e-14 * scale
+        assert without[1:] == zero[1:]
+
+
+def test_drag_vanishes_when_water_moves_with_the_hull(platform):
+    # a uniform current and a hull that drifts with it, upright or heeled, no added-mass terms
+    strips = strips_of(platform)
+    rng = np.random.default_rng(7)
+    for _ in range(10):
+        r, R, _, _ = motion(rng)
+        stream = np.array([0.9, -0.3, 0.0])
+        got = load(0.0, (r, R, R.T @ stream, np.zeros(3)), strips, None, Current(0.9, -0.3, 0.0))
+        assert np.abs(np.array(got.wrench)).max() < 1e-9
+
+
 def test_current_on_an_upright_spar_is_its_drag_integral(platform, site):
     strips = strips_of(platform)
     got = load(0.0, STILL, strips, None, Current(1.0, 0.0, 0.0))
@@ -87,12 +174,22 @@ def test_current_on_an_upright_spar_is_its_drag_integral(platform, site):
     expected = 0.5 * site.water_density * platform.hydro.drag_coefficient * area
     assert got.wrench.fx == pytest.approx(expected, rel=1e-12)
     # a linear profile: u^2 integrates to the second moment of the height above the seabed
-    z = np.linspace(-120.0, 0.0, 200001)
-    d = np.interp(z, platform.hull.z, platform.hull.diameter)
+    z, weight, d, _ = naive.nodes(spar_of(platform), 0.0)
     quadratic = 0.5 * site.water_density * platform.hydro.drag_coefficient
-    expected = quadratic * np.trapezoid(d * (1.0 + z / site.water_depth) ** 2, z)
+    expected = quadratic * np.sum(weight * d * (1.0 + z / site.water_depth) ** 2)
     sheared = load(0.0, STILL, strips, None, Current(1.0, 0.0, 1.0))
     assert sheared.wrench.fx == pytest.approx(expected, rel=1e-6)
+
+
+def test_drag_takes_energy_in_still_water_whatever_the_motion(platform):
+    strips = strips_of(platform)._replace(
+        added_mass_coefficient=0.0, heave_added_mass=0.0, axial_drag_coefficient=1.5
+    )
+    rng = np.random.default_rng(9)
+    for _ in range(200):
+        moving = motion(rng, tilt=1.0)
+        power = np.array(load(0.0, moving, strips, None).wrench) @ np.r_[moving[2], moving[3]]
+        assert power < 0.0
 
 
 def test_axial_drag_slows_heave(platform, site):
@@ -102,6 +199,28 @@ def test_axial_drag_slows_heave(platform, site):
         got = load(0.0, (np.zeros(3), np.eye(3), np.array([0.0, 0.0, speed]), np.zeros(3)), strips, None)
         expected = -0.5 * site.water_density * 2.0 * area * abs(speed) * speed
         assert got.wrench.fz == pytest.approx(expected, rel=1e-12)
+
+
+def test_still_water_power_of_the_inertia_terms_is_third_order(platform):
+    # relative Morison is not a conservative added mass: its residual power is the Munk-type
+    # integral of rho A C_A u_z (u_x w_y - u_y w_x), theory.md 5.4
+    strips = strips_of(platform)._replace(drag_coefficient=0.0)
+    spar = spar_of(platform)
+    rng = np.random.default_rng(10)
+    for _ in range(20):
+        r, R, v, w = motion(rng)
+        r[2] = 0.0
+        got = np.array(load(0.0, (r, R, v, w), strips, None).wrench)
+        z, weight, d, _ = naive.nodes(spar, 0.0)
+        line = spar.density * spar.added_mass * np.pi / 4.0 * d**2
+        ux, uy = v[0] + w[1] * z, v[1] - w[0] * z
+        # w x u has no part along u, so what the normal terms do is what its axial part leaves out
+        munk = np.sum(weight * line * v[2] * (w[0] * uy - w[1] * ux))
+        keel = v[0] + w[1] * spar.z[0], v[1] - w[0] * spar.z[0]
+        munk -= spar.heave_added_mass * v[2] * (w[0] * keel[1] - w[1] * keel[0])
+        assert got @ np.r_[v, w] == pytest.approx(munk, rel=1e-4, abs=1e-3)
+        tenth = np.array(load(0.0, (r, R, 0.1 * v, 0.1 * w), strips, None).wrench)
+        assert tenth @ np.r_[0.1 * v, 0.1 * w] == pytest.approx(1e-3 * munk, rel=1e-4, abs=1e-6)
 
 
 def test_fixed_spar_has_the_force_amplitudes_of_linear_theory(platform, site):

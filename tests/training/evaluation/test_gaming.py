@@ -4,10 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.control import make
+from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.descriptions.units import RPM
 from fowt_env.training.evaluation import bootstrap
 from fowt_env.training.evaluation import leaderboard as board_module
-from fowt_env.training.evaluation.cases import read_suite
-from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.cases import Case, Limits, read_suite
+from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
 from fowt_env.training.evaluation.failures import PENALTY, penalised, with_lost_power
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS, better
@@ -98,6 +101,17 @@ def test_a_run_that_is_given_up_where_it_goes_badly_gains_nothing(status):
     assert set(verdicts) == {"failed"}
 
 
+def test_power_beyond_rated_is_no_energy():
+    def overproduces(wind, seed):
+        return good(wind, seed) | {"GenPwr_mean_[kW]": 1.05, ENERGY: 0.985}
+
+    runs = table(honest=good, gamer=overproduces)
+    assert ranks(runs)["honest"] < ranks(runs)["gamer"]
+    verdicts = agent_scores(runs, ["gspi_oc3"]).set_index(["agent", "figure"])["verdict"]
+    assert verdicts["gamer", "energy"].startswith("missed")
+    assert not verdicts["honest", "energy"].startswith("missed")
+
+
 @pytest.mark.parametrize("spent", [{SHAFT: 1.4}, {TORQUE: 6.0}, {TRAVEL: 1.3}, {"GenPwr_max_[kW]": 1.2}])
 def test_rotor_speed_that_is_bought_with_torque_or_pitch_or_power_is_beyond_a_limit(spent):
     def buys(wind, seed):
@@ -168,6 +182,27 @@ def test_a_lost_run_counts_a_fixed_multiple_of_the_reference():
     assert found["trips"] == found["fails"] and found["gspi_oc3"] == 1.0
 
 
+# the worst ratios to the reference of runs that ended well, of laws with limit cycles and commands that swing
+JUST_ALIVE = {
+    SPEED: 1.5, LEAN: 6.7, TRAVEL: 43.0, SHAFT: 9.7, "TwrBsMyt_DEL_[kN-m]": 3.9, "FAIRTEN_DEL_[kN]": 1.1,
+    ENERGY: 0.85,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("given_up", [{12.0}, {24.0}, {12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0}])
+def test_giving_up_pays_for_nobody_however_bad_its_run_would_be(given_up):
+    for seeds in (1, 6):
+        runs = table(
+            endures=lambda wind, seed: dict(JUST_ALIVE),
+            quits=lambda wind, seed: (
+                {"status": "failed"}
+                if wind in given_up and seed <= seeds  # noqa: B023
+                else dict(JUST_ALIVE)
+            ),
+        )
+        assert scores(runs)["quits"] > scores(runs)["endures"] > 10.0
+
+
 def test_a_reference_without_a_figure_counts_for_nobody_and_without_one_there_is_no_score():
     runs = table(honest=good, gamer=gives_up_once)
     at = (runs["controller"] == REFERENCE) & (runs["case"] == "ntm_12") & (runs["seed"] == 1)
@@ -225,3 +260,72 @@ def test_a_turbine_that_stands_still_has_lost_power_unless_a_fault_took_it():
     lost = with_lost_power(without)
     assert (lost["status"] == "lost power").sum() == 42 and "of gspi_oc3" in lost["reason"].max()
     assert with_lost_power(without[without["controller"] != "gspi_oc3"])["status"].eq("ok").all()
+
+
+# ------------------------------------------------------------------ real runs
+
+
+class Quitter:
+    """gspi_oc3 that raises once the rotor is off by so many rpm."""
+
+    def __init__(self, turbine, off=0.3):
+        self.inner = make("gspi_oc3", turbine, 0.1)
+        self.information = (*self.inner.information, "rotor_speed")
+        self.off, self.rated = off * RPM, turbine.rated_rotor_speed
+
+    def reset(self, measurement):
+        self.inner.reset(measurement)
+
+    def act(self, measurement):
+        if abs(measurement.rotor_speed - self.rated) > self.off:
+            raise RuntimeError("enough of this")
+        return self.inner.act(measurement)
+
+
+class LowerSetPoint:
+    """gspi_oc3 that is told of a rotor 3 % faster than it is, and so holds one 3 % slower."""
+
+    def __init__(self, turbine):
+        self.inner = make("gspi_oc3", turbine, 0.1)
+        self.information = self.inner.information
+
+    def _told(self, measurement):
+        return measurement._replace(generator_speed=1.03 * measurement.generator_speed)
+
+    def reset(self, measurement):
+        self.inner.reset(self._told(measurement))
+
+    def act(self, measurement):
+        return self.inner.act(self._told(measurement))
+
+
+def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_twin():
+    case = Case("ntm_18", {"kind": "ntm", "speed": 18.0, "class": "B"}, None)
+    turbine = read_turbine("nrel5mw")
+    options = {"duration": 60.0, "skip": 10.0, "seeds": (1001, 1002), "reference": "gspi_oc3"}
+    runs = evaluate({"gspi_oc3": "gspi_oc3", "quitter": Quitter(turbine)}, [case], **options)
+    lost = runs[runs["controller"] == "quitter"]
+    assert (lost["status"] == "failed").any() and "enough of this" in " ".join(lost["reason"])
+    board = leaderboard(runs, score=HEADLINE.score)
+    assert [entry["controller"] for entry in board["controllers"]] == ["gspi_oc3", "quitter"]
+    quitter = board["controllers"][1]
+    assert quitter["score"]["mean"] >= 1.0 and not quitter["score"]["valid"]
+
+
+def test_a_lower_set_point_loses_energy_and_is_beyond_the_limit_of_settling():
+    settling = read_suite("settling")
+    case = next(case for case in settling.cases if case.name == "settling_18")
+    turbine = read_turbine("nrel5mw")
+    runs = evaluate(
+        {"gspi_oc3": "gspi_oc3", "low": LowerSetPoint(turbine)}, [case], duration=600.0, skip=0.0
+    ).set_index("controller")
+    assert runs.loc["gspi_oc3", "RotSpeed_offset_[%]"] < 0.5 < 2.5 < runs.loc["low", "RotSpeed_offset_[%]"]
+    board = leaderboard(runs.reset_index(), limits=settling.limits)
+    assert [entry["controller"] for entry in board["controllers"]] == ["gspi_oc3", "low"]
+    assert "RotSpeed_offset" in board["controllers"][1]["beyond"][0]
+
+
+def test_limits_of_the_headline_are_of_metrics_that_there_are_and_hold_for_the_baseline():
+    assert isinstance(HEADLINE.limits, Limits) and HEADLINE.limits.baseline == HEADLINE.score.baseline
+    runs = table()
+    assert not leaderboard(runs, limits=HEADLINE.limits)["controllers"][0]["beyond"]
