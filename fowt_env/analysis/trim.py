@@ -1,6 +1,6 @@
 """Steady operating point of a scene, averaged over the rotor's azimuth, in its mean wind and still water."""
 
-from collections import UserDict
+from collections.abc import Mapping
 from math import cos, pi, sin
 
 import numpy as np
@@ -43,7 +43,7 @@ DEFLECTION_STEP = 1e-3  # m, of those of a flexible tower
 PLATFORM_MODES = ("floating", "fixed")
 
 
-class OperatingPoint(UserDict):
+class OperatingPoint(Mapping):
     """Steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] or op["RotThrust_[kN]"].
 
     Attributes: state (n_state,) and command (n_commands,): generator torque N m, blade pitch rad, both SI;
@@ -51,7 +51,7 @@ class OperatingPoint(UserDict):
     """
 
     def __init__(self, values, state, command, wind_speed, platform):
-        super().__init__(values)
+        self.data = dict(values)
         self.state, self.command = state, command
         self.wind_speed, self.platform = wind_speed, platform
 
@@ -66,6 +66,12 @@ class OperatingPoint(UserDict):
 
     def __contains__(self, name):
         return channel_name(name) in self.data
+
+    def __iter__(self):
+        return iter(self.data)
+
+    def __len__(self):
+        return len(self.data)
 
     def copy(self):
         """Return the same point with separate arrays."""

@@ -47,7 +47,7 @@ def made_up_fit():
     for i, j in ((0, 0), (0, 4), (4, 4), (2, 2), (5, 5)):
         value = (RNG.normal(size=pole[j]) + 1j * RNG.normal(size=pole[j])) * np.sqrt(size[i] * size[j])
         residues[i, j] = residues[j, i] = value
-    return RadiationFit(poles, residues, {}, 0.0, 0.02)
+    return RadiationFit(poles, residues, {})
 
 
 STATES = build_state_space(made_up_fit(), 15)
