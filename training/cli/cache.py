@@ -44,7 +44,8 @@ def clear(
     """
     from fowt_env.training.cli import health
 
-    wanted = ["other versions", "submissions", *["this version"] * every, *["wind boxes"] * wind_boxes]
+    wanted = {"other versions", "submissions"} | ({"this version", "hashes of sources"} if every else set())
+    wanted |= {"wind boxes"} if wind_boxes else set()
     parts = {what: paths for what, paths in health.cache_parts().items() if what in wanted and paths}
     if not parts:
         note("nothing to remove")

@@ -62,6 +62,7 @@ def cache_parts() -> dict[str, list[Path]]:
     if root is None:
         return {}
     kernels, boxes, submissions = root / "kernels", root / "wind_boxes", root / "submissions"
+    parsed = root / "sources" / "parsed.json"
     folders = own_folders(kernels) if _ours(kernels) else []
     named = [path for path in boxes.glob("*.npz") if BOX_NAME.fullmatch(path.name)] if _ours(boxes) else []
     inner = submissions.iterdir() if _ours(submissions) else ()
@@ -71,6 +72,7 @@ def cache_parts() -> dict[str, list[Path]]:
         "other versions": [path for path in folders if path != CACHE_FOLDER],
         "wind boxes": [path for path in named if path.is_file() and not path.is_symlink()],
         "submissions": [path for path in judged if path.is_dir() and not path.is_symlink()],
+        "hashes of sources": [parsed] if _ours(parsed.parent) and parsed.is_file() else [],
     }
 
 

@@ -29,7 +29,10 @@ def root(tmp_path, monkeypatch):
         folder = tmp_path / "submissions" / name / "kernels"
         folder.mkdir(parents=True)
         (folder / "kernel.nbi").write_bytes(b"0" * 2_000_000)
-    for folder in (tmp_path / "kernels", boxes, tmp_path / "submissions"):
+    (tmp_path / "sources").mkdir()
+    for name in ("parsed.json", "mine.json"):
+        (tmp_path / "sources" / name).write_bytes(b"0" * 100_000)
+    for folder in (tmp_path / "kernels", boxes, tmp_path / "submissions", tmp_path / "sources"):
         folder.chmod(0o700)
     monkeypatch.setattr(health, "CACHE_FOLDER", tmp_path / "kernels" / THIS)
     return tmp_path
@@ -41,12 +44,11 @@ def fowt(*words, **options):
 
 def left(root):
     """Names of what is in the cache."""
-    return {
-        path.name for folder in ("kernels", "wind_boxes", "submissions") for path in (root / folder).iterdir()
-    }
+    folders = ("kernels", "wind_boxes", "submissions", "sources")
+    return {path.name for folder in folders for path in (root / folder).iterdir()}
 
 
-ALL = {THIS, OTHER, FOREIGN, f"{'a' * 24}.npz", "mine.npz", SUBMISSION, "mine"}
+ALL = {THIS, OTHER, FOREIGN, f"{'a' * 24}.npz", "mine.npz", SUBMISSION, "mine", "parsed.json", "mine.json"}
 OLD = {OTHER, SUBMISSION}
 
 
@@ -58,11 +60,16 @@ def test_it_shows_folder_versions_and_sizes(root):
     }
     assert rows["this version"] == ["1", "1.0"] and rows["other versions"] == ["1", "1.0"]
     assert rows["wind boxes"] == ["1", "3.0"] and rows["submissions"] == ["1", "2.0"]
+    assert rows["hashes of sources"] == ["1", "0.1"]
 
 
 @pytest.mark.parametrize(
     "words, gone",
-    [((), OLD), (("--all", "--yes"), OLD | {THIS}), (("--wind-boxes", "--yes"), OLD | {f"{'a' * 24}.npz"})],
+    [
+        ((), OLD),
+        (("--all", "--yes"), OLD | {THIS, "parsed.json"}),
+        (("--wind-boxes", "--yes"), OLD | {f"{'a' * 24}.npz"}),
+    ],
 )
 def test_it_removes_what_is_named_and_nothing_else(root, words, gone):
     (root / "submissions" / f"{SUBMISSION}-k3_x9a2b").mkdir()  # of an interrupted judging
