@@ -3,10 +3,12 @@
 import os
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
 from copied_code import copied_code
+from numba.core.registry import CPUDispatcher
 
 from fowt_env.layout import PACKAGE
 from fowt_env.plant.compile.decorators import entry, kernel
@@ -46,6 +48,30 @@ def test_python_calls_it_with_the_same_bits():
     slopes(values, out)
     assert [slope(value) for value in values] == out.tolist()
     assert slope.twin.signatures and slope(2) == slope.py_func(2)  # of another type: compiled for it
+
+
+def test_a_thread_that_compiles_a_caller_leaves_python_its_function(monkeypatch):
+    @kernel
+    def halved(x):
+        return 0.5 * x
+
+    @entry
+    def quartered(x):
+        return 0.5 * halved(x)
+
+    compile_for_args, threads = CPUDispatcher._compile_for_args, []
+
+    def interrupted(self, *args, **options):
+        if self is halved:
+            threads.append(threading.Thread(target=quartered, args=(8.0,)))
+            threads[0].start()
+            threads[0].join(2.0)
+        return compile_for_args(self, *args, **options)
+
+    monkeypatch.setattr(CPUDispatcher, "_compile_for_args", interrupted)
+    assert halved(8.0) == 4.0
+    threads[0].join()
+    assert quartered(8.0) == 2.0
 
 
 def test_a_kernel_may_print_for_whoever_looks_for_a_fault(tmp_path):
