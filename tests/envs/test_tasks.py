@@ -122,7 +122,7 @@ def test_lists_of_a_series_are_data_and_not_ranges():
         ({"wind": [(1.0, WIND, None), 14.0]}, r"wind\[1\] = 14.0: must be \(share, wind, sea\)"),
         ({"wind": [(0.0, WIND, None)]}, r"share of wind\[0\] = 0.0: must be a number in \(0, 1e\+06\]"),
         ({"wind": [(1.0, {"kind": "ntm", "speed": 120.0}, None)]}, "speed = 120.0"),
-        ({"wind": [(1.0, WIND, None)], "sea": "paper_regular"}, "sea = 'paper_regular': must be None beside"),
+        ({"wind": [(1.0, WIND, None)], "sea": "paper_regular"}, "sea = 'paper_regular': must be None with"),
         ({"wind": [(1.0, {"kind": "box"}, None)]}, r"wind\[0\]: a box of full-field wind"),
         ({"wind_preview": (1.0, -2.0)}, "wind_preview = -2.0"),
         ({"wind_preview": 5.0}, "must be a list of times"),

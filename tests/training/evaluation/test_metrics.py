@@ -55,6 +55,13 @@ def test_sine_has_the_known_standard_deviation_and_travel():
     assert result["blade_pitch_travel_[deg/s]"] == pytest.approx(1.2, rel=1e-12)
 
 
+def test_deviations_are_about_the_mean_with_n_in_the_denominator():
+    names = ("RotSpeed_[rpm]", "PtfmSway_[m]", "FAIRTEN2_[kN]")
+    result = metrics(synthetic_run(duration=0.3, **dict.fromkeys(names, lambda t: 12.0 + 10.0 * t)))
+    for name in ("RotSpeed_std_[rpm]", "PtfmSway_std_[m]", "FAIRTEN_std_[kN]"):
+        assert result[name] == pytest.approx(np.sqrt(1.25), rel=1e-12)
+
+
 def test_what_is_skipped_counts_from_the_first_row_whatever_its_time():
     run = synthetic_run(**{"RotSpeed_[rpm]": lambda t: np.where(t < 19.95, 5.0, 12.0)})
     for start in (0.0, 100.0):
@@ -167,7 +174,8 @@ def test_a_gust_is_over_where_the_rotor_stays_within_5_percent_of_where_it_ends(
     run = synthetic_run(duration=600.0, **speed)
     expected = 50.0 * np.log(2.42 / 0.605)  # the end is at 12.1 within 0.01 rpm
     assert metrics(run, skip=150.0, gust_start=200.0)["settling_time_[s]"] == pytest.approx(expected, abs=1.0)
-    assert metrics(synthetic_run(duration=300.0), gust_start=200.0)["settling_time_[s]"] == 0.0
+    early = synthetic_run(duration=300.0, **{"RotSpeed_[rpm]": lambda t: np.where(t < 150.0, 20.0, 12.1)})
+    assert metrics(early, gust_start=200.0)["settling_time_[s]"] == 0.0  # away before the gust alone
 
 
 # ------------------------------------------------------------------ fatigue and constraints
