@@ -11,7 +11,7 @@ from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel, s
 from fowt_env.analysis.linear_model import STATES
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.advance import RUNNING, advance, forget, observe
-from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, build_integrator
+from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, bashforth, build_integrator, moulton
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State
@@ -151,3 +151,12 @@ def test_a_blade_pitch_that_jumps_to_its_command_leaves_the_step_its_accuracy(na
     for channel in ("RotSpeed_[rpm]", "PtfmPitch_[deg]", "PtfmSurge_[m]"):
         error = np.sqrt(np.mean((whole[channel] - fine[channel]) ** 2)) / fine[channel].std()
         assert error < 4e-4  # else 2e-3 to 4e-3 under the plain method and 6e-4 to 9e-4 under the corrected
+
+
+@pytest.mark.parametrize("order", (1, 2, 3, 4))
+def test_the_multistep_formulas_are_exact_for_polynomials_of_their_order(order):
+    for power in range(5):
+        history = np.array([[float((-k) ** power)] for k in range(4)])  # of t^power at t = 0, -1, -2, -3
+        exact = 1.0 / (power + 1.0)  # its integral from 0 to 1
+        assert (abs(bashforth(order, 0, history) - exact) < 1e-12) == (power < order)
+        assert (abs(moulton(order, 1.0, 0, history) - exact) < 1e-12) == (power <= min(order, 3))
