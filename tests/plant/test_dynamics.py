@@ -6,8 +6,10 @@ from naive import joined_bodies, rigid_body
 from plant_helpers import integrate, leaning, make_pose, random_state, rates, state
 from scipy.integrate import solve_ivp
 
+from fowt_env import build_scene
 from fowt_env.errors import InputError
 from fowt_env.plant.accelerations import accelerate, factor_spd, substitute_spd
+from fowt_env.plant.advance import forget, observe
 from fowt_env.plant.drivetrain import build_drivetrain, shaft_torque
 from fowt_env.plant.hydro.hydrostatics import submerged
 from fowt_env.plant.model import N_CACHE
@@ -328,3 +330,20 @@ def test_nothing_depends_on_the_compass(name, request):
 def test_still_water_has_no_preferred_time(still_scene):
     x = random_state(np.random.default_rng(4))
     assert np.array_equal(rates(still_scene, x, t=0.0), rates(still_scene, x, t=123.4))
+
+
+@pytest.mark.parametrize("tower", ("rigid", "modes"))
+def test_rates_are_those_of_the_state_whatever_was_evaluated_before(tower):
+    """The factors of the mass matrix stay in the data arrays for the same state alone."""
+    scene = build_scene("oc3_hywind", tower=tower, mooring=False)  # whose solution keeps a warm start
+    rng, used, found = np.random.default_rng(6), scene.handle(), []
+    for _ in range(3):
+        x, u = 0.05 * rng.normal(size=scene.n_state), np.zeros(scene.n_commands)
+        x[State.HEAVE] = rng.normal()
+        for handle in (used, scene.handle()):
+            dx, measurement = np.zeros_like(x), np.zeros(scene.n_measurements)
+            forget(handle)
+            observe(handle, x, u, 0.0, dx, measurement)
+            found.append(dx)
+        assert np.array_equal(*found[-2:])
+    assert not np.array_equal(found[0], found[2])
