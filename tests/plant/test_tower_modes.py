@@ -275,6 +275,7 @@ def test_an_impulse_of_the_rotor_is_that_of_a_short_push(platform, turbine):
     load, torque = Wrench(*(1e6 * rng.normal(size=6))), 3e5
     bend, still, rates_of = bend_by_modes(x, tower), np.zeros_like(x), np.full(len(x), 7.0)
     cache = np.zeros(N_CACHE)
+    cache[LoadCache.FACTORED] = 1.0  # of the matrix at another state
     fill_impulse(load, x, bend, tower, still, rates_of, cache)
     accelerate_bending(
         pose_of(still),
