@@ -75,10 +75,10 @@ class Rotor(Record):
         longest = mass * (self.tip_radius - self.hub_radius)
         if first > longest * BLADE_SLACK:
             yield f"blade_first_moment = {first:g}: must be <= {longest:g}, blade_mass at the tip"
-        if first**2 > mass * second * BLADE_SLACK:
-            least = first**2 / mass if mass else math.inf
+        if first * first > mass * second * BLADE_SLACK:  # a product overflows to inf, a power raises
+            least = first * first / mass if mass else math.inf
             yield f"blade_second_moment = {second:g}: must be >= blade_first_moment**2/blade_mass = {least:g}"
-        about_shaft = second + 2.0 * self.hub_radius * first + self.hub_radius**2 * mass
+        about_shaft = second + 2.0 * self.hub_radius * first + self.hub_radius * self.hub_radius * mass
         about_shaft *= self.blades * np.cos(self.cone) ** 2
         if about_shaft > self.inertia * BLADE_SLACK:
             yield (
