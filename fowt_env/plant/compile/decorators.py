@@ -167,7 +167,7 @@ inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=True)
 # Functions called from Python, which take Handles (counted references) or allocate.
 entry = _decorator(**_HOUSE)
 
-# The same with its prange loops spread over threads.
+# Entries whose prange loops are spread over threads.
 parallel_entry = _decorator(**_HOUSE, parallel=True)
 
 FLOATS = types.float64[::1]
