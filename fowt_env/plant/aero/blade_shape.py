@@ -199,18 +199,18 @@ def _along_normal(along, out, at):
 
 
 @inlined_kernel
-def _add_to_straight(load, found, j, turn, shape):
-    length, first = found.length, found.first_moment
-    fn, ft = found.normal, found.tangential
+def _add_to_straight(load, part, j, turn, shape):
+    length, first = part.length, part.first_moment
+    fn, ft = part.normal, part.tangential
     return BladeLoad(
         load.fx + length * fn, 0.0, load.ft + length * ft, load.mx + first * ft, 0.0, load.mt - first * fn
     )
 
 
 @inlined_kernel
-def _add_to_curved(load, found, j, turn, shape):
+def _add_to_curved(load, part, j, turn, shape):
     lever = lever_of(j, turn, shape)
-    fn, ft, moment = found.length * found.normal, found.length * found.tangential, found.length * found.moment
+    fn, ft, moment = part.length * part.normal, part.length * part.tangential, part.length * part.moment
     return BladeLoad(
         load.fx + fn * lever.nx,
         load.fr + fn * lever.nr,
@@ -229,7 +229,7 @@ station_at = chosen_by_class(
 value_at = chosen_by_class("at", {OnAxis: _value_on_axis, Station: _value_at_station}, inlined=True)
 # (along, out, at) -> component normal to the blade axis of a vector (along, out) in x and r
 normal_part = chosen_by_class("at", {OnAxis: _along_shaft, Station: _along_normal}, inlined=True)
-# (load, found, j, turn, shape) -> BladeLoad with the StationLoad of station j added
+# (load, part, j, turn, shape) -> BladeLoad with the StationLoad of station j added
 add_station = chosen_by_class(
     "shape", {type(None): _add_to_straight, BladeShape: _add_to_curved}, inlined=True
 )
@@ -321,12 +321,12 @@ def build_blade_shape(turbine, line, chosen, arm, moment):
     """Return the BladeShape of chosen stations of a BladeLine; arm (n, 3) and moment: see BladeShape."""
     inner = line.points[1:-1]
     slope = np.gradient(inner[:, 0], inner[:, 2], edge_order=2 if len(inner) > 2 else 1)
-    place = inner[chosen]
-    columns = (*place.T, np.sin(np.arctan(slope))[chosen], *arm.T, np.asarray(turbine.blade.chord)[chosen])
+    points = inner[chosen]
+    columns = (*points.T, np.sin(np.arctan(slope))[chosen], *arm.T, np.asarray(turbine.blade.chord)[chosen])
     return BladeShape(
         *(np.ascontiguousarray(column, dtype=np.float64) for column in columns),
         np.ascontiguousarray(moment, dtype=np.float64),
         float(np.cos(turbine.rotor.cone)),
         float(np.sin(turbine.rotor.cone)),
-        float(np.linalg.norm(place, axis=1).max()),
+        float(np.linalg.norm(points, axis=1).max()),
     )

@@ -225,12 +225,12 @@ def is_boxed(flow, reach, shape, field):
         return False
     size, hub = field.velocity.shape, flow.hub
     late = rotor_depth(flow.pose, reach, shape) * field.slowness * field.rate
-    place = (flow.t + field.shift - hub.X * field.slowness) * field.rate
+    position = (flow.t + field.shift - hub.X * field.slowness) * field.rate
     if field.periodic:
-        place = place % size[0]
+        position = position % size[0]
     y, z = (hub.Y - field.low_y) * field.inverse_dy, (hub.Z - field.low_z) * field.inverse_dz
     dy, dz = reach * field.inverse_dy, reach * field.inverse_dz
-    timely = late <= place < size[0] - 1.0 - late
+    timely = late <= position < size[0] - 1.0 - late
     return timely and dy <= y < size[2] - 1.0 - dy and dz <= z < size[1] - 1.0 - dz
 
 
@@ -239,12 +239,12 @@ def box_wind(flow, motion, field):
     """Return the BoxWind of a blade in a WindField."""
     pose, hub = flow.pose, flow.hub
     pace, slices = field.slowness * field.rate, field.velocity.shape[0]
-    place = (flow.t + field.shift - hub.X * field.slowness) * field.rate
+    position = (flow.t + field.shift - hub.X * field.slowness) * field.rate
     if field.periodic:
-        place = place % slices
+        position = position % slices
     dy, dz = field.inverse_dy, field.inverse_dz
     return BoxWind(
-        Plane(place, -pose.r11 * pace, -motion.rx * field.slowness * field.rate, -motion.tx * pace),
+        Plane(position, -pose.r11 * pace, -motion.rx * field.slowness * field.rate, -motion.tx * pace),
         Plane((hub.Y - field.low_y) * dy, pose.r21 * dy, motion.ry * dy, motion.ty * dy),
         Plane((hub.Z - field.low_z) * dz, pose.r31 * dz, motion.rz * dz, motion.tz * dz),
         pose,
@@ -259,8 +259,8 @@ def _relative(u, v, w, at, pose, motion):
     m = motion
     along = value_at(Plane(pose.r11 * u + pose.r21 * v + pose.r31 * w - m.vx, 0.0, m.wt, -m.wr), at)
     out = value_at(Plane(m.rx * u + m.ry * v + m.rz * w - m.vr, -m.wt, 0.0, m.wx), at)
-    own = value_at(Plane(m.vt, -m.wr, m.wx, 0.0), at)
-    return normal_part(along, out, at), own - (m.tx * u + m.ty * v + m.tz * w)
+    moving = value_at(Plane(m.vt, -m.wr, m.wx, 0.0), at)
+    return normal_part(along, out, at), moving - (m.tx * u + m.ty * v + m.tz * w)
 
 
 @inlined_kernel
@@ -289,8 +289,8 @@ def _sheared(wind, at):
 
 @inlined_kernel
 def _boxed(wind, at):
-    place = GridPlace(value_at(wind.slice, at), value_at(wind.row, at), value_at(wind.column, at))
-    u, v, w = cell_wind(place, wind.velocity)
+    position = GridPlace(value_at(wind.slice, at), value_at(wind.row, at), value_at(wind.column, at))
+    u, v, w = cell_wind(position, wind.velocity)
     return _relative(u, v, w, at, wind.pose, wind.motion)
 
 
@@ -311,9 +311,9 @@ def _station(j, wind, blade, radius, shape):
 
 
 @inlined_kernel
-def _with_station(force, found, j, blade, shape):
+def _with_station(force, part, j, blade, shape):
     """Return a BladeForce plus the StationLoad of station j."""
-    return BladeForce(add_station(force.load, found, j, blade.turn, shape), force.outside + found.outside)
+    return BladeForce(add_station(force.load, part, j, blade.turn, shape), force.outside + part.outside)
 
 
 @inlined_kernel
@@ -326,9 +326,9 @@ def swept(wind, blade, radius, shape):
     """
     force = NO_FORCE
     for j in range(radius.shape[0]):
-        found = _station(j, wind, blade, radius, shape)
-        force = _with_station(force, found, j, blade, shape)
-        put_rates(found.rates, blade.response)
+        part = _station(j, wind, blade, radius, shape)
+        force = _with_station(force, part, j, blade, shape)
+        put_rates(part.rates, blade.response)
     return force
 
 

@@ -197,18 +197,18 @@ def _slopes(less, middle, more, co, si, size):
 
 
 @kernel
-def _straight_place(j, turn, rotor, shape):
+def _straight_geometry(j, turn, rotor, shape):
     arm = rotor.moment_weight[j] / rotor.weight[j]
     return Station(0.0, rotor.radius[j], 0.0, 1.0, 0.0), Lever(1.0, 0.0, -arm, 0.0, 0.0, 0.0, arm)
 
 
 @kernel
-def _curved_place(j, turn, rotor, shape):
+def _curved_geometry(j, turn, rotor, shape):
     return curved_station(j, turn, rotor.radius, shape), lever_of(j, turn, shape)
 
 
 # (j, turn, rotor, shape) -> (Station, Lever) of station j
-_place = chosen_by_class("shape", {type(None): _straight_place, BladeShape: _curved_place})
+_station_geometry = chosen_by_class("shape", {type(None): _straight_geometry, BladeShape: _curved_geometry})
 
 
 @entry
@@ -225,7 +225,7 @@ def _fill(theta, blade_pitch, load, lean, rotor, shape):
         for k in range(blade_pitch.shape[0]):
             turned = turn_of(blade_pitch[k])
             for j in range(rotor.radius.shape[0]):
-                at, lever = _place(j, turned, rotor, shape)
+                at, lever = _station_geometry(j, turned, rotor, shape)
                 pitch = effective_pitch(j, blade_pitch[k], shape)
                 r, nx, nr = at.r / big, at.nx, at.nr
                 arm, turn, t_nr = lever.r / big, -lever.turn / big, lever.t_nr / big
@@ -491,8 +491,8 @@ def coefficient_table_load(pose, x, now, series, table, counters):
     if steepest > STEEPEST * s:
         if now.u != 0.0:  # in still air the load is negligible
             counters[Counter.ROTOR_TABLE_CLAMPED] += 1.0
-        held = STEEPEST * s / steepest
-        gy, gz, qy, qz = held * gy, held * gz, held * qy, held * qz
+        reduction = STEEPEST * s / steepest
+        gy, gz, qy, qz = reduction * gy, reduction * gz, reduction * qy, reduction * qz
     my, mz = gy + HIGHER_SQUARE * qy, gz + HIGHER_SQUARE * qz
     nn, nt, tt = my * my + mz * mz, mz * cy - my * cz, cy * cy + cz * cz
     force = table.density * table.tip_radius * table.tip_radius

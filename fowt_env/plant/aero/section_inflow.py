@@ -76,20 +76,20 @@ def _fill(induced, load, blade_pitch, elements, shape):
             turned = effective_pitch(j, blade_pitch[i], shape)
             element = element_of(j, turned, elements)
             for k in range(load.shape[2]):
-                place = k - REVERSED
-                v_normal = place / AHEAD if place <= AHEAD else 1.0 - (place - AHEAD) / BEHIND
+                direction = k - REVERSED
+                v_normal = direction / AHEAD if direction <= AHEAD else 1.0 - (direction - AHEAD) / BEHIND
                 v_tangential = 1.0 - abs(v_normal)
-                if place > AHEAD:
+                if direction > AHEAD:
                     v_tangential = -v_tangential
                 cn, ct, square = airload(v_normal, v_tangential, element, elements.polars)
                 load[i, j, k, 0] = weight * element.half_density_chord * square * cn
                 load[i, j, k, 1] = weight * element.half_density_chord * square * ct
                 put_moment(load[i, j, k], weight, v_normal, v_tangential, j, element, elements, shape)
-                if place >= 0:
+                if direction >= 0:
                     v_normal = max(v_normal, LEAST_NORMAL)
                     section = blade_section(v_normal, v_tangential, turned, j, 1.0, elements)
-                    induced[i, j, place, 0] = section.induced_normal
-                    induced[i, j, place, 1] = section.induced_tangential
+                    induced[i, j, direction, 0] = section.induced_normal
+                    induced[i, j, direction, 1] = section.induced_tangential
 
 
 _tables = Cache(8)  # two per blade, 37 MB together: building takes about a second
@@ -124,7 +124,7 @@ def _pitch_rows(blade_pitch, rotor):
 
 
 @inlined_kernel
-def _own_rows(number, first, x, rotor, pitches):
+def _blade_rows(number, first, x, rotor, pitches):
     """Return the _pitch_rows of a blade; first: _pitch_rows of the first blade."""
     if pitches is None:
         return first
@@ -135,7 +135,7 @@ def _own_rows(number, first, x, rotor, pitches):
 def _blade(number, first, x, flow, rate, rotor, dx, pitches):
     """Return the Blade with this number; first: _pitch_rows of the first blade."""
     elements = rotor.elements
-    turn, induced, load = _own_rows(number, first, x, rotor, pitches)
+    turn, induced, load = _blade_rows(number, first, x, rotor, pitches)
     state = State.INTERNAL + PER_ELEMENT * elements.radius.shape[0] * number
     response = Lagging(state, induced, load, rate, rotor.ratio, rotor.arm, elements.shape, x, dx)
     return Blade(number, motion_of(number, x, elements, flow), turn, response)

@@ -166,7 +166,7 @@ def turn_and_response(blade_pitch, table):
 
 
 @inlined_kernel
-def _own_response(number, first, x, table, pitches):
+def _blade_response(number, first, x, table, pitches):
     """Return (Turn, Tabled) of a blade; first: (Turn, Tabled) of the first blade."""
     if pitches is None:
         return first
@@ -176,7 +176,7 @@ def _own_response(number, first, x, table, pitches):
 @inlined_kernel
 def tabled_blade(number, first, x, flow, table, pitches):
     """Return the Blade with this number; first: (Turn, Tabled) of the first blade."""
-    turn, response = _own_response(number, first, x, table, pitches)
+    turn, response = _blade_response(number, first, x, table, pitches)
     return Blade(number, motion_of(number, x, table.elements, flow), turn, response)
 
 

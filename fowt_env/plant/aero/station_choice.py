@@ -71,17 +71,17 @@ def fit_stations(loads, chosen, full, prior):
     states = np.vstack(loads)
     few = states[:, chosen]
     columns = []
-    for whole, own in zip((full.force, *full.first.T), (prior.force, *prior.first.T), strict=True):
-        size = np.abs(own).sum() / prior.force.sum() * prior.force  # scale of the changes, by station
+    for whole, column in zip((full.force, *full.first.T), (prior.force, *prior.first.T), strict=True):
+        size = np.abs(column).sum() / prior.force.sum() * prior.force  # scale of the changes, by station
         goal = states @ whole
         scale = np.sqrt(np.mean(goal**2))
         if scale == 0.0:  # such as the moment of a blade without sweep
-            columns.append(own)
+            columns.append(column)
             continue
         hold = HOLD * np.sqrt(len(states) / len(chosen)) * np.eye(len(chosen))
         matrix = np.vstack([few * size / scale, hold])
-        left = np.concatenate([(goal - few @ own) / scale, np.zeros(len(chosen))])
-        columns.append(own + size * np.linalg.lstsq(matrix, left, rcond=None)[0])
+        residual = np.concatenate([(goal - few @ column) / scale, np.zeros(len(chosen))])
+        columns.append(column + size * np.linalg.lstsq(matrix, residual, rcond=None)[0])
     return Fit(columns[0], np.column_stack(columns[1:]))
 
 

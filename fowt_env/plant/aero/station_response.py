@@ -169,10 +169,10 @@ def cell_of(v_normal, v_tangential, total, first):
     total: |v_normal| + |v_tangential|. All inputs are safe, also NaN.
     """
     ahead = AHEAD * v_normal
-    place = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total + first
-    place = place if place > 0.0 else 0.0  # also for NaN
-    k = min(int(place), first + AHEAD + BEHIND - 1)
-    return Cell(np.uintp(k), place - k)  # unsigned indices avoid the test for negative indices
+    position = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total + first
+    position = position if position > 0.0 else 0.0  # also for NaN
+    k = min(int(position), first + AHEAD + BEHIND - 1)
+    return Cell(np.uintp(k), position - k)  # unsigned indices avoid the test for negative indices
 
 
 @inlined_kernel
@@ -213,9 +213,9 @@ def _tabled_load(response, v_normal, v_tangential, j):
 @inlined_kernel
 def _tabled_or_solved_load(response, v_normal, v_tangential, j):
     """Return the StationLoad of station j over the air density."""
-    found = _tabled_load(response.tabled, v_normal, v_tangential, j)
-    if found.outside == 0:
-        return found
+    tabled = _tabled_load(response.tabled, v_normal, v_tangential, j)
+    if tabled.outside == 0:
+        return tabled
     return _exact_load(response, v_normal, v_tangential, j)
 
 

@@ -43,8 +43,8 @@ PLANT = Path(__file__).absolute().parents[1]
 def _hash(paths):
     """Return a hash (16 hexadecimal digits) of the code of sources and the versions of numba and Python."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    for place, path in sorted((installed_path(path), path) for path in paths):
-        digest.update(place.relative_to(PACKAGE).as_posix().encode())
+    for installed, path in sorted((installed_path(path), path) for path in paths):
+        digest.update(installed.relative_to(PACKAGE).as_posix().encode())
         digest.update(read_source(path).code.encode())
     keep_sources()
     return digest.hexdigest()[:16]
@@ -63,12 +63,12 @@ def _drop_oldest(folder):
     """Remove sibling cache folders unused for a day; the KEEP_CACHES last used are kept for a month."""
     now = time.time()
     used = {path: path.stat().st_mtime for path in own_folders(folder.parent) if path != folder}
-    for place, (path, last) in enumerate(sorted(used.items(), key=lambda item: -item[1])):
-        if now - last > (DAY if place >= KEEP_CACHES else UNUSED):
+    for rank, (path, last) in enumerate(sorted(used.items(), key=lambda item: -item[1])):
+        if now - last > (DAY if rank >= KEEP_CACHES else UNUSED):
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _places(folder):
+def _folders_to_check(folder):
     """Yield the folders that must belong to the user, outer ones first: only then can inner ones be read."""
     yield folder.parent
     yield folder
@@ -88,10 +88,10 @@ def _cache_folder(sources):
     with suppress(OSError):
         make_private(folder)
     try:
-        for place in _places(folder):
-            if fault := distrust(place):
+        for checked in _folders_to_check(folder):
+            if fault := distrust(checked):
                 warnings.warn(
-                    f"{place} {fault}: compiled kernels are executable code, so this folder is not used and"
+                    f"{checked} {fault}: compiled kernels are executable code, so this folder is not used and"
                     " kernels are compiled at each start. Set FOWT_CACHE_DIR to a private folder",
                     RuntimeWarning,
                     stacklevel=2,

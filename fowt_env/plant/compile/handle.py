@@ -72,11 +72,11 @@ else:
     @lower_getattr_generic(Reference)
     def _read_field(context, builder, kind, value, name):
         number = kind.target.fields.index(name)
-        place = cgutils.gep_inbounds(builder, value, 0, number)
+        address = cgutils.gep_inbounds(builder, value, 0, number)
         field = kind.target.types[number]
         if _by_reference(field):
-            return place
-        return imputils.impl_ret_borrowed(context, builder, field, builder.load(place))
+            return address
+        return imputils.impl_ret_borrowed(context, builder, field, builder.load(address))
 
     @structref.register
     class _HandleType(types.StructRef):
@@ -99,11 +99,11 @@ else:
         """Return a Handle; numba's constructor is not cached and would take a second in every process."""
         return Handle(model, data)
 
-    def _place_of(name):
+    def _reference_to(name):
         """Return the intrinsic that takes a Handle and returns a Reference to its field of this name."""
 
         @intrinsic
-        def place(typing_context, handle):
+        def reference(typing_context, handle):
             field = handle.field_dict[name]
 
             def build(context, builder, signature, arguments):
@@ -112,6 +112,6 @@ else:
 
             return Reference(field)(handle), build
 
-        return place
+        return reference
 
-    model_of, data_of = _place_of("model"), _place_of("data")
+    model_of, data_of = _reference_to("model"), _reference_to("data")

@@ -66,10 +66,10 @@ class Notice(event.Listener):
         if self.depth > 1:
             return
         self.started = time.monotonic()
-        found = gc.get_threshold()
-        if 0 < found[0] < COLLECT_AFTER:
-            self.thresholds = found
-            gc.set_threshold(COLLECT_AFTER, *found[1:])
+        current = gc.get_threshold()
+        if 0 < current[0] < COLLECT_AFTER:
+            self.thresholds = current
+            gc.set_threshold(COLLECT_AFTER, *current[1:])
         if self.thread is None or not self.thread.is_alive():  # a forked process has no thread
             self._begin()
 
@@ -103,23 +103,23 @@ class Notice(event.Listener):
 
     def _watch(self):
         """Write the report from a separate thread: half of the compile time is a single call of LLVM."""
-        told = None  # s of compiling at the last line that stays
+        reported = None  # s of compiling at the last line that stays
         while not self.stop.wait(REDRAW):
             now = time.monotonic()
             working = self.depth > 0
             spent = self.spent + (now - self.started if working else 0.0)
-            if told is None:
+            if reported is None:
                 if spent >= DELAY and not self.counters:
-                    told = spent
+                    reported = spent
                     self._write(f"{NAME}{COMPILING_MESSAGE}\n")
             elif working and _redraws(sys.stderr):
                 self._draw(f"{NAME}{self.count} kernels compiled, {spent:.0f} s ")
-            elif working and spent >= told + REPEAT:
-                told = spent
+            elif working and spent >= reported + REPEAT:
+                reported = spent
                 self._write(f"{NAME}{self.count} kernels compiled, {spent:.0f} s ...\n")
             if not working and now - self.ended > PAUSE:
                 break
-        if told is not None:
+        if reported is not None:
             self._write(f"{NAME}{self.count} kernels compiled in {self.spent:.0f} s\n")
 
     def _write(self, text):

@@ -21,7 +21,7 @@ def _prefetch(typing_context, values, i, j, k):
         shape = cgutils.unpack_tuple(builder, array.shape, kind.ndim)
         strides = cgutils.unpack_tuple(builder, array.strides, kind.ndim)
         zero = ir.Constant(args[1].type, 0)
-        place = cgutils.get_item_pointer2(
+        address = cgutils.get_item_pointer2(
             context, builder, array.data, shape, strides, kind.layout, [*args[1:], zero], wraparound=False
         )
         byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
@@ -29,7 +29,7 @@ def _prefetch(typing_context, values, i, j, k):
             builder.module, ir.FunctionType(ir.VoidType(), [byte, word, word, word]), "llvm.prefetch.p0i8"
         )
         read, keep, data = (ir.Constant(word, value) for value in (0, 3, 1))
-        builder.call(hint, [builder.bitcast(place, byte), read, keep, data])
+        builder.call(hint, [builder.bitcast(address, byte), read, keep, data])
         return context.get_dummy_value()
 
     return types.void(values, types.uintp, types.uintp, types.uintp), generate

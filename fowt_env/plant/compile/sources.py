@@ -107,8 +107,8 @@ def imported_files(starts, roots, inside):
     def imported(path):
         files = []
         for level, name in all_imports(path):
-            places = [path.parents[level - 1]] if level else roots
-            files += next(filter(None, (_module_files(place, name) for place in places)), [])
+            folders = [path.parents[level - 1]] if level else roots
+            files += next(filter(None, (_module_files(folder, name) for folder in folders)), [])
         return files
 
     return in_order(_followed(map(Path, starts), inside, imported))
@@ -116,7 +116,7 @@ def imported_files(starts, roots, inside):
 
 def imported_at_top(path, but):
     """Return a source of this project and its module-level imports, followed; none from the folder `but`."""
-    return _followed([path], lambda found: but not in found.parents, _imported_at_top)
+    return _followed([path], lambda file: but not in file.parents, _imported_at_top)
 
 
 @cache  # some twenty modules with kernels outside the plant share most imports
@@ -127,13 +127,13 @@ def _imported_at_top(path):
 
 def _followed(starts, inside, imported):
     """Return the set of files reached from starts through imported(path), limited to those inside(path)."""
-    found, left = set(), list(starts)
-    while left:
-        path = left.pop()
-        if path not in found and inside(path):
-            found.add(path)
-            left += imported(path)
-    return found
+    reached, pending = set(), list(starts)
+    while pending:
+        path = pending.pop()
+        if path not in reached and inside(path):
+            reached.add(path)
+            pending += imported(path)
+    return reached
 
 
 def in_order(paths):
@@ -143,16 +143,16 @@ def in_order(paths):
 
 def _module_files(folder, name):
     """Return the existing files of a dotted module in a folder, and of its parent packages."""
-    own = folder == PACKAGE.parent and name.partition(".")[0] == PACKAGE.name
-    return _own_files(name) if own else _found_files(folder, name)
+    in_project = folder == PACKAGE.parent and name.partition(".")[0] == PACKAGE.name
+    return _project_files(name) if in_project else _existing_files(folder, name)
 
 
 @cache  # modules of this project do not change during a run
-def _own_files(name):
-    return _found_files(PACKAGE.parent, name)
+def _project_files(name):
+    return _existing_files(PACKAGE.parent, name)
 
 
-def _found_files(folder, name):
+def _existing_files(folder, name):
     files = [folder / "__init__.py"] if not name and (folder / "__init__.py").is_file() else []
     for part in filter(None, name.split(".")):
         if folder == PACKAGE and part in FOLDERS:

@@ -19,10 +19,10 @@ def chosen_by_class(argument, cases, inlined=False):
     """
     plain = {kind: getattr(kernel, "py_func", kernel) for kind, kernel in cases.items()}
     names = list(inspect.signature(next(iter(plain.values()))).parameters)
-    place = names.index(argument)
+    position = names.index(argument)
 
     def called(*arguments):
-        return cases[type(arguments[place])](*arguments)
+        return cases[type(arguments[position])](*arguments)
 
     if numba.config.DISABLE_JIT:
         return called

@@ -68,8 +68,8 @@ def _lane_sums(context, builder, signature, args, pairs):
     with cgutils.for_range_slice(builder, ir.Constant(n.type, 0), n, step, n.type) as (index, _):
         loaded = []
         for pointer in pointers:
-            place = builder.bitcast(builder.gep(pointer, [index]), VECTOR.as_pointer())
-            loaded.append(builder.load(place, align=8))
+            address = builder.bitcast(builder.gep(pointer, [index]), VECTOR.as_pointer())
+            loaded.append(builder.load(address, align=8))
         for (i, j), total in zip(pairs, totals, strict=True):
             builder.store(builder.fadd(builder.load(total), builder.fmul(loaded[i], loaded[j])), total)
     return context.make_tuple(
@@ -112,16 +112,16 @@ def _advance(typing_context, x, y, factors, first, start, begin, count, old, new
         def spread(value):
             undefined, zero = ir.Constant(vector, ir.Undefined), ir.Constant(ir.IntType(32), 0)
             one = builder.insert_element(undefined, value, zero)
-            places = ir.Constant(ir.VectorType(ir.IntType(32), PAIR_LANES), [0] * PAIR_LANES)
-            return builder.shuffle_vector(one, undefined, places)
+            lanes = ir.Constant(ir.VectorType(ir.IntType(32), PAIR_LANES), [0] * PAIR_LANES)
+            return builder.shuffle_vector(one, undefined, lanes)
 
         before, after = spread(old), spread(new)
         step = ir.Constant(count.type, PAIR_LANES)
         zero = ir.Constant(count.type, 0)
         with cgutils.for_range_slice(builder, zero, count, step, count.type) as (index, _):
-            place = builder.add(start, index)
-            other = builder.add(place, count)
-            real, imaginary = (builder.load(at(source.data, k), align=8) for k in (place, other))
+            real_part = builder.add(start, index)
+            imaginary_part = builder.add(real_part, count)
+            real, imaginary = (builder.load(at(source.data, k), align=8) for k in (real_part, imaginary_part))
             column, rows = builder.add(begin, index), []
             for k in range(6):
                 row = builder.mul(builder.add(first, ir.Constant(first.type, k)), width)
@@ -131,13 +131,13 @@ def _advance(typing_context, x, y, factors, first, start, begin, count, old, new
             def sum_of(a, p, b, q):
                 return builder.fadd(builder.fmul(a, p), builder.fmul(b, q))
 
-            turned = builder.fsub(builder.fmul(er, real), builder.fmul(ei, imaginary))
+            rotated = builder.fsub(builder.fmul(er, real), builder.fmul(ei, imaginary))
             builder.store(
-                builder.fadd(turned, sum_of(sr, before, nr, after)), at(target.data, place), align=8
+                builder.fadd(rotated, sum_of(sr, before, nr, after)), at(target.data, real_part), align=8
             )
-            turned = sum_of(er, imaginary, ei, real)
+            rotated = sum_of(er, imaginary, ei, real)
             builder.store(
-                builder.fadd(turned, sum_of(si, before, ni, after)), at(target.data, other), align=8
+                builder.fadd(rotated, sum_of(si, before, ni, after)), at(target.data, imaginary_part), align=8
             )
         return context.get_dummy_value()
 

@@ -23,14 +23,14 @@ class Package(NamedTuple):
     def advice(self) -> str:
         """Return the problem and the pip command that solves it, for a package that does not fit."""
         if self.version is None:
-            found = "is not installed"
+            problem = "is not installed"
         else:
             lowest = SpecifierSet(
                 ",".join(str(bound) for bound in SpecifierSet(self.needed) if ">" in str(bound))
             )
             old = not lowest.contains(self.version, prereleases=True)
-            found = f"{self.version} is too {'old' if old else 'new'}"
-        return f"{self.name} {found}: pip install '{self.name}{self.needed}'"
+            problem = f"{self.version} is too {'old' if old else 'new'}"
+        return f"{self.name} {problem}: pip install '{self.name}{self.needed}'"
 
 
 def check_numba(version: str) -> None:
