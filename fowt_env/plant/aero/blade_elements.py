@@ -113,9 +113,9 @@ class Momentum(NamedTuple):
     qs: float  # sin f / (1 - a)
     swirl: float  # cos f (1 - k')
     weight: float  # of the residual in value: abs(sin f), or 1 in the empirical state
-    scale: float  # of f, on which the terms change
+    scale: float  # range of f over which the terms change
     value: float  # weight times the residual times v_tangential
-    slope: float  # its derivative with f
+    slope: float  # derivative of value with f
     dcn: float  # derivatives with f
     dct: float
     dqs: float

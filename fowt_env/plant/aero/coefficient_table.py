@@ -525,7 +525,7 @@ def performance(rotor, tip_speed_ratio, blade_pitch):
     ratio = np.ascontiguousarray(tip_speed_ratio, dtype=np.float64)
     blade_pitch = np.ascontiguousarray(blade_pitch, dtype=np.float64)
     load, _ = _filled_loads(np.arctan(ratio), blade_pitch, rotor)
-    # the table has them over rho R^2 (and R) and the combined speed s^2 of wind and tip
+    # table entries are over rho R^2 (and R) and the combined speed s^2 of wind and tip
     scale = 2.0 / np.pi * (1.0 + ratio[:, None] ** 2)
     torque = scale * load[:, :, 1]
     return ratio[:, None] * torque, scale * load[:, :, 0], torque

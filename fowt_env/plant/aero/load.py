@@ -144,7 +144,7 @@ def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
 
 @kernel
 def wind_of(t, X, Y, Z, aero):
-    """Return the wind (u, v, w), m/s, inertial components, at an inertial point (m); zero without aero."""
+    """Return the wind (u, v, w), m/s, inertial components, at an inertial point (m); zero if aero is None."""
     if aero is None:
         return 0.0, 0.0, 0.0
     return wind_at(t, X, Y, Z, wind_now(t, aero.wind), aero.wind, aero.field)

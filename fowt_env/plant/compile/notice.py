@@ -157,7 +157,7 @@ atexit.register(NOTICE.close)
 
 
 def set_quiet(quiet: bool = True) -> None:
-    """Switch off (quiet) or on the compile messages of this process; FOWT_QUIET=1 also switches them off."""
+    """Switch the compile messages of this process off (quiet, as FOWT_QUIET=1 does) or on."""
     NOTICE.quiet = bool(quiet)
 
 

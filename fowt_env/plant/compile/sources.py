@@ -115,7 +115,7 @@ def imported_files(starts, roots, inside):
 
 
 def imported_at_top(path, but):
-    """Return a source of this project and its module-level imports, followed; none from the folder `but`."""
+    """Return a source of this project and its direct and indirect module-level imports outside `but`."""
     return _followed([path], lambda file: but not in file.parents, _imported_at_top)
 
 
