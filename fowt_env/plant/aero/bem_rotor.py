@@ -1,8 +1,8 @@
-"""Rotor aerodynamics: blade element momentum solved at every station of every blade (theory.md, 5.1).
+"""Computes rotor loads by blade element momentum at every station of every blade (theory.md, 5.1).
 
-Each station sees the wind where it is at this instant. On a parked or slow rotor the induction fades
-out between the tip-speed ratios SLOW_ROTOR and FAST_ROTOR (as AeroDyn does); below, the blade sees the
-wind alone, at any angle of attack.
+The wind is sampled at the present position of each station. On a parked or slow rotor the induction fades
+out between the tip-speed ratios FAST_ROTOR and SLOW_ROTOR (as in AeroDyn); below SLOW_ROTOR there is no
+induction, at any angle of attack.
 """
 
 from fowt_env.plant.aero.blade_shape import turn_of
@@ -29,12 +29,12 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
     """Return the RotorLoad of the state x at time t in rotor axes; theory.md, 5.1. No rotor or no wind: zero.
 
     pose                in rotor axes (tilt.py)
-    now, series, field  wind (weather/wind.py); every station samples it where it is at this instant
+    now, series, field  wind (wind.py), sampled at the present position of every station
     skew, wake          optional SkewedWake and DynamicInflow (wake.py)
-    dx                  derivative of the state: only the wake states are written
-    counters            counters[Counter.BEM_FALLBACK] grows by one per station without a bracket
+    dx                  rates of the state: only those of wake states are written
+    counters            counters[Counter.BEM_FALLBACK] is incremented for each station without a root
     pitches             BladePitches, or None: one pitch for all blades
-    blades              with pitches the BladeLoad of each blade is put there, (blades, 6)
+    blades              with pitches: output, the BladeLoad of each blade, (blades, 6)
     """
     if rotor is None:
         return NO_ROTOR_LOAD

@@ -1,17 +1,17 @@
-"""One blade station: blade element momentum, inflow in, loads and induced flow out (theory.md, 5.1).
+"""Solves blade element momentum at one station: loads and induced flow from the inflow (theory.md, 5.1).
 
 At very high tip-speed ratios (above about 20: spinning in little or no wind) the published equations have
-their root on a pole, where drag with no flow through the disk makes endless swirl, and the load vanishes.
+their root on a pole, where drag without flow through the disk gives infinite swirl, and the load vanishes.
 Here the residual is one continuous function of the inflow angle f from -pi/2 to pi/2:
 
-* the swirl is carried away by a flow of at least LEAST_FLOW; no operating state is that low;
+* the swirl is convected by a flow of at least LEAST_FLOW, which is below all operating states;
 * f < 0 (propeller brake): the thrust is the larger of Buhl's curve continued beyond a = 1 and the
   momentum value 4 F a (a - 1), so that the root passes through f = 0 without a jump.
 
-Degenerate inflows: none at all, zero load; in the plane from behind (v_tangential <= 0), no induction, faded
-in between two small ratios v_tangential/|v_normal|; reversed (v_normal < 0), the mirrored problem; no root
-(never met with a finite polar), no induction at that station, which is counted. The pitching moment (cm) is
-included for curved blades alone (blade_shape.py): on straight ones it does next to nothing.
+Degenerate inflows: zero inflow, zero load; in-plane inflow from behind (v_tangential <= 0), no induction,
+which fades in between two small ratios v_tangential/|v_normal|; reversed (v_normal < 0), the mirrored
+problem; no root (not observed with finite polars), no induction at that station, which is counted. The
+pitching moment (cm) is included for curved blades only (blade_shape.py): on straight blades it is negligible.
 """
 
 from math import acos, atan2, cos, exp, floor, nan, pi, sin, sqrt
@@ -26,33 +26,33 @@ from fowt_env.plant.aero.blade_shape import blade_line, build_blade_shape, is_cu
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.tilt import rotor_axes
 
-TOLERANCE = 1e-8  # of the residual before the last step of Newton's method; after it, about its square
-LAST_STEP = 1e-6  # largest last step, times Momentum.scale: the second-order error of loads is then 1e-12
+TOLERANCE = 1e-8  # of the residual before the last Newton step; after that step, about its square
+LAST_STEP = 1e-6  # largest last step over Momentum.scale: the second-order error of loads is then 1e-12
 SMALLEST_ANGLE = 1e-6  # rad; end of a bracket, the residual may be singular at 0
 LARGEST_ANGLE = 1.8  # rad; roots above pi/2 (flow turned by the swirl) only where v_normal > 50 v_tangential
 LEAST_FLOW = 0.01  # least normal flow, as a fraction of the local speed, that carries the swirl away
 MAX_NEWTON = 24  # safeguarded Newton steps; usually 2 or 3 are taken
 MAX_BISECTIONS = 180  # a third of them halve the bracket: to pi/2^60, below rounding of the smallest angle
-SLOW_SECTION, FAST_SECTION = 0.01, 0.02  # v_tangential/|v_normal| between which it fades in
-LARGEST_SPEED = 1e6  # m/s; beyond (or not a number) the section returns nan instead of indexing with it
-LIFT_SLOPE = 6.0  # 1/rad, of the first guess only
+SLOW_SECTION, FAST_SECTION = 0.01, 0.02  # v_tangential/|v_normal| between which induction fades in
+LARGEST_SPEED = 1e6  # m/s; above (or NaN) the section returns nan instead of an invalid index
+LIFT_SLOPE = 6.0  # 1/rad, for the first guess only
 HALF_PI = 0.5 * pi
 PRANDTL = 4.0 / pi**2
 GUESSES = 129  # points of the table of first guesses in each direction
 GUESS_PITCH = (-0.2, 1.7)  # rad, blade pitch spanned by that table
-NO_LOSS = 37.0  # exponent beyond which exp(-x) is below rounding
-CELLS = 720  # of the table that finds the segment of a polar, each half a degree
+NO_LOSS = 37.0  # exponent above which exp(-x) is below rounding
+CELLS = 720  # of the look-up table of polar segments, each half a degree
 
 
 class Polars(NamedTuple):
-    """Polars of m foils as segments between their published points, and a table to find a segment."""
+    """Holds polars of m foils as segments between published points, and a look-up table of segments."""
 
     cell: np.ndarray  # (m, CELLS) int64, first segment that reaches into this half degree
     segment: np.ndarray  # (k, 5) start of the segment (rad), cl, cd there, slopes of cl and cd
 
 
 class BladeElements(NamedTuple):
-    """What blade element momentum needs, fixed for a turbine. n stations, m foils."""
+    """Holds the constant inputs of blade element momentum for a turbine; n stations, m foils."""
 
     blades: int
     hub_radius: float  # m
@@ -66,17 +66,17 @@ class BladeElements(NamedTuple):
     solidity: np.ndarray  # (n,) blades * chord / (2 pi radius)
     tip_exponent: np.ndarray  # (n,) Prandtl: blades (tip - radius) / (2 radius), lengths along the blade
     hub_exponent: np.ndarray  # (n,) blades (radius - hub) / (2 hub), the same
-    zero_lift: np.ndarray  # (n,) rad, of the first guess only
+    zero_lift: np.ndarray  # (n,) rad, for the first guess only
     weight: np.ndarray  # (n,) m, integral of the station's hat function
     moment_weight: np.ndarray  # (n,) m2, integral of radius times the hat function
     foil: np.ndarray  # (n,) int64, row of polars.cell
     polars: Polars
     shape: object  # blade_shape.BladeShape, or None: straight blades in the rotor plane
-    guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, inflow angles to start from; see first_guess
+    guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, initial inflow angles; see first_guess
 
 
 class Element(NamedTuple):
-    """Numbers of one station at one blade pitch: all that the momentum balance needs beside the inflow."""
+    """Holds the inputs of the momentum balance of one station at one blade pitch, except the inflow."""
 
     theta: float  # twist + blade pitch, rad
     solidity: float
@@ -88,7 +88,7 @@ class Element(NamedTuple):
 
 
 class Section(NamedTuple):
-    """Solution of one blade station."""
+    """Holds the solution of the momentum balance of one blade station."""
 
     phi: float  # inflow angle of the momentum balance, rad
     a: float  # axial induction of the momentum balance; 0 where v_normal is 0
@@ -99,12 +99,12 @@ class Section(NamedTuple):
     ft: float  # N/m, in the direction of rotation
     induced_normal: float  # m/s, added to v_normal by the wake (-a v_normal)
     induced_tangential: float  # m/s, added to v_tangential (a' v_tangential)
-    residual: float  # of theory.md, 5.1, before the last step of Newton's method: that of phi is smaller
+    residual: float  # of theory.md, 5.1, before the last Newton step; at phi it is smaller
     solved: bool  # False: no bracket, no induction
 
 
 class Momentum(NamedTuple):
-    """Terms of the momentum balance at one inflow angle f (the names of theory.md, 5.1)."""
+    """Holds the terms of the momentum balance at one inflow angle f (symbols of theory.md, 5.1)."""
 
     s: float  # sin f
     c: float  # cos f
@@ -113,9 +113,9 @@ class Momentum(NamedTuple):
     qs: float  # sin f / (1 - a)
     swirl: float  # cos f (1 - k')
     weight: float  # of the residual in value: abs(sin f), or 1 in the empirical state
-    scale: float  # of f, on which the terms change
+    scale: float  # range of f over which the terms change
     value: float  # weight times the residual times v_tangential
-    slope: float  # its derivative with f
+    slope: float  # derivative of value with f
     dcn: float  # derivatives with f
     dct: float
     dqs: float
@@ -138,13 +138,13 @@ def element_of(j, blade_pitch, rotor):
 
 @inlined_kernel
 def segment_of(alpha, foil, polars):
-    """Return (row of polars.segment, alpha beyond its start) of a foil at alpha (rad, wrapped to +-pi)."""
+    """Return (row of polars.segment, alpha minus its start) of a foil at alpha (rad, wrapped to +-pi)."""
     if alpha > pi or alpha < -pi:
         alpha -= 2.0 * pi * floor((alpha + pi) / (2.0 * pi))
     cell = int((alpha + pi) * (CELLS / (2.0 * pi)))
     i = polars.cell[foil, max(0, min(cell, CELLS - 1))]
     segment = polars.segment
-    while alpha >= segment[i + 1, 0]:  # ends at the latest on the row of infinity behind each polar
+    while alpha >= segment[i + 1, 0]:  # ends at the latest at the last row of a polar, infinity
         i += 1
     return i, alpha - segment[i, 0]
 
@@ -153,8 +153,8 @@ def segment_of(alpha, foil, polars):
 def lift_drag(alpha, foil, polars):
     """Return (cl, cd, dcl/dalpha, dcd/dalpha) of a foil at alpha (rad, wrapped to +-pi).
 
-    Linear between the published points, which are not evenly spaced: a table gives the first segment
-    of each half degree, at most a few steps before the right one.
+    Linear between the published points, which are not evenly spaced: a look-up table gives the first
+    segment of each half degree, at most a few before the right one.
     """
     i, x = segment_of(alpha, foil, polars)
     segment = polars.segment
@@ -168,7 +168,7 @@ def lift_drag(alpha, foil, polars):
 
 @kernel
 def _loss(exponent, h, dh):
-    """Return acos(exp(-exponent/h)) and its derivative with the inflow angle; Prandtl's factor is 2/pi of it.
+    """Return acos(exp(-exponent/h)), pi/2 times Prandtl's factor, and its derivative with the inflow angle.
 
     h, dh: absolute value of the sine of the inflow angle, and its derivative.
     """
@@ -176,7 +176,7 @@ def _loss(exponent, h, dh):
         return HALF_PI, 0.0
     x = exponent / h
     e = exp(-x)
-    if e < 0.02:  # the series of acos, exact to rounding here, at a third of its cost
+    if e < 0.02:  # the series of acos, exact to rounding here, at a third of the cost
         e2 = e * e
         arc = HALF_PI - e * (1.0 + e2 * (1.0 / 6.0 + e2 * (3.0 / 40.0 + e2 * (15.0 / 336.0))))
     else:
@@ -194,7 +194,7 @@ def _momentum(f, side, v_normal, v_tangential, element, polars):
     """
     s, c = sin(f), cos(f)
     sign = -1.0 if s < 0.0 else 1.0
-    h, dh = max(sign * s, 1e-12), sign * c  # never 0: a bisection may come to f = 0
+    h, dh = max(sign * s, 1e-12), sign * c  # never 0: bisection may reach f = 0
     lift, drag, lift_slope, drag_slope = lift_drag(side * f - element.theta, element.foil, polars)
     lift, drag_slope = side * lift, side * drag_slope
     cn, ct = lift * c + drag * s, lift * s - drag * c
@@ -258,7 +258,7 @@ def _momentum(f, side, v_normal, v_tangential, element, polars):
 
 @kernel
 def _shifted(at, step):
-    """Return the Momentum terms a tiny step further, to first order."""
+    """Return the Momentum terms after a small step of f, to first order."""
     return Momentum(
         at.s + step * at.c,
         at.c - step * at.s,
@@ -279,9 +279,9 @@ def _shifted(at, step):
 
 @kernel
 def bem_residual(phi, v_normal, v_tangential, blade_pitch, station, rotor):
-    """Return sin f/(1-a) - (V_x/V_y) cos f (1-k') of a station at the inflow angle phi = f; v_tangential > 0.
+    """Return the residual sin f/(1-a) - (V_x/V_y) cos f (1-k') of a station at inflow angle phi = f.
 
-    For v_normal < 0 of the mirrored problem, with f = -phi and the foil turned upside down.
+    v_tangential > 0. For v_normal < 0: the mirrored problem, with f = -phi and the foil upside down.
     """
     side = -1.0 if v_normal < 0.0 else 1.0
     element = element_of(station, blade_pitch, rotor)
@@ -303,7 +303,7 @@ def _bracketed(low, high, side, v_normal, v_tangential, element, polars):
     f = low
     for i in range(MAX_BISECTIONS):
         f = 0.5 * (low + high)
-        if i % 3 != 0:  # every third step halves the bracket, whatever the secants do
+        if i % 3 != 0:  # every third step halves the bracket
             f = min(max((low * r_high - high * r_low) / (r_high - r_low), low), high)
         at = _momentum(f, side, v_normal, v_tangential, element, polars)
         r = v_tangential * at.qs - v_normal * at.swirl
@@ -318,7 +318,7 @@ def _bracketed(low, high, side, v_normal, v_tangential, element, polars):
 
 @kernel
 def _solve_bracketed(side, v_normal, v_tangential, element, polars):
-    """Return (found, f) bracket by bracket, the wind turbine states first; rarely needed."""
+    """Search the root of the residual by brackets, wind turbine states first; return (found, f)."""
     low = SMALLEST_ANGLE
     found, f = _bracketed(low, LARGEST_ANGLE, side, v_normal, v_tangential, element, polars)
     if not found:
@@ -328,7 +328,7 @@ def _solve_bracketed(side, v_normal, v_tangential, element, polars):
 
 @kernel
 def _rough_guess(v_normal, v_tangential, side, element):
-    """Return the inflow angle with a linear lift and neither drag nor losses, small angles (f > 0)."""
+    """Return a first guess of the inflow angle f > 0: linear lift, no drag, no losses, small angles."""
     x = v_normal / v_tangential
     pull = 0.25 * element.solidity * LIFT_SLOPE
     b = x - pull
@@ -338,11 +338,11 @@ def _rough_guess(v_normal, v_tangential, side, element):
 
 @kernel
 def first_guess(v_normal, v_tangential, blade_pitch, j, rotor):
-    """Return the inflow angle to start Newton's method from, bilinear in a table over inflow and blade pitch.
+    """Return the initial inflow angle of Newton's method, bilinear in a table over inflow and blade pitch.
 
-    Only the number of steps depends on it, and, where the balance has several roots (deep stall), which of
-    them is found: a function of the inflow of this station alone, so no history enters. Zero where there is
-    no table: reversed flow, no induction, not a number.
+    The guess affects the number of steps and, where the balance has several roots (deep stall), the selected
+    root. It depends on the present inflow of the station only, not on the past. Zero outside the table:
+    reversed flow, no induction, NaN.
     """
     if not (v_normal >= 0.0 and v_tangential > 0.0):
         return 0.0
@@ -359,10 +359,10 @@ def first_guess(v_normal, v_tangential, blade_pitch, j, rotor):
 
 @kernel
 def _solve(guess, side, v_normal, v_tangential, element, polars):
-    """Return (found, f, momentum terms there) of one station, v_normal >= 0 and v_tangential > 0.
+    """Solve the momentum balance of one station, v_normal >= 0, v_tangential > 0: (found, f, Momentum at f).
 
-    Newton's method inside [-pi/2, LARGEST_ANGLE], where the residual goes from minus to plus; if that does
-    not converge, the brackets one by one.
+    Newton's method inside [-pi/2, LARGEST_ANGLE], where the residual changes from negative to positive;
+    without convergence, bisection bracket by bracket.
     """
     scale = 1.0 / (v_normal + v_tangential)
     v_normal, v_tangential = scale * v_normal, scale * v_tangential
@@ -390,7 +390,7 @@ def _solve(guess, side, v_normal, v_tangential, element, polars):
 
 @kernel
 def smoothstep(x, low, high):
-    """Return 0 below low, 1 above high, smooth between (third order)."""
+    """Return a smooth step: 0 below low, 1 above high, cubic in between."""
     if x >= high:
         return 1.0
     if x <= low:
@@ -401,7 +401,7 @@ def smoothstep(x, low, high):
 
 @kernel
 def airload(v_normal, v_tangential, element, polars):
-    """Return (cn, ct, square of the speed) of one station in a local flow, without any induction."""
+    """Return (cn, ct, squared speed): load coefficients of a station in a local flow, without induction."""
     square = v_normal * v_normal + v_tangential * v_tangential
     if square == 0.0:
         return 0.0, 0.0, 0.0
@@ -453,7 +453,7 @@ def solve_section(v_normal, v_tangential, induction, guess, element, polars):
     if part > 0.0:
         solved, f, at = _solve(guess, side, abs(v_normal), v_tangential, element, polars)
         if solved:
-            # both are the speed of the local flow at the root; the better conditioned one is taken
+            # both formulas give the local speed at the root; the better conditioned one is used
             if abs(v_normal) < v_tangential:
                 speed = v_tangential / at.swirl
             else:
@@ -488,7 +488,7 @@ def solve_section(v_normal, v_tangential, induction, guess, element, polars):
 
 @entry
 def _fill_guesses(rotor):
-    """Solve the momentum balance at the points of rotor.guess and put the angles there."""
+    """Fill rotor.guess with the inflow angles that solve the momentum balance at the table points."""
     for j in range(rotor.radius.shape[0]):
         for i in range(GUESSES):
             fraction = i / (GUESSES - 1.0)
@@ -510,7 +510,7 @@ def elements_key(elements):
 
 
 def _guess_table(elements):
-    """Return the filled guess table of BladeElements; left at zero (the rough guess) without the compiler."""
+    """Return the guess table of BladeElements; with the JIT off zeros, which select the rough guess."""
     if numba.config.DISABLE_JIT:
         return elements.guess
     key = elements_key(elements._replace(air_density=0.0))
@@ -523,7 +523,7 @@ def _filled_guess(elements):
 
 
 def _hat_weights(radius, hub_radius, tip_radius):
-    """Return ((n,), (n,)): integrals of each station's hat function and of radius times it (m, m2).
+    """Return integrals (n,) of each station's hat function, m, and of radius times hat function, m2.
 
     The line load is linear between stations and zero at the hub and the tip.
     """
@@ -534,10 +534,10 @@ def _hat_weights(radius, hub_radius, tip_radius):
 
 
 def station_weights(length, chosen):
-    """Return (n chosen, n + 2): the line load at all points of a blade per unit at each chosen station.
+    """Return the line load at all points of a blade for a unit load at each chosen station, (chosen, n + 2).
 
-    length (n + 2,) of hub, stations and tip along the blade. The load is linear between the chosen ones, and
-    zero at hub and tip.
+    length (n + 2,): of hub, stations and tip along the blade. The line load is linear between the chosen
+    stations and zero at hub and tip.
     """
     nodes = np.concatenate(([length[0]], length[1:-1][chosen], [length[-1]]))
     unit = np.eye(len(nodes))[1:-1]
@@ -545,26 +545,26 @@ def station_weights(length, chosen):
 
 
 def _cm_segments(polar):
-    """Return (m+1, 2): cm at the start of each segment of a polar, and its slope."""
+    """Return cm at the start of each segment of a polar and its slope, (m+1, 2)."""
     step, moment = np.diff(polar[:, 0]), polar[:, 3]
     return np.column_stack([moment, np.append(np.diff(moment) / step, 0.0)])
 
 
 def _polar_segments(polar):
-    """Return ((m+1, 5), (CELLS,)): segments of one polar, and the first segment of each half degree."""
+    """Return the segments of a polar (m+1, 5) and the first segment of each half degree (CELLS,)."""
     alpha, lift, drag = polar[:, 0], polar[:, 1], polar[:, 2]
     step = np.diff(alpha)
     segments = np.zeros((len(step) + 1, 5))
     segments[:-1, 0], segments[:-1, 1], segments[:-1, 2] = alpha[:-1], lift[:-1], drag[:-1]
     segments[:-1, 3], segments[:-1, 4] = np.diff(lift) / step, np.diff(drag) / step
     segments[-1, 0] = np.inf
-    edges = np.linspace(-pi, pi, CELLS + 1)[:-1] - 1e-9  # a cell's own rounding must not overshoot
+    edges = np.linspace(-pi, pi, CELLS + 1)[:-1] - 1e-9  # rounding must not move a cell past a point
     first = np.clip(np.searchsorted(alpha, edges, side="right") - 1, 0, len(step) - 1)
     return segments, first
 
 
 def _zero_lift(polar):
-    """Return the angle by which the lift line through -2 and 6 deg crosses zero below 0, rad (guess only)."""
+    """Return minus the zero-lift angle by the lift at -2 and 6 deg, rad; for the first guess only."""
     low, high = np.interp(np.radians([-2.0, 6.0]), polar[:, 0], polar[:, 1])
     rise = (high - low) / np.radians(8.0)
     return high / rise - np.radians(6.0) if rise > 1.0 else 0.0
@@ -573,8 +573,8 @@ def _zero_lift(polar):
 def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=None):
     """Return the BladeElements of a turbine description; stations: indices of a subset, default all.
 
-    shaped: with a BladeShape even where blades are straight and lie in the rotor plane.
-    fit: of curved blades, a function from what the stations stand for (station_choice.Fit) to another.
+    shaped: with a BladeShape even for straight blades in the rotor plane.
+    fit: for curved blades, a function that replaces the factors (force, first) of a station_choice.Fit.
 
     Raises: InputError if a station lies outside the blade or a polar does not span -180 to 180 deg.
     """

@@ -1,11 +1,11 @@
-"""Blades that do not lie in the rotor plane: cone, prebend and sweep, and loads summed along them.
+"""Computes positions, directions and loads of blades with cone, prebend and sweep.
 
 Directions of a blade: x along the shaft, downwind; r outwards, in the plane through shaft and pitch axis; t
 in the direction of rotation, r x t = x. The momentum balance of a station is that of blade_elements.py, for
 the wind normal to the blade axis (turned by cone and slope in the plane of x and r) and along t, at the
 distance from the shaft; loads are per length of the blade axis. The slope that sweep and blade pitch add in
 the plane of r and t is left out, as in AeroDyn (BEM_Mod 1). Blade pitch turns prebend and sweep about the
-pitch axis, so places and slopes depend on it. The pitching moment (cm) acts about the blade axis.
+pitch axis, so positions and slopes depend on it. The pitching moment (cm) acts about the blade axis.
 """
 
 from math import atan2, cos, sin, sqrt
@@ -19,13 +19,13 @@ from fowt_env.plant.state import Wrench
 
 
 class BladeShape(NamedTuple):
-    """Where a blade's stations are at zero blade pitch, about its pitch axis. n stations, k segments."""
+    """Holds positions of a blade's n stations about the pitch axis at zero blade pitch; k polar segments."""
 
     prebend: np.ndarray  # (n,) m, downwind of the pitch axis
     sweep: np.ndarray  # (n,) m, against the direction of rotation
     distance: np.ndarray  # (n,) m, from the rotor centre along the pitch axis
     slope: np.ndarray  # (n,) sine of the angle between blade axis and pitch axis, of prebend
-    arm_prebend: np.ndarray  # (n,) m, the same three of the point where the station's part of the load acts
+    arm_prebend: np.ndarray  # (n,) m, the same three for the point where the load of the station acts
     arm_sweep: np.ndarray
     arm_distance: np.ndarray
     chord: np.ndarray  # (n,) m
@@ -36,13 +36,13 @@ class BladeShape(NamedTuple):
 
 
 class OnAxis(NamedTuple):
-    """Place of a station of a straight blade in the rotor plane."""
+    """Holds the position of a station of a straight blade in the rotor plane."""
 
     r: float  # m, from the rotor centre
 
 
 class Station(NamedTuple):
-    """Place and direction of a station of a curved blade at a blade pitch, in directions of the blade."""
+    """Holds position and direction of a curved blade's station at a blade pitch, in blade directions."""
 
     x: float  # m
     r: float
@@ -52,7 +52,7 @@ class Station(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """A quantity that is linear in the place of a station: one + x, r and t times these."""
+    """Holds a quantity linear in the position of a station: one plus x, r and t times these slopes."""
 
     one: float
     x: float
@@ -61,7 +61,7 @@ class Plane(NamedTuple):
 
 
 class Turn(NamedTuple):
-    """Blade pitch."""
+    """Holds a blade pitch with its cosine and sine."""
 
     pitch: float  # rad
     cosine: float
@@ -69,9 +69,9 @@ class Turn(NamedTuple):
 
 
 class Lever(NamedTuple):
-    """Moments per force of a station, of the forces normal to the blade axis (n) and along t.
+    """Holds moments per unit force of a station, for forces normal to the blade axis (n) and along t.
 
-    The forces act at the point (x, r, t), not exactly at the station.
+    Forces act at the point (x, r, t), not exactly at the station.
     """
 
     nx: float  # directions of the normal, as in Station
@@ -84,7 +84,7 @@ class Lever(NamedTuple):
 
 
 class BladeMotion(NamedTuple):
-    """Directions of a blade in inertial components, and its motion in directions of the blade."""
+    """Holds the directions of a blade in inertial components and the motion in blade directions."""
 
     ey: float  # e_r = (0, ey, ez) in rotor axes, e_t = (0, -ez, ey)
     ez: float
@@ -97,25 +97,25 @@ class BladeMotion(NamedTuple):
     vx: float  # of the hub, m/s
     vr: float
     vt: float
-    wx: float  # angular velocity with the rotor's, rad/s
+    wx: float  # angular velocity including rotor speed, rad/s
     wr: float
     wt: float
 
 
 class StationLoad(NamedTuple):
-    """Load of a station, before it is multiplied by the length that the station represents."""
+    """Holds the load of a station before multiplication by the length that the station represents."""
 
     normal: float  # force normal to the blade axis, downwind
     tangential: float  # force in the direction of rotation
-    moment: float  # pitching moment, nose up; counts for curved blades alone
+    moment: float  # pitching moment, nose up; used for curved blades only
     length: float  # factor on the three
     first_moment: float  # factor on the forces of a straight blade for their moments about the rotor centre
     outside: int  # 1 where a table does not contain the inflow, else 0
-    rates: object  # station_response.WakeRates of states that the response has, or None
+    rates: object  # station_response.WakeRates, or None for a response without wake states
 
 
 class BladeLoad(NamedTuple):
-    """Load of one blade about the rotor centre in its own directions."""
+    """Holds the load of one blade about the rotor centre, in blade directions."""
 
     fx: float
     fr: float
@@ -130,7 +130,7 @@ NO_BLADE_LOAD = BladeLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def effective_pitch(j, blade_pitch, shape):
-    """Return the angle by which the blade pitch turns the section of station j about its own axis, rad."""
+    """Return the rotation of the section of station j about the local blade axis by blade pitch, rad."""
     if shape is None:
         return blade_pitch
     s = shape.slope[j]
@@ -143,7 +143,7 @@ def turn_of(blade_pitch):
     return Turn(blade_pitch, cos(blade_pitch), sin(blade_pitch))
 
 
-# -------------------------------------------------- what differs between straight and curved blades
+# ----------------------------------------------------- variants for straight and curved blades
 
 
 @inlined_kernel
@@ -199,18 +199,18 @@ def _along_normal(along, out, at):
 
 
 @inlined_kernel
-def _add_to_straight(load, found, j, turn, shape):
-    length, first = found.length, found.first_moment
-    fn, ft = found.normal, found.tangential
+def _add_to_straight(load, part, j, turn, shape):
+    length, first = part.length, part.first_moment
+    fn, ft = part.normal, part.tangential
     return BladeLoad(
         load.fx + length * fn, 0.0, load.ft + length * ft, load.mx + first * ft, 0.0, load.mt - first * fn
     )
 
 
 @inlined_kernel
-def _add_to_curved(load, found, j, turn, shape):
+def _add_to_curved(load, part, j, turn, shape):
     lever = lever_of(j, turn, shape)
-    fn, ft, moment = found.length * found.normal, found.length * found.tangential, found.length * found.moment
+    fn, ft, moment = part.length * part.normal, part.length * part.tangential, part.length * part.moment
     return BladeLoad(
         load.fx + fn * lever.nx,
         load.fr + fn * lever.nr,
@@ -221,15 +221,15 @@ def _add_to_curved(load, found, j, turn, shape):
     )
 
 
-# (j, turn, radius, shape) -> place of station j: OnAxis or Station
+# (j, turn, radius, shape) -> position of station j: OnAxis or Station
 station_at = chosen_by_class(
     "shape", {type(None): _station_on_axis, BladeShape: curved_station}, inlined=True
 )
-# (plane, at) -> value of a Plane at the place of a station
+# (plane, at) -> value of a Plane at the position of a station
 value_at = chosen_by_class("at", {OnAxis: _value_on_axis, Station: _value_at_station}, inlined=True)
-# (along, out, at) -> part normal to the blade axis of a vector with these components along x and r
+# (along, out, at) -> component normal to the blade axis of a vector (along, out) in x and r
 normal_part = chosen_by_class("at", {OnAxis: _along_shaft, Station: _along_normal}, inlined=True)
-# (load, found, j, turn, shape) -> BladeLoad with the StationLoad of station j added
+# (load, part, j, turn, shape) -> BladeLoad with the StationLoad of station j added
 add_station = chosen_by_class(
     "shape", {type(None): _add_to_straight, BladeShape: _add_to_curved}, inlined=True
 )
@@ -262,7 +262,7 @@ def blade_motion(psi, rotor_speed, pose, hub):
 
 @kernel
 def with_blade(total, load, blade):
-    """Add the BladeLoad of a blade to a Wrench about the rotor centre in rotor axes."""
+    """Return total plus the BladeLoad of a blade: a Wrench about the rotor centre in rotor axes."""
     return Wrench(
         total.fx + load.fx,
         total.fy + load.fr * blade.ey - load.ft * blade.ez,
@@ -274,14 +274,14 @@ def with_blade(total, load, blade):
 
 
 def _ends(values, distance, low, high):
-    """Return values (n,) at the stations with those at hub and tip, on the lines through the last two."""
+    """Extend station values (n,) to hub and tip by linear extrapolation from the two outermost stations."""
     first = values[0] + (low - distance[0]) * (values[1] - values[0]) / (distance[1] - distance[0])
     last = values[-1] + (high - distance[-1]) * (values[-1] - values[-2]) / (distance[-1] - distance[-2])
     return np.concatenate(([first], values, [last]))
 
 
 class BladeLine(NamedTuple):
-    """A blade's axis from hub to tip, the stations in between: n stations."""
+    """Describes the axis of a blade from hub to tip through n stations."""
 
     points: np.ndarray  # (n + 2, 3) m: prebend, sweep, distance along the pitch axis
     length: np.ndarray  # (n + 2,) m from the rotor centre along the pitch axis and then along the blade axis
@@ -302,13 +302,13 @@ def blade_line(blade, hub_radius, tip_radius):
 
 
 def is_curved(turbine):
-    """Return whether blades leave the plane through their pitch axes' foot points, or bend."""
+    """Return whether the blades of a turbine have cone, prebend or sweep."""
     offsets = (turbine.blade.prebend, turbine.blade.sweep)
     return turbine.rotor.cone != 0.0 or any(v is not None and np.any(np.asarray(v) != 0.0) for v in offsets)
 
 
 def line_integrals(line, weights):
-    """Return ((m,), (m, 3)): integral and first moments along a BladeLine of line loads (m, n + 2)."""
+    """Integrate line loads (m, n + 2) along a BladeLine; return force (m,) and first moments (m, 3)."""
     steps = np.diff(line.length)[:, None]
     low, high = weights[:, :-1], weights[:, 1:]
     force = 0.5 * (low + high) @ steps[:, 0]
@@ -321,12 +321,12 @@ def build_blade_shape(turbine, line, chosen, arm, moment):
     """Return the BladeShape of chosen stations of a BladeLine; arm (n, 3) and moment: see BladeShape."""
     inner = line.points[1:-1]
     slope = np.gradient(inner[:, 0], inner[:, 2], edge_order=2 if len(inner) > 2 else 1)
-    place = inner[chosen]
-    columns = (*place.T, np.sin(np.arctan(slope))[chosen], *arm.T, np.asarray(turbine.blade.chord)[chosen])
+    points = inner[chosen]
+    columns = (*points.T, np.sin(np.arctan(slope))[chosen], *arm.T, np.asarray(turbine.blade.chord)[chosen])
     return BladeShape(
         *(np.ascontiguousarray(column, dtype=np.float64) for column in columns),
         np.ascontiguousarray(moment, dtype=np.float64),
         float(np.cos(turbine.rotor.cone)),
         float(np.sin(turbine.rotor.cone)),
-        float(np.linalg.norm(place, axis=1).max()),
+        float(np.linalg.norm(points, axis=1).max()),
     )

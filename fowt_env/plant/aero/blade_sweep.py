@@ -1,8 +1,8 @@
-"""The sweep over blades and stations that all rotor models but the coefficient table share.
+"""Sweeps over blades and stations for all rotor models except the coefficient table.
 
-A station is placed (blade_shape.py), meets a wind, responds to it (station_response.py), and its load is
-added to that of its blade. The wind of a blade is one of three: sampled at every station; in a sheared
-series, where it is linear in the place but for the power law; in a box, one cell lookup per station.
+For each station the position (blade_shape.py), the relative wind and the response (station_response.py) are
+evaluated, and the load is added to that of the blade. The wind of a blade has one of three forms: sampled at
+every station; sheared series, linear in position times a power law; wind box, one cell lookup per station.
 """
 
 from math import pi, sqrt
@@ -42,7 +42,7 @@ SLOW_ROTOR, FAST_ROTOR = 1.0, 2.0  # tip-speed ratios between which the inductio
 
 
 class RotorLoad(NamedTuple):
-    """Aerodynamic load of the rotor."""
+    """Holds the aerodynamic load of the rotor."""
 
     wrench: Wrench  # about the body origin, body components; contains the torque
     thrust: float  # N, along the shaft, downwind
@@ -50,7 +50,7 @@ class RotorLoad(NamedTuple):
 
 
 class HubFlow(NamedTuple):
-    """Hub position in O, velocity of the hub and the wind relative to it in body components."""
+    """Holds hub position in O, hub velocity and wind relative to the hub, both in body components."""
 
     X: float
     Y: float
@@ -65,14 +65,14 @@ class HubFlow(NamedTuple):
 
 
 class BladeForce(NamedTuple):
-    """Sum over a blade."""
+    """Holds the load summed over the stations of a blade."""
 
     load: BladeLoad
-    outside: int  # stations outside a table: the sum is valid where it is 0
+    outside: int  # stations outside a table: the load is valid only if 0
 
 
 class RotorFlow(NamedTuple):
-    """Wind about a rotor and its motion at an instant."""
+    """Holds wind and motion of a rotor at an instant."""
 
     t: float  # s
     pose: Pose  # in rotor axes
@@ -83,7 +83,7 @@ class RotorFlow(NamedTuple):
 
 
 class Blade(NamedTuple):
-    """A blade at an instant."""
+    """Holds number, motion, pitch and response model of a blade at an instant."""
 
     number: int  # 0, 1, ...
     motion: BladeMotion
@@ -92,19 +92,19 @@ class Blade(NamedTuple):
 
 
 class SampledWind(NamedTuple):
-    """Wind of a blade, sampled at the place of every station."""
+    """Defines the wind of a blade by samples at the position of every station."""
 
     flow: RotorFlow
     motion: BladeMotion
 
 
 class ShearedWind(NamedTuple):
-    """Wind relative to a blade in a series: Planes and factors on the Profile, in directions of the blade.
+    """Defines the wind relative to a blade in a series by Planes and factors on the Profile.
 
-    The tangential component is against the motion, as v_tangential.
+    Components in blade directions; tangential is positive against the motion, as v_tangential.
     """
 
-    height: Plane  # over that of the profile's centre, less 1
+    height: Plane  # over that of the profile's centre, minus 1
     along: Plane
     out: Plane
     tangential: Plane
@@ -115,7 +115,7 @@ class ShearedWind(NamedTuple):
 
 
 class BoxWind(NamedTuple):
-    """Wind of a blade in a box, with the place of a station on its grid."""
+    """Defines the wind of a blade in a wind box by the grid positions of the stations."""
 
     slice: Plane
     column: Plane
@@ -155,7 +155,7 @@ def rotor_flow(t, pose, now, series, field, elements):
 
 @kernel
 def faded_induction(rotor_speed, wind_speed, elements):
-    """Return the fraction of the induction in a relative wind (m/s): 0 parked, 1 from FAST_ROTOR on."""
+    """Return the fraction of induction in a relative wind (m/s): 0 when parked, 1 above FAST_ROTOR."""
     return smoothstep(rotor_speed * elements.tip_radius, SLOW_ROTOR * wind_speed, FAST_ROTOR * wind_speed)
 
 
@@ -176,13 +176,13 @@ def rotor_reach(tip_radius, shape):
 
 @kernel
 def is_sheared(hub, reach, field):
-    """Return whether a Profile describes the wind of the whole rotor: no box, not near the sea."""
+    """Return whether a Profile describes the wind of the whole rotor: no box, rotor clear of the sea."""
     if field is not None:
         return False
     return profile_spans(hub.Z - reach, hub.Z + reach)
 
 
-# ---------------------------------------------------------------------------- winds of a blade
+# ------------------------------------------------------------------------------ wind of a blade
 
 
 @inlined_kernel
@@ -220,17 +220,17 @@ def rotor_depth(pose, reach, shape):
 
 @kernel
 def is_boxed(flow, reach, shape, field):
-    """Return whether the grid of a box holds the whole rotor; field None: no."""
+    """Return whether the grid of a wind box contains the whole rotor; field None: False."""
     if field is None:
         return False
     size, hub = field.velocity.shape, flow.hub
     late = rotor_depth(flow.pose, reach, shape) * field.slowness * field.rate
-    place = (flow.t + field.shift - hub.X * field.slowness) * field.rate
+    position = (flow.t + field.shift - hub.X * field.slowness) * field.rate
     if field.periodic:
-        place = place % size[0]
+        position = position % size[0]
     y, z = (hub.Y - field.low_y) * field.inverse_dy, (hub.Z - field.low_z) * field.inverse_dz
     dy, dz = reach * field.inverse_dy, reach * field.inverse_dz
-    timely = late <= place < size[0] - 1.0 - late
+    timely = late <= position < size[0] - 1.0 - late
     return timely and dy <= y < size[2] - 1.0 - dy and dz <= z < size[1] - 1.0 - dz
 
 
@@ -239,12 +239,12 @@ def box_wind(flow, motion, field):
     """Return the BoxWind of a blade in a WindField."""
     pose, hub = flow.pose, flow.hub
     pace, slices = field.slowness * field.rate, field.velocity.shape[0]
-    place = (flow.t + field.shift - hub.X * field.slowness) * field.rate
+    position = (flow.t + field.shift - hub.X * field.slowness) * field.rate
     if field.periodic:
-        place = place % slices
+        position = position % slices
     dy, dz = field.inverse_dy, field.inverse_dz
     return BoxWind(
-        Plane(place, -pose.r11 * pace, -motion.rx * field.slowness * field.rate, -motion.tx * pace),
+        Plane(position, -pose.r11 * pace, -motion.rx * field.slowness * field.rate, -motion.tx * pace),
         Plane((hub.Y - field.low_y) * dy, pose.r21 * dy, motion.ry * dy, motion.ty * dy),
         Plane((hub.Z - field.low_z) * dz, pose.r31 * dz, motion.rz * dz, motion.tz * dz),
         pose,
@@ -255,12 +255,12 @@ def box_wind(flow, motion, field):
 
 @inlined_kernel
 def _relative(u, v, w, at, pose, motion):
-    """Return (v_normal, v_tangential) of a station in the wind (u, v, w), inertial components, m/s."""
+    """Return the relative wind (v_normal, v_tangential), m/s, of a station in the inertial wind (u, v, w)."""
     m = motion
     along = value_at(Plane(pose.r11 * u + pose.r21 * v + pose.r31 * w - m.vx, 0.0, m.wt, -m.wr), at)
     out = value_at(Plane(m.rx * u + m.ry * v + m.rz * w - m.vr, -m.wt, 0.0, m.wx), at)
-    own = value_at(Plane(m.vt, -m.wr, m.wx, 0.0), at)
-    return normal_part(along, out, at), own - (m.tx * u + m.ty * v + m.tz * w)
+    moving = value_at(Plane(m.vt, -m.wr, m.wx, 0.0), at)
+    return normal_part(along, out, at), moving - (m.tx * u + m.ty * v + m.tz * w)
 
 
 @inlined_kernel
@@ -289,8 +289,8 @@ def _sheared(wind, at):
 
 @inlined_kernel
 def _boxed(wind, at):
-    place = GridPlace(value_at(wind.slice, at), value_at(wind.row, at), value_at(wind.column, at))
-    u, v, w = cell_wind(place, wind.velocity)
+    position = GridPlace(value_at(wind.slice, at), value_at(wind.row, at), value_at(wind.column, at))
+    u, v, w = cell_wind(position, wind.velocity)
     return _relative(u, v, w, at, wind.pose, wind.motion)
 
 
@@ -311,14 +311,14 @@ def _station(j, wind, blade, radius, shape):
 
 
 @inlined_kernel
-def _with_station(force, found, j, blade, shape):
-    """Add the StationLoad of station j to a BladeForce."""
-    return BladeForce(add_station(force.load, found, j, blade.turn, shape), force.outside + found.outside)
+def _with_station(force, part, j, blade, shape):
+    """Return a BladeForce plus the StationLoad of station j."""
+    return BladeForce(add_station(force.load, part, j, blade.turn, shape), force.outside + part.outside)
 
 
 @inlined_kernel
 def swept(wind, blade, radius, shape):
-    """Return the BladeForce of a Blade.
+    """Return the BladeForce of a Blade, summed over the stations.
 
     wind    SampledWind, ShearedWind or BoxWind
     radius  (n,) m, of the stations
@@ -326,9 +326,9 @@ def swept(wind, blade, radius, shape):
     """
     force = NO_FORCE
     for j in range(radius.shape[0]):
-        found = _station(j, wind, blade, radius, shape)
-        force = _with_station(force, found, j, blade, shape)
-        put_rates(found.rates, blade.response)
+        part = _station(j, wind, blade, radius, shape)
+        force = _with_station(force, part, j, blade, shape)
+        put_rates(part.rates, blade.response)
     return force
 
 
@@ -336,8 +336,8 @@ def swept(wind, blade, radius, shape):
 def swept_together(winds, blades, radius, shape):
     """Return the BladeForce of each of three Blades.
 
-    A station of all three at a time keeps the processor busier than one blade after the other. What does not
-    differ between blades is computed once, so long as nothing is written in between: hence rates come last.
+    Evaluating a station for all three blades at a time uses the processor better than blade by blade. Terms
+    common to all blades are computed once if nothing is written in between: rates are therefore written last.
     """
     a = b = c = NO_FORCE
     for j in range(radius.shape[0]):
@@ -367,7 +367,7 @@ def sheared_forces(p, q, r, flow, reach, radius, shape):
 
 @kernel
 def store_blade_load(number, load, factor, pitches, blades):
-    """Put a factor times the BladeLoad of a blade into blades; nothing with one pitch for all blades."""
+    """Put factor times the BladeLoad of a blade into blades; no-op with one pitch for all blades."""
     if pitches is None:
         return
     row = blades[number]
@@ -377,7 +377,7 @@ def store_blade_load(number, load, factor, pitches, blades):
 
 @inlined_kernel
 def add_blade(total, blade, load, factor, pitches, blades):
-    """Add a BladeLoad to a Wrench about the rotor centre, and put factor times it into blades."""
+    """Return total plus a BladeLoad, about the rotor centre; put factor times the load into blades."""
     store_blade_load(blade.number, load, factor, pitches, blades)
     return with_blade(total, load, blade.motion)
 
@@ -403,13 +403,13 @@ def rotor_axes_load(about_centre, factor, rotor):
 
 @kernel
 def stations_outside(forces):
-    """Return how many stations of three BladeForces lie outside a table."""
+    """Return the number of stations of three BladeForces that lie outside a table."""
     return forces[0].outside + forces[1].outside + forces[2].outside
 
 
 @inlined_kernel
 def load_of_three(p, q, r, forces, elements, pitches, blades):
-    """Return the RotorLoad of three Blades and their BladeForces over the air density."""
+    """Return the RotorLoad of three Blades from their BladeForces over the air density."""
     density = elements.air_density
     total = add_blade(NO_LOAD, p, forces[0].load, density, pitches, blades)
     total = add_blade(total, q, forces[1].load, density, pitches, blades)

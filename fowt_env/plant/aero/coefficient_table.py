@@ -1,12 +1,12 @@
-"""Rotor loads from one table of the blade element momentum solution, expanded about uniform axial flow.
+"""Computes rotor loads from one table of blade element momentum, expanded about uniform axial flow.
 
-To first order in what varies over the disk the sum over three or more blades does not depend on the azimuth:
+To first order in variations over the disk the sum over three or more blades does not depend on the azimuth:
 in-plane force and moment have one coefficient each per gradient of the axial wind (shear, platform pitch and
 yaw rate) and per cross wind (misalignment, platform pitch, motion of the hub). Thrust and torque change to
 second order in both. All are integrals of derivatives of the line load, over inflow angle and blade pitch.
 
-Left out: what fluctuates with the azimuth, and the change of the cross wind over the disk. A box of
-full-field wind has to be averaged over the rotor first (scene/build.py does).
+Neglected: fluctuations with the azimuth, and the change of the cross wind over the disk. Full-field wind is
+averaged over the rotor first (in scene/build.py).
 """
 
 from math import atan2, cos, sin, sqrt
@@ -38,30 +38,30 @@ from fowt_env.plant.events import Counter
 from fowt_env.plant.state import State, Wrench
 
 # Angle theta = atan2(speed * tip radius, axial wind): 0 parked, 90 deg no wind, 180 deg parked in reversed
-# wind, negative turning backwards. Steps are small where the loads bend: (start, step) in deg. Tip-speed
+# wind, negative: rotating backwards. Steps are small where loads curve: (start, step) in deg. Tip-speed
 # ratios 3 to 20 are 71 to 87 deg; around 90 deg the wake state changes within a degree.
 THETA_STEPS = ((-180.0, 3.0), (0.0, 1.0), (40.0, 0.5), (66.0, 0.1), (89.9, 0.02), (90.1, 0.5), (110.0, 2.0))
 PITCH_STEPS = ((-10.0, 1.0), (-4.0, 0.25), (26.0, 1.0), (40.0, 2.5))  # deg, blade pitch
 THETA_END, PITCH_END = 180.0, 100.0
-# Largest change of the axial wind from hub to tip, over the speed at the tip, that the expansion is asked
-# for; a steeper one is taken as this one. It is 8 m/s at rated speed. A platform that yaws at 20 deg/s would
-# have 22, where the second-order torque outweighs the torque itself and drives the rotor.
+# Largest change of the axial wind from hub to tip, over the speed at the tip, in the expansion; steeper
+# gradients are limited to this one, 8 m/s at rated speed. A platform yaw rate of 20 deg/s would give 22 m/s,
+# where the second-order torque would exceed the mean torque and drive the rotor.
 STEEPEST = 0.1
-CELLS = 1024  # of the tables that find an interval of theta or blade pitch
+CELLS = 1024  # of the look-up tables of intervals of theta and blade pitch
 
-# rad, change of the inflow direction of a station for its derivatives. Gusts turn it by about this over a
-# turn; with sqrt(3/4) of their amplitude a central difference gives their mean effect to the next order too.
-# The worst error of a run at 18 m/s is 0.018 to 0.021 with 0.017, 0.009 to 0.016 with 0.03.
+# rad, change of a station's inflow direction for finite differences. Gusts change it by about this much per
+# revolution; with sqrt(3/4) of their amplitude a central difference gives their mean effect to the next order
+# too. The largest error of a run at 18 m/s is 0.018 to 0.021 with 0.017, 0.009 to 0.016 with 0.03.
 TURN = 0.03
-MEAN_SQUARE = 0.6  # of the radius over the tip's: where curvature of the wind counts for the torque
+MEAN_SQUARE = 0.6  # of radius over tip radius, at which wind curvature acts on the torque
 HIGHER_SQUARE = 0.7  # the same for the highest orders of the power law, which are small
 
 
 class Coefficients(NamedTuple):
-    """Loads over the air density and powers of the tip radius R and s = sqrt(V^2 + (speed R)^2).
+    """Holds loads over the air density and powers of the tip radius R and s = sqrt(V^2 + (speed R)^2).
 
-    With n, t the normal and tangential line load, subscripts their derivatives with the inflow, B blades
-    and all lengths over R: integrals of ... Terms of leaning blades: see _fill.
+    Values are integrals of the expressions below: n, t normal and tangential line load, subscripts their
+    derivatives with the inflow, B blades, lengths over R. Terms of leaning blades: see _fill.
     """
 
     thrust: float  # B n, on s^2 R^2
@@ -87,13 +87,13 @@ class Coefficients(NamedTuple):
 
 
 class Leaning(NamedTuple):
-    """What cone and prebend add: cross wind along the blades, forces along their radius, moments about it.
+    """Holds the terms of cone and prebend: cross wind and forces along the radius, moments about the radius.
 
-    With nx, nr, turn, t_nx, x of a station's Lever (blade_shape.py), t its place across the radius, m the
-    pitching moment and Q the moment about the shaft, integrals of ...
+    Values are integrals of the expressions below: nx, nr, turn, t_nx, x of a station's Lever
+    (blade_shape.py), t its position across the radius, m the pitching moment, Q the moment about the shaft.
     """
 
-    moment_lean: float  # -B/2 turn nr n_n, on s R^2: cross wind meets leaning blades as a gradient does
+    moment_lean: float  # -B/2 turn nr n_n, on s R^2: cross wind acts on leaning blades like a gradient
     force_lean: float  # B/2 nr t_n, on s R
     out_gradient: float  # B/2 nx (nr r n_n + t t_n), on s R^2
     out_cross: float  # B/2 nr n_t
@@ -101,14 +101,14 @@ class Leaning(NamedTuple):
     roll_gradient: float  # B/2 nx (r (t_nx n_n - x t_n + nx m_n) + t turn n_n), on s R^3
     roll_cross: float  # B/2 (t_nx n_t - x t_t + nx m_t)
     roll_lean: float  # B/2 nr (t_nx n_n - x t_n + nx m_n)
-    thrust_spread: float  # B nr r nx n_n, on s R^2: cross wind that diverges
+    thrust_spread: float  # B nr r nx n_n, on s R^2: diverging cross wind
     torque_spread: float  # B nr r Q_n, on s R^3
     thrust_both: float  # B/2 nx (nr nx r n_nn - nx t n_nt), on R^2: gradient along the cross wind
     torque_both: float  # B/2 (nr nx r Q_nn - nx t Q_nt), on R^3
 
 
 class TableAxis(NamedTuple):
-    """Points of one variable, and a table that finds the interval a value lies in."""
+    """Holds the points of one table variable, and a look-up table of intervals."""
 
     point: np.ndarray  # (n,) increasing
     cell: np.ndarray  # (CELLS,) int64, first interval that reaches into this cell
@@ -116,12 +116,12 @@ class TableAxis(NamedTuple):
 
 
 class CoefficientTable(NamedTuple):
-    """Coefficients of the rotor over inflow angle (n,) and blade pitch (m,), rad."""
+    """Holds the coefficients of the rotor over inflow angle (n,) and blade pitch (m,), rad."""
 
     theta: TableAxis
     blade_pitch: TableAxis
-    load: np.ndarray  # (n, m, len(Coefficients._fields)) in their order
-    lean: object  # (n, m, len(Leaning._fields)); None: straight blades in the rotor plane
+    load: np.ndarray  # (n, m, len(Coefficients._fields)), in order of the fields
+    lean: object  # (n, m, len(Leaning._fields)), likewise; None: straight blades in the rotor plane
     tip_radius: float
     overhang: float  # in rotor axes, as the hub height (tilt.py)
     hub_height: float
@@ -129,7 +129,7 @@ class CoefficientTable(NamedTuple):
 
 
 class TableCell(NamedTuple):
-    """Cell of a CoefficientTable and the weights of its corners."""
+    """Holds a cell of a CoefficientTable and the interpolation weights of the corners."""
 
     i: int  # of the inflow angle
     k: int  # of the blade pitch
@@ -140,7 +140,7 @@ class TableCell(NamedTuple):
 
 
 class DiskInflow(NamedTuple):
-    """Wind relative to the moving rotor about the hub, body components, m/s; radii over the tip's.
+    """Holds the wind relative to the moving rotor about the hub, body components, m/s; radii over the tip's.
 
     On a ring of radius r, in the direction e = (y, z) at the angle psi from z, the axial wind is
     axial + bend (r^2 - MEAN_SQUARE + r^2 cos(2 psi)) + r (gradient + r^2 cubic) . e
@@ -155,7 +155,7 @@ class DiskInflow(NamedTuple):
     cubic_z: float
     cross_y: float
     cross_z: float
-    spread: float  # mean of the cross wind's flow outwards at the tip
+    spread: float  # mean outward flow of the cross wind at the tip
 
 
 def _axis(steps, end):
@@ -167,14 +167,14 @@ def _axis(steps, end):
     ]
     point = np.radians(np.concatenate([*parts, [end]]))
     scale = CELLS / (point[-1] - point[0])
-    start = point[0] + np.arange(CELLS) / scale - 1e-9  # a cell's own rounding must not overshoot
+    start = point[0] + np.arange(CELLS) / scale - 1e-9  # rounding must not move a cell past a point
     cell = np.clip(np.searchsorted(point, start, side="right") - 1, 0, len(point) - 2)
     return TableAxis(point, cell.astype(np.int64), float(scale))
 
 
 @kernel
 def _loads_at(v_normal, v_tangential, j, blade_pitch, induction, rotor):
-    """Return (fn, ft, pitching moment) of station j per length."""
+    """Return the line loads (fn, ft, pitching moment) of station j."""
     section = blade_section(v_normal, v_tangential, blade_pitch, j, induction, rotor)
     element = element_of(j, blade_pitch, rotor)
     moment = pitching_moment(
@@ -186,7 +186,7 @@ def _loads_at(v_normal, v_tangential, j, blade_pitch, induction, rotor):
 
 @kernel
 def _slopes(less, middle, more, co, si, size):
-    """Return the derivatives with v_normal and v_tangential, and the second ones times the squared speed."""
+    """Return derivatives of a load with v_normal and v_tangential, the second ones times squared speed."""
     first = 0.5 * (more - less) / TURN
     second = (more - 2.0 * middle + less) / (TURN * TURN)
     normal, tangential = (2.0 * co * middle - si * first) / size, (2.0 * si * middle + co * first) / size
@@ -197,26 +197,26 @@ def _slopes(less, middle, more, co, si, size):
 
 
 @kernel
-def _straight_place(j, turn, rotor, shape):
+def _straight_geometry(j, turn, rotor, shape):
     arm = rotor.moment_weight[j] / rotor.weight[j]
     return Station(0.0, rotor.radius[j], 0.0, 1.0, 0.0), Lever(1.0, 0.0, -arm, 0.0, 0.0, 0.0, arm)
 
 
 @kernel
-def _curved_place(j, turn, rotor, shape):
+def _curved_geometry(j, turn, rotor, shape):
     return curved_station(j, turn, rotor.radius, shape), lever_of(j, turn, shape)
 
 
 # (j, turn, rotor, shape) -> (Station, Lever) of station j
-_place = chosen_by_class("shape", {type(None): _straight_place, BladeShape: _curved_place})
+_station_geometry = chosen_by_class("shape", {type(None): _straight_geometry, BladeShape: _curved_geometry})
 
 
 @entry
 def _fill(theta, blade_pitch, load, lean, rotor, shape):
     """Add the coefficients of a rotor in air of density 1 to load and lean, by blade element momentum.
 
-    The load of a station is the square of its inflow times a function of its direction, so that three
-    directions give the first and second derivatives.
+    The load of a station is the square of the inflow speed times a function of the inflow direction, so
+    three directions give the first and second derivatives.
     """
     big = rotor.tip_radius
     for i in range(theta.shape[0]):
@@ -225,7 +225,7 @@ def _fill(theta, blade_pitch, load, lean, rotor, shape):
         for k in range(blade_pitch.shape[0]):
             turned = turn_of(blade_pitch[k])
             for j in range(rotor.radius.shape[0]):
-                at, lever = _place(j, turned, rotor, shape)
+                at, lever = _station_geometry(j, turned, rotor, shape)
                 pitch = effective_pitch(j, blade_pitch[k], shape)
                 r, nx, nr = at.r / big, at.nx, at.nr
                 arm, turn, t_nr = lever.r / big, -lever.turn / big, lever.t_nr / big
@@ -286,7 +286,7 @@ def add_row(row, values):
 
 @kernel
 def _fill_lean(at, lever, of_n, of_t, of_m, half, quarter, big, d, shape):
-    """Add to d what a station of a curved blade adds to Leaning; of_n, of_t, of_m: _slopes of its loads."""
+    """Add a curved blade's station to d, a row of Leaning; of_n, of_t, of_m: _slopes of the loads."""
     if shape is None:
         return
     n_n, n_t, n_nn, n_nt, _ = of_n
@@ -319,12 +319,12 @@ _tables = Cache(8)  # one per set of blade elements: building takes about two se
 
 
 def build_coefficient_table(rotor):
-    """Return the CoefficientTable of a BladeElements; equal elements share their table."""
+    """Return the CoefficientTable of a BladeElements; equal elements share one cached table."""
     return _tables.get(elements_key(rotor), lambda: _filled_table(rotor))
 
 
 def _filled_loads(theta, blade_pitch, rotor):
-    """Return (load, lean) of a CoefficientTable at these points."""
+    """Return the arrays (load, lean) of a CoefficientTable at points of theta and blade_pitch (rad)."""
     load = np.zeros((len(theta), len(blade_pitch), len(Coefficients._fields)))
     lean = np.zeros((*load.shape[:2], 0 if rotor.shape is None else len(Leaning._fields)))
     _fill(theta, blade_pitch, load, lean, rotor._replace(air_density=1.0), rotor.shape)
@@ -332,7 +332,7 @@ def _filled_loads(theta, blade_pitch, rotor):
 
 
 def _filled_table(rotor):
-    """Return the computed CoefficientTable of BladeElements."""
+    """Compute the CoefficientTable of BladeElements."""
     theta, blade_pitch = _axis(THETA_STEPS, THETA_END), _axis(PITCH_STEPS, PITCH_END)
     load, lean = _filled_loads(theta.point, blade_pitch.point, rotor)
     return CoefficientTable(
@@ -349,7 +349,7 @@ def _filled_table(rotor):
 
 @kernel
 def _interval(x, axis):
-    """Return (i, weight): x lies between points i and i + 1; outside, the values of the ends apply."""
+    """Return the interval (i, weight) of x between points i and i + 1; outside, the nearest end point."""
     point = axis.point
     last = point.shape[0] - 1
     if not x > point[0]:
@@ -367,13 +367,13 @@ def _cell(wind, tip_speed, blade_pitch, table):
     """Return the TableCell of an axial wind and a tip speed (m/s) at a blade pitch (rad)."""
     i, p = _interval(atan2(tip_speed, wind), table.theta)
     k, b = _interval(blade_pitch, table.blade_pitch)
-    # indices without sign are not tested for counting from the end
+    # unsigned indices avoid the test for negative indices
     return TableCell(np.uintp(i), np.uintp(k), (1.0 - p) * (1.0 - b), (1.0 - p) * b, p * (1.0 - b), p * b)
 
 
 @inlined_kernel
 def _value(column, cell, values):
-    """Return a column of values (n, m, columns), bilinear in a TableCell."""
+    """Interpolate a column of values (n, m, columns) bilinearly in a TableCell."""
     i, k = cell.i, cell.k
     after, above = i + np.uintp(1), k + np.uintp(1)
     return (
@@ -386,7 +386,7 @@ def _value(column, cell, values):
 
 @kernel
 def _coefficients(cell, c):
-    """Return the Coefficients in a TableCell of CoefficientTable.load."""
+    """Return the Coefficients interpolated in a TableCell of CoefficientTable.load."""
     return Coefficients(
         _value(0, cell, c), _value(1, cell, c), _value(2, cell, c), _value(3, cell, c),
         _value(4, cell, c), _value(5, cell, c), _value(6, cell, c), _value(7, cell, c),
@@ -398,7 +398,7 @@ def _coefficients(cell, c):
 
 @kernel
 def _leaning(cell, c):
-    """Return the Leaning in a TableCell of CoefficientTable.lean."""
+    """Return the Leaning interpolated in a TableCell of CoefficientTable.lean."""
     return Leaning(
         _value(0, cell, c), _value(1, cell, c), _value(2, cell, c), _value(3, cell, c),
         _value(4, cell, c), _value(5, cell, c), _value(6, cell, c), _value(7, cell, c),
@@ -448,7 +448,7 @@ def _inflow(pose, now, series, table):
 
 @kernel
 def _add_lean(plain, flow, cell, s, gy, gz, table, lean):
-    """Add to a Wrench about the rotor centre the loads by cone and prebend."""
+    """Return plain plus the loads by cone and prebend: a Wrench about the rotor centre."""
     if lean is None:
         return plain
     at = _leaning(cell, lean)
@@ -470,11 +470,11 @@ def _add_lean(plain, flow, cell, s, gy, gz, table, lean):
 
 @kernel
 def coefficient_table_load(pose, x, now, series, table, counters):
-    """Return the RotorLoad of the state x, averaged over a turn of the rotor.
+    """Return the RotorLoad of the state x, averaged over a rotor revolution.
 
     No table or no wind series: zero.
-    now, series  wind (weather/wind.py), taken where the moving rotor is
-    counters     counters[Counter.ROTOR_TABLE_CLAMPED] grows by one where the wind is steeper than STEEPEST
+    now, series  wind (wind.py), evaluated at the position of the moving rotor
+    counters     counters[Counter.ROTOR_TABLE_CLAMPED] is incremented where the wind is steeper than STEEPEST
     """
     if table is None:
         return NO_ROTOR_LOAD
@@ -489,10 +489,10 @@ def coefficient_table_load(pose, x, now, series, table, counters):
     cy, cz = flow.cross_y, flow.cross_z
     steepest = sqrt((gy + qy) * (gy + qy) + (gz + qz) * (gz + qz))
     if steepest > STEEPEST * s:
-        if now.u != 0.0:  # in still air there is next to no load to be wrong
+        if now.u != 0.0:  # in still air the load is negligible
             counters[Counter.ROTOR_TABLE_CLAMPED] += 1.0
-        held = STEEPEST * s / steepest
-        gy, gz, qy, qz = held * gy, held * gz, held * qy, held * qz
+        reduction = STEEPEST * s / steepest
+        gy, gz, qy, qz = reduction * gy, reduction * gz, reduction * qy, reduction * qz
     my, mz = gy + HIGHER_SQUARE * qy, gz + HIGHER_SQUARE * qz
     nn, nt, tt = my * my + mz * mz, mz * cy - my * cz, cy * cy + cz * cz
     force = table.density * table.tip_radius * table.tip_radius
@@ -501,8 +501,8 @@ def coefficient_table_load(pose, x, now, series, table, counters):
     thrust = force * (thrust + nn * at.thrust_nn + nt * at.thrust_nt + tt * at.thrust_tt)
     torque = s * (s * at.torque + bend * at.torque_bend)
     torque = moment * (torque + nn * at.torque_nn + nt * at.torque_nt + tt * at.torque_tt)
-    # the first harmonic of a blade's force along the shaft tilts the rotor, of that across pushes it; the
-    # second harmonic of the inflow turns the first into its mirror image
+    # the first harmonic of the blade force along the shaft gives a moment, in the plane a force; the second
+    # harmonic of the inflow mirrors the first
     y = s * (gy * at.moment_gradient + qy * at.moment_cubic - cz * at.moment_cross)
     y -= bend * (my * at.moment_bend_gradient - cz * at.moment_bend_cross)
     z = s * (gz * at.moment_gradient + qz * at.moment_cubic + cy * at.moment_cross)
@@ -517,15 +517,15 @@ def coefficient_table_load(pose, x, now, series, table, counters):
 
 
 def performance(rotor, tip_speed_ratio, blade_pitch):
-    """Return (cp, ct, cq), each (n, m): coefficients of power, thrust and torque in axial wind.
+    """Return the coefficients of power, thrust and torque (cp, ct, cq) in axial wind, each (n, m).
 
-    rotor: BladeElements; tip_speed_ratio (n,); blade_pitch (m,) rad. The usual ones: on rho V^2/2 times the
-    area (and the radius).
+    rotor: BladeElements; tip_speed_ratio (n,); blade_pitch (m,) rad. Usual definitions: over rho V^2/2 times
+    rotor area (and radius).
     """
     ratio = np.ascontiguousarray(tip_speed_ratio, dtype=np.float64)
     blade_pitch = np.ascontiguousarray(blade_pitch, dtype=np.float64)
     load, _ = _filled_loads(np.arctan(ratio), blade_pitch, rotor)
-    # the table's are on rho R^2 (and R) and the speed of wind and tip together
+    # table entries are over rho R^2 (and R) and the combined speed s^2 of wind and tip
     scale = 2.0 / np.pi * (1.0 + ratio[:, None] ** 2)
     torque = scale * load[:, :, 1]
     return ratio[:, None] * torque, scale * load[:, :, 0], torque

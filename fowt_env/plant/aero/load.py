@@ -1,4 +1,4 @@
-"""Wind loads: of the rotor by whichever model the scene has, and of the tower."""
+"""Computes wind loads of the rotor, by the scene's rotor model, and of the tower."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ from fowt_env.plant.tower.modes import TowerModes
 
 
 class BemRotor(NamedTuple):
-    """Blade-element momentum solved at every station, with its optional wake models."""
+    """Holds the data of blade element momentum at every station, and of the optional wake models."""
 
     elements: object  # blade_elements.BladeElements
     skew: object  # wake.SkewedWake or None
@@ -27,7 +27,7 @@ class BemRotor(NamedTuple):
 
 
 class Aero(NamedTuple):
-    """Wind, and what it acts on."""
+    """Holds the wind and the parts of the turbine on which the wind acts."""
 
     wind: WindSeries
     field: object  # wind_field.WindField, which replaces the series, or None
@@ -37,7 +37,7 @@ class Aero(NamedTuple):
 
 
 class AeroLoad(NamedTuple):
-    """Loads of the wind, body components about the body origin; of the rotor in those of its Pose."""
+    """Holds wind loads: tower in body axes about the body origin, rotor in axes and origin of the nacelle."""
 
     rotor: RotorLoad
     tower: Wrench
@@ -84,7 +84,7 @@ _rotor_model = chosen_by_class(
 
 @kernel
 def settled_wake(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
-    """Set the wake states of x to their steady values for the other states; return their number.
+    """Set the wake states of x to their steady values for the other states; return the number of wake states.
 
     The filter is linear in its states: the rates at two values of the first stage, 0 and 1, give its
     steady value 0.4 W_qs, whatever the time constants. pose: in rotor axes; rotor: DynamicSections, or
@@ -107,9 +107,9 @@ def settled_wake(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
 
 @inlined_kernel
 def rotor_part(t, pose, x, now, aero, rotor, dx, counters, pitches, blades):
-    """Return the RotorLoad of a rotor model in body axes; of dx the wake's rates alone are written.
+    """Return the RotorLoad of a rotor model in the axes of pose; write only the wake rates of dx.
 
-    pitches, blades: blades with pitches of their own, and where the load of each is put, as in rotor_load.
+    pitches, blades: individual blade pitches and the output array of blade loads, as in rotor_load.
     """
     load = _rotor_model(t, rotor_pose(pose, aero.tilt), x, now, aero, rotor, dx, counters, pitches, blades)
     return RotorLoad(to_body_axes(load.wrench, aero.tilt), load.thrust, load.torque)
@@ -125,15 +125,15 @@ def _bent_drag(t, pose, x, now, aero, modes, modal):
     return bent_tower_load(t, pose, x, now, aero.wind, aero.field, aero.tower, modes, modal)
 
 
-# (t, pose, x, now, aero, modes, modal) -> Wrench; the forces on a bending tower's deflections go to modal
+# (t, pose, x, now, aero, modes, modal) -> Wrench; forces on tower deflections are added to modal
 _drag = chosen_by_class("modes", {type(None): _straight_drag, TowerModes: _bent_drag})
 
 
 @inlined_kernel
 def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
-    """Return the AeroLoad at a state; put the wake's rates into dx, add to the forces on tower deflections.
+    """Return the AeroLoad at a state; put wake rates into dx, add modal forces of tower drag to data.cache.
 
-    nacelle: nacelle_pose, whose axes and origin the rotor's load has. modes: TowerModes or None.
+    nacelle: nacelle_pose, the axes and origin of the rotor load. modes: TowerModes or None.
     """
     if aero is None:
         return NO_AERO_LOAD
@@ -144,7 +144,7 @@ def aero_load(t, pose, nacelle, x, aero, pitches, modes, data, dx):
 
 @kernel
 def wind_of(t, X, Y, Z, aero):
-    """Return (u, v, w) m/s, inertial components, at an inertial point (m); zero without aerodynamics."""
+    """Return the wind (u, v, w), m/s, inertial components, at an inertial point (m); zero if aero is None."""
     if aero is None:
         return 0.0, 0.0, 0.0
     return wind_at(t, X, Y, Z, wind_now(t, aero.wind), aero.wind, aero.field)

@@ -1,10 +1,10 @@
-"""Rotor loads with dynamic inflow from tables per blade station, as section_table.py has those without.
+"""Computes rotor loads with dynamic inflow from tables per blade station (section_table.py: without).
 
-The loads there contain the induced velocity of the momentum balance. With dynamic inflow that velocity has
-states, so what is tabulated is split in two: the quasi-steady induced velocity of a station over the
-direction of the wind that it meets, which the filter of wake.py follows, and its load over the direction of
-the flow that is left with the filtered velocity, without any balance. Directions, rows and limits of both
-tables are those of section_table.py. States, and the loads beyond the tables, are those of rotor_load.
+Loads in section_table.py include the induced velocity of the momentum balance. With dynamic inflow that
+velocity has states, so there are two tables: the quasi-steady induced velocity of a station over the inflow
+direction, input of the filter of wake.py, and the load over the direction of the local flow, which includes
+the filtered velocity, without momentum balance. Directions, rows and limits of both tables are as in
+section_table.py. States, and loads outside the tables, are as in rotor_load.
 """
 
 from typing import NamedTuple
@@ -50,11 +50,11 @@ from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.state import BLADES, State
 
-LEAST_LAG = 1e-6  # s, of a wake without a least one
+LEAST_LAG = 1e-6  # s, lower limit of time constants where the wake has none
 
 
 class DynamicSections(NamedTuple):
-    """Induced velocity and load of the n stations of a blade over blade pitch and flow direction."""
+    """Holds induced velocity and load of the n stations of a blade over blade pitch and flow direction."""
 
     induced: np.ndarray  # (blade pitches, n, directions, 2) float32, normal and tangential; see _fill
     load: np.ndarray  # (blade pitches, n, directions, 2, or 3 of curved blades) float32; see _fill
@@ -66,9 +66,9 @@ class DynamicSections(NamedTuple):
 
 @entry
 def _fill(induced, load, blade_pitch, elements, shape):
-    """Put into induced the quasi-steady induced velocities over the inflow's v_normal + |v_tangential|.
+    """Fill induced with quasi-steady induced velocities over v_normal + |v_tangential| of the inflow.
 
-    Into load go the columns of section_table._fill, of the flow that has its induced velocity already.
+    load gets the columns of section_table._fill, for a local flow that includes the induced velocity.
     """
     for i in range(load.shape[0]):
         for j in range(load.shape[1]):
@@ -76,29 +76,29 @@ def _fill(induced, load, blade_pitch, elements, shape):
             turned = effective_pitch(j, blade_pitch[i], shape)
             element = element_of(j, turned, elements)
             for k in range(load.shape[2]):
-                place = k - REVERSED
-                v_normal = place / AHEAD if place <= AHEAD else 1.0 - (place - AHEAD) / BEHIND
+                direction = k - REVERSED
+                v_normal = direction / AHEAD if direction <= AHEAD else 1.0 - (direction - AHEAD) / BEHIND
                 v_tangential = 1.0 - abs(v_normal)
-                if place > AHEAD:
+                if direction > AHEAD:
                     v_tangential = -v_tangential
                 cn, ct, square = airload(v_normal, v_tangential, element, elements.polars)
                 load[i, j, k, 0] = weight * element.half_density_chord * square * cn
                 load[i, j, k, 1] = weight * element.half_density_chord * square * ct
                 put_moment(load[i, j, k], weight, v_normal, v_tangential, j, element, elements, shape)
-                if place >= 0:
+                if direction >= 0:
                     v_normal = max(v_normal, LEAST_NORMAL)
                     section = blade_section(v_normal, v_tangential, turned, j, 1.0, elements)
-                    induced[i, j, place, 0] = section.induced_normal
-                    induced[i, j, place, 1] = section.induced_tangential
+                    induced[i, j, direction, 0] = section.induced_normal
+                    induced[i, j, direction, 1] = section.induced_tangential
 
 
 _tables = Cache(8)  # two per blade, 37 MB together: building takes about a second
 
 
 def build_dynamic_sections(elements, wake):
-    """Return the DynamicSections of a BladeElements; the same blade shares its tables in any air.
+    """Return the DynamicSections of a BladeElements; the cached tables serve all air densities.
 
-    19 stations: 37 MB, 1 s compiled; without the compiler many minutes (use rotor_load there).
+    19 stations: 37 MB, 1 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
     unit = elements._replace(air_density=1.0)
     induced, load = _tables.get(elements_key(unit), lambda: _filled_tables(unit))
@@ -108,7 +108,7 @@ def build_dynamic_sections(elements, wake):
 
 
 def _filled_tables(elements):
-    """Return (induced, load) of DynamicSections."""
+    """Return the arrays (induced, load) of DynamicSections, computed by blade element momentum."""
     blade_pitch = table_pitches()
     stations, directions = (len(blade_pitch), len(elements.radius)), AHEAD + BEHIND + 1
     induced = np.zeros((*stations, directions, 2), dtype=np.float32)
@@ -124,8 +124,8 @@ def _pitch_rows(blade_pitch, rotor):
 
 
 @inlined_kernel
-def _own_rows(number, first, x, rotor, pitches):
-    """Return _pitch_rows of a blade; first: those of the first blade."""
+def _blade_rows(number, first, x, rotor, pitches):
+    """Return the _pitch_rows of a blade; first: _pitch_rows of the first blade."""
     if pitches is None:
         return first
     return _pitch_rows(pitch_of(number, x, pitches), rotor)
@@ -133,9 +133,9 @@ def _own_rows(number, first, x, rotor, pitches):
 
 @inlined_kernel
 def _blade(number, first, x, flow, rate, rotor, dx, pitches):
-    """Return the Blade of a number; first: _pitch_rows of the first blade."""
+    """Return the Blade with this number; first: _pitch_rows of the first blade."""
     elements = rotor.elements
-    turn, induced, load = _own_rows(number, first, x, rotor, pitches)
+    turn, induced, load = _blade_rows(number, first, x, rotor, pitches)
     state = State.INTERNAL + PER_ELEMENT * elements.radius.shape[0] * number
     response = Lagging(state, induced, load, rate, rotor.ratio, rotor.arm, elements.shape, x, dx)
     return Blade(number, motion_of(number, x, elements, flow), turn, response)
@@ -143,13 +143,13 @@ def _blade(number, first, x, flow, rate, rotor, dx, pitches):
 
 @kernel
 def _sampled_force(blade, flow, radius, shape):
-    """Return the BladeForce with the wind sampled station by station."""
+    """Return the BladeForce with the wind sampled at each station."""
     return swept(SampledWind(flow, blade.motion), blade, radius, shape)
 
 
 @kernel
 def _tabled_load(flow, x, rotor, dx, pitches, blades):
-    """Return (stations outside the tables, RotorLoad) of a fast rotor of three blades pitched within them."""
+    """Return (stations outside the tables, RotorLoad) of a fast three-bladed rotor, pitched within them."""
     elements, shape, radius = rotor.elements, rotor.elements.shape, rotor.elements.radius
     slow, _ = time_constants(
         0.0, flow.hub.speed, 0.0, elements.tip_radius, DynamicInflow(rotor.wake.scale, 0.0)
@@ -174,7 +174,7 @@ def _tabled_load(flow, x, rotor, dx, pitches, blades):
 def dynamic_sections_load(t, pose, x, now, series, field, rotor, dx, counters, pitches, blades):
     """Return the RotorLoad of the state x at time t with its wake states; arguments as in rotor_load.
 
-    rotor_load computes the load of other than three blades, and where a station lies outside the tables.
+    rotor_load computes the load if there are not three blades or a station lies outside the tables.
     """
     if rotor is None:
         return NO_ROTOR_LOAD

@@ -1,11 +1,11 @@
-"""Rotor loads from a table per blade station: every blade, station and wind sample, without iteration.
+"""Computes rotor loads without iteration, from a table per blade station, for each blade and wind sample.
 
-The quasi-steady load of a station over the square of its inflow depends on the direction of the inflow and
-on the blade pitch alone (blade_elements.py). It is tabulated once per blade and interpolated linearly in
-both; all else is as in rotor_load. The table spans inflows from upwind (v_normal > 0) and blade pitches from
--5 to 90 deg; elsewhere, and on a slow or parked rotor, the exact solution is taken. Where that jumps between
-roots of the momentum balance (deep stall), or fades within hundredths of an angle, the table smooths it over
-a cell. The induction is not tabulated: dynamic inflow needs section_inflow.py, a skewed wake rotor_load.
+The quasi-steady load of a station over the square of the inflow speed depends only on inflow direction and
+blade pitch (blade_elements.py). This ratio is tabulated once per blade and interpolated linearly in both; all
+else is as in rotor_load. The table spans inflows from upwind (v_normal > 0) and blade pitches from -5 to 90
+deg; elsewhere, and on a slow or parked rotor, the exact solution is used. Where the exact solution jumps
+between roots of the momentum balance (deep stall), or fades within hundredths of an angle, the table smooths
+it over a cell. Induction is not tabulated: dynamic inflow needs section_inflow.py, skewed wake rotor_load.
 """
 
 from math import pi
@@ -47,13 +47,13 @@ from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.state import BLADES, NO_LOAD, State
 
-DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches where turbines operate
-COARSE_END, COARSE_ROWS = 90.0, 60  # deg, on to feather
-LEAST_NORMAL = 1e-9  # v_normal of the first direction: the limit from upwind, as the load jumps at zero
+DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches in operation
+COARSE_END, COARSE_ROWS = 90.0, 60  # deg, up to feather
+LEAST_NORMAL = 1e-9  # v_normal of the first direction: limit from upwind, since the load jumps at zero
 
 
 class SectionTable(NamedTuple):
-    """Loads of the n stations of a blade over blade pitch and inflow direction."""
+    """Holds the loads of the n stations of a blade over blade pitch and inflow direction."""
 
     load: np.ndarray  # (blade pitches, n, directions, 2, or 3 of curved blades) float32; see _fill
     arm: np.ndarray  # (n,) m, radius at which the station's part of a straight blade's force acts
@@ -62,8 +62,8 @@ class SectionTable(NamedTuple):
 
 @entry
 def _fill(load, blade_pitch, elements, shape):
-    """Put into load each station's part of the blade's force, normal and tangential, over the air density
-    and the square of v_normal + |v_tangential|; of curved blades its pitching moment too."""
+    """Fill load with each station's part of the blade force, normal and tangential, over the air density
+    and the square of v_normal + |v_tangential|; for curved blades also with the pitching moment."""
     for i in range(load.shape[0]):
         for j in range(load.shape[1]):
             weight = elements.weight[j] / elements.air_density
@@ -84,7 +84,7 @@ def _fill(load, blade_pitch, elements, shape):
 
 @kernel
 def put_moment(load, weight, v_normal, v_tangential, j, element, elements, shape):
-    """Put the pitching moment of a local flow, times weight, into load[2]; nothing for straight blades."""
+    """Put the pitching moment of a local flow, times weight, into load[2]; no-op for straight blades."""
     if shape is None:
         return
     load[2] = weight * pitching_moment(v_normal, v_tangential, j, element, shape, elements.polars)
@@ -94,9 +94,9 @@ _tables = Cache(8)  # one per blade, 18 MB each: building takes about a second
 
 
 def build_section_table(elements):
-    """Return the SectionTable of a BladeElements; the same blade shares its table in any air.
+    """Return the SectionTable of a BladeElements; one cached table serves all air densities.
 
-    19 stations: 18 MB, 0.8 s compiled; without the compiler many minutes (use rotor_load there).
+    19 stations: 18 MB, 0.8 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
     unit = elements._replace(air_density=1.0)
     load = _tables.get(elements_key(unit), lambda: _filled_table(unit))
@@ -109,19 +109,19 @@ def station_arms(elements):
 
 
 def table_pitches():
-    """Return the blade pitches of the rows of a table, rad."""
+    """Return the blade pitches of the table rows, rad."""
     dense = np.linspace(DENSE_START, DENSE_END, DENSE_ROWS, endpoint=False)
     coarse = np.linspace(DENSE_END, COARSE_END, COARSE_ROWS + 1)
     return np.radians(np.concatenate((dense, coarse)))
 
 
 def load_components(elements):
-    """Return the number of components of a table of loads: 2, or 3 with the moment of curved blades."""
+    """Return the number of components of a load table: 2, or 3 with the moment of curved blades."""
     return 2 if elements.shape is None else 3
 
 
 def _filled_table(elements):
-    """Return the loads of a SectionTable."""
+    """Return the load array of a SectionTable, computed by blade element momentum."""
     blade_pitch = table_pitches()
     size = (len(blade_pitch), len(elements.radius), AHEAD + BEHIND + 1, load_components(elements))
     load = np.zeros(size, dtype=np.float32)
@@ -131,7 +131,7 @@ def _filled_table(elements):
 
 @kernel
 def pitch_row(blade_pitch):
-    """Return the place of a blade pitch (rad) among the rows of the table, in rows; -1 outside."""
+    """Return the fractional row index of a blade pitch (rad) in the table; -1 outside."""
     degrees = blade_pitch * (180.0 / pi)
     if DENSE_START <= degrees < DENSE_END:
         return (degrees - DENSE_START) * (DENSE_ROWS / (DENSE_END - DENSE_START))
@@ -142,7 +142,7 @@ def pitch_row(blade_pitch):
 
 @kernel
 def pitches_in_table(x, pitches):
-    """Return whether every blade's pitch lies in the table."""
+    """Return whether the pitch of every blade lies in the table."""
     if pitches is None:
         return pitch_row(x[State.BLADE_PITCH]) >= 0.0
     inside = True
@@ -153,7 +153,7 @@ def pitches_in_table(x, pitches):
 
 @inlined_kernel
 def rows_of(blade_pitch, table):
-    """Return the Rows of a table (blade pitches, ...) about a blade pitch (rad) within it."""
+    """Return the Rows of a table (blade pitches, ...) that enclose a blade pitch (rad)."""
     row = pitch_row(blade_pitch)
     i = int(row)
     return Rows(table[i], table[i + 1], row - i)
@@ -166,8 +166,8 @@ def turn_and_response(blade_pitch, table):
 
 
 @inlined_kernel
-def _own_response(number, first, x, table, pitches):
-    """Return (Turn, Tabled) of a blade; first: those of the first blade."""
+def _blade_response(number, first, x, table, pitches):
+    """Return (Turn, Tabled) of a blade; first: (Turn, Tabled) of the first blade."""
     if pitches is None:
         return first
     return turn_and_response(pitch_of(number, x, pitches), table)
@@ -175,14 +175,14 @@ def _own_response(number, first, x, table, pitches):
 
 @inlined_kernel
 def tabled_blade(number, first, x, flow, table, pitches):
-    """Return the Blade of a number; first: (Turn, Tabled) of the first blade."""
-    turn, response = _own_response(number, first, x, table, pitches)
+    """Return the Blade with this number; first: (Turn, Tabled) of the first blade."""
+    turn, response = _blade_response(number, first, x, table, pitches)
     return Blade(number, motion_of(number, x, table.elements, flow), turn, response)
 
 
 @inlined_kernel
 def box_force(blade, flow, field, boxed, elements):
-    """Return the BladeForce in a box of wind that holds the rotor (boxed); else one that is not known."""
+    """Return the BladeForce in a wind box that contains the rotor (boxed); otherwise UNKNOWN_FORCE."""
     if field is None:
         return UNKNOWN_FORCE
     if not boxed:
@@ -192,7 +192,7 @@ def box_force(blade, flow, field, boxed, elements):
 
 @kernel
 def sampled_force(blade, flow, elements, counters):
-    """Return the BladeForce with the wind sampled station by station, solved where the table has no load."""
+    """Return the BladeForce with the wind sampled at each station; inflows outside the table are solved."""
     sure = TabledOrSolved(blade.response, blade.turn, elements, counters)
     blade = Blade(blade.number, blade.motion, blade.turn, sure)
     return swept(SampledWind(flow, blade.motion), blade, elements.radius, elements.shape)
@@ -200,9 +200,9 @@ def sampled_force(blade, flow, elements, counters):
 
 @kernel
 def section_table_load(t, pose, x, now, series, field, table, counters, pitches, blades):
-    """Return the RotorLoad of the state x at time t by the tables of stations; arguments as in rotor_load.
+    """Return the RotorLoad of the state x at time t from the station tables; arguments as in rotor_load.
 
-    Against rotor_load: rms 1e-4 of the standard deviation of thrust and torque over all operating states.
+    Error against rotor_load: rms 1e-4 of the standard deviation of thrust and torque over operating states.
     """
     if table is None:
         return NO_ROTOR_LOAD

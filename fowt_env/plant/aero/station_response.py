@@ -1,11 +1,11 @@
-"""Load of one blade station in a relative wind, by each of the rotor models that sweep over stations.
+"""Computes the load of one blade station in a relative wind, for each rotor model that sweeps over stations.
 
-A response is a NamedTuple that holds what a model needs for one blade. `station_load` finds the kernel by the
+A response is a NamedTuple with the data of a model for one blade. `station_load` selects the kernel by the
 class of the response:
 
 * Solved: blade element momentum, with the optional models of the wake (bem_rotor.py);
 * Tabled: the table of quasi-steady loads (section_table.py);
-* TabledOrSolved: the same, and blade element momentum for inflows outside the table;
+* TabledOrSolved: as Tabled, with blade element momentum for inflows outside the table;
 * Lagging: the tables of induced velocity and of load, with the states of dynamic inflow (section_inflow.py).
 """
 
@@ -30,15 +30,15 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
 
 # Directions: v_normal/(v_normal + |v_tangential|) in AHEAD cells, from the rotor plane to the shaft (where
-# this has a kink), then on in BEHIND cells to an inflow in the plane from behind (roots in cross wind).
+# this has a kink), then in BEHIND cells to an in-plane inflow from behind (blade roots in cross wind).
 # Halving the cells of both variables divides the error by three, at four times the memory.
 AHEAD, BEHIND = 512, 64
-# further cells of the loads before the first: a wake that lags a lull may blow back through the rotor plane
+# further load cells before the first: in a lull the lagging induced velocity may reverse the flow
 REVERSED = 64
 
 
 class Solved(NamedTuple):
-    """Response of a blade by blade element momentum."""
+    """Computes the response of a blade by blade element momentum."""
 
     number: int  # of the blade
     turn: Turn
@@ -49,13 +49,13 @@ class Solved(NamedTuple):
     skew: object  # wake.SkewedWake or None
     wake: object  # wake.DynamicInflow or None
     x: np.ndarray  # state
-    dx: np.ndarray  # its rates, of which those of the wake are written
+    dx: np.ndarray  # rates of the state; only those of wake states are written
     counters: np.ndarray
     elements: BladeElements
 
 
 class Rows(NamedTuple):
-    """Two neighbouring rows of a table over blade pitch, and the place between them."""
+    """Holds two neighbouring rows of a table over blade pitch and the position in between."""
 
     low: np.ndarray  # (n, directions, components) float32
     high: np.ndarray
@@ -63,7 +63,7 @@ class Rows(NamedTuple):
 
 
 class Tabled(NamedTuple):
-    """Response of a blade by the table of quasi-steady loads over the air density."""
+    """Computes the response of a blade from the table of quasi-steady loads over the air density."""
 
     rows: Rows
     arm: np.ndarray  # (n,) m, see section_table.SectionTable
@@ -71,7 +71,7 @@ class Tabled(NamedTuple):
 
 
 class TabledOrSolved(NamedTuple):
-    """As Tabled; blade element momentum where the table does not contain the inflow."""
+    """Computes the response as Tabled, by blade element momentum for inflows outside the table."""
 
     tabled: Tabled
     turn: Turn
@@ -80,14 +80,14 @@ class TabledOrSolved(NamedTuple):
 
 
 class WakeRate(NamedTuple):
-    """Rates of the filters of dynamic inflow, 1/s."""
+    """Holds the rates of the filters of dynamic inflow, 1/s."""
 
     slow: float  # 1/tau_1 without induction
-    most: float  # largest of both filters
+    most: float  # upper limit for both filters
 
 
 class WakeRates(NamedTuple):
-    """Rates of the four wake states of a station, m/s2."""
+    """Holds the rates of the four wake states of a station, m/s2."""
 
     first: int  # index of the first of the states
     normal_0: float
@@ -97,7 +97,7 @@ class WakeRates(NamedTuple):
 
 
 class Lagging(NamedTuple):
-    """Response of a blade by the tables of dynamic inflow, loads over the air density."""
+    """Computes the response of a blade from the tables of dynamic inflow, loads over the air density."""
 
     first: int  # index in the state of the blade's first wake state
     induced: Rows  # of the quasi-steady induced velocity
@@ -107,11 +107,11 @@ class Lagging(NamedTuple):
     arm: np.ndarray  # (n,) m
     shape: object  # BladeShape or None
     x: np.ndarray  # state
-    dx: np.ndarray  # its rates, of which those of the wake are written
+    dx: np.ndarray  # rates of the state; only those of wake states are written
 
 
 class Cell(NamedTuple):
-    """Cell of an inflow direction, and the place in it."""
+    """Holds the table cell of an inflow direction and the fractional position in the cell."""
 
     k: int
     part: float
@@ -152,7 +152,7 @@ def _induced(section, v_normal, j, response, skew, wake):
 
 @kernel
 def _induced_load(section, v_normal, v_tangential, element, elements, skew, wake):
-    """Return (fn, ft), N/m, of a section in this local flow; those of the balance without wake models."""
+    """Return the line loads (fn, ft), N/m, in this local flow; without wake models those of the section."""
     if wake is None and skew is None:
         return section.fn, section.ft
     cn, ct, square = airload(v_normal, v_tangential, element, elements.polars)
@@ -164,20 +164,20 @@ def _induced_load(section, v_normal, v_tangential, element, elements, skew, wake
 
 @inlined_kernel
 def cell_of(v_normal, v_tangential, total, first):
-    """Return the Cell of a direction in a table whose direction within the rotor plane has the index first.
+    """Return the Cell of a direction in a table; first: index of the direction in the rotor plane.
 
-    total: |v_normal| + |v_tangential|. Any input is safe.
+    total: |v_normal| + |v_tangential|. All inputs are safe, also NaN.
     """
     ahead = AHEAD * v_normal
-    place = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total + first
-    place = place if place > 0.0 else 0.0  # not a number too
-    k = min(int(place), first + AHEAD + BEHIND - 1)
-    return Cell(np.uintp(k), place - k)  # indices without sign are not tested for counting from the end
+    position = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total + first
+    position = position if position > 0.0 else 0.0  # also for NaN
+    k = min(int(position), first + AHEAD + BEHIND - 1)
+    return Cell(np.uintp(k), position - k)  # unsigned indices avoid the test for negative indices
 
 
 @inlined_kernel
 def looked_up(cell, j, component, rows):
-    """Return a component of a table at a Cell of station j, bilinear between rows and directions."""
+    """Return a table component of station j in a Cell, bilinear in rows and directions."""
     k, low, high, fraction = cell.k, rows.low, rows.high, rows.fraction
     after = k + np.uintp(1)
     here = (1.0 - fraction) * float(low[j, k, component]) + fraction * float(high[j, k, component])
@@ -187,7 +187,7 @@ def looked_up(cell, j, component, rows):
 
 @inlined_kernel
 def _tabled_moment(cell, j, rows, shape):
-    """Return the pitching moment in a table; zero for straight blades, whose tables have none."""
+    """Return the pitching moment from a table; zero for straight blades, whose tables have no moment."""
     if shape is None:
         return 0.0
     return looked_up(cell, j, 2, rows)
@@ -213,9 +213,9 @@ def _tabled_load(response, v_normal, v_tangential, j):
 @inlined_kernel
 def _tabled_or_solved_load(response, v_normal, v_tangential, j):
     """Return the StationLoad of station j over the air density."""
-    found = _tabled_load(response.tabled, v_normal, v_tangential, j)
-    if found.outside == 0:
-        return found
+    tabled = _tabled_load(response.tabled, v_normal, v_tangential, j)
+    if tabled.outside == 0:
+        return tabled
     return _exact_load(response, v_normal, v_tangential, j)
 
 
@@ -231,7 +231,7 @@ def _exact_load(response, v_normal, v_tangential, j):
         v_normal + section.induced_normal, v_tangential + section.induced_tangential, j,
         element_of(j, turned, elements), elements.shape, elements.polars,
     )  # fmt: skip
-    # without air there is no load here either: the sums are multiplied by the density afterwards
+    # zero density gives zero load here too: the sums are multiplied by the density afterwards
     weight = elements.weight[j] / elements.air_density if elements.air_density > 0.0 else 0.0
     return StationLoad(weight * section.fn, weight * section.ft, weight * moment, 1.0, arm[j], 0, None)
 
@@ -277,7 +277,7 @@ def _lagging_load(response, v_normal, v_tangential, j):
 
 @inlined_kernel
 def put_rates(rates, response):
-    """Put the WakeRates of a station into dx; nothing without any."""
+    """Put the WakeRates of a station into dx; no-op for None."""
     if rates is None:
         return
     i, dx = rates.first, response.dx

@@ -1,4 +1,4 @@
-"""Wind drag of the tower (theory.md, Eq. 14)."""
+"""Computes the wind drag of the tower (theory.md, Eq. 14)."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -9,18 +9,18 @@ from fowt_env.plant.aero.wind import power_profile, profile_at, profile_spans, s
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.state import NO_LOAD, Wrench, to_inertial
 
-POINTS = 6  # Gauss points: force and moment to 4e-6 against 60 points, sheared wind on a pitching tower
+POINTS = 6  # Gauss points: within 4e-6 of force and moment by 60 points, sheared wind, pitching tower
 
 
 class TowerDrag(NamedTuple):
-    """Gauss points over the height of the tower. n points."""
+    """Holds n Gauss points over the height of the tower, with the drag factor of each."""
 
     z: np.ndarray  # (n,) m, body frame
     factor: np.ndarray  # (n,) kg/m: 1/2 air density * drag coefficient * diameter * quadrature weight
 
 
 def build_tower_drag(tower, air_density, points=POINTS):
-    """Return the TowerDrag of a tower description, the diameter linear from base to top."""
+    """Return the TowerDrag of a tower description; the diameter is linear from base to top."""
     node, weight = np.polynomial.legendre.leggauss(points)
     height = tower.top_height - tower.base_height
     up = 0.5 * (node + 1.0)
@@ -34,9 +34,9 @@ def build_tower_drag(tower, air_density, points=POINTS):
 
 @kernel
 def tower_load(t, pose, now, series, field, tower):
-    """Return the Wrench of the relative wind normal to the tower's axis; theory.md Eq. (14).
+    """Return the drag Wrench of the relative wind normal to the tower's axis; theory.md, Eq. 14.
 
-    No tower or no wind series: zero. In still air (a series of zero wind) it always takes energy.
+    No tower or no wind series: zero. In still air (a series of zero wind) drag always dissipates energy.
     """
     if tower is None:
         return NO_LOAD
@@ -49,7 +49,7 @@ def tower_load(t, pose, now, series, field, tower):
     for i in range(tower.z.shape[0]):
         z = tower.z[i]
         X, Y, Z = pose.x + z * pose.r13, pose.y + z * pose.r23, pose.z + z * pose.r33
-        if profiled:  # a power at every point is a tenth of the time of a step
+        if profiled:  # evaluating the power law at every point takes a tenth of a time step
             shear = profile.scale * profile_at(Z / profile.centre - 1.0, profile)
             u, v, w = scaled_wind(Y, Z, shear, now, series)
         else:
@@ -66,9 +66,9 @@ def tower_load(t, pose, now, series, field, tower):
 
 @kernel
 def bent_tower_load(t, pose, x, now, series, field, tower, modes, modal):
-    """Return tower_load of a tower that bends: at its displaced points, relative to their velocity.
+    """Return the drag Wrench of a flexible tower, from position and velocity of its displaced points.
 
-    modes: tower.modes.TowerModes. The generalised forces on its deflections are added to modal (n,).
+    modes: tower.modes.TowerModes. The generalised forces on the deflections are added to modal (n,).
     """
     if tower is None:
         return NO_LOAD

@@ -1,6 +1,6 @@
-"""Optional wake models on top of the quasi-steady induction: skewed wake and dynamic inflow.
+"""Computes optional wake effects on the quasi-steady induction: skewed wake and dynamic inflow.
 
-Both are off by default (None). Source: theory.md, 5.1.
+Both models are off by default (None). Source: theory.md, 5.1.
 """
 
 from math import atan2, pi, sqrt, tan
@@ -10,34 +10,34 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.state import State
 
 PER_ELEMENT = 4  # wake states of a blade element: first stage and induced velocity, axial and tangential
-LOWEST_WIND = 1.0  # m/s; weaker wind gets the time constants of this one, which would else grow without bound
+LOWEST_WIND = 1.0  # m/s; lower limit of the wind speed in time constants, which would otherwise be unbounded
 
 
 class SkewedWake(NamedTuple):
-    """Glauert / Pitt-Peters redistribution of the axial induction in yawed or tilted inflow.
+    """Redistributes the axial induction in yawed or tilted inflow (Glauert / Pitt-Peters).
 
     a_skew = a (1 + strength tan(chi/2) (radius/tip radius) cos(psi - psi_0)), with the wake skew angle
     chi = (0.6 a + 1) chi_0 of each element, chi_0 the angle between shaft and relative wind at the
-    hub, and psi_0 the blade that points downstream. chi is limited to 90 deg.
+    hub, and psi_0 the azimuth of a blade that points downstream. chi is limited to 90 deg.
     """
 
     strength: float  # 15 pi/32 in the literature
 
 
 class DynamicInflow(NamedTuple):
-    """Oeye's filter on the induced velocity of every blade element, with two time constants.
+    """Filters the induced velocity of every blade element by Oeye's model with two time constants.
 
     W_int + tau_1 W_int' = W_qs + 0.6 tau_1 W_qs',  W + tau_2 W' = W_int. With the state
     s = W_int - 0.6 W_qs no derivative of W_qs is needed: tau_1 s' = 0.4 W_qs - s.
     tau_1 = scale 1.1/(1 - 1.3 min(a, 0.5)) tip_radius/U_0, tau_2 = (0.39 - 0.26 (r/tip_radius)^2) tau_1.
     """
 
-    scale: float  # 1; other values only to study the effect
-    least: float  # s, no time constant is shorter: what the integrator follows, see least_lag
+    scale: float  # 1; other values for sensitivity studies only
+    least: float  # s, lower limit of both time constants for the integrator, see least_lag
 
 
 class Skew(NamedTuple):
-    """Direction of the wind in the rotor plane (unit vector) and its angle to the shaft, rad."""
+    """Holds the wind direction in the rotor plane (unit vector) and the angle of wind to shaft, rad."""
 
     y: float
     z: float
@@ -45,12 +45,12 @@ class Skew(NamedTuple):
 
 
 def build_skewed_wake(strength=15.0 * pi / 32.0):
-    """Return the SkewedWake with the given strength."""
+    """Return the SkewedWake of this strength."""
     return SkewedWake(float(strength))
 
 
 def build_dynamic_inflow(scale=1.0, least=0.0):
-    """Return the DynamicInflow with its time constants scaled, and none below least (s)."""
+    """Return the DynamicInflow with scaled time constants of at least `least` (s)."""
     return DynamicInflow(float(scale), float(least))
 
 
@@ -63,7 +63,7 @@ def n_wake_states(elements, wake):
 
 @kernel
 def skew_of(hub, skew):
-    """Return the Skew of the relative wind at the hub; none where no skew model is used."""
+    """Return the Skew of the relative wind at the hub; zero without a skew model."""
     if skew is None:
         return Skew(0.0, 0.0, 0.0)
     across = sqrt(hub.wy * hub.wy + hub.wz * hub.wz)
@@ -84,13 +84,13 @@ def skew_factor(induced_normal, v_normal, ey, ez, span, skewed, skew):
 
 @kernel
 def pace(a):
-    """Return the factor on 1/tau_1 and 1/tau_2 at axial induction a, 1 without."""
+    """Return the factor on 1/tau_1 and 1/tau_2 at axial induction a; 1 at a = 0."""
     return 1.0 - 1.3 * min(max(a, 0.0), 0.5)
 
 
 @kernel
 def time_constants(a, wind_speed, radius, tip_radius, wake):
-    """Return (tau_1, tau_2) s of a blade element with axial induction a."""
+    """Return the time constants (tau_1, tau_2), s, of a blade element with axial induction a."""
     slow = 1.1 / pace(a) * tip_radius / max(wind_speed, LOWEST_WIND)
     span = radius / tip_radius
     slow *= wake.scale
@@ -99,9 +99,9 @@ def time_constants(a, wind_speed, radius, tip_radius, wake):
 
 @kernel
 def filtered_induction(section, v_normal, blade, j, wind_speed, wake, x, dx, radius, tip_radius):
-    """Return (normal, tangential) induced velocity of an element, m/s; quasi-steady without dynamic inflow.
+    """Return the induced velocity (normal, tangential) of an element, m/s.
 
-    With it the velocities are states, and their derivatives are written to dx.
+    Quasi-steady without dynamic inflow; otherwise taken from the wake states, whose rates are put into dx.
     """
     if wake is None:
         return section.induced_normal, section.induced_tangential

@@ -1,4 +1,4 @@
-"""Wind at any instant and point: a time series at the reference height, sheared over the height, or a box."""
+"""Computes the wind at any time and point from a wind box or a series, which is sheared over the height."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -13,12 +13,12 @@ LOWEST_HEIGHT = 1.0  # m; points below it (waves, rotor at sea level) see the wi
 
 
 class WindSeries(NamedTuple):
-    """Wind varying in time, with its shear over the height."""
+    """Holds a time series of the wind and the shear over the height."""
 
     time: np.ndarray  # (n,) s, increasing, n >= 1; with a period it runs from 0 to the period
     value: np.ndarray  # (n, 5) u, v, w at the reference height, vertical_shear, horizontal_shear; m/s
     inverse_step: float  # 1/dt of a uniform time, 1/s; 0: not uniform (then bisection)
-    period: float  # s; > 0: the series repeats, its last row equals the first; 0: ends are held
+    period: float  # s; > 0: the series repeats, its last row equals the first; 0: constant past the ends
     shear_exponent: float  # of the power law on u and v
     reference_height: float  # m
     reference_length: float  # m; the linear shears are m/s per this length
@@ -26,7 +26,7 @@ class WindSeries(NamedTuple):
 
 
 class WindNow(NamedTuple):
-    """One instant of a WindSeries, m/s."""
+    """Holds the values of a WindSeries at one instant, m/s."""
 
     u: float
     v: float
@@ -36,7 +36,7 @@ class WindNow(NamedTuple):
 
 
 class Profile(NamedTuple):
-    """Power law over the height as scale P(z)/Q(z), z = height/centre - 1."""
+    """Approximates a power law over the height by scale P(z)/Q(z), z = height/centre - 1."""
 
     centre: float  # m
     scale: float  # power law at the centre
@@ -71,14 +71,14 @@ def _row(series, i, weight):
 
 @kernel
 def wind_now(t, series):
-    """Return the WindNow at time t (s): linear between samples, periodic, or constant beyond the ends."""
+    """Return the WindNow at time t (s): linear between samples, periodic, or constant past the ends."""
     if series is None:
         return NO_WIND
     time = series.time
     last = time.shape[0] - 1
     if series.period > 0.0:
         t = t % series.period
-    # written so that a NaN time gives the first row instead of an index out of range
+    # the negated comparison maps a NaN time to the first row instead of an invalid index
     if last == 0 or not t > time[0]:
         first = series.value[0]
         return WindNow(first[0], first[1], first[2], first[3], first[4])
@@ -107,11 +107,11 @@ def interval_at(time, t):
 
 @kernel
 def wind_at(t, X, Y, Z, now, series, field):
-    """Return (u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
+    """Return the wind (u, v, w), m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s).
 
     The horizontal wind follows the power law of Z/reference_height; the linear shears add to u, m/s per
-    reference_length above and to the left (+y). Points below LOWEST_HEIGHT take its wind. now: wind_now(t,
-    series). field: None, or the wind_field.WindField that replaces the series.
+    reference_length above and to the left (+y). Points below LOWEST_HEIGHT see the wind at that height. now:
+    wind_now(t, series). field: None, or the wind_field.WindField that replaces the series.
     """
     if series is None:
         return 0.0, 0.0, 0.0
@@ -122,7 +122,7 @@ def wind_at(t, X, Y, Z, now, series, field):
 
 @kernel
 def _series_at(Y, Z, now, series):
-    """Return (u, v, w) of a series at a height and a distance to the left."""
+    """Return the wind (u, v, w) of a series, m/s, at height Z and distance Y to the left (m)."""
     height = max(Z, LOWEST_HEIGHT)
     profile = 1.0
     if series.shear_exponent != 0.0:
@@ -132,7 +132,7 @@ def _series_at(Y, Z, now, series):
 
 @kernel
 def scaled_wind(Y, height, profile, now, series):
-    """Return (u, v, w) of a series, m/s, at a distance to the left and a height (m) of this power law."""
+    """Return the wind (u, v, w) of a series, m/s, at a distance Y to the left and a height with profile."""
     linear = (
         now.vertical_shear * (height - series.reference_height) + now.horizontal_shear * Y
     ) / series.reference_length

@@ -1,4 +1,4 @@
-"""Full-field wind at a point: a box of frozen turbulence that the mean wind carries past the turbine."""
+"""Computes full-field wind at a point of a box of frozen turbulence, convected by the mean wind."""
 
 from typing import NamedTuple
 
@@ -9,28 +9,28 @@ from fowt_env.plant.compile.prefetch import prefetch
 
 
 class WindField(NamedTuple):
-    """A box of wind: slices normal to the mean wind, evenly spaced in time, height and across."""
+    """Holds a wind box: slices normal to the mean wind, evenly spaced in time, height and width."""
 
     velocity: np.ndarray  # (n_time, n_z, n_y, 3) float32 u, v, w, m/s
     rate: float  # slices per second
     shift: float  # s, added to the time
-    slowness: float  # s/m, 1 over the speed at which the box travels
+    slowness: float  # s/m, 1 over the convection speed of the box
     low_y: float  # m, lowest grid line
     low_z: float
     inverse_dy: float  # 1/m
     inverse_dz: float
-    periodic: bool  # False: the first and last slices hold
+    periodic: bool  # False: constant before the first and after the last slice
 
 
 @kernel
 def field_at(t, X, Y, Z, field):
-    """Return (u, v, w) m/s, inertial components, at the inertial point X, Y, Z (m) and time t (s)."""
+    """Return the wind (u, v, w), m/s, inertial components, at the inertial point X, Y, Z (m), time t (s)."""
     velocity = field.velocity
     slices, n_z, n_y = velocity.shape[0], velocity.shape[1], velocity.shape[2]
     s = (t + field.shift - X * field.slowness) * field.rate
     if field.periodic:
         s = s % slices
-    if not s > 0.0:  # also where s is not a number
+    if not s > 0.0:  # also for NaN
         s = 0.0
     if field.periodic:
         i = min(int(s), slices - 1)
@@ -64,7 +64,7 @@ def field_at(t, X, Y, Z, field):
 
 
 class GridPlace(NamedTuple):
-    """Place on the grid of a box, in grid steps from its first slice, lowest row and rightmost column."""
+    """Holds a position in a wind box: grid steps from first slice, lowest row and rightmost column."""
 
     slice: float
     row: float
@@ -73,7 +73,7 @@ class GridPlace(NamedTuple):
 
 @kernel
 def _across(velocity, cut, row, column, component, p, q, r, d):
-    """Return a component of the wind within a slice, from the corners of a cell with their weights."""
+    """Return a wind component within a slice: the weighted sum (p, q, r, d) of the corners of a cell."""
     above, beside = row + np.uintp(1), column + np.uintp(1)
     return (
         p * velocity[cut, row, column, component]
@@ -85,13 +85,13 @@ def _across(velocity, cut, row, column, component, p, q, r, d):
 
 @inlined_kernel
 def cell_wind(place, velocity):
-    """Return (u, v, w) of a box at a GridPlace within its grid, m/s."""
+    """Return the wind (u, v, w) of a box, m/s, at a GridPlace inside the grid."""
     s, y, z = place.slice, place.column, place.row
-    # indices without sign are not tested for counting from the end
+    # unsigned indices avoid the test for negative indices
     now, row, column = np.uintp(s), np.uintp(z), np.uintp(y)
     late, up, left = s - float(now), z - float(row), y - float(column)
     after = now + np.uintp(1)
-    # in a long box every new slice lies in memory that the processor does not expect to be read
+    # in a long box the processor does not anticipate the read of the next slice
     prefetch(velocity, after + np.uintp(1), row, column)
     prefetch(velocity, after + np.uintp(1), row + np.uintp(1), column)
     p, q = (1.0 - up) * (1.0 - left), (1.0 - up) * left

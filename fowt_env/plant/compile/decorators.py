@@ -1,8 +1,8 @@
-"""The house decorators for compiled code, and the disk cache keyed by the package's sources.
+"""Defines the decorators of compiled functions, and the disk cache keyed by the package's sources.
 
-Numba's own cache watches the file of the function alone, not those of its callees. So the cache lives in a
-folder named by a hash of the code of every source of the plant (sources.py); a kernel of another package
-carries the hash of what its module imports besides. A user's function is compiled anew in each process.
+Numba's built-in cache checks only the file of the function, not the files of its callees. Compiled kernels
+are therefore kept in a folder named by a hash of the code of all plant sources (sources.py); the key of a
+kernel of another package also has the hash of its module's imports. User functions are not cached.
 """
 
 import hashlib
@@ -20,7 +20,7 @@ import numba
 
 from fowt_env.plant.compile.versions import check_numba
 
-check_numba(numba.__version__)  # ahead of what other versions cannot import or compile
+check_numba(numba.__version__)  # before imports and kernels that fail with other versions
 
 from numba import types  # noqa: E402
 from numba.core.ccallback import CFunc  # noqa: E402
@@ -29,29 +29,29 @@ from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
 from fowt_env.layout import PACKAGE, installed_path  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
 from fowt_env.plant.compile.linked import LinkedDispatcher  # noqa: E402
-from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # listens from here on
+from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # registers its listener
 from fowt_env.plant.compile.sources import imported_at_top, keep_sources, read_source  # noqa: E402
 
 KEEP_CACHES = 4  # folders of older sources kept, so that switching branches does not recompile
-DAY = 86400.0  # s; what was used within it may be in use still
-UNUSED = 30 * DAY  # s after which a folder of older sources goes, however few there are
-MARKER = "made_by_fowt_env"  # a file in each folder that this module makes, and may therefore remove
+DAY = 86400.0  # s; a folder used less than a day ago may still be in use
+UNUSED = 30 * DAY  # s without use after which a folder of older sources is removed in any case
+MARKER = "made_by_fowt_env"  # file that marks folders made by this module: only these are removed
 OWN_NAME = re.compile("[0-9a-f]{16}")
 PLANT = Path(__file__).absolute().parents[1]
 
 
 def _hash(paths):
-    """Return the hash (16 hexadecimal digits) of sources' code and of versions that shape machine code."""
+    """Return a hash (16 hexadecimal digits) of the code of sources and the versions of numba and Python."""
     digest = hashlib.sha256(f"{numba.__version__} {sys.version}".encode())
-    for place, path in sorted((installed_path(path), path) for path in paths):
-        digest.update(place.relative_to(PACKAGE).as_posix().encode())
+    for installed, path in sorted((installed_path(path), path) for path in paths):
+        digest.update(installed.relative_to(PACKAGE).as_posix().encode())
         digest.update(read_source(path).code.encode())
     keep_sources()
     return digest.hexdigest()[:16]
 
 
 def own_folders(kernels):
-    """Return the folders of compiled kernels in a folder, those that this package made and no others."""
+    """Return the subfolders of compiled kernels in a folder that this package made."""
     return [
         path
         for path in kernels.iterdir()
@@ -60,26 +60,26 @@ def own_folders(kernels):
 
 
 def _drop_oldest(folder):
-    """Remove folders beside this one unused for a day or, of the KEEP_CACHES last used, a month."""
+    """Remove sibling cache folders unused for a day; the KEEP_CACHES last used are kept for a month."""
     now = time.time()
     used = {path: path.stat().st_mtime for path in own_folders(folder.parent) if path != folder}
-    for place, (path, last) in enumerate(sorted(used.items(), key=lambda item: -item[1])):
-        if now - last > (DAY if place >= KEEP_CACHES else UNUSED):
+    for rank, (path, last) in enumerate(sorted(used.items(), key=lambda item: -item[1])):
+        if now - last > (DAY if rank >= KEEP_CACHES else UNUSED):
             shutil.rmtree(path, ignore_errors=True)
 
 
-def _places(folder):
-    """Yield the folders that must be ours: an inner one can only be looked at if its outer one is."""
+def _folders_to_check(folder):
+    """Yield the folders that must belong to the user, outer ones first: only then can inner ones be read."""
     yield folder.parent
     yield folder
     yield from (Path(entry) for entry in os.scandir(folder) if entry.is_dir())
 
 
 def _cache_folder(sources):
-    """Return the folder of this source version's kernels, made if need be; the oldest others are dropped.
+    """Return the folder of compiled kernels of these sources, made if missing; remove the oldest others.
 
-    None, and kernels are then compiled in each process, where there is none or, after a warning, where
-    somebody else may have put files into it.
+    None without a usable folder, or, after a warning, with one that another user can write to: kernels are
+    then compiled in each process.
     """
     root = cache_root()
     if root is None:
@@ -88,18 +88,18 @@ def _cache_folder(sources):
     with suppress(OSError):
         make_private(folder)
     try:
-        for place in _places(folder):
-            if fault := distrust(place):
+        for checked in _folders_to_check(folder):
+            if fault := distrust(checked):
                 warnings.warn(
-                    f"{place} {fault}, and compiled kernels are code: it is not used, and kernels are"
-                    " compiled at each start. Set FOWT_CACHE_DIR to a folder of your own",
+                    f"{checked} {fault}: compiled kernels are executable code, so this folder is not used and"
+                    " kernels are compiled at each start. Set FOWT_CACHE_DIR to a private folder",
                     RuntimeWarning,
                     stacklevel=2,
                 )
                 return None
-    except OSError:  # it could not be made, or cannot be read
+    except OSError:  # the folder cannot be made or read
         return None
-    with suppress(OSError):  # it is somebody else's to care for
+    with suppress(OSError):  # the folder is shared and read-only: its owner maintains it
         (folder / MARKER).touch(mode=0o600)
         os.utime(folder)
         _drop_oldest(folder)
@@ -110,7 +110,7 @@ CACHE_FOLDER = _cache_folder(PLANT.rglob("*.py"))
 
 
 def kernels_compiled():
-    """Return whether this version's kernels are on disk already, for at least one kind of scene."""
+    """Return whether compiled kernels of this version are on disk for at least one kind of scene."""
     if numba.config.DISABLE_JIT:
         return True
     return CACHE_FOLDER is not None and any(CACHE_FOLDER.rglob("*.nbi"))
@@ -118,7 +118,7 @@ def kernels_compiled():
 
 @cache
 def _stamp(path):
-    """Return the hash of a source and its imports outside the plant; "" for one in it, None for a user's."""
+    """Return the hash of a source and its imports outside the plant; "" in the plant, None for user code."""
     path = Path(path)
     if installed_path(path) is None:
         return None
@@ -126,14 +126,14 @@ def _stamp(path):
 
 
 def _keep(compiled, function):
-    """Have what numba made of a function kept on disk, if all that it can depend on is in its key."""
+    """Attach the disk cache to a compiled function if its key covers all sources that it depends on."""
     stamp = CACHE_FOLDER and _stamp(os.path.abspath(function.__code__.co_filename))
     if stamp is not None:
         compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, isinstance(compiled, LinkedDispatcher))
 
 
 def _decorator(linked=False, **options):
-    """Return the decorator numba.njit with these options, kept on disk; linked: by linked.py."""
+    """Return the decorator numba.njit with these options and the disk cache; linked: by linked.py."""
 
     def decorate(function):
         if numba.config.DISABLE_JIT:
@@ -152,22 +152,22 @@ def _decorator(linked=False, **options):
 _HOUSE = {"error_model": "numpy", "nogil": True}
 
 # _nrt=False: numba counts references at every slice and call that takes arrays, each an atomic
-# instruction; without them a step takes a third less time. Such a kernel must not allocate, nor
-# return an array or a part that holds one.
+# instruction; without reference counts a time step takes a third less time. Such a kernel must not
+# allocate, nor return an array or a tuple that contains one.
 kernel = _decorator(**_HOUSE, _nrt=False, linked=True)
 
 # No fastmath anywhere: LLVM then orders a sum differently in each caller's copy of a function, and a
-# process that compiles gets other last bits than one that loads from disk (seen on the look-up rotor
-# and the wave sums). Where a sum's time counts, vector_sums.py writes it in a fixed order of lanes.
+# process that compiles gets other last bits than one that loads from disk (observed with the look-up
+# rotor and the wave sums). Time-critical sums use the fixed order of lanes of vector_sums.py.
 
-# A kernel put into its caller whatever its size. A call hands over a part of the model by value, up to some
-# hundred words: that takes longer than many a load, so what merely hands parts on is put into its caller.
+# A kernel that is inlined whatever its size. A call passes a part of the model by value, up to a few
+# hundred words, which takes longer than many loads: kernels that only pass parts on are inlined.
 inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=True)
 
-# Functions that Python calls: they take Handles, which are counted references, or allocate.
+# Functions called from Python, which take Handles (counted references) or allocate.
 entry = _decorator(**_HOUSE)
 
-# The same with its prange loops spread over threads.
+# Entries whose prange loops are spread over threads.
 parallel_entry = _decorator(**_HOUSE, parallel=True)
 
 FLOATS = types.float64[::1]
@@ -175,7 +175,7 @@ CONTROL_SIGNATURE = types.void(FLOATS, FLOATS, FLOATS, FLOATS)
 
 
 class ControlKernel:
-    """A control law that is compiled when a run first needs it: a scene has one of a dozen."""
+    """Holds a control law and compiles it at first use: a run needs only one of a dozen laws."""
 
     def __init__(self, function):
         self.function = function
@@ -183,7 +183,7 @@ class ControlKernel:
 
     @cached_property
     def compiled(self):
-        """Return the first-class function, or the Python function itself under NUMBA_DISABLE_JIT."""
+        """Return the law as a first-class function, or the Python function under NUMBA_DISABLE_JIT."""
         if numba.config.DISABLE_JIT:
             return self.function
         signature = CONTROL_SIGNATURE.args, CONTROL_SIGNATURE.return_type
@@ -194,9 +194,9 @@ class ControlKernel:
 
 
 def control_kernel(function):
-    """Return a ControlKernel: a law as a first-class function, so that one compiled loop serves all.
+    """Return the ControlKernel of a law: one compiled loop calls every law as a first-class function.
 
-    function(parameters, memory, measurement, command): four (n,) float64 arrays; it reads the
+    function(parameters, memory, measurement, command): four (n,) float64 arrays; the law reads the
     first and third and writes the second and fourth.
     """
     return ControlKernel(function)

@@ -1,9 +1,9 @@
-"""Numba's cache of compiled functions, made fit for several processes, broken files and full disks.
+"""Defines the disk cache of compiled kernels, safe for concurrent processes, broken files and full disks.
 
 Numba adds entries to a function's index without a lock, and a broken file or a full disk ends the program.
-Here entries are added under a lock, a broken file is as good as none, and what cannot be kept is compiled
-again the next time. The files are pickles, which run code as they are read: one that may be from somebody
-else is not.
+Here entries are added under a lock, a broken file counts as missing, and a kernel that cannot be stored is
+compiled again in the next process. The files are pickles, which run code when loaded: a file that another
+user may have written is not read.
 """
 
 import fcntl
@@ -23,10 +23,10 @@ from fowt_env.plant.compile import linked
 
 
 class SharedCacheFile(caching.IndexDataCacheFile):
-    """Index and machine code of one function, in files that other processes use too."""
+    """Holds the index and machine code of one function in files shared between processes."""
 
     def save(self, key, data):
-        """Keep the machine code of a key, the code before the index that tells of it."""
+        """Store the machine code of a key, and then its entry in the index."""
         try:
             with self._lock():
                 names = self._load_index()
@@ -37,12 +37,12 @@ class SharedCacheFile(caching.IndexDataCacheFile):
                     )
                 self._save_data(names[key], data)
                 self._save_index(names)
-        except OSError:  # no space, or no longer a place to write
+        except OSError:  # the disk is full or the folder is gone
             return
 
     @contextmanager
     def _lock(self):
-        """Return a context that one process at a time is in."""
+        """Return a context that holds the lock on the index: one process at a time."""
         handle = os.open(self._index_path + ".lock", os.O_RDWR | os.O_CREAT, 0o600)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX)
@@ -54,30 +54,30 @@ class SharedCacheFile(caching.IndexDataCacheFile):
         try:
             _check(self._index_path)
             return super()._load_index()
-        except Exception:  # whatever unpickling a broken file raises
+        except Exception:  # unpickling a broken file can raise anything
             return {}
 
     def _load_data(self, name):
         try:
             _check(self._data_path(name))
             return super()._load_data(name)
-        except Exception as error:  # likewise; numba compiles anew where the file cannot be read
+        except Exception as error:  # likewise; numba compiles again after an OSError
             raise OSError(f"{name}: {error}") from error
 
     def _open_for_write(self, path):
-        """Return a context with a file that takes the path's place at its end."""
+        """Return a context with a temporary file that replaces the file at path on exit."""
         return replaced_privately(path)
 
 
 def _check(path):
-    """Raise PermissionError for a file that somebody else may have written."""
+    """Raise PermissionError for a cache file that another user may have written."""
     fault = distrust(path, stat.S_ISREG)
     if fault:
         raise PermissionError(f"{path} {fault}")
 
 
 class _Locator(caching.UserProvidedCacheLocator):
-    """Where a kernel's files are: in its folder, named by the package, not by the path or the line."""
+    """Locates the cache files of a kernel by package and name, not by source path or line."""
 
     def __init__(self, function, path, folder, stamp):
         self._py_file = path
@@ -86,23 +86,23 @@ class _Locator(caching.UserProvidedCacheLocator):
         self._stamp = stamp
 
     def get_source_stamp(self):
-        """Return what must not have changed beside the folder's name."""
+        """Return the hash that, besides the folder's name, must match for a stored kernel to be valid."""
         return self._stamp
 
     def get_disambiguator(self):
-        """Return the text that tells functions of one name in a module apart, by code and numbers."""
+        """Return a hash of bytecode and constants: it distinguishes functions of one name in a module."""
         numbers = [value for value in self._code.co_consts if isinstance(value, (int, float, complex, tuple))]
         shape = repr((self._code.co_code, self._code.co_names, numbers))
         return hashlib.sha256(shape.encode()).hexdigest()[:8]
 
     def ensure_cache_path(self):
-        """Make the folder if it can be made; where it cannot, nothing is kept."""
+        """Make the cache folder if possible; without the folder no kernel is stored."""
         with suppress(OSError):
             make_private(self._cache_path)
 
 
 class _Files(caching.CompileResultCacheImpl):
-    """Numba's rules on what can be kept and what it is called, with our locator."""
+    """Applies numba's rules for storing and naming compiled functions, with the _Locator."""
 
     def __init__(self, function, folder, stamp):
         path = inspect.getfile(function)
@@ -113,7 +113,7 @@ class _Files(caching.CompileResultCacheImpl):
 
 
 class _LinkedFiles(_Files):
-    """The same for kernels that are linked into their callers: no machine code."""
+    """Stores kernels that are linked into their callers, as LLVM bitcode instead of machine code."""
 
     def __init__(self, function, folder, stamp):
         super().__init__(function, folder, stamp)
@@ -127,10 +127,10 @@ class _LinkedFiles(_Files):
 
 
 class KernelCache(caching.FunctionCache):
-    """Cache of one compiled function beneath a folder, for compiled functions' attribute _cache.
+    """Caches one compiled function in a folder; set as the attribute _cache of the compiled function.
 
-    stamp: whatever it depends on beside its key and the name of the folder.
-    links: whether it is a kernel of linked.py.
+    stamp: hash of further dependencies, in addition to the key and the folder's name.
+    links: whether the function is a kernel of linked.py.
     """
 
     def __init__(self, function, folder, stamp="", links=False):
@@ -138,14 +138,14 @@ class KernelCache(caching.FunctionCache):
         super().__init__(function)
         file = getattr(self, "_cache_file", None)
         if type(file) is not caching.IndexDataCacheFile:
-            raise ImportError(f"numba {numba.__version__} keeps compiled functions in an unknown way")
+            raise ImportError(f"numba {numba.__version__} stores compiled functions in an unsupported way")
         locator = self._impl.locator
         self._cache_file = SharedCacheFile(
             locator.get_cache_path(), self._impl.filename_base, locator.get_source_stamp()
         )
 
     def save_overload(self, sig, data):
-        """Keep the machine code for a signature, unless a compiled function is among its arguments: that is
-        compiled into it, and as no other process knows it again, each would add its own."""
+        """Store the machine code of a signature, unless an argument is a compiled function: no other process
+        would recognise that argument, and each would add an entry."""
         if "CPUDispatcher(" not in repr(sig):
             super().save_overload(sig, data)

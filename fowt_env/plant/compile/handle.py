@@ -1,10 +1,10 @@
-"""What Python holds and hands to kernels: a model, which never changes, and data, which does.
+"""Defines the Handle that passes a constant model and its changing data from Python to kernels.
 
-A NamedTuple goes by value, some 400 machine words for a model, in every call from one kernel to the next; a
-reference is one word. So a class of NamedTuples that is marked by_reference is seen by kernels as a
-Reference, in a Handle and as a field of another such class; its parts are plain values.
+Numba passes a NamedTuple by value, some 400 machine words for a model, in every call between kernels; a
+reference is one word. Kernels therefore see a NamedTuple class marked by_reference as a Reference, both in
+a Handle and as a field of another such class; its other fields are plain values.
 
-A Reference does not keep what it refers to alive. It is made in an entry, whose caller holds the Handle.
+A Reference does not keep its target alive: it is made in an entry, whose caller keeps the Handle.
 """
 
 import numba
@@ -18,7 +18,7 @@ from fowt_env.plant.compile.decorators import entry
 
 
 def by_reference(kind):
-    """Class decorator: kernels see this NamedTuple as a Reference."""
+    """Mark a NamedTuple class (decorator): kernels see it as a Reference."""
     kind.by_reference = True
     return kind
 
@@ -26,25 +26,25 @@ def by_reference(kind):
 if numba.config.DISABLE_JIT:
 
     class Handle:
-        """Plain twin of the compiled handle, for runs with the JIT off."""
+        """Holds a model and data, in place of the compiled handle when the JIT is off."""
 
         def __init__(self, model, data):
             self.model = model
             self.data = data
 
     def model_of(handle):
-        """The model of a handle."""
+        """Return the model of a Handle."""
         return handle.model
 
     def data_of(handle):
-        """The data of a handle."""
+        """Return the data of a Handle."""
         return handle.data
 
 else:
     from numba.experimental import structref
 
     class Reference(types.Type):
-        """Address of a NamedTuple, with the attributes of its fields."""
+        """Represents the address of a NamedTuple; its attributes are the fields of the tuple."""
 
         def __init__(self, target):
             self.target = target
@@ -56,7 +56,7 @@ else:
             super().__init__(manager, kind, manager.lookup(kind.target).get_value_type().as_pointer())
 
     def _by_reference(kind):
-        """Whether kernels see a type as a Reference."""
+        """Return whether kernels see a numba type as a Reference."""
         return isinstance(kind, types.NamedTuple) and getattr(kind.instance_class, "by_reference", False)
 
     @infer_getattr
@@ -72,11 +72,11 @@ else:
     @lower_getattr_generic(Reference)
     def _read_field(context, builder, kind, value, name):
         number = kind.target.fields.index(name)
-        place = cgutils.gep_inbounds(builder, value, 0, number)
+        address = cgutils.gep_inbounds(builder, value, 0, number)
         field = kind.target.types[number]
         if _by_reference(field):
-            return place
-        return imputils.impl_ret_borrowed(context, builder, field, builder.load(place))
+            return address
+        return imputils.impl_ret_borrowed(context, builder, field, builder.load(address))
 
     @structref.register
     class _HandleType(types.StructRef):
@@ -84,9 +84,9 @@ else:
             return tuple((name, types.unliteral(kind)) for name, kind in fields)
 
     class Handle(structref.StructRefProxy):
-        """A model and data in the form that entries take from Python.
+        """Holds a model and data in the form that entries take from Python.
 
-        A structref crosses from Python, and into prange, far cheaper than nested NamedTuples.
+        Passing a structref from Python, and into prange, is far cheaper than passing nested NamedTuples.
         """
 
         def __new__(cls, model, data):
@@ -96,14 +96,14 @@ else:
 
     @entry
     def _filled_handle(model, data):
-        """A Handle; numba's own constructor would be compiled anew, for a second, in every process."""
+        """Return a Handle; numba's constructor is not cached and would take a second in every process."""
         return Handle(model, data)
 
-    def _place_of(name):
-        """Intrinsic: Reference to a field of a Handle."""
+    def _reference_to(name):
+        """Return the intrinsic that takes a Handle and returns a Reference to its field of this name."""
 
         @intrinsic
-        def place(typing_context, handle):
+        def reference(typing_context, handle):
             field = handle.field_dict[name]
 
             def build(context, builder, signature, arguments):
@@ -112,6 +112,6 @@ else:
 
             return Reference(field)(handle), build
 
-        return place
+        return reference
 
-    model_of, data_of = _place_of("model"), _place_of("data")
+    model_of, data_of = _reference_to("model"), _reference_to("data")

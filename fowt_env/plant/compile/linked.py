@@ -1,8 +1,8 @@
-"""Kernels for kernels: typed and lowered once, and linked into their callers, without machine code.
+"""Compiles kernels called by kernels to LLVM bitcode, which is linked into their callers.
 
-Numba makes machine code of each kernel, which is never run where kernels alone call it, since each caller
-has a copy: 40 % of the time of compiling a scene. Here such a kernel ends as LLVM's code, which callers link
-and the disk cache keeps. Called from Python, as in tests, it is compiled once more as numba does it.
+Numba generates machine code for each kernel. Where kernels alone call a kernel, that code is never run, as
+each caller has a copy, but takes 40 % of the compile time of a scene. Such a kernel is compiled to bitcode
+only, which callers link and the disk cache stores; calls from Python, as in tests, compile it separately.
 """
 
 from functools import cached_property
@@ -20,7 +20,7 @@ from numba.core.typed_passes import NativeLowering
 
 
 class LinkedLibrary(JITCodeLibrary):
-    """Code of a kernel that callers link: no machine code is made of it."""
+    """Holds the LLVM bitcode of a kernel for its callers to link; generates no machine code."""
 
     def _finalize_final_module(self):
         self._finalize_dynamic_globals()
@@ -28,15 +28,15 @@ class LinkedLibrary(JITCodeLibrary):
         self._finalized = True
 
     def _optimize_final_module(self):
-        """Nothing: the caller that gets machine code optimises all that it has linked at once."""
+        """Skip optimisation: the caller with machine code optimises all linked kernels at once."""
 
     def serialized(self):
-        """(name, code) for the disk cache."""
+        """Return (name, LLVM bitcode) of the library for the disk cache."""
         return self.name, self._get_module_for_linking().as_bitcode()
 
     @classmethod
     def rebuilt(cls, codegen, name, code):
-        """The library that was serialized so."""
+        """Return the LinkedLibrary of a serialized name and LLVM bitcode."""
         library = cls(codegen, name)
         library._final_module = library._shared_module = llvm.parse_bitcode(code)
         library._finalize_final_module()
@@ -44,9 +44,9 @@ class LinkedLibrary(JITCodeLibrary):
 
 
 def place_environment(codegen, name, environment):
-    """Define the variable that a kernel's code finds its Environment by, in which a print looks things up.
+    """Define the variable through which a kernel reads its Environment, as a print needs.
 
-    Of variables of a common name in several modules the first one counts, so that callers find this one.
+    Among variables with common linkage in several modules the first counts, so callers use this one.
     """
     module = codegen._create_empty_module(name)
     variable = ir.GlobalVariable(module, ir.IntType(8).as_pointer(), name)
@@ -58,12 +58,12 @@ def place_environment(codegen, name, environment):
 
 
 class Key:
-    """What stands for a linked kernel where numba has the function that Python calls."""
+    """Identifies a linked kernel where numba has the function that Python calls."""
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class LinkedLowering(NativeLowering):
-    """Numba's lowering into a LinkedLibrary."""
+    """Runs numba's lowering pass with a LinkedLibrary as its target."""
 
     _name = "linked_lowering"
 
@@ -80,7 +80,7 @@ class LinkedLowering(NativeLowering):
 
 
 class LinkedCompiler(CompilerBase):
-    """Numba's pipeline with LinkedLowering at its end."""
+    """Runs numba's compiler pipeline with LinkedLowering as its last pass."""
 
     def define_pipelines(self):
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
@@ -93,27 +93,27 @@ class LinkedCompiler(CompilerBase):
 
 
 class LinkedDispatcher(CPUDispatcher):
-    """Dispatcher of a kernel for kernels."""
+    """Dispatches calls to a linked kernel: from kernels to its bitcode, from Python to its twin."""
 
     def __init__(self, py_func, locals=None, targetoptions=None, pipeline_class=LinkedCompiler):
         super().__init__(py_func, locals, targetoptions, pipeline_class)
-        self.keep = None  # keep(compiled, function): has the disk cache keep the machine code of the twin
+        self.keep = None  # keep(compiled, function): attaches the disk cache to the twin
         self._called_from_python = False
 
     @cached_property
     def twin(self):
-        """The same function as numba compiles it for Python."""
+        """Return the dispatcher of the same function compiled by numba for calls from Python."""
         twin = numba.jit(**self.targetoptions)(self.py_func)
         if self.keep is not None:
             self.keep(twin, self.py_func)
         return twin
 
     def add_overload(self, cres):
-        """Numba's, but Python does not find it."""
+        """Register an overload for kernels only: calls from Python do not use it."""
         self.overloads[tuple(cres.signature.args)] = cres
 
     def _compile_for_args(self, *args, **kws):
-        with global_compiler_lock:  # numba's, which can be taken twice: another thread compiles for kernels
+        with global_compiler_lock:  # reentrant lock of numba: another thread may compile for kernels
             self._called_from_python = True
             try:
                 return super()._compile_for_args(*args, **kws)
@@ -121,10 +121,10 @@ class LinkedDispatcher(CPUDispatcher):
                 self._called_from_python = False
 
     def compile(self, sig):
-        """The Key of a signature's code or, called from Python, its function."""
+        """Compile for a signature; return the Key of the bitcode or, called from Python, the function."""
         if not self._called_from_python:
             return super().compile(sig)
-        self._called_from_python = False  # what it calls is compiled from here
+        self._called_from_python = False  # its callees are compiled for kernels
         args, _ = sigutils.normalize_signature(sig)
         function = self.twin.compile(tuple(args))
         self._insert([kind._code for kind in args], function, False)
@@ -132,14 +132,14 @@ class LinkedDispatcher(CPUDispatcher):
 
 
 def reduced(cres):
-    """A CompileResult of a linked kernel in parts that can be pickled."""
+    """Return the parts of a linked kernel's CompileResult that can be pickled."""
     descriptor = cres.fndesc
     descriptor.typemap = descriptor.calltypes = None
     return cres.library.serialized(), descriptor, cres.environment, cres.signature, cres.reload_init
 
 
 def rebuilt(target_context, parts):
-    """The CompileResult whose reduced form is given."""
+    """Return the CompileResult of a linked kernel from its reduced parts."""
     (name, code), descriptor, environment, signature, reload_init = parts
     for function in reload_init:
         function()

@@ -1,8 +1,8 @@
-"""What users are told while kernels are compiled, wherever they call from, and a slower collector meanwhile.
+"""Reports to the user that kernels are being compiled, and makes garbage collection less frequent meanwhile.
 
-It goes to stderr: a line at the start, one at the end, and between them a line that counts, which a terminal
-has drawn over every REDRAW seconds and a log, a pipe or a notebook gets every REPEAT seconds. The
-environment variable FOWT_QUIET and set_quiet switch it off.
+The report goes to stderr: a line at the start, a line at the end, and in between the number of kernels
+compiled so far, redrawn every REDRAW seconds on a terminal and printed every REPEAT seconds to a log, a pipe
+or a notebook. The environment variable FOWT_QUIET and set_quiet switch the report off.
 """
 
 import atexit
@@ -19,22 +19,22 @@ from numba.core import event
 
 COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 5 s to 1 min) ..."
 NAME = "fowt_env: "
-DELAY = 1.0  # s of compiling after which the user is told: a kernel or two take less
-PAUSE = 2.0  # s without compiling after which it counts as ended
+DELAY = 1.0  # s of compiling before the first line: a kernel or two take less
+PAUSE = 2.0  # s without compiling after which compilation counts as finished
 REDRAW = 0.2  # s between counts on a terminal
-REPEAT = 15.0  # s between counts where lines stay
-# While kernels are compiled numba makes millions of objects that stay, over which Python's collector goes
-# again and again: a seventh of the time at its usual threshold of some hundreds.
+REPEAT = 15.0  # s between counts where lines cannot be overwritten
+# While compiling, numba allocates millions of long-lived objects, which Python's collector scans again and
+# again: a seventh of the compile time at its default threshold of some hundreds.
 COLLECT_AFTER = 200_000
 
 
 def own(compiled):
-    """Return whether an event of numba is about a kernel of this project, not one of numba's or a user's."""
+    """Return whether a compile event of numba concerns a kernel of this project."""
     return (compiled.data["dispatcher"].py_func.__module__ or "").startswith("fowt_env.")
 
 
 def _redraws(stream):
-    """Return whether a line can be written over: not in rich's live displays, which wait for its end."""
+    """Return whether a stream can overwrite a line; rich's live displays cannot, they print whole lines."""
     if type(stream).__name__ == "FileProxy":
         return False
     with suppress(Exception):
@@ -43,38 +43,38 @@ def _redraws(stream):
 
 
 class Notice(event.Listener):
-    """Listens to numba, under whose lock for compiling it is called: by one thread at a time."""
+    """Listens to numba's compile events; the compiler lock admits one thread at a time."""
 
     def __init__(self):
-        self.quiet = False  # by set_quiet
-        self.counters = []  # of the contexts in which somebody else says it
-        self.depth = 0  # of kernels that are being compiled for kernels
-        self.count = 0  # compiled since `_begin`
-        self.spent = 0.0  # s, by those at the top
-        self.started = self.ended = 0.0  # of the last one at the top
+        self.quiet = False  # set by set_quiet
+        self.counters = []  # callbacks of active compilation_reported contexts, which report instead
+        self.depth = 0  # nesting: a kernel is compiled while its caller is
+        self.count = 0  # kernels compiled since `_begin`
+        self.spent = 0.0  # s, in outermost compilations
+        self.started = self.ended = 0.0  # of the last outermost compilation
         self.thread = None
         self.stop = threading.Event()
         self.writing = threading.Lock()
-        self.drawn = 0  # characters of the line that counts
+        self.drawn = 0  # characters of the drawn line
         self.thresholds = None
 
     def on_start(self, compiled):
-        """Note that numba begins with a kernel."""
+        """Record that numba starts to compile a kernel."""
         if not own(compiled):
             return
         self.depth += 1
         if self.depth > 1:
             return
         self.started = time.monotonic()
-        found = gc.get_threshold()
-        if 0 < found[0] < COLLECT_AFTER:
-            self.thresholds = found
-            gc.set_threshold(COLLECT_AFTER, *found[1:])
-        if self.thread is None or not self.thread.is_alive():  # it does not live on in a fork
+        current = gc.get_threshold()
+        if 0 < current[0] < COLLECT_AFTER:
+            self.thresholds = current
+            gc.set_threshold(COLLECT_AFTER, *current[1:])
+        if self.thread is None or not self.thread.is_alive():  # a forked process has no thread
             self._begin()
 
     def on_end(self, compiled):
-        """Note that numba has ended with a kernel, or failed."""
+        """Record that numba has compiled a kernel, or failed to."""
         if not own(compiled):
             return
         self.count += 1
@@ -89,37 +89,37 @@ class Notice(event.Listener):
             gc.set_threshold(*self.thresholds)
             self.thresholds = None
         with self.writing:
-            self._erase()  # the next thing on the terminal may be the user's own
+            self._erase()  # the user may print next
 
     def _begin(self):
         self.count, self.spent = 0, 0.0
         if self.quiet or self.counters or os.environ.get("FOWT_QUIET", "0") not in ("", "0"):
             return
-        if multiprocessing.parent_process() is not None:  # which says it
+        if multiprocessing.parent_process() is not None:  # the parent reports
             return
         self.stop.clear()
         self.thread = threading.Thread(target=self._watch, name="fowt_env compiling", daemon=True)
         self.thread.start()
 
     def _watch(self):
-        """Tell the user, from a thread of its own: half the wait is one call of LLVM's."""
-        told = None  # s of compiling at the last line that stays
+        """Write the report from a separate thread: half of the compile time is a single call of LLVM."""
+        reported = None  # s of compiling at the last line that stays
         while not self.stop.wait(REDRAW):
             now = time.monotonic()
             working = self.depth > 0
             spent = self.spent + (now - self.started if working else 0.0)
-            if told is None:
+            if reported is None:
                 if spent >= DELAY and not self.counters:
-                    told = spent
+                    reported = spent
                     self._write(f"{NAME}{COMPILING_MESSAGE}\n")
             elif working and _redraws(sys.stderr):
                 self._draw(f"{NAME}{self.count} kernels compiled, {spent:.0f} s ")
-            elif working and spent >= told + REPEAT:
-                told = spent
+            elif working and spent >= reported + REPEAT:
+                reported = spent
                 self._write(f"{NAME}{self.count} kernels compiled, {spent:.0f} s ...\n")
             if not working and now - self.ended > PAUSE:
                 break
-        if told is not None:
+        if reported is not None:
             self._write(f"{NAME}{self.count} kernels compiled in {self.spent:.0f} s\n")
 
     def _write(self, text):
@@ -140,12 +140,12 @@ class Notice(event.Listener):
 
     @staticmethod
     def _put(text):
-        with suppress(Exception):  # no stderr, or one that is closed: nothing to fail for
+        with suppress(Exception):  # a missing or closed stderr must not stop the run
             sys.stderr.write(text)
             sys.stderr.flush()
 
     def close(self):
-        """End the thread: at the interpreter's end one that writes could stop it."""
+        """Stop the reporting thread: a write during interpreter shutdown could hang."""
         self.stop.set()
         if self.thread is not None and self.thread.is_alive():
             self.thread.join(2.0)
@@ -157,13 +157,13 @@ atexit.register(NOTICE.close)
 
 
 def set_quiet(quiet: bool = True) -> None:
-    """Silence this process while it compiles kernels (quiet), as the variable FOWT_QUIET=1 does, or not."""
+    """Switch the compile messages of this process off (quiet, as FOWT_QUIET=1 does) or on."""
     NOTICE.quiet = bool(quiet)
 
 
 @contextmanager
 def compilation_reported(said: Callable[[int], object]):
-    """Return a context without prints, in which each compiled kernel calls said(kernels compiled so far)."""
+    """Return a context that prints nothing and calls said(count) after each of count compiled kernels."""
     count = 0
 
     def counter():

@@ -1,7 +1,7 @@
-"""What a source file holds for the compiler: a hash of its code, without its texts, and what it imports.
+"""Computes the hash of a source file's code and lists the modules that the file imports.
 
-The hash is of the syntax tree without comments, docstrings and the metadata of `Annotated`. Parsing takes
-some ms a file, so a small file in the cache folder keeps the result by a hash of the source's bytes.
+The hash covers the syntax tree without comments, docstrings and the metadata of `Annotated`. Parsing takes
+some ms per file, so results are stored in a file of the cache folder, keyed by a hash of the source's bytes.
 """
 
 import ast
@@ -17,20 +17,20 @@ from fowt_env.caches import cached
 from fowt_env.folders import cache_root, distrust, make_private, replaced_privately
 from fowt_env.layout import FOLDERS, PACKAGE, installed_path
 
-MOST_KEPT = 1000  # sources in the file, the latest
-_unsaved: set[str] = set()  # keys of what was parsed since the file was written
+MOST_KEPT = 1000  # sources in the file of results, the latest
+_unsaved: set[str] = set()  # keys of sources parsed since the file was written
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
 class Source(NamedTuple):
-    """What one file of Python holds."""
+    """Holds the code hash and the imports of one Python source file."""
 
     code: str  # hash of its code, 32 hexadecimal digits
-    top: tuple[str, ...]  # modules of this project that statements at its top import
+    top: tuple[str, ...]  # modules of this project imported at module level
 
 
 def read_source(path):
-    """Return the Source of a file; the code of what is no Python is a hash of its bytes."""
+    """Return the Source of a file; for a file that is not valid Python, code is a hash of its bytes."""
     path = Path(path)
     status = path.stat()
     return _read_source(path, status.st_mtime_ns, status.st_size)
@@ -49,7 +49,7 @@ def _read_source(path, time, size):
 
 
 def _parsed_source(content):
-    """Return [hash of the code, modules of this project imported at the top] of a file's bytes."""
+    """Return [hash of the code, modules of this project imported at module level] of a file's bytes."""
     try:
         tree = ast.parse(content)
     except (SyntaxError, ValueError, RecursionError):
@@ -60,7 +60,7 @@ def _parsed_source(content):
 
 
 def code_text(tree):
-    """Return a text of a syntax tree, the same for sources that differ in texts and lines alone."""
+    """Return a syntax tree as text; sources that differ only in docstrings, comments and layout agree."""
     for node in ast.walk(tree):
         if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             del node.body[0]
@@ -71,7 +71,7 @@ def code_text(tree):
 
 
 def _imported_names(nodes):
-    """Return {(level, module)} of the import statements among nodes; of `from a import b` a and a.b."""
+    """Return {(level, module)} of the import statements in nodes; `from a import b` gives a and a.b."""
     names = set()
     for node in nodes:
         if isinstance(node, ast.Import):
@@ -84,7 +84,7 @@ def _imported_names(nodes):
 
 
 def all_imports(path):
-    """Return (level, module) of every import of a file, at its top or in a function; of no Python none."""
+    """Return (level, module) of every import in a file, also inside functions; () if not valid Python."""
     return _all_imports(path, path.stat().st_mtime_ns)
 
 
@@ -97,62 +97,62 @@ def _all_imports(path, time):
 
 
 def imported_files(starts, roots, inside):
-    """Return the files `starts` and the Python files that they import, directly or not, in order.
+    """Return the sorted Python files that `starts` import, directly or indirectly, including `starts`.
 
-    Imports inside functions count too, and the packages around a module.
-    roots    folders that top-level modules lie in; the first that has one counts
-    inside   inside(path) -> whether a file belongs to them: others are neither in it nor followed
+    Imports inside functions count too, as do the parent packages of a module.
+    roots    folders searched for top-level modules, in this order
+    inside   inside(path) -> whether to include a file; imports of excluded files are not followed
     """
 
     def imported(path):
         files = []
         for level, name in all_imports(path):
-            places = [path.parents[level - 1]] if level else roots
-            files += next(filter(None, (_module_files(place, name) for place in places)), [])
+            folders = [path.parents[level - 1]] if level else roots
+            files += next(filter(None, (_module_files(folder, name) for folder in folders)), [])
         return files
 
     return in_order(_followed(map(Path, starts), inside, imported))
 
 
 def imported_at_top(path, but):
-    """Return a source of this project and all that it imports at its top, none of the folder `but`."""
-    return _followed([path], lambda found: but not in found.parents, _imported_at_top)
+    """Return a source of this project and its direct and indirect module-level imports outside `but`."""
+    return _followed([path], lambda file: but not in file.parents, _imported_at_top)
 
 
-@cache  # some twenty modules with kernels of their own import much the same
+@cache  # some twenty modules with kernels outside the plant share most imports
 def _imported_at_top(path):
-    """Return the sources that statements at the top of one name, without the packages around them."""
+    """Return the source files imported by a source at module level, without their parent packages."""
     return [file for name in read_source(path).top for file in _module_files(PACKAGE.parent, name)[-1:]]
 
 
 def _followed(starts, inside, imported):
-    """Return the set of files that are inside, from some on by what imported(path) lists."""
-    found, left = set(), list(starts)
-    while left:
-        path = left.pop()
-        if path not in found and inside(path):
-            found.add(path)
-            left += imported(path)
-    return found
+    """Return the set of files reached from starts through imported(path), limited to those inside(path)."""
+    reached, pending = set(), list(starts)
+    while pending:
+        path = pending.pop()
+        if path not in reached and inside(path):
+            reached.add(path)
+            pending += imported(path)
+    return reached
 
 
 def in_order(paths):
-    """Return files sorted by their paths, those of this package by the paths they have once installed."""
+    """Return files sorted by path, with files of this package sorted by their installed paths."""
     return sorted(paths, key=lambda path: installed_path(path) or path)
 
 
 def _module_files(folder, name):
-    """Return the files of a dotted module beneath a folder and of its packages, as far as there are any."""
-    own = folder == PACKAGE.parent and name.partition(".")[0] == PACKAGE.name
-    return _own_files(name) if own else _found_files(folder, name)
+    """Return the existing files of a dotted module in a folder, and of its parent packages."""
+    in_project = folder == PACKAGE.parent and name.partition(".")[0] == PACKAGE.name
+    return _project_files(name) if in_project else _existing_files(folder, name)
 
 
-@cache  # the modules of this project stay as they are
-def _own_files(name):
-    return _found_files(PACKAGE.parent, name)
+@cache  # modules of this project do not change during a run
+def _project_files(name):
+    return _existing_files(PACKAGE.parent, name)
 
 
-def _found_files(folder, name):
+def _existing_files(folder, name):
     files = [folder / "__init__.py"] if not name and (folder / "__init__.py").is_file() else []
     for part in filter(None, name.split(".")):
         if folder == PACKAGE and part in FOLDERS:
@@ -167,14 +167,14 @@ def _found_files(folder, name):
 
 
 def _store():
-    """Return the path of the file of parsed sources; None without a cache folder."""
+    """Return the path of the file that stores parsed sources; None without a cache folder."""
     root = cache_root()
     return root and root / "sources" / "parsed.json"
 
 
 @cache
 def _kept_sources():
-    """Return {hash of a source's bytes: [code, modules at the top]} of the file, {} if it is unusable."""
+    """Return {hash of a source's bytes: [code, top]} as stored on disk; {} if the file is unusable."""
     path = _store()
     try:
         if path is None or distrust(path.parent) or distrust(path, stat.S_ISREG):
@@ -183,12 +183,12 @@ def _kept_sources():
             str(key): [str(code), list(map(str, top))]
             for key, (code, top) in json.loads(path.read_bytes()).items()
         }
-    except (OSError, ValueError, TypeError, AttributeError):  # there is none, or a broken one
+    except (OSError, ValueError, TypeError, AttributeError):  # the file is missing or broken
         return {}
 
 
 def keep_sources():
-    """Write what was parsed since into the file, where that can be; returns None."""
+    """Write newly parsed sources to the file in the cache folder, if possible."""
     known, path = _kept_sources(), _store()
     if not _unsaved or path is None:
         return
@@ -198,5 +198,5 @@ def keep_sources():
         if not distrust(path.parent):
             with replaced_privately(path) as file:
                 file.write(json.dumps(dict(list(known.items())[-MOST_KEPT:])).encode())
-    except OSError:  # no space, or no place to write
+    except OSError:  # the disk is full or read-only
         return

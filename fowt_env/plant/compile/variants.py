@@ -1,8 +1,8 @@
-"""One kernel out of several, chosen by the class of a part when its caller is compiled.
+"""Selects one of several kernels by the class of a model part, when the caller is compiled.
 
-Numba prunes a branch on `part is None` for a function's own argument alone, not for a field. So absence is
-tested first thing in a function that takes the part as an argument, and what has several forms is several
-classes: chosen_by_class compiles the kernel of one.
+Numba prunes a branch on `part is None` only if the part is an argument of the function, not a field. A kernel
+therefore takes an optional part as an argument and tests it for None first. A part with several variants has
+a class for each, and chosen_by_class compiles only the kernel of the class in use.
 """
 
 import inspect
@@ -13,16 +13,16 @@ from numba.core.extending import overload
 
 
 def chosen_by_class(argument, cases, inlined=False):
-    """A function that is one of cases {class: kernel}, by the class of its argument of this name.
+    """Return a function that calls one of cases {class: kernel}, by the class of the named argument.
 
-    The kernels take arguments of the same names. inlined: put into the caller whatever the size.
+    All kernels take arguments of the same names. inlined: inline into the caller whatever the size.
     """
     plain = {kind: getattr(kernel, "py_func", kernel) for kind, kernel in cases.items()}
     names = list(inspect.signature(next(iter(plain.values()))).parameters)
-    place = names.index(argument)
+    position = names.index(argument)
 
     def called(*arguments):
-        return cases[type(arguments[place])](*arguments)
+        return cases[type(arguments[position])](*arguments)
 
     if numba.config.DISABLE_JIT:
         return called
@@ -35,7 +35,7 @@ def chosen_by_class(argument, cases, inlined=False):
 
 
 def _class_of(kind):
-    """Class of the values of a numba type, or of what a Reference refers to."""
+    """Return the Python class of a numba type, or of the target of a Reference."""
     if isinstance(kind, types.NoneType):
         return type(None)
     return getattr(getattr(kind, "target", kind), "instance_class", None)

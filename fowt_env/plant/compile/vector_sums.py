@@ -1,9 +1,9 @@
-"""Sums of products in eight lanes, written as vector instructions.
+"""Computes sums of products in eight lanes by vector instructions.
 
-LLVM may not reorder a floating-point sum, so a plain loop adds one product after another. Allowing it
-to (fastmath) leaves the order to each caller's copy, and bits then differ from process to process. Here
-the order is fixed: lane l adds the products l, l + 8, l + 16, ..., and the lanes are added in pairs. The
-Python twin beside each does the same, for runs with the JIT off.
+LLVM may not reorder a floating-point sum, so a plain loop adds one product after another. With fastmath
+the order depends on each caller's copy, and last bits then differ from process to process. Here the
+order is fixed: lane l adds the products l, l + 8, l + 16, ..., and the lanes are added in pairs. Each
+compiled sum has a Python twin with the same order, for runs with the JIT off.
 """
 
 import numba
@@ -21,14 +21,14 @@ CROSSED = ((0, 2), (0, 3), (1, 2), (1, 3))  # of rows v, g, c, s
 
 
 def add_lanes(lanes):
-    """Sum of eight lanes in pairs: the order that the compiled form has."""
+    """Return the sum of eight lanes, added in pairs in the order of the compiled form."""
     four = [lanes[i] + lanes[i + 4] for i in range(4)]
     two = [four[0] + four[2], four[1] + four[3]]
     return float(two[0] + two[1])
 
 
 def _sums_twin(rows, pairs, n):
-    """The sums of _lane_sums in Python, in the same order."""
+    """Return the sums of _lane_sums, computed in Python in the same order."""
     rows = [np.asarray(row[:n]).reshape(-1, SUM_LANES) for row in rows]
     totals = np.zeros((len(pairs), SUM_LANES))
     for k in range(n // SUM_LANES):
@@ -41,7 +41,7 @@ VECTOR = ir.VectorType(ir.DoubleType(), SUM_LANES)
 
 
 def _reduce(builder, vector):
-    """Sum of a vector's lanes in the order of add_lanes."""
+    """Generate code for the sum of a vector's lanes in the order of add_lanes."""
     for half in (4, 2):
         undefined = ir.Constant(vector.type, ir.Undefined)
         low, high = (
@@ -56,7 +56,7 @@ def _reduce(builder, vector):
 
 
 def _lane_sums(context, builder, signature, args, pairs):
-    """Code that sums args[i][k] * args[j][k] over k < n (a multiple of 8) for each (i, j) of pairs."""
+    """Generate code that sums args[i][k] args[j][k] over k < n, a multiple of 8, for (i, j) in pairs."""
     *rows, n = args
     pointers = [
         context.make_array(kind)(context, builder, row).data
@@ -68,8 +68,8 @@ def _lane_sums(context, builder, signature, args, pairs):
     with cgutils.for_range_slice(builder, ir.Constant(n.type, 0), n, step, n.type) as (index, _):
         loaded = []
         for pointer in pointers:
-            place = builder.bitcast(builder.gep(pointer, [index]), VECTOR.as_pointer())
-            loaded.append(builder.load(place, align=8))
+            address = builder.bitcast(builder.gep(pointer, [index]), VECTOR.as_pointer())
+            loaded.append(builder.load(address, align=8))
         for (i, j), total in zip(pairs, totals, strict=True):
             builder.store(builder.fadd(builder.load(total), builder.fmul(loaded[i], loaded[j])), total)
     return context.make_tuple(
@@ -95,7 +95,7 @@ def _four_sums(typing_context, v, g, c, s, n):
 
 @intrinsic
 def _advance(typing_context, x, y, factors, first, start, begin, count, old, new):
-    """The loop of advance_pairs; four poles at a time, which fill 256 bits."""
+    """Generate the loop of advance_pairs over four poles at a time, which fill 256 bits."""
 
     def generate(context, builder, signature, args):
         source, target, table = (
@@ -112,16 +112,16 @@ def _advance(typing_context, x, y, factors, first, start, begin, count, old, new
         def spread(value):
             undefined, zero = ir.Constant(vector, ir.Undefined), ir.Constant(ir.IntType(32), 0)
             one = builder.insert_element(undefined, value, zero)
-            places = ir.Constant(ir.VectorType(ir.IntType(32), PAIR_LANES), [0] * PAIR_LANES)
-            return builder.shuffle_vector(one, undefined, places)
+            lanes = ir.Constant(ir.VectorType(ir.IntType(32), PAIR_LANES), [0] * PAIR_LANES)
+            return builder.shuffle_vector(one, undefined, lanes)
 
         before, after = spread(old), spread(new)
         step = ir.Constant(count.type, PAIR_LANES)
         zero = ir.Constant(count.type, 0)
         with cgutils.for_range_slice(builder, zero, count, step, count.type) as (index, _):
-            place = builder.add(start, index)
-            other = builder.add(place, count)
-            real, imaginary = (builder.load(at(source.data, k), align=8) for k in (place, other))
+            real_part = builder.add(start, index)
+            imaginary_part = builder.add(real_part, count)
+            real, imaginary = (builder.load(at(source.data, k), align=8) for k in (real_part, imaginary_part))
             column, rows = builder.add(begin, index), []
             for k in range(6):
                 row = builder.mul(builder.add(first, ir.Constant(first.type, k)), width)
@@ -131,13 +131,13 @@ def _advance(typing_context, x, y, factors, first, start, begin, count, old, new
             def sum_of(a, p, b, q):
                 return builder.fadd(builder.fmul(a, p), builder.fmul(b, q))
 
-            turned = builder.fsub(builder.fmul(er, real), builder.fmul(ei, imaginary))
+            rotated = builder.fsub(builder.fmul(er, real), builder.fmul(ei, imaginary))
             builder.store(
-                builder.fadd(turned, sum_of(sr, before, nr, after)), at(target.data, place), align=8
+                builder.fadd(rotated, sum_of(sr, before, nr, after)), at(target.data, real_part), align=8
             )
-            turned = sum_of(er, imaginary, ei, real)
+            rotated = sum_of(er, imaginary, ei, real)
             builder.store(
-                builder.fadd(turned, sum_of(si, before, ni, after)), at(target.data, other), align=8
+                builder.fadd(rotated, sum_of(si, before, ni, after)), at(target.data, imaginary_part), align=8
             )
         return context.get_dummy_value()
 
@@ -148,37 +148,38 @@ def _advance(typing_context, x, y, factors, first, start, begin, count, old, new
 if numba.config.DISABLE_JIT:
 
     def advance_pairs(x, y, factors, first, start, begin, count, old, new):
-        """y[start:] by the first-order recursion of pairs of poles from x[start:], see the compiled form."""
+        """Advance the states of pole pairs from x to y; see the compiled form."""
         real, imaginary = x[start : start + count].copy(), x[start + count : start + 2 * count].copy()
         er, ei, sr, si, nr, ni = factors[first : first + 6, begin : begin + count]
         y[start : start + count] = (er * real - ei * imaginary) + (sr * old + nr * new)
         y[start + count : start + 2 * count] = (er * imaginary + ei * real) + (si * old + ni * new)
 
     def lane_dot(a, b, n):
-        """Sum of a[k] b[k] over k < n, a multiple of SUM_LANES."""
+        """Return the sum of a[k] b[k] over k < n, a multiple of SUM_LANES."""
         return _sums_twin((a, b), ((0, 1),), n)[0]
 
     def crossed_sums(v, g, c, s, n):
-        """Sums over k < n, a multiple of SUM_LANES, of v c, v s, g c and g s."""
+        """Return the sums over k < n, a multiple of SUM_LANES, of v c, v s, g c and g s."""
         return _sums_twin((v, g, c, s), CROSSED, n)
 
 else:
 
     @kernel
     def advance_pairs(x, y, factors, first, start, begin, count, old, new):
-        """z = e z + s old + n new for the complex states of `count` poles, a multiple of PAIR_LANES.
+        """Advance the complex states z of `count` poles by one step: z = e z + s old + n new.
 
-        x, y from `start` on: the real parts of the states, then the imaginary; read from x, put into y, which
-        may be x. factors: from row `first` and column `begin` on e, s and n, real and imaginary parts.
+        x, y: from index `start` the real parts of the states, then the imaginary parts; read from x, written
+        to y, which may be x. count: a multiple of PAIR_LANES. factors: from row `first` and column `begin`
+        the real and imaginary parts of e, s and n.
         """
         _advance(x, y, factors, first, start, begin, count, old, new)
 
     @kernel
     def lane_dot(a, b, n):
-        """Sum of a[k] b[k] over k < n, a multiple of SUM_LANES; contiguous float64 rows."""
+        """Return the sum of a[k] b[k] over k < n, a multiple of SUM_LANES; contiguous float64 rows."""
         return _one_sum(a, b, n)[0]
 
     @kernel
     def crossed_sums(v, g, c, s, n):
-        """Sums over k < n, a multiple of SUM_LANES, of v c, v s, g c and g s; contiguous float64 rows."""
+        """Return the sums over k < n, a multiple of SUM_LANES, of v c, v s, g c and g s; float64 rows."""
         return _four_sums(v, g, c, s, n)

@@ -1,4 +1,4 @@
-"""Inertia of a tower that bends, and of nacelle and rotor on its top: masses and rates of momentum."""
+"""Computes mass integrals and rates of momentum of a flexible tower and of nacelle and rotor on its top."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from fowt_env.plant.tower.modes import from_nacelle
 
 
 class Masses(NamedTuple):
-    """Integrals of line mass over the bent tower, less those of the straight one; d(h) is its deflection."""
+    """Holds integrals of line mass over the bent tower, minus those of the straight one; d(h): deflection."""
 
     dx: float  # kg m, of d
     dy: float
@@ -19,7 +19,7 @@ class Masses(NamedTuple):
     gyy: float
     vx: float  # kg m/s, of the rate of d
     vy: float
-    wx: float  # kg m2/s, of h times it
+    wx: float  # kg m2/s, of h times the rate of d
     wy: float
     hxx: float  # kg m2/s, of the rate of d times d^T
     hxy: float
@@ -28,7 +28,7 @@ class Masses(NamedTuple):
 
 
 class Upper(NamedTuple):
-    """Nacelle and rotor about the tower top, platform axes."""
+    """Holds first moment, inertia and shaft of nacelle and rotor about the tower top, platform axes."""
 
     sx: float  # kg m, first moment
     sy: float
@@ -46,7 +46,7 @@ class Upper(NamedTuple):
 
 @inlined_kernel
 def masses_of(x, tower):
-    """Return the Masses of a state."""
+    """Return the Masses of the bent tower in state x."""
     n = len(tower.count)
     q, v = tower.first, tower.first + n
     dx = dy = ex = ey = gxx = gxy = gyy = vx = vy = wx = wy = hxx = hxy = hyx = hyy = 0.0
@@ -76,7 +76,7 @@ def masses_of(x, tower):
 
 @inlined_kernel
 def upper_of(bend, tower):
-    """Return the Upper of a bent tower."""
+    """Return the Upper, inertia of nacelle and rotor, on a bent tower."""
     s, m, t = tower.upper_moment, tower.upper_inertia, tower.shaft
     sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
     nx, ny, nz = from_nacelle(bend, t[0], t[1], t[2])
@@ -91,7 +91,7 @@ def upper_of(bend, tower):
 
 @inlined_kernel
 def with_free_rotor(upper, inertia):
-    """Return Upper without an inertia (kg m2) about the shaft."""
+    """Return the Upper minus the inertia of the free rotor about the shaft (kg m2)."""
     u = upper
     nx, ny, nz = inertia * u.nx, inertia * u.ny, inertia * u.nz
     return Upper(
@@ -104,7 +104,7 @@ def with_free_rotor(upper, inertia):
 
 @kernel
 def turn(upper, x, y, z):
-    """Return the inertia of Upper times a vector."""
+    """Return the inertia matrix of an Upper times a vector."""
     u = upper
     return u.xx * x + u.xy * y + u.xz * z, u.xy * x + u.yy * y + u.yz * z, u.xz * x + u.yz * y + u.zz * z
 
@@ -117,9 +117,9 @@ def cross(ax, ay, az, bx, by, bz):
 
 @inlined_kernel
 def top_bias(pose, bend):
-    """Return the accelerations of tower top and nacelle rotation, and the nacelle's angular velocity.
+    """Return the bias accelerations of tower top and nacelle rotation, and the nacelle's angular velocity.
 
-    Platform axes, with no rate of any velocity: (ax, ay, az, alpha_x, alpha_y, alpha_z, wx, wy, wz).
+    Platform axes, for zero rates of all velocities: (ax, ay, az, alpha_x, alpha_y, alpha_z, wx, wy, wz).
     """
     wx, wy, wz = pose.wx, pose.wy, pose.wz
     # w x (v + w x p + p') + w x p', without the acceleration of the top
@@ -127,7 +127,7 @@ def top_bias(pose, bend):
     uy = pose.vy + wz * bend.x - wx * bend.z + 2.0 * bend.vy
     uz = pose.vz + wx * bend.y - wy * bend.x
     ax, ay, az = cross(wx, wy, wz, ux, uy, uz)
-    tx, ty, tz = bend.db * bend.ca, bend.da, -bend.db * bend.sa  # turning against the platform
+    tx, ty, tz = bend.db * bend.ca, bend.da, -bend.db * bend.sa  # nacelle rotation relative to the platform
     bx, by, bz = cross(wx, wy, wz, tx, ty, tz)
     spread = bend.da * bend.db
     bx, bz = bx - spread * bend.sa, bz - spread * bend.ca
@@ -138,8 +138,8 @@ def top_bias(pose, bend):
 def upper_rate(upper, mass, spin, ax, ay, az, bx, by, bz, wx, wy, wz):
     """Return the rate of momentum of nacelle and rotor about the tower top, platform axes: (force, moment).
 
-    a: acceleration of the top; b: of the nacelle's rotation; w: its angular velocity. spin: angular momentum
-    of the rotor against the nacelle, N m s, which is constant along the shaft.
+    a: acceleration of the top; b: angular acceleration of the nacelle; w: angular velocity of the nacelle.
+    spin: angular momentum of the rotor relative to the nacelle, N m s, constant along the shaft.
     """
     u = upper
     px, py, pz = cross(wx, wy, wz, u.sx, u.sy, u.sz)
@@ -157,9 +157,9 @@ def upper_rate(upper, mass, spin, ax, ay, az, bx, by, bz, wx, wy, wz):
 
 @inlined_kernel
 def deflection_rate(pose, d):
-    """Return the Wrench about the body origin by velocities and deflections d (Masses).
+    """Return the Wrench that deflections d (Masses) add to the rate of momentum of the straight tower.
 
-    It is what bending adds to the straight tower's rate of momentum, without the rates of velocities.
+    About the body origin, for zero rates of all velocities.
     """
     vx, vy, vz, wx, wy, wz = pose.vx, pose.vy, pose.vz, pose.wx, pose.wy, pose.wz
     px, py, pz = cross(wx, wy, wz, d.dx, d.dy, 0.0)

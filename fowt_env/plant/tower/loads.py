@@ -1,4 +1,4 @@
-"""Loads on a tower that bends: of nacelle and rotor, of its structure and of the weight (theory.md, 2.5)."""
+"""Computes loads on a flexible tower: of nacelle and rotor, structure and weight (theory.md, 2.7)."""
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.state import Wrench
@@ -7,7 +7,7 @@ from fowt_env.plant.tower.modes import from_nacelle
 
 @kernel
 def carried(load, bend):
-    """Return a wrench in nacelle axes about their origin as one in body axes about the body origin."""
+    """Transform a Wrench from the nacelle frame to the body frame; rigid tower: unchanged."""
     if bend is None:
         return load
     fx, fy, fz = from_nacelle(bend, load.fx, load.fy, load.fz)
@@ -22,7 +22,7 @@ def carried(load, bend):
 
 @kernel
 def add_modal(load, bend, tower, modal):
-    """Add to modal (n,) the generalised forces of a wrench of the nacelle; nothing with a rigid tower."""
+    """Add the generalised forces of a Wrench on the nacelle to modal (n,); no-op for a rigid tower."""
     if bend is None:
         return
     fx, fy, _ = from_nacelle(bend, load.fx, load.fy, load.fz)
@@ -35,7 +35,7 @@ def add_modal(load, bend, tower, modal):
 
 @inlined_kernel
 def begin_modal(x, tower, modal):
-    """Set modal (n,) to the generalised forces of the tower's structure; nothing with a rigid tower."""
+    """Set modal (n,) to the generalised elastic and damping forces of the tower; no-op for a rigid tower."""
     if tower is None:
         return
     n = len(tower.count)
@@ -49,7 +49,7 @@ def begin_modal(x, tower, modal):
 
 @inlined_kernel
 def shortening(x, tower):
-    """Return the first moment of mass (kg m) by which bending lowers the masses towards the tower base."""
+    """Return the decrease of the first moment of mass along z by axial shortening of the bent tower, kg m."""
     n, q = len(tower.count), tower.first
     total = 0.0
     for i in range(n):
@@ -60,7 +60,7 @@ def shortening(x, tower):
 
 @inlined_kernel
 def displaced_moment(x, bend, tower):
-    """Return (x, y, z), kg m: change of the turbine's first moment of mass by bending, platform axes."""
+    """Return the change (x, y, z) of the turbine's first moment of mass by bending, kg m, platform axes."""
     n, q = len(tower.count), tower.first
     dx = dy = 0.0
     for i in range(0, n, 2):
@@ -73,7 +73,7 @@ def displaced_moment(x, bend, tower):
 
 @kernel
 def add_bent_weight(load, pose, x, bend, tower, gravity):
-    """Add to the load the moment by bending of the weight of a straight turbine."""
+    """Return load plus the moment that bending adds to the weight of the straight turbine."""
     if bend is None:
         return load
     sx, sy, sz = displaced_moment(x, bend, tower)
@@ -88,15 +88,15 @@ def add_bent_weight(load, pose, x, bend, tower, gravity):
 
 @kernel
 def add_modal_weight(pose, x, bend, tower, gravity, modal):
-    """Add to modal (n,) the generalised forces of the weight; nothing with a rigid tower."""
+    """Add the generalised forces of the weight to modal (n,); no-op for a rigid tower."""
     if bend is None:
         return
     n, q, g = len(tower.count), tower.first, gravity
     s, m = tower.upper_moment, tower.upper_mass
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
-    turning = sx * nz - sz * nx  # moment about the top over g, along y
-    rolling = bend.ca * (sz * ny - sy * nz) - bend.sa * (sy * nx - sx * ny)  # along the turned x axis
+    turning = sx * nz - sz * nx  # moment about the top, over g, along y
+    rolling = bend.ca * (sz * ny - sy * nz) - bend.sa * (sy * nx - sx * ny)  # along the rotated x axis
     for i in range(n):
         raised = 0.0
         for j in range(n):

@@ -1,8 +1,8 @@
-"""A tower that bends: its modes, and where they carry nacelle and rotor.
+"""Defines the modes of a flexible tower and the resulting motion of nacelle and rotor (theory.md, 2.7).
 
-theory.md, "A tower that bends". The tower's points move across its axis by the sum of shape times deflection,
-and nacelle and rotor turn with the tower's top as one rigid body. With a rigid tower the part is None.
-Modes come in pairs, fore-aft and side-side of the same order: even ones are fore-aft, odd ones side-side.
+Points of the tower move normal to the tower axis by the sum of shape times deflection, and nacelle and rotor
+rotate with the tower top as one rigid body. With a rigid tower the part is None. Modes come in pairs of the
+same order: even indices are fore-aft, odd ones side-side.
 """
 
 from math import cos, sin
@@ -20,34 +20,34 @@ MOST_MODES = 4
 
 @by_reference
 class TowerModes(NamedTuple):
-    """Modes of a tower, n of them: first fore-aft, first side-side, then the second ones if there are."""
+    """Holds the n modes of a tower: first fore-aft, first side-side, and optionally the second pair."""
 
     first: int  # index in the state of the first deflection; the velocities follow the n deflections
     fore_aft: np.ndarray  # (n,) 1.0 fore-aft, 0.0 side-side
-    top_height: float  # m, tower top above the body origin; there the shapes are 1
+    top_height: float  # m, tower top above the body origin, where all shapes are 1
     slope: np.ndarray  # (n,) 1/m, of each shape at the top
     first_moment: np.ndarray  # (n,) kg, integral of the tower's line mass times shape
     height_moment: np.ndarray  # (n,) kg m, of line mass times height above the body origin times shape
-    mass: np.ndarray  # (n, n) kg, of line mass times both shapes, pairs across directions too
+    mass: np.ndarray  # (n, n) kg, of line mass times both shapes, also across directions
     stiffness: np.ndarray  # (n, n) N/m, of the structure
     damping: np.ndarray  # (n, n) N s/m, of the structure
-    weight_stiffness: np.ndarray  # (n, n) kg/m, times gravity taken off the stiffness: axial shortening
+    weight_stiffness: np.ndarray  # (n, n) kg/m, times gravity subtracted from stiffness: axial shortening
     drag_shape: np.ndarray  # (points, n) shapes at the points of tower_drag.TowerDrag
-    count: tuple  # n zeros: its length is known when a kernel is compiled, and so that of every loop
+    count: tuple  # n zeros: a tuple, so that n is known at compile time
     lower: object = None  # (6, 6) mass matrix of floater and straight tower about the body origin
-    straight: object = None  # (6, 6) that of the straight tower alone
+    straight: object = None  # (6, 6) mass matrix of the straight tower alone
     upper_mass: float = 0.0  # kg, of nacelle and rotor
-    upper_moment: object = None  # (3,) kg m, their first moment about the tower top, nacelle axes
+    upper_moment: object = None  # (3,) kg m, first moment of both about the tower top, nacelle axes
     upper_inertia: object = None  # (3, 3) kg m2, about the tower top, nacelle axes
     shaft: object = None  # (3,) direction of the shaft, downwind, nacelle axes
 
 
 class Bend(NamedTuple):
-    """Place and motion of the tower's top seen from the platform: the nacelle is turned by Ry(a) Rx(b)."""
+    """Holds the motion of the tower top relative to the platform; Ry(a) Rx(b) rotates the nacelle."""
 
     x: float  # m, displacement of the top
     y: float
-    z: float  # m, its height
+    z: float  # m, height of the top
     vx: float  # m/s
     vy: float
     ca: float  # cosine and sine of a and b
@@ -65,7 +65,7 @@ def _straight(x, tower):
 
 @inlined_kernel
 def bend_by_modes(x, tower):
-    """Return the Bend of a state."""
+    """Return the Bend of the tower top in state x."""
     n = len(tower.count)
     q, v = tower.first, tower.first + n
     ux = uy = vx = vy = a = b = da = db = 0.0
@@ -101,7 +101,7 @@ def to_nacelle(bend, x, y, z):
 
 @kernel
 def turned_pose(pose, bend):
-    """Return the Pose of the nacelle frame: the body frame where the tower is straight."""
+    """Return the Pose of the nacelle frame, equal to that of the body frame for a straight tower."""
     if bend is None:
         return pose
     z = bend.z
@@ -127,9 +127,9 @@ def turned_pose(pose, bend):
 
 @kernel
 def nacelle_pose(pose, x, tower):
-    """Return the Pose of the frame fixed in the nacelle that is the body frame where the tower is straight.
+    """Return the Pose of the nacelle frame, fixed in the nacelle; rigid tower (None): pose.
 
-    Its origin is where the body origin would be, were that fixed to the nacelle: every point of nacelle and
-    rotor has in it the coordinates that it has in the body frame of a rigid tower. Rigid (None): pose.
+    For a straight tower the nacelle frame coincides with the body frame: points of nacelle and rotor have the
+    same coordinates in the nacelle frame as in the body frame of a rigid tower.
     """
     return turned_pose(pose, bend_of(x, tower))

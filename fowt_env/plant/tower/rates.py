@@ -1,4 +1,4 @@
-"""Accelerations of the nacelle, and the rate of momentum of all above the tower base, for outputs."""
+"""Computes nacelle accelerations and the rate of momentum of all masses above the tower base, for outputs."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from fowt_env.plant.tower.modes import TowerModes, to_nacelle, turned_pose
 
 
 class Twist(NamedTuple):
-    """Rates of the velocity components (vx..wz) of a Pose, m/s2 and rad/s2, in the pose's axes."""
+    """Holds rates of the velocity components (vx..wz) of a Pose, m/s2 and rad/s2, in the pose's axes."""
 
     vx: float
     vy: float
@@ -28,7 +28,7 @@ def _platform_rates(pose, bend, dx, tower):
 
 @kernel
 def _top_rates(pose, bend, dx, tower):
-    """Return the Twist of tower top and nacelle rotation, absolute, platform axes."""
+    """Return the absolute accelerations (Twist) of tower top and nacelle rotation, platform axes."""
     v = tower.first + len(tower.count)
     ax, ay, az, bx, by, bz, _, _, _ = top_bias(pose, bend)
     for i in range(0, len(tower.count), 2):
@@ -54,13 +54,13 @@ def _nacelle_rates(pose, bend, dx, tower):
     ax, ay, az = to_nacelle(bend, top.vx, top.vy, top.vz)
     bx, by, bz = to_nacelle(bend, top.wx, top.wy, top.wz)
     wx, wy, wz = now.wx, now.wy, now.wz
-    # of the frame's origin, which lies z below the top, then of its components
+    # acceleration of the frame's origin, z below the top, then rates of the velocity components
     ax, ay, az = ax - by * z - wx * wz * z, ay + bx * z - wy * wz * z, az + (wx * wx + wy * wy) * z
     cx, cy, cz = cross(wx, wy, wz, now.vx, now.vy, now.vz)
     return Twist(ax - cx, ay - cy, az - cz, bx, by, bz)
 
 
-# (pose, bend, dx, tower) -> Twist of nacelle_pose, from the rates of a state
+# (pose, bend, dx, tower) -> Twist of nacelle_pose, from the rates dx of the state
 nacelle_rates = chosen_by_class("tower", {type(None): _platform_rates, TowerModes: _nacelle_rates})
 
 

@@ -1,4 +1,4 @@
-"""Time steps of a tower that bends: the force of its structure in Adams-Bashforth 4 (theory.md, 6.3)."""
+"""Corrects Adams-Bashforth 4 time steps for the structural force of a flexible tower (theory.md, 6.3)."""
 
 from fowt_env.plant.accelerations import find_modes, rotation_along_shaft, substitute_spd, without_modes
 from fowt_env.plant.compile.decorators import kernel
@@ -7,18 +7,18 @@ from fowt_env.plant.state import State
 from fowt_env.plant.tower.loads import add_modal, begin_modal
 from fowt_env.plant.tower.modes import bend_by_modes, from_nacelle
 
-# of the fourth difference of the structure's force: the error of Adams-Bashforth 4 (251/720) less that with
-# which Adams-Moulton 4 moves the deflections (19/720), so that those of velocity and position cancel
+# factor on the fourth difference of the structural force: error constant of Adams-Bashforth 4 (251/720) minus
+# that of Adams-Moulton 4 for the deflections (19/720), so that errors of velocity and position cancel
 ELASTIC_WEIGHT = 232.0 / 720.0
-# of the correction with its own new force: one is stable to 0.7 over the frequency, two to 1.29
+# passes, each with the new force: time steps are stable to 0.7/frequency with 1 pass, 1.29 with 2
 ELASTIC_ROUNDS = 2
 
 
 @kernel
 def fill_impulse(load, x, bend, tower, still, dx, cache):
-    """Put into `still` the deflections of x, and into dx the forces on them of a wrench of the nacelle.
+    """Copy the deflections of x to `still`; put the generalised forces of a nacelle Wrench into dx.
 
-    The mass matrix is that of x then, not that of the last evaluation.
+    Discards the factors of the mass matrix, which is then evaluated at x, not at the last evaluation.
     """
     if bend is None:
         return
@@ -32,7 +32,7 @@ def fill_impulse(load, x, bend, tower, still, dx, cache):
 
 @kernel
 def add_tower_steps(dt, dx, tower, x):
-    """Add dt times the rates in dx to the velocities of the deflections in x."""
+    """Add dt times the rates in dx to the deflection velocities in x; no-op for a rigid tower."""
     if tower is None:
         return
     v = tower.first + len(tower.count)
@@ -42,7 +42,7 @@ def add_tower_steps(dt, dx, tower, x):
 
 @kernel
 def keep_elastic(x, tower, elastic):
-    """Put the forces of the tower's structure at a state before those of past steps; nothing when rigid."""
+    """Insert the structural forces at state x before those of past steps; no-op for a rigid tower."""
     if tower is None:
         return
     for k in range(elastic.shape[0] - 1, 0, -1):
@@ -53,11 +53,11 @@ def keep_elastic(x, tower, elastic):
 
 @kernel
 def correct_elastic(dt, x, history, body, tower, matrix, elastic, still, extra, y):
-    """Correct in y the velocities of Adams-Bashforth 4 for the force of the tower's structure.
+    """Correct the Adams-Bashforth 4 velocities in y for the structural force of the tower.
 
-    It is linear in the new deflections and velocities, so that its fourth difference with them is known for
-    little: theory.md, section 6.3. matrix: what the solve at the step's beginning has left; still and extra
-    (n_state,) are scratch.
+    The force is linear in the new deflections and velocities, so its fourth difference with the new state is
+    cheap to evaluate: theory.md, 6.3. matrix: factors left by the solve at the beginning of the step; still
+    and extra (n_state,): scratch. No-op for a rigid tower.
     """
     if tower is None:
         return
