@@ -239,6 +239,7 @@ def test_output_step_does_not_change_the_motion(wave_scene):
         (dict(duration=-5.0), ("duration = -5.0", "positive")),
         (dict(control_dt=float("nan")), ("control_dt = nan", "positive")),
         (dict(output_dt=True), ("output_dt = True", "positive")),
+        (dict(output_dt=0.0), ("output_dt = 0.0", "positive")),
     ],
 )
 def test_steps_that_do_not_fit_are_refused_with_both_values(options, names, still_scene):

@@ -86,13 +86,18 @@ class HeldCommand(CompiledController):
         """Start a law without memory."""
 
 
+def check_period(name: str, value: float) -> None:
+    """Raise InputError unless a time (s) called name is positive and finite."""
+    check_number(name, value, 0.0, low_open=True, allowed="a positive number of seconds")
+
+
 def steps_in(name: str, period: float, dt: float, step: str = "dt") -> int:
     """Return the number of steps of dt (s), called step, in a period.
 
     Raises: InputError if dt does not divide it.
     """
-    for key, value in ((name, period), (step, dt)):
-        check_number(key, value, 0.0, low_open=True, allowed="a positive number of seconds")
+    check_period(name, period)
+    check_period(step, dt)
     count = round(period / dt)
     if count < 1 or abs(count * dt - period) > 1e-9 * period:
         raise InputError(f"{step} = {dt:g} s does not divide {name} = {period:g} s (ratio {period / dt:.6g})")
@@ -227,6 +232,7 @@ def simulate(
         raise unknown_keyword("simulate", name, KEYWORDS)
     check_scene(scene)
     if dt is None:
+        check_period("output_dt", output_dt)  # by its name, not as the step that would follow from it
         dt = min(scene.dt, control_dt, output_dt)
     per_control = steps_in("control_dt", control_dt, dt)
     per_output = steps_in("output_dt", output_dt, dt)
