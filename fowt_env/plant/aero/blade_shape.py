@@ -125,9 +125,6 @@ class BladeLoad(NamedTuple):
     mt: float
 
 
-NO_BLADE_LOAD = BladeLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 @kernel
 def effective_pitch(j, blade_pitch, shape):
     """Return the rotation of the section of station j about the local blade axis by blade pitch, rad."""
