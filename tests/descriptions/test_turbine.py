@@ -64,7 +64,7 @@ def test_what_a_file_gives_is_kept():
 @pytest.mark.parametrize(
     ("law", "part"),
     [
-        (DIRECT_DRIVE + "cut_in_speed = 0.5\n", "torque_law.cut_in_speed: given beside minimum_speed"),
+        (DIRECT_DRIVE + "cut_in_speed = 0.5\n", "torque_law.cut_in_speed: conflicts with minimum_speed"),
         (DIRECT_DRIVE.replace("0.5236", "-1.0"), "torque_law.minimum_speed = -1.0: must be a number > 0"),
         (DIRECT_DRIVE.replace("rated_torque = 1.97868e7", ""), "torque_law.rated_torque is missing"),
         (DIRECT_DRIVE.replace("0.5236", "0.9"), "must be cut_in_speed < region2_start_speed"),
