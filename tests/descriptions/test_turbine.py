@@ -118,7 +118,7 @@ def test_blades_and_hub_make_the_inertia_about_the_shaft(name, hub):
             "blade_first_moment = 5e5",
             "rotor: blade_second_moment = 1.1776e+07: must be >= blade_first_moment",
         ),
-        ("blade_second_moment = 12905655.0", "it makes 4.2105"),  # about the rotor centre instead of the root
+        ("blade_second_moment = 12905655.0", "together have 4.2105"),  # about the rotor centre, not the root
         ("", "rotor: blade_first_moment: is missing; blade_mass, blade_first_moment"),
     ],
 )
