@@ -53,15 +53,15 @@ def level_outside() -> int:
     return level
 
 
-_said: set[object] = set()  # keys
+_issued: set[object] = set()  # keys
 _muted = ContextVar("muted", default=False)
 
 
 def warn_once(key: object, text: str) -> None:
     """Issue a PlantWarning at the first line outside this package, once per key and process."""
-    if key in _said or _muted.get():
+    if key in _issued or _muted.get():
         return
-    _said.add(key)
+    _issued.add(key)
     warnings.warn(text, PlantWarning, stacklevel=level_outside())
 
 

@@ -15,7 +15,7 @@ from fowt_env.descriptions.potential_flow import PotentialFlow, read_potential_f
 from fowt_env.descriptions.records import (
     Finite,
     NonNegative,
-    Place,
+    Position,
     Positive,
     Record,
     bounded,
@@ -44,10 +44,10 @@ class Ballast(Record):
     """Holds the mass properties of the floater with its ballast, as one rigid body."""
 
     mass: Positive
-    cm_depth: Place  # below still water, positive downwards, m
+    cm_depth: Position  # below still water, positive downwards, m
     inertia: Inertia  # about the centre of mass, kg m2
-    cm_downwind: Place = 0.0  # of the tower axis, m
-    cm_left: Place = 0.0  # looking downwind, m
+    cm_downwind: Position = 0.0  # of the tower axis, m
+    cm_left: Position = 0.0  # looking downwind, m
 
 
 class Hull(Record):
@@ -158,10 +158,10 @@ class Tower(Record):
     """Describes the tower as one rigid body, with taper for the wind drag and optional bending modes."""
 
     mass: NonNegative
-    cm_height: Place
+    cm_height: Position
     inertia: Inertia  # about the centre of mass
-    base_height: Place
-    top_height: Place
+    base_height: Position
+    top_height: Position
     base_diameter: Positive
     top_diameter: Positive
     drag_coefficient: NonNegative = 1.0
@@ -289,8 +289,8 @@ def read_platform(name_or_path: str | Path) -> Platform:
     if "mooring" in data:
         if "lines" in data:
             problems.append("lines: given twice, also as [mooring]; allowed: one of them")
-        group, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
-        problems += found
+        group, invalid = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
+        problems += invalid
         data["lines"] = group.mooring.lines() if group else ()
     for key in ("lines", "members", "shapes"):
         if isinstance(data.get(key), list):
@@ -311,8 +311,8 @@ def read_platform(name_or_path: str | Path) -> Platform:
             data["turbine"] = str(locate("turbine", name, turbine_names(), folder=path.parent).resolve())
     if ("hull" in data) != ("hydro" in data):
         problems.append(_missing_half("hydro" if "hull" in data else "hull"))
-    platform, found = validate(Platform, {**data, **free}, origin)
-    raise_problems(f"platform file {str(path)!r}", list(dict.fromkeys(problems + found)))
+    platform, invalid = validate(Platform, {**data, **free}, origin)
+    raise_problems(f"platform file {str(path)!r}", list(dict.fromkeys(problems + invalid)))
     return platform
 
 

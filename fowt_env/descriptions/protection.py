@@ -85,6 +85,6 @@ def read_protection(value: Any, own: Protection, overspeed: float = 1.3) -> Prot
         )
     problems: list[str] = []
     data, origin = to_si(dict(value), problems)
-    record, found = validate(Protection, data, origin)
-    raise_problems("protection", problems + found)
+    record, invalid = validate(Protection, data, origin)
+    raise_problems("protection", problems + invalid)
     return own.model_copy(update={key: getattr(record, key) for key in data})

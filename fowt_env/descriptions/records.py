@@ -93,7 +93,7 @@ FilePath = checked(check_path, "a path")
 Positive = bounded(gt=0)
 NonNegative = bounded(ge=0)
 Finite = bounded()
-Place = bounded(ge=-1e5, le=1e5)  # m, small enough for a finite square times a mass
+Position = bounded(ge=-1e5, le=1e5)  # m, small enough for a finite square times a mass
 Fraction = bounded(gt=0, le=1)
 FloatArray = Annotated[np.ndarray, BeforeValidator(_float_array)]
 NumberOrArray = Annotated[

@@ -380,10 +380,10 @@ def read_turbine(name_or_path: str | Path) -> Turbine:
                 allowed = "must be a file, relative to the turbine file's folder"
                 raise InputError(f"discon = {data['discon'][:60]!r}: {allowed}")
             data["discon"] = str(discon.absolute())
-    turbine, found = validate(Turbine, data, origin)
+    turbine, invalid = validate(Turbine, data, origin)
     if blade_problems:  # these problems explain why the record has no blade
-        found = [problem for problem in found if not problem.startswith("blade is missing")]
-    raise_problems(f"turbine file {str(path)!r}", problems + found + blade_problems)
+        invalid = [problem for problem in invalid if not problem.startswith("blade is missing")]
+    raise_problems(f"turbine file {str(path)!r}", problems + invalid + blade_problems)
     return turbine
 
 

@@ -137,7 +137,7 @@ FIELD_KINDS = {
         },
     ),
     "box": _kind(
-        "in Python alone", "a full-field box from arrays",
+        "in Python only", "a full-field box from arrays",
         {
             "u": (array(3), ...), "v": (array(3) | None, None), "w": (array(3) | None, None),
             "y": (array(1), ...), "z": (array(1), ...), "dt": (in_range(*BOX_STEPS), ...),

@@ -286,7 +286,7 @@ def _controller_errors():
 
 
 class Run:
-    """One run of a scene in chunks, with the control law inside the compiled loop if it is compiled."""
+    """Runs a scene in chunks, with the control law inside the compiled loop if it is compiled."""
 
     def __init__(self, scene, controller, x, u, schedule, interface):
         self.scene = scene

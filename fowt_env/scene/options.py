@@ -162,29 +162,29 @@ OPTIONS = {
         "radiation memory of a potential-flow body; None: the fidelity's"),
     "radiation_error": Option(0.02, Range(
         "rms error of each entry of the state space over its rms, 0.001 to 0.5", 0.001, 0.5),
-        "of the state space fitted to the radiation memory"),
-    "current": Option(None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}", "of the water"),
+        "error of the state space fitted to the radiation memory"),
+    "current": Option(None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}", "water current"),
     "excitation_position": Option("undisplaced", ("undisplaced", "filtered"),
-        "where waves meet a potential-flow body: at rest, or behind its slow drift"),
-    "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "of that low pass"),
+        "where waves act on a potential-flow body: at rest, or following its slow drift"),
+    "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "cut-off of that low pass"),
     "second_order": Option(None, (None, "none", *METHODS),
         "difference-frequency wave forces of a potential-flow body"),
     "second_order_cutoff": Option(None, Range("None or rad/s, > 0", 0.0, 100.0, low_open=True),
-        "differences above it make no force"),
+        "difference frequency above which the force is zero"),
     "duration": Option(700.0, Range("seconds of random wind and sea, > 0", 0.0, 1e6, low_open=True),
-        "for which random wind and sea are made"),
+        "length of random wind and sea"),
     "wave_components": Option(None, Range(
         "None or a number of components, 1 to 10000", 1, 10_000, whole=True),
-        "of an irregular sea; None: as many as the duration needs"),
+        "components of an irregular sea; None: as many as the duration requires"),
     "blade_stations": Option(None, "None (the turbine file's) or a number of them, 3 up to the file's",
-        "of the rotor model"),
+        "blade stations of the rotor model"),
     "strip_length": Option(None, Range(
         "None (fraction of the draft) or metres, 0.01 to 1000: cells of exact wave loads", 0.01, 1e3),
-        "of the hull's strips"),
+        "length of the hull's strips"),
     "shear_exponent": Option(None, Range("None (the platform file's) or 0 to 1", 0.0, 1.0),
-        "of the power-law wind profile"),
+        "exponent of the power-law wind profile"),
     "turbine": Option(None, "None (the platform file's), a name, a path or a descriptions.turbine.Turbine",
-        "in place of the platform's"),
+        "replaces the turbine of the platform"),
 }  # fmt: skip
 # defaults of a floater other than a slender spar: linear theory is valid for the undisplaced pose only
 UNDISPLACED = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none"}
@@ -231,14 +231,14 @@ def default_step(options, fastest=0.0):
     return dt
 
 
-def checked_options(given, platform):
+def checked_options(overrides, platform):
     """Return the checked options: defaults, overridden by the platform file, then by the caller."""
     options = {name: option.default for name, option in OPTIONS.items()}
     if platform.hull is None:
         options |= UNDISPLACED
     for source, values in (
         (f"platform {platform.name!r}, options", platform.options),
-        ("build_scene", given),
+        ("build_scene", overrides),
     ):
         for name, value in values.items():
             if name not in OPTIONS:

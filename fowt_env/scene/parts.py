@@ -273,6 +273,6 @@ def build_current(spec):
     return Current(speed * cos(heading), speed * sin(heading), exponent)
 
 
-def build_moorings(lines, wanted):
-    """Return the mooring part, None without lines or with mooring=False."""
-    return build_mooring(lines, tabulated=wanted == "table") if wanted else None
+def build_moorings(lines, option):
+    """Return the mooring part for the option mooring, None without lines or with False."""
+    return build_mooring(lines, tabulated=option == "table") if option else None
