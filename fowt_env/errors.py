@@ -67,7 +67,7 @@ def warn_once(key: object, text: str) -> None:
 
 @contextmanager
 def muted() -> Iterator[None]:
-    """Return a context in which warn_once issues no warning; the same warning can still follow outside it."""
+    """Return a context in which warn_once does nothing; the same warning can still be issued later."""
     token = _muted.set(True)
     try:
         yield
@@ -75,7 +75,7 @@ def muted() -> Iterator[None]:
         _muted.reset(token)
 
 
-MOST_LISTED, NEAREST = 30, 5  # most names that a message lists in full; number listed of more names
+MOST_LISTED, NEAREST = 30, 5  # most names listed in full by a message; number listed otherwise
 
 
 def unknown(kind: str, name: object, known: Iterable[object], command: str | None = None) -> InputError:

@@ -11,7 +11,7 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def user_folder(own, base, usual):
-    """Return the folder in the environment variable `own`, else fowt_env in that of `base`, else in ~/usual.
+    """Return the folder in the environment variable `own`, else $base/fowt_env, else ~/usual/fowt_env.
 
     A leading "~" is the home folder. A relative path in `own` starts at the working folder; in `base` a
     relative path is ignored, as the XDG specification requires. None for a user without a home folder.

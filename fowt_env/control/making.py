@@ -17,7 +17,7 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError, unknown
 
 CATALOGUE = "fowt_env.controllers"
-LONGEST_CONTROL_DT = 1.0  # s; with a longer period the sampled loop deviates from the continuous design
+LONGEST_CONTROL_DT = 1.0  # s; with a longer period the sampled loop deviates from the design
 
 
 def check_control_dt(control_dt: float) -> float:

@@ -1,10 +1,10 @@
 """Defines the protocol of controllers: reset(measurement) and act(measurement).
 
 A plain function of the measurement can replace act: f(measurement) -> (generator torque, blade pitch). A
-function with one required argument not called `turbine` is such a control law; one with two
-arguments, (turbine, control_dt), or none is a factory, which returns the controller of a run or a control
-law. The state of a control law is never reset: use a factory to create the law for every run. The attributes
-below may be set on a function too, as f.information = ("wind_speed",). Optional attributes of a controller:
+function with one required argument not called `turbine` is such a control law; one with two arguments,
+(turbine, control_dt), or none is a factory, which returns the controller of a run or a control law. The state
+of a control law is never reset: use a factory to create the law for every run. The attributes below may be
+set on a function too, as f.information = ("wind_speed",). Optional attributes of a controller:
 
 - information, a tuple of the Measurement fields and PRIVILEGED_INPUTS that the controller reads; all others
   are hidden. A compiled law reads NaN in hidden fields, and NaN as the torque or blade pitch in force unless
@@ -94,7 +94,7 @@ class CompiledController:
         self.name = str(name)
         self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         self.memory = np.zeros(n_memory)
-        # command in force, for act(); undefined (zero) at the first call
+        # command in force, for act(); zero before the first call
         self.command = np.zeros(N_INDIVIDUAL_COMMANDS if self.individual else N_COMMANDS)
 
     @property
@@ -248,7 +248,7 @@ def failure_of(controller, what, error, time):
     position = f", {Path(inside[-1].filename).name} line {inside[-1].lineno}" if inside else ""
     try:
         text = _lacking(error) or str(error)
-    except (Exception, SystemExit, GeneratorExit):  # a user-defined error class may fail in its text
+    except (Exception, SystemExit, GeneratorExit):  # str() of a user-defined error may raise
         text = "its message cannot be read"
     ending = f": {text}" if text else ""
     when = "" if time is None else f" at t = {time:.3f} s"

@@ -38,7 +38,7 @@ class CommandUnits:
                 self.warn(torque, blade_pitch)
 
     def is_little(self, torque: float) -> bool:
-        """Return whether a torque (N m) is positive and too small to last in a law in N m."""
+        """Return whether a torque (N m) is positive but implausibly small for a command in N m."""
         return 0.0 < torque < self._few
 
     def see_run(self, torque: np.ndarray, rotor_speed: np.ndarray, period: float) -> None:

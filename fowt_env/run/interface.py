@@ -96,7 +96,7 @@ def build_interface(
     control_dt: float,
     periods: int,
 ) -> Interface:
-    """Return the Interface of a run over a number of control periods, with the declared information alone.
+    """Return the Interface of a run of `periods` control periods for the information of a controller.
 
     chain None: exact sensors. Raises: InputError if the controller declares a field that the chain or the
     scene does not have.

@@ -87,7 +87,7 @@ class HeldCommand(CompiledController):
 
 
 def steps_in(name: str, period: float, dt: float, step: str = "dt") -> int:
-    """Return the number of steps of dt in a period (s); messages call the two `step` and `name`.
+    """Return the number of steps of dt in a period, s; step and name: their names in messages.
 
     Raises: InputError if dt does not divide the period.
     """
