@@ -166,7 +166,7 @@ OPTIONS = {
     "current": Option(None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}", "water current"),
     "excitation_position": Option("undisplaced", ("undisplaced", "filtered"),
         "where waves act on a potential-flow body: at rest, or following its slow drift"),
-    "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "low-pass cut-off of that drift"),
+    "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "low-pass cut-off of the drift"),
     "second_order": Option(None, (None, "none", *METHODS),
         "difference-frequency wave forces of a potential-flow body"),
     "second_order_cutoff": Option(None, Range("None or rad/s, > 0", 0.0, 100.0, low_open=True),
