@@ -1,6 +1,6 @@
-"""fowt_env: control-design environment for floating offshore wind turbines.
+"""Provides an environment for the control design of floating offshore wind turbines.
 
-Its import registers the environments at Gymnasium. Public names are loaded on first use.
+Importing fowt_env registers the environments in Gymnasium; public names are loaded on first use.
 """
 
 from importlib import import_module
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fowt_env.layout import check_packages
 
-check_packages()  # ahead of what only an installation has
+check_packages()  # before imports that need a complete installation
 
 from fowt_env.registration import register_environments  # noqa: E402
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:  # the names below, for editors and type checkers
 
 __version__ = "0.2.0"
 
-_MODULES = {  # the same: module -> its public names
+_MODULES = {  # module: its public names, as imported above
     "analysis.linear_model": ("linearize", "natural_periods"),
     "analysis.trim": ("OperatingPoint", "trim"),
     "errors": ("ControllerError", "InputError", "PlantWarning", "SimulationStopped"),

@@ -1,7 +1,7 @@
-"""What is computed once and kept in memory: every such cache is bounded, and clear_caches empties them all.
+"""Caches computed values in memory: every cache is bounded, and clear_caches empties all of them.
 
-Kept are values that follow from their keys alone and are never written to, so that dropping one changes no
-figure. Not among them are the hashes that plant/compile keeps of this package's own sources.
+Cached values depend on their keys alone and are never modified, so discarding one changes no result. The
+hashes of source files in plant/compile are stored elsewhere.
 """
 
 from collections import OrderedDict
@@ -11,7 +11,7 @@ _CACHES = []
 
 
 class Cache:
-    """The most recently used values by key, `size` of them at most."""
+    """Holds the most recently used values by key, at most `size` of them."""
 
     def __init__(self, size):
         self.size = size
@@ -19,7 +19,7 @@ class Cache:
         _CACHES.append(self)
 
     def get(self, key, make):
-        """The value of a key, made by make() where it is not kept."""
+        """Return the value of a key, computed by make() if the cache does not hold the key."""
         if key in self._values:
             self._values.move_to_end(key)
             return self._values[key]
@@ -32,12 +32,12 @@ class Cache:
         return len(self._values)
 
     def cache_clear(self):
-        """Forget every value."""
+        """Discard all values."""
         self._values.clear()
 
 
 def cached(size):
-    """Decorator: functools.lru_cache of a size that clear_caches empties too."""
+    """Return a decorator like functools.lru_cache(size), for a cache that clear_caches empties too."""
 
     def decorate(function):
         kept = lru_cache(maxsize=size)(function)
@@ -48,9 +48,9 @@ def cached(size):
 
 
 def clear_caches() -> None:
-    """Forget what this process computed and keeps in memory: tables, trims, designs, spectra.
+    """Discard the values cached in the memory of this process: tables, trims, designs, spectra.
 
-    What is asked for next is computed anew, with the same bits. Compiled kernels stay.
+    Later requests recompute bit-identical values. Compiled kernels remain loaded.
     """
     for cache in _CACHES:
         cache.cache_clear()

@@ -1,4 +1,4 @@
-"""Tables in HTML, for objects that a notebook shows."""
+"""Formats HTML tables for objects displayed in notebooks."""
 
 from html import escape
 
@@ -7,9 +7,9 @@ NUMBER = 'style="text-align:right;padding:0.15em 0.8em 0.15em 0"'
 
 
 def html_table(title, headings, rows):
-    """HTML of a table: a title, headings (or none) and rows of texts and numbers, everything escaped.
+    """Return the HTML of a table with a title, headings (may be empty) and rows of text and numbers, escaped.
 
-    Numbers stand to the right with four significant digits. The colours are the notebook's own.
+    Numbers are right-aligned with four significant digits; the notebook sets the colours.
     """
     head = f"<tr>{''.join(f'<th {CELL}>{escape(text)}</th>' for text in headings)}</tr>" if headings else ""
     body = "".join(f"<tr>{''.join(map(_cell, row))}</tr>" for row in rows)
@@ -17,7 +17,7 @@ def html_table(title, headings, rows):
 
 
 def _cell(value):
-    """HTML of one cell."""
+    """Return the HTML of one table cell."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return f"<td {NUMBER}>{value:.4g}</td>"
     return f"<td {CELL}>{escape(str(value))}</td>"

@@ -1,4 +1,4 @@
-"""The errors that users meet. Each message names the key, the value and what is allowed."""
+"""Defines the errors and warnings of the package; messages name the key, the value and what is allowed."""
 
 import difflib
 import sys
@@ -10,22 +10,22 @@ from typing import Any
 
 
 class InputError(ValueError):
-    """A description, option or argument that cannot be used; raised before anything runs."""
+    """Reports a description, option or argument that cannot be used; raised before anything runs."""
 
 
 class KeywordError(InputError, TypeError):
-    """An InputError for a keyword that a function does not have, for which Python raises a TypeError.
+    """Reports a keyword that a function does not have; also a TypeError, as Python raises.
 
-    Libraries that try keywords, as TorchRL does with `frameskip`, know its wording and leave the keyword out.
+    Libraries that try keywords, as TorchRL does with `frameskip`, match the wording and omit the keyword.
     """
 
 
 class ControllerInputError(InputError):
-    """An InputError that a controller raised while it was prepared, reset or asked: it alone is at fault."""
+    """Reports an InputError that a controller raised in prepare(), reset() or act()."""
 
 
 class SimulationStopped(RuntimeError):
-    """A run that cannot go on (capsize, non-finite state).
+    """Reports a run that cannot continue (capsize, non-finite state).
 
     Attributes: reason (str), time (s), frame (the rows up to the stop, or None).
     """
@@ -38,36 +38,36 @@ class SimulationStopped(RuntimeError):
 
 
 class PlantWarning(UserWarning):
-    """A run whose loads were less accurate than they are meant to be, as DataFrame.attrs["events"] counts.
+    """Warns of a run whose loads were less accurate than intended (see DataFrame.attrs["events"]).
 
-    Also a platform whose file has what can hardly be meant.
+    Also of implausible values in the file of a platform.
     """
 
 
 def level_outside() -> int:
-    """Return the stacklevel by which the caller's warnings name the first line outside of this package."""
-    own = __name__.partition(".")[0]
+    """Return the stacklevel with which a warning of the caller names the first line outside this package."""
+    package = __name__.partition(".")[0]
     level, frame = 1, sys._getframe(1)
-    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == own:
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
         level, frame = level + 1, frame.f_back
     return level
 
 
-_said: set[object] = set()  # keys
+_issued: set[object] = set()  # keys
 _muted = ContextVar("muted", default=False)
 
 
 def warn_once(key: object, text: str) -> None:
-    """Warn (PlantWarning), where the first line outside of this package is, once per key and process."""
-    if key in _said or _muted.get():
+    """Issue a PlantWarning at the first line outside this package, once per key and process."""
+    if key in _issued or _muted.get():
         return
-    _said.add(key)
+    _issued.add(key)
     warnings.warn(text, PlantWarning, stacklevel=level_outside())
 
 
 @contextmanager
 def muted() -> Iterator[None]:
-    """Return a context in which warn_once says nothing, and says it when it is asked to outside."""
+    """Return a context in which warn_once does nothing; the same warning can still be issued later."""
     token = _muted.set(True)
     try:
         yield
@@ -75,36 +75,36 @@ def muted() -> Iterator[None]:
         _muted.reset(token)
 
 
-MOST_LISTED, NEAREST = 30, 5  # names that are all listed; how many are where there are more
+MOST_LISTED, NEAREST = 30, 5  # most names listed in full by a message; number listed otherwise
 
 
 def unknown(kind: str, name: object, known: Iterable[object], command: str | None = None) -> InputError:
-    """Return the InputError for a name that is not known, with the nearest known one as a suggestion.
+    """Return the InputError for an unknown name, with the nearest known name as a suggestion.
 
-    Of more than MOST_LISTED names it lists the NEAREST, their number, and the command that prints them all.
+    For more than MOST_LISTED names the message lists the NEAREST, the total and the command that prints all.
     """
     return InputError(f"unknown {kind} {name!r}.{_nearest(name, known, command)}")
 
 
 def unknown_keyword(function: str, name: str, known: Iterable[object]) -> KeywordError:
-    """Return the KeywordError for a keyword that a function does not have, with the nearest known one."""
+    """Return the KeywordError for a keyword that a function does not have, with the nearest known keyword."""
     return KeywordError(f"{function}() got an unexpected keyword argument {name!r}.{_nearest(name, known)}")
 
 
 def nearest(name: object, known: Iterable[object], most: int, cutoff: float = 0.6) -> list[str]:
-    """Return the known names that are most like one, whatever their case, the nearest first."""
+    """Return the known names most similar to a name, ignoring case, the nearest first."""
     lowered = {str(k).lower(): str(k) for k in known}
     return [lowered[k] for k in difflib.get_close_matches(str(name).lower(), lowered, n=most, cutoff=cutoff)]
 
 
 def did_you_mean(name: object, known: Iterable[object], most: int = 1) -> str:
-    """Return " Did you mean 'a' or 'b'?" with known names like an unknown one; "" where there is none."""
+    """Return " Did you mean 'a' or 'b'?" with the known names similar to an unknown one; "" without any."""
     near = nearest(name, known, most)
     return f" Did you mean {' or '.join(map(repr, near))}?" if near else ""
 
 
 def _nearest(name: object, known: Iterable[object], command: str | None = None) -> str:
-    """Return the end of a message on an unknown name: which known ones are near it."""
+    """Return the end of a message about an unknown name: the suggestion and the known or nearest names."""
     names = sorted(str(k) for k in known)
     hint = did_you_mean(name, names)
     if len(names) <= MOST_LISTED:
@@ -115,9 +115,9 @@ def _nearest(name: object, known: Iterable[object], command: str | None = None) 
 
 
 class ControllerError(RuntimeError):
-    """A controller that did not return two finite numbers.
+    """Reports a controller that failed, read undeclared information or did not return finite numbers.
 
-    Attributes: controller (its name), time (s), returned (what it gave back).
+    Attributes: controller (its name), time (s), returned (the value that act() returned).
     """
 
     def __init__(self, message: str, controller: str, time: float, returned: object) -> None:

@@ -1,4 +1,4 @@
-"""The user's folders of compiled kernels, wind boxes and configuration: where, and whose they must be."""
+"""Locates the user's folders of compiled kernels, wind boxes and configuration, and checks their owner."""
 
 import os
 import stat
@@ -11,31 +11,31 @@ OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def user_folder(own, base, usual):
-    """Return the folder that the variable own names; else fowt_env in that of base, or in usual at home.
+    """Return the folder in the environment variable `own`, else $base/fowt_env, else ~/usual/fowt_env.
 
-    A "~" at the beginning is the home folder. A path that is not absolute begins at the working folder; in
-    base it counts for nothing, as the XDG specification has it. None for a user without a home.
+    A leading "~" is the home folder. A relative path in `own` starts at the working folder; in `base` a
+    relative path is ignored, as the XDG specification requires. None for a user without a home folder.
     """
-    given, shared = os.environ.get(own), os.environ.get(base)
+    custom, shared = os.environ.get(own), os.environ.get(base)
     try:
-        if given:
-            return Path(given).expanduser().absolute()
+        if custom:
+            return Path(custom).expanduser().absolute()
         if shared and Path(shared).is_absolute():
             return Path(shared) / "fowt_env"
         return Path.home() / usual / "fowt_env"
-    except (RuntimeError, OSError):  # no home, or no working folder any more
+    except (RuntimeError, OSError):  # no home folder, or the working folder was removed
         return None
 
 
 def cache_root():
-    """Return the folder of what can be made again (FOWT_CACHE_DIR, else the user's cache folder), or None."""
+    """Return the folder of reproducible files (FOWT_CACHE_DIR, else the user's cache folder), or None."""
     return user_folder("FOWT_CACHE_DIR", "XDG_CACHE_HOME", ".cache")
 
 
 def make_private(folder):
-    """Make a folder, and those above it that are missing, for this user alone whatever the umask.
+    """Create a folder and its missing parents with access for this user alone, whatever the umask.
 
-    Raises: OSError where that cannot be.
+    Raises: OSError if a folder cannot be created.
     """
     folder = Path(folder)
     if not folder.is_dir():
@@ -45,7 +45,7 @@ def make_private(folder):
 
 @contextmanager
 def replaced_privately(path):
-    """Return a context with a binary file that takes the path's place at its end, private to the user."""
+    """Return a context with a binary file, private to the user, which replaces the file at path on exit."""
     folder, name = os.path.split(path)
     handle, temporary = tempfile.mkstemp(dir=folder, prefix=f"{name}.tmp.")
     try:
@@ -59,15 +59,15 @@ def replaced_privately(path):
 
 
 def distrust(path, kind=stat.S_ISDIR):
-    """Return why what lies at a path may be from someone else than this user or root; "" where it cannot.
+    """Return why a path may have been written by someone other than this user or root; "" if not possible.
 
-    Who owns a folder above it can put another thing into its place, but none that belongs to this user.
+    The owner of a parent folder can replace the path, but not by a file that belongs to this user.
     """
-    found = os.lstat(path)
-    if not kind(found.st_mode):
-        return "is a symbolic link" if stat.S_ISLNK(found.st_mode) else "is not of the right kind"
-    if found.st_uid not in (0, os.geteuid()):
-        return f"belongs to user {found.st_uid}"
-    if found.st_mode & OTHERS_WRITE:
-        return f"can be written by others (mode {stat.S_IMODE(found.st_mode):04o})"
+    status = os.lstat(path)
+    if not kind(status.st_mode):
+        return "is a symbolic link" if stat.S_ISLNK(status.st_mode) else "is not of the right kind"
+    if status.st_uid not in (0, os.geteuid()):
+        return f"belongs to user {status.st_uid}"
+    if status.st_mode & OTHERS_WRITE:
+        return f"can be written by others (mode {stat.S_IMODE(status.st_mode):04o})"
     return ""

@@ -1,6 +1,6 @@
-"""Where the sources of this package lie: in a checkout, two of its packages are folders beside it.
+"""Locates the sources of this package: in a checkout, two of its packages are folders next to fowt_env.
 
-Once installed, all of them lie inside it. So a source is known by the path that it has once installed.
+Once installed, all packages are inside fowt_env; a source file is therefore identified by its installed path.
 """
 
 import sys
@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).absolute().parent
 
 
 def _folder(name):
-    """Return the folder of the package fowt_env.<name>: in this one, or beside it in a checkout."""
+    """Return the folder of the package fowt_env.<name>: inside fowt_env, or next to it in a checkout."""
     inside = PACKAGE / name
     return inside if inside.is_dir() else PACKAGE.parent / name
 
@@ -20,14 +20,14 @@ FOLDERS = {name: _folder(name) for name in ("controllers", "training")}
 
 
 def check_packages():
-    """Raise ImportError where Python finds none of FOLDERS, or those of another copy of this package."""
+    """Raise ImportError if Python does not find one of FOLDERS, or finds that of another copy of fowt_env."""
     for name, folder in FOLDERS.items():
         spec = find_spec(f"fowt_env.{name}")
-        place = None if spec is None else spec.origin and Path(spec.origin).parent
-        if place is not None and place.resolve() == folder.resolve():
+        location = None if spec is None else spec.origin and Path(spec.origin).parent
+        if location is not None and location.resolve() == folder.resolve():
             continue
-        found = f"has no fowt_env.{name}" if place is None else f"takes fowt_env.{name} from {place}"
-        fault = f"fowt_env is in {PACKAGE}, but {sys.executable} {found}"
+        reason = f"has no fowt_env.{name}" if location is None else f"takes fowt_env.{name} from {location}"
+        fault = f"fowt_env is in {PACKAGE}, but {sys.executable} {reason}"
         if (PACKAGE.parent / "pyproject.toml").is_file():
             raise ImportError(
                 f"{fault}: this checkout is not installed there. Run"
@@ -38,16 +38,16 @@ def check_packages():
 
 
 def link_packages(folder):
-    """Make a folder with links in which fowt_env lies as once installed, for tools that read its sources."""
-    place = Path(folder, PACKAGE.name)
-    place.mkdir(parents=True, exist_ok=True)
+    """Create a folder of links in which fowt_env looks as installed, for tools that read its sources."""
+    package = Path(folder, PACKAGE.name)
+    package.mkdir(parents=True, exist_ok=True)
     for path in (*PACKAGE.iterdir(), *FOLDERS.values()):
-        if not (place / path.name).exists():
-            (place / path.name).symlink_to(path)
+        if not (package / path.name).exists():
+            (package / path.name).symlink_to(path)
 
 
 def installed_path(path):
-    """Return the path that a source of this package has once installed; None for any other file."""
+    """Return the installed path of a source file of this package; None for any other file."""
     for name, folder in FOLDERS.items():
         if path.is_relative_to(folder):
             return PACKAGE / name / path.relative_to(folder)
@@ -55,7 +55,7 @@ def installed_path(path):
 
 
 def module_path(name):
-    """Return the path of a module of this package, by its dotted name, without the ending .py."""
+    """Return the path, without .py, of a module of this package from its dotted name."""
     _, *parts = name.split(".")
     folder = FOLDERS.get(parts[0]) if parts else None
     return PACKAGE.joinpath(*parts) if folder is None else folder.joinpath(*parts[1:])

@@ -1,19 +1,19 @@
-"""The environments' names at Gymnasium: text alone, so that none is loaded before somebody makes one."""
+"""Registers the environments in Gymnasium by import path, so that none is loaded before its first use."""
 
 from gymnasium.envs.registration import register, registry
 
 ENVIRONMENTS = {"fowt_env/OC3Hywind-v1": "fowt_env.envs:FowtEnv"}
-OTHER_PLATFORMS = {  # name: platform; FowtEnv takes any platform, these have a name that results can cite
+OTHER_PLATFORMS = {  # name: platform; FowtEnv takes any platform, these have an identifier for citation
     "fowt_env/VolturnUS15MW-v0": "iea15_volturnus_s",
     "fowt_env/ITIBarge-v0": "nrel5mw_iti_barge",
     "fowt_env/OC4Semi-v0": "nrel5mw_oc4_semi",
 }
 ENTRY_POINT = "fowt_env.envs:FowtEnv"
-VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # of each of them
+VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"  # the same for every name
 
 
 def register_environments():
-    """Add the names to Gymnasium's registry, each once however often this is called."""
+    """Add the names to Gymnasium's registry; names already registered are skipped."""
     for name, entry_point in (ENVIRONMENTS | dict.fromkeys(OTHER_PLATFORMS, ENTRY_POINT)).items():
         if name not in registry:
             settings = {"platform": OTHER_PLATFORMS[name]} if name in OTHER_PLATFORMS else {}

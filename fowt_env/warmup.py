@@ -1,4 +1,4 @@
-"""Compiling the usual kinds of scene ahead, so that no later run waits for it."""
+"""Compiles the usual kinds of scene in advance, so that no later run waits for compilation."""
 
 import json
 import subprocess
@@ -17,7 +17,7 @@ WIND, SEA = {"kind": "ntm", "speed": 18.0}, {"kind": "jonswap", "Hs": 6.0, "Tp":
 
 
 def _simulated(fidelity, **weather):
-    """Return what simulates a platform at a fidelity in a weather."""
+    """Return a function that simulates a platform at a fidelity in given weather."""
 
     def run(platform):
         from fowt_env.run.simulation import simulate
@@ -29,7 +29,7 @@ def _simulated(fidelity, **weather):
 
 
 def _stepped(name, **settings):
-    """Return what resets and steps an environment, a class of fowt_env.envs."""
+    """Return a function that resets and steps an environment, a class of fowt_env.envs."""
 
     def run(platform):
         from fowt_env import envs
@@ -50,7 +50,7 @@ def _linear(platform):
 
 
 RUNS = "runs in turbulence and a random sea at fidelity"
-KINDS: dict[str, tuple[str, Callable[[str], object]]] = {  # name: what it is, and how it is run
+KINDS: dict[str, tuple[str, Callable[[str], object]]] = {  # name: (summary, function that runs it)
     "standard": (f"{RUNS} standard", _simulated("standard", wind=WIND, sea=SEA)),
     "environment": ("reset and step of the Gymnasium environment", _stepped("FowtEnv")),
     "vector": ("reset and step of the vector environment", _stepped("FowtVectorEnv", num_envs=2)),
@@ -74,15 +74,15 @@ def warmup(
     """Compile kinds of scene that are not yet on disk; return a DataFrame (kind, kernels, seconds).
 
     platform  a built-in name or the path of a TOML file
-    kinds     names of KINDS; what they share is compiled with the first
-    jobs      processes: with more than one, the first kind is compiled here, then the others side by side
+    kinds     names of KINDS; shared kernels are compiled with the first kind
+    jobs      processes: with more than one, the first kind is compiled here, then the others in parallel
     progress  called with (kind, kinds done, kernels compiled) in a process that compiles
 
     Raises: InputError before anything is compiled for an unknown kind or jobs below 1, and for a platform
     that cannot be read.
     """
     if not kinds:
-        raise InputError("kinds = []: name at least one")
+        raise InputError("kinds = []: must name at least one")
     for kind in kinds:
         if kind not in KINDS:
             raise unknown("kind", kind, KINDS)
@@ -132,7 +132,7 @@ print(json.dumps(list(row)))
 
 
 def _compiled_apart(platform, kind):
-    """Compile a kind in a process of its own and return its row. Raises: InputError."""
+    """Compile a kind in a separate process and return its row. Raises: InputError."""
     words = [sys.executable, "-c", CHILD, json.dumps(sys.path), str(platform), kind]
     done = subprocess.run(words, capture_output=True, text=True)
     if done.returncode != 0:

@@ -211,7 +211,7 @@ def test_blades_of_a_scene_with_one_pitch_are_not_there(collective_scene):
     with pytest.raises(ControllerError, match="the scene has one pitch for all blades"):
         run(collective_scene, Asking())
     law = CompiledCyclic()
-    with pytest.raises(InputError, match="the measurement has no fields of single blades"):
+    with pytest.raises(InputError, match="fields of single blades, which the measurement lacks"):
         law.act(Measurement(*np.ones(N_MEASUREMENTS)))
 
 

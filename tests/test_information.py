@@ -293,7 +293,7 @@ def test_prepare_is_given_the_turbine_alone_where_it_is_not(storm_scene):
     asking = Asking(("rotor_speed",))
     fowt_env.simulate(storm_scene, asking, duration=0.5)
     assert asking.scene.turbine is storm_scene.turbine
-    with pytest.raises(ControllerError, match="asks prepare's scene for 'model'.*'plant_model'"):
+    with pytest.raises(ControllerError, match="reads 'model' of prepare's scene.*'plant_model'"):
         _ = asking.scene.model
 
 

@@ -321,7 +321,7 @@ def test_bad_starts_are_refused(options, message, still_scene):
         ({"PtfmHeave": -200.0}, "its tower base 190 m under water"),
         ({"PtfmHeave": 121.0}, "its keel 0.9.* m above the water"),
         ({"PtfmYaw": 180.0}, r"PtfmYaw'\] = 180: must be within 90 deg of 0"),
-        ({"PtfmYaw": -90.5}, "its back to it"),
+        ({"PtfmYaw": -90.5}, "face away from the wind"),
     ],
 )
 def test_a_rotor_that_cannot_work_where_it_is_put_is_refused(initial, message, storm_scene):

@@ -1,4 +1,4 @@
-"""The protocol of controllers, the information that they read, and controllers by name (protocol.py)."""
+"""Defines the protocol of controllers, the information that they read, and controllers by name."""
 
 from fowt_env.control.information import (
     EXACT,

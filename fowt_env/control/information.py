@@ -1,4 +1,4 @@
-"""Information that a controller declares: measured quantities, the wind ahead, the plant model."""
+"""Checks the information that a controller declares: measurements, wind preview and plant model."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,23 +16,20 @@ from fowt_env.weather.lidar import lidar_preview
 from fowt_env.weather.preview import Preview, check_times, exact_preview
 from fowt_env.weather.wind_field import profile_field
 
-PRIVILEGED_INPUTS = {  # what a controller may read beside Measurement
+PRIVILEGED_INPUTS = {  # information that a controller may declare in addition to Measurement fields
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
     "plant_model": "the equations of the plant: trims, linear models or performance tables of the scene",
 }
-EXACT = "exact"  # preview, and sensors
+EXACT = "exact"  # value of the arguments preview and sensors
 
 
 def declares_blades(controller: Any) -> bool:
-    """Whether a controller declares a field of BladeMeasurement."""
+    """Return whether a controller declares a field of BladeMeasurement."""
     return not set(BladeMeasurement._fields).isdisjoint(controller.information)
 
 
 def check_pitches(controller: Any, individual: bool) -> None:
-    """Refuse what needs individual pitch in a scene with one pitch for all blades.
-
-    Raises: InputError.
-    """
+    """Raise InputError if a controller needs individual pitch and the scene has one pitch for all blades."""
     if individual:
         return
     lacking = ""
@@ -43,17 +40,17 @@ def check_pitches(controller: Any, individual: bool) -> None:
         lacking = f"declares {name!r}, which is measured with individual pitch"
     if lacking:
         raise InputError(
-            f"controller {controller.name!r}: {lacking}, and the scene has one pitch for all: build it with"
-            " pitch='individual'"
+            f"controller {controller.name!r}: {lacking}, and the scene has one pitch for all blades: build it"
+            " with pitch='individual'"
         )
 
 
 @cached(256)
 def mask(name: str, information: tuple[str, ...]) -> np.ndarray:
-    """GIVEN for what is declared, and the time, HIDDEN for the rest; read only.
+    """Return the read-only mask of fields: GIVEN for declared ones and the time, HIDDEN for all others.
 
-    (N_MEASUREMENTS + N_BLADE_MEASUREMENTS,), the fields of Measurement first.
-    Raises: InputError for a name that is neither a field of these nor a privileged input.
+    Shape (N_MEASUREMENTS + N_BLADE_MEASUREMENTS,), the fields of Measurement first.
+    Raises: InputError for a name that is neither a field of the two nor a privileged input.
     """
     fields = (*Measurement._fields, *BladeMeasurement._fields)
     known = (*fields, *PRIVILEGED_INPUTS)
@@ -69,10 +66,10 @@ def mask(name: str, information: tuple[str, ...]) -> np.ndarray:
 def hidden(
     controller: Any, chain: tuple[str, Sequence[str]] | None = None, individual: bool = False
 ) -> np.ndarray:
-    """mask of a run: what the controller declares, and the sensor chain (name, fields that it has) shows.
+    """Return the mask of a run: fields that the controller declares and the chain (name, fields) has.
 
-    individual: whether the scene has individual pitch; else it is of the N_MEASUREMENTS fields.
-    Raises: InputError where it declares a field that the chain does not have, or the scene (check_pitches).
+    individual: whether the scene has individual pitch; else the mask has the N_MEASUREMENTS fields only.
+    Raises: InputError for a declared field that the chain or the scene (check_pitches) does not have.
     """
     check_pitches(controller, individual)
     size = N_MEASUREMENTS + (N_BLADE_MEASUREMENTS if individual else 0)
@@ -93,9 +90,9 @@ def hidden(
 
 
 def preview_leads(controller: Any) -> tuple[float, ...]:
-    """The controller's preview_times, checked, () for none.
+    """Return the checked preview_times of a controller, () for none.
 
-    Raises: InputError for times that cannot be used, and where times and "wind_preview" do not go together.
+    Raises: InputError for unusable times, and if only one of preview_times and "wind_preview" is declared.
     """
     times = tuple(getattr(controller, "preview_times", ()))
     declared = "wind_preview" in controller.information
@@ -103,8 +100,8 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
         return ()
     if not times:
         raise InputError(
-            f"controller {controller.name!r}: declares 'wind_preview' and has no preview_times: how far ahead"
-            " it reads the wind (s, increasing)"
+            f"controller {controller.name!r}: declares 'wind_preview' and has no preview_times, the"
+            " look-ahead times of the wind (s, increasing)"
         )
     if not declared:
         raise InputError(
@@ -118,22 +115,22 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
 
 
 def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float) -> Preview:
-    """Preview of a run of `duration` (s) from the argument of simulate: "exact", a lidar, a Preview, ...
+    """Return the Preview of a run of `duration` (s) from the argument preview of simulate.
 
-    Raises: InputError for anything else, and for a Preview of other leads or shapes.
+    Raises: InputError for an unknown preview, and for a Preview with other leads or shapes.
     """
     if isinstance(preview, str) and preview != EXACT:
         if preview not in lidars():
             raise unknown("preview", preview, (EXACT, *lidars()))
-        found = lidar_preview(scene, leads, preview)
+        result = lidar_preview(scene, leads, preview)
     elif isinstance(preview, str):
-        if duration > scene.options["duration"]:  # of a box of wind that repeats
+        if duration > scene.options["duration"]:  # possible for a periodic wind box
             scene = replace(scene, options=scene.options | {"duration": duration})
-        found = exact_preview(scene, leads)
+        result = exact_preview(scene, leads)
     else:
-        found = preview(scene, leads) if callable(preview) else preview
+        result = preview(scene, leads) if callable(preview) else preview
     try:
-        time, values = (np.ascontiguousarray(part, dtype=np.float64) for part in found[:2])
+        time, values = (np.ascontiguousarray(part, dtype=np.float64) for part in result[:2])
     except (TypeError, ValueError, IndexError):
         raise InputError(
             f"preview = {preview!r}: must be {EXACT!r}, the name of a lidar, a Preview (time, values), or a"
@@ -146,11 +143,11 @@ def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float
         )
     if not (np.isfinite(time).all() and np.isfinite(values).all() and (np.diff(time) > 0.0).all()):
         raise InputError("preview: time must increase, and time and values must be finite")
-    return Preview(time, values, found[2] if len(found) > 2 else None)
+    return Preview(time, values, result[2] if len(result) > 2 else None)
 
 
 class Known:
-    """Known part of a run for a controller that does not declare "plant_model": the turbine."""
+    """Holds the turbine alone, for controllers that do not declare "plant_model"."""
 
     def __init__(self, turbine: Any, controller: str) -> None:
         self.turbine = turbine
@@ -160,7 +157,7 @@ class Known:
         if name.startswith("__"):
             raise AttributeError(name)
         raise ControllerError(
-            f"controller {self._controller!r} asks prepare's scene for {name!r} and does not declare it: add"
+            f"controller {self._controller!r} reads {name!r} of prepare's scene and does not declare it: add"
             " 'plant_model' to its attribute information",
             controller=self._controller,
             time=0.0,
@@ -169,10 +166,10 @@ class Known:
 
 
 def known_scene(scene: Any, controller: Any) -> Any:
-    """Return the known part of a scene for prepare: its plant in steady rated wind, or its turbine alone.
+    """Return the scene for prepare(): the plant in steady rated wind and still water, or the turbine alone.
 
-    The plant is in still water, with the seed 0; nothing of the run's weather can be read from it. A box
-    of wind, whose mean over time is the seed's, is replaced by the power law of the site.
+    The seed is 0, so the scene contains nothing of the run's weather. A wind box, whose mean over time
+    depends on the seed, is replaced by the power law of the site.
     """
     if "plant_model" not in controller.information:
         return Known(scene.turbine, controller.name)

@@ -1,4 +1,4 @@
-"""From a name, an import path or an object to a controller that is ready for a run."""
+"""Makes a controller that is ready for a run from a name, an import path or an object."""
 
 import importlib
 import inspect
@@ -17,33 +17,33 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError, unknown
 
 CATALOGUE = "fowt_env.controllers"
-LONGEST_CONTROL_DT = 1.0  # s; above it the sampled loop differs from the design
+LONGEST_CONTROL_DT = 1.0  # s; with a longer period the sampled loop deviates from the design
 
 
 def check_control_dt(control_dt: float) -> float:
-    """The control period as a float. Raises: InputError outside (0, 1] s."""
+    """Return the control period as a float. Raises: InputError outside (0, 1] s."""
     allowed = f"in (0, {LONGEST_CONTROL_DT:g}] s"
     return check_number("control_dt", control_dt, 0.0, LONGEST_CONTROL_DT, low_open=True, allowed=allowed)
 
 
 def catalogue() -> Any:
-    """The package of the built-in controllers: CONTROLLERS, PREFIXES, named(name), WindEstimator."""
+    """Return the package of built-in controllers: CONTROLLERS, PREFIXES, named(name), WindEstimator."""
     return importlib.import_module(CATALOGUE)
 
 
 def make(controller: Any, turbine: Any, control_dt: float) -> Any:
-    """Controller ready for a run, from a name, an import path or an object.
+    """Return a controller that is ready for a run, from a name, an import path or an object.
 
     controller: a built-in name ("pi"); "policy:NAME" or "policy:PATH" of a trained agent; "design:FILE" with
-    a file of `fowt design`; "module:Name" with Name a class, a factory, a function or a controller (looked
-    for in the working folder too); such a class, factory or function itself; or an object with
-    reset(measurement) and act(measurement). Classes and factories are called with (turbine, control_dt) where
-    they take two arguments, else with none. A function that needs one argument, not called turbine, is the
-    law itself: f(measurement) -> (torque, blade pitch). Compiled controllers come back as they are, others
-    inside a CheckedController.
-    Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, agents and
-    designs that cannot be used, and objects without reset and act; ControllerError for what a module or a
-    factory of the user raises, with its line.
+    a file of `fowt design`; "module:Name" with Name a class, a factory, a function or a controller (the
+    working folder is searched too); such a class, factory or function itself; or an object with
+    reset(measurement) and act(measurement). Classes and factories are called with (turbine, control_dt) if
+    they take two arguments, else without arguments. A function with one required argument, not called
+    turbine, is the control law: f(measurement) -> (torque, blade pitch). Compiled controllers are returned
+    unchanged, others inside a CheckedController.
+    Raises: InputError for unknown names (with a suggestion), paths that cannot be imported, unusable agents
+    and designs, and objects without reset and act; ControllerError, with the line, for an error raised by a
+    user's module or factory.
     """
     control_dt = check_control_dt(control_dt)
     name = None
@@ -68,11 +68,11 @@ def make(controller: Any, turbine: Any, control_dt: float) -> Any:
 
 
 def _imported(path):
-    """What "module:Name" points at."""
+    """Return the attribute that the import path "module:Name" refers to."""
     module_name, _, attribute = path.partition(":")
     if not module_name or not attribute:
         raise InputError(f"controller {path!r}: an import path is 'module:Name'")
-    sys.path.insert(0, "")  # a console script has its folder on the path, not the user's
+    sys.path.insert(0, "")  # a console script has its own folder on the path, not the working folder
     try:
         module = importlib.import_module(module_name)
     except ImportError as error:
@@ -90,12 +90,12 @@ def _imported(path):
 
 
 def _is_law(function):
-    """Whether something is a function of the measurement (FunctionController) and no factory or object."""
+    """Return whether an object is a function of the measurement (FunctionController) and not a factory."""
     if not callable(function) or isinstance(function, type) or hasattr(function, "act"):
         return False
     try:
         parameters = inspect.signature(function).parameters.values()
-    except ValueError:  # some built-in callables have none
+    except ValueError:  # some built-in callables have no signature
         return False
     free = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     needed = [one for one in parameters if one.default is one.empty and one.kind not in free]
@@ -105,12 +105,12 @@ def _is_law(function):
 
 
 def _called(factory, name, turbine, control_dt):
-    """What a class or factory makes; anything that cannot be called comes back as it is."""
+    """Return the result of a class or factory; an object that cannot be called is returned unchanged."""
     if not callable(factory):
         return factory
     try:
         signature = inspect.signature(factory)
-    except ValueError:  # some built-in callables have none
+    except ValueError:  # some built-in callables have no signature
         return factory
     for arguments in ((turbine, control_dt), ()):
         try:

@@ -1,33 +1,30 @@
-"""The protocol of controllers, and the controller of a name.
+"""Defines the protocol of controllers: reset(measurement) and act(measurement).
 
-A controller has reset(measurement) and act(measurement). So has a plain function of the measurement, which is
-act by itself: f(measurement) -> (generator torque, blade pitch). A function counts as one where a single
-argument has to be given to it and that is not called `turbine`; with two, (turbine, control_dt), or with none
-it is a factory, which makes the controller of a run, or the function that is one. Nothing resets what a
-function remembers: a factory makes it afresh for every run. The attributes below may be set on a function
-too, as f.information = ("wind_speed",). Beside its methods a controller may have
+A plain function of the measurement can replace act: f(measurement) -> (generator torque, blade pitch). A
+function with one required argument not called `turbine` is such a control law; one with two arguments,
+(turbine, control_dt), or none is a factory, which returns the controller of a run or a control law. The state
+of a control law is never reset: use a factory to create the law for every run. The attributes below may be
+set on a function too, as f.information = ("wind_speed",). Optional attributes of a controller:
 
-- information, a tuple of the Measurement fields that it uses and of its PRIVILEGED_INPUTS. It reads these
-  and nothing else. A compiled law reads NaN in every other field, and so it does as the torque or the blade
-  pitch in force where it does not declare generator_torque or blade_pitch. A controller in Python receives a
-  Measurement whose other fields raise a ControllerError. The time is always there. A Python
-  controller that declares nothing reads what a turbine's sensors measure (SENSOR_FIELDS of
-  fowt_env/plant/measurement.py);
-- prepare(scene), called once per run before reset. Where "plant_model" is declared it receives the scene of
-  the run in steady wind (rated) and still water: the plant's equations, and nothing of the weather that is
-  coming. Where it is not, the scene has a `turbine` and nothing else;
-- preview_times, where "wind_preview" is declared: how far ahead (s, increasing) it reads the
-  rotor-averaged wind, as `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's
-  array;
-- individual = True where it commands the pitch of each blade: act returns (generator torque, pitch of blade
-  1, of blade 2, of blade 3), and a compiled law writes these four. It needs a scene with pitch="individual".
-  In such a scene the pitch of other controllers goes to all blades, blade_pitch is the mean of the
-  blades', and any controller may declare fields of BladeMeasurement: `measurement.blades` has them, a
-  compiled law's array behind the wind ahead. Of the pitches in force a law that commands each blade sees
-  those that it declares (blade_pitch_1 ...).
+- information, a tuple of the Measurement fields and PRIVILEGED_INPUTS that the controller reads; all others
+  are hidden. A compiled law reads NaN in hidden fields, and NaN as the torque or blade pitch in force unless
+  generator_torque or blade_pitch is declared. A Python controller receives a Measurement whose hidden fields
+  raise a ControllerError. The time is never hidden. A Python controller without the attribute reads the
+  fields measured by a turbine's sensors (SENSOR_FIELDS of fowt_env/plant/measurement.py);
+- prepare(scene), called once per run before reset. If "plant_model" is declared, the scene is that of the run
+  in steady rated wind and still water: the plant's equations without the weather of the run. Otherwise the
+  scene has the attribute `turbine` alone;
+- preview_times (s, increasing), required by "wind_preview": look-ahead times of the rotor-averaged wind in
+  `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's array;
+- individual = True if the controller commands the pitch of each blade: act returns (generator torque, pitch
+  of blade 1, of blade 2, of blade 3), and a compiled law writes these four. This needs a scene with
+  pitch="individual". In such a scene the command of other controllers applies to all blades, blade_pitch is
+  the mean over the blades, and any controller may declare fields of BladeMeasurement, which are in
+  `measurement.blades` or follow the wind preview in a compiled law's array. A law that commands each blade
+  reads, of the pitches in force, those that it declares (blade_pitch_1 ...).
 
-The built-in controllers are built on the simulator, and so it imports none of them: it knows the name of the
-package that has them (CATALOGUE), and imports that when a run or an environment asks for a name.
+The built-in controllers depend on the simulator, so the simulator imports none of them: it imports their
+package (CATALOGUE) when a run or an environment requests a controller by name.
 """
 
 import reprlib
@@ -57,13 +54,13 @@ from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS
 
 @runtime_checkable
 class Controller(Protocol):
-    """Any object with these two methods can control a run (SI, radians)."""
+    """Defines the two methods of any object that controls a run (SI, radians)."""
 
     def reset(self, measurement: Measurement) -> object:
-        """Start afresh from a Measurement, so that the first command does not bump the plant."""
+        """Initialise all states from a Measurement, for a first command without a jump (bumpless start)."""
 
     def act(self, measurement: Measurement) -> tuple[float, ...]:
-        """(generator torque N m on the high-speed shaft, blade pitch rad) constant until the next call.
+        """Return (generator torque N m on the high-speed shaft, blade pitch rad), held until the next call.
 
         With individual = True the pitch of each of the three blades.
         """
@@ -75,54 +72,54 @@ def _call(law, parameters, memory, measurement, command):
 
 
 def call_law(law, parameters, memory, measurement, command):
-    """Run a law once, a ControlKernel or compiled; the way to it from Python."""
+    """Run a control law once from Python, either a ControlKernel or its compiled function."""
     _call(getattr(law, "compiled", law), parameters, memory, measurement, command)
 
 
 class CompiledController:
-    """Base of the controllers whose law runs inside the compiled loop.
+    """Provides the base class of controllers whose law runs inside the compiled loop.
 
-    A subclass sets `kernel = staticmethod(law)`, with law made by control_kernel, and
-    writes reset(). parameters and memory are float64 arrays; IntEnums beside the law name their
-    entries. The compiled loop calls kernel on these arrays; act() calls the same law from Python.
-    A law is handed the command in force, which it overwrites with the next one.
+    A subclass sets `kernel = staticmethod(law)`, with law made by control_kernel, and implements reset().
+    parameters and memory are float64 arrays, with entries named by IntEnums in the law's module. The compiled
+    loop calls kernel on these arrays; act() calls the same law from Python. A law receives the command in
+    force and overwrites it with the next command.
     """
 
     kernel: Callable[..., None] | None = None
-    information: tuple[str, ...] = ()  # what the law uses: Measurement fields and PRIVILEGED_INPUTS
-    preview_times: tuple[float, ...] = ()  # s ahead of the wind that it reads
-    individual: bool = False  # whether the law commands the pitch of each blade, else one for all
+    information: tuple[str, ...] = ()  # Measurement fields and PRIVILEGED_INPUTS that the law reads
+    preview_times: tuple[float, ...] = ()  # look-ahead times of the wind preview, s
+    individual: bool = False  # whether the law commands the pitch of each blade, not one for all
 
     def __init__(self, name: str, parameters: npt.ArrayLike, n_memory: int) -> None:
         self.name = str(name)
         self.parameters = np.ascontiguousarray(parameters, dtype=np.float64)
         self.memory = np.zeros(n_memory)
-        # in force, for act(); a first call must not rely on it
+        # command in force, for act(); zero before the first call
         self.command = np.zeros(N_INDIVIDUAL_COMMANDS if self.individual else N_COMMANDS)
 
     @property
     def law(self) -> Any:
-        """The kernel, compiled."""
+        """Return the compiled kernel."""
         return getattr(self.kernel, "compiled", self.kernel)
 
     def prepare(self, scene: Any) -> None:
-        """Take what the law needs of the scene of the coming run; called once before reset()."""
+        """Read what the law needs from the scene of the run; called once before reset()."""
 
     def reset(self, measurement: Measurement) -> None:
-        """Set memory from a Measurement, forgetting everything before."""
+        """Initialise the memory from a Measurement, discarding all earlier states."""
         raise NotImplementedError(f"{type(self).__name__} must define reset(measurement)")
 
     def act(self, measurement: Measurement) -> tuple[float, ...]:
-        """(generator torque, blade pitch or that of each blade) for a Measurement; advances the memory.
+        """Return (generator torque, blade pitch or that of each blade) for a Measurement; update the memory.
 
-        What the law does not declare it reads as NaN, as in the compiled loop.
+        Fields that the law does not declare are NaN, as in the compiled loop.
         """
         blades = values_of_blades(measurement)
         values = np.array([*measurement, *wind_ahead(measurement), *blades], dtype=np.float64)
         leads, shown = len(self.preview_times), mask(self.name, tuple(self.information))
         if not blades and declares_blades(self):
             raise InputError(
-                f"controller {self.name!r}: the measurement has no fields of single blades, which it declares"
+                f"controller {self.name!r}: declares fields of single blades, which the measurement lacks"
             )
         if values.shape != (N_MEASUREMENTS + leads + len(blades),):
             size = N_MEASUREMENTS + leads + len(blades)
@@ -135,7 +132,7 @@ class CompiledController:
 
 
 class CheckedController:
-    """A Python controller whose every answer is checked to be two finite numbers, or four if individual."""
+    """Wraps a Python controller and checks each command: two finite numbers, or four if individual."""
 
     def __init__(self, controller: Any, name: str | None = None) -> None:
         self.controller = controller
@@ -147,32 +144,32 @@ class CheckedController:
         self.preview_times = tuple(getattr(controller, "preview_times", ()))
 
     def prepare(self, scene: Any) -> None:
-        """Hand the scene of the coming run to the controller inside, where it asks for it.
+        """Pass the scene of the run to the wrapped controller, if the controller has prepare().
 
-        Raises: ControllerError for whatever that raises.
+        Raises: ControllerError for any error of the wrapped controller.
         """
         if hasattr(self.controller, "prepare"):
             with named_failure(self.name, "in prepare()"):
                 self.controller.prepare(scene)
 
     def reset(self, measurement: Measurement) -> None:
-        """Reset the controller inside. Raises: ControllerError for whatever that raises."""
+        """Reset the wrapped controller. Raises: ControllerError for any error of the wrapped controller."""
         shown = self._shown(measurement)
         with named_failure(self.name, "in reset()", float(measurement.time)):
             self.controller.reset(shown)
 
     def _shown(self, measurement):
-        """The part of a Measurement that the controller declares."""
+        """Return the view of a Measurement with the fields that the controller declares."""
         view = view_class(self.name, self.information, len(self.preview_times))
         return measurement if isinstance(measurement, view) else view.of(measurement)
 
     def act(self, measurement: Measurement) -> tuple[float, ...]:
-        """(generator torque, blade pitch or that of each blade) as floats.
+        """Return (generator torque, blade pitch or that of each blade) as floats.
 
-        Raises: ControllerError naming the controller, the time and what it returned or raised.
+        Raises: ControllerError naming the controller, the time and the returned value or the error.
         """
         shown = self._shown(measurement)
-        try:  # no context manager: this is called at every control period
+        try:  # no context manager, for speed: called in every control period
             returned = self.controller.act(shown)
         except (ControllerError, InputError, SimulationStopped):
             raise
@@ -205,9 +202,9 @@ class CheckedController:
 
 
 class FunctionController:
-    """A function of the measurement as a controller: called as act, without reset.
+    """Wraps a function of the measurement as a controller: act() calls the function, reset() does nothing.
 
-    information, preview_times, individual and prepare are the function's attributes, where it has them.
+    information, preview_times, individual and prepare are attributes of the function, if set.
     """
 
     def __init__(self, function: Callable[[Any], Any]) -> None:
@@ -218,16 +215,16 @@ class FunctionController:
                 setattr(self, key, getattr(function, key))
 
     def reset(self, measurement: Measurement) -> None:
-        """Nothing to start."""
+        """Do nothing: a function has no states to initialise."""
 
     def act(self, measurement: Measurement) -> Any:
-        """What the function returns."""
+        """Return the command that the function returns."""
         return self.function(measurement)
 
 
 @contextmanager
 def named_failure(controller, what, time=None):
-    """Return a context that turns errors of a controller into a ControllerError with their place."""
+    """Return a context that turns errors of a controller into a ControllerError with file and line."""
     try:
         yield
     except (ControllerError, InputError, SimulationStopped):
@@ -237,26 +234,26 @@ def named_failure(controller, what, time=None):
 
 
 def failure_of(controller, what, error, time):
-    """Return the ControllerError of a controller's error, with place and time (None: before the run).
+    """Return the ControllerError of a controller's error, with file, line and time (None: before the run).
 
-    what: what it was doing, as "in act()".
+    what: the phase of the error, such as "in act()".
     """
-    frames = traceback.extract_tb(error.__traceback__)[1:]  # the first is the caller's
-    own = [
+    frames = traceback.extract_tb(error.__traceback__)[1:]  # the first frame is the caller's
+    outside = [
         frame
         for frame in frames
         if Path(frame.filename).parent != Path(__file__).parent and "importlib" not in frame.filename
     ]
-    inside = [frame for frame in own if frame.filename == own[0].filename]  # not a library that it calls
-    place = f", {Path(inside[-1].filename).name} line {inside[-1].lineno}" if inside else ""
+    inside = [frame for frame in outside if frame.filename == outside[0].filename]  # no library
+    position = f", {Path(inside[-1].filename).name} line {inside[-1].lineno}" if inside else ""
     try:
         text = _lacking(error) or str(error)
-    except (Exception, SystemExit, GeneratorExit):  # it may be a controller's own, and so may be its text
+    except (Exception, SystemExit, GeneratorExit):  # str() of a user-defined error may raise
         text = "its message cannot be read"
-    said = f": {text}" if text else ""
+    ending = f": {text}" if text else ""
     when = "" if time is None else f" at t = {time:.3f} s"
     return ControllerError(
-        f"controller {controller!r} raised {type(error).__name__} {what}{when}{place}{said}",
+        f"controller {controller!r} raised {type(error).__name__} {what}{when}{position}{ending}",
         controller=controller,
         time=0.0 if time is None else time,
         returned=None,
@@ -264,7 +261,7 @@ def failure_of(controller, what, error, time):
 
 
 def _lacking(error):
-    """Words on an attribute that a measurement does not have, with the nearest; "" for other errors."""
+    """Return a text on an unknown attribute of a measurement, with similar names; "" for other errors."""
     of_blades = isinstance(getattr(error, "obj", None), BladeMeasurement)
     if not isinstance(error, AttributeError) or not of_blades and not isinstance(error.obj, Measurement):
         return ""
@@ -277,11 +274,11 @@ def _lacking(error):
 
 
 def _shown(value: Any) -> str:
-    """repr of a controller's answer in some 200 characters, whatever it is."""
+    """Return the repr of a controller's return value, shortened to about 200 characters."""
     short = reprlib.Repr()
     short.maxother = short.maxstring = short.maxlong = 200
     try:
         text = short.repr(value)
-    except Exception:  # of an element, which reprlib asks as it is
+    except Exception:  # raised by the repr of an element, which reprlib does not catch
         text = f"<{type(value).__name__}>"
     return f"{text[:200]}..." if len(text) > 200 else text

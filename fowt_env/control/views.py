@@ -1,4 +1,4 @@
-"""Views of a measurement that hold what a controller declares, and refuse the rest."""
+"""Provides views of a measurement with the declared fields; reading another field raises an error."""
 
 import operator
 from collections.abc import Callable, Sequence
@@ -11,37 +11,37 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measure
 
 
 class MeasurementView(Measurement):
-    """Measurement of the fields that a controller declares; the other ones are NaN and raise when read.
+    """Holds the measured fields that a controller declares; reading another field raises ControllerError.
 
-    view[i] raises as the attribute does; np.array(view), slices and loops have NaN there.
+    view[i] raises as the attribute does; np.array(view), slices and loops contain NaN instead.
     """
 
     _controller = ""
     _information: tuple[str, ...] = ()
     _hidden: frozenset[str] = frozenset()
-    _places: tuple[int, ...] = ()  # of the hidden fields
+    _indices: tuple[int, ...] = ()  # of the hidden fields
     _foresees = False
-    _leads = 0  # how many times the wind is foreseen for
+    _leads = 0  # number of preview_times
     _blade_class: type
     _ahead: tuple[float, ...] = ()
     _blades: "BladeView | None" = None
 
     @classmethod
     def take(cls, values: Sequence[float]) -> "MeasurementView":
-        """The view of (N_MEASUREMENTS + leads,) values, or with those of BladeMeasurement behind them."""
+        """Return the view of (N_MEASUREMENTS + leads,) values, optionally followed by blade measurements."""
         rest = N_MEASUREMENTS + cls._leads
         return cls._taken(values[:N_MEASUREMENTS], values[N_MEASUREMENTS:rest], values[rest:])
 
     @classmethod
     def of(cls, measurement: Any) -> "MeasurementView":
-        """The view of a Measurement, with the wind ahead and the blades that it carries."""
+        """Return the view of a Measurement, with its wind preview and blade measurements."""
         return cls._taken(measurement, wind_ahead(measurement), values_of_blades(measurement))
 
     @classmethod
     def _taken(cls, values, ahead, blades):
         shown = list(values)
-        for place in cls._places:
-            shown[place] = nan
+        for index in cls._indices:
+            shown[index] = nan
         view = cls._make(shown)
         view._ahead = tuple(ahead)
         if len(blades):
@@ -50,18 +50,18 @@ class MeasurementView(Measurement):
 
     @property
     def wind_preview(self) -> tuple[float, ...]:
-        """Rotor-averaged wind (m/s) at each of the controller's preview_times."""
+        """Return the rotor-averaged wind (m/s) at each of the controller's preview_times."""
         if not self._foresees:
             self._refuse("wind_preview")
         return self._ahead
 
     @property
     def blades(self) -> "BladeView":
-        """BladeMeasurement of a scene with individual pitch."""
+        """Return the BladeMeasurement of a scene with individual pitch."""
         if self._blades is None:
             raise ControllerError(
                 f"controller {self._controller!r} reads 'blades': the scene has one pitch for all blades;"
-                " build it with pitch='individual'",
+                " build the scene with pitch='individual'",
                 controller=self._controller,
                 time=float(tuple.__getitem__(self, 0)),
                 returned=None,
@@ -92,7 +92,7 @@ class MeasurementView(Measurement):
 
 
 class BladeView(BladeMeasurement):
-    """A BladeMeasurement that holds what a controller declares, as MeasurementView does."""
+    """Holds the fields of a BladeMeasurement that a controller declares, like MeasurementView."""
 
     _controller = ""
     _information: tuple[str, ...] = ()
@@ -101,7 +101,7 @@ class BladeView(BladeMeasurement):
 
     @classmethod
     def take(cls, values: Sequence[float], time: float) -> "BladeView":
-        """The view of (N_BLADE_MEASUREMENTS,) values at a time (s)."""
+        """Return the view of (N_BLADE_MEASUREMENTS,) values at a time (s)."""
         names = BladeMeasurement._fields
         view = cls._make(nan if n in cls._hidden else v for n, v in zip(names, values, strict=True))
         view._time = time
@@ -123,7 +123,7 @@ class BladeView(BladeMeasurement):
 
 
 def _refuse(controller, name, time):
-    """Raise ControllerError: a controller reads at a time (s) what it does not declare."""
+    """Raise ControllerError: a controller reads an undeclared field at a time (s)."""
     also = " and give preview_times" if name == "wind_preview" else ""
     raise ControllerError(
         f"controller {controller!r} reads {name!r} at t = {time:.3f} s and does not declare it: add"
@@ -135,7 +135,7 @@ def _refuse(controller, name, time):
 
 
 def _hiding(name, fields, information):
-    """Members of the view class of a controller's name that hide the fields which are not in information."""
+    """Return the members of a controller's view class, which hide all fields that are not in information."""
     hidden_fields = frozenset(fields) - {"time", *information}
     refusing = {field: property(lambda self, field=field: self._refuse(field)) for field in hidden_fields}
     about = {"_controller": name, "_information": information, "_hidden": hidden_fields}
@@ -144,10 +144,10 @@ def _hiding(name, fields, information):
 
 @cached(256)
 def view_class(name, information, leads):
-    """MeasurementView of a controller's name, information and number of preview_times."""
+    """Return the subclass of MeasurementView for a controller's name, information and preview count."""
     members = _hiding(name, Measurement._fields, information)
     members |= {
-        "_places": tuple(i for i, field in enumerate(Measurement._fields) if field in members["_hidden"]),
+        "_indices": tuple(i for i, field in enumerate(Measurement._fields) if field in members["_hidden"]),
         "_foresees": "wind_preview" in information,
         "_leads": leads,
         "_blade_class": type("BladeView", (BladeView,), _hiding(name, BladeMeasurement._fields, information)),
@@ -156,38 +156,38 @@ def view_class(name, information, leads):
 
 
 def _view_again(name, information, leads, values, ahead, blades):
-    """A MeasurementView as it was before it was pickled."""
+    """Return an unpickled MeasurementView."""
     return view_class(name, information, leads)._taken(values, ahead, blades)
 
 
 def _blades_again(name, information, values, time):
-    """A BladeView as it was before it was pickled."""
+    """Return an unpickled BladeView."""
     return view_class(name, information, 0)._blade_class.take(values, time)
 
 
 def view_of(controller: Any) -> Callable[[Sequence[float]], MeasurementView]:
-    """Return the function that makes the view of a controller from its array of readings."""
+    """Return the function that makes the view of a controller from an array of readings."""
     return view_class(controller.name, tuple(controller.information), len(controller.preview_times)).take
 
 
 def whole_view(values: Sequence[float], wind: Sequence[float] = ()) -> MeasurementView:
-    """The view of measured values, of which nothing is hidden, and of the wind (m/s) that is foreseen."""
+    """Return a view of measured values and of the wind preview (m/s) without hidden fields."""
     everything = (*Measurement._fields, *BladeMeasurement._fields, "wind_preview")
     rest = values[N_MEASUREMENTS:]
     return view_class("", everything, len(wind)).take([*values[:N_MEASUREMENTS], *wind, *rest])
 
 
 def with_wind_ahead(measurement: Measurement, wind: Sequence[float]) -> MeasurementView:
-    """The measurement with the wind (m/s) that is foreseen, of which nothing else is hidden."""
+    """Return a view of a measurement with a wind preview (m/s), without hidden fields."""
     return whole_view([*measurement, *values_of_blades(measurement)], wind)
 
 
 def wind_ahead(measurement: Any) -> tuple[float, ...]:
-    """The foreseen wind that a measurement carries; () where it carries none."""
+    """Return the wind preview of a measurement; () without one."""
     return getattr(measurement, "_ahead", ())
 
 
 def values_of_blades(measurement: Any) -> tuple[float, ...]:
-    """(N_BLADE_MEASUREMENTS,) the BladeMeasurement that a measurement carries; () where it carries none."""
+    """Return the (N_BLADE_MEASUREMENTS,) blade values of a measurement; () without any."""
     blades = getattr(measurement, "_blades", None)
     return () if blades is None else tuple(blades)

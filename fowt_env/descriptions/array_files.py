@@ -1,7 +1,7 @@
-"""Arrays of .npz files from strangers, read without pickle.
+"""Reads the arrays of untrusted .npz files without pickle.
 
-No count in a file is believed: an array takes the memory that the file's table of contents gives it, and all
-of them at most what the caller allows.
+Memory is allocated by the archive's table of contents, not by the array headers, and up to a limit of the
+caller.
 """
 
 import math
@@ -13,10 +13,10 @@ HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.re
 
 
 def read_arrays(path, largest):
-    """{name: array} of a .npz file, each once its size is known to be that of its place in the file.
+    """Return {name: array} of a .npz file, each after a check of its header against its size in the archive.
 
-    largest: bytes of all arrays together. Raises: whatever zipfile, zlib and numpy make of a broken file, and
-    ValueError for one whose figures do not agree.
+    largest: bytes of all arrays together. Raises: errors of zipfile, zlib and numpy for a broken file, and
+    ValueError for inconsistent sizes.
     """
     arrays = {}
     with zipfile.ZipFile(path) as archive:

@@ -1,4 +1,4 @@
-"""Names of the built-in descriptions."""
+"""Lists the names of the built-in descriptions."""
 
 from fowt_env.descriptions.platform import platform_names
 from fowt_env.descriptions.sea_state import joint_tables, sea_states
@@ -14,7 +14,7 @@ DESCRIPTIONS = {
 
 
 def names(kind):
-    """Sorted built-in names of a kind of description, see DESCRIPTIONS. Raises: InputError."""
+    """Return the sorted built-in names of a kind of description, see DESCRIPTIONS. Raises: InputError."""
     if kind not in DESCRIPTIONS:
         raise unknown("kind of description", kind, DESCRIPTIONS)
     return DESCRIPTIONS[kind]()

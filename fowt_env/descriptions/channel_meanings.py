@@ -1,4 +1,4 @@
-"""What the output channels mean, in words: OpenFAST's names, read as its own output lists define them."""
+"""Describes the output channels in words; names and definitions are those of OpenFAST's output lists."""
 
 import re
 
@@ -27,7 +27,7 @@ MEANINGS = {
     "Azimuth": "rotor azimuth, blade 1 upwards at 0",
     "RotSpeed": "rotor speed",
     "GenSpeed": "generator speed, high-speed shaft",
-    "BldPitch1": "blade pitch (of blade 1 where each has its own)",
+    "BldPitch1": "blade pitch (of blade 1 with individual pitch)",
     "BldPitch2": "pitch of blade 2",
     "BldPitch3": "pitch of blade 3",
     "GenTq": "generator torque, high-speed shaft",
@@ -65,15 +65,15 @@ MEANINGS = {
     "YawBrMzp": "yaw-bearing moment, yaw",
     "TTDspFA": "tower-top deflection, fore-aft",
     "TTDspSS": "tower-top deflection, side to side",
-    "YawBrTAxp": "tower-top acceleration along x of its turned axes",
-    "YawBrTAyp": "tower-top acceleration along y of its turned axes",
+    "YawBrTAxp": "tower-top acceleration along x of the rotated axes",
+    "YawBrTAyp": "tower-top acceleration along y of the rotated axes",
 }
 
 
 def channel_meaning(name):
-    """Text of a channel's meaning, by its name without unit; "" for a load that a user has added.
+    """Return the description of a channel by its name, with or without unit; "" for a user-defined load.
 
-    Those of one line or blade have its number: FAIRTEN2, RootMyc3.
+    Channels of a line or blade end with its number: FAIRTEN2, RootMyc3.
     """
     name = name.partition("_[")[0]
     if name in MEANINGS:

@@ -1,4 +1,4 @@
-"""Checks of single values: what a number is, and the one message about a value that cannot be used.
+"""Checks single values and builds the message about a value that cannot be used.
 
 A message is `key = value: must be ...`, with the allowed range in words.
 """
@@ -12,23 +12,23 @@ from fowt_env.errors import InputError, did_you_mean
 
 
 def plain_number(value):
-    """Return a scalar of numpy or the like as Python's own, which the strict float type takes."""
+    """Return a scalar of numpy or the like as a built-in Python number, as the strict float type requires."""
     return value.item() if getattr(value, "ndim", None) == 0 else value
 
 
 def is_number(value):
-    """Return whether a value is a finite number that fits a float, and neither bool nor text."""
+    """Return whether a value is a finite number that fits a float, and not a bool."""
     value = plain_number(value)
     return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= 1e300
 
 
 def is_whole(value):
-    """Return whether a value is a whole number by its type, and no bool."""
+    """Return whether a value is of an integer type, and not a bool."""
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
 
 
 def short(value):
-    """Return repr of a value, shortened for messages."""
+    """Return the repr of a value, shortened for messages."""
     try:
         text = repr(plain_number(value))
     except ValueError:  # an integer of more digits than Python prints
@@ -37,7 +37,7 @@ def short(value):
 
 
 def refusal(key, value, allowed):
-    """Return the InputError for a value that is not what is allowed, in words."""
+    """Return the InputError for a value that is not allowed; allowed: the range in words."""
     return InputError(f"{key} = {short(value)}: must be {allowed}")
 
 
@@ -55,9 +55,9 @@ def check_number(
 ):
     """Return the value as a float. Raises: InputError unless it is a number from low to high.
 
-    low_open, high_open   whether that end itself is left out
-    infinite              whether infinity is a number
-    allowed               the range in other words than "a number in [low, high]"
+    low_open, high_open   whether that limit itself is excluded
+    infinite              whether infinity is allowed
+    allowed               the range in words, in place of "a number in [low, high]"
     """
     good = is_number(value) or infinite and isinstance(value, float) and math.isinf(value)
     if good:
@@ -71,7 +71,7 @@ def check_number(
 
 
 def check_whole_number(key, value, low=None, high=None):
-    """Return the value as an int. Raises: InputError unless it is whole, from low to high (None: no end)."""
+    """Return the value as an int. Raises: InputError unless it is whole, low to high (None: no limit)."""
     good = is_whole(value) and (low is None or low <= value) and (high is None or value <= high)
     if not good:
         allowed = "a whole number" if low is None else f"a whole number >= {low}"
@@ -80,7 +80,7 @@ def check_whole_number(key, value, low=None, high=None):
 
 
 def check_pair(key, value, low, high):
-    """Return the (low, high) of an ordered pair of numbers. Raises: InputError, also beyond the range."""
+    """Return an ordered pair (low, high) of numbers in a range. Raises: InputError."""
     if not isinstance(value, tuple | list) or len(value) != 2:
         raise refusal(key, value, "a pair (low, high)")
     first, last = (check_number(key, number, low, high) for number in value)
@@ -95,11 +95,11 @@ def check_in_range(key, value, low, high, unit=""):
 
 
 def check_choice(key, value, choices):
-    """Return which of a few names or numbers a value is, letters of either case. Raises: InputError."""
+    """Return the choice that equals a name or number, ignoring case. Raises: InputError."""
     plain = plain_number(value)
-    wanted = plain.upper() if isinstance(plain, str) else plain
+    folded = plain.upper() if isinstance(plain, str) else plain
     for choice in choices if isinstance(plain, str | int | float) and not isinstance(plain, bool) else ():
-        if wanted == (choice.upper() if isinstance(choice, str) else choice):
+        if folded == (choice.upper() if isinstance(choice, str) else choice):
             return choice
     hint = did_you_mean(value, choices) if isinstance(value, str) else ""
     raise refusal(key, value, f"one of {', '.join(map(str, choices))}{'.' * bool(hint)}{hint}")
@@ -135,7 +135,7 @@ def check_samples(key, value, low, high, unit):
 
 
 def check_array(key, value, axes):
-    """Return an array of finite numbers, float32 where it has several axes. Raises: InputError."""
+    """Return an array of finite numbers, float32 with several axes, else float64. Raises: InputError."""
     try:
         values = np.asarray(value, dtype=np.float32 if axes > 1 else np.float64)
     except (TypeError, ValueError):
@@ -146,8 +146,8 @@ def check_array(key, value, axes):
 
 
 def check_one_of(key, value, choices):
-    """Return the value. Raises: InputError unless it is one of a few."""
-    if value not in tuple(choices):  # a tuple asks for no hash
+    """Return the value. Raises: InputError unless it is one of the choices."""
+    if value not in tuple(choices):  # a tuple, as the value may be unhashable
         raise refusal(key, value, f"one of {', '.join(map(str, choices))}")
     return value
 
@@ -168,7 +168,7 @@ def parse_numbers(text, what):
 
 
 def parse_whole_numbers(text, what):
-    """Return the list of whole numbers of a text, as parse_numbers takes it."""
+    """Return the whole numbers of a text in the format of parse_numbers. Raises: InputError."""
     values = parse_numbers(text, what)
     if any(value != int(value) for value in values):
         raise InputError(f"{what} = {text!r}: must be whole numbers")
@@ -176,7 +176,7 @@ def parse_whole_numbers(text, what):
 
 
 def parse_number(text):
-    """Return the finite number that a text means, or None."""
+    """Return the finite number in a text, or None."""
     try:
         value = float(text)
     except ValueError:

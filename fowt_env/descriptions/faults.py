@@ -1,4 +1,4 @@
-"""What goes wrong in a run: the grid, a pitch drive, a sensor; and stops that are ordered."""
+"""Describes the faults of a run: grid loss, faults of pitch drives and sensors, and ordered stops."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
@@ -14,55 +14,55 @@ FIELDS = tuple(name for name in (*Measurement._fields, *BladeMeasurement._fields
 
 
 class FaultKind(NamedTuple):
-    """A kind of fault."""
+    """Describes a kind of fault."""
 
-    keys: tuple[str, ...]  # beside kind and time
-    summary: str  # TIME: its time
+    keys: tuple[str, ...]  # in addition to kind and time
+    summary: str  # TIME stands for the time of the fault
 
 
 FAULTS = {
     "grid_loss": FaultKind(("delay", "rate"), "the generator torque is zero from TIME on"),
-    "emergency_stop": FaultKind(("rate",), "no torque, and the blades feather from TIME on"),
+    "emergency_stop": FaultKind(("rate",), "zero torque, and the blades feather from TIME on"),
     "normal_stop": FaultKind(
         ("rate",), "the blades feather at the normal rate; the torque falls with the rotor speed"
     ),
-    "stuck_pitch": FaultKind(("blades", "backup"), "blades stay where they are at TIME"),
+    "stuck_pitch": FaultKind(("blades", "backup"), "blades stay at their pitch of TIME"),
     "pitch_runaway": FaultKind(
         ("blades", "towards", "backup"), "blades run to one end of their range (JSON: towards)"
     ),
     "pitch_offset": FaultKind(
-        ("blades", "offset"), "blades are off from what their encoders show (JSON: offset, deg)"
+        ("blades", "offset"), "blade pitch differs from the encoder reading (JSON: offset, deg)"
     ),
-    "sensor_bias": FaultKind(("field", "value"), "a reading is off (JSON: field, value)"),
-    "sensor_freeze": FaultKind(("field",), "a reading stays as it is at TIME (JSON: field)"),
+    "sensor_bias": FaultKind(("field", "value"), "a reading has a constant error (JSON: field, value)"),
+    "sensor_freeze": FaultKind(("field",), "a reading stays at its value of TIME (JSON: field)"),
     "sensor_loss": FaultKind(("field",), "a reading is zero from TIME on (JSON: field)"),
 }
 KINDS = tuple(FAULTS)
 BLADE_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "blades" in fault.keys)
 SENSOR_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "field" in fault.keys)
-NEEDED = ("towards", "offset", "field", "value")  # by the kinds that have them
+NEEDED = ("towards", "offset", "field", "value")  # required by the kinds of fault that have these keys
 Blade = Annotated[int, Field(ge=1, le=3, strict=True)]
 
 
 class Fault(Record):
-    """A fault of a load case.
+    """Defines a fault of a load case.
 
-    A run with a fault goes on past the turbine's overspeed, which ends any other as failed: how far a rotor
-    without torque or pitch runs away is what such a case shows.
+    A run with a fault continues above the turbine's overspeed, which ends a run without faults as failed, to
+    show the maximum speed of a rotor without torque or pitch.
 
-    The kinds are those of FAULTS, the keys of each as in docs/guides/faults.md. Readings are of Measurement
-    or, with pitch="individual", of BladeMeasurement; single blades need a scene with that option too.
+    The kinds are those of FAULTS, the keys of each as in docs/guides/faults.md. Readings are fields of
+    Measurement or, with pitch="individual", of BladeMeasurement; `blades` needs that option as well.
     """
 
     kind: Literal[KINDS]
     time: NonNegative  # s
     delay: NonNegative | None = None  # s from the loss of the grid to feathering; None: no feathering
-    rate: Positive | None = None  # deg/s of feathering, in place of the protection's
+    rate: Positive | None = None  # deg/s of feathering, replaces the rate of the protection
     blades: tuple[Blade, ...] | None = None  # None: all
-    # whether an emergency stop feathers these blades all the same, from their own energy stores
+    # whether an emergency stop still feathers these blades, from their backup energy storage
     backup: Annotated[bool, Field(strict=True)] = False
     towards: Literal["fine", "feather"] | None = None
-    offset: Finite | None = None  # deg, of the blades beyond what their encoders show
+    offset: Finite | None = None  # deg, actual blade pitch minus encoder reading
     field: str | None = None
     value: Finite | None = None  # SI, added to the reading
 
@@ -70,7 +70,7 @@ class Fault(Record):
         known = FAULTS[self.kind].keys
         for key in sorted(self.model_fields_set - {"kind", "time", *known}):
             if getattr(self, key) not in (None, False):
-                yield f"{key}: is no key of {self.kind}, which has {', '.join(known)}"
+                yield f"{key}: is not a key of {self.kind}, which has {', '.join(known)}"
         for key in NEEDED:
             if key in known and getattr(self, key) is None:
                 yield f"{key} is missing: {self.kind} needs it"
@@ -81,17 +81,17 @@ class Fault(Record):
 
     @property
     def grid_loss(self) -> float | None:
-        """Return the time (s) from which the generator is off the grid; None: it stays."""
+        """Return the time (s) from which the generator is disconnected from the grid; None: never."""
         return self.time if self.kind in ("grid_loss", "emergency_stop") else None
 
     @property
     def ends_operation(self) -> bool:
-        """Return whether the turbine is stopped because of it: its protection then is part of the case."""
+        """Return whether the fault stops the turbine, so that the protection is part of the load case."""
         return self.kind not in (*SENSOR_FAULTS, "pitch_offset")
 
 
 def read_faults(value: Any) -> tuple[Fault, ...]:
-    """Return a tuple of Faults from none, one or several, each a Fault or a mapping of its keys.
+    """Return the tuple of Faults of None, one or several, each a Fault or a mapping of its keys.
 
     Raises: InputError with a line per wrong key.
     """

@@ -1,4 +1,4 @@
-"""Checked reading of TOML, JSON and CSV; whatever is wrong becomes an InputError that names the file."""
+"""Reads and checks TOML, JSON and CSV files; any problem becomes an InputError that names the file."""
 
 import csv
 import io
@@ -15,10 +15,10 @@ from fowt_env.descriptions.checks import interval, short
 from fowt_env.errors import NEAREST, InputError, did_you_mean, nearest
 
 DATA = Path(__file__).parents[1] / "data"
-MAX_BYTES = 5_000_000  # a description is a few kB; anything far larger is a wrong file
+MAX_BYTES = 5_000_000  # a description has a few kB; a much larger file is not one
 MAX_LISTED = 20  # problems listed in one message
-MOST_NAMED = 12  # names that are all listed; of more the NEAREST are
-MAX_DEPTH = 32  # parts of a dotted key; tomllib's time goes with their square
+MOST_NAMED = 12  # most names listed in full; of more names the NEAREST are listed
+MAX_DEPTH = 32  # parts of a dotted key; the time of tomllib grows with their square
 _KEY_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_KEY_PART}){{{MAX_DEPTH}}}")
 
@@ -26,7 +26,7 @@ _DEEP_KEY = re.compile(rf"(?m)(?:^|[\[{{,])[ \t]*{_KEY_PART}(?:[ \t]*\.[ \t]*{_K
 def read_text(path, kind, largest=MAX_BYTES, fallback=None):
     """Return the text of a file of at most `largest` bytes; kind ("platform" ...) is for messages.
 
-    fallback: the encoding of what is not UTF-8; None: that is refused.
+    fallback: encoding of a file that is not UTF-8; None: such a file is an InputError.
     """
     try:
         if not path.exists():
@@ -63,7 +63,7 @@ def read_toml(path, kind):
 
 
 def parse_json(text):
-    """Return the value of a JSON text, every number of it finite. Raises: ValueError."""
+    """Return the value of a JSON text with finite numbers only. Raises: ValueError."""
     try:
         return json.loads(text, parse_constant=_finite, parse_float=_finite)
     except RecursionError:
@@ -71,7 +71,7 @@ def parse_json(text):
 
 
 def json_text(where, text):
-    """Return the value of a JSON text. Raises: InputError that names its place and what is wrong."""
+    """Return the value of a JSON text. Raises: InputError that names `where` and the error."""
     try:
         return parse_json(text)
     except ValueError as error:
@@ -81,14 +81,14 @@ def json_text(where, text):
 def _finite(text):
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"{text} is not a number of JSON")
+        raise ValueError(f"{text} is not a JSON number")
     return value
 
 
 def read_table(path, kind, columns, optional=()):
     """Return the rows of a CSV file with these columns, in any order: [(line number, dict of strings)].
 
-    optional: columns that it may have beside them.
+    optional: further columns that the file may have.
 
     Lines starting with # and empty lines are skipped. Wrong columns, ragged or missing rows are errors.
     """
@@ -120,9 +120,9 @@ def read_table(path, kind, columns, optional=()):
 
 
 def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_ends=True, increasing=False):
-    """Return the (n,) float64 values of a CSV column; append a problem for each that is not in the range.
+    """Return the (n,) float64 values of a CSV column; append a problem for each value out of range.
 
-    open_ends: the limits themselves are not allowed. increasing: each value must be above the one before.
+    open_ends: the limits themselves are excluded. increasing: each value must exceed the previous one.
     """
     values = np.full(len(rows), np.nan)
     allowed = interval(minimum, maximum, open_ends, open_ends)
@@ -141,7 +141,7 @@ def column(rows, name, problems, minimum=-math.inf, maximum=math.inf, *, open_en
 
 
 def raise_problems(where, problems):
-    """Raise one InputError that lists the problems found in where (a file), if there are any."""
+    """Raise one InputError that lists the problems of `where` (a file), if there are any."""
     if not problems:
         return
     shown = problems[:MAX_LISTED]
@@ -153,7 +153,7 @@ def raise_problems(where, problems):
 
 @contextmanager
 def noted(problems, prefix=""):
-    """Context whose InputError becomes one of the problems."""
+    """Return a context that appends an InputError raised inside to the problems."""
     try:
         yield
     except InputError as error:
@@ -163,7 +163,7 @@ def noted(problems, prefix=""):
 def locate(kind, name_or_path, known, builtin=None, folder=Path(), listed=None, also=""):
     """Return the file of a built-in name (builtin(name) -> Path), or of a path relative to a folder.
 
-    listed: the command that prints the names, for messages; also: what is allowed beside name and path.
+    listed: the command that prints the names, for messages; also: allowed forms other than name and path.
     """
     if isinstance(name_or_path, str) and name_or_path in known:
         return builtin(name_or_path)

@@ -1,4 +1,4 @@
-"""Nacelle lidars: where their beams look, how they average along them, how often; by name or from a file."""
+"""Describes nacelle lidars: beam directions, range weighting and scan period; built-in or from a file."""
 
 from typing import Annotated
 
@@ -13,10 +13,10 @@ Distance = bounded(ge=10.0, le=1000.0)  # m
 
 
 class Lidar(Record):
-    """A lidar on the nacelle that looks upwind; keys and units as in data/lidars.toml.
+    """Describes a lidar on the nacelle that looks upwind; keys and units as in data/lidars.toml.
 
     Either azimuth and elevation of each beam, or beams and half_angle; either pulse_length, or lens_radius
-    and wavelength; with none of these it measures at points.
+    and wavelength; without these the lidar measures at points.
     """
 
     name: str = ""
@@ -28,7 +28,7 @@ class Lidar(Record):
     pulse_length: bounded(gt=0.0, le=500.0) | None = None  # m
     lens_radius: bounded(ge=1e-3, le=1.0) | None = None  # m
     wavelength: bounded(ge=1e-7, le=1e-4) | None = None  # m
-    scan_period: bounded(ge=0.0, le=60.0) = 0.0  # s in which every beam measures once
+    scan_period: bounded(ge=0.0, le=60.0) = 0.0  # s per scan, in which every beam measures once
     behind_rotor: bounded(ge=0.0, le=100.0) | None = None  # m downwind of the rotor plane; None: unobstructed
     above_shaft: bounded(gt=-50.0, lt=50.0) = 0.0  # m
     source: str = ""
@@ -53,7 +53,7 @@ def lidars():
 
 
 def read_lidar(lidar):
-    """Return the Lidar of a built-in name (lidars()), of a TOML file with the keys at its top, or itself.
+    """Return the Lidar of a built-in name (lidars()) or a TOML file with top-level keys; a Lidar unchanged.
 
     Raises: InputError naming the key, value and allowed range.
     """

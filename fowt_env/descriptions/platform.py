@@ -1,7 +1,7 @@
-"""Platform and turbine descriptions: text files in, checked frozen objects out.
+"""Describes platforms and reads them from TOML files into checked, frozen records.
 
-A built-in name or a path to a user's own file works everywhere. Every wrong value is reported with
-the file, the key, the value and the allowed range, all of them at once. Sea states: sea_state.py.
+A built-in name or a path to a user's file is accepted everywhere. All wrong values of a file are reported
+together, each with file, key, value and allowed range.
 """
 
 import math
@@ -15,7 +15,7 @@ from fowt_env.descriptions.potential_flow import PotentialFlow, read_potential_f
 from fowt_env.descriptions.records import (
     Finite,
     NonNegative,
-    Place,
+    Position,
     Positive,
     Record,
     bounded,
@@ -31,7 +31,7 @@ SixDamping = tuple[NonNegative, NonNegative, NonNegative, NonNegative, NonNegati
 
 
 class Environment(Record):
-    """Site and fluid constants (SI)."""
+    """Holds the site and fluid constants (SI)."""
 
     gravity: Positive = 9.80665
     water_density: Positive = 1025.0
@@ -41,19 +41,19 @@ class Environment(Record):
 
 
 class Ballast(Record):
-    """Floater with its ballast, as one rigid body."""
+    """Holds the mass properties of the floater with its ballast, as one rigid body."""
 
     mass: Positive
-    cm_depth: Place  # below still water, positive downwards, m
-    inertia: Inertia  # about its own centre of mass, kg m2
-    cm_downwind: Place = 0.0  # of the tower axis, m
-    cm_left: Place = 0.0  # looking downwind, m
+    cm_depth: Position  # below still water, positive downwards, m
+    inertia: Inertia  # about the centre of mass, kg m2
+    cm_downwind: Position = 0.0  # of the tower axis, m
+    cm_left: Position = 0.0  # looking downwind, m
 
 
 class Hull(Record):
-    """Outer shape: diameters linear between heights, keel first, ending above the water."""
+    """Holds the outer shape: diameters linear between heights, from the keel to above the water."""
 
-    # far beyond any structure, so that volumes and their moments are finite
+    # far larger than any structure, so that volumes and their moments are finite
     z: tuple[bounded(ge=-1e4, le=1e4), ...]  # m, body frame, increasing
     diameter: tuple[bounded(gt=0, le=1e4), ...]  # m, the last two equal (the water-piercing cylinder)
 
@@ -71,7 +71,7 @@ class Hull(Record):
 
 
 class HydroCoefficients(Record):
-    """Strip coefficients, axial terms and the additional linear terms of the platform."""
+    """Holds strip coefficients, axial terms and the additional linear terms of the platform."""
 
     added_mass_coefficient: NonNegative  # C_A, transverse
     drag_coefficient: NonNegative  # C_D, transverse
@@ -79,7 +79,7 @@ class HydroCoefficients(Record):
     axial_drag_coefficient: NonNegative = 0.0  # C_Dz on the keel plate
     linear_damping: SixDamping = (0.0,) * 6  # surge, sway, heave N/(m/s); roll, pitch, yaw N m/(rad/s)
     yaw_stiffness: NonNegative = 0.0  # delta lines, N m/rad
-    added_mass: SixBySix | None = None  # further constant one about the body origin, kg, kg m, kg m2
+    added_mass: SixBySix | None = None  # additional constant matrix about the body origin, kg, kg m, kg m2
 
     def _problems(self):
         if self.added_mass is not None:
@@ -92,10 +92,10 @@ class HydroCoefficients(Record):
 
 
 class AdditionalLoads(Record):
-    """Constant and linear terms about the body origin in inertial axes, and quadratic damping.
+    """Holds constant and linear load terms about the body origin in inertial axes, and quadratic damping.
 
-    Load = preload - stiffness q - linear_damping q' - quadratic_damping |q'| q', with q surge to yaw: what
-    HydroDyn's AddF0, AddCLin, AddBLin and AddBQuad are.
+    Load = preload - stiffness q - linear_damping q' - quadratic_damping |q'| q', with q surge to yaw:
+    HydroDyn's AddF0, AddCLin, AddBLin and AddBQuad.
     """
 
     preload: SixNumbers = (0.0,) * 6  # N, N m
@@ -108,22 +108,22 @@ class AdditionalLoads(Record):
             rows = getattr(self, name)
             for i, row in enumerate(rows or ()):
                 if row[i] < 0.0:
-                    yield f"{name}.{i + 1}.{i + 1} = {row[i]:g}: must be >= 0: it damps"
+                    yield f"{name}.{i + 1}.{i + 1} = {row[i]:g}: must be >= 0 to dissipate energy"
 
 
 class Straight(Record):
-    """Base of what lies between two points of the body."""
+    """Provides the base of parts between two points of the body."""
 
     start: Vector3  # m
     end: Vector3
 
     def _problems(self):
         if math.dist(self.start, self.end) < 1e-6:
-            yield f"start = {list(self.start)}: must not be end"
+            yield f"start = {list(self.start)}: must differ from end"
 
 
 class Member(Straight):
-    """A straight cylinder of the hull, of any direction and taper, for strip (Morison) loads.
+    """Describes a straight cylinder of the hull, of any direction and taper, for strip (Morison) loads.
 
     start, end in body axes; end 1 is the start. The coefficients multiply 1/2 rho D |v| v, rho A a and, on
     an end that is an outer face of the hull, 1/2 rho A |v| v and the added mass of a half sphere.
@@ -132,17 +132,17 @@ class Member(Straight):
     diameter: tuple[Positive, Positive]  # m, at start and end
     drag_coefficient: tuple[NonNegative, NonNegative]
     added_mass_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)
-    pressure_coefficient: tuple[NonNegative, NonNegative] = (1.0, 1.0)  # of the undisturbed wave's
+    pressure_coefficient: tuple[NonNegative, NonNegative] = (1.0, 1.0)  # of the undisturbed wave pressure
     axial_drag_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)  # of the ends
     axial_added_mass_coefficient: tuple[NonNegative, NonNegative] = (0.0, 0.0)
     axial_pressure_coefficient: tuple[NonNegative, NonNegative] = (1.0, 1.0)
-    potential_flow: bool = False  # in the potential-flow body: drag alone, no inertia and no buoyancy
+    potential_flow: bool = False  # part of the potential-flow body: drag alone, no inertia or buoyancy
 
 
 class Shape(Straight):
-    """A straight part of the hull for pictures alone: round, or a box of a horizontal axis. It has no loads.
+    """Describes a straight part of the hull for pictures, round or a box of horizontal axis, without loads.
 
-    For hulls whose loads come from elsewhere, as a radiation database or a cylinder of the same drag.
+    For hulls with loads from another model, such as a radiation database or a cylinder of equal drag.
     """
 
     diameter: Positive | None = None  # m
@@ -151,17 +151,17 @@ class Shape(Straight):
     def _problems(self):
         yield from super()._problems()
         if (self.diameter is None) == (self.section is None):
-            yield "diameter: must be given where section is not, and only there"
+            yield "diameter: must be given if section is not, and only then"
 
 
 class Tower(Record):
-    """Tower as one rigid body, with the taper that its drag needs, and how it bends where that is known."""
+    """Describes the tower as one rigid body, with taper for the wind drag and optional bending modes."""
 
     mass: NonNegative
-    cm_height: Place
-    inertia: Inertia  # about its own centre of mass
-    base_height: Place
-    top_height: Place
+    cm_height: Position
+    inertia: Inertia  # about the centre of mass
+    base_height: Position
+    top_height: Position
     base_diameter: Positive
     top_diameter: Positive
     drag_coefficient: NonNegative = 1.0
@@ -175,7 +175,7 @@ class Tower(Record):
 
 
 class LineProperties(Record):
-    """What a mooring line is made of."""
+    """Holds the properties of a mooring line."""
 
     length: Positive  # unstretched, m
     wet_weight: Positive  # per length, N/m
@@ -184,14 +184,14 @@ class LineProperties(Record):
 
 
 class Line(LineProperties):
-    """One mooring line. anchor in inertial, fairlead in body coordinates, m."""
+    """Describes a mooring line; anchor in inertial, fairlead in body coordinates, m."""
 
     anchor: Vector3
     fairlead: Vector3
 
 
 class Platform(Record):
-    """A floating platform with its tower and moorings; names its turbine."""
+    """Describes a floating platform with its tower and moorings; names its turbine."""
 
     name: str
     turbine: str
@@ -205,13 +205,13 @@ class Platform(Record):
     members: tuple[Member, ...] = ()
     shapes: tuple[Shape, ...] = ()  # drawn in place of hull and members
     lines: tuple[Line, ...] = ()
-    options: dict = Field(default_factory=dict)  # defaults of build_scene's options
-    published: dict = Field(default_factory=dict)  # figures that tests compare with
+    options: dict = Field(default_factory=dict)  # defaults of the options of build_scene
+    published: dict = Field(default_factory=dict)  # values that tests compare with
     source: str = ""
 
     @property
     def draft(self) -> float:
-        """Return the depth of the lowest part of the hull, m; an estimate where no file says it."""
+        """Return the depth of the lowest part of the hull, m; an estimate if no file specifies the draft."""
         if self.hull is not None:
             return -self.hull.z[0]
         if self.potential_flow is not None and self.potential_flow.draft is not None:
@@ -226,7 +226,7 @@ class Platform(Record):
         if (self.hull is None) != (self.hydro is None):
             yield _missing_half("hydro" if self.hydro is None else "hull")
         elif self.hull is not None and self.potential_flow is not None:
-            yield "potential_flow: a platform has it or hull, not both"
+            yield "potential_flow: a platform has potential_flow or hull, not both"
         elif self.hull is None and self.potential_flow is None and not self.members:
             yield "hull is missing: a platform needs hull and hydro, potential_flow or members"
         depth = self.environment.water_depth
@@ -241,12 +241,12 @@ class Platform(Record):
 
 
 def _missing_half(name):
-    """Return the problem line for a hull without the coefficients of its strips, or the other way round."""
+    """Return the problem line for a hull without strip coefficients, or vice versa."""
     return f"{name} is missing: must be a table; a platform has hull and hydro, or neither"
 
 
 class MooringSpread(LineProperties):
-    """Equal lines around the tower axis, as platform files may give them."""
+    """Describes equal mooring lines around the tower axis, a short form in platform files."""
 
     azimuth: tuple[Finite, ...]  # of the anchors, rad from +x towards +y
     anchor_radius: Positive
@@ -255,7 +255,7 @@ class MooringSpread(LineProperties):
     fairlead_z: Finite
 
     def lines(self):
-        """Return a Line per azimuth, its direction rounded so that symmetric spreads stay symmetric."""
+        """Return a Line per azimuth, with directions rounded so that symmetric spreads stay symmetric."""
         directions = [(round(math.cos(angle), 14), round(math.sin(angle), 14)) for angle in self.azimuth]
         return tuple(
             Line(
@@ -289,8 +289,8 @@ def read_platform(name_or_path: str | Path) -> Platform:
     if "mooring" in data:
         if "lines" in data:
             problems.append("lines: given twice, also as [mooring]; allowed: one of them")
-        group, found = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
-        problems += found
+        group, invalid = validate(_MooringFile, {"mooring": data.pop("mooring")}, origin)
+        problems += invalid
         data["lines"] = group.mooring.lines() if group else ()
     for key in ("lines", "members", "shapes"):
         if isinstance(data.get(key), list):
@@ -311,8 +311,8 @@ def read_platform(name_or_path: str | Path) -> Platform:
             data["turbine"] = str(locate("turbine", name, turbine_names(), folder=path.parent).resolve())
     if ("hull" in data) != ("hydro" in data):
         problems.append(_missing_half("hydro" if "hull" in data else "hull"))
-    platform, found = validate(Platform, {**data, **free}, origin)
-    raise_problems(f"platform file {str(path)!r}", list(dict.fromkeys(problems + found)))
+    platform, invalid = validate(Platform, {**data, **free}, origin)
+    raise_problems(f"platform file {str(path)!r}", list(dict.fromkeys(problems + invalid)))
     return platform
 
 
@@ -321,7 +321,7 @@ class _MooringFile(Record):
 
 
 def turbine_of(platform, turbine=None):
-    """Return the Turbine of a platform, or the one that replaces it; each a name, a path or a description."""
+    """Return the Turbine of a platform or its replacement `turbine`; each a name, a path or a record."""
     if turbine is None:
         turbine = (platform if isinstance(platform, Platform) else read_platform(platform)).turbine
     return turbine if isinstance(turbine, Turbine) else read_turbine(turbine)

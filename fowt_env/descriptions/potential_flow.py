@@ -1,7 +1,7 @@
-"""Potential-flow coefficients of a floating body: the record, and its reading from files.
+"""Describes the potential-flow coefficients of a floating body and reads them from files.
 
-Everything is dimensional, in SI units, about the body origin and in inertial axes, for small motions about
-the undisplaced pose.
+All coefficients are dimensional, in SI units, about the body origin and in inertial axes, for small motions
+about the undisplaced pose.
 """
 
 import math
@@ -15,12 +15,12 @@ from fowt_env.descriptions.files import raise_problems
 from fowt_env.descriptions.records import Finite, Positive, Record, checked_record
 from fowt_env.errors import InputError
 
-MAX_BYTES = 200_000_000  # of a file of coefficients: a full difference-frequency QTF has some 10 MB
+MAX_BYTES = 200_000_000  # of a file of coefficients: a full difference-frequency QTF has about 10 MB
 
 
 @dataclass(frozen=True, eq=False)
 class DifferenceQtf:
-    """Quadratic transfer function of difference-frequency forces, Re(sum a_i a_j* Q_ij exp(i (w_i-w_j) t)).
+    """Holds the quadratic transfer function of difference forces, Re(sum a_i a_j* Q_ij exp(i (w_i-w_j) t)).
 
     On a grid of frequency pairs and of pairs of headings; N/m2 and N m/m2.
     """
@@ -32,7 +32,7 @@ class DifferenceQtf:
 
 @dataclass(frozen=True, eq=False)
 class PotentialFlow:
-    """First- and second-order coefficients of one body, about the body origin, in inertial axes.
+    """Holds the first- and second-order coefficients of a body, about the body origin, in inertial axes.
 
     The excitation per metre of amplitude is the force Re(X a exp(i omega t)) in the wave
     a cos(omega t - k x cos(heading) - k y sin(heading)).
@@ -55,22 +55,22 @@ class PotentialFlow:
 
 
 class _PotentialFlowTable(Record):
-    """The table [potential_flow] of a platform file."""
+    """Holds the table [potential_flow] of a platform file."""
 
     coefficients: str  # a .npz, or the root of WAMIT's .1, .3 and .hst; relative to the file
     displaced_volume: Positive
     centre_of_buoyancy: tuple[Finite, Finite] = (0.0, 0.0)
-    length_scale: Positive = 1.0  # of WAMIT's dimensionless figures, m
+    length_scale: Positive = 1.0  # of WAMIT's dimensionless coefficients, m
     draft: Positive | None = None
 
 
-ARRAYS = {  # of a file: name -> shape, a letter for the size of the arrays that it names in SIZES
+ARRAYS = {  # of a file, name: shape, with letters for the sizes in SIZES
     "omega": "n", "added_mass": "n66", "damping": "n66", "added_mass_infinite": "66", "excitation_omega": "k",
     "heading": "m", "excitation": "km6", "stiffness": "66", "added_mass_zero": "66", "qtf_omega": "q",
     "qtf_heading": "p2", "qtf_value": "pqq6",
 }  # fmt: skip
 SIZES = {"n": "omega", "k": "excitation_omega", "m": "heading", "q": "qtf_omega", "p": "qtf_heading"}
-LOWEST = {"omega": 0.0, "excitation_omega": 0.0, "heading": -math.inf, "qtf_omega": 0.0}  # of what increases
+LOWEST = {"omega": 0.0, "excitation_omega": 0.0, "heading": -math.inf, "qtf_omega": 0.0}  # exclusive
 COMPLEX = ("excitation", "qtf_value")
 QTF_ARRAYS = tuple(name for name in ARRAYS if name.startswith("qtf_"))
 OPTIONAL = ("added_mass_zero", *QTF_ARRAYS)
@@ -79,19 +79,19 @@ OPTIONAL = ("added_mass_zero", *QTF_ARRAYS)
 def read_potential_flow(table, folder, gravity, density):
     """Return the PotentialFlow of the table [potential_flow] of a platform file in this folder.
 
-    gravity, density  of the water, which WAMIT's dimensionless figures need
+    gravity, density  of the water, for WAMIT's dimensionless coefficients
     Raises: InputError naming the file, the key or the array and what is allowed.
     """
     record = checked_record(_PotentialFlowTable, table, "[potential_flow]")
     path = folder / Path(record.coefficients).expanduser()
     if path.suffix == ".npz":
-        found = read_coefficients(path)
+        body = read_coefficients(path)
     else:
         from fowt_env.descriptions.wamit import read_wamit
 
-        found = read_wamit(path, length_scale=record.length_scale, gravity=gravity, density=density)
+        body = read_wamit(path, length_scale=record.length_scale, gravity=gravity, density=density)
     return replace(
-        found,
+        body,
         volume=record.displaced_volume,
         centre_of_buoyancy=record.centre_of_buoyancy,
         draft=record.draft,
@@ -99,9 +99,9 @@ def read_potential_flow(table, folder, gravity, density):
 
 
 def read_coefficients(path):
-    """Return the PotentialFlow of a .npz file of coefficient_arrays, without volume, place and draft.
+    """Return the PotentialFlow of a .npz file of coefficient_arrays, without volume, its centre and draft.
 
-    Nothing in the file is executed: arrays of numbers alone are read.
+    Nothing in the file is executed: only arrays of numbers are read.
     """
     where = f"coefficients file {str(path)!r}"
     try:
@@ -112,7 +112,7 @@ def read_coefficients(path):
         arrays = read_arrays(path, MAX_BYTES)
     except InputError:
         raise
-    except Exception as error:  # whatever a broken file makes zipfile, zlib and numpy raise
+    except Exception as error:  # any error of zipfile, zlib and numpy for a broken file
         raise InputError(f"{where} cannot be read: {error!s:.300}") from None
     used = [name for name in ARRAYS if name not in QTF_ARRAYS or arrays.keys() >= set(QTF_ARRAYS)]
     arrays = {name: value for name, value in arrays.items() if name in (*used, "source")}
@@ -140,13 +140,13 @@ def coefficient_arrays(body):
     if (qtf := body.difference_qtf) is not None:
         values |= dict(zip(QTF_ARRAYS, (qtf.omega, qtf.heading, qtf.value), strict=True))
     kinds = dict.fromkeys(ARRAYS, np.float32) | dict.fromkeys(COMPLEX, np.complex64)
-    kinds |= dict.fromkeys((*LOWEST, "qtf_heading"))  # as they are
+    kinds |= dict.fromkeys((*LOWEST, "qtf_heading"))  # dtype unchanged
     arrays = {name: np.asarray(value, kinds[name]) for name, value in values.items() if value is not None}
     return arrays | {"source": np.array(body.source)}
 
 
 def _array_problems(arrays):
-    """Return what is wrong with the arrays of a file, one line each."""
+    """Return the problems of the arrays of a file, one line each."""
     problems = []
     for name, value in arrays.items():
         if name == "source":

@@ -1,4 +1,4 @@
-"""What stops a turbine: the limits of its protection, and how it is stopped."""
+"""Describes the protection of a turbine: the limits of its trips and its two kinds of stop."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -11,7 +11,7 @@ from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 
 TURBINE = "turbine"  # the protection of the turbine file
-END_AT_OVERSPEED = "end_at_overspeed"  # the run ends beyond the overspeed of the turbine file
+END_AT_OVERSPEED = "end_at_overspeed"  # the run ends above the overspeed of the turbine file
 STOPS = ("normal", "emergency", "end")
 NORMAL_RATE = 0.9 * DEGREE  # rad/s
 EMERGENCY_RATE = 8.0 * DEGREE
@@ -19,7 +19,7 @@ OFF_SPEED = 0.3
 
 
 class TripLimit(Record):
-    """Limit of a trip, how long it must be passed without a break, and the stop that follows.
+    """Holds the limit of a trip, the time for which it must be exceeded without a break, and the stop.
 
     stop: "normal", "emergency", or "end", which ends the run at once.
     """
@@ -29,25 +29,25 @@ class TripLimit(Record):
     stop: Literal[STOPS] = "emergency"
 
 
-# false is how a file says that there is no such trip
+# a file disables a trip by false
 Limited = Annotated[TripLimit | None, BeforeValidator(lambda value: None if value is False else value)]
 
 
 class Protection(Record):
-    """Trips of a turbine, each with a TripLimit or none, and the two stops.
+    """Describes the trips of a turbine, each a TripLimit or None, and the two kinds of stop.
 
-    What a file leaves out is chosen: trips at 1.3 of rated rotor speed, 1.25 of rated power for 1 s, 3.3 m/s2
-    (the constraint of the ATLAS Offshore contest, ARPA-E 2019) and 5 deg for 1 s; feathering at 8 deg/s in an
-    emergency (NREL/TP-500-38060) and at 0.9 deg/s else (90 deg in 100 s: ASME OMAE2020 V009T09A070), each at
-    most as fast as the pitch drive can. A normal stop takes the torque back with the rotor speed, to none at
-    off_speed, where the generator is taken off.
+    Defaults: trips at 1.3 of rated rotor speed, 1.25 of rated power for 1 s, 3.3 m/s2 (the constraint of the
+    ATLAS Offshore contest, ARPA-E 2019) and 5 deg for 1 s; feathering at 8 deg/s in an emergency
+    (NREL/TP-500-38060) and at 0.9 deg/s otherwise (90 deg in 100 s: ASME OMAE2020 V009T09A070), each limited
+    by the pitch drive. A normal stop reduces the torque with the rotor speed, to zero at off_speed, where the
+    generator is disconnected.
     """
 
     overspeed: Limited = TripLimit(limit=1.3)  # of rated rotor speed
     overpower: Limited = TripLimit(limit=1.25, time=1.0, stop="normal")  # of rated power
     # of the tower top in the plane of the nacelle, m/s2
     acceleration: Limited = TripLimit(limit=3.3, stop="normal")
-    # of a blade's measured pitch from its command, or of that among the blades, rad
+    # of a blade's measured pitch from its command, or between blades, rad
     pitch_deviation: Limited = TripLimit(limit=5.0 * DEGREE, time=1.0)
     normal_rate: Positive = NORMAL_RATE  # rad/s
     emergency_rate: Positive = EMERGENCY_RATE
@@ -57,7 +57,7 @@ class Protection(Record):
         for name in ("overspeed", "overpower"):
             trip = getattr(self, name)
             if trip is not None and not trip.limit > 1.0:
-                yield f"{name}.limit = {trip.limit:g}: must be above 1, of rated"
+                yield f"{name}.limit = {trip.limit:g}: must be > 1 (of rated)"
 
 
 NO_TRIPS = dict.fromkeys(("overspeed", "overpower", "acceleration", "pitch_deviation"))
@@ -66,9 +66,9 @@ NO_TRIPS = dict.fromkeys(("overspeed", "overpower", "acceleration", "pitch_devia
 def read_protection(value: Any, own: Protection, overspeed: float = 1.3) -> Protection:
     """Return the Protection of a run from its setting.
 
-    value: None (no trips), "turbine" (own, that of the turbine file), "end_at_overspeed" (the run ends at a
+    value: None (no trips), "turbine" (`own`, that of the turbine file), "end_at_overspeed" (the run ends at a
     rotor speed above `overspeed`, of rated), a Protection, or a mapping of the keys of a turbine file's
-    [protection] that replace single ones of `own`; false for no trip.
+    [protection] that override entries of `own`; false for no trip.
     Raises: InputError naming the key, value and allowed range.
     """
     if isinstance(value, Protection):
@@ -85,6 +85,6 @@ def read_protection(value: Any, own: Protection, overspeed: float = 1.3) -> Prot
         )
     problems: list[str] = []
     data, origin = to_si(dict(value), problems)
-    record, found = validate(Protection, data, origin)
-    raise_problems("protection", problems + found)
+    record, invalid = validate(Protection, data, origin)
+    raise_problems("protection", problems + invalid)
     return own.model_copy(update={key: getattr(record, key) for key in data})

@@ -1,4 +1,4 @@
-"""Ratings of a turbine in the units of output channels, for plots and pictures."""
+"""Computes the ratings of a turbine in the units of output channels, for plots and pictures."""
 
 from fowt_env.descriptions.units import RPM
 
@@ -11,7 +11,7 @@ RATED_SPEED, OVERSPEED, RATED_POWER, RATED_WIND = (
 
 
 def ratings(turbine):
-    """{name: float} of a Turbine: rated rotor speed, overspeed (rpm), power (kW), wind (m/s)."""
+    """Return {name: float} of a Turbine: rated rotor speed, overspeed (rpm), power (kW), wind (m/s)."""
     drive = turbine.drivetrain
     return {
         RATED_SPEED: turbine.rated_rotor_speed / RPM,

@@ -1,6 +1,6 @@
-"""Base of all descriptions: strict frozen records, units of files, and errors that help.
+"""Provides the base of all descriptions: strict frozen records, units of files, and precise error messages.
 
-A problem is one line of text: key, value and allowed range. Keys are dotted paths as they stand in the file.
+A problem is one line of text: key, value and allowed range. Keys are dotted paths as in the file.
 """
 
 import math
@@ -29,10 +29,10 @@ from fowt_env.descriptions.files import raise_problems, read_toml
 from fowt_env.descriptions.units import FILE_UNITS
 from fowt_env.errors import did_you_mean
 
-# Keys that had another name: the old one -> the one of now.
+# Renamed keys: old name: new name.
 RENAMED = {"designed_on": "nominal_plant"}
 
-# Tables that files may give instead of a field: key in the file -> field.
+# Tables that files may contain instead of a field: key in the file: field.
 OTHER_FORMS = {"mooring": "lines"}
 
 
@@ -44,24 +44,24 @@ def _float_array(value):
     """Return a (n,) float64 copy of a list or array of finite numbers."""
     try:
         array = np.array(value)
-    except (ValueError, TypeError):  # a ragged list, or no list at all
+    except (ValueError, TypeError):  # a ragged list, or not a list
         array = np.array(None)
     if array.dtype.kind not in "iuf" or array.ndim != 1 or not np.isfinite(array).all():
         raise PydanticCustomError("no_array", "must be a list of finite numbers")
     return array.astype(np.float64)
 
 
-KEY = "\0"  # where a message of a check has the key
+KEY = "\0"  # placeholder of the key in messages of checks
 
 
 class Allowed(typing.NamedTuple):
-    """What a checked field may be, in words."""
+    """Describes the allowed values of a checked field in words."""
 
     text: str
 
 
 def checked(check, allowed, *arguments):
-    """Return the annotated type of what check(key, value, *arguments), a function of checks.py, returns."""
+    """Return the annotated type of a field checked by check(key, value, *arguments) of checks.py."""
     return Annotated[
         typing.Any, BeforeValidator(lambda value: check(KEY, value, *arguments)), Allowed(allowed)
     ]
@@ -73,7 +73,7 @@ def in_range(low, high, unit=""):
 
 
 def one_of(choices):
-    """Return the annotated type of one of a few names or numbers; letters of either case."""
+    """Return the annotated type of one of several names or numbers; upper and lower case are equal."""
     return checked(check_choice, f"one of {', '.join(map(str, choices))}", choices)
 
 
@@ -93,7 +93,7 @@ FilePath = checked(check_path, "a path")
 Positive = bounded(gt=0)
 NonNegative = bounded(ge=0)
 Finite = bounded()
-Place = bounded(ge=-1e5, le=1e5)  # m, whose square times a mass is a number still
+Position = bounded(ge=-1e5, le=1e5)  # m, small enough for a finite square times a mass
 Fraction = bounded(gt=0, le=1)
 FloatArray = Annotated[np.ndarray, BeforeValidator(_float_array)]
 NumberOrArray = Annotated[
@@ -102,12 +102,12 @@ NumberOrArray = Annotated[
 
 
 class Record(BaseModel):
-    """Base of all descriptions: frozen, no unknown keys, no silent type changes."""
+    """Provides the base of all descriptions: frozen, no unknown keys, no implicit type conversion."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
     def _problems(self):
-        """Yield a line for each thing that is wrong between the fields."""
+        """Yield a line for each inconsistency between fields."""
         return ()
 
     @model_validator(mode="after")
@@ -123,7 +123,7 @@ class Record(BaseModel):
 def to_si(data, problems, path=()):
     """Return (data in SI units, {path in SI names: (path in the file, value there)}) of nested TOML data.
 
-    Only the keys of FILE_UNITS are converted; what is no number is left for the validation to reject.
+    Only the keys of FILE_UNITS are converted; other values than numbers are rejected by validation.
     """
     converted, origin = {}, {}
     for key, value in data.items():
@@ -171,16 +171,16 @@ def checked_record(model, data, where):
 
 def checked_entries(model, path, kind, table):
     """Return {name: record} of a table of tables in a TOML file. Raises: InputError."""
-    found, problems = {}, []
+    records, problems = {}, []
     for name, entry in read_toml(path, kind)[table].items():
-        found[name], wrong = validate(model, {"name": name, **entry})
+        records[name], wrong = validate(model, {"name": name, **entry})
         problems += [f"{table}.{name}: {problem}" for problem in wrong]
     raise_problems(f"{kind} file {str(path)!r}", problems)
-    return found
+    return records
 
 
 def _problem(model, item, origin):
-    """Return the lines of text for one entry of pydantic's ValidationError.errors()."""
+    """Return the problem lines of one entry of pydantic's ValidationError.errors()."""
     loc = tuple(part for part in item["loc"] if part != "[key]")
     shown, value = loc, item["input"]
     for length in range(len(loc), 0, -1):
@@ -209,7 +209,7 @@ def _problem(model, item, origin):
 
 
 def unknown_key(key, name, known):
-    """Return the problem line for an unknown key, with the nearest known one, or its name of now."""
+    """Return the problem line for an unknown key, with the nearest known key or the new name."""
     if name in RENAMED:
         elsewhere = "" if RENAMED[name] in known else f", which is no key here. Allowed: {', '.join(known)}"
         return f"{key}: is called {RENAMED[name]} now{elsewhere}"
@@ -217,7 +217,7 @@ def unknown_key(key, name, known):
 
 
 def _fields_at(model, loc):
-    """Return the names of the keys allowed in the table at loc, those in a unit of files included."""
+    """Return the names of the keys allowed in the table at loc, including those of FILE_UNITS."""
     here, _ = _type_at(model, loc)
     if not (isinstance(here, type) and issubclass(here, BaseModel)):
         return []
@@ -241,7 +241,7 @@ def _unwrapped(kind, metadata):
 
 
 def _type_at(model, loc):
-    """Return (type, constraints) of the field at loc; (None, []) where the model has no such field."""
+    """Return (type, constraints) of the field at loc; (None, []) if the model has no such field."""
     kind, metadata = model, []
     for part in loc:
         if isinstance(kind, type) and issubclass(kind, BaseModel):
@@ -265,7 +265,7 @@ def _type_at(model, loc):
 
 
 def allowed(model, loc):
-    """Return what the field at loc of a pydantic model may be, in words: "a number > 0", "a table" ..."""
+    """Return the allowed values of the field at loc of a pydantic model: "a number > 0", "a table" ..."""
     kind, metadata = _type_at(model, loc)
     for entry in metadata:
         if isinstance(entry, Allowed):
@@ -295,7 +295,7 @@ def allowed(model, loc):
 
 
 def dotted(path):
-    """Return a key as it would be written in the file; positions in lists count from 1."""
+    """Return a key as written in the file; list positions count from 1."""
     return ".".join(str(part + 1) if isinstance(part, int) else str(part) for part in path)
 
 

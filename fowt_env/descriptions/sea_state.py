@@ -1,4 +1,4 @@
-"""Sea states: waves of one kind, by name, from a mapping or a file, and tables of them against wind speed."""
+"""Describes sea states by name, mapping or file, and joint tables of sea states against wind speed."""
 
 import math
 from collections.abc import Mapping
@@ -24,16 +24,16 @@ from fowt_env.descriptions.records import (
 from fowt_env.errors import InputError
 
 STANDARD_GRAVITY = 9.80665  # m/s2
-LOWEST_WAVE = 1e-9  # m; a spectrum of less, but not of nothing, would underflow
+LOWEST_WAVE = 1e-9  # m; the spectrum of a smaller non-zero height would underflow
 
-SEA_KEYS = {  # kind -> (required keys, optional keys); the common keys may be given with every kind
+SEA_KEYS = {  # kind: (required keys, optional keys); the common keys are allowed for every kind
     "still": ((), ()),
     "regular": (("H", "T"), ("phase",)),
     "jonswap": (("Hs", "Tp"), ("gamma",)),
     "pierson_moskowitz": (("Hs",), ("Tp",)),
     "components": (("omega", "amplitude"), ("phase",)),
 }
-TEXT_KEYS = {  # of the kinds that may be written as a text: KIND:NUMBER:NUMBER ..., and how many it needs
+TEXT_KEYS = {  # kind of sea in the text form KIND:NUMBER:NUMBER ...: (keys, how many are required)
     "regular": (("H", "T"), 2),
     "jonswap": (("Hs", "Tp", "gamma"), 2),
     "pierson_moskowitz": (("Hs", "Tp"), 1),
@@ -41,7 +41,7 @@ TEXT_KEYS = {  # of the kinds that may be written as a text: KIND:NUMBER:NUMBER 
 COMMON_SEA_KEYS = ("name", "kind", "heading", "ramp", "wind", "source", "confidence")
 
 
-Period = bounded(ge=0.01, le=10_000.0)  # s; far beyond any sea or tank, and the sums over waves stay finite
+Period = bounded(ge=0.01, le=10_000.0)  # s; wider than any sea or tank, and sums over waves stay finite
 
 
 LISTED = "fowt list seas"  # the command that prints the names
@@ -49,20 +49,20 @@ SEA_FORMS = "KIND:NUMBERS (jonswap:4:9, regular:3:5), a mapping with 'kind'"
 
 
 class SeaState(Record):
-    """Waves of one kind; the fields of other kinds are None.
+    """Describes the waves of one kind; the fields of other kinds are None.
 
     still: none. regular: H (m, crest to trough), T (s), phase (rad, 0).
     jonswap: Hs (m), Tp (s), gamma (1 to 10; the IEC rule of iec_gamma if omitted).
     pierson_moskowitz: Hs, Tp (fully developed sea of that Hs if omitted).
-    components: omega (rad/s), amplitude (m), phase (rad, 0 if omitted), equally long; given as one number,
-    phase is filled up to an array. heading may be one number or an array.
+    components: omega (rad/s), amplitude (m), phase (rad, 0 if omitted), of equal length; a single phase is
+    expanded to an array. heading may be one number or an array.
     """
 
     kind: Literal["still", "regular", "jonswap", "pierson_moskowitz", "components"]
     name: str = ""
-    heading: NumberOrArray = 0.0  # degrees, as users write it: direction of travel from +x towards +y
-    ramp: NonNegative = 0.0  # s: waves grow from nothing over this time
-    wind: NonNegative | None = None  # m/s at hub height that belongs to this sea state
+    heading: NumberOrArray = 0.0  # deg: direction of travel from +x towards +y
+    ramp: NonNegative = 0.0  # s: waves grow from zero over this time
+    wind: NonNegative | None = None  # m/s at hub height, associated with this sea state
     H: NonNegative | None = None
     T: Period | None = None
     phase: NumberOrArray | None = None
@@ -84,27 +84,27 @@ class SeaState(Record):
     @model_validator(mode="before")
     @classmethod
     def _kind_keys(cls, data):
-        """Check the keys against the kind and fill what the kind defines by rule."""
+        """Check the keys against the kind and compute defaults that the kind defines by a rule."""
         if not isinstance(data, dict) or str(data.get("kind")) not in SEA_KEYS:
             return data
         kind = data["kind"]
         required, optional = SEA_KEYS[kind]
-        given = {key: value for key, value in data.items() if value is not None}
+        entries = {key: value for key, value in data.items() if value is not None}
         known = (*required, *optional, *COMMON_SEA_KEYS)
         needs = f"kind {kind!r} needs {', '.join(required)}"
-        problems = [unknown_key(key, key, known) + f" (kind {kind!r})" for key in given if key not in known]
-        problems += [f"{key} is missing: {needs}" for key in required if key not in given]
+        problems = [unknown_key(key, key, known) + f" (kind {kind!r})" for key in entries if key not in known]
+        problems += [f"{key} is missing: {needs}" for key in required if key not in entries]
         if problems:
             raise ValueError("\n".join(problems))
         if "phase" in optional:
-            given.setdefault("phase", 0.0)
-        if kind == "components" and is_number(given["phase"]):
-            given["phase"] = np.full(np.size(given["omega"]), float(given["phase"]))
-        if kind == "jonswap" and "gamma" not in given and _usable(given["Hs"], given["Tp"]):
-            given["gamma"] = iec_gamma(float(given["Hs"]), float(given["Tp"]))
-        if kind == "pierson_moskowitz" and "Tp" not in given and _usable(given["Hs"]):
-            given["Tp"] = fully_developed_period(float(given["Hs"]))
-        return given
+            entries.setdefault("phase", 0.0)
+        if kind == "components" and is_number(entries["phase"]):
+            entries["phase"] = np.full(np.size(entries["omega"]), float(entries["phase"]))
+        if kind == "jonswap" and "gamma" not in entries and _usable(entries["Hs"], entries["Tp"]):
+            entries["gamma"] = iec_gamma(float(entries["Hs"]), float(entries["Tp"]))
+        if kind == "pierson_moskowitz" and "Tp" not in entries and _usable(entries["Hs"]):
+            entries["Tp"] = fully_developed_period(float(entries["Hs"]))
+        return entries
 
     def _problems(self):
         if self.kind != "components":
@@ -129,7 +129,7 @@ class SeaState(Record):
 
 
 class JointTable(Record):
-    """Sea states of a site against wind speed at hub height."""
+    """Holds the sea states of a site against wind speed at hub height."""
 
     name: str = ""
     wind: tuple[NonNegative, ...]  # m/s, increasing
@@ -176,7 +176,7 @@ def fully_developed_period(Hs):
 
 @cached(1)
 def _sea_data():
-    """Return ({name: SeaState}, {name: JointTable}) of the built-in file; a table's rows are states too."""
+    """Return ({name: SeaState}, {name: JointTable}) of the built-in file; table rows are states too."""
     path = DATA / "sea_states.toml"
     states, tables = {}, checked_entries(JointTable, path, "sea state", "table")
     for table in tables.values():
@@ -202,7 +202,7 @@ def joint_tables():
 
 
 def read_sea_state(name_or_path):
-    """Return the SeaState of a built-in name (sea_states()) or a TOML file with its keys at the top level."""
+    """Return the SeaState of a built-in name (sea_states()) or of a TOML file with top-level keys."""
     if isinstance(name_or_path, str) and name_or_path in _sea_data()[0]:
         return _sea_data()[0][name_or_path]
     path = locate("sea_state", name_or_path, _sea_data()[0], listed=LISTED, also=SEA_FORMS)
@@ -210,10 +210,10 @@ def read_sea_state(name_or_path):
 
 
 def sea_of(spec):
-    """Return the sea that a text stands for, as None or a mapping; names, paths and all else as they are.
+    """Return the sea of a text as None or a mapping; names, paths and other objects unchanged.
 
-    "jonswap:4:9" (Hs, Tp and, if given, gamma); "regular:3:5" (H, T); "pierson_moskowitz:4" (Hs and, if
-    given, Tp); JSON of a mapping; "none" and "still".
+    "jonswap:4:9" (Hs, Tp and optionally gamma); "regular:3:5" (H, T); "pierson_moskowitz:4" (Hs and
+    optionally Tp); JSON of a mapping; "none" and "still".
     Raises: InputError for a text of one of these kinds that lacks a number.
     """
     if not isinstance(spec, str):

@@ -1,4 +1,4 @@
-"""Sensor chains: what stands between the plant's true motions and what a controller reads."""
+"""Describes sensor chains: the models between true motions of the plant and a controller's readings."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -19,7 +19,7 @@ MOMENTS = BladeMeasurement._fields[BladeMeasure.ROOT_OUT_OF_PLANE_1 :]
 
 @dataclass(frozen=True)
 class Sensor:
-    """How one field of a Measurement or BladeMeasurement is read: SI.
+    """Describes the sensor of a field of Measurement or BladeMeasurement, in SI units.
 
     Low pass, delay, noise and quantisation, in this order.
 
@@ -43,10 +43,10 @@ class Sensor:
 
 @dataclass(frozen=True)
 class SensorChain:
-    """Sensors by the field of Measurement that they show; no controller can read what a chain does not have.
+    """Holds sensors by field of Measurement; a controller cannot read fields that the chain does not have.
 
-    Those of BladeMeasurement are read where every blade has a pitch of its own. The time is always read as it
-    is. Raises: InputError naming the field, key, value and allowed range.
+    Fields of BladeMeasurement are read with individual pitch only. The time is always exact.
+    Raises: InputError naming the field, key, value and allowed range.
     """
 
     name: str
@@ -75,12 +75,12 @@ class SensorChain:
 
     @property
     def available(self) -> tuple[str, ...]:
-        """Return the fields of Measurement that the chain shows, in its order."""
+        """Return the fields of Measurement that the chain has, in the order of Measurement."""
         return tuple(name for name in Measurement._fields if name in self.sensors)
 
     @property
     def available_of_blades(self) -> tuple[str, ...]:
-        """Return the fields of BladeMeasurement that the chain shows, in its order."""
+        """Return the fields of BladeMeasurement that the chain has, in the order of BladeMeasurement."""
         return tuple(name for name in BladeMeasurement._fields if name in self.sensors)
 
 
@@ -105,11 +105,11 @@ def _chain(name: str, entries: dict[str, Any]) -> SensorChain:
 
 
 def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | None:
-    """Return the SensorChain of the sensors of a run, for a turbine (its description); None for none.
+    """Return the SensorChain of a run with a Turbine description; None for exact readings.
 
-    Noise and quantisation of speeds and torque on the shafts are fractions of the rated ones in a built-in
-    chain, which is given by name, and those of bending moments of the rated torque on the rotor's shaft; a
-    SensorChain stays as it is. Raises: InputError as sensor_chain.
+    A built-in chain, given by name, is scaled to the turbine: noise and quantisation of shaft speeds and
+    torque with the rated values, those of bending moments with the rated torque on the rotor shaft. A
+    SensorChain is returned unchanged. Raises: InputError as sensor_chain.
     """
     chain = sensor_chain(given)
     if chain is None or not isinstance(given, str):
@@ -132,9 +132,9 @@ def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | N
 
 
 def sensor_chain(given: str | SensorChain | None) -> SensorChain | None:
-    """Return the SensorChain of the sensors of a run; None, as for "exact", where readings are exact.
+    """Return the SensorChain of a run from a name or SensorChain; None for None and "exact".
 
-    Raises: InputError for an unknown name and for anything that is no chain.
+    Raises: InputError for an unknown name and for anything else.
     """
     if given is None or isinstance(given, SensorChain):
         return given

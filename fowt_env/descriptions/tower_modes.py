@@ -1,6 +1,6 @@
-"""A tower that bends, as platform files have it: distributed mass and stiffness, and shapes of modes.
+"""Describes a flexible tower in platform files: distributed mass and stiffness, and mode shapes.
 
-As ElastoDyn has it: polynomial shapes over the height, each of the tower clamped at its base, and sums over
+As in ElastoDyn: polynomial shapes over the height, each of the tower clamped at the base, and sums over
 equal elements.
 """
 
@@ -15,25 +15,25 @@ from fowt_env.descriptions.records import Finite, NonNegative, Positive, Record,
 
 COLUMNS = ("height_fraction", "mass_density", "fore_aft_stiffness", "side_side_stiffness")
 POWERS = np.arange(2, 7)  # of the height fraction, in a shape
-END = 0.0015  # how far from 1 a shape may be at the top: ElastoDyn's limit; the rest is scaled away
-MASS = 0.01  # how far the mass of the distribution may be from the tower's, of it
+END = 0.0015  # largest deviation of a shape from 1 at the top, as in ElastoDyn; removed by scaling
+MASS = 0.01  # largest deviation of the distributed mass from the tower's mass, relative
 LARGEST = {"mass_density": 1e9, "fore_aft_stiffness": 1e18, "side_side_stiffness": 1e18}
 
 Shape = tuple[Finite, Finite, Finite, Finite, Finite]
-Share = bounded(ge=0, lt=1)
+Ratio = bounded(ge=0, lt=1)
 
 
 class ModeShapes(Record):
-    """What [tower.modes] has beside the distribution: one or two modes each way, the lowest first."""
+    """Holds the table [tower.modes] except the distribution: one or two modes each way, lowest first."""
 
     fore_aft: tuple[Shape, ...]  # coefficients of x^2 to x^6, x from 0 at the base to 1 at the top
     side_side: tuple[Shape, ...]
-    fore_aft_damping: tuple[Share, ...]  # structural damping ratio of each, of the tower without its top
-    side_side_damping: tuple[Share, ...]
-    fore_aft_tuner: tuple[Positive, ...] | None = None  # factors on the stiffness of each
+    fore_aft_damping: tuple[Ratio, ...]  # structural damping ratio per mode, without tower-top mass
+    side_side_damping: tuple[Ratio, ...]
+    fore_aft_tuner: tuple[Positive, ...] | None = None  # factor on the stiffness of each mode
     side_side_tuner: tuple[Positive, ...] | None = None
-    top_mass: NonNegative = 0.0  # kg, of the tower's mass: a point at its top, as the yaw bearing
-    # equal ones, mass and stiffness at their middles, as ElastoDyn's TwrNodes
+    top_mass: NonNegative = 0.0  # kg, point mass at the top, part of the tower's mass, as the yaw bearing
+    # number of equal elements, evaluated at midpoints, as ElastoDyn's TwrNodes
     elements: Annotated[int, Field(strict=True, ge=1, le=999)] = 20
 
     def _problems(self):
@@ -53,7 +53,7 @@ class ModeShapes(Record):
 
 
 class TowerBending(ModeShapes):
-    """Distributed mass and stiffness of a tower, linear between heights, and the shapes of its modes."""
+    """Holds the distributed mass and stiffness of a tower, linear between heights, and the mode shapes."""
 
     height_fraction: tuple[Finite, ...]  # of the tower's height, from 0 to 1
     mass_density: tuple[Positive, ...]  # kg/m
@@ -61,27 +61,27 @@ class TowerBending(ModeShapes):
     side_side_stiffness: tuple[Positive, ...]
 
     def mass(self, height):
-        """Return the mass (kg) of a tower of this height (m), summed over the elements."""
+        """Return the mass (kg) of a tower of a height (m), summed over the elements."""
         line = np.interp(self.middles(), self.height_fraction, self.mass_density)
         return float(line.mean()) * height + self.top_mass
 
     def middles(self):
-        """Return (elements,) height fractions of the middles of the elements."""
+        """Return the height fractions (elements,) of the midpoints of the elements."""
         return (np.arange(self.elements) + 0.5) / self.elements
 
 
 def mass_problem(modes, mass, height):
-    """Yield what is wrong between a TowerBending and its tower's mass (kg) and height (m)."""
-    found = modes.mass(height)
-    if abs(found - mass) > MASS * mass:
+    """Yield the problem if a TowerBending contradicts the mass (kg) of a tower of a height (m)."""
+    total = modes.mass(height)
+    if abs(total - mass) > MASS * mass:
         yield (
-            f"modes.distribution: has a mass of {found:.6g} kg with top_mass; must be the tower's mass ="
+            f"modes.distribution: has a mass of {total:.6g} kg with top_mass; must be the tower's mass ="
             f" {mass:.6g} kg within {MASS:.0%}"
         )
 
 
 class _ModesTable(ModeShapes):
-    """The table [tower.modes] of a platform file."""
+    """Holds the table [tower.modes] of a platform file."""
 
     distribution: str  # a CSV file with COLUMNS, relative to the platform file or among the built-in ones
 
@@ -96,11 +96,11 @@ def read_tower_modes(table, folder):
     if not path.exists() and (builtin := DATA / "platforms" / record.distribution).is_file():
         path = builtin
     rows, problems = read_table(path, "tower", COLUMNS), []
-    place = column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False, increasing=True)
-    values = {"height_fraction": place}
+    height = column(rows, "height_fraction", problems, 0.0, 1.0, open_ends=False, increasing=True)
+    values = {"height_fraction": height}
     values |= {name: column(rows, name, problems, 0.0, largest) for name, largest in LARGEST.items()}
-    if not problems and (place[0] != 0.0 or place[-1] != 1.0):
-        problems.append(f"height_fraction: goes from {place[0]:g} to {place[-1]:g}; must go from 0 to 1")
+    if not problems and (height[0] != 0.0 or height[-1] != 1.0):
+        problems.append(f"height_fraction: goes from {height[0]:g} to {height[-1]:g}; must go from 0 to 1")
     raise_problems(f"tower file {str(path)!r}", problems)
-    given = {name: getattr(record, name) for name in record.model_fields_set if name != "distribution"}
-    return TowerBending(**given, **{name: tuple(map(float, value)) for name, value in values.items()})
+    settings = {name: getattr(record, name) for name in record.model_fields_set if name != "distribution"}
+    return TowerBending(**settings, **{name: tuple(map(float, value)) for name, value in values.items()})

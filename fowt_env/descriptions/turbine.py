@@ -1,4 +1,4 @@
-"""Descriptions of turbines: nacelle, rotor, drivetrain, blade with polars, and the reader of their files."""
+"""Describes turbines (nacelle, rotor, drivetrain, blade with polars) and reads them from TOML files."""
 
 import math
 from pathlib import Path
@@ -28,21 +28,21 @@ Inertia = tuple[NonNegative, NonNegative, NonNegative]
 
 
 class Nacelle(Record):
-    """Nacelle with the generator rotor locked; positions relative to the tower axis and still water."""
+    """Holds nacelle masses, generator rotor locked; positions relative to tower axis and still water."""
 
     mass: NonNegative
     cm_downwind: Finite
     cm_height: Finite
-    inertia: Inertia  # about its own centre of mass
+    inertia: Inertia  # about the centre of mass
     cm_left: Finite = 0.0
 
 
 BLADE_MASSES = ("blade_mass", "blade_first_moment", "blade_second_moment")
-BLADE_SLACK = 1.01  # between figures of a turbine file that are rounded, or of bent blades
+BLADE_SLACK = 1.01  # tolerance for rounded values of a turbine file, or bent blades
 
 
 class Rotor(Record):
-    """Rotor masses and geometry. The rotor centre is where the blades' pitch axes meet."""
+    """Holds rotor masses and geometry; the rotor centre is the intersection of the blades' pitch axes."""
 
     blades: Annotated[int, Field(strict=True, ge=1, le=6)] = 3
     mass: Positive
@@ -54,22 +54,22 @@ class Rotor(Record):
     inertia_diameter: Positive  # about a diameter through the rotor's centre of mass
     shaft_tilt: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: the upwind end points up
     cone: bounded(gt=-0.5, lt=0.5) = 0.0  # rad, positive: blades lean upwind, away from the tower
-    cm_offset: Finite = 0.0  # of its centre of mass from the rotor centre along the shaft, downwind, m
-    blade_mass: NonNegative | None = None  # of one blade; outputs of single blades need it and its moments
+    cm_offset: Finite = 0.0  # centre of mass from the rotor centre along the shaft, downwind, m
+    blade_mass: NonNegative | None = None  # of one blade, kg; blade outputs need mass and moments
     blade_first_moment: NonNegative | None = None  # kg m, about the blade's root, along the pitch axis
-    blade_second_moment: NonNegative | None = None  # kg m2, the same
+    blade_second_moment: NonNegative | None = None  # kg m2, about the blade's root
 
     def _problems(self):
         if self.tip_radius <= self.hub_radius:
             yield f"tip_radius = {self.tip_radius}: must exceed hub_radius = {self.hub_radius}"
             return
-        given = {key: getattr(self, key) for key in BLADE_MASSES}
-        missing = [key for key, value in given.items() if value is None]
-        if missing and len(missing) < len(given):
-            yield f"{missing[0]}: is missing; {', '.join(BLADE_MASSES)} go together"
+        values = {key: getattr(self, key) for key in BLADE_MASSES}
+        missing = [key for key, value in values.items() if value is None]
+        if missing and len(missing) < len(values):
+            yield f"{missing[0]}: is missing; {', '.join(BLADE_MASSES)} are required together"
         if missing:
             return
-        mass, first, second = given.values()
+        mass, first, second = values.values()
         if self.blades * mass > self.mass * BLADE_SLACK:
             yield f"blade_mass = {mass:g}: must be <= mass/blades = {self.mass / self.blades:g}"
         longest = mass * (self.tip_radius - self.hub_radius)
@@ -82,37 +82,37 @@ class Rotor(Record):
         about_shaft *= self.blades * np.cos(self.cone) ** 2
         if about_shaft > self.inertia * BLADE_SLACK:
             yield (
-                f"blade_second_moment = {second:g}: about the blade's root; with the other blades it makes"
+                f"blade_second_moment = {second:g}: about the blade's root; all blades together have"
                 f" {about_shaft:g} about the shaft, must be <= inertia = {self.inertia:g}"
             )
 
 
 class Drivetrain(Record):
-    """Rigid shaft with gearbox; losses as in theory.md Eq. (7)."""
+    """Describes a rigid shaft with gearbox; losses as in theory.md Eq. (7)."""
 
     gear_ratio: Positive
     generator_inertia: NonNegative  # about the high-speed shaft
     mesh_loss: NonNegative = 0.0  # zeta_m
     bearing_loss: NonNegative = 0.0  # zeta_v
     generator_efficiency: Fraction
-    torque_time_constant: Positive | None = None  # s, of generator and converter; None: followed at once
+    torque_time_constant: Positive | None = None  # s, of generator and converter; None: no lag
 
 
 class SecondOrderDrive(Record):
-    """Blade-pitch drive with inertia: natural frequency, damping ratio, and what it may have beside them."""
+    """Describes a second-order blade-pitch drive: frequency, damping ratio, optional nonlinearities."""
 
     natural_frequency: bounded(gt=0, le=100)  # w, rad/s
     damping: bounded(gt=0, le=5)  # zeta
     acceleration_limit: Positive | None = None  # rad/s2
-    deadband: NonNegative = 0.0  # rad, change of the command that is not followed
+    deadband: NonNegative = 0.0  # rad, change of the command that is ignored
     friction: NonNegative = 0.0  # rad, distance from the command at which a blade at rest begins to move
 
 
 class PitchDrive(SecondOrderDrive):
-    """Blade-pitch drive: first order with time_constant, second with natural_frequency and damping.
+    """Describes a blade-pitch drive: first order by time_constant, second by natural_frequency and damping.
 
-    time_constant 0: the command is followed at once. second_order is another drive of the same turbine, used
-    where a scene asks for it.
+    time_constant 0: no lag. second_order is an alternative drive of the same turbine, selected by the option
+    pitch_drive of a scene.
     """
 
     time_constant: NonNegative | None = None  # tau_p, s
@@ -128,16 +128,16 @@ class PitchDrive(SecondOrderDrive):
             yield f"maximum = {self.maximum}: must exceed minimum = {self.minimum}"
         if self.natural_frequency is None and self.time_constant is None:
             yield (
-                "time_constant is missing: must be a number >= 0; or natural_frequency and damping, of a"
-                " drive of second order"
+                "time_constant is missing: must be a number >= 0; or natural_frequency and damping of a"
+                " second-order drive"
             )
         if (self.natural_frequency is None) != (self.damping is None):
             missing = "damping" if self.damping is None else "natural_frequency"
-            yield f"{missing} is missing: natural_frequency and damping belong together, each > 0"
+            yield f"{missing} is missing: natural_frequency and damping are required together, each > 0"
         if self.natural_frequency is not None and self.time_constant is not None:
             yield (
-                f"time_constant = {self.time_constant:g}: given beside natural_frequency and damping;"
-                " allowed: it, of a drive of first order, or they, of one of second order"
+                f"time_constant = {self.time_constant:g}: conflicts with natural_frequency and damping;"
+                " allowed: time_constant (first order) or the other two (second order)"
             )
         for key in ("acceleration_limit", "deadband", "friction"):
             value = getattr(self, key)
@@ -146,22 +146,22 @@ class PitchDrive(SecondOrderDrive):
 
     @property
     def lag(self):
-        """Return the time constant of the first-order lag that trails a slow command by as much, s."""
+        """Return the time constant (s) of the first-order lag with the same delay to a slow command."""
         if self.natural_frequency is None:
             return self.time_constant
         return 2.0 * self.damping / self.natural_frequency
 
     def slowed(self, factor):
-        """Return a copy with that many times the lag."""
+        """Return a copy with the lag multiplied by factor."""
         if self.natural_frequency is None:
             return self.model_copy(update={"time_constant": factor * self.time_constant})
         return self.model_copy(update={"natural_frequency": self.natural_frequency / factor})
 
 
 def with_second_order_drive(turbine):
-    """Return the turbine with the drive of its [pitch_drive.second_order]; itself where it has one.
+    """Return the turbine with the drive of [pitch_drive.second_order]; unchanged if second-order already.
 
-    Raises: InputError where its file has none.
+    Raises: InputError if the turbine file has no such table.
     """
     drive = turbine.pitch_drive
     if drive.natural_frequency is not None:
@@ -171,16 +171,15 @@ def with_second_order_drive(turbine):
             f"pitch_drive = 'second_order': the turbine {turbine.name!r} has no [pitch_drive.second_order]"
             " with natural_frequency (rad/s) and damping in its file; allowed here 'file'"
         )
-    figures = drive.second_order.model_dump() | {"time_constant": None}
-    return turbine.model_copy(update={"pitch_drive": drive.model_copy(update=figures)})
+    settings = drive.second_order.model_dump() | {"time_constant": None}
+    return turbine.model_copy(update={"pitch_drive": drive.model_copy(update=settings)})
 
 
 class TorqueLaw(Record):
-    """Generator torque against filtered high-speed-shaft speed (theory.md, section 3).
+    """Describes generator torque against filtered high-speed-shaft speed (theory.md, section 3).
 
-    A turbine file may leave out what follows from the rest (with_torque_defaults), and may give
-    minimum_speed, that of VS_MinOMSpd in a DISCON.IN of ROSCO, in place of cut_in_speed and
-    region2_start_speed.
+    A turbine file may omit derived values (with_torque_defaults), and may specify minimum_speed, as
+    VS_MinOMSpd in a DISCON.IN of ROSCO, in place of cut_in_speed and region2_start_speed.
     """
 
     rated_torque: Positive  # N m, high-speed shaft
@@ -207,31 +206,31 @@ class TorqueLaw(Record):
             yield f"max_torque = {self.max_torque}: must be >= rated_torque = {self.rated_torque}"
 
 
-REGION15 = 0.05  # of the minimum speed, over which the torque rises to that of region 2
-# What a torque law is given where its file says nothing: key, the figures that it follows from, and how. The
-# fractions are those of the NREL 5 MW turbine (NREL/TP-500-38060).
+REGION15 = 0.05  # of the minimum speed, the width of region 1.5
+# Defaults of a torque law: key, the keys that its value is computed from, and the formula. The fractions are
+# those of the NREL 5 MW turbine (NREL/TP-500-38060).
 TORQUE_DEFAULTS = (
     ("rated_speed", ("rated_rotor_speed", "gear_ratio"), lambda rotor, ratio: rotor * ratio),
     ("rated_torque", ("rated_power", "rated_speed"), lambda power, speed: power / speed),
     ("rated_power", ("rated_torque", "rated_speed"), lambda torque, speed: torque * speed),
     ("cut_in_speed", ("minimum_speed",), lambda speed: speed),
     ("region2_start_speed", ("minimum_speed",), lambda speed: (1.0 + REGION15) * speed),
-    # region 3: at 99 % of rated speed, or before, just below the speed at which region 2 reaches rated torque
+    # region 3: at 99 % of rated speed, or just below the speed where region 2 reaches rated torque if lower
     ("transition_speed", ("rated_speed", "rated_torque", "region2_constant"),
      lambda speed, torque, constant: min(0.99 * speed, 0.999 * (torque / constant) ** 0.5)),
     ("slip_percent", (), lambda: 10.0),
     ("region3_min_pitch", (), lambda: 0.01745329),  # rad, 1 deg
     ("max_torque", ("rated_torque",), lambda torque: 1.1 * torque),
-    ("max_torque_rate", ("rated_torque",), lambda torque: 0.348 * torque),  # a second
+    ("max_torque_rate", ("rated_torque",), lambda torque: 0.348 * torque),  # per second
     ("speed_filter_corner", ("rated_rotor_speed",), lambda rotor: 1.24 * rotor),  # 0.25 Hz
 )  # fmt: skip
 
 
 def with_torque_defaults(data):
-    """Return the entries of a turbine (SI) with those of torque_law that follow from others: TORQUE_DEFAULTS.
+    """Return the entries of a turbine (SI) with missing entries of torque_law computed by TORQUE_DEFAULTS.
 
-    Whatever is no positive number stays as it is.
-    Raises: ValueError where minimum_speed is given with one of the speeds that it stands for.
+    Values computed from anything but positive numbers stay missing.
+    Raises: ValueError if minimum_speed is combined with a speed that it replaces.
     """
     law, drive = data.get("torque_law"), data.get("drivetrain")
     if not isinstance(law, dict):
@@ -240,20 +239,20 @@ def with_torque_defaults(data):
     law, others = dict(law), {"rated_rotor_speed": data.get("rated_rotor_speed"), "gear_ratio": ratio}
     if "minimum_speed" in law:
         slowest = others["minimum_speed"] = law.pop("minimum_speed")
-        given = [key for key in ("cut_in_speed", "region2_start_speed") if key in law]
-        if given:
-            raise ValueError(f"torque_law.{given[0]}: given beside minimum_speed, which stands for it")
+        conflicting = [key for key in ("cut_in_speed", "region2_start_speed") if key in law]
+        if conflicting:
+            raise ValueError(f"torque_law.{conflicting[0]}: conflicts with minimum_speed, which replaces it")
         if not (is_number(slowest) and slowest > 0.0):
             raise ValueError(f"torque_law.minimum_speed = {slowest!r}: must be a number > 0")
     for key, needs, value in TORQUE_DEFAULTS:
         known = [others.get(name, law.get(name)) for name in needs]
-        if key not in law and all(is_number(figure) and figure > 0.0 for figure in known):
+        if key not in law and all(is_number(number) and number > 0.0 for number in known):
             law[key] = value(*known)
     return data | {"torque_law": law}
 
 
 class PitchGains(Record):
-    """Published PI gains on generator speed, and their schedule."""
+    """Holds published PI gains on generator speed and the gain schedule."""
 
     KP: Positive  # s
     KI: Positive  # -
@@ -261,10 +260,10 @@ class PitchGains(Record):
 
 
 class Blade(Record):
-    """Blade stations (increasing radius) with one polar each.
+    """Holds the blade stations (increasing radius) with one polar each.
 
-    The stations are those where the aerodynamics are evaluated. The line loads fall to zero at the hub and
-    tip radius of the Rotor, which are not stations.
+    The aerodynamics are evaluated at these stations. The line loads fall to zero at the hub and tip radius of
+    the Rotor, which are not stations.
     """
 
     radius: FloatArray  # (n,) m from the rotor centre along the pitch axis
@@ -298,7 +297,7 @@ class Blade(Record):
 
 
 def _polar_problem(polar):
-    """Return what is wrong with a (m, 4) polar in rad, in words; None if nothing is."""
+    """Return the problem of a (m, 4) polar in rad as a text; None without one."""
     if polar.ndim != 2 or polar.shape[0] < 2 or polar.shape[1] != 4 or not np.isfinite(polar).all():
         return f"shape {polar.shape}: must be finite numbers, (m >= 2, 4)"
     degrees = np.degrees(polar[:, 0])
@@ -312,20 +311,20 @@ def _polar_problem(polar):
 
 
 class Turbine(Record):
-    """A wind turbine: rotor, nacelle, drivetrain, actuator and its published controller data."""
+    """Describes a wind turbine: rotor, nacelle, drivetrain, actuators and published controller data."""
 
     name: str
     rated_rotor_speed: Positive  # rad/s
     rated_wind_speed: Positive
     cut_in_wind_speed: Positive
     cut_out_wind_speed: Positive
-    overspeed: Positive  # rad/s: failure threshold of the environment
+    overspeed: Positive  # rad/s, failure threshold of environments
     rotor: Rotor
     nacelle: Nacelle
     drivetrain: Drivetrain
     pitch_drive: PitchDrive
     torque_law: TorqueLaw
-    gains: dict[str, PitchGains] = {}  # published ones; without any they are derived (controllers/gains.py)
+    gains: dict[str, PitchGains] = {}  # published ones; without any, derived (controllers/gains.py)
     protection: Protection = Protection()
     blade: Blade
     discon: str | None = None  # path of a DISCON.IN of ROSCO for this turbine
@@ -352,7 +351,7 @@ class Turbine(Record):
 
 
 def turbine_file(name):
-    """Return the path of the file of a built-in turbine."""
+    """Return the path of the TOML file of a built-in turbine."""
     return DATA / "turbines" / name / "turbine.toml"
 
 
@@ -376,15 +375,15 @@ def read_turbine(name_or_path: str | Path) -> Turbine:
             data["blade"] = _read_blade(blade.blade, path.parent)
     if isinstance(data.get("discon"), str):
         with noted(problems):
-            place = _beside(path.parent, data["discon"])
-            if not place.is_file():
+            discon = _beside(path.parent, data["discon"])
+            if not discon.is_file():
                 allowed = "must be a file, relative to the turbine file's folder"
                 raise InputError(f"discon = {data['discon'][:60]!r}: {allowed}")
-            data["discon"] = str(place.absolute())
-    turbine, found = validate(Turbine, data, origin)
-    if blade_problems:  # which say why the record has no blade
-        found = [problem for problem in found if not problem.startswith("blade is missing")]
-    raise_problems(f"turbine file {str(path)!r}", problems + found + blade_problems)
+            data["discon"] = str(discon.absolute())
+    turbine, invalid = validate(Turbine, data, origin)
+    if blade_problems:  # these problems explain why the record has no blade
+        invalid = [problem for problem in invalid if not problem.startswith("blade is missing")]
+    raise_problems(f"turbine file {str(path)!r}", problems + invalid + blade_problems)
     return turbine
 
 

@@ -1,11 +1,11 @@
-"""Units of files, tables and pages, in SI: a figure times its unit is SI, and SI over it the figure."""
+"""Defines units of files, tables and pages: a value in a unit times the unit is the value in SI."""
 
 from math import pi
 
 RPM = pi / 30.0  # rad/s
 DEGREE = pi / 180.0  # rad
 
-# Keys of files whose figures are in another unit than the field's: key in the file -> (field, unit).
+# Keys of files with values in another unit than that of the field: key in the file: (field, unit).
 FILE_UNITS = {
     "rated_rotor_speed_rpm": ("rated_rotor_speed", RPM),
     "overspeed_rpm": ("overspeed", RPM),

@@ -1,4 +1,4 @@
-"""Reading of WAMIT's numeric output: .1, .3, .hst and .12d of one body."""
+"""Reads WAMIT's numeric output of one body: files .1, .3, .hst and .12d."""
 
 import math
 from itertools import product
@@ -11,22 +11,22 @@ from fowt_env.descriptions.potential_flow import MAX_BYTES, DifferenceQtf, Poten
 from fowt_env.errors import InputError
 
 MODES = 6
-NEGATIVE_DAMPING = 0.02  # fraction of a mode's largest that rounding may leave below zero on the diagonal
+NEGATIVE_DAMPING = 0.02  # largest negative diagonal damping due to rounding, fraction of the mode's maximum
 _LIMITS = {-1.0: "zero frequency (period < 0)", 0.0: "infinite frequency (period = 0)"}
 
 
 def read_wamit(
     root: str | Path, *, length_scale: float, gravity: float, density: float, excitation: tuple | None = None
 ) -> PotentialFlow:
-    """PotentialFlow of root.1, root.3, root.hst and, where there is one, root.12d, in SI units.
+    """Return the PotentialFlow of root.1, root.3, root.hst and, if present, root.12d, in SI units.
 
-    root          path without the ending; the case of the file's name does not matter
+    root          path without the extension; the case of file names is ignored
     length_scale  WAMIT's ULEN, m; gravity (m/s2) and density (kg/m3) of the water
     excitation    (omega (k,) rad/s, heading (m,) rad, force (k, m, 6) complex N/m) in place of root.3
 
-    The displaced volume is nan and the centre of buoyancy (0, 0): none of the files has them. A period below
-    0 is the zero frequency and 0 the infinite one. Modes that a file does not list are zero.
-    Raises: InputError naming file, line and figure.
+    The displaced volume is nan and the centre of buoyancy (0, 0), as no file contains them. A period < 0
+    means zero frequency, a period of 0 infinite frequency. Modes that a file does not list are zero.
+    Raises: InputError naming file, line and value.
     """
     root, scale = Path(root), float(length_scale)
     water = density * gravity
@@ -60,33 +60,33 @@ def read_wamit(
 
 
 def _powers(least):
-    """(6, 6) powers of the length: least between forces, one more for every moment or angle."""
+    """Return (6, 6) powers of the length: least between forces, one more for every moment or angle."""
     turns = np.array([0.0] * 3 + [1.0] * 3)
     return least + turns[:, None] + turns
 
 
 def _path(root, ending, needed=None):
-    """Path of root with an ending, whatever the case of its name; None where there is no such file.
+    """Return the path of root with an extension, ignoring case; None if there is no such file.
 
-    needed: what is in the file, where there must be one. Raises: InputError.
+    needed: contents of a required file, for the message. Raises: InputError.
     """
-    exact, found = root.with_name(root.name + ending), None
+    exact, match = root.with_name(root.name + ending), None
     try:
         if exact.is_file():
             return exact
         same = (path for path in sorted(exact.parent.iterdir()) if path.name.lower() == exact.name.lower())
-        found = next(same, None)
+        match = next(same, None)
     except (OSError, ValueError):
         pass
-    if found is None and needed is not None:
+    if match is None and needed is not None:
         raise InputError(f"WAMIT file {str(root)[:200] + ending!r} ({needed}) does not exist")
-    return found
+    return match
 
 
 class _Rows:
-    """Rows [(line number, [floats])] of a WAMIT file, which have one of some numbers of columns.
+    """Holds the rows [(line number, [floats])] of a WAMIT file with one of the allowed column counts.
 
-    Lines that begin with no number are skipped above the first row, where WAMIT writes a title.
+    Lines above the first row that do not begin with a number are skipped: WAMIT writes a title there.
     """
 
     def __init__(self, path, *sizes):
@@ -109,39 +109,39 @@ class _Rows:
             raise self.refusal("has no rows of numbers", mark="")
 
     def refusal(self, what, line=None, mark=":"):
-        """InputError about the file and the number of a line."""
+        """Return the InputError about the file and, optionally, a line number."""
         where = f"WAMIT file {str(self.path)!r}"
         return InputError(f"{where}{mark} {what}" if line is None else f"{where}: line {line}{mark} {what}")
 
     def mode(self, line, value):
-        """Index of a mode 1 to 6. Raises: InputError, also for further bodies."""
+        """Return the index of a mode 1 to 6. Raises: InputError, also for modes of further bodies."""
         if value != int(value) or not 1 <= value <= MODES:
             allowed = "must be 1 to 6; files of several bodies are not read"
             raise self.refusal(f"mode {value:g}: {allowed}", line)
         return int(value) - 1
 
     def frequency(self, line, period):
-        """2 pi / period, rad/s. Raises: InputError where that is no positive finite number."""
+        """Return 2 pi / period, rad/s. Raises: InputError for a period out of range."""
         omega = 2.0 * math.pi / period if period > 0.0 else 0.0
         if not 1e-6 < omega < 1e6:
             raise self.refusal(f"period {period:g} s: must be 1e-5 to 1e6 s", line)
         return omega
 
     def heading(self, line, value):
-        """A heading, deg. Raises: InputError."""
+        """Return a heading, deg. Raises: InputError for a heading out of range."""
         if not -360.0 <= value <= 360.0:
             raise self.refusal(f"heading {value:g} deg: must be -360 to 360", line)
         return value
 
     def put(self, table, key, value, line, what):
-        """Enter a row into a table. Raises: InputError where it is there already."""
+        """Add a row to a table. Raises: InputError if the table has the key already."""
         if key in table:
-            raise self.refusal(f"{what} there twice", line)
+            raise self.refusal(f"{what} listed twice", line)
         table[key] = value
 
 
 def _number(cell):
-    """A finite number in Fortran's or C's notation. Raises: ValueError."""
+    """Return a finite number in Fortran or C notation. Raises: ValueError."""
     try:
         value = float(cell.replace("D", "E").replace("d", "e")) if "_" not in cell else math.nan
     except ValueError:
@@ -152,7 +152,7 @@ def _number(cell):
 
 
 def _read_radiation(path):
-    """(omega, added mass, damping, that at zero and infinite frequency) of a .1 file, dimensionless."""
+    """Return (omega, added mass, damping, added mass at zero, at infinite frequency), dimensionless."""
     file = _Rows(path, 4, 5)
     tables, first = {}, {}
     for line, (period, i, j, *values) in file.rows:
@@ -185,13 +185,13 @@ def _read_radiation(path):
                 matrix[: len(values), j, i] = values
     omega = np.array([file.frequency(first[period], period) for period in periods])
     both = np.array([matrices[period] for period in periods])
-    for i in range(MODES):  # a body with negative damping beyond rounding gains energy
+    for i in range(MODES):  # with negative damping larger than rounding a body gains energy
         values = both[:, 1, i, i] * omega
         worst, largest = int(np.argmin(values)), np.abs(values).max()
         if values[worst] < -NEGATIVE_DAMPING * largest:
-            share = f"{values[worst] / largest:.1%} of the mode's largest"
+            fraction = f"{values[worst] / largest:.1%} of the mode's largest"
             raise file.refusal(
-                f"damping {i + 1} {i + 1} at {omega[worst]:.4g} rad/s is negative: {share};"
+                f"damping {i + 1} {i + 1} at {omega[worst]:.4g} rad/s is negative: {fraction};"
                 f" allowed: at least {-NEGATIVE_DAMPING:.0%}"
             )
     zero = matrices[-1.0][0] if -1.0 in matrices else None
@@ -199,7 +199,7 @@ def _read_radiation(path):
 
 
 def _read_excitation(path):
-    """(omega, heading, dimensionless force (k, m, 6)) of a .3 file; zero and infinite periods left out."""
+    """Return (omega, heading, dimensionless force (k, m, 6)) of a .3 file without zero, infinite periods."""
     file, table = _Rows(path, 7), {}
     for line, (period, heading, i, _, _, real, imaginary) in file.rows:
         mode = file.mode(line, i)
@@ -214,7 +214,7 @@ def _read_excitation(path):
     for key in product(periods, headings, modes):
         if key not in table:
             text = "period {:g}, heading {:g}, mode {:g}".format(*key)
-            raise file.refusal(f"no row of {text}, though others have each of these")
+            raise file.refusal(f"no row of {text}, although other rows have each of these values")
     periods = periods[::-1]
     force = np.zeros((len(periods), len(headings), MODES), dtype=complex)
     for mode in modes:
@@ -224,7 +224,7 @@ def _read_excitation(path):
 
 
 def _read_stiffness(path):
-    """Dimensionless (6, 6) of a .hst file."""
+    """Return the dimensionless stiffness (6, 6) of a .hst file."""
     file, table = _Rows(path, 3), {}
     for line, (i, j, value) in file.rows:
         entry = file.mode(line, i), file.mode(line, j)
@@ -238,10 +238,10 @@ def _read_stiffness(path):
 
 
 def _read_qtf(path):
-    """(omega, heading pairs rad, dimensionless (p, k, k, 6)) of a .12d file; nan where it has none.
+    """Return (omega, heading pairs rad, dimensionless (p, k, k, 6)) of a .12d file; nan for missing entries.
 
-    What it has of one side of the diagonal is filled in on the other: Q(j, i) = conj Q(i, j), with the
-    headings exchanged.
+    Entries on one side of the diagonal are copied to the other: Q(j, i) = conj Q(i, j), with the headings
+    exchanged.
     """
     file, table = _Rows(path, 9), {}
     for line, (first, second, one, other, i, _, _, real, imaginary) in file.rows:
@@ -253,15 +253,15 @@ def _read_qtf(path):
     periods = sorted({period for key in table for period in key[2:4]}, reverse=True)
     headings = sorted({pair for one, other, *_ in table for pair in ((one, other), (other, one))})
     row = {period: k for k, period in enumerate(periods)}
-    place = {pair: k for k, pair in enumerate(headings)}
+    column = {pair: k for k, pair in enumerate(headings)}
     if len(headings) * len(periods) ** 2 * MODES > 30 * len(table) + 1_000_000:
         what = f"{len(table)} rows for {len(periods)} frequencies and {len(headings)} pairs of headings"
         raise file.refusal(f"{what}: not a grid")
     value = np.full((len(headings), len(periods), len(periods), MODES), np.nan, dtype=complex)
     for (one, other, first, second, mode), force in table.items():
-        value[place[other, one], row[second], row[first], mode] = force.conjugate()
-    for (one, other, first, second, mode), force in table.items():  # goes over what follows from it
-        value[place[one, other], row[first], row[second], mode] = force
+        value[column[other, one], row[second], row[first], mode] = force.conjugate()
+    for (one, other, first, second, mode), force in table.items():  # overwrites copied entries
+        value[column[one, other], row[first], row[second], mode] = force
     omega = np.array([2.0 * math.pi / period for period in periods])
     missing = set(range(MODES)) - {key[4] for key in table}
     value[..., sorted(missing)] = np.where(np.isnan(value).all(axis=-1), np.nan, 0.0)[..., None]

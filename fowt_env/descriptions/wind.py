@@ -1,8 +1,7 @@
-"""What a user may ask of the wind: the kinds, their keys, units, ranges and defaults, and the checks.
+"""Defines the kinds of wind with their keys, units, ranges and defaults, and checks wind specifications.
 
-KINDS are those that are uniform over the rotor but for shear, FIELD_KINDS the boxes of full-field wind.
-`wind_of` turns the text or path that stands for a wind into a number or a mapping, and `read_wind` these
-into a checked WindSpec.
+KINDS are uniform over the rotor except for shear, FIELD_KINDS are full-field wind boxes. `wind_of` converts
+the text or path of a wind to a number or a mapping, and `read_wind` both to a checked WindSpec.
 """
 
 from dataclasses import dataclass, field
@@ -29,14 +28,14 @@ from fowt_env.descriptions.records import (
 from fowt_env.descriptions.wind_files import TABLES, UNIFORM, read_uniform_wind, read_wind_table
 from fowt_env.errors import InputError, unknown
 
-SPEED_LIMIT = 100.0  # m/s; above every extreme of the standard (70 m/s)
+SPEED_LIMIT = 100.0  # m/s; above all extreme speeds of the standard (70 m/s)
 SPEEDS = (0.0, SPEED_LIMIT, "m/s")
-# the mean of turbulence and gusts divides frequencies and angles, so it cannot be zero
+# the mean speed of turbulence and gusts is a divisor of frequencies and angles, so it must not be zero
 MOVING_SPEEDS = (1.0, SPEED_LIMIT, "m/s")
 BOX_STEPS = (1e-4, 1e3, "s")
-NTM_SIGMAS = ("90%", "drawn")  # the standard's representative value, or one drawn from its distribution
+NTM_SIGMAS = ("90%", "drawn")  # the standard's representative value, or a random value of its distribution
 
-# A key is (type, default); one whose default is ... must be given, None: found from site, scene or box.
+# A key is (type, default); default ...: the key is required; None: taken from site, scene or box.
 SPEED, MOVING = (in_range(*SPEEDS), ...), (in_range(*MOVING_SPEEDS), ...)
 DIRECTION = (in_range(-180.0, 180.0, "deg"), 0.0)  # towards which the wind blows, from +x towards +y
 TURBINE_CLASS = (one_of(tuple(REFERENCE_SPEED)), "I")
@@ -59,7 +58,7 @@ GUST = {"speed": MOVING, "start": START, "class": TURBULENCE_CLASS}
 
 
 class WindKind(NamedTuple):
-    """A kind of wind."""
+    """Describes a kind of wind."""
 
     form: str  # on the command line
     summary: str
@@ -112,7 +111,7 @@ KINDS = {
     ),
     "steps": _uniform(
         '{"kind": "steps", "speeds": [12, 14], "every": 60}',
-        "wind speeds one after the other, each held for a time, s",
+        "consecutive wind speeds, each constant for a time, s",
         {
             "speeds": (samples(*SPEEDS), ...),
             "every": (in_range(0.01, 1e6, "s"), ...),
@@ -138,7 +137,7 @@ FIELD_KINDS = {
         },
     ),
     "box": _kind(
-        "in Python alone", "a full-field box of your own arrays",
+        "in Python only", "a full-field box from arrays",
         {
             "u": (array(3), ...), "v": (array(3) | None, None), "w": (array(3) | None, None),
             "y": (array(1), ...), "z": (array(1), ...), "dt": (in_range(*BOX_STEPS), ...),
@@ -147,8 +146,8 @@ FIELD_KINDS = {
     ),
 }  # fmt: skip
 ALL_KINDS = KINDS | FIELD_KINDS
-BOX = ".bts"  # ending of TurbSim's boxes
-OTHER_NAMES = {  # what others call a kind
+BOX = ".bts"  # extension of TurbSim's boxes
+OTHER_NAMES = {  # names of kinds in other tools
     "turbsim": "bts",
     "constant": "steady",
     "uniform": "steady",
@@ -163,7 +162,7 @@ FORMS = (
 
 @dataclass(frozen=True)
 class WindSpec:
-    """A checked wind: its kind and the value of each of its keys (see KINDS)."""
+    """Holds a checked wind: the kind and the value of each key (see KINDS)."""
 
     kind: str
     values: dict = field(default_factory=dict)
@@ -173,7 +172,7 @@ class WindSpec:
 
 
 def wind_of(spec: Any) -> Any:
-    """Return the wind that a text or path stands for, as number or mapping; anything else as it is.
+    """Return the wind of a text or path as a number or mapping; other objects unchanged.
 
     "18"; "ntm:18:B", which is KIND:SPEED[:CLASS]; JSON of a mapping; "none"; a path to a .bts box, a uniform
     wind file of InflowWind (.wnd, .hh) or a table of time (s) and speed (m/s) (.csv, .parquet).
@@ -201,25 +200,25 @@ def wind_of(spec: Any) -> Any:
         other = OTHER_NAMES.get(text.lower(), text.lower())
         hint = ""
         if other == "bts":
-            hint = f"; a box of TurbSim is the path of its {BOX} file"
+            hint = f"; for a box of TurbSim use the path of its {BOX} file"
         elif other in ALL_KINDS:
-            hint = f"; {other!r} is a kind and needs more, as {other}:18 or a mapping"
+            hint = f"; the kind {other!r} needs further keys, as {other}:18 or a mapping"
         raise InputError(f"wind = {short(text)}: must be {FORMS}{hint}")
-    found = {"kind": kind, "speed": parse_number(rest[0])}
-    return found | {"class": rest[1]} if len(rest) == 2 else found
+    mapping = {"kind": kind, "speed": parse_number(rest[0])}
+    return mapping | {"class": rest[1]} if len(rest) == 2 else mapping
 
 
 def is_wind_file(text: str) -> bool:
-    """Return whether a text is the path of a wind, by its ending."""
+    """Return whether a text is the path of a wind file, by its extension."""
     return Path(text).suffix.lower() in (BOX, *UNIFORM, *TABLES) and not text.lstrip().startswith("{")
 
 
 def unknown_kind(kind):
-    """Return the InputError for an unknown kind of wind, with the name that a kind has elsewhere."""
+    """Return the InputError for an unknown kind of wind, with the kind of which it is another tool's name."""
     other = OTHER_NAMES.get(kind.lower()) if isinstance(kind, str) else None
     if other is None:
         return unknown("wind.kind", kind, ALL_KINDS)
-    of_a_file = ", and a path to a .bts file is a wind by itself" if other == "bts" else ""
+    of_a_file = ", and the path of a .bts file can be used as the wind" if other == "bts" else ""
     return InputError(
         f"unknown wind.kind {kind!r}. It is called {other!r} here{of_a_file}. Known: {', '.join(ALL_KINDS)}"
     )
@@ -257,7 +256,7 @@ def checked_keys(spec):
 
 
 def _check_together(kind, values):
-    """Check the rules that join several keys. Raises: InputError."""
+    """Check the rules for combinations of keys. Raises: InputError."""
     if kind == "series":
         time = values["time"]
         for key, array in values.items():

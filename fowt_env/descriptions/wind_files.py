@@ -1,4 +1,4 @@
-"""Files of wind that is uniform over the rotor: InflowWind's (.wnd, .hh), and tables of time and speed."""
+"""Reads uniform wind files of InflowWind (.wnd, .hh) and tables of time and wind speed."""
 
 import re
 from pathlib import Path
@@ -11,18 +11,18 @@ from fowt_env.errors import InputError
 
 UNIFORM = (".wnd", ".hh")
 TABLES = (".csv", ".parquet")
-COLUMNS = (("Time_[s]", "Wind1VelX_[m/s]"), ("time", "speed"))  # of tables that have more than two
+COLUMNS = (("Time_[s]", "Wind1VelX_[m/s]"), ("time", "speed"))  # of tables with more than two columns
 WIND_COLUMNS = 8
 FINEST_TURN = DEGREE  # between two samples of a turning wind
 WIND_ROWS = 1_000_000
 
 
 def read_wind_table(path):
-    """Wind {"kind": "series", ...} of a table with a column of time (s) and one of wind speed (m/s).
+    """Return the wind {"kind": "series", ...} of a table with columns of time (s) and wind speed (m/s).
 
-    path: .csv or .parquet; two columns in that order, or those called time and speed, or Time_[s] and
-    Wind1VelX_[m/s] as in the table of a run.
-    Raises: InputError that names the file and what is wrong with it.
+    path: .csv or .parquet with two columns in that order, or with columns named time and speed, or Time_[s]
+    and Wind1VelX_[m/s] as in the table of a run.
+    Raises: InputError that names the file and the problem.
     """
     import pandas as pd
 
@@ -33,7 +33,7 @@ def read_wind_table(path):
     try:
         is_text = path.suffix.lower() == ".csv"
         frame = pd.read_csv(path) if is_text else pd.read_parquet(path.absolute())
-    except Exception as error:  # whatever a broken file makes pandas and pyarrow raise
+    except Exception as error:  # any error of pandas and pyarrow for a broken file
         raise InputError(f"{where}: cannot be read: {error!s:.300}") from None
     named = [list(pair) for pair in COLUMNS if set(pair) <= set(frame.columns)]
     if named:
@@ -50,16 +50,16 @@ def read_wind_table(path):
 
 
 def read_uniform_wind(path):
-    """Wind {"kind": "series", ...} of a uniform wind file of InflowWind, as build_scene takes it.
+    """Return the wind {"kind": "series", ...} of a uniform wind file of InflowWind, for build_scene.
 
     Columns: time (s), horizontal speed (m/s), direction (deg, clockwise seen from above), vertical speed
     (m/s), horizontal linear shear, power-law exponent, vertical linear shear, gust (m/s). The file does
-    not hold its reference height and length: they are taken as hub height and rotor diameter, as is usual.
-    Between rows of different direction there are further samples, since a series is linear in the
-    components and the file in speed and direction (source: OpenFAST, IfW_UniformWind.f90).
+    not contain reference height and length; hub height and rotor diameter are used, as is common. Samples are
+    added between rows of different direction, since a series is linear in the components and the file in
+    speed and direction (source: OpenFAST, IfW_UniformWind.f90).
 
-    Raises: InputError, also for what a series cannot hold: an exponent that varies, a gust (which the
-    power law spares) with an exponent, a linear shear in wind that is not along x.
+    Raises: InputError, also for properties that a series cannot represent: a varying exponent, a gust (not
+    subject to the power law) with an exponent, linear shear in wind that is not along x.
     """
     time, speed, direction, vertical, horizontal_shear, exponent, vertical_shear, gust = _wind_rows(path).T
     if np.ptp(exponent) > 0.0:
@@ -67,7 +67,7 @@ def read_uniform_wind(path):
     if exponent[0] != 0.0 and gust.any():
         raise _refused(path, "a gust (column 8) with a power-law exponent (column 6)", "one of them zero")
     if np.abs(direction).max() > 360.0:
-        raise _refused(path, "a direction beyond a full turn", "directions in [-360, 360] deg")
+        raise _refused(path, "a direction outside one full turn", "directions in [-360, 360] deg")
     sheared = horizontal_shear.any() or vertical_shear.any()
     if sheared and direction.any():
         raise _refused(path, "linear shear (columns 5, 7) with a direction (column 3)", "one of them zero")
@@ -103,7 +103,7 @@ def _refused(path, what, allowed):
 
 
 def _wind_rows(path):
-    """(n, 8) finite numbers of a uniform wind file, its times increasing."""
+    """Return the (n, 8) finite numbers of a uniform wind file, with increasing times."""
     rows = []
     for number, line in enumerate(read_text(Path(path), "uniform wind file").splitlines(), 1):
         words = re.split(r"[\s,]+", line.partition("!")[0].strip())

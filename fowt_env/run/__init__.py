@@ -1,1 +1,1 @@
-"""One run of a scene with a controller: initial conditions, interface and simulation."""
+"""Runs a scene with a controller: initial conditions, interface and simulation."""

@@ -1,4 +1,4 @@
-"""State and command at the beginning of a run."""
+"""Computes the state and command at the beginning of a run."""
 
 from collections.abc import Mapping
 from math import cos, pi
@@ -47,11 +47,11 @@ def initial_state(
     initial: "trim" (or None), the floating steady state in the mean wind; "zero", all states of platform and
     tower zero, with the rotor speed and blade pitch of that wind on a fixed platform; or a mapping of
     absolute values of channels at the trim, or at {"start": "zero"}. Channels are named PtfmPitch or
-    PtfmPitch_[deg]; BldPitch1 is that of all blades where they have one pitch, and of the
-    first with individual pitch; TTDspFA and TTDspSS bend the tower in its first modes alone.
-    Raises: InputError for unknown channels, values that are no numbers, and impossible positions: below
-    the sea bed; with wind also out of the water, with the tower base under water, or with the rotor's back to
-    the wind.
+    PtfmPitch_[deg]; BldPitch1 sets the pitch of all blades, with individual pitch that of
+    blade 1; TTDspFA and TTDspSS bend the tower in its first modes only.
+    Raises: InputError for unknown channels, values that are not numbers, and impossible positions:
+    below the sea bed; with wind also out of the water, with the tower base under water, or with the rotor
+    facing away from the wind.
     """
     if not isinstance(initial, str | Mapping | None):
         raise InputError(f"initial = {initial!r}: must be 'trim', 'zero' or a mapping of channels")
@@ -85,7 +85,7 @@ def initial_state(
             f"initial['PtfmPitch'] = {x[State.PLATFORM_PITCH] / DEGREE:g}: must be inside (-90, 90) deg"
         )
     if values:
-        _check_place(scene, x)
+        _check_position(scene, x)
     if rates:  # inertial axes to body axes
         inertial = np.zeros(6)
         for index, value in rates.items():
@@ -106,22 +106,22 @@ def initial_state(
     return x, u
 
 
-def _check_place(scene, x):
-    """Refuse a state whose position a platform cannot have or in which no rotor can work: InputError."""
+def _check_position(scene, x):
+    """Raise InputError for a position that a platform cannot have or in which the rotor cannot operate."""
     blown = scene.model.aero is not None
     if scene.model.hydro is not None:
         upright = cos(x[State.PLATFORM_PITCH]) * cos(x[State.ROLL])
-        found = impossible_place(scene, float(x[State.HEAVE]), float(upright))
-        found = [text for what, text in found.items() if what == "bed" or blown and what != "tilt"]
-        if found:
+        reasons = impossible_place(scene, float(x[State.HEAVE]), float(upright))
+        reasons = [text for what, text in reasons.items() if what == "bed" or blown and what != "tilt"]
+        if reasons:
             lean, roll = x[State.PLATFORM_PITCH] / DEGREE, x[State.ROLL] / DEGREE
             raise InputError(
-                f"initial: the run of platform {scene.label!r} would begin with {' and '.join(found)}"
+                f"initial: the run of platform {scene.label!r} would begin with {' and '.join(reasons)}"
                 f" (PtfmHeave = {x[State.HEAVE]:.4g} m, PtfmPitch = {lean:.3g} deg, PtfmRoll = {roll:.3g}"
                 " deg)"
             )
     if blown and cos(x[State.YAW]) <= 0.0:
         raise InputError(
-            f"initial['PtfmYaw'] = {x[State.YAW] / DEGREE:g}: must be within 90 deg of 0, but for whole"
-            " turns, with wind: the rotor would have its back to it"
+            f"initial['PtfmYaw'] = {x[State.YAW] / DEGREE:g}: must be within 90 deg of 0 or a multiple of"
+            " 360 with wind: the rotor would face away from the wind"
         )

@@ -1,4 +1,4 @@
-"""Interface of a run: protection, faults, sensors and wind ahead, from descriptions to what kernels read."""
+"""Builds the interface of a run from descriptions: protection, faults, sensors and wind ahead."""
 
 from collections.abc import Sequence
 from math import exp, inf, isfinite, radians
@@ -41,11 +41,11 @@ def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_
     }
     trips = []
     for kind, unit in units.items():
-        found = getattr(limits, kind.name.lower())
-        if found is None:
+        trip = getattr(limits, kind.name.lower())
+        if trip is None:
             trips.append((inf, 0.0, Stop.EMERGENCY))
         else:
-            trips.append((float(found.limit * unit), found.time, Stop[found.stop.upper()]))
+            trips.append((float(trip.limit * unit), trip.time, Stop[trip.stop.upper()]))
     ordered, rates, rows = [inf, inf], [limits.normal_rate, limits.emergency_rate], []
     for fault in faults:
         rows += _failures(scene, fault)
@@ -96,10 +96,10 @@ def build_interface(
     control_dt: float,
     periods: int,
 ) -> Interface:
-    """Return the Interface of a run of so many control periods: what the controller declares, and no more.
+    """Return the Interface of a run of `periods` control periods for the information of a controller.
 
-    chain None: exact sensors. Raises: InputError where the controller declares what the chain or the scene
-    does not have.
+    chain None: exact sensors. Raises: InputError if the controller declares a field that the chain or the
+    scene does not have.
     """
     individual = scene.model.pitches is not None
     available = None if chain is None else (chain.name, chain.available + chain.available_of_blades)
@@ -113,7 +113,7 @@ def build_interface(
 
 
 def wind_ahead_of(scene, leads, preview, control_dt, duration) -> WindAhead:
-    """Return the WindAhead of a run at look-ahead times (s), from what simulate takes as preview."""
+    """Return the WindAhead of a run at look-ahead times (s) from the argument preview of simulate."""
     if not leads:
         return no_wind_ahead()
     time, values, motion = foreseen(scene, leads, preview, duration)
@@ -124,7 +124,7 @@ def wind_ahead_of(scene, leads, preview, control_dt, duration) -> WindAhead:
 
 
 def nacelle_motion(motion: Motion, control_dt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return (taps, weight) of a WindAhead: the Motion of a preview at the control instants.
+    """Return (taps, weight) of a WindAhead, the Motion of a preview sampled at the control instants.
 
     Between two instants the velocity is linear.
     """
@@ -138,15 +138,15 @@ def nacelle_motion(motion: Motion, control_dt: float) -> tuple[np.ndarray, np.nd
     size = int(max(offsets.max(), 0.0)) + int(max(delays.max(), 0.0)) + 3
     taps = np.zeros((len(delays), size))
     for j, delay in enumerate(delays):
-        for offset, share in zip(offsets, motion.weight, strict=True):
+        for offset, fraction in zip(offsets, motion.weight, strict=True):
             for late, part in _linear(delay):
                 for later, piece in _linear(offset):
-                    taps[j, late + later] += share * part * piece
+                    taps[j, late + later] += fraction * part * piece
     return taps, weight
 
 
 def _linear(lag):
-    """Return ((instants ago, weight), ...) of a lag in control periods, linear between two instants."""
+    """Return ((instants ago, weight), ...) of a lag in control periods, interpolated between two instants."""
     whole = int(max(lag, 0.0))
     part = max(lag, 0.0) - whole
     return (whole, 1.0 - part), (whole + 1, part)

@@ -1,4 +1,4 @@
-"""Outcome of a run or an episode: its DataFrame, and when and why the turbine was stopped."""
+"""Collects the outcome of a run or an episode: its DataFrame, and when and why the turbine was stopped."""
 
 from math import isinf
 from typing import Any
@@ -14,12 +14,12 @@ from fowt_env.scene.scene import Scene
 
 
 def trip_name(watch: np.ndarray) -> str:
-    """Return the name of the trip in InterfaceData.watch, as "overspeed"."""
+    """Return the name of the trip in InterfaceData.watch, such as "overspeed"."""
     return Trip(int(watch[Watch.TRIP])).name.lower()
 
 
 def stop_facts(watch: np.ndarray) -> dict[str, Any]:
-    """Return {"tripped": time (s) of the trip, "trip": its name, "stop": kind of the stop}, each or None."""
+    """Return {"tripped": time (s) of the trip, "trip": its name, "stop": its kind}, None without one."""
     tripped, stop = float(watch[Watch.TRIPPED_AT]), int(watch[Watch.STOP])
     return {
         "tripped": None if isinf(tripped) else tripped,

@@ -1,4 +1,4 @@
-"""One run of a scene with a controller, to a table of OpenFAST channels."""
+"""Simulates one run of a scene with a controller and returns a table of OpenFAST channels."""
 
 import inspect
 import os
@@ -50,13 +50,13 @@ from fowt_env.scene.scene import Scene, check_scene
 from fowt_env.weather.preview import Preview
 from fowt_env.weather.wind_field import WindBox
 
-# Between compiled calls progress is shown and Ctrl-C ends the run. A call by itself costs 1e-4 s, so calls
-# grow longer until they last about CHUNK_TIME.
+# Between compiled calls progress is shown and Ctrl-C ends the run. The overhead of a call is 1e-4 s, so calls
+# are lengthened until they last about CHUNK_TIME.
 FIRST_CHUNK = 20.0  # simulated seconds
-CHUNK_TIME = 0.05  # s of the clock
+CHUNK_TIME = 0.05  # s of wall-clock time
 GIB = 2.0**30
-MOST_MEMORY = 0.8  # of the machine's that a table may take
-LIMITED = 0.5  # of a run's time with the generator torque limited, where it is worth a warning
+MOST_MEMORY = 0.8  # fraction of the machine's memory that a table may take
+LIMITED = 0.5  # fraction of a run with limited generator torque that causes a warning
 REPLACED = {  # former keywords of simulate
     "stop_overspeed": "protection='end_at_overspeed'",
     "trip": "protection={'overspeed': RATIO}, of rated rotor speed",
@@ -71,7 +71,7 @@ def hold(parameters, memory, measurement, command):
 
 
 class HeldCommand(CompiledController):
-    """Law of controller=None, which leaves the command unchanged."""
+    """Keeps the command unchanged: the control law of controller=None."""
 
     kernel = staticmethod(hold)
     information: tuple[str, ...] = ("generator_torque", "blade_pitch")
@@ -83,7 +83,7 @@ class HeldCommand(CompiledController):
             self.information += ("blade_pitch_1", "blade_pitch_2", "blade_pitch_3")
 
     def reset(self, measurement: Measurement) -> None:
-        """Start a law without memory."""
+        """Do nothing: the control law has no memory."""
 
 
 def check_period(name: str, value: float) -> None:
@@ -92,9 +92,9 @@ def check_period(name: str, value: float) -> None:
 
 
 def steps_in(name: str, period: float, dt: float, step: str = "dt") -> int:
-    """Return the number of steps of dt (s), called step, in a period.
+    """Return the number of steps of dt in a period, s; step and name: their names in messages.
 
-    Raises: InputError if dt does not divide it.
+    Raises: InputError if dt does not divide the period.
     """
     check_period(name, period)
     check_period(step, dt)
@@ -105,7 +105,7 @@ def steps_in(name: str, period: float, dt: float, step: str = "dt") -> int:
 
 
 def check_duration(scene: Scene, duration: float) -> None:
-    """Refuse a run that is longer than the scene's random or recorded weather."""
+    """Raise InputError for a run longer than the scene's random or recorded weather."""
     limit = scene.options["duration"]
     aero, hydro = scene.model.aero, scene.model.hydro
     waves: Any = None if hydro is None else hydro.waves
@@ -133,19 +133,19 @@ def check_duration(scene: Scene, duration: float) -> None:
 
 
 def check_memory(scene: Scene, duration: float, output_dt: float) -> None:
-    """Refuse a run whose table this machine cannot hold. Raises: InputError."""
+    """Raise InputError for a run whose table does not fit into the memory of this machine."""
     rows, columns = round(duration / output_dt) + 1, len(scene.channels)
     needed, most = 8.0 * rows * columns, MOST_MEMORY * physical_memory()
     if needed > most:
         raise InputError(
             f"duration = {duration:g} s: a table of {rows} rows of {columns} channels takes"
-            f" {needed / GIB:.3g} GiB, and {most / GIB:.3g} GiB are allowed here: take a longer output_dt"
-            f" (now {output_dt:g} s), or several runs"
+            f" {needed / GIB:.3g} GiB, and {most / GIB:.3g} GiB are allowed here: use a longer output_dt"
+            f" (now {output_dt:g} s) or several runs"
         )
 
 
 def physical_memory() -> float:
-    """Bytes of memory that this machine has; inf where it does not say."""
+    """Return the physical memory of this machine in bytes; inf if unknown."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError, OSError):
@@ -171,12 +171,12 @@ def simulate(
     """Simulate one run and return its DataFrame, with columns named as in OpenFAST (`PtfmPitch_[deg]`).
 
     scene       result of build_scene: a platform in its wind and sea
-    controller  None: rotor speed and blade pitch are kept at the trim (at rest without wind); a
-                name of a built-in one or "module:Class"; an object with
-                reset(measurement) and act(measurement) -> (generator torque N m, blade pitch rad), and
-                prepare(scene) where it needs more than measurements; or a function of the measurement
-                alone that returns this pair. One that commands each blade (control.py) needs a scene
-                with pitch="individual"
+    controller  None: rotor speed and blade pitch are kept at the trim (at rest without wind); the
+                name of a built-in controller or "module:Class"; an object with reset(measurement) and
+                act(measurement) -> (generator torque N m, blade pitch rad), and optionally
+                prepare(scene) for more than measurements; or a function of the measurement alone that
+                returns this pair. A controller that commands each blade (control/protocol.py) needs a
+                scene with pitch="individual"
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
@@ -185,7 +185,7 @@ def simulate(
                 {"start": "zero", ...}
     progress    True shows a bar; a callable is called with the fraction done
     protection  trips by overspeed, overpower, tower-top acceleration and pitch deviation: "turbine" for those
-                of the turbine file, a mapping of its [protection] keys that replace single ones of these
+                of the turbine file, a mapping of its [protection] keys that override individual entries
                 (False: no such trip), a Protection (fowt_env.descriptions.protection), or "end_at_overspeed",
                 which ends the run at a rotor speed above the overspeed of the turbine file. From a trip on
                 controller commands are ignored and the blades feather to the drive's maximum: in an emergency
@@ -203,28 +203,27 @@ def simulate(
 
     A controller reads what its `information` declares and nothing else (fowt_env.control).
 
-    The generator torque stays within [0, max_torque] of the turbine file and moves in a control period at
-    most as far as its max_torque_rate allows, whatever is commanded: GenTq is the torque in force, and
-    GenTqLim is 1 while it differs from the command.
+    The generator torque is limited to [0, max_torque] of the turbine file and its rate to max_torque_rate:
+    GenTq is the torque in force, and GenTqLim is 1 while GenTq differs from the command.
 
     Columns have their unit in the name, as in OpenFAST's files: frame["RotSpeed_[rpm]"];
-    frame.filter(like="RotSpeed") finds one without it. attrs["events"] of the DataFrame: {name: count} of
-    what the plant met outside its usual range (fowt_env.plant.events), of those that happened.
-    attrs["doubtful_commands"]: the warning about commands that can hardly be in N m and rad, "" for none.
-    attrs["torque_limited"]: time (s) for which the generator torque was not the commanded one.
-    attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: the trip
-    that did, as "overspeed"; attrs["stop"]: "normal" or "emergency" where the turbine was being stopped at
-    the end, by a trip or a fault, else None; attrs["ratings"]: rated rotor speed, overspeed, rated power and
-    rated wind speed of the turbine (descriptions.ratings), which plots mark.
+    frame.filter(like="RotSpeed") selects a column without the unit. attrs["events"] of the DataFrame:
+    {name: count} of events outside the usual range of the plant's models (fowt_env.plant.events), without
+    zeros. attrs["doubtful_commands"]: the warning about commands implausible in N m and rad, "" for none.
+    attrs["torque_limited"]: time (s) for which the generator torque differed from the command.
+    attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: name of
+    that trip, such as "overspeed"; attrs["stop"]: "normal" or "emergency" if a trip or a fault was stopping
+    the turbine at the end, else None; attrs["ratings"]: rated rotor speed, overspeed, rated power and rated
+    wind speed of the turbine (descriptions.ratings), marked in plots.
 
-    Warns (PlantWarning) once of commands that can hardly be in N m and rad; and at the end of a run whose
-    loads were less accurate for its events, whose rotor exceeds the overspeed, or whose torque was limited
-    for half of the time (these two where nothing stops the turbine and there are no faults).
+    Warns (PlantWarning) once of commands implausible in N m and rad; and at the end of a run with events that
+    made loads less accurate and, if no fault or protection stops the turbine, with a rotor above overspeed or
+    a generator torque limited for half of the time.
 
-    Raises: InputError before anything runs (ControllerInputError where the controller raised it, whenever
-    that is); SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a
-    non-finite state or command or, where it is to stop there, overspeed; ControllerError if a controller
-    returns anything but two finite numbers or reads what it does not declare.
+    Raises: InputError before anything runs (ControllerInputError at any time if the controller raised it);
+    SimulationStopped (with the rows so far) on capsize, a numerical blow-up, a non-finite state or command
+    or a trip whose stop is "end"; ControllerError if a controller returns anything but finite numbers or
+    reads undeclared information.
     """
     for name in replaced:
         if name in REPLACED:
@@ -245,16 +244,16 @@ def simulate(
     limits = read_protection(protection, turbine.protection, turbine.overspeed / turbine.rated_rotor_speed)
     chain = sensors_of(sensors, scene.turbine)
     without_controller = controller is None
-    wrong = read_faults(faults)
-    if without_controller and wrong:
+    listed = read_faults(faults)
+    if without_controller and listed:
         raise InputError(
-            f"faults: {wrong[0].kind}: faults need a controller; with controller=None rotor speed and blade"
+            f"faults: {listed[0].kind}: faults need a controller; with controller=None rotor speed and blade"
             " pitch are constant"
         )
     if not without_controller:
         controller = make(controller, scene.turbine, control_dt)
         check_pitches(controller, scene.model.pitches is not None)
-        with _controllers_own():
+        with _controller_errors():
             controller.prepare(known_scene(scene if nominal is None else nominal, controller))
     x, u = initial_state(scene, initial)
     if without_controller:
@@ -265,18 +264,18 @@ def simulate(
     external = not isinstance(controller, CompiledController)
     schedule = Schedule(float(dt), per_control, per_output, last, bool(controller.individual), external)
     period = per_control * dt
-    guard = guard_of(scene, limits, wrong, period)
+    guard = guard_of(scene, limits, listed, period)
     periods = -(-last // per_control)
     interface = build_interface(scene, controller, guard, chain, preview, period, periods)
     run = Run(scene, controller, x, u, schedule, interface)
-    with _bar(progress) as report, _controllers_own():
+    with _bar(progress) as report, _controller_errors():
         run.advance(report)
     frame = run.frame()
     sentences = [harm(frame.attrs["events"])]
-    if not (without_controller or wrong):
+    if not (without_controller or listed):
         sentences += run.out_of_bounds(frame.attrs)
-    if found := ". ".join(f"{text[0].upper()}{text[1:]}" for text in sentences if text):
-        warnings.warn(f"{scene.label}: {found}", PlantWarning, stacklevel=level_outside())
+    if message := ". ".join(f"{text[0].upper()}{text[1:]}" for text in sentences if text):
+        warnings.warn(f"{scene.label}: {message}", PlantWarning, stacklevel=level_outside())
     return frame
 
 
@@ -284,8 +283,8 @@ KEYWORDS = tuple(name for name in inspect.signature(simulate).parameters if name
 
 
 @contextmanager
-def _controllers_own():
-    """An InputError raised inside becomes a ControllerInputError with the same words."""
+def _controller_errors():
+    """Return a context that turns an InputError into a ControllerInputError with the same message."""
     try:
         yield
     except InputError as error:
@@ -293,7 +292,7 @@ def _controllers_own():
 
 
 class Run:
-    """One run of a scene in chunks, with the control law inside the compiled loop if it is compiled."""
+    """Runs a scene in chunks, with the control law inside the compiled loop if it is compiled."""
 
     def __init__(self, scene, controller, x, u, schedule, interface):
         self.scene = scene
@@ -338,15 +337,15 @@ class Run:
             raise
 
     def _begin(self, step):
-        """Begin the control period of a step. Returns whether the turbine is being stopped."""
+        """Begin the control period of a step; return whether the turbine is being stopped."""
         return begin_command(self.handle, self.x, self.u, self.linked, self.schedule, step)
 
     def _reading(self):
-        """Return the reading of the present control instant as the controller's view."""
+        """Return the readings at the current control instant as the controller's view."""
         return self.view(self.link.law_reading.tolist())
 
     def _command(self, step):
-        """Take the command of a controller in Python at a step, unless the turbine is being stopped."""
+        """Store the command of a Python controller at a step, unless the turbine is being stopped."""
         if self._begin(step):
             return
         command = self.controller.act(self._reading())
@@ -375,7 +374,7 @@ class Run:
         raise SimulationStopped(f"stopped at t = {time:.3f} s: {reason}", reason, time, self.frame())
 
     def frame(self):
-        """Return the rows so far in channel units, which are overwritten."""
+        """Return the DataFrame of the rows so far; the rows are overwritten by channel units."""
         period = self.schedule.per_output * self.schedule.dt
         frame = run_frame(self.scene, self.rows[: self.filled], self.data.counters, self.link.watch, period)
         if not self.schedule.external and self.units.is_little(self.u[Command.GENERATOR_TORQUE]):
@@ -388,10 +387,10 @@ class Run:
         """Return warnings about overspeed or torque saturation at the end of an unprotected run."""
         if attrs["stop"] is not None:
             return []
-        found, turbine = [], self.scene.turbine
+        texts, turbine = [], self.scene.turbine
         speed, duration = float(self.x[State.ROTOR_SPEED]), self.schedule.last * self.schedule.dt
         if speed > turbine.overspeed:
-            found.append(
+            texts.append(
                 f"the rotor turns at {speed / RPM:.4g} rpm at the end, above the overspeed of"
                 f" {turbine.overspeed / RPM:.4g} rpm in the turbine file (protection='end_at_overspeed' ends"
                 " the run there, protection='turbine' stops the turbine)"
@@ -399,17 +398,17 @@ class Run:
         limited = attrs["torque_limited"]
         if limited >= max(1.0, LIMITED * duration) and not self.units.said:
             law = turbine.torque_law
-            found.append(
+            texts.append(
                 f"the generator torque was limited for {limited:.4g} of {duration:.4g} s: controller"
                 f" {self.controller.name!r} commanded less than 0 or more than"
                 f" {law.max_torque * 1e-3:.4g} kN m, or changes faster than"
                 f" {law.max_torque_rate * 1e-3:.4g} kN m/s (GenTqLim)"
             )
-        return found
+        return texts
 
 
 class _bar:
-    """Return a context with a callable of the fraction done: of no effect, rich's bar or the user's."""
+    """Provides a context with a callable of the fraction done: a no-op, rich's bar or the user's."""
 
     def __init__(self, progress):
         self.progress = progress

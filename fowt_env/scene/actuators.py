@@ -1,4 +1,4 @@
-"""Actuators of a scene: pitch drives and the lag of the generator, their states, and how they rest."""
+"""Builds the actuators of a scene, pitch drives and generator lag, and sets their states to rest."""
 
 from math import inf
 
@@ -9,7 +9,7 @@ from fowt_env.plant.state import BLADES, Command
 
 
 def build_actuator(pitch_drive, first_state, blades):
-    """Actuator of a descriptions.turbine.PitchDrive, of so many blades with states from first_state on."""
+    """Return the actuator of a description's PitchDrive for `blades` blades, states from first_state on."""
     if pitch_drive.natural_frequency is None:
         return build_pitch_actuator(pitch_drive)
     limit = pitch_drive.acceleration_limit
@@ -28,7 +28,7 @@ def build_actuator(pitch_drive, first_state, blades):
 
 
 def build_converter(drivetrain, first_state):
-    """TorqueLag of a descriptions.turbine.Drivetrain with its state at first_state; None without a lag."""
+    """Return the TorqueLag of a description's Drivetrain, state at first_state; None without a lag."""
     if drivetrain.torque_time_constant is None:
         return None
     return TorqueLag(float(drivetrain.torque_time_constant), first_state)
@@ -38,12 +38,12 @@ def drive_states(actuator, pitches):
     """Return {name of a block: number of states} of a pitch actuator."""
     blades = 1 if pitches is None else BLADES
     moving = isinstance(actuator, PitchDrive)
-    held = moving and actuator.held is not None
-    return {"pitch_rate": blades if moving else 0, "followed_pitch": blades if held else 0}
+    deadband = moving and actuator.held is not None
+    return {"pitch_rate": blades if moving else 0, "followed_pitch": blades if deadband else 0}
 
 
 def rest_actuators(model, x, u):
-    """Set what actuators have of the state x to rest at the command u, blade pitches aside."""
+    """Set the actuator states in x to rest at the command u, except the blade pitches."""
     actuator, blades = model.actuator, 1 if model.pitches is None else BLADES
     if isinstance(actuator, PitchDrive):
         x[actuator.rate : actuator.rate + blades] = 0.0
@@ -54,7 +54,7 @@ def rest_actuators(model, x, u):
 
 
 def linear_actuator(actuator):
-    """Return the actuator as a linear model has it: without deadband and friction."""
+    """Return the actuator of a linear model: without deadband and friction."""
     if not isinstance(actuator, PitchDrive):
         return actuator
     return actuator._replace(deadband=0.0, friction=0.0)

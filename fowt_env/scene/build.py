@@ -1,4 +1,4 @@
-"""From descriptions to a scene: everything that a run needs, checked, typed and built once."""
+"""Builds a scene from descriptions: checks, types and assembles all parts of a run once."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -54,20 +54,20 @@ def build_scene(
     sea       None: still water; a named sea state (`fowt list seas`); "jonswap:4:9" (Hs, Tp), "regular:3:5"
               (H, T); a path to a TOML file; or a dict with "kind": regular, jonswap, pierson_moskowitz,
               components
-    seed      of everything random: the same seed gives the same bits
+    seed      of all random processes: equal seeds give bit-identical results
     rotor     "bem": blade-element momentum solved at every blade and station; "lookup": the same sweep
-              from a table per station; "table": the whole rotor as one table. None: the fidelity's
+              from a table per station; "table": the whole rotor as one table. None: that of the fidelity
     fidelity  "standard": every blade and station by look-up, fast wave sums, Adams-Bashforth 4 (in a box of
               wind with three rotor loads per step), within 1e-3 of "reference" and a thousand times faster;
               "reference": everything solved exactly, Runge-Kutta 4, some 20 times real time; "fast": the
               rotor as one table
-    loads     further loads on platform and tower, defined by the user (fowt_env.Load)
-    options   see OPTIONS; a platform file may set other defaults. planar: surge, heave and platform pitch
-              alone move; of ntm and etm turbulence the part in the plane is kept
+    loads     additional user-defined loads on platform and tower (fowt_env.Load)
+    options   see OPTIONS; a platform file may set other defaults. planar: only surge, heave and platform
+              pitch move; ntm and etm turbulence is reduced to its components in the plane
 
-    Raises: InputError naming the key, the value and what is allowed. Warns (PlantWarning), once, of places of
-    the platform that can hardly be meant (`fowt check` says more), of waves steeper than breaking ones, and
-    of a mean wind in which the turbine does not operate.
+    Raises: InputError naming the key, the value and what is allowed. Warns (PlantWarning), once, of
+    implausible positions of the platform (details: `fowt check`), of waves above the breaking limit, and of a
+    mean wind in which the turbine does not operate.
     """
     label = platform.name if isinstance(platform, Platform) else str(platform)
     if not isinstance(platform, Platform):

@@ -1,4 +1,4 @@
-"""Names of output channels as users write them: RotSpeed, or RotSpeed_[rpm] as the column of a table."""
+"""Reads names of output channels with or without unit: RotSpeed, or the column name RotSpeed_[rpm]."""
 
 from typing import Any
 
@@ -9,9 +9,9 @@ UNITS = {channel.name: channel.unit for channel in (*FIXED_CHANNELS, *BLADE_CHAN
 
 
 def channel_name(name: Any) -> Any:
-    """Return the bare name of a channel: "RotSpeed" of "RotSpeed_[rpm]"; what is no text as it is.
+    """Return the bare name of a channel: "RotSpeed" of "RotSpeed_[rpm]"; other objects unchanged.
 
-    Raises: InputError for a unit other than the channel's own.
+    Raises: InputError for a unit other than that of the channel.
     """
     if not isinstance(name, str) or "_[" not in name:
         return name
@@ -23,5 +23,5 @@ def channel_name(name: Any) -> Any:
 
 
 def channel_unit(name: str) -> str:
-    """Return the unit of a channel by its bare name; "" for the loads of a user, which other parts know."""
+    """Return the unit of a channel by its bare name; "" for user-defined loads."""
     return "kN" if name.startswith(("FAIRTEN", "ANCHTEN")) else UNITS.get(name, "")

@@ -6,20 +6,20 @@ import numpy as np
 
 from fowt_env.errors import warn_once
 
-WIDE = 4.0  # of the hull's reach from the tower axis, where a fairlead is odd
-LOW = 1.2  # of the draft
-ABOVE_BED = 0.1  # of the water depth, between an anchor and the sea bed
-STRAIN = 0.05  # of a line, twice what breaks chain and wire
-UPRIGHT = 0.2  # horizontal over vertical span of a tendon, whose anchor may lie anywhere below
+WIDE = 4.0  # fairlead radius over the hull's reach, both from the tower axis, above which to warn
+LOW = 1.2  # fairlead depth over draft, above which to warn
+ABOVE_BED = 0.1  # height of an anchor above the sea bed over water depth, above which to warn
+STRAIN = 0.05  # of a line, twice the breaking strain of chain and wire
+UPRIGHT = 0.2  # largest horizontal over vertical span of a tendon, whose anchor may be anywhere below
 
 
 def geometry_faults(platform):
-    """Return {name: sentence} of what can hardly be meant in a Platform's places; empty where nothing is."""
+    """Return {name: sentence} of the implausible positions of a Platform; empty if there are none."""
     return _line_faults(platform) | _member_faults(platform)
 
 
 def warn_of_geometry(platform, label):
-    """Warn, once per platform, of what geometry_faults finds."""
+    """Warn, once per platform, of the faults of geometry_faults."""
     faults = geometry_faults(platform)
     if not faults:
         return
@@ -29,7 +29,7 @@ def warn_of_geometry(platform, label):
 
 
 def in_radians(anchors, fairleads):
-    """Azimuths, deg, of several anchors (n, 3) that look like radians taken for degrees; None otherwise."""
+    """Return the azimuths (deg) of anchors (n, 3) that look like radians read as degrees; None otherwise."""
     if len(anchors) < 2 or any(
         dist(a[:2], f[:2]) < UPRIGHT * abs(a[2] - f[2]) for a, f in zip(anchors, fairleads, strict=True)
     ):
@@ -40,7 +40,7 @@ def in_radians(anchors, fairleads):
 
 
 def _reach(platform):
-    """Return the largest distance of the hull from the tower axis, m; None where the file does not say it."""
+    """Return the largest distance of the hull from the tower axis, m; None if the file does not define it."""
     reach = [0.5 * diameter for diameter in platform.hull.diameter] if platform.hull is not None else []
     for member in platform.members:
         ends = zip((member.start, member.end), member.diameter, strict=True)
@@ -49,8 +49,8 @@ def _reach(platform):
 
 
 def _line_faults(platform):
-    """Return {name: sentence} of the first line of each fault."""
-    found, depth = {}, platform.environment.water_depth
+    """Return {name: sentence} of the faults of mooring lines, each for its first line."""
+    sentences, depth = {}, platform.environment.water_depth
     reach, draft = _reach(platform), platform.draft
     for number, line in enumerate(platform.lines, 1):
         (x, y, z), anchor = line.fairlead, line.anchor
@@ -73,24 +73,24 @@ def _line_faults(platform):
             ),
             "anchor inside": (
                 hypot(*anchor[:2]) < out and span > UPRIGHT * rise,
-                f"the anchor of line {number} is nearer to the tower axis than its fairlead,"
+                f"the anchor of line {number} is closer to the tower axis than its fairlead,"
                 f" {span:.4g} m from it",
             ),
         }
-        found |= {name: text for name, (wrong, text) in faults.items() if wrong and name not in found}
-    return found
+        sentences |= {name: text for name, (wrong, text) in faults.items() if wrong and name not in sentences}
+    return sentences
 
 
 def _member_faults(platform):
-    """Return {name: sentence} of the members."""
-    found, depth = {}, platform.environment.water_depth
+    """Return {name: sentence} of the faults of members."""
+    sentences, depth = {}, platform.environment.water_depth
     for number, member in enumerate(platform.members, 1):
         low = min(member.start[2], member.end[2])
         if low < -depth:
-            found.setdefault(
+            sentences.setdefault(
                 "sea bed",
                 f"member {number} reaches down to z = {low:.4g} m, below the sea bed at {-depth:g} m",
             )
     if platform.members and all(min(member.start[2], member.end[2]) >= 0.0 for member in platform.members):
-        found["dry"] = f"all {len(platform.members)} members lie above the water, where they have no load"
-    return found
+        sentences["dry"] = f"all {len(platform.members)} members lie above the water, where they have no load"
+    return sentences

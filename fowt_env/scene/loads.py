@@ -8,17 +8,17 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class LoadFacts(NamedTuple):
-    """What is known of a load."""
+    """Holds the facts about a load."""
 
     summary: str
-    file: str  # of fowt_env/plant, with its equation
+    file: str  # in fowt_env/plant, implements the equation
     section: str  # of docs/explanation/theory.md
-    slot: str | None  # path in plant.model.Model that is None where it is absent; None: always there
-    total: str  # entry of plant.model.LoadCache that holds it beside others of its kind
-    without: Mapping[str, Any] = NOTHING  # arguments of build_scene that leave it out
-    keys: tuple[str, ...] = ()  # or keys of the platform file, all of them zero
-    strength: tuple[str, ...] = ()  # paths in the model, of those that it has: all at zero, so is the load
-    mirrored: bool = True  # whether a mirrored state and weather give the mirrored load
+    slot: str | None  # path in plant.model.Model that is None without the load; None: always present
+    total: str  # entry of plant.model.LoadCache that includes the load
+    without: Mapping[str, Any] = NOTHING  # arguments of build_scene that disable the load
+    keys: tuple[str, ...] = ()  # or keys of the platform file, all zero
+    strength: tuple[str, ...] = ()  # paths in the model (if present): the load is zero if all are
+    mirrored: bool = True  # whether mirrored state and weather give the mirrored load
 
 
 EXCITATION = (
@@ -50,7 +50,7 @@ LOADS = {
         ),
     ),
     "waves": LoadFacts(
-        "motion and pressure of the water that strips and keel meet; without it the water is still",
+        "motion and pressure of the water at strips and keel; without it the water is still",
         "hydro/waves.py", "5.4", "hydro.waves", "HYDRO", {"sea": None},
         strength=(
             "hydro.waves.amplitude", "hydro.waves.velocity", "hydro.strips.bands.weight", *EXCITATION,
@@ -61,7 +61,7 @@ LOADS = {
         "hydro/diffraction.py", "5.4", "hydro.strips.diffraction", "HYDRO", {"diffraction": "none"},
     ),
     "current": LoadFacts(
-        "steady velocity of the water that strips meet",
+        "steady velocity of the water at the strips",
         "hydro/morison.py", "5.4", "hydro.current", "HYDRO", {"current": None},
         strength=("hydro.current.u", "hydro.current.v"),
     ),
@@ -80,7 +80,7 @@ LOADS = {
         keys=("hydro.added_mass",), strength=("hydro.added_inertia.matrix",),
     ),
     "members": LoadFacts(
-        "buoyancy, fluid inertia, wave pressure and drag on cylinders of any place and direction",
+        "buoyancy, fluid inertia, wave pressure and drag on cylinders of any position and direction",
         "hydro/members.py, hydro/member_buoyancy.py", "5.10", "hydro.members", "HYDRO", keys=("members",),
         strength=(
             *(f"hydro.members.{name}" for name in ("table", "nodes", "added_mass")),
@@ -96,7 +96,7 @@ LOADS = {
         ),
     ),
     "radiation memory": LoadFacts(
-        "what waves of its own earlier motion do to a potential-flow body",
+        "force on a potential-flow body from waves radiated by its earlier motion",
         "hydro/radiation.py", "5.8", "hydro.radiation", "HYDRO", {"radiation": "none"},
         strength=("hydro.radiation.weight",),
     ),
@@ -106,7 +106,7 @@ LOADS = {
         strength=EXCITATION,
     ),
     "moorings": LoadFacts(
-        "elastic catenaries on the seabed, at rest in the present place",
+        "elastic catenaries on the seabed, quasi-static at the current position",
         "mooring.py", "5.5", "mooring", "MOORING", {"mooring": False},
     ),
     "rotor": LoadFacts(
@@ -115,7 +115,7 @@ LOADS = {
         "5.1", "aero", "ROTOR",
         {"wind": None},
         strength=("aero.rotor.elements.air_density", "aero.rotor.density"),
-        mirrored=False,  # blades turn one way
+        mirrored=False,  # blades rotate in one direction
     ),
     "tower drag": LoadFacts(
         "drag of the wind on the tower",
@@ -123,7 +123,7 @@ LOADS = {
         strength=("aero.tower.factor",),
     ),
     "user loads": LoadFacts(
-        "loads of one's own, `fowt_env.Load`",
+        "user-defined loads, `fowt_env.Load`",
         "user_loads.py", "5.6", "user", "TOTAL", {"loads": ()}, mirrored=False,
     ),
 }  # fmt: skip

@@ -1,4 +1,4 @@
-"""Mass properties of a turbine on its platform, and the points that outputs need."""
+"""Computes mass properties of a turbine on its platform, and the points for outputs."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ SPAN_POINTS = 8  # along a blade, for the mean wind over the blades in the outpu
 
 
 def assemble(bodies):
-    """Return (6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), inertia about it).
+    """Return (6, 6) mass matrix about the body origin of rigid bodies (mass, centre (3,), central inertia).
 
     inertia: (3,) about the body axes, or a (3, 3) tensor.
     """
@@ -31,7 +31,7 @@ def assemble(bodies):
 
 
 def _rotor_body(rotor):
-    """Rotor as (mass, centre, inertia): its centre of mass lies on the shaft, which is a principal axis."""
+    """Return the rotor as (mass, centre, inertia), with the centre on the shaft, a principal axis."""
     shaft = np.array([np.cos(rotor.shaft_tilt), 0.0, -np.sin(rotor.shaft_tilt)])  # downwind
     centre = np.array([-rotor.overhang, 0.0, rotor.hub_height]) + rotor.cm_offset * shaft
     inertia = np.array([rotor.inertia, rotor.inertia_diameter, rotor.inertia_diameter])
@@ -58,7 +58,7 @@ def top_mass_matrix(platform, turbine):
 
 
 def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False, plane=None):
-    """RigidBody part: Eq. (10) from the four rigid bodies. plane: True holds sway, roll and yaw at zero."""
+    """Return the RigidBody, Eq. (10), of the four bodies; plane: True keeps sway, roll and yaw at zero."""
     matrix = assemble(_bodies(platform, turbine))
     if plane is not None and matrix[0, 5] != 0.0:
         left = -matrix[0, 5] / matrix[0, 0]
@@ -84,7 +84,7 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
 
 
 def with_masses(modes, platform, turbine):
-    """Return the TowerModes (or None) with the mass properties of what is below and above the tower's top.
+    """Return the TowerModes (or None) with the mass properties below and above the tower top.
 
     Floater and straight tower are one rigid body, nacelle and rotor another, as in build_rigid_body.
     """
@@ -105,7 +105,7 @@ def with_masses(modes, platform, turbine):
 
 
 def build_blade_masses(platform, turbine):
-    """Return the BladeMasses of a turbine. Raises: InputError if its file does not have them."""
+    """Return the BladeMasses of a turbine. Raises: InputError if the turbine file lacks them."""
     rotor = turbine.rotor
     if rotor.blade_mass is None:
         raise InputError(
@@ -123,7 +123,7 @@ def build_blade_masses(platform, turbine):
 
 
 def build_layout(platform, turbine, individual=False):
-    """Return the layout part: points and masses that outputs need; individual: those of single blades too."""
+    """Return the layout part: points and masses for outputs; individual: including those of single blades."""
     rotor = turbine.rotor
     hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
     return Layout(

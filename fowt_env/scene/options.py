@@ -1,4 +1,4 @@
-"""Options of build_scene: fidelities, rotor models, single parts; their defaults and what is allowed."""
+"""Defines the options of build_scene, with defaults and allowed values, fidelities and rotor models."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
@@ -18,17 +18,17 @@ from fowt_env.weather.second_order import METHODS
 
 
 class RotorModel(NamedTuple):
-    """A model of the rotor, and what is known of it."""
+    """Describes a rotor model."""
 
     summary: str
     build: Callable[[BladeElements, Mapping[str, Any]], Any]  # (elements, options) -> part of the model
-    wake: tuple[str, ...]  # the options of the wake that it takes, of WAKE_OPTIONS
-    full_field: bool  # whether blades meet a box of wind point by point; else its average over the rotor
+    wake: tuple[str, ...]  # entries of WAKE_OPTIONS that the model supports
+    full_field: bool  # whether blades sample a wind box point by point; else the rotor average is used
     error: float  # of a motion or tension at most, rms over its standard deviation: performance.md
 
 
 class Fidelity(NamedTuple):
-    """Parts that a level of fidelity chooses; any of them given explicitly overrides its part."""
+    """Defines the parts of a level of fidelity; an explicit option overrides a part."""
 
     summary: str
     rotor: str
@@ -37,11 +37,11 @@ class Fidelity(NamedTuple):
     mooring: str
     radiation: str
     error: float  # of a motion or tension at most, rms over its standard deviation: performance.md
-    dt: float | None = None  # s, default step with its own integrator; None: that of the integrator
+    dt: float | None = None  # s, default step with this integrator; None: default of the integrator
 
 
 def least_lag(dt, integrator):
-    """Return the shortest time constant (s) of the wake that an integrator follows with the step dt (s)."""
+    """Return the shortest wake time constant (s) that an integrator resolves stably with the step dt (s)."""
     return LAG_MARGIN * dt / INTEGRATORS[integrator].decay_limit
 
 
@@ -61,7 +61,7 @@ def _build_lookup(elements, options):
     return build_section_table(elements)
 
 
-WAKE_OPTIONS = ("dynamic_inflow", "skewed_wake")  # what asks for the induced velocity
+WAKE_OPTIONS = ("dynamic_inflow", "skewed_wake")  # options that need the induced velocity
 ROTORS = {
     "bem": RotorModel(
         "blade-element momentum solved at every blade and station",
@@ -94,20 +94,20 @@ FIDELITIES = {
         error=2e-2,
     ),
 }  # fmt: skip
-# frequency times step, in place of a limit of stability that an integrator lacks: at half of it an undamped
-# oscillation grows as one with a damping ratio of -0.5 % by heun, of -0.04 % by abm4
+# frequency times step, for integrators without a stability limit: at half of this value an undamped
+# oscillation grows with a damping ratio of -0.5 % (heun) or -0.04 % (abm4)
 SLOW_GROWTH = 0.7
-LAG_MARGIN = 1.25  # of the shortest lag over what just does not grow
-FIELD_SAMPLES = 3  # rotor loads per step in a box of wind, whose cells the blades cross in 0.1 s
+LAG_MARGIN = 1.25  # ratio of the shortest lag to the limit of stability
+FIELD_SAMPLES = 3  # rotor loads per step in a wind box, whose cells the blades cross in 0.1 s
 
 
 class Range(NamedTuple):
-    """Numbers that an option may be."""
+    """Defines the range of numbers allowed for an option."""
 
     text: str
     low: float
     high: float
-    low_open: bool = False  # whether the lower end is left out
+    low_open: bool = False  # whether the lower limit is excluded
     whole: bool = False
 
     def __str__(self):
@@ -121,10 +121,10 @@ class Range(NamedTuple):
 
 
 class Option(NamedTuple):
-    """One option of build_scene."""
+    """Defines an option of build_scene."""
 
     default: Any
-    allowed: tuple | Range | str  # the values, or what they are in words
+    allowed: tuple | Range | str  # the values, or their description in words
     summary: str
 
 
@@ -140,20 +140,20 @@ OPTIONS = {
     "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
     "tower_drag": Option(True, (False, True), "wind drag of the tower"),
     "hydrodynamics": Option(True, (False, True), "all loads of the water"),
-    # True: the fidelity's; "table": tensions tabulated about rest, solved beyond
+    # True: that of the fidelity; "table": tensions tabulated about rest, solved outside the table
     "mooring": Option(True, (False, True, "catenary", "table"),
         "lines: catenary solved at each step, a table of tensions, or none"),
     "planar": Option(False, (False, True), "motion in the vertical plane of the wind alone"),
     "pitch": Option("collective", ("collective", "individual"),
-        "blades pitch together, or each by itself (individual pitch control)"),
-    # "second_order": that of [pitch_drive.second_order] of the turbine file; "file": the file's [pitch_drive]
+        "blades pitch together, or independently (individual pitch control)"),
+    # "second_order": [pitch_drive.second_order] of the turbine file; "file": [pitch_drive] of the file
     "pitch_drive": Option("file", ("file", "second_order"),
         "first-order drive of the turbine file, or its second-order one"),
-    # bending of the tower: none, or its first mode or first two in each direction ([tower.modes] of the file)
+    # tower bending: none, or the first one or two modes in each direction ([tower.modes] of the file)
     "tower": Option("rigid", ("rigid", "modes", "modes2"),
         "rigid, or with one or two bending modes in each direction"),
     "integrator": Option(None, (None, *INTEGRATORS), "time stepping; None: the fidelity's"),
-    # of the rotor's load per step, of an integrator that samples it; None: FIELD_SAMPLES in a box, else 1
+    # of the rotor load per step; None: FIELD_SAMPLES in a wind box with an integrator that samples it, else 1
     "rotor_samples": Option(None, Range("None or a number of samples, 1 to 10", 1, 10, whole=True),
         "rotor loads per step of an integrator that samples them"),
     "wave_loads": Option(None, (None, "exact", "fast"),
@@ -162,49 +162,49 @@ OPTIONS = {
         "radiation memory of a potential-flow body; None: the fidelity's"),
     "radiation_error": Option(0.02, Range(
         "rms error of each entry of the state space over its rms, 0.001 to 0.5", 0.001, 0.5),
-        "of the state space fitted to the radiation memory"),
-    "current": Option(None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}", "of the water"),
+        "error of the state space fitted to the radiation memory"),
+    "current": Option(None, "None, a speed (m/s) or {'speed', 'heading' (deg), 'exponent'}", "water current"),
     "excitation_position": Option("undisplaced", ("undisplaced", "filtered"),
-        "where waves meet a potential-flow body: at rest, or behind its slow drift"),
-    "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "of that low pass"),
+        "where waves act on a potential-flow body: at rest, or following its slow drift"),
+    "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "low-pass cut-off of the drift"),
     "second_order": Option(None, (None, "none", *METHODS),
         "difference-frequency wave forces of a potential-flow body"),
     "second_order_cutoff": Option(None, Range("None or rad/s, > 0", 0.0, 100.0, low_open=True),
-        "differences above it make no force"),
+        "difference frequency above which the force is zero"),
     "duration": Option(700.0, Range("seconds of random wind and sea, > 0", 0.0, 1e6, low_open=True),
-        "for which random wind and sea are made"),
+        "length of random wind and sea"),
     "wave_components": Option(None, Range(
         "None or a number of components, 1 to 10000", 1, 10_000, whole=True),
-        "of an irregular sea; None: as many as the duration needs"),
+        "components of an irregular sea; None: as many as the duration requires"),
     "blade_stations": Option(None, "None (the turbine file's) or a number of them, 3 up to the file's",
-        "of the rotor model"),
+        "blade stations of the rotor model"),
     "strip_length": Option(None, Range(
         "None (fraction of the draft) or metres, 0.01 to 1000: cells of exact wave loads", 0.01, 1e3),
-        "of the hull's strips"),
+        "length of the hull's strips"),
     "shear_exponent": Option(None, Range("None (the platform file's) or 0 to 1", 0.0, 1.0),
-        "of the power-law wind profile"),
+        "exponent of the power-law wind profile"),
     "turbine": Option(None, "None (the platform file's), a name, a path or a descriptions.turbine.Turbine",
-        "in place of the platform's"),
+        "replaces the turbine of the platform"),
 }  # fmt: skip
-# defaults of a floater that is no slender spar: linear theory knows it in its undisplaced pose alone
+# defaults of a floater other than a slender spar: linear theory is valid for the undisplaced pose only
 UNDISPLACED = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none"}
-ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # of build_scene beside OPTIONS
+ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # and OPTIONS
 
 
 def choose_parts(fidelity, rotor, options):
-    """Rotor model of a fidelity, with the other parts filled into options where they were left open."""
+    """Return the rotor model of a fidelity, and set the other unspecified parts in options."""
     if fidelity not in tuple(FIDELITIES):  # which may be unhashable
         raise unknown("fidelity", fidelity, FIDELITIES)
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in tuple(ROTORS):
         raise unknown("rotor model", rotor, ROTORS)
-    # not every table has what a wake needs; a level falls back to what has it, an explicit choice is rejected
-    wanted = [name for name in WAKE_OPTIONS if options[name]]
-    able = [name for name, model in ROTORS.items() if set(wanted) <= set(model.wake)]
+    # not all models support a wake: a fidelity falls back to one that does, an explicit choice is rejected
+    required = [name for name in WAKE_OPTIONS if options[name]]
+    able = [name for name, model in ROTORS.items() if set(required) <= set(model.wake)]
     if rotor is not None and rotor not in able:
-        lacking = " and ".join(name for name in wanted if name not in ROTORS[rotor].wake)
+        lacking = " and ".join(name for name in required if name not in ROTORS[rotor].wake)
         need = " or ".join(repr(name) for name in able)
-        raise InputError(f"rotor = {rotor!r}: it has no {lacking}, which needs rotor = {need}")
+        raise InputError(f"rotor = {rotor!r}: does not support {lacking}, which needs rotor = {need}")
     options["fidelity"] = fidelity
     options["explicit_wave_loads"] = options["wave_loads"] is not None
     for part in ("wave_loads", "integrator", "radiation"):
@@ -218,32 +218,32 @@ def choose_parts(fidelity, rotor, options):
 
 
 def default_step(options, fastest=0.0):
-    """Default physics step (s): that of the fidelity with its own integrator, else that of the integrator.
+    """Return the default physics step (s) of the fidelity with its integrator, or of another integrator.
 
     fastest: largest natural frequency of the structure, rad/s. The step is halved until it is within half
-    the integrator's limit for an undamped oscillation.
+    the integrator's stability limit of an undamped oscillation.
     """
     level, method = FIDELITIES[options["fidelity"]], INTEGRATORS[options["integrator"]]
-    own = level.dt is not None and options["integrator"] == level.integrator
-    dt = level.dt if own else method.dt
+    default = level.dt is not None and options["integrator"] == level.integrator
+    dt = level.dt if default else method.dt
     while dt * fastest > 0.5 * (method.oscillation_limit or SLOW_GROWTH):
         dt *= 0.5
     return dt
 
 
-def checked_options(given, platform):
-    """Return the options with defaults, the platform file's own ones and the caller's, checked."""
+def checked_options(overrides, platform):
+    """Return the checked options: defaults, overridden by the platform file, then by the caller."""
     options = {name: option.default for name, option in OPTIONS.items()}
     if platform.hull is None:
         options |= UNDISPLACED
     for source, values in (
         (f"platform {platform.name!r}, options", platform.options),
-        ("build_scene", given),
+        ("build_scene", overrides),
     ):
         for name, value in values.items():
             if name not in OPTIONS:
-                own = () if values is platform.options else ARGUMENTS
-                raise unknown(f"option of {source}", name, (*OPTIONS, *own))
+                arguments = () if values is platform.options else ARGUMENTS
+                raise unknown(f"option of {source}", name, (*OPTIONS, *arguments))
             allowed = OPTIONS[name].allowed
             if type(allowed) is tuple and not any(value is a or value == a for a in allowed):
                 raise InputError(f"{name} = {value!r}: allowed {', '.join(repr(a) for a in allowed)}")
@@ -255,22 +255,22 @@ def checked_options(given, platform):
 
 
 def samples_per_step(options, field):
-    """Return the evaluations of the rotor's load per step."""
-    asked, integrator = options["rotor_samples"], options["integrator"]
+    """Return the number of evaluations of the rotor load per step. Raises: InputError."""
+    count, integrator = options["rotor_samples"], options["integrator"]
     able = INTEGRATORS[integrator].samples_rotor
-    if asked not in (None, 1) and not able:
+    if count not in (None, 1) and not able:
         some = " or ".join(repr(name) for name, method in INTEGRATORS.items() if method.samples_rotor)
         raise InputError(
-            f"rotor_samples = {asked}: only integrator = {some} evaluates the rotor more than once a step,"
+            f"rotor_samples = {count}: only integrator = {some} evaluates the rotor more than once a step,"
             f" not {integrator!r}"
         )
-    if asked is None:
-        asked = FIELD_SAMPLES if field is not None and able else 1
-    return asked
+    if count is None:
+        count = FIELD_SAMPLES if field is not None and able else 1
+    return count
 
 
 def chosen_stations(count, turbine):
-    """Return the indices of that many of the file's blade stations, root and tip among them; None: all."""
+    """Return the indices of `count` of the file's blade stations, including first and last; None: all."""
     if count is None:
         return None
     known = len(turbine.blade.radius)

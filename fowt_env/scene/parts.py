@@ -44,7 +44,7 @@ def wake_states(aero):
 
 
 def build_elements(turbine, density, count):
-    """Return the BladeElements of a turbine with that many of its stations; None: all. Raises: InputError."""
+    """Return the BladeElements of a turbine with `count` of its stations; None: all. Raises: InputError."""
     stations = chosen_stations(count, turbine)
     if stations is None or not is_curved(turbine):
         return build_blade_elements(turbine, density, stations)
@@ -63,7 +63,7 @@ def build_aero(platform, turbine, air, rotor, options):
 def build_blade_pitches(turbine, rotor, first_state):
     """Return BladePitches of a rotor whose blades have individual pitch, with states from first_state on.
 
-    Raises: InputError for another number of blades, and for a rotor model that knows one pitch alone.
+    Raises: InputError for another number of blades, and for a rotor model with one pitch only.
     """
     if turbine.rotor.blades != BLADES:
         raise InputError(
@@ -73,14 +73,14 @@ def build_blade_pitches(turbine, rotor, first_state):
     if not ROTORS[rotor].full_field:
         able = " or ".join(repr(name) for name, model in ROTORS.items() if model.full_field)
         raise InputError(
-            f"rotor = {rotor!r}: is a table of the whole rotor at one blade pitch; pitch = 'individual' needs"
+            f"rotor = {rotor!r}: tabulates the whole rotor at one blade pitch; pitch = 'individual' needs"
             f" rotor = {able}"
         )
     return BladePitches(first_state)
 
 
 def build_hydro(platform, waves, current, options, dt, first_state=N_RIGID):
-    """Return the Hydro of a scene with time step dt (s); states of waves and memory begin at first_state."""
+    """Return the Hydro of a scene with time step dt (s); states of waves and memory start at first_state."""
     site, spar, kinematics = platform.environment, platform.hull is not None, _kinematics(platform, options)
     strips, water = None, (site.water_density, site.gravity)
     if spar:
@@ -108,9 +108,9 @@ def build_hydro(platform, waves, current, options, dt, first_state=N_RIGID):
 
 
 def hydro_in_waves(hydro, waves, platform, options):
-    """Return the hydro of a scene with a sea in other waves (None: still water) of the same types.
+    """Return the Hydro of a scene with other waves (None: still water), with parts of the same types.
 
-    Raises: InputError for a sea beyond the fast path.
+    Raises: InputError for a sea that the fast path does not support.
     """
     waves = _flat_waves_of(platform) if waves is None else waves
     strips, excitation = hydro.strips, still_excitation(hydro.excitation)
@@ -130,9 +130,9 @@ def hydro_in_waves(hydro, waves, platform, options):
 
 
 def still_hydro(hydro, platform, options):
-    """Return the Hydro of a scene with a sea in flat water: the same types and strip nodes.
+    """Return the Hydro of a scene with flat water, with parts of the same types and the same strip nodes.
 
-    One component of zero height represents the water; it is summed, which is faster than a table.
+    Flat water is one wave component of zero height; the sum is faster than a table.
     """
     waves = _flat_waves_of(platform)
     return hydro._replace(
@@ -151,7 +151,7 @@ def _flat_waves_of(platform):
 def excitation_in_waves(platform, waves, options, first_state):
     """Return the Excitation of a potential-flow body in waves, with states from first_state; None without.
 
-    Raises: InputError for a sea beyond the body's coefficients, or second order without a QTF.
+    Raises: InputError for a sea outside the range of coefficients, or second order without a QTF.
     """
     body, second = platform.potential_flow, options["second_order"]
     if second not in (None, "none") and (body is None or body.difference_qtf is None):
@@ -173,7 +173,7 @@ def _refinement(waves):
 
 
 def strips_in_waves(strips, waves, options):
-    """Return the strips in waves (None: still water). Raises: InputError for a sea beyond the fast path."""
+    """Return the strips in waves (None: still water). Raises: InputError if the fast path lacks the sea."""
     if strips is None:
         return None
     diffracting = options["diffraction"] == "maccamy_fuchs" and waves is not None
@@ -190,7 +190,7 @@ def strips_in_waves(strips, waves, options):
 
 
 def takes_wave_bands(options, waves, strips):
-    """Return whether the strip loads are fast; a fidelity falls back to exact ones for unsuitable seas."""
+    """Return whether strip loads use the fast path; a fidelity falls back to exact loads for other seas."""
     if options["wave_loads"] != "fast":
         return False
     if waves is None or can_use_bands(waves, strips):
@@ -204,7 +204,7 @@ def takes_wave_bands(options, waves, strips):
 
 
 def check_symmetry(lines, current, members=()):
-    """Check that lines, current and members of a planar scene are symmetric. Raises: InputError."""
+    """Check the symmetry of lines, current and members of a planar scene. Raises: InputError."""
     if current is not None and abs(current.v) > IN_PLANE * abs(current.u):
         raise InputError("current.heading: must be 0 or 180 deg in a planar scene")
     mirror = np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0, 1.0, 1.0, 1.0, 1.0])
@@ -229,13 +229,13 @@ def check_symmetry(lines, current, members=()):
 
 
 def _shape_of(member):
-    """Return (2, n) values at both ends of a Member."""
+    """Return the (2, n) properties at both ends of a Member."""
     pairs = [np.array(value) for name, value in member if name not in ("start", "end", "potential_flow")]
     return np.column_stack([(member.start, member.end), *pairs, 2 * (float(member.potential_flow),)])
 
 
 def _kinematics(platform, options):
-    """Return the keywords that strips and members share: site, and options of the wave kinematics."""
+    """Return the common keywords of strips and members: site and wave kinematics."""
     site = platform.environment
     return {
         "density": site.water_density, "depth": site.water_depth, "position": options["kinematics_position"],
@@ -251,8 +251,8 @@ def members_in_waves(members, waves, options):
     if waves is None or options["wave_loads"] != "fast" or not still:
         return members._replace(series=no_series())
     channels = N_WATER if members.inertial else VELOCITIES
-    place = members.nodes[:, :3]
-    return members._replace(series=build_water_series(waves, place, channels, options["duration"]))
+    position = members.nodes[:, :3]
+    return members._replace(series=build_water_series(waves, position, channels, options["duration"]))
 
 
 def build_current(spec):
@@ -273,6 +273,6 @@ def build_current(spec):
     return Current(speed * cos(heading), speed * sin(heading), exponent)
 
 
-def build_moorings(lines, wanted):
-    """Return the mooring part, None without lines or with mooring=False."""
-    return build_mooring(lines, tabulated=wanted == "table") if wanted else None
+def build_moorings(lines, option):
+    """Return the mooring part for the option mooring, None without lines or with False."""
+    return build_mooring(lines, tabulated=option == "table") if option else None

@@ -9,12 +9,12 @@ from fowt_env.errors import warn_once
 from fowt_env.weather.waves import wave_number
 from fowt_env.weather.wind_field import WindBox
 
-STEEPEST = 1.0 / 7.0  # height over length of a wave that breaks in deep water, times tanh(k depth) in other
-MEAN_WINDS = ("steady", "ntm", "etm")  # kinds whose speed is a mean that a turbine operates in
+STEEPEST = 1.0 / 7.0  # height over length of a breaking wave, times tanh(k depth) in finite depth
+MEAN_WINDS = ("steady", "ntm", "etm")  # kinds of wind with a mean speed in which a turbine operates
 
 
 def warn_of_weather(air, sea, platform, turbine, label):
-    """Warn, once per text, of an Air and a SeaState that can hardly be meant for a platform and turbine."""
+    """Warn, once per text, of an Air and a SeaState that are implausible for a platform and turbine."""
     faults = [*wind_faults(air, turbine), *sea_faults(sea, platform.environment)]
     text = " ".join(f"{fault[0].upper()}{fault[1:]}." for fault in faults)
     if text:
@@ -22,27 +22,27 @@ def warn_of_weather(air, sea, platform, turbine, label):
 
 
 def wind_faults(air, turbine):
-    """Sentences on a mean wind in which a turbine does not operate; none of still air, gusts and extremes."""
+    """Return sentences on a mean wind outside the operating range; none for still air, gusts and extremes."""
     spec = air.spec
     kind = spec.get("kind") if isinstance(spec, dict) else getattr(spec, "kind", None)
     if not air.speed or not (is_number(spec) or isinstance(spec, WindBox) or kind in MEAN_WINDS):
         return []
-    said = f"the mean wind of {air.speed:.4g} m/s is"
+    start = f"the mean wind of {air.speed:.4g} m/s is"
     low, high = turbine.cut_in_wind_speed, turbine.cut_out_wind_speed
     if air.speed > high:
         return [
-            f"{said} above the turbine's cut-out wind of {high:.4g} m/s: a run starts with feathered blades"
+            f"{start} above the turbine's cut-out wind of {high:.4g} m/s: a run starts with feathered blades"
             " and a rotor at rest"
         ]
-    return [f"{said} below the turbine's cut-in wind of {low:.4g} m/s"] if air.speed < low else []
+    return [f"{start} below the turbine's cut-in wind of {low:.4g} m/s"] if air.speed < low else []
 
 
 def sea_faults(sea, site):
     """Return the sentences on a SeaState in which the waves would break, by Miche's limit.
 
     Height over length at most 1/7 tanh(k depth) (R. Miche, Annales des Ponts et Chaussees 114, 1944;
-    DNV-RP-C205, 3.4.6). Of a spectrum it is the significant height over the length at the peak, which real
-    seas stay well below: 1/11.6 in the steepest of the built-in ones.
+    DNV-RP-C205, 3.4.6). For a spectrum, significant height over length at the peak; real seas are far less
+    steep: 1/11.6 in the steepest built-in sea state.
     """
     names = ("H", "T") if sea.kind == "regular" else ("Hs", "Tp")
     height, period = (getattr(sea, name) for name in names)
@@ -55,5 +55,5 @@ def sea_faults(sea, site):
         return []
     return [
         f"waves of {names[0]} = {height:.4g} m and {names[1]} = {period:.4g} s are {length:.3g} m long: their"
-        f" steepness of {height / length:.2g} is beyond that of breaking waves, {steepest:.2g}"
+        f" steepness of {height / length:.2g} exceeds the breaking limit of {steepest:.2g}"
     ]

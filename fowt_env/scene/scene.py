@@ -1,4 +1,4 @@
-"""Scene: a turbine on its platform in its weather, ready to be stepped."""
+"""Defines Scene: a turbine on its platform in given weather, ready for time stepping."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -37,29 +37,29 @@ from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
 from fowt_env.weather.wind_field import WindBox, hub_wind
 
-UNCHANGED: Any = object()  # default of what a scene may have None of
+UNCHANGED: Any = object()  # default of arguments for which None has a meaning
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A turbine on its platform in its weather, ready to be stepped.
+    """Holds a turbine on its platform in given weather, ready for time stepping.
 
-    model is what kernels read; the rest says where it came from. Scenes are never written to: the
-    state vector and the scratch of a run belong to the run.
+    Kernels read `model`; the other fields are its origin. A scene is never modified: state vector and scratch
+    arrays belong to the run.
     """
 
     model: Any  # a plant.model.Model; its parts have many types
     platform: Platform
     turbine: Turbine
-    wind: Any  # as given
+    wind: Any  # as specified
     sea: Any
     seed: int
     rotor: str
     options: dict
-    wind_speed: float | None  # mean hub wind that a trim uses; None without aerodynamics
-    loads: tuple[Load, ...] = ()  # the user's
-    label: str = ""  # the platform as it was given: name or path
-    trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint} found
+    wind_speed: float | None  # mean hub wind for a trim; None without aerodynamics
+    loads: tuple[Load, ...] = ()  # user-defined loads
+    label: str = ""  # name or path of the platform, as specified
+    trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint}
 
     @property
     def n_lines(self) -> int:
@@ -71,7 +71,7 @@ class Scene:
 
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
-        """Return what the entries of this scene's state vector are, in order."""
+        """Return the blocks of this scene's state vector, in order."""
         internal = {"wake": wake_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
         bending = tower_states(self.model.tower) // 2
@@ -88,19 +88,19 @@ class Scene:
 
     @property
     def n_commands(self) -> int:
-        """Return the generator torque and the blades' pitch, or that of each of them."""
+        """Return the number of commands: generator torque and collective or individual blade pitches."""
         return N_COMMANDS if self.model.pitches is None else N_INDIVIDUAL_COMMANDS
 
     @property
     def pitch_states(self) -> tuple[int, ...]:
-        """Return the indices in the state of the blades' pitch, or of that of each of them."""
+        """Return the state indices of the collective blade pitch, or of the pitch of each blade."""
         pitches = self.model.pitches
         others = () if pitches is None else range(pitches.first, pitches.first + BLADES - 1)
         return (int(State.BLADE_PITCH), *others)
 
     @property
     def n_measurements(self) -> int:
-        """Fields of a Measurement and, with individual blade pitch, of a BladeMeasurement."""
+        """Return the number of fields of Measurement and, with individual pitch, of BladeMeasurement."""
         return N_MEASUREMENTS + (0 if self.model.pitches is None else N_BLADE_MEASUREMENTS)
 
     @property
@@ -110,15 +110,15 @@ class Scene:
 
     @property
     def channel_groups(self) -> tuple[str, ...]:
-        """Return the names of the GROUPS of channels that this scene has beside the fixed ones."""
+        """Return the names of the GROUPS of channels of this scene, in addition to the fixed channels."""
         parts = {"tower": self.model.tower, "blades": self.model.pitches}
         return tuple(name for name, part in parts.items() if part is not None)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
-        """Return the output rows (k, n_channels), in SI as kernels write them, in the units of the channels.
+        """Return output rows (k, n_channels), written in SI by kernels, in the units of the channels.
 
-        Where the plant's wind is a rotor average, Wind1VelX to Z become those of a point at the hub.
-        overwrite: into the rows themselves; a copy of a long run costs as much as a tenth of it.
+        If the plant's wind is a rotor average, Wind1VelX to Z are replaced by the wind at the hub.
+        overwrite: convert in place; copying a long run takes up to a tenth of its run time.
         """
         rows = rows if overwrite else rows.copy()
         if self._hub_wind is not None:
@@ -128,26 +128,26 @@ class Scene:
 
     @cached_property
     def _hub_wind(self):
-        """(time, (n, 3)) of the wind at the hub where the model's wind is a rotor average, else None."""
+        """Return (time, (n, 3)) of the wind at the hub if the model's wind is a rotor average, else None."""
         rotor = self.turbine.rotor
         if isinstance(self.wind, WindBox):
             return hub_wind(self.wind, rotor.hub_height) if self.model.aero.field is None else None
-        place = {"reference_height": rotor.hub_height, "rotor_diameter": 2.0 * rotor.tip_radius}
-        found = hub_series(self.wind, **place, seed=self.seed, duration=self.options["duration"])
-        if found is not None and self.options["planar"]:
-            found[1][:, 1] = 0.0
-        return found
+        rotor_size = {"reference_height": rotor.hub_height, "rotor_diameter": 2.0 * rotor.tip_radius}
+        series = hub_series(self.wind, **rotor_size, seed=self.seed, duration=self.options["duration"])
+        if series is not None and self.options["planar"]:
+            series[1][:, 1] = 0.0
+        return series
 
     @property
     def weather_kind(self) -> tuple[bool, bool, bool, str]:
-        """What with_weather keeps: aerodynamics or not, a box of wind, waves; and the class of the strips."""
+        """Return the properties that with_weather keeps: (aerodynamics, wind box, waves, class of strips)."""
         aero, hydro = self.model.aero, self.model.hydro
         field = aero is not None and aero.field is not None
         waves = hydro is not None and hydro.waves is not None
         return aero is not None, field, waves, "" if hydro is None else type(hydro.strips).__name__
 
     def data(self) -> Data:
-        """Return the fresh scratch arrays for one plant of this scene."""
+        """Return new scratch arrays for one plant of this scene."""
         hydro, bending = self.model.hydro, tower_states(self.model.tower) // 2
         strips = None if hydro is None else hydro.strips
         members = None if hydro is None else hydro.members
@@ -179,16 +179,16 @@ class Scene:
         return Handle(self.model, self.data() if data is None else data)
 
     def first_nonfinite_load(self, data: Data) -> str | None:
-        """Words for the load of the user's that made a run not finite with this data; None where none did."""
+        """Return a text on the user-defined load that made a run of this data non-finite; None otherwise."""
         return first_nonfinite_load(self.loads, data.user)
 
     def with_weather(self, wind: Wind = UNCHANGED, sea: Sea = UNCHANGED, seed: int | None = None) -> "Scene":
-        """Return the scene in another wind, sea or seed, with a model of the same types: nothing is compiled.
+        """Return the scene with another wind, sea or seed and a model of the same types: nothing is compiled.
 
-        What is omitted stays as it is. sea None is still water. In a scene that was built with a sea it is a
-        wave without height: to rounding the loads of a scene built in still water, in twice the time.
-        Raises: InputError, also where aerodynamics, a box of wind or a sea would be gained, or the first two
-        lost (build a scene for that).
+        Omitted arguments are unchanged. sea None is still water; in a scene built with a sea, a wave of zero
+        height, with the loads of a scene built in still water to rounding, at twice the run time.
+        Raises: InputError, also if aerodynamics, a wind box or a sea would be added, or the first two removed
+        (build a new scene instead).
         """
         wind = self.wind if wind is UNCHANGED else wind
         sea = self.sea if sea is UNCHANGED else sea
@@ -218,19 +218,19 @@ class Scene:
 
     @property
     def dt(self) -> float:
-        """Default physics step, s: that of the scene's integrator, or finer by its fidelity or its tower."""
+        """Return the default physics step (s) of the integrator, or a finer one for the fidelity or tower."""
         return default_step(self.options, tower_frequency(self.model.tower))
 
     def with_step(self, dt: float) -> "Scene":
-        """Return this scene, made to be stepped by dt (s).
+        """Return this scene for the time step dt (s).
 
-        A convolution of radiation is of one step alone, and dynamic inflow has no lag too short for it.
+        A radiation convolution holds for one step only, and lags of dynamic inflow are limited by the step.
         """
         hydro, parts = self.model.hydro, {}
         memory = None if hydro is None else hydro.radiation
-        fitting = memory_for_step(memory, self.platform.potential_flow, dt, self.options["planar"])
-        if fitting is not memory:
-            parts["hydro.radiation"] = fitting
+        adapted = memory_for_step(memory, self.platform.potential_flow, dt, self.options["planar"])
+        if adapted is not memory:
+            parts["hydro.radiation"] = adapted
         if wake_states(self.model.aero):
             parts["aero.rotor.wake.least"] = least_lag(dt, self.options["integrator"])
         return self.with_model(parts) if parts else self
@@ -252,7 +252,7 @@ class Scene:
         )
 
     def _repr_html_(self):
-        """What a notebook shows: the scene's parts, and each option that is not the default."""
+        """Return the HTML for notebooks: the scene's parts and each option that is not the default."""
         rows = [
             ("platform", self.label or self.platform.name),
             ("turbine", f"{self.turbine.name}, rated {self.turbine.torque_law.rated_power / 1e6:.3g} MW"),
@@ -270,7 +270,7 @@ class Scene:
 
 
 def check_scene(scene: Any) -> None:
-    """Raises: InputError for anything but a Scene, as for the name of a platform."""
+    """Raise InputError for anything but a Scene, such as the name of a platform."""
     if not isinstance(scene, Scene):
         raise InputError(
             f"scene = {short(scene)}: must be a Scene, a platform in its wind and sea:"
@@ -279,6 +279,6 @@ def check_scene(scene: Any) -> None:
 
 
 def _replaced(part, path, value):
-    """Return a part of a model with that at a path of field names replaced."""
+    """Return a part of a model with the value at a path of field names replaced."""
     name, *rest = path
     return part._replace(**{name: _replaced(getattr(part, name), rest, value) if rest else value})

@@ -11,25 +11,25 @@ MODES = {"rigid": 0, "modes": 1, "modes2": 2}  # option tower: modes in each dir
 
 
 def modes_asked(options):
-    """Return modes in each direction that a scene's options ask for. Raises: InputError in a planar scene."""
+    """Return the number of modes in each direction of the options. Raises: InputError in a planar scene."""
     count = MODES[options["tower"]]
     if count and options["planar"]:
         raise InputError(
-            f"tower = {options['tower']!r}: the tower bends to the sides too; a planar scene needs 'rigid'"
+            f"tower = {options['tower']!r}: the tower also bends sideways; a planar scene needs 'rigid'"
             " (or planar = False)"
         )
     return count
 
 
 def mode_shapes(modes, count):
-    """((n, 5) coefficients, (n,) whether it is a fore-aft one) of the modes, n = 2 count; 1 at the top."""
+    """Return ((n, 5) coefficients, (n,) fore-aft flags) of the modes, n = 2 count; values 1 at the top."""
     pairs = zip(modes.fore_aft[:count], modes.side_side[:count], strict=True)
     shapes = np.array([shape for pair in pairs for shape in pair])
     return shapes / shapes.sum(axis=1, keepdims=True), np.tile([True, False], count)
 
 
 def shape_values(shapes, fraction, derivative=0):
-    """(points, n) values of shapes, or their derivatives by the height fraction, at height fractions."""
+    """Return (points, n) values of shapes, or of their derivatives, at height fractions."""
     power, factor = POWERS.copy(), np.ones(len(POWERS))
     for _ in range(derivative):
         factor = factor * power
@@ -38,9 +38,9 @@ def shape_values(shapes, fraction, derivative=0):
 
 
 def build_tower_modes(platform, turbine, count, first_state):
-    """TowerModes of that many modes in each direction, their states from first_state on; None without modes.
+    """Return TowerModes with `count` modes in each direction, states from first_state on; None for count 0.
 
-    Raises: InputError if the platform file says too little of the tower.
+    Raises: InputError if the platform file lacks the modes.
     """
     if count == 0:
         return None
@@ -63,9 +63,9 @@ def build_tower_modes(platform, turbine, count, first_state):
     alike = np.equal.outer(fore_aft, fore_aft)
     generalised = np.einsum("k,ki,kj->ij", mass, shape, shape)
     stiffness = _stiffness(bending, middle, curvature, fore_aft, cell, count)
-    # what hangs on each element: all above it, and of its own mass that above its middle
+    # mass supported by each element: all mass above its midpoint
     top = bending.top_mass + turbine.nacelle.mass + turbine.rotor.mass
-    drag_points = 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)  # those of build_tower_drag
+    drag_points = 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)  # points of build_tower_drag
     above = mass[::-1].cumsum()[::-1] - 0.5 * mass + top
     return TowerModes(
         first=int(first_state),
@@ -90,9 +90,9 @@ def tower_states(modes):
 
 
 def tower_frequency(modes):
-    """Largest natural frequency (rad/s) of TowerModes on their floater without water; 0 for None (rigid).
+    """Return the largest natural frequency (rad/s) of TowerModes on the dry floater; 0 for None (rigid).
 
-    Structure and inertia alone, of the straight tower and the rotor held: added mass and weight lower it.
+    Straight tower and fixed rotor, without added mass and weight, which would lower the frequency.
     """
     if modes is None:
         return 0.0
@@ -100,7 +100,7 @@ def tower_frequency(modes):
     across, height, first = 1.0 - along, modes.top_height, modes.upper_moment
     cross = np.cross(np.eye(3), first)
     upper = np.block([[modes.upper_mass * np.eye(3), -cross], [cross, modes.upper_inertia]])
-    # velocity of the tower top and of the nacelle's rotation, by the platform's six and by the deflections'
+    # velocity and angular velocity of the tower top, from six platform motions and the deflections
     moved = np.zeros((6, 6 + n))
     moved[:, :6] = np.eye(6)
     moved[0, 4], moved[1, 3] = height, -height
@@ -119,22 +119,22 @@ def tower_frequency(modes):
 
 
 def _stiffness(bending, middle, curvature, fore_aft, cell, count):
-    """Return (n, n) of EI times two curvatures, with the root of the product of both modes' tuners."""
+    """Return the (n, n) modal stiffness, EI times two curvatures, scaled by the modes' stiffness tuners."""
     known = bending.height_fraction
     ones = (1.0,) * count
     tuner = _each(bending.fore_aft_tuner or ones, bending.side_side_tuner or ones, count)
-    found = np.zeros((2 * count, 2 * count))
+    result = np.zeros((2 * count, 2 * count))
     for along, side in ((False, bending.side_side_stiffness), (True, bending.fore_aft_stiffness)):
         rows = np.flatnonzero(fore_aft == along)
         part, stiffness = curvature[:, rows], np.interp(middle, known, side)
-        found[np.ix_(rows, rows)] = np.einsum("k,ki,kj->ij", cell * stiffness, part, part)
-    return found * np.sqrt(np.outer(tuner, tuner))
+        result[np.ix_(rows, rows)] = np.einsum("k,ki,kj->ij", cell * stiffness, part, part)
+    return result * np.sqrt(np.outer(tuner, tuner))
 
 
 def _damping(bending, stiffness, generalised, count):
-    """(n, n) of 2 zeta K / omega, zeta and omega of the second mode, without the mass on the tower's top.
+    """Return the (n, n) damping 2 zeta K / omega, zeta and omega of the second mode, without top mass.
 
-    ElastoDyn's CTFA and CTSS: its frequency there is of the bare tower, without weight.
+    ElastoDyn's CTFA and CTSS, which use the frequency of the bare tower without weight.
     """
     ratio = _each(bending.fore_aft_damping, bending.side_side_damping, count)
     bare = np.sqrt(np.diag(stiffness) / np.diag(generalised))
@@ -142,5 +142,5 @@ def _damping(bending, stiffness, generalised, count):
 
 
 def _each(fore_aft, side_side, count):
-    """Return (n,) of values of the modes in the plant's order."""
+    """Return (n,) values of the modes in the order of the plant."""
     return np.column_stack([fore_aft[:count], side_side[:count]]).ravel()

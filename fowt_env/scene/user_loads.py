@@ -1,4 +1,4 @@
-"""Loads defined by the user, compiled into the plant: a kernel, its numbers and the point where it acts."""
+"""Compiles user-defined loads into the plant: a kernel, its parameters and the point of action."""
 
 import inspect
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ SIGNATURE = types.void(FLOATS, FLOATS, FLOATS)
 KERNEL_ARGUMENTS = 3
 MOST_STATES = 100  # of one load
 IN_PLANE = 1e-9  # fraction of a force out of the plane of a planar scene that rounding may leave
-TRIALS = (  # states that a load is tried in: surge, sway, heave, roll, pitch, yaw, and their rates
+TRIALS = (  # states for checks of a load: surge, sway, heave, roll, pitch, yaw, and their rates
     (np.zeros(6), np.zeros(6)),
     (np.array([12.0, -3.0, -1.5, 0.01, 0.07, -0.02]), np.array([0.7, -0.2, 0.4, 0.002, 0.01, 0.001])),
     (np.array([-4.0, 2.0, 1.0, -0.02, -0.03, 0.03]), np.array([-0.9, 0.3, -0.6, 0.003, -0.02, 0.002])),
@@ -87,7 +87,7 @@ def _meaning(function, above=()):
 
 
 def _known(outer, names, above):
-    """Return the plain values of those names that a mapping has; of a module those that it has of them."""
+    """Return the plain values of the names in a mapping, and of the same names in its modules."""
     known = {}
     for name in sorted(set(names) & outer.keys()):
         value = outer[name]
@@ -139,8 +139,8 @@ class Load:
                 the nacelle: motion and body axes are then those of the nacelle, angles those of the platform
     axes        "inertial" or "body": of velocities and force
     water       whether the kernel reads the motion of the water at its point (Motion.WATER_X ...), whose
-                sum over 225 wave components takes 6 microseconds, as three steps at fidelity "standard"
-                without wind (a load without it: 0.4, eight of them: 0.6 a step)
+                sum over 225 wave components takes 6 microseconds, as long as three steps at fidelity
+                "standard" without wind (without water: 0.4 microseconds a step, eight loads: 0.6)
     states      number of states, integrated with the plant: motion[Motion.STATE + i] is a state and
                 force[Force.RATE + i] its rate. A run starts with zero rates, as in a trim
 
@@ -183,8 +183,8 @@ class Load:
 
     def key(self) -> tuple:
         """Return all properties as plain values, identical in every process."""
-        own = self.name, self.kernel.fingerprint(), self.parameters, self.point, self.axes, self.water
-        return (*own, self.states)
+        basic = self.name, self.kernel.fingerprint(), self.parameters, self.point, self.axes, self.water
+        return (*basic, self.states)
 
 
 def _numbers(where, key, values):
@@ -216,12 +216,12 @@ def checked_loads(loads: Any, n_lines: int, planar: bool) -> tuple[Load, ...]:
         raise InputError(f"loads: {len(listed)} of them: at most {MOST_LOADS}; a kernel may hold several")
     taken = {channel.name for channel in channels(n_lines)}
     for load in listed:
-        own = {channel.name for channel in channels(0, (load.name,))} - {c.name for c in channels(0)}
-        if taken & own or not own:
+        new = {channel.name for channel in channels(0, (load.name,))} - {c.name for c in channels(0)}
+        if taken & new or not new:
             raise InputError(
                 f"load {load.name!r}: its channel {load.name}Fxi exists already: choose another name"
             )
-        taken |= own
+        taken |= new
         for position, rate in TRIALS:
             _try(load, position, rate, planar)
     return listed
@@ -259,7 +259,7 @@ def _try(load, position, rate, planar):
     try:
         with np.errstate(all="ignore"):
             returned = load.kernel(parameters, motion, force)
-    except Exception as error:  # whatever a user's code may raise
+    except Exception as error:  # any error of a user's code
         raise InputError(f"{where}: its kernel failed: {type(error).__name__}: {error}") from error
     if returned is not None:
         raise InputError(
@@ -275,8 +275,8 @@ def _try(load, position, rate, planar):
         out = max(abs(force[1]), abs(moment[0]) / 100.0, abs(moment[2]) / 100.0)  # over an arm of 100 m
         if out > IN_PLANE * np.abs(force[[0, 2]]).max():
             raise InputError(
-                f"{where}: pushes out of the plane, force = {force.tolist()}; a planar scene needs loads"
-                " in it (planar = False)"
+                f"{where}: acts out of the plane, force = {force.tolist()}; a planar scene needs loads"
+                " in the plane (planar = False)"
             )
 
 

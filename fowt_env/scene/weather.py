@@ -1,4 +1,4 @@
-"""Wind and sea of a scene: from what a user gives to the parts that the plant reads."""
+"""Builds wind and sea of a scene from specifications of the user."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,14 +15,14 @@ from fowt_env.weather.waves import build_waves
 from fowt_env.weather.wind import build_wind, make_series, nominal_speed
 from fowt_env.weather.wind_field import WindBox, hub_speed, is_field, read_box, rotor_average
 
-# what users may give as wind and sea, see build_scene
+# specifications of wind and sea, see build_scene
 Wind = float | str | Path | dict[str, Any] | WindSeries | WindBox | None
 Sea = str | Path | Mapping[str, Any] | SeaState | None
 IN_PLANE = 1e-9  # fraction of a vector out of the plane of a planar scene that rounding may leave
 
 
 class Air(NamedTuple):
-    """Wind of a scene: what was given (a box once read), its parts, and the mean hub wind of a trim."""
+    """Holds the wind of a scene: specification (or the wind box), parts, and mean hub wind for a trim."""
 
     spec: object
     series: object  # WindSeries or None
@@ -31,25 +31,25 @@ class Air(NamedTuple):
 
 
 def build_air(wind, seed, turbine, rotor, shear, duration):
-    """Return the air of a wind specification."""
+    """Return the Air of a wind specification. Raises: InputError."""
     wind = wind_of(wind)
     hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
-    place = {"rotor_diameter": diameter, "shear_exponent": shear, "seed": seed, "duration": duration}
+    common = {"rotor_diameter": diameter, "shear_exponent": shear, "seed": seed, "duration": duration}
     if not is_field(wind):
-        series = build_wind(wind, reference_height=hub, **place)
+        series = build_wind(wind, reference_height=hub, **common)
         return Air(wind, series, None, None if series is None else nominal_speed(wind))
-    box = read_box(wind, hub_height=hub, **place)
+    box = read_box(wind, hub_height=hub, **common)
     speed = hub_speed(box, hub)
-    like = {"reference_height": hub, "reference_length": diameter, "shear_exponent": 0.0}
+    site = {"reference_height": hub, "reference_length": diameter, "shear_exponent": 0.0}
     if not ROTORS[rotor].full_field:
         period = box.velocity.shape[0] * box.dt if box.periodic else 0.0
-        return Air(box, make_series(*rotor_average(box, hub, diameter), period=period, **like), None, speed)
-    mean = make_series(np.zeros(1), np.array([[speed, 0.0, 0.0, 0.0, 0.0]]), **like)
+        return Air(box, make_series(*rotor_average(box, hub, diameter), period=period, **site), None, speed)
+    mean = make_series(np.zeros(1), np.array([[speed, 0.0, 0.0, 0.0, 0.0]]), **site)
     return Air(box, mean, box.field(), speed)
 
 
 def build_weather(wind, sea, seed, platform, turbine, rotor, options):
-    """Return (Air, Waves or None) of a wind and sea specification."""
+    """Return (Air, Waves or None) of a wind and sea specification. Raises: InputError."""
     site = platform.environment
     shear = site.shear_exponent if options["shear_exponent"] is None else options["shear_exponent"]
     air = build_air(wind, seed, turbine, rotor, shear, options["duration"])
@@ -77,7 +77,7 @@ def build_weather(wind, sea, seed, platform, turbine, rotor, options):
 
 
 def _in_plane(air):
-    """The Air of a planar scene; of turbulence the part in the plane. Raises: InputError for cross wind."""
+    """Return the Air of a planar scene, without lateral turbulence. Raises: InputError for cross wind."""
     if air.series is None:
         return air
     if air.field is not None:
@@ -92,8 +92,8 @@ def _in_plane(air):
     kind = air.spec.get("kind") if isinstance(air.spec, dict) else getattr(air.spec, "kind", None)
     if kind not in ("ntm", "etm") or abs(value[:, 1].mean()) > 1e-3 * abs(value[:, 0].mean()):
         raise InputError(
-            f"wind: cross wind or horizontal shear of up to {across:g} m/s; a planar scene has neither"
-            " (planar = False)"
+            f"wind: cross wind or horizontal shear of up to {across:g} m/s; a planar scene must have"
+            " none (planar = False)"
         )
     value[:, [1, 4]] = 0.0
     return air._replace(series=air.series._replace(value=value))

@@ -154,7 +154,7 @@ def test_members_and_lines_in_wrong_places_are_named():
     inside = Line(
         anchor=(-60.0, 0.0, -200.0), fairlead=(70.0, 0.0, -14.0), length=300.0, wet_weight=1e3, EA=1e9
     )
-    with pytest.warns(fowt_env.PlantWarning, match="he anchor of line 1 is nearer to the tower axis"):
+    with pytest.warns(fowt_env.PlantWarning, match="he anchor of line 1 is closer to the tower axis"):
         fowt_env.build_scene(semi(lines=(inside,)), fidelity="reference")
 
 

@@ -160,7 +160,7 @@ def test_a_scene_that_cannot_rest_is_refused(bare_scene):
 @pytest.fixture
 def warned(monkeypatch):
     """Warnings of platforms as in a process that has given none."""
-    monkeypatch.setattr(errors, "_said", set())
+    monkeypatch.setattr(errors, "_issued", set())
 
 
 def edited(folder, key, value):

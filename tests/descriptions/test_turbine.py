@@ -64,7 +64,7 @@ def test_what_a_file_gives_is_kept():
 @pytest.mark.parametrize(
     ("law", "part"),
     [
-        (DIRECT_DRIVE + "cut_in_speed = 0.5\n", "torque_law.cut_in_speed: given beside minimum_speed"),
+        (DIRECT_DRIVE + "cut_in_speed = 0.5\n", "torque_law.cut_in_speed: conflicts with minimum_speed"),
         (DIRECT_DRIVE.replace("0.5236", "-1.0"), "torque_law.minimum_speed = -1.0: must be a number > 0"),
         (DIRECT_DRIVE.replace("rated_torque = 1.97868e7", ""), "torque_law.rated_torque is missing"),
         (DIRECT_DRIVE.replace("0.5236", "0.9"), "must be cut_in_speed < region2_start_speed"),
@@ -119,7 +119,7 @@ def test_blades_and_hub_make_the_inertia_about_the_shaft(name, hub):
             "rotor: blade_second_moment = 1.1776e+07: must be >= blade_first_moment",
         ),
         ("blade_first_moment = 1e200", "rotor: blade_first_moment = 1e+200: must be <= "),  # square: inf
-        ("blade_second_moment = 12905655.0", "it makes 4.2105"),  # about the rotor centre instead of the root
+        ("blade_second_moment = 12905655.0", "together have 4.2105"),  # about the rotor centre, not the root
         ("", "rotor: blade_first_moment: is missing; blade_mass, blade_first_moment"),
     ],
 )

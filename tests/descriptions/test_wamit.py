@@ -142,15 +142,15 @@ def changed(lines, number, text):
         ({"end_1": lines_1()[:16]}, "2 finite frequencies; needed: at least 3"),
         ({"end_1": []}, "has no rows of numbers"),
         ({"end_3": lines_3()[:-1]}, "no row of period 8, heading 90, mode 5"),
-        ({"end_3": [*lines_3(), lines_3()[0]]}, "line 28: period, heading and mode are there twice"),
+        ({"end_3": [*lines_3(), lines_3()[0]]}, "line 28: period, heading and mode are listed twice"),
         (
             {"end_3": changed(lines_3(), 2, "2.0 400 1 1 1 1 1")},
             "line 2: heading 400 deg: must be -360 to",
         ),
         ({"end_hst": lines_hst()[:10]}, "no entry 3 3"),
-        ({"end_hst": [*lines_hst(), "1 1 2.0"]}, "line 37: entry 1 1 is there twice"),
+        ({"end_hst": [*lines_hst(), "1 1 2.0"]}, "line 37: entry 1 1 is listed twice"),
         ({"end_12d": [*lines_12d(), "10 5 0 30 1 1 1 1"]}, "has 8 columns; expected 9"),
-        ({"end_12d": [*lines_12d(), lines_12d()[1]]}, "periods, headings and mode are there twice"),
+        ({"end_12d": [*lines_12d(), lines_12d()[1]]}, "periods, headings and mode are listed twice"),
         ({"end_12d": [*lines_12d(), "-1 5 0 30 1 1 1 1 1"]}, "period -1 s: must be"),
     ],
 )

@@ -220,7 +220,7 @@ def test_a_library_that_is_not_installed_is_named_with_its_extra(library, monkey
 
 @pytest.mark.parametrize("mistake", WARNED)
 def test_what_can_hardly_be_meant_is_warned_of_once(mistake, scene, monkeypatch):
-    monkeypatch.setattr(errors, "_said", set())  # other tests of this process may have built the same
+    monkeypatch.setattr(errors, "_issued", set())  # other tests of this process may have built the same
     do, words = WARNED[mistake]
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

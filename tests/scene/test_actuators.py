@@ -186,7 +186,7 @@ LIMITS = {"rate_limit": 0.1, "minimum": 0.0, "maximum": 1.5}
         ({"damping": 0.7, "time_constant": 0.1}, "natural_frequency is missing"),
         (
             {"natural_frequency": 5.0, "damping": 0.7, "time_constant": 0.1},
-            "time_constant = 0.1: given beside",
+            "time_constant = 0.1: conflicts with",
         ),
         ({"time_constant": 0.1, "friction": 0.01}, "friction = 0.01: needs natural_frequency"),
         ({"time_constant": 0.1, "acceleration_limit": 1.0}, "acceleration_limit = 1: needs"),

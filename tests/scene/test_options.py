@@ -80,7 +80,7 @@ def test_a_wake_is_taken_by_those_that_have_it_and_refused_by_the_others(name, o
     if option in ROTORS[name].wake:
         assert build_scene(wind=8.0, rotor=name, **{"fidelity": "reference"} | {option: True}).rotor == name
         return
-    with pytest.raises(InputError, match=f"rotor = '{name}': it has no {option}, which needs rotor = 'bem'"):
+    with pytest.raises(InputError, match=f"rotor = '{name}': does not support {option}, which needs rotor"):
         build_scene(wind=8.0, rotor=name, **{"fidelity": "reference"} | {option: True})
 
 

@@ -267,7 +267,7 @@ def test_weather_drawn_anew_keeps_the_loads():
 
 def test_a_planar_scene_takes_loads_in_its_plane_alone():
     sideways, along = Load("Side", push, Push(fy=1e4)), Load("Along", push, Push(fx=2e5))
-    with pytest.raises(InputError, match="load 'Side': pushes out of the plane"):
+    with pytest.raises(InputError, match="load 'Side': acts out of the plane"):
         still(sideways, planar=True)
     planar, full = trim(still(along, planar=True)), trim(still(along))
     assert planar["PtfmSurge"] == pytest.approx(full["PtfmSurge"], abs=1e-6)
