@@ -42,7 +42,7 @@ def show_command(u, interface, individual, pitches, link):
 
 @kernel
 def show_pitches(u, guard, command):
-    """Copy the pitches in force to the command; with a guard it keeps the commanded pitches."""
+    """Copy the pitches in force to the command; with a guard the command keeps the commanded pitches."""
     if guard is None:
         for i in range(Command.BLADE_PITCH, u.shape[0]):
             command[i] = u[i]

@@ -111,10 +111,10 @@ def accelerate(pose, x, load, torque, added, body, matrix, cache, dx):
         for i in range(6):
             for j in range(6):
                 matrix[i, j] = body.mass_matrix[i, j] + added[i, j]
-        _take_rotor_row(ratio * body.coupling, matrix, body.tilt)
+        _eliminate_rotor_row(ratio * body.coupling, matrix, body.tilt)
         factor_spd(matrix)
         cache[LoadCache.FACTORED] = 1.0
-    _take_rotor_moment(ratio * torque, b, body.tilt)
+    _eliminate_rotor_moment(ratio * torque, b, body.tilt)
     substitute_spd(matrix, b)
     if body.rotor_fixed:
         dx[State.ROTOR_SPEED] = 0.0
@@ -124,7 +124,7 @@ def accelerate(pose, x, load, torque, added, body, matrix, cache, dx):
 
 
 @kernel
-def _take_rotor_row(inertia, matrix, tilt):
+def _eliminate_rotor_row(inertia, matrix, tilt):
     """Eliminate the rotor row from the matrix: the rotor inertia lies along the shaft."""
     if tilt is None:
         matrix[3, 3] -= inertia
@@ -137,7 +137,7 @@ def _take_rotor_row(inertia, matrix, tilt):
 
 
 @kernel
-def _take_rotor_moment(moment, b, tilt):
+def _eliminate_rotor_moment(moment, b, tilt):
     """Eliminate the rotor row from the right-hand side: the rotor moment lies along the shaft."""
     if tilt is None:
         b[3] -= moment
@@ -210,7 +210,7 @@ def _add_modes(x, upper, mass, bend, tower, matrix):
 
 
 @inlined_kernel
-def _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
+def _subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
     """Subtract velocity terms from modal (n,): of the tower's line mass, and of a wrench at the tower top."""
     n = len(tower.count)
     q, v = tower.first, tower.first + n
@@ -301,7 +301,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache,
     b[3] = load.mx - c.mx - e.mx - mx - bend.y * fz + bend.z * fy
     b[4] = load.my - c.my - e.my - my - bend.z * fx + bend.x * fz
     b[5] = load.mz - c.mz - e.mz - mz - bend.x * fy + bend.y * fx
-    _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
+    _subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
 
     if cache[LoadCache.FACTORED] < 0.5:
         for i in range(6):

@@ -74,14 +74,14 @@ set_at_once = chosen_by_class("actuator", {PitchActuator: _set_lagging, PitchDri
 
 @kernel
 def advance_pitches(x, u, after, actuator, pitches, y):
-    """Fill y with the pitches a time `after` (s) the state x, under a constant command u."""
+    """Advance the pitches from state x to y over a time `after` (s) under a constant command u."""
     advance_pitch(0, State.BLADE_PITCH, x, u, after, actuator, y)
     _advance_others(x, u, after, actuator, pitches, y)
 
 
 @kernel
 def advance_actuators(x, u, after, model, y):
-    """Fill y with the pitches and the torque in force a time `after` (s) the state x, under a command u."""
+    """Advance pitches and torque in force from state x to y over a time `after` (s) under a constant u."""
     advance_pitches(x, u, after, model.actuator, model.pitches, y)
     advance_torque(x, u, after, model.converter, y)
 

@@ -182,7 +182,7 @@ def torque_in_force(x, u, converter):
 
 @kernel
 def advance_torque(x, u, after, converter, y):
-    """Fill y with the torque in force a time `after` (s) the state x; nothing without a lag."""
+    """Advance the torque in force from state x to y over a time `after` (s); nothing without a lag."""
     if converter is None:
         return
     command = u[Command.GENERATOR_TORQUE]

@@ -2,7 +2,7 @@
 
 Within a step, blade pitch and generator torque are exact (constant command), the states of radiation memory
 are exact for velocities linear in time (hydro/radiation.py), and the rotor load in a wind box is evaluated
-several times (rotor_substeps.py), so that none of these limits the step.
+several times a step (rotor_substeps.py), so that none of these limits the step.
 """
 
 from typing import NamedTuple

@@ -37,7 +37,7 @@ NEGLIGIBLE = 1e-100  # spans over L below this count as zero, far below the roun
 
 
 class LineTable(NamedTuple):
-    """Holds the fairlead tensions of n lines over their spans, C1 in both; takes a quarter of Newton's time.
+    """Holds the fairlead tensions of n lines over their spans, C1 in both; costs a quarter of Newton's time.
 
     tension: (n, distances, heights, 2) H and V, N, in steps of TABLE_X, TABLE_Z metres from origin.
     """

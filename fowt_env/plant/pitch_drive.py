@@ -33,7 +33,7 @@ class PitchDrive(NamedTuple):
     friction: float  # rad, distance from the command at which a blade at rest begins to move
     minimum: float  # rad
     maximum: float  # rad
-    rate: int  # index in the state of the first blade's pitch rate; the other blades are next
+    rate: int  # index in the state of the first blade's pitch rate, followed by the other blades
     held: object  # the same of the followed command, or None without a deadband
 
 
@@ -198,7 +198,7 @@ def _store_followed(blade, target, followed, y):
 
 @kernel
 def advance_drive(blade, i, x, u, after, actuator, y):
-    """Fill y with the drive states of a blade a time `after` (s) the state x; i: index of its pitch."""
+    """Advance a blade's drive from state x to y over a time `after` (s); i: index of its pitch."""
     target = target_of(blade, x, u, actuator, actuator.held)
     pitch, rate = drive_after(x[i], x[actuator.rate + blade], target, after, actuator)
     y[i], y[actuator.rate + blade] = pitch, rate

@@ -30,8 +30,8 @@ class RotorSubsteps(NamedTuple):
 def build_substeps(samples):
     """Return the RotorSubsteps of a number of samples per step, None for one.
 
-    The weights are those of Adams-Bashforth 4 in `samples` shorter steps, less those of one step, so
-    that a slowly varying load is unchanged.
+    The weights are those of Adams-Bashforth 4 in `samples` shorter steps, less those of one step: zero in
+    effect for a slowly varying load.
     """
     if samples == 1:
         return None

@@ -54,7 +54,7 @@ RIGID_BLOCKS = (
 )
 
 
-FURTHER_BLOCKS = {  # kind and steady where they are not ("internal", "settled")
+FURTHER_BLOCKS = {  # (kind, steady) of blocks other than ("internal", "settled")
     "tower_deflection": ("position", "solved"),
     "tower_velocity": ("velocity", "zero"),
     "other_blade_pitches": ("internal", "solved"),

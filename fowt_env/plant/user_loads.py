@@ -189,7 +189,7 @@ def fill_point(pose, px, py, pz, body_axes, motion):
 
 @kernel
 def fill_water(t, pose, hydro, needed, body_axes, motion):
-    """Fill the motion of the water at the point, or at still water below it; zero if not needed."""
+    """Fill the motion of the water at the point, limited to the still-water level; zero if not needed."""
     u = v = w = du = dv = dw = 0.0
     if needed:
         z = min(motion[Motion.Z], 0.0)

@@ -1,7 +1,7 @@
 """Applies constant matrices of a floating body about its undisplaced pose (theory.md, 5.7).
 
 Potential-flow hydrostatics and the added mass at infinite frequency, with the additional preload, stiffness
-and damping of the platform file. Linear theory is about the undisplaced pose, so all matrices are in inertial
+and damping of the platform file. Linear theory assumes the undisplaced pose, so all matrices are in inertial
 axes about the body origin, as in HydroDyn:
 
     F = constant - stiffness q - linear_damping q' - quadratic_damping |q'| q' - added_mass q''

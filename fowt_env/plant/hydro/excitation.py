@@ -1,6 +1,6 @@
 """Computes the wave force on a potential-flow body, first and second order (theory.md, 5.9).
 
-Linear theory is about the undisplaced pose, so the forces are functions of time, in inertial axes about the
+Linear theory assumes the undisplaced pose, so the forces are functions of time, in inertial axes about the
 body origin: the first order summed over components or tabulated over time, the second always tabulated, as
 coefficients of cubic B-splines. For waves at the slowly varying position of the body, phases are taken at a
 low-passed surge and sway, two states.
@@ -46,7 +46,7 @@ class TimeTable(NamedTuple):
 
 
 class ExcitationSeries(NamedTuple):
-    """Holds first-order force and elevation at the origin as a table, and the sum for times outside it."""
+    """Holds first-order force and elevation at the origin as a table, and the sum for times outside."""
 
     table: TimeTable
     exact: ExactExcitation
@@ -69,7 +69,7 @@ class FilteredPosition(NamedTuple):
 
 
 class SecondOrder(NamedTuple):
-    """Holds the difference-frequency force as a table, and the mean force for times outside it."""
+    """Holds the difference-frequency force as a table, and the mean force for times outside."""
 
     table: TimeTable
     mean: np.ndarray  # (6,) N and N m

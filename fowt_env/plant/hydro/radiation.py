@@ -51,7 +51,7 @@ class ConvolutionMemory(NamedTuple):
 WHOLE, HALF, STEP = 0, 6, 12
 # Entries of the last row of the data of ConvolutionMemory; the other rows are past velocities: index of the
 # latest, weight of the current velocity, sums over past velocities (6): now, half a step and a step later.
-PLACE, WEIGHT, TAIL, TAIL_HALF, TAIL_WHOLE, N_HEAD = 0, 1, 2, 8, 14, 20
+LATEST, WEIGHT, TAIL, TAIL_HALF, TAIL_WHOLE, N_HEAD = 0, 1, 2, 8, 14, 20
 
 
 def memory_states(hydro):
@@ -203,7 +203,7 @@ def _begin_past(x, dt, halves, plane, memory, data):
     u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
     w = to_inertial(pose, pose.wx, pose.wy, pose.wz)
     # ring buffer, latest first, stored twice, so that all velocities are contiguous from any index
-    index = int(head[PLACE]) - 1
+    index = int(head[LATEST]) - 1
     if index < 0:
         index = size - 1
     weight = 0.5 if head[WEIGHT] == 0.0 else 1.0  # of the trapezoid rule, for the first velocity of a run
@@ -211,7 +211,7 @@ def _begin_past(x, dt, halves, plane, memory, data):
         value = weight * (u[j] if j < 3 else w[j - 3])
         data[j, index] = value
         data[j, index + size] = value
-    head[PLACE] = index
+    head[LATEST] = index
     for i in range(MOTIONS):
         head[TAIL_HALF + i] = 0.0
         head[TAIL_WHOLE + i] = 0.0
