@@ -29,7 +29,7 @@ class Trip(IntEnum):
     OVERSPEED = 0  # rotor speed, rad/s
     OVERPOWER = 1  # mechanical power of the generator, W
     ACCELERATION = 2  # magnitude at the tower top, fore-aft and side-side, m/s2
-    PITCH_DEVIATION = 3  # of a blade's measured pitch from its command, or of this among blades, rad
+    PITCH_DEVIATION = 3  # largest pitch error, encoder less command, or its spread among blades, rad
 
 
 class Limit(IntEnum):
@@ -163,7 +163,7 @@ def encoder_offset(blade, t, guard):
 
 @kernel
 def pitch_deviation(t, x, actuator, pitches, guard, command):
-    """Return the largest pitch deviation (rad): encoder less command of a blade, or between two blades."""
+    """Return the pitch deviation (rad): largest error, encoder less command, or its spread among blades."""
     low = high = largest = 0.0
     for blade in range(pitches_of(pitches)):
         target = clamp(command[Command.BLADE_PITCH + blade], actuator.minimum, actuator.maximum)

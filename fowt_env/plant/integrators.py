@@ -44,7 +44,7 @@ class Heun(NamedTuple):
 class Adams(NamedTuple):
     """Selects Adams-Bashforth 4, with or without correction by Adams-Moulton 4."""
 
-    corrector: bool  # Adams-Bashforth-Moulton in PECE form, two evaluations; else predictor alone, one
+    corrector: bool  # Adams-Bashforth-Moulton in PECE form, two evaluations; else predictor only, one
     substeps: object = None  # RotorSubsteps, or None: one evaluation of the rotor load, as of all loads
 
 

@@ -33,11 +33,11 @@ TABLE_INWARD, TABLE_OUTWARD, TABLE_HEIGHT = 60.0, 32.0, 30.0
 # A table is checked between its points, up to this many from the spans at rest. Above this relative error of
 # the tension, as of a tendon, which goes slack within a metre, the line is solved instead.
 TRIED_X, TRIED_Z, TABLE_ERROR = 16, 4, 2e-2
-NEGLIGIBLE = 1e-100  # spans over L below this count as zero, far below the rounding of any real one
+NEGLIGIBLE = 1e-100  # spans over L below this count as zero, far below the rounding of any real span
 
 
 class LineTable(NamedTuple):
-    """Holds the fairlead tensions of n lines over their spans, C1 in both; costs a quarter of Newton's time.
+    """Holds the fairlead tensions of n lines over their spans, C1 in both: four times as fast as Newton.
 
     tension: (n, distances, heights, 2) H and V, N, in steps of TABLE_X, TABLE_Z metres from origin.
     """

@@ -46,8 +46,8 @@ def build_substeps(samples):
 def sample_rotor(t, x, u, dt, model, substeps, data):
     """Put the rotor loads within the step from t into data.samples, latest first, ahead of the past ones.
 
-    Between the ends of the step the state is extrapolated from the last two derivatives: to second order,
-    while the platform hardly moves and the blades turn by 7 deg. Without substeps nothing is done.
+    Between the ends of the step the state is extrapolated from the last two derivatives, to second order:
+    the platform hardly moves while the blades rotate by 7 deg. Without substeps nothing is done.
     """
     if substeps is None:
         return

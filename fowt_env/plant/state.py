@@ -65,7 +65,7 @@ FURTHER_BLOCKS = {  # (kind, steady) of blocks other than ("internal", "settled"
 
 
 def state_blocks(internal):
-    """Return the tuple of all Blocks of a scene from its internal {name: size}, in order; size 0: omitted."""
+    """Return a tuple of all Blocks of a scene with these internal blocks {name: size}; size 0: omitted."""
     blocks, offset = list(RIGID_BLOCKS), N_RIGID
     for name, size in internal.items():
         if size:
@@ -165,7 +165,7 @@ def fill_sines(x, plane, sines):
 
 @kernel
 def pose_by_sines(x, sines, plane):
-    """Return pose_in of a state from its sines and cosines (fill_sines)."""
+    """Return the Pose (pose_in) of a state from its sines and cosines (fill_sines)."""
     if plane is None:
         return _pose(x, sines[0], sines[1], sines[2], sines[3], sines[4], sines[5])
     return _pose_in_plane(x, sines[2], sines[3])

@@ -20,7 +20,7 @@ from fowt_env.plant.hydro.waves import elevation, wave_kinematics
 from fowt_env.plant.state import N_RIGID, Wrench, add, pose_of, to_body, to_inertial
 
 CELLS_PER_SIZE = 20  # of the longest side of the box around all members: 3e-4 of the first harmonic, T = 5 s
-CUT_ROUNDS = 12  # for the point where an axis meets the waves
+CUT_ROUNDS = 12  # iterations for the intersection of an axis with the waves
 CUT_TOLERANCE = 1e-10  # m
 
 # columns of nodes: position and axis in body axes, coefficients across the axis, coefficients along the axis
