@@ -197,7 +197,7 @@ def _end_states(x, plane, memory, data):
 def _begin_past(x, dt, halves, plane, memory, data):
     """Store the velocities of x, and sum over past velocities for the force half a step and a step later."""
     if abs(memory.dt - dt) > 1e-9 * dt:
-        raise ValueError("the convolution of radiation is of another time step: use Scene.with_step")
+        raise ValueError("the radiation convolution is for another time step: use Scene.with_step")
     head, size = data[MOTIONS], memory.whole.shape[1]
     pose = pose_in(x, plane)
     u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
