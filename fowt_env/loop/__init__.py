@@ -1,1 +1,1 @@
-"""The compiled control period between the plant and its controller or agent."""
+"""Runs the compiled control period between the plant and its controller or agent."""

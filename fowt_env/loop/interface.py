@@ -1,7 +1,7 @@
-"""The interface between a plant and its controller: what stays fixed in a run, and what changes.
+"""Defines the interface between a plant and its controller: the constants and the variables of a run.
 
-A part that a run lacks is None, and the compiler then leaves it out; simulate always has sensors and a guard,
-so that one compiled loop serves all of its runs.
+A part that a run lacks is None, and the compiler then omits it; simulate always has sensors and a guard, so
+that one compiled loop serves all of its runs.
 """
 
 from typing import NamedTuple
@@ -15,32 +15,32 @@ from fowt_env.plant.compile.handle import by_reference
 
 @by_reference
 class Interface(NamedTuple):
-    """What stays fixed in a run between plant and controller."""
+    """Holds the constants of a run between plant and controller."""
 
     control_dt: float  # s
     sensors: Sensors | None  # None: readings are the measurements
     hidden: np.ndarray | None  # (n,) GIVEN or HIDDEN of each measured quantity; None: no law
-    ahead: WindAhead | None  # wind ahead that the law reads; None as hidden
-    guard: Guard | None  # trips, stops and faults; None: there are none
+    ahead: WindAhead | None  # wind ahead that the law reads; None: no law
+    guard: Guard | None  # trips, stops and faults; None: none of them
 
 
 @by_reference
 class InterfaceData(NamedTuple):
-    """What changes in a run between plant and controller."""
+    """Holds the variables of a run between plant and controller."""
 
-    measurement: np.ndarray  # (n,) of the present control instant
-    reading: np.ndarray  # (n,) the measurement as the sensors read it; without sensors the measurement itself
-    law_reading: np.ndarray  # (n + leads,) what the law reads; without a law the reading itself
-    command: np.ndarray  # (n_commands,) of the law or a stop, before faults and the limits of the generator
+    measurement: np.ndarray  # (n,) of the current control instant
+    reading: np.ndarray  # (n,) output of the sensors; without sensors the measurement itself
+    law_reading: np.ndarray  # (n + leads,) input of the law; without a law the reading itself
+    command: np.ndarray  # (n_commands,) of the law or a stop, before faults and generator limits
     past: np.ndarray | None  # memory of the sensors (new_past); None without sensors
     motion: np.ndarray | None  # memory of a lidar on the nacelle (WindAhead); None without a law
     watch: np.ndarray | None  # (N_WATCH,) memory of the protection; None without a guard
-    held: np.ndarray | None  # (faults,) pitch or reading that a fault keeps, NaN: none yet
-    dx: np.ndarray  # (n_state,) derivative of the state at the present control instant
+    held: np.ndarray | None  # (faults,) pitch or reading that a fault freezes, NaN: none yet
+    dx: np.ndarray  # (n_state,) derivative of the state at the current control instant
 
 
 def interface_data(interface, n_state, n_commands, size):
-    """Return InterfaceData of a run that has not begun. size: of a measurement."""
+    """Return the initial InterfaceData of a run. size: number of measured quantities."""
     sensors, hidden, ahead, guard = interface.sensors, interface.hidden, interface.ahead, interface.guard
     measurement = np.zeros(size)
     reading = measurement if sensors is None else np.zeros(size)

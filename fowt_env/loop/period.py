@@ -1,8 +1,8 @@
-"""The control period: the order of its parts is defined here alone.
+"""Defines the control period: no other file orders its parts.
 
-begin_period: watch the turbine, read the sensors, break them, inform the law.
-command of the law or of a stop, in InterfaceData.command.
-apply_command: break the pitch drives, limit the torque; the plant then advances under u.
+begin_period: check the trips, read the sensors, apply sensor faults, fill the input of the law.
+Then the law or a stop writes InterfaceData.command.
+apply_command: apply pitch-drive faults, limit the torque; the plant then advances under u.
 """
 
 from math import isfinite
@@ -18,7 +18,7 @@ from fowt_env.plant.state import BLADES, Command
 
 @kernel
 def begin_period(period, t, x, model, interface, link):
-    """Begin a control period whose measurement is taken. Returns whether the turbine is being stopped.
+    """Begin a control period after its measurement. Returns whether the turbine is being stopped.
 
     period: number of control instants before this one; t: time, s.
     """
@@ -31,7 +31,7 @@ def begin_period(period, t, x, model, interface, link):
 
 @kernel
 def show_command(u, interface, individual, pitches, link):
-    """Put the command in force into link.command, which the law overwrites; undeclared parts are NaN.
+    """Copy the command in force to link.command, which the law overwrites; undeclared parts are NaN.
 
     individual: whether the law commands each blade.
     """
@@ -42,7 +42,7 @@ def show_command(u, interface, individual, pitches, link):
 
 @kernel
 def show_pitches(u, guard, command):
-    """Put the pitches in force into the command, where no guard keeps those that were commanded."""
+    """Copy the pitches in force to the command; with a guard the command keeps the commanded pitches."""
     if guard is None:
         for i in range(Command.BLADE_PITCH, u.shape[0]):
             command[i] = u[i]
@@ -50,7 +50,7 @@ def show_pitches(u, guard, command):
 
 @kernel
 def hide_command(hidden, individual, pitches, command):
-    """Hide of the command in force what a law that is about to overwrite it does not declare."""
+    """Set the parts of the command in force that the law does not declare to NaN."""
     if hidden is None:
         return
     command[Command.GENERATOR_TORQUE] += hidden[Measure.GENERATOR_TORQUE]
@@ -60,7 +60,7 @@ def hide_command(hidden, individual, pitches, command):
 
 @kernel
 def hide_pitches(hidden, individual, pitches, command):
-    """Hide pitches as hide_command, of a law that commands each blade. Returns whether the law does."""
+    """Hide pitches as hide_command, for a law that commands each blade. Returns whether the law does so."""
     if pitches is None:
         return False
     if individual:
@@ -73,10 +73,9 @@ def hide_pitches(hidden, individual, pitches, command):
 
 @kernel
 def apply_command(t, x, u, model, data, interface, link):
-    """Put into u what pitch drives and generator make of link.command in the control period from t (s) on.
+    """Fill u with link.command after pitch-drive faults and torque limits, for the control period from t (s).
 
-    The torque in u is the one in force until then. Off the grid the generator has no torque at once,
-    whatever is commanded.
+    On entry u holds the torque in force. Off the grid the torque is zero at once, whatever the command.
     """
     torque, command = u[Command.GENERATOR_TORQUE], link.command[Command.GENERATOR_TORQUE]
     for i in range(Command.BLADE_PITCH, u.shape[0]):
@@ -95,7 +94,7 @@ def apply_command(t, x, u, model, data, interface, link):
 
 @kernel
 def all_finite(values):
-    """Whether every entry is finite."""
+    """Return whether every entry of an array is finite."""
     for value in values:
         if not isfinite(value):
             return False

@@ -1,6 +1,6 @@
-"""Protection and faults of a turbine: trips, stops, faults of pitch drives and of sensors.
+"""Models protection and faults of a turbine: trips, stops, faults of pitch drives and of sensors.
 
-All of it happens at control instants, in the order of loop/period.py. Python builds a Guard per run
+All of them act at control instants, in the order of loop/period.py. Python builds a Guard per run
 (build_guard), whose memory is in InterfaceData: watch and held.
 """
 
@@ -20,66 +20,66 @@ from fowt_env.plant.state import BLADES, Command, State, pose_of
 from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.tower.rates import nacelle_rates
 
-ROUNDING = 1e-9  # s, by which a control instant may miss a time
+ROUNDING = 1e-9  # s, tolerance in comparisons of times
 
 
 class Trip(IntEnum):
-    """Rows of Guard.trips; each names a field of descriptions.protection.Protection."""
+    """Enumerates the rows of Guard.trips; each names a field of descriptions.protection.Protection."""
 
     OVERSPEED = 0  # rotor speed, rad/s
     OVERPOWER = 1  # mechanical power of the generator, W
-    ACCELERATION = 2  # of the tower top, along and across the nacelle together, m/s2
-    PITCH_DEVIATION = 3  # between a blade's measured pitch and its command, or of that among blades, rad
+    ACCELERATION = 2  # magnitude at the tower top, fore-aft and side-side, m/s2
+    PITCH_DEVIATION = 3  # largest pitch error, encoder less command, or its spread among blades, rad
 
 
 class Limit(IntEnum):
-    """Columns of Guard.trips."""
+    """Enumerates the columns of Guard.trips."""
 
-    VALUE = 0  # it trips above; infinite: never
-    TIME = 1  # s for which it must be passed without a break
-    STOP = 2  # what follows, of Stop
+    VALUE = 0  # threshold; infinite: no trip
+    TIME = 1  # s for which it must be exceeded without interruption
+    STOP = 2  # the Stop that follows
 
 
 class Stop(IntEnum):
-    """How the turbine is stopped; a later one takes over from an earlier one."""
+    """Enumerates the ways to stop the turbine; a higher one supersedes a lower one."""
 
     NONE = -1
-    NORMAL = 0  # feathers at a normal rate; the torque falls with the rotor speed, until the generator is off
-    EMERGENCY = 1  # no torque at once, feathers at the highest rate
-    END = 2  # the run ends at once
+    NORMAL = 0  # feathering at the normal rate; torque falls with rotor speed until the generator is off
+    EMERGENCY = 1  # zero torque at once, feathering at the highest rate
+    END = 2  # end of the run at once
 
 
 class Failure(IntEnum):
-    """Kinds of what breaks, in Guard.faults."""
+    """Enumerates the kinds of faults in Guard.faults."""
 
-    STUCK = 0  # a blade stays where it is then
-    RUNAWAY = 1  # it goes to an end of the drive's range as fast as the drive can
-    OFFSET = 2  # its true pitch is its command and an angle; its encoder shows it without
-    BIAS = 3  # a value is added to a reading
-    FREEZE = 4  # the reading keeps its value
+    STUCK = 0  # the blade stays at its pitch at the onset
+    RUNAWAY = 1  # the blade moves to an end of the drive's range at the highest rate
+    OFFSET = 2  # an angle adds to the pitch of the blade and is not in the encoder reading
+    BIAS = 3  # a value adds to a reading
+    FREEZE = 4  # a reading keeps its value
     LOSS = 5  # a reading is zero
 
 
 class Part(IntEnum):
-    """Columns of Guard.faults."""
+    """Enumerates the columns of Guard.faults."""
 
     KIND = 0  # Failure
-    TIME = 1  # s from which it is there
+    TIME = 1  # s, onset
     PLACE = 2  # blade (0, 1, 2), or field of the measurement
-    VALUE = 3  # of an offset (rad) or bias (SI); a runaway's end: below zero fine, above feather
-    BACKUP = 4  # 1: in an emergency stop the blade feathers all the same, by its backup drive
+    VALUE = 3  # offset (rad) or bias (SI); end of a runaway: below zero fine, above feather
+    BACKUP = 4  # 1: in an emergency stop the blade still feathers, by its backup drive
 
 
 class Watch(IntEnum):
-    """Entries of InterfaceData.watch, the memory of the protection."""
+    """Enumerates the entries of InterfaceData.watch, the memory of the protection."""
 
     TRIPPED_AT = 0  # s; infinite: not yet
-    TRIP = 1  # which
-    STOP = 2  # under way, of Stop
-    TORQUE = 3  # N m at the beginning of a stop; zero once the generator is off
-    SPEED = 4  # rotor speed then, rad/s
-    SINCE = 5  # s, of each trip: from when its limit is passed; infinite: it is not
-    TARGET = 9  # rad, of each blade: pitch that a stop commands
+    TRIP = 1  # the first Trip
+    STOP = 2  # the Stop in progress
+    TORQUE = 3  # N m at the start of a stop; zero once the generator is off
+    SPEED = 4  # rotor speed at the start of a stop, rad/s
+    SINCE = 5  # s, of each trip: time from which its limit is exceeded; infinite: not exceeded
+    TARGET = 9  # rad, of each blade: pitch command of a stop
 
 
 N_WATCH = Watch.TARGET + BLADES
@@ -87,19 +87,19 @@ N_WATCH = Watch.TARGET + BLADES
 
 @by_reference
 class Guard(NamedTuple):
-    """Protection and faults of one run."""
+    """Holds the protection and the faults of a run."""
 
     trips: np.ndarray  # (len(Trip), len(Limit))
-    ordered: np.ndarray  # (2,) s, times from which a NORMAL and an EMERGENCY stop are ordered
-    rates: np.ndarray  # (2,) rad in a control period, feathering of each stop
-    feathered: float  # rad, where it ends
-    off_speed: float  # rotor speed (rad/s) at which a normal stop takes the generator off
-    grid_loss: float  # s, time from which the generator is off the grid
+    ordered: np.ndarray  # (2,) s, times of the ordered NORMAL and EMERGENCY stops
+    rates: np.ndarray  # (2,) rad per control period, feathering rate of each stop
+    feathered: float  # rad, pitch at which feathering ends
+    off_speed: float  # rad/s, rotor speed at which a normal stop disconnects the generator
+    grid_loss: float  # s, time of the grid loss
     faults: np.ndarray  # (n, len(Part))
 
 
 def new_watch():
-    """Return InterfaceData.watch of a turbine on which nothing has happened."""
+    """Return the initial InterfaceData.watch, with neither trip nor stop."""
     watch = np.zeros(N_WATCH)
     watch[Watch.TRIPPED_AT] = inf
     watch[Watch.STOP] = Stop.NONE
@@ -110,7 +110,7 @@ def new_watch():
 def build_guard(
     trips=None, ordered=(inf, inf), rates=(0.0, 0.0), feathered=0.0, off_speed=0.0, grid_loss=inf, faults=None
 ):
-    """Return the Guard of a run; without arguments there are no trips, stops and faults."""
+    """Return the Guard of a run; the defaults have no trips, stops or faults."""
     if trips is None:
         trips = [(inf, 0.0, Stop.EMERGENCY)] * len(Trip)
     return Guard(
@@ -126,7 +126,7 @@ def build_guard(
 
 @kernel
 def tower_top_acceleration(x, dx, model):
-    """Size of the tower top's acceleration in the plane of the nacelle, m/s2."""
+    """Return the magnitude of the tower-top acceleration in the x-y plane of the nacelle, m/s2."""
     pose, top = pose_of(x), model.layout.tower_top
     bend = bend_of(x, model.tower)
     nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
@@ -136,7 +136,7 @@ def tower_top_acceleration(x, dx, model):
 
 @kernel
 def pitches_of(pitches):
-    """Number of pitches that the blades have: one for all, or one each."""
+    """Return the number of blade pitches: one for all blades, or one for each."""
     if pitches is None:
         return 1
     return BLADES
@@ -144,7 +144,7 @@ def pitches_of(pitches):
 
 @kernel
 def kind_now(k, t, guard):
-    """Failure of a row of the faults, -1 before its time."""
+    """Return the Failure of row k of the faults, -1 before its onset."""
     if t < guard.faults[k, Part.TIME] - ROUNDING:
         return -1
     return int(guard.faults[k, Part.KIND])
@@ -152,18 +152,18 @@ def kind_now(k, t, guard):
 
 @kernel
 def encoder_offset(blade, t, guard):
-    """Angle (rad) by which a blade's pitch exceeds the reading of its encoder."""
+    """Return the angle (rad) by which the pitch of a blade exceeds its encoder reading."""
     faults, offset = guard.faults, 0.0
     for k in range(faults.shape[0]):
-        wrong = kind_now(k, t, guard) == Failure.OFFSET and int(faults[k, Part.PLACE]) == blade
-        if wrong:
+        active = kind_now(k, t, guard) == Failure.OFFSET and int(faults[k, Part.PLACE]) == blade
+        if active:
             offset += faults[k, Part.VALUE]
     return offset
 
 
 @kernel
 def pitch_deviation(t, x, actuator, pitches, guard, command):
-    """Greatest difference (rad) of encoder and command of a blade, and of that between two blades."""
+    """Return the pitch deviation (rad): largest error, encoder less command, or its spread among blades."""
     low = high = largest = 0.0
     for blade in range(pitches_of(pitches)):
         target = clamp(command[Command.BLADE_PITCH + blade], actuator.minimum, actuator.maximum)
@@ -175,7 +175,7 @@ def pitch_deviation(t, x, actuator, pitches, guard, command):
 
 @kernel
 def watched(trip, t, x, model, guard, link):
-    """Return the quantity that a trip watches."""
+    """Return the quantity that a trip compares with its limit."""
     if trip == Trip.OVERSPEED:
         return x[State.ROTOR_SPEED]
     if trip == Trip.OVERPOWER:
@@ -187,7 +187,7 @@ def watched(trip, t, x, model, guard, link):
 
 @kernel
 def watch_turbine(t, x, model, guard, link):
-    """Compare the turbine with its limits at a control instant, and begin the stop that follows."""
+    """Compare the turbine with its trip limits at a control instant, and begin the resulting stop."""
     if guard is None:
         return
     watch, trips = link.watch, guard.trips
@@ -221,7 +221,7 @@ def watch_turbine(t, x, model, guard, link):
 
 @kernel
 def is_stopping(guard, link):
-    """Whether the turbine is being stopped, so that the law's commands are ignored."""
+    """Return whether the turbine is being stopped: commands of the law are then ignored."""
     if guard is None:
         return False
     return link.watch[Watch.STOP] >= 0.0
@@ -229,7 +229,7 @@ def is_stopping(guard, link):
 
 @kernel
 def has_ended(guard, link):
-    """Whether a trip ended the run."""
+    """Return whether a trip ended the run."""
     if guard is None:
         return False
     return int(link.watch[Watch.STOP]) == Stop.END
@@ -237,7 +237,7 @@ def has_ended(guard, link):
 
 @kernel
 def off_grid(t, guard, link):
-    """Whether the generator has no torque: from the loss of the grid on, and in an emergency stop."""
+    """Return whether the generator torque is zero: after a grid loss, and in an emergency stop."""
     if guard is None:
         return False
     return t >= guard.grid_loss or int(link.watch[Watch.STOP]) == Stop.EMERGENCY
@@ -245,7 +245,7 @@ def off_grid(t, guard, link):
 
 @kernel
 def stop_turbine(x, guard, link):
-    """Command the stop: blades feather from the pitch at which it began, the torque falls."""
+    """Command the stop: blades feather from their pitch at its start, the torque falls with rotor speed."""
     if guard is None:
         return
     watch, command = link.watch, link.command
@@ -258,15 +258,15 @@ def stop_turbine(x, guard, link):
             command[Command.BLADE_PITCH + blade] = target
     speed = x[State.ROTOR_SPEED]
     if emergency or speed <= guard.off_speed or watch[Watch.SPEED] <= guard.off_speed:
-        watch[Watch.TORQUE] = 0.0  # off the grid, and it stays so
+        watch[Watch.TORQUE] = 0.0  # the generator stays disconnected
     span = max(watch[Watch.SPEED] - guard.off_speed, ROUNDING)
-    share = clamp((speed - guard.off_speed) / span, 0.0, 1.0)
-    command[Command.GENERATOR_TORQUE] = watch[Watch.TORQUE] * share
+    fraction = clamp((speed - guard.off_speed) / span, 0.0, 1.0)
+    command[Command.GENERATOR_TORQUE] = watch[Watch.TORQUE] * fraction
 
 
 @kernel
 def break_drives(t, x, u, model, guard, link):
-    """Put into u what faulty pitch drives make of the commanded pitches in it."""
+    """Apply the faults of pitch drives to the commanded pitches in u."""
     if guard is None:
         return
     for k in range(guard.faults.shape[0]):
@@ -288,7 +288,7 @@ def break_drives(t, x, u, model, guard, link):
 
 @kernel
 def break_sensors(t, guard, link):
-    """Put into the reading what faulty sensors make of it; what the sensors lack stays NaN."""
+    """Apply the faults of sensors to the reading; fields without a sensor stay NaN."""
     if guard is None:
         return
     reading = link.reading

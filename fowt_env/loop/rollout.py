@@ -1,4 +1,4 @@
-"""The compiled loop of a whole run: control periods with a law, and output rows."""
+"""Runs the compiled loop of a simulation: control periods with a law, and output rows."""
 
 from typing import NamedTuple
 
@@ -12,14 +12,14 @@ from fowt_env.plant.integrators import take_step
 
 
 class Schedule(NamedTuple):
-    """When a rollout steps, controls and records, in steps of dt from the run's beginning."""
+    """Holds the schedule of control periods and output rows of a rollout, in steps of dt from its start."""
 
     dt: float  # s
     per_control: int  # steps in a control period
     per_output: int  # steps from one output row to the next
     last: int  # step at which the run ends, with a row
     individual: bool = False  # whether the law commands each blade, else one pitch for all
-    external: bool = False  # whether the command of each period comes from outside, after begin_command
+    external: bool = False  # whether commands come from an external controller, after begin_command
 
 
 @kernel
@@ -32,9 +32,9 @@ def observe_and_begin(step, model, data, x, u, interface, link, schedule):
 
 @entry
 def begin_command(handle, x, u, linked, schedule, step):
-    """Begin the control period of a step for a controller outside; link.command then holds the one in force.
+    """Begin a control period for an external controller; link.command then holds the command in force.
 
-    Returns whether the turbine is being stopped: the controller's command is then ignored.
+    Returns whether the turbine is being stopped: commands of the controller are then ignored.
     """
     model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
     stopping = observe_and_begin(step, model, data, x, u, interface, link, schedule)
@@ -45,14 +45,14 @@ def begin_command(handle, x, u, linked, schedule, step):
 
 @entry
 def rollout(handle, x, u, law, parameters, memory, linked, schedule, first, end, out):
-    """Run the closed loop over the instants first <= step < end, and at the run's last one; rows go to out.
+    """Run the closed loop over steps first <= step < end, and the last instant of the run; write rows to out.
 
     law         compiled control law (CompiledController.law), called at every control instant
     linked      Handle of the run's Interface and InterfaceData
-    out         (k, n_channels) of the rows to come, SI
-    Returns (status, step reached, rows written). x (n_state,), u, memory and the InterfaceData are written.
-    While the guard stops the turbine, the law is not called. With schedule.external begin_command has begun
-    the period of `first`, and no other control instant may follow before end.
+    out         (k, n_channels) output rows, SI
+    Returns (status, step reached, rows written). x (n_state,), u, memory and the InterfaceData are updated.
+    While the guard stops the turbine, the law is not called. With schedule.external, begin_command has begun
+    the period of `first`, and no other control instant may lie before end.
     """
     model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
     dt, rows = schedule.dt, 0

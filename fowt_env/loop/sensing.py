@@ -1,7 +1,7 @@
-"""Sensors between plant and controller, the fields that a controller declares, and the wind ahead.
+"""Models the sensors between plant and controller, the fields that a controller declares, and the wind ahead.
 
-A measurement has N_MEASUREMENTS fields and, with individual pitch, those of BladeMeasurement
-after them. In what a law reads the wind ahead lies between the two.
+A measurement has N_MEASUREMENTS fields and, with individual pitch, the fields of BladeMeasurement
+after them. The input of a law has the wind ahead between the two.
 """
 
 from enum import IntEnum
@@ -13,32 +13,32 @@ from fowt_env.plant.aero.wind import interval_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 
-GIVEN, HIDDEN = -0.0, np.nan  # what is added to a field; minus zero leaves every bit, the sign of zero too
+GIVEN, HIDDEN = -0.0, np.nan  # added to a field; minus zero keeps every bit, also the sign of zero
 
 
 class Setting(IntEnum):
-    """Rows of Sensors.chain."""
+    """Enumerates the rows of Sensors.chain."""
 
     HIDDEN = 0  # GIVEN or HIDDEN
     DELAY = 1  # control periods from measurement to reading
-    KEPT = 2  # fraction of the old value that a first-order low pass leaves in a control period; 0: none
-    STEP = 3  # of the quantisation, SI; 0: none
-    SOURCE = 4  # field whose reading is integrated; the field itself: it is measured
-    LEFT = 5  # fraction of an integral that its high pass leaves in a control period
-    PERIOD = 6  # s, control period of an integral
+    KEPT = 2  # fraction of the old value that a low pass of order 1 keeps over a control period; 0: no filter
+    STEP = 3  # quantisation step, SI; 0: none
+    SOURCE = 4  # field whose reading is integrated; the field itself: measured directly
+    LEFT = 5  # fraction of an integral that its high pass keeps over a control period
+    PERIOD = 6  # s, control period, of an integrated field
 
 
 class Sensors(NamedTuple):
-    """Sensors of a run; their noise is drawn beforehand, so that a snapshot needs no random generator."""
+    """Holds the sensors of a run; noise is drawn beforehand, so that a snapshot needs no random generator."""
 
     chain: np.ndarray  # (len(Setting), n) of the n fields of a measurement
     noise: np.ndarray  # (readings, n), SI; the last row repeats; no row: exact sensors
 
 
 class WindAhead(NamedTuple):
-    """The wind ahead that is read in a run, with what the motion of a lidar on the nacelle adds to it.
+    """Holds the wind ahead of a run, with the effect of the motion of a lidar on the nacelle.
 
-    taps of no column: nothing is added. weight (3,): y = weight[0] y before + weight[1] velocity before +
+    taps without columns: no effect. weight (3,): y = weight[0] last y + weight[1] last velocity +
     weight[2] velocity is a low pass of the nacelle's fore-aft velocity between two control instants; the wind
     ahead j changes by -sum(taps[j, m] y) of m control periods ago.
     """
@@ -49,12 +49,12 @@ class WindAhead(NamedTuple):
     weight: np.ndarray
 
     def new_memory(self) -> np.ndarray:
-        """Return (m + 1,) zeros: a ring of y, then the last velocity."""
+        """Return (m + 1,) zeros: ring buffer of y, then the last velocity."""
         return np.zeros(self.taps.shape[1] + 1)
 
 
 def open_chain(size: int = N_MEASUREMENTS) -> np.ndarray:
-    """Return the Sensors.chain of exact sensors of so many measured quantities."""
+    """Return the Sensors.chain of exact sensors. size: number of measured quantities."""
     chain = np.zeros((len(Setting), size))
     chain[Setting.HIDDEN] = GIVEN
     chain[Setting.SOURCE] = np.arange(size)
@@ -62,32 +62,32 @@ def open_chain(size: int = N_MEASUREMENTS) -> np.ndarray:
 
 
 def new_past(chain: np.ndarray) -> np.ndarray:
-    """Return the memory of a chain: a ring of (longest delay + 1) measurements, low passes, integrals."""
+    """Return the memory of a chain: ring of (longest delay + 1) measurements, low passes, integrals."""
     return np.zeros((int(chain[Setting.DELAY].max()) + 3, chain.shape[1]))
 
 
 def open_sensors(size: int = N_MEASUREMENTS) -> Sensors:
-    """Return exact Sensors of so many measured quantities."""
+    """Return exact Sensors. size: number of measured quantities."""
     return Sensors(open_chain(size), np.zeros((0, size)))
 
 
 def no_wind_ahead() -> WindAhead:
-    """Return the WindAhead of a law that reads none."""
+    """Return the WindAhead of a law without wind ahead."""
     return WindAhead(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), np.zeros(3))
 
 
 @kernel
-def place_of(field, leads):
-    """Return the index of a measured quantity in a law's reading. leads: entries of wind ahead in it."""
+def law_index(field, leads):
+    """Return the index of a measured quantity in the input of a law. leads: its entries of wind ahead."""
     return field if field < N_MEASUREMENTS else field + leads
 
 
 @kernel
 def take_reading(sensors, period, measurement, past, reading):
-    """Fill the reading (n,) of a control period from the measurement (n,); sensors None: the reading is it.
+    """Fill the reading (n,) of a control period from the measurement (n,); sensors None: both are one array.
 
     Low pass, delay, noise and quantisation, in this order. period counts control instants from 0, where every
-    memory starts at the measurement; a second reading in period 0 is the same. past: new_past.
+    memory starts at the measurement; a repeated reading in period 0 is the same. past: new_past.
     """
     if sensors is None:
         return
@@ -132,9 +132,9 @@ def take_reading(sensors, period, measurement, past, reading):
 
 @kernel
 def read_wind_ahead(ahead, t, period, velocity, motion, values, first):
-    """Fill values[first:] with the wind ahead at time t (s), under the nacelle's velocity (m/s).
+    """Fill values[first:] with the wind ahead at time t (s), for a velocity (m/s) of the nacelle.
 
-    The first and last wind hold outside the times; before period 0 the velocity was that of period 0.
+    Outside the times the first or last wind holds; before period 0 the velocity is that of period 0.
     """
     if ahead.values.shape[0] == 0:
         return
@@ -168,14 +168,14 @@ def read_wind_ahead(ahead, t, period, velocity, motion, values, first):
 
 @kernel
 def inform_law(hidden, ahead, period, t, link):
-    """Fill what the law reads in a control period: the reading that it declares, and the wind ahead.
+    """Fill the input of the law in a control period: the fields that it declares, and the wind ahead.
 
-    hidden None: there is no law that declares anything, and the law's reading is the reading.
+    hidden None: there is no law, and link.law_reading is link.reading.
     """
     if hidden is None:
         return
     leads = ahead.values.shape[0]
     for i in range(link.reading.shape[0]):
-        link.law_reading[place_of(i, leads)] = link.reading[i] + hidden[i]
+        link.law_reading[law_index(i, leads)] = link.reading[i] + hidden[i]
     velocity = link.measurement[Measure.NACELLE_VELOCITY]
     read_wind_ahead(ahead, t, period, velocity, link.motion, link.law_reading, N_MEASUREMENTS)

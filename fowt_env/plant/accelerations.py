@@ -1,7 +1,7 @@
-"""The solution of the equation of motion: accelerations of platform, rotor and tower under given loads.
+"""Solves the equation of motion: accelerations of platform, rotor and tower under given loads.
 
-Unknowns of a rigid tower are (v', w', w_b'); the rotor row is eliminated, which leaves a symmetric 6x6 solve
-(theory.md, Eqs 9, 10 and 13). A tower that bends adds a row for each mode, which is eliminated first.
+Unknowns with a rigid tower are (v', w', w_b'); the rotor row is eliminated, which leaves a symmetric 6x6
+solve (theory.md, Eqs 9, 10 and 13). A flexible tower adds a row for each mode, which is eliminated first.
 """
 
 from math import sqrt
@@ -27,11 +27,11 @@ from fowt_env.plant.tower.modes import TowerModes, bend_by_modes
 
 @kernel
 def factor_spd(a):
-    """Put the factors of a symmetric positive definite matrix a (6, 6) in its place.
+    """Factor a symmetric positive definite matrix a (6, 6) in place.
 
-    L D L^T with the reciprocals of D kept on the diagonal: six divisions and no root.
+    L D L^T with the reciprocals of D on the diagonal: six divisions and no square root.
     """
-    for i in range(6):  # a known count, which the compiler unrolls
+    for i in range(6):  # a constant count, which the compiler unrolls
         for j in range(i):
             total = a[i, j]
             for k in range(j):
@@ -62,7 +62,7 @@ def substitute_spd(a, b):
 
 @kernel
 def accelerate_in_plane(pose, load, torque, added, body, dx):
-    """Put the accelerations with sway, roll and yaw at zero into dx: rotor and platform are not coupled."""
+    """Fill dx with the accelerations of planar motion: rotor and platform are not coupled."""
     m, vx, vz, wy = body.mass_matrix, pose.vx, pose.vz, pose.wy
     px = m[0, 0] * vx + m[0, 2] * vz + m[0, 4] * wy
     pz = m[2, 0] * vx + m[2, 2] * vz + m[2, 4] * wy
@@ -111,10 +111,10 @@ def accelerate(pose, x, load, torque, added, body, matrix, cache, dx):
         for i in range(6):
             for j in range(6):
                 matrix[i, j] = body.mass_matrix[i, j] + added[i, j]
-        _take_rotor_row(ratio * body.coupling, matrix, body.tilt)
+        _eliminate_rotor_row(ratio * body.coupling, matrix, body.tilt)
         factor_spd(matrix)
         cache[LoadCache.FACTORED] = 1.0
-    _take_rotor_moment(ratio * torque, b, body.tilt)
+    _eliminate_rotor_moment(ratio * torque, b, body.tilt)
     substitute_spd(matrix, b)
     if body.rotor_fixed:
         dx[State.ROTOR_SPEED] = 0.0
@@ -124,8 +124,8 @@ def accelerate(pose, x, load, torque, added, body, matrix, cache, dx):
 
 
 @kernel
-def _take_rotor_row(inertia, matrix, tilt):
-    """Take the rotor's row out of the matrix: its inertia lies along the shaft."""
+def _eliminate_rotor_row(inertia, matrix, tilt):
+    """Eliminate the rotor row from the matrix: the rotor inertia lies along the shaft."""
     if tilt is None:
         matrix[3, 3] -= inertia
         return
@@ -137,8 +137,8 @@ def _take_rotor_row(inertia, matrix, tilt):
 
 
 @kernel
-def _take_rotor_moment(moment, b, tilt):
-    """Take the rotor's row out of the right-hand side: its moment lies along the shaft."""
+def _eliminate_rotor_moment(moment, b, tilt):
+    """Eliminate the rotor row from the right-hand side: the rotor moment lies along the shaft."""
     if tilt is None:
         b[3] -= moment
         return
@@ -148,7 +148,7 @@ def _take_rotor_moment(moment, b, tilt):
 
 @inlined_kernel
 def _add_body(matrix, d, upper, mass, bend):
-    """Add to the platform's rows (lower triangle) the bent tower's and the nacelle's masses."""
+    """Add the masses of deflected tower and nacelle to the platform rows (lower triangle)."""
     u, px, py, pz = upper, bend.x, bend.y, bend.z
     sx, sy, sz = d.dx + mass * px + u.sx, d.dy + mass * py + u.sy, mass * pz + u.sz
     matrix[0, 0] += mass
@@ -172,10 +172,10 @@ def _add_body(matrix, d, upper, mass, bend):
 
 @inlined_kernel
 def _add_modes(x, upper, mass, bend, tower, matrix):
-    """Fill the rows of the modes (lower triangle)."""
+    """Fill the rows of the tower modes (lower triangle)."""
     u, px, py, pz = upper, bend.x, bend.y, bend.z
     n, q = len(tower.count), tower.first
-    tx, tz = bend.ca, -bend.sa  # axis about which side-side modes turn the nacelle
+    tx, tz = bend.ca, -bend.sa  # axis about which side-side modes rotate the nacelle
     ax, ay, az = u.xy, u.yy, u.yz  # inertia times the y axis
     bx, by, bz = turn(u, tx, 0.0, tz)
     cx, cy, cz = cross(tx, 0.0, tz, u.sx, u.sy, u.sz)
@@ -210,8 +210,8 @@ def _add_modes(x, upper, mass, bend, tower, matrix):
 
 
 @inlined_kernel
-def _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
-    """Take off modal (n,) the terms of velocities: of the tower's line mass, and of a wrench at its top."""
+def _subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
+    """Subtract velocity terms from modal (n,): of the tower's line mass, and of a wrench at the tower top."""
     n = len(tower.count)
     q, v = tower.first, tower.first + n
     wx, wy, wz = pose.wx, pose.wy, pose.wz
@@ -239,7 +239,7 @@ def _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
 
 @inlined_kernel
 def _factor_modes(matrix, n):
-    """Take the n modes out of the platform's system, the last first; the lower triangle alone counts."""
+    """Eliminate the n modes from the platform's system, last mode first; only the lower triangle is used."""
     for k in range(n - 1, -1, -1):
         row = 6 + k
         over = 1.0 / matrix[row, row]
@@ -251,7 +251,7 @@ def _factor_modes(matrix, n):
 
 @inlined_kernel
 def without_modes(matrix, b, modal, n):
-    """Take the modes out of the right-hand sides b (6,) and modal (n,), with what _factor_modes has left."""
+    """Eliminate the modes from the right-hand sides b (6,) and modal (n,), after _factor_modes."""
     for k in range(n - 1, -1, -1):
         row = 6 + k
         force = modal[k] / matrix[row, row]
@@ -263,7 +263,7 @@ def without_modes(matrix, b, modal, n):
 
 @inlined_kernel
 def find_modes(matrix, b, modal, n):
-    """Put the accelerations of the deflections into modal, from those of the platform in b."""
+    """Fill modal with the accelerations of the deflections, from those of the platform in b."""
     for k in range(n):
         row = 6 + k
         total = modal[k]
@@ -276,10 +276,10 @@ def find_modes(matrix, b, modal, n):
 
 @kernel
 def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache, dx):
-    """Put the accelerations of platform, deflections and rotor into dx.
+    """Fill dx with the accelerations of platform, deflections and rotor.
 
-    load: on the whole turbine, about the body origin. dx comes with the generalised forces on the deflections
-    where it has the rates of their velocities. matrix (6 + n, 6 + n) keeps its factors as in accelerate.
+    load: on the whole turbine, about the body origin. On entry dx has the generalised forces on the
+    deflections in place of their accelerations. matrix (6 + n, 6 + n) keeps its factors as in accelerate.
     """
     n = len(tower.count)
     b, modal = dx[State.VX : State.WZ + 1], dx[tower.first + n : tower.first + 2 * n]
@@ -290,7 +290,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache,
     free = with_free_rotor(upper, ratio * body.coupling)
     ax, ay, az, bx, by, bz, wx, wy, wz = top_bias(pose, bend)
     fx, fy, fz, mx, my, mz = upper_rate(upper, mass, spin, ax, ay, az, bx, by, bz, wx, wy, wz)
-    # what the free rotor takes of the rotation's bias, and its own torque on the nacelle
+    # moment of the free rotor by the bias of the rotation, and by the rotor torque
     push = ratio * (torque - body.coupling * (upper.nx * bx + upper.ny * by + upper.nz * bz))
     mx, my, mz = mx + push * upper.nx, my + push * upper.ny, mz + push * upper.nz
 
@@ -301,7 +301,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache,
     b[3] = load.mx - c.mx - e.mx - mx - bend.y * fz + bend.z * fy
     b[4] = load.my - c.my - e.my - my - bend.z * fx + bend.x * fz
     b[5] = load.mz - c.mz - e.mz - mz - bend.x * fy + bend.y * fx
-    _take_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
+    _subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
 
     if cache[LoadCache.FACTORED] < 0.5:
         for i in range(6):
@@ -328,7 +328,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache,
 
 @inlined_kernel
 def rotation_along_shaft(bx, by, bz, b, modal, bend, tower, nx, ny, nz):
-    """Return the rate of the nacelle's rotation along the shaft (n), by its bias (b) and accelerations."""
+    """Return the angular acceleration of the nacelle along the shaft (nx, ny, nz), of bias (bx, by, bz)."""
     for i in range(0, len(tower.count), 2):
         by += tower.slope[i] * modal[i]
         rolling = tower.slope[i + 1] * modal[i + 1]
@@ -350,7 +350,7 @@ accelerate_turbine = chosen_by_class(
 
 @kernel
 def fill_tower_rates(x, modal, tower, dx):
-    """Put the rates of the deflections into dx, and for accelerate_bending the forces on them."""
+    """Fill dx with the rates of the deflections and, as input of accelerate_bending, the forces on them."""
     if tower is None:
         return
     n, q = len(tower.count), tower.first

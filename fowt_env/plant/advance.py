@@ -1,4 +1,4 @@
-"""Fixed-step advance of one plant, its measurement and its output."""
+"""Advances one plant by fixed steps, and computes its measurement and output."""
 
 from math import isfinite
 
@@ -15,7 +15,7 @@ from fowt_env.plant.state import State
 
 RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP, BAD_COMMAND, TRIPPED = 0, 1, 2, 3, 4, 5, 6
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg
-# No floating platform moves as fast: a state beyond is the time step's doing, not the sea's. A hull that
+# No floating platform moves as fast: higher speeds come from the time step, not from the sea. A hull that
 # capsizes passes 80 deg at some 0.5 rad/s.
 FASTEST, FASTEST_TURN = 100.0, 10.0  # m/s, rad/s
 STOP_REASONS = {
@@ -25,14 +25,14 @@ STOP_REASONS = {
     BLOWN_UP: f"numerical blow-up (platform faster than {FASTEST:g} m/s or {FASTEST_TURN:g} rad/s): loads too"
     " stiff for the time step",
     TRIPPED: "above the limit that ends the run",
-    BAD_COMMAND: "the controller's command is not finite (what its information does not declare, it reads as"
+    BAD_COMMAND: "the controller's command is not finite (fields that its information does not declare are"
     " NaN)",
 }
 
 
 @kernel
 def status_of(x):
-    """RUNNING, NON_FINITE, BLOWN_UP or CAPSIZED for a state."""
+    """Return the status of a state: RUNNING, NON_FINITE, BLOWN_UP or CAPSIZED."""
     for value in x:
         if not isfinite(value):
             return NON_FINITE
@@ -46,7 +46,7 @@ def status_of(x):
 
 @kernel
 def advance_plant(model, data, x, u, first, n, dt):
-    """Advance x by n steps from time first*dt under constant u; returns the status."""
+    """Advance the state x by n steps from time first*dt under constant u; returns the status."""
     for i in range(n):
         take_step((first + i) * dt, x, u, dt, model, model.integrator, data)
         status = status_of(x)
@@ -63,24 +63,23 @@ def advance(handle, x, u, first, n, dt):
 
 @inlined_kernel
 def observe_plant(model, data, x, u, t, dx, measurement):
-    """Fill dx and measurement as observe does."""
+    """Fill the rates dx and the measurement as observe does."""
     rates(t, x, u, model, data, dx)
     measure(model, data, x, dx, u, t, measurement)
 
 
 @inlined_kernel
 def output_plant(model, data, x, u, t, dx, row):
-    """Fill dx and one output row as output does."""
+    """Fill the rates dx and one output row as output does."""
     rates(t, x, u, model, data, dx)
     record(model, data, x, dx, u, t, loads_of(data, dx), row)
 
 
 @entry
 def observe(handle, x, u, t, dx, measurement):
-    """Fill dx (n_state,) and measurement (Scene.n_measurements,) at time t under u.
+    """Fill the rates dx (n_state,) and the measurement (Scene.n_measurements,) at time t under u.
 
-    The loads kept by the data arrays are used where they are fresh: after changing x from outside,
-    call forget first.
+    Cached loads are used where they are valid: after changing x from outside, call forget first.
     """
     observe_plant(model_of(handle), data_of(handle), x, u, t, dx, measurement)
 
@@ -100,7 +99,7 @@ def forget(handle):
 
 
 def output_row(handle, x, u, t, size):
-    """One output row (size,) in SI of any state at time t under u."""
+    """Return one output row (size,) in SI of any state at time t under u."""
     row = np.empty(size)
     forget(handle)
     output(handle, x, u, float(t), np.zeros_like(x), row)

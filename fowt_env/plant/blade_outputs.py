@@ -1,8 +1,8 @@
-"""Bending moments of blade roots, hub and yaw bearing with individual pitch.
+"""Computes bending moments of blade roots, hub and yaw bearing with individual pitch.
 
-As ElastoDyn has them: with what the outer part loads the inner one, by the air, its weight and its inertia
-(theory.md, 6.6). Blades are rigid and, as masses, straight along their pitch axes. Pose and rates that
-kernels take are those of the frame that is fixed in the nacelle (nacelle_pose and nacelle_rates in tower/).
+The moments are defined as in ElastoDyn: loads of the outer part on the inner one by aerodynamics, weight and
+inertia (theory.md, 6.6). Blades are rigid, with their mass straight along the pitch axis. Kernels take pose
+and rates of the nacelle-fixed frame (nacelle_pose and nacelle_rates in tower/).
 """
 
 from math import cos, pi, sin
@@ -24,7 +24,7 @@ N_BLADE_CHANNELS = 2 + 2 * BLADES + 2 + 3  # of channels.BLADE_CHANNELS: pitches
 
 
 class BladeMasses(NamedTuple):
-    """Masses and places that the moments need beside those of channels.Layout."""
+    """Holds masses and distances that the moments need in addition to channels.Layout."""
 
     hub_radius: float  # m, from the rotor centre to a blade root along the pitch axis
     first_moment: float  # kg m, of a blade about its root, along the pitch axis
@@ -35,7 +35,7 @@ class BladeMasses(NamedTuple):
 
 
 class HubMotion(NamedTuple):
-    """Motion of the hub in rotor axes, which do not turn with the rotor."""
+    """Holds the motion of the hub in rotor axes, which do not rotate with the rotor."""
 
     gx: float  # m/s2, weight per mass less the acceleration of the rotor centre
     gy: float
@@ -51,14 +51,14 @@ class HubMotion(NamedTuple):
 
 
 class RootMoments(NamedTuple):
-    """Bending moments of a blade root, N m."""
+    """Holds the bending moments of a blade root, N m."""
 
     in_plane: float  # by forces in the rotor plane: about the normal of the coned blade, downwind
     out_of_plane: float  # by forces along that normal: against the direction of rotation
 
 
 class BladeMoments(NamedTuple):
-    """Bending moments of the roots of three blades, of the hub and of the yaw bearing, N m."""
+    """Holds the bending moments of the roots of three blades, of the hub and of the yaw bearing, N m."""
 
     first: RootMoments
     second: RootMoments
@@ -72,7 +72,7 @@ class BladeMoments(NamedTuple):
 
 @kernel
 def hub_motion(pose, rates, speed, rate, gravity, layout):
-    """HubMotion of a rotor that turns with speed and rate; pose and rates of the nacelle frame."""
+    """Return the HubMotion of a rotor with this speed and rate; pose and rates of the nacelle frame."""
     turned = rotor_pose(pose, layout.tilt)
     vx, vz = in_rotor_axes(rates.vx, rates.vz, layout.tilt)
     ax, az = in_rotor_axes(rates.wx, rates.wz, layout.tilt)
@@ -99,14 +99,14 @@ def hub_motion(pose, rates, speed, rate, gravity, layout):
 
 @kernel
 def blade_load(blade, blades):
-    """BladeLoad of a blade from Data.blades."""
+    """Return the BladeLoad of a blade from Data.blades."""
     row = blades[blade]
     return BladeLoad(row[0], row[1], row[2], row[3], row[4], row[5])
 
 
 @kernel
 def root_moments(psi, load, hub, masses, layout):
-    """RootMoments of the blade at the azimuth psi under a BladeLoad.
+    """Return the RootMoments of the blade at the azimuth psi under a BladeLoad.
 
     Weight and inertia: the integral of s a x (g - acceleration) over the blade's mass, a the direction of
     the pitch axis, s the distance from the root.
@@ -117,7 +117,7 @@ def root_moments(psi, load, hub, masses, layout):
     ay, az = hub.ay + hub.speed * hub.wz, hub.az - hub.speed * hub.wy
     ax, ar, at = hub.ax + hub.rate, ay * ey + az * ez, az * ey - ay * ez
     along = c * wr - s * wx  # of the angular velocity, on the pitch axis (-s, c, 0)
-    # less s times what lies on the pitch axis, which has no moment
+    # less s times the component on the pitch axis, which has no moment
     turning_x = along * wx - c * at
     turning_r = along * wr - s * at
     turning_t = along * wt + c * ax + s * ar
@@ -134,7 +134,7 @@ def root_moments(psi, load, hub, masses, layout):
 
 @kernel
 def hub_moments(azimuth, hub, masses, layout, blades):
-    """(tilting, yawing) moment of the rotor on its shaft at the rotor centre, about y and z of rotor axes."""
+    """Return the (tilting, yawing) moment of the rotor on its shaft at the rotor centre: rotor axes y, z."""
     my = mz = 0.0
     for blade in range(BLADES):
         psi = azimuth + 2.0 * pi * blade / BLADES
@@ -154,9 +154,9 @@ def hub_moments(azimuth, hub, masses, layout, blades):
 
 @kernel
 def bearing_moments(pose, rates, speed, rate, rotor, masses, body, layout):
-    """(roll, tilting, yawing) moment of nacelle and rotor on the tower top, axes of the nacelle frame.
+    """Return the (roll, tilting, yawing) moment of nacelle and rotor on the tower top, nacelle-frame axes.
 
-    rotor: Wrench of the air on the rotor about the frame's origin; speed and rate of the rotor.
+    rotor: aerodynamic Wrench on the rotor about the frame's origin; speed, rate: of the rotor.
     """
     m, a = masses.upper_matrix, rates
     c = momentum_rate(pose, speed, m, body.coupling, body.tilt)
@@ -177,7 +177,7 @@ def bearing_moments(pose, rates, speed, rate, rotor, masses, body, layout):
 
 @kernel
 def blade_moments(pose, rates, x, dx, model, data):
-    """BladeMoments at a state with the loads of its last evaluation; pose and rates of the nacelle frame."""
+    """Return the BladeMoments at a state with its last loads; pose and rates of the nacelle frame."""
     layout, body, blades = model.layout, model.rigid_body, data.blades
     masses = layout.blade_masses
     speed, rate = x[State.ROTOR_SPEED], dx[State.ROTOR_SPEED]
@@ -200,40 +200,40 @@ def blade_moments(pose, rates, x, dx, model, data):
 
 @kernel
 def record_blades(pose, rates, x, dx, pitches, model, data, row):
-    """Fill the last entries of an output row with channels.BLADE_CHANNELS; none with one pitch for all.
+    """Fill the last entries of an output row with channels.BLADE_CHANNELS; nothing with one pitch for all.
 
     pose, rates: of the nacelle frame.
     """
     if pitches is None:
         return
-    found = blade_moments(pose, rates, x, dx, model, data)
+    moments = blade_moments(pose, rates, x, dx, model, data)
     out = row[row.shape[0] - N_BLADE_CHANNELS :]
     out[0], out[1] = pitch_of(1, x, pitches), pitch_of(2, x, pitches)
-    out[2], out[3], out[4] = found.first.in_plane, found.second.in_plane, found.third.in_plane
-    out[5], out[6] = found.first.out_of_plane, found.second.out_of_plane
-    out[7], out[8], out[9] = found.third.out_of_plane, found.hub_tilt, found.hub_yaw
-    out[10], out[11], out[12] = found.bearing_roll, found.bearing_tilt, found.bearing_yaw
+    out[2], out[3], out[4] = moments.first.in_plane, moments.second.in_plane, moments.third.in_plane
+    out[5], out[6] = moments.first.out_of_plane, moments.second.out_of_plane
+    out[7], out[8], out[9] = moments.third.out_of_plane, moments.hub_tilt, moments.hub_yaw
+    out[10], out[11], out[12] = moments.bearing_roll, moments.bearing_tilt, moments.bearing_yaw
 
 
 @kernel
 def measure_blades(pose, rates, x, dx, pitches, model, data, m):
-    """Fill the last entries of a measurement with a BladeMeasurement; none with one pitch for all.
+    """Fill the last entries of a measurement with a BladeMeasurement; nothing with one pitch for all.
 
     pose, rates: of the nacelle frame.
     """
     if pitches is None:
         return
-    found = blade_moments(pose, rates, x, dx, model, data)
+    moments = blade_moments(pose, rates, x, dx, model, data)
     out = m[m.shape[0] - N_BLADE_MEASUREMENTS :]
     out[BladeMeasure.AZIMUTH] = x[State.AZIMUTH] % (2.0 * pi)
     for blade in range(BLADES):
         out[BladeMeasure.BLADE_PITCH_1 + blade] = pitch_of(blade, x, pitches)
-    out[BladeMeasure.ROOT_OUT_OF_PLANE_1] = found.first.out_of_plane
-    out[BladeMeasure.ROOT_OUT_OF_PLANE_2] = found.second.out_of_plane
-    out[BladeMeasure.ROOT_OUT_OF_PLANE_3] = found.third.out_of_plane
-    out[BladeMeasure.ROOT_IN_PLANE_1] = found.first.in_plane
-    out[BladeMeasure.ROOT_IN_PLANE_2] = found.second.in_plane
-    out[BladeMeasure.ROOT_IN_PLANE_3] = found.third.in_plane
-    out[BladeMeasure.HUB_TILT_MOMENT], out[BladeMeasure.HUB_YAW_MOMENT] = found.hub_tilt, found.hub_yaw
-    out[BladeMeasure.YAW_BEARING_TILT_MOMENT] = found.bearing_tilt
-    out[BladeMeasure.YAW_BEARING_YAW_MOMENT] = found.bearing_yaw
+    out[BladeMeasure.ROOT_OUT_OF_PLANE_1] = moments.first.out_of_plane
+    out[BladeMeasure.ROOT_OUT_OF_PLANE_2] = moments.second.out_of_plane
+    out[BladeMeasure.ROOT_OUT_OF_PLANE_3] = moments.third.out_of_plane
+    out[BladeMeasure.ROOT_IN_PLANE_1] = moments.first.in_plane
+    out[BladeMeasure.ROOT_IN_PLANE_2] = moments.second.in_plane
+    out[BladeMeasure.ROOT_IN_PLANE_3] = moments.third.in_plane
+    out[BladeMeasure.HUB_TILT_MOMENT], out[BladeMeasure.HUB_YAW_MOMENT] = moments.hub_tilt, moments.hub_yaw
+    out[BladeMeasure.YAW_BEARING_TILT_MOMENT] = moments.bearing_tilt
+    out[BladeMeasure.YAW_BEARING_YAW_MOMENT] = moments.bearing_yaw

@@ -1,7 +1,7 @@
-"""Blades whose pitches differ: where each is in the state, and how it follows its command.
+"""Defines individual blade pitches: their indices in the state, and their response to commands.
 
-The first blade's pitch is State.BLADE_PITCH; those of the others are a block of their own. With one pitch for
-all blades the part is None.
+The first blade's pitch is State.BLADE_PITCH; the other blades have a separate block. With one pitch for all
+blades the part is None.
 """
 
 from typing import NamedTuple
@@ -18,7 +18,7 @@ FIRST_PITCH = int(Command.BLADE_PITCH)  # numba has no int() of an enum
 
 
 class BladePitches(NamedTuple):
-    """Individual pitch of the blades."""
+    """Locates the individual pitches of the blades in the state."""
 
     first: int  # index in the state of the second blade's pitch; the third's follows
 
@@ -64,7 +64,7 @@ def _halt_lagging(blade, i, x, actuator):
     return
 
 
-# of one blade, whose pitch has the index i in the state
+# of one blade, whose pitch has index i in the state
 advance_pitch = chosen_by_class("actuator", {PitchActuator: _advance_lagging, PitchDrive: advance_drive})
 fill_rates = chosen_by_class("actuator", {PitchActuator: _fill_lagging, PitchDrive: fill_drive_rates})
 jumps = chosen_by_class("actuator", {PitchActuator: _lagging_jumps, PitchDrive: stays})
@@ -74,14 +74,14 @@ set_at_once = chosen_by_class("actuator", {PitchActuator: _set_lagging, PitchDri
 
 @kernel
 def advance_pitches(x, u, after, actuator, pitches, y):
-    """Put into y the pitches at a time `after` (s) the state x, under a constant command u."""
+    """Advance the pitches from state x to y over a time `after` (s) under a constant command u."""
     advance_pitch(0, State.BLADE_PITCH, x, u, after, actuator, y)
     _advance_others(x, u, after, actuator, pitches, y)
 
 
 @kernel
 def advance_actuators(x, u, after, model, y):
-    """Put into y the pitches and the torque in force at a time `after` (s) the state x, under a command u."""
+    """Advance pitches and torque in force from state x to y over a time `after` (s) under a constant u."""
     advance_pitches(x, u, after, model.actuator, model.pitches, y)
     advance_torque(x, u, after, model.converter, y)
 
@@ -96,7 +96,7 @@ def _advance_others(x, u, after, actuator, pitches, y):
 
 @kernel
 def fill_pitch_rates(x, u, actuator, pitches, dx):
-    """Put the rates of the pitches into dx."""
+    """Fill dx with the rates of the pitches."""
     fill_rates(0, State.BLADE_PITCH, x, u, actuator, dx)
     _fill_other_rates(x, u, actuator, pitches, dx)
 
@@ -127,7 +127,7 @@ def _others_jump(x, u, dt, actuator, pitches):
 
 @kernel
 def set_followed(x, u, dt, actuator, pitches):
-    """Set the pitches of x to those that an actuator without lag has at the beginning of a step of dt (s)."""
+    """Set the pitches of x to those of an actuator without lag at the beginning of a step of dt (s)."""
     set_at_once(0, State.BLADE_PITCH, x, u, dt, actuator)
     _set_others(x, u, dt, actuator, pitches)
 
@@ -142,7 +142,7 @@ def _set_others(x, u, dt, actuator, pitches):
 
 @kernel
 def halt_blade(blade, x, actuator, pitches):
-    """Take the pitch rate of a blade that sticks (0, 1, 2): its pitch has none to lose without inertia."""
+    """Set the pitch rate of a stuck blade (0, 1, 2) to zero, where the actuator has such a state."""
     if pitches is None:
         halt(0, State.BLADE_PITCH, x, actuator)
         return
@@ -151,6 +151,6 @@ def halt_blade(blade, x, actuator, pitches):
 
 @kernel
 def spread_command(command):
-    """Set the pitch commands of all blades that have one to that of the first."""
+    """Set the pitch commands of all blades to that of the first."""
     for i in range(FIRST_PITCH + 1, command.shape[0]):
         command[i] = command[Command.BLADE_PITCH]

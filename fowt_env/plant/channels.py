@@ -1,4 +1,4 @@
-"""OpenFAST-named outputs and controller measurements from a state: the only place with deg, rpm and kN."""
+"""Computes OpenFAST-named outputs and measurements from a state: the only file with deg, rpm and kN."""
 
 from enum import IntEnum
 from math import cos, pi, sin
@@ -33,7 +33,7 @@ UNITS = {  # of output channels: factors from SI
 
 
 class Channel(NamedTuple):
-    """One output channel: OpenFAST name, unit, and factor from SI."""
+    """Describes an output channel: OpenFAST name, unit, and factor from SI."""
 
     name: str
     unit: str
@@ -62,7 +62,7 @@ FIXED_CHANNELS = _channels(
 )
 Out = IntEnum("Out", [c.name.upper() for c in FIXED_CHANNELS], start=0)
 N_FIXED = len(FIXED_CHANNELS)
-# of each of the user's loads: about the body origin, inertial axes, as HydroFxi
+# of each user load: about the body origin, inertial axes, as HydroFxi
 LOAD_CHANNELS = tuple(
     channel[:2] for channel in _channels("Fxi_[N] Fyi_[N] Fzi_[N] Mxi_[N-m] Myi_[N-m] Mzi_[N-m]")
 )
@@ -71,13 +71,13 @@ BLADE_CHANNELS = _channels(  # of a rotor with individual pitch
     " RootMyc2_[kN-m] RootMyc3_[kN-m] LSSTipMys_[kN-m] LSSTipMzs_[kN-m] YawBrMxp_[kN-m] YawBrMyp_[kN-m]"
     " YawBrMzp_[kN-m]"
 )
-# of a tower that bends
+# of a flexible tower
 TOWER_CHANNELS = _channels("TTDspFA_[m] TTDspSS_[m] YawBrTAxp_[m/s^2] YawBrTAyp_[m/s^2]")
 GROUPS = {"tower": TOWER_CHANNELS, "blades": BLADE_CHANNELS}  # of parts that a scene may have, in row order
 
 
 def channels(n_lines, loads=(), groups=()):
-    """Return every output channel of a model with n_lines mooring lines and these loads, in row order.
+    """Return every output channel of a model with n_lines mooring lines and these user loads, in row order.
 
     groups: names of those GROUPS that the model has.
     """
@@ -92,7 +92,7 @@ def channels(n_lines, loads=(), groups=()):
 
 
 class Layout(NamedTuple):
-    """Points and masses that outputs need beyond the dynamics."""
+    """Holds points and masses that outputs need in addition to the dynamics."""
 
     hub: np.ndarray  # (3,) body, m
     tower_top: np.ndarray  # (3,)
@@ -103,7 +103,7 @@ class Layout(NamedTuple):
     gear_ratio: float
     generator_efficiency: float
     blades: int
-    span: np.ndarray  # (n,) distances along a blade at which the rotor's mean wind is read, m
+    span: np.ndarray  # (n,) distances along a blade at which the rotor-averaged wind is evaluated, m
     tilt: object  # tilt.Tilt of the shaft or None
     shaft_hub: np.ndarray  # (3,) hub in rotor axes, whose x axis is the shaft, m
     lean: float  # m upwind per metre along a blade, sine of the cone
@@ -116,8 +116,8 @@ class Layout(NamedTuple):
 def rotor_wind(t, pose, azimuth, aero, layout):
     """Return the mean wind over the blades, relative to the hub and along the shaft, m/s: AeroDyn's RtVAvgxh.
 
-    As there every length of blade counts alike. Of a series it is the mean over the azimuth at rest, of a box
-    that over the blades where they are now.
+    As in AeroDyn every length of blade has equal weight. The mean of a series is over the azimuth at rest, of
+    a wind box over the current positions of the blades.
     """
     if aero is None:
         return 0.0
@@ -127,7 +127,7 @@ def rotor_wind(t, pose, azimuth, aero, layout):
 
 @kernel
 def _rotor_wind(t, pose, azimuth, now, series, field, layout):
-    """Return rotor_wind with the pose in rotor axes."""
+    """Return rotor_wind for a pose in rotor axes."""
     hub = layout.shaft_hub
     if field is None:
         u, v, w = now.u * series.rotor_factor, now.v * series.rotor_factor, now.w
@@ -145,8 +145,8 @@ def _rotor_wind(t, pose, azimuth, now, series, field, layout):
                 w += c
         n = layout.blades * layout.span.shape[0]
         u, v, w = u / n, v / n, w / n
-    own = pose.vx + pose.wy * hub[2] - pose.wz * hub[1]
-    return pose.r11 * u + pose.r21 * v + pose.r31 * w - own
+    hub_velocity = pose.vx + pose.wy * hub[2] - pose.wz * hub[1]
+    return pose.r11 * u + pose.r21 * v + pose.r31 * w - hub_velocity
 
 
 @kernel
@@ -160,7 +160,7 @@ def point_acceleration(pose, dx, px, py, pz):
 def acceleration_at(pose, rates, px, py, pz):
     """Return the absolute acceleration of a point of a Pose's frame: v' + w x v + w' x p + w x (w x p).
 
-    rates: Twist of the pose. All components are the frame's.
+    rates: Twist of the pose. All components are in the frame's axes.
     """
     wx, wy, wz = pose.wx, pose.wy, pose.wz
     ux = pose.vx + wy * pz - wz * py
@@ -174,7 +174,7 @@ def acceleration_at(pose, rates, px, py, pz):
 
 @kernel
 def elevation_now(t, hydro, data):
-    """Return surface_at_origin, computed once for all outputs of an instant."""
+    """Return the elevation surface_at_origin, computed once for all outputs of an instant."""
     cache = data.cache
     if cache[LoadCache.ELEVATED] < 0.5:
         cache[LoadCache.ELEVATION] = surface_at_origin(t, hydro, data)
@@ -239,7 +239,7 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.GENTQ] = torque
     row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * torque
     row[Out.GENTQLIM] = data.cache[LoadCache.TORQUE_LIMITED]
-    # shaft loads: aerodynamics less the rotor's own inertia and weight
+    # shaft loads: aerodynamics less inertia and weight of the rotor
     hub, cm, tilt = layout.hub, layout.rotor_cm, layout.tilt
     cx, _, cz = acceleration_at(nacelle, moving, cm[0], cm[1], cm[2])
     push = along_shaft(cx + body.gravity * nacelle.r31, cz + body.gravity * nacelle.r33, tilt)
@@ -269,7 +269,7 @@ def record(model, data, x, dx, u, t, loads, row):
 
 @inlined_kernel
 def tower_base(pose, x, dx, loads, bend, body, layout, tower, row):
-    """Fill in the loads at the tower base: aerodynamics and weight above it less the momentum rate there.
+    """Fill the tower-base loads of a row: aerodynamics and weight above it less the momentum rate there.
 
     Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
     on the lower one).
@@ -283,7 +283,7 @@ def tower_base(pose, x, dx, loads, bend, body, layout, tower, row):
 
 
 def put_hub_wind(rows, hub_wind, period):
-    """Put the wind (time, value (n, 3)) at the hub into rows (k, n_channels) in SI; period 0: none."""
+    """Fill the hub wind of rows (k, n_channels), SI, from (time, value (n, 3)); period 0: not periodic."""
     time, value = hub_wind
     at = rows[:, Out.TIME] % period if period > 0.0 else rows[:, Out.TIME]
     for column in range(3):
@@ -291,10 +291,10 @@ def put_hub_wind(rows, hub_wind, period):
 
 
 def to_units(rows, n_lines, loads=(), groups=()):
-    """Return a copy of rows (k, n_channels) in SI, in the units of channels(n_lines, loads, groups)."""
+    """Return a copy of rows (k, n_channels) from SI to the units of channels(n_lines, loads, groups)."""
     return rows * scales(n_lines, loads, groups)
 
 
 def scales(n_lines, loads=(), groups=()):
-    """Return (n_channels,) factors from SI to the units of channels(n_lines, loads, groups)."""
+    """Return the (n_channels,) factors from SI to the units of channels(n_lines, loads, groups)."""
     return np.array([c.scale for c in channels(n_lines, loads, groups)])

@@ -1,4 +1,4 @@
-"""Torque law, generator and shaft balance of a geared turbine (theory.md, section 3)."""
+"""Models torque law, generator and shaft balance of a geared turbine (theory.md, section 3)."""
 
 from math import exp, isfinite, sqrt
 from typing import NamedTuple
@@ -11,7 +11,7 @@ REGION3 = ("constant_torque", "constant_power")
 
 
 class TorqueCurve(NamedTuple):
-    """Generator torque over generator speed, both on the high-speed shaft (theory.md, section 3).
+    """Holds the generator torque over generator speed, both on the high-speed shaft (theory.md, section 3).
 
     In region 3 the torque is region3_torque + region3_power / speed; one of the two is zero.
     """
@@ -31,7 +31,7 @@ class TorqueCurve(NamedTuple):
 
 
 class Shaft(NamedTuple):
-    """Rigid shaft with gearbox: the figures of theory.md Eq. (7).
+    """Holds the constants of a rigid shaft with gearbox, theory.md Eq. (7).
 
     inertia_row is I_rx = I_rotor + N_g^2 I_g, the inertia of the rotor-speed equation; coupling is
     H = I_rotor + N_g I_g, the angular momentum per unit rotor speed.
@@ -46,21 +46,21 @@ class Shaft(NamedTuple):
 
 
 class TorqueLimits(NamedTuple):
-    """What generator and converter can do, on the high-speed shaft. They never drive the rotor."""
+    """Holds the torque limits of generator and converter, on the high-speed shaft; the minimum is zero."""
 
     maximum: float  # N m
-    rate_limit: float  # N m/s, either way
+    rate_limit: float  # N m/s, in both directions
 
 
-SLACK = 1e-9  # relative, by which a command may miss a limit in rounding
+SLACK = 1e-9  # relative tolerance for rounding of a command at a limit
 
 
 def build_torque_curve(torque_law, region3="constant_torque"):
     """Return the TorqueCurve of a TorqueLaw; region3 is "constant_torque" or "constant_power".
 
     The slip line of region 2.5 rises from the synchronous speed, region3_start/(1 + slip), to the
-    region-3 torque at region3_start; it takes over from the parabola where the two meet.
-    Raises: InputError for an unknown region3, or where line and parabola do not meet in between.
+    region-3 torque at region3_start; it replaces the parabola from their intersection on.
+    Raises: InputError for an unknown region3, or where line and parabola do not intersect in between.
     """
     if region3 not in REGION3:
         raise unknown("region3 law", region3, REGION3)
@@ -109,7 +109,7 @@ def build_drivetrain(turbine):
 
 
 class TorqueLag(NamedTuple):
-    """First-order lag of generator and converter: the torque in force is a state."""
+    """Models the first-order lag of generator and converter: the torque in force is a state."""
 
     time_constant: float  # s
     torque: int  # index in the state of the torque in force
@@ -122,7 +122,7 @@ def build_torque_limits(torque_law):
 
 @kernel
 def clamp(value, low, high):
-    """Return the value, or the limit that it passes."""
+    """Return the value limited to [low, high]."""
     return min(max(value, low), high)
 
 
@@ -136,9 +136,9 @@ def rate_limit(value, target, step):
 def generator_torque(generator_speed, blade_pitch, curve):
     """Return the generator torque of the static curve, N m on the high-speed shaft (theory.md, section 3).
 
-    Region 3 is tested first, so a blade pitch of region3_min_pitch and above forces it at any
-    forward speed, as published. A shaft that stands or turns backwards gives no torque: it brakes
-    the rotor at most to rest, never drives it.
+    Region 3 is tested first, so a blade pitch of region3_min_pitch and above forces region 3 at any
+    forward speed, as published. At zero or negative speed the torque is zero: the generator brakes
+    the rotor at most to rest and never drives the rotor.
     """
     if generator_speed <= 0.0:
         return 0.0
@@ -159,10 +159,10 @@ def generator_torque(generator_speed, blade_pitch, curve):
 def followed_torque(torque, command, period, limits):
     """Return the generator torque (N m) of a control period: the command within limits and rate.
 
-    The command within [0, maximum], and not further from the torque before than the rate limit allows in a
-    period (s). It acts from the period's beginning, as a torque that is set by a Bladed-style DLL does.
+    The command is limited to [0, maximum] and to the change from the last torque that the rate limit allows
+    in a period (s). It acts from the start of the period, as a torque set by a Bladed-style DLL.
     """
-    if not isfinite(command):  # which a limit would turn into a torque; the run stops at it instead
+    if not isfinite(command):  # clamp would turn it into a torque; the run stops instead
         return command
     target = clamp(command, 0.0, limits.maximum)
     step = limits.rate_limit * period
@@ -174,7 +174,7 @@ def followed_torque(torque, command, period, limits):
 
 @kernel
 def torque_in_force(x, u, converter):
-    """Return the present generator torque, N m: the command, or a state where it lags."""
+    """Return the current generator torque, N m: the command, or a state with a lag."""
     if converter is None:
         return u[Command.GENERATOR_TORQUE]
     return x[converter.torque]
@@ -182,7 +182,7 @@ def torque_in_force(x, u, converter):
 
 @kernel
 def advance_torque(x, u, after, converter, y):
-    """Put into y the torque in force a time `after` (s) the state x; nothing without a lag."""
+    """Advance the torque in force from state x to y over a time `after` (s); nothing without a lag."""
     if converter is None:
         return
     command = u[Command.GENERATOR_TORQUE]
@@ -192,7 +192,7 @@ def advance_torque(x, u, after, converter, y):
 
 @kernel
 def fill_torque_rate(x, u, converter, dx):
-    """Put the rate of the torque in force into dx; nothing without a lag."""
+    """Fill dx with the rate of the torque in force; nothing without a lag."""
     if converter is None:
         return
     dx[converter.torque] = (u[Command.GENERATOR_TORQUE] - x[converter.torque]) / converter.time_constant
@@ -200,7 +200,7 @@ def fill_torque_rate(x, u, converter, dx):
 
 @kernel
 def lose_torque(x, converter):
-    """Take the torque in force at once, as off the grid; nothing without a lag."""
+    """Set the torque in force to zero at once, as off the grid; nothing without a lag."""
     if converter is None:
         return
     x[converter.torque] = 0.0
@@ -216,9 +216,9 @@ def torque_was_limited(torque, command, limits):
 def shaft_torque(aerodynamic_torque, torque, rotor_speed, drivetrain):
     """Return the torque Q_b that accelerates the rotor, N m on the low-speed shaft (theory.md Eq. (7)).
 
-    torque is the generator's, on the high-speed shaft, positive against positive rotation. The mesh
-    loss always takes power: it adds to the torque where the rotor drives the generator, and lessens
-    it where the generator drives the rotor.
+    torque: of the generator on the high-speed shaft, positive against positive rotation. The mesh
+    loss always dissipates power: it increases the torque where the rotor drives the generator, and
+    reduces it where the generator drives the rotor.
     """
     gearbox = drivetrain.gear_ratio * torque
     if torque * rotor_speed >= 0.0:

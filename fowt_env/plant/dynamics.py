@@ -1,11 +1,11 @@
-"""The equation of motion: sum of loads to accelerations, theory.md Eq. (9).
+"""Evaluates the equation of motion: accelerations from the sum of loads, theory.md Eq. (9).
 
     (M + A) a = aero + gravity + buoyancy + strips + mooring + damping + user - momentum rate
 
-Each *_load(t, pose, x, part, data) is in the file of its part, returns body components about the body origin,
-and returns none for a part that is None. Numba leaves out what follows `if part is None: return` only where
-the part is an argument of that very function, and never for a field (`model.part is None`): so each test
-stands first in the function that takes the part. compile/variants.py is for parts of several classes.
+Each *_load(t, pose, x, part, data) is in the file of its part and returns body components about the body
+origin, zero for a part that is None. Numba omits the code after `if part is None: return` only where the part
+is an argument of the same function, never for a field (`model.part is None`): so each test comes first in the
+function that takes the part. compile/variants.py is for parts of several classes.
 """
 
 from typing import NamedTuple
@@ -27,17 +27,17 @@ from fowt_env.plant.user_loads import add_modal_user_loads, add_user_loads, eval
 
 
 class Loads(NamedTuple):
-    """Loads of one evaluation, for outputs (body components about the body origin)."""
+    """Holds the loads of one evaluation, for outputs (body components about the body origin)."""
 
-    rotor: RotorLoad  # of a tower that bends in nacelle axes, about the nacelle frame's origin
-    tower: Wrench  # drag, and the user's loads above the tower base
+    rotor: RotorLoad  # with a flexible tower in nacelle axes, about the nacelle frame's origin
+    tower: Wrench  # drag, and user loads above the tower base
     hydro: Wrench  # buoyancy, strip loads with added mass times acceleration, additional linear terms
     mooring: Wrench
 
 
 @kernel
 def evaluate_loads(t, x, model, data, dx):
-    """Put every load at a state into data; of dx the rates of internal states alone are written."""
+    """Evaluate all loads at a state into data; of dx only the rates of internal states are written."""
     cache, plane = data.cache, model.rigid_body.plane
     fill_sines(x, plane, cache[LoadCache.SINES :])
     pose, modal = pose_by_sines(x, cache[LoadCache.SINES :], plane), cache[LoadCache.MODAL :]
@@ -75,7 +75,7 @@ def evaluate_loads(t, x, model, data, dx):
 
 @inlined_kernel
 def respond(x, u, model, data, dx):
-    """Put the rates of the state under the command u into dx, with the loads of the last evaluation."""
+    """Fill dx with the rates of the state under the command u, from the loads of the last evaluation."""
     cache, body = data.cache, model.rigid_body
     pose = pose_by_sines(x, cache[LoadCache.SINES :], body.plane)
     torque = shaft_torque(
@@ -95,7 +95,7 @@ def respond(x, u, model, data, dx):
 
 @inlined_kernel
 def derivative(t, x, u, model, data, dx):
-    """Put f(t, x, u) into dx; u is a Command."""
+    """Fill dx with the derivative f(t, x, u) of the state; u is a Command."""
     data.cache[LoadCache.VALID] = 0.0
     evaluate_loads(t, x, model, data, dx)
     respond(x, u, model, data, dx)
@@ -103,7 +103,7 @@ def derivative(t, x, u, model, data, dx):
 
 @kernel
 def store(cache, start, wrench):
-    """Put a wrench into six entries of the cache."""
+    """Store a wrench in six entries of the cache."""
     cache[start] = wrench.fx
     cache[start + 1] = wrench.fy
     cache[start + 2] = wrench.fz
@@ -114,7 +114,7 @@ def store(cache, start, wrench):
 
 @kernel
 def stored(cache, start):
-    """Return the wrench that store has put there."""
+    """Return the wrench stored in the cache from `start` on."""
     return Wrench(
         cache[start], cache[start + 1], cache[start + 2], cache[start + 3], cache[start + 4], cache[start + 5]
     )
@@ -122,7 +122,7 @@ def stored(cache, start):
 
 @kernel
 def loads_of(data, dx):
-    """Return the loads of the last evaluate and the accelerations dx that followed from them."""
+    """Return the loads of the last evaluation, with the added-mass load of its accelerations dx."""
     cache = data.cache
     hydro = add(stored(cache, LoadCache.HYDRO), added_mass_load(data.added_mass, dx))
     rotor = RotorLoad(stored(cache, LoadCache.ROTOR), cache[LoadCache.THRUST], cache[LoadCache.TORQUE])
@@ -131,7 +131,7 @@ def loads_of(data, dx):
 
 @kernel
 def added_mass_load(added, dx):
-    """Return -A nu': the part of the water's load that is on the left-hand side."""
+    """Return -A nu', the part of the hydrodynamic load on the left-hand side."""
     return Wrench(
         -_row(added, 0, dx), -_row(added, 1, dx), -_row(added, 2, dx),
         -_row(added, 3, dx), -_row(added, 4, dx), -_row(added, 5, dx),
@@ -140,7 +140,7 @@ def added_mass_load(added, dx):
 
 @kernel
 def _row(added, i, dx):
-    """Return one row of added mass times the acceleration."""
+    """Return row i of the added mass times the acceleration."""
     total = added[i, 0] * dx[State.VX]
     for j in range(1, 6):
         total += added[i, j] * dx[State.VX + j]

@@ -1,7 +1,7 @@
-"""Rare events counted inside kernels, so that nothing unusual passes silently.
+"""Defines the rare events that kernels count, so that every run reports them.
 
-Each is counted at every evaluation of the loads in which it happens, of which an integrator makes one to
-four a step.
+An event is counted at every evaluation of the loads in which it occurs; an integrator makes one to four
+evaluations a step.
 """
 
 from enum import IntEnum
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 
 class Counter(IntEnum):
-    """Index of each event in the (N_COUNTERS,) float64 counter array."""
+    """Indexes the events in the (N_COUNTERS,) float64 counter array."""
 
     BEM_FALLBACK = 0
     HYDROSTATIC_FALLBACK = 1
@@ -18,23 +18,23 @@ class Counter(IntEnum):
 
 
 class Event(NamedTuple):
-    """What a counter counts, and what it means for a run."""
+    """Describes a counted event and its consequence for a run."""
 
     meaning: str
-    advice: str  # what to do
-    harmful: bool  # whether the loads are less accurate for it
+    advice: str  # recommended action
+    harmful: bool  # whether the loads are less accurate
 
 
 EVENTS = {
     Counter.BEM_FALLBACK: Event(
-        "blade sections without a solution of the momentum balance, which were given no induction",
+        "blade sections without a solution of the momentum balance, computed without induction",
         "check the polars and the chord of the turbine file, and the wind speed; a few during start-up or in"
         " reversed flow change little",
         True,
     ),
     Counter.HYDROSTATIC_FALLBACK: Event(
-        "evaluations with the water plane off the upper cylinder of the hull, integrated slice by slice",
-        "nothing: the buoyancy is as accurate, only slower; the wave loads assume a hull that floats upright",
+        "evaluations with the water plane outside the upper cylinder of the hull, integrated slice by slice",
+        "none needed: the buoyancy is as accurate, only slower; the wave loads assume an upright hull",
         False,
     ),
     Counter.MOORING_UNCONVERGED: Event(
@@ -43,10 +43,10 @@ EVENTS = {
         True,
     ),
     Counter.ROTOR_TABLE_CLAMPED: Event(
-        "evaluations with the wind changing more steeply across the rotor than its coefficient table takes,"
-        " where the steepest was used",
-        "rotor='lookup' (fidelity 'standard') solves every blade section: a rotor that stands still or yaws"
-        " fast needs it",
+        "evaluations with a wind gradient across the rotor above the range of its coefficient table,"
+        " limited to that range",
+        "use rotor='lookup' (fidelity 'standard'), which solves every blade section, for a rotor at"
+        " standstill or with fast yaw",
         True,
     ),
 }
@@ -54,12 +54,12 @@ N_COUNTERS = len(Counter)
 
 
 def counted(counters):
-    """{event: count} of a counter array, those that happened."""
+    """Return the {event: count} of a counter array, without zeros."""
     return {event.name: int(counters[event]) for event in Counter if counters[event]}
 
 
 def harm(events):
-    """Words on those of {event: count} for which the loads are less accurate; None where there are none."""
-    found = [(name, count, EVENTS[Counter[name]]) for name, count in events.items() if count]
-    lines = [f"{name} {count}: {e.meaning}; {e.advice}" for name, count, e in found if e.harmful]
+    """Return a warning of those of {event: count} that make the loads less accurate; None without any."""
+    rows = [(name, count, EVENTS[Counter[name]]) for name, count in events.items() if count]
+    lines = [f"{name} {count}: {e.meaning}; {e.advice}" for name, count, e in rows if e.harmful]
     return ". ".join(lines) if lines else None

@@ -1,8 +1,8 @@
-"""Fixed-step integrators of one plant: a class, a step and a row of INTEGRATORS each.
+"""Defines the fixed-step integrators: a class, a step and a row of INTEGRATORS each.
 
-Blade pitch and generator torque follow their own laws exactly within a step (constant command), the states of
-radiation memory follow exactly from velocities that are linear over it (hydro/radiation.py), and the rotor's
-load in a box of wind is evaluated several times a step (rotor_substeps.py), so that none of these limits it.
+Within a step, blade pitch and generator torque are exact (constant command), the states of radiation memory
+are exact for velocities linear in time (hydro/radiation.py), and the rotor load in a wind box is evaluated
+several times a step (rotor_substeps.py), so that none of these limits the step.
 """
 
 from typing import NamedTuple
@@ -24,33 +24,33 @@ from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.tower.steps import correct_elastic, keep_elastic
 
 START_STEPS = 3  # steps before four past derivatives exist
-# rad of blade pitch (30.4 deg) beyond which the lift of a free rotor's blades works against its speed: up to
+# rad of blade pitch (30.4 deg) above which the lift of the blades damps the speed of a free rotor: by up to
 # 4.5 1/s in 70 m/s, where Adams-Bashforth alone is stable to 0.3 over that and the corrected method to 1.3
 FEATHERING = 0.53
 
 
 class RungeKutta(NamedTuple):
-    """Classical Runge-Kutta 4."""
+    """Selects the classical Runge-Kutta method of order 4."""
 
     stages: int = 4
 
 
 class Heun(NamedTuple):
-    """Explicit trapezoidal rule."""
+    """Selects the explicit trapezoidal rule."""
 
     stages: int = 2
 
 
 class Adams(NamedTuple):
-    """Adams-Bashforth 4, with or without correction by Adams-Moulton 4."""
+    """Selects Adams-Bashforth 4, with or without correction by Adams-Moulton 4."""
 
-    corrector: bool  # Adams-Bashforth-Moulton in PECE form, two evaluations; else predictor alone, one
-    substeps: object = None  # RotorSubsteps, or None: the rotor's load is evaluated once like all others
+    corrector: bool  # Adams-Bashforth-Moulton in PECE form, two evaluations; else predictor only, one
+    substeps: object = None  # RotorSubsteps, or None: one evaluation of the rotor load, as of all loads
 
 
 @inlined_kernel
 def rates(t, x, u, model, data, dx):
-    """dx at an instant under u, from the cached loads where they are fresh."""
+    """Fill dx with the rates of the state under u, from the cached loads where they are valid."""
     cache = data.cache
     if cache[LoadCache.VALID] < 0.5 or cache[LoadCache.TIME] != t:
         evaluate_loads(t, x, model, data, data.stages[0])
@@ -64,7 +64,7 @@ def rates(t, x, u, model, data, dx):
 
 @inlined_kernel
 def rk4(t, x, u, dt, model, method, data):
-    """One classical Runge-Kutta step of x in place, blade pitch exact at every stage."""
+    """Advance x in place by one classical Runge-Kutta step, blade pitch exact at every stage."""
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
     n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
     rates(t, x, u, model, data, k1)
@@ -94,7 +94,7 @@ def rk4(t, x, u, dt, model, method, data):
 
 @inlined_kernel
 def heun(t, x, u, dt, model, method, data):
-    """One step of the explicit trapezoidal rule, blade pitch exact."""
+    """Advance x in place by one step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
     n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
     rates(t, x, u, model, data, k1)
@@ -114,7 +114,7 @@ def heun(t, x, u, dt, model, method, data):
 
 @kernel
 def bashforth(order, i, history):
-    """Adams-Bashforth combination of the latest derivatives of state i, history latest first."""
+    """Return the Adams-Bashforth combination of the latest derivatives of state i, history latest first."""
     if order == 1:
         return history[0, i]
     if order == 2:
@@ -126,7 +126,7 @@ def bashforth(order, i, history):
 
 @kernel
 def moulton(order, new, i, history):
-    """Adams-Moulton combination of a derivative at the end of the step and the latest ones."""
+    """Return the Adams-Moulton combination of a derivative at the end of the step and the latest ones."""
     if order == 1:
         return 0.5 * (new + history[0, i])
     if order == 2:
@@ -136,17 +136,17 @@ def moulton(order, new, i, history):
 
 @kernel
 def feathering(x, model):
-    """Whether a free rotor's blades are pitched beyond FEATHERING, where its speed is heavily damped."""
+    """Return whether the blades of a free rotor are pitched above FEATHERING: its speed is heavily damped."""
     return mean_pitch(x, model.pitches) > FEATHERING and not model.rigid_body.rotor_fixed
 
 
 @inlined_kernel
 def adams(t, x, u, dt, model, method, data):
-    """One Adams step: velocities by Adams-Bashforth 4, positions by Adams-Moulton 4 with the new velocities.
+    """Advance x by one step: velocities by Adams-Bashforth 4, then positions by Adams-Moulton 4.
 
     With the corrector, in the first three steps, and while the blades of a free rotor are feathered,
-    velocities are corrected by Adams-Moulton after an evaluation at the predicted state. Without it, the
-    rotor's load may be followed within the step (follow_rotor).
+    velocities are corrected by Adams-Moulton after an evaluation at the predicted state. Otherwise
+    follow_rotor may correct them for the rotor load within the step.
     """
     history, new, y = data.history, data.stages[1], data.stages[4]
     cache = data.cache
@@ -188,7 +188,7 @@ def adams(t, x, u, dt, model, method, data):
 
 @kernel
 def bend_on(dt, x, order, history, tower, y):
-    """Put into y the deflections of the tower by Adams-Moulton, from their new velocities there."""
+    """Fill y with the deflections of the tower by Adams-Moulton, from their new velocities in y."""
     if tower is None:
         return
     n = len(tower.count)
@@ -198,16 +198,16 @@ def bend_on(dt, x, order, history, tower, y):
 
 @inlined_kernel
 def set_pitch(t, x, u, dt, model, method, data):
-    """Set the blade pitch to another value at once, in a method that remembers nothing of past steps."""
+    """Set the blade pitch to another value at once, for a method without memory of past steps."""
     set_followed(x, u, dt, model.actuator, model.pitches)
     data.cache[LoadCache.VALID] = 0.0
 
 
 @inlined_kernel
 def renew_loads(t, x, model, user, data):
-    """Bring the loads of the last evaluation to another blade pitch: that of the rotor alone has changed.
+    """Update the loads of the last evaluation to another blade pitch, which changes the rotor load alone.
 
-    Loads of the user's may know the blade pitch: with them all is evaluated anew.
+    User loads may depend on the blade pitch: with user loads all loads are evaluated again.
     """
     if user is None:
         renew_rotor(t, x, model, model.aero, data)
@@ -217,7 +217,7 @@ def renew_loads(t, x, model, user, data):
 
 @inlined_kernel
 def renew_rotor(t, x, model, aero, data):
-    """Put the rotor's load at this state in place of that of the last evaluation; nothing without one."""
+    """Replace the rotor load of the last evaluation by that at this state; aero None: unchanged."""
     if aero is None:
         return
     cache, bend = data.cache, bend_of(x, model.tower)
@@ -240,10 +240,10 @@ def renew_rotor(t, x, model, aero, data):
 
 @inlined_kernel
 def set_pitch_and_history(t, x, u, dt, model, method, data):
-    """Set the blade pitch at once, and make past derivatives those of this pitch.
+    """Set the blade pitch at once, and correct the past derivatives to this pitch.
 
-    A polynomial through derivatives of before and after a jump has first-order errors; what the jump changes
-    now is added to those of before, which leaves the smooth part alone.
+    A polynomial through derivatives before and after a jump has first-order errors; the change of the
+    derivative at the jump is added to the past ones, which keeps their smooth part.
     """
     before, after, history, cache = data.stages[1], data.stages[4], data.history, data.cache
     rates(t, x, u, model, data, before)
@@ -261,7 +261,7 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
 
 @kernel
 def shift_tower(after, before, tower, row):
-    """Add to the rates of the deflections' velocities in a row what is between two derivatives."""
+    """Add the difference of two derivatives to the rates of the deflection velocities in a row."""
     if tower is None:
         return
     n = len(tower.count)
@@ -270,22 +270,22 @@ def shift_tower(after, before, tower, row):
 
 
 class Method(NamedTuple):
-    """An integrator, and what is known of it."""
+    """Describes an integrator: its step and its numerical properties."""
 
     order: int  # of convergence on a smooth plant
     evaluations: int  # of the loads per step
-    dt: float  # s, default step: within half its limit of stability for every built-in scene
-    # largest decay rate (1/s) of a velocity times dt that does not grow, and largest frequency (rad/s) of an
-    # undamped oscillation times dt; 0: one grows at any step, however slowly
+    dt: float  # s, default step: within half the stability limit for every built-in scene
+    # stability limits: decay rate (1/s) of a velocity times dt, and frequency (rad/s) of an undamped
+    # oscillation times dt; 0: an oscillation grows at any step, however slowly
     decay_limit: float
     oscillation_limit: float
-    part: tuple  # what a model has in its slot `integrator`; its class chooses the step
+    part: tuple  # value of Model.integrator; its class selects the step
     step: object  # (t, x, u, dt, model, method, data): one step of x in place
-    samples_rotor: bool = False  # whether it can evaluate the rotor's load more than once a step
+    samples_rotor: bool = False  # whether the rotor load can be evaluated more than once a step
 
 
-# The limits are the textbook's, but for an oscillation under Adams-Bashforth (0.43 by itself): the new
-# velocities move the positions.
+# The limits are textbook values, except for an oscillation under ab4 (0.43 for Adams-Bashforth alone): the
+# positions follow from the new velocities.
 INTEGRATORS = {
     "rk4": Method(
         order=4, evaluations=4, dt=0.05, decay_limit=2.785, oscillation_limit=2.828,
@@ -311,9 +311,9 @@ jump_pitch = chosen_by_class(
 
 
 def build_integrator(name, rotor_samples=1):
-    """Part of an integrator's name.
+    """Return the integrator part of a Model by its name.
 
-    rotor_samples  evaluations of the rotor's load per step; more than one where the Method samples_rotor
+    rotor_samples  evaluations of the rotor load per step; more than one where the Method samples_rotor
     Raises: InputError for an unknown name.
     """
     if name not in INTEGRATORS:
@@ -325,14 +325,14 @@ def build_integrator(name, rotor_samples=1):
 
 
 def rotor_samples(method):
-    """Rows per step that an integrator's part keeps of the rotor's load: none where it is evaluated once."""
+    """Return the rotor loads that an integrator stores per step: 0 where the load is evaluated once."""
     substeps = getattr(method, "substeps", None)
     return 0 if substeps is None else substeps.samples
 
 
 @inlined_kernel
 def take_step(t, x, u, dt, model, method, data):
-    """One step of the scene's integrator, x in place."""
+    """Advance x in place by one step of the integrator of the scene."""
     if pitches_jump(x, u, dt, model.actuator, model.pitches):  # an actuator without lag
         jump_pitch(t, x, u, dt, model, method, data)
     method_step(t, x, u, dt, model, method, data)

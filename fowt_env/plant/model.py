@@ -1,7 +1,7 @@
-"""What a scene is made of, as kernels see it: Model never changes while stepping, Data does.
+"""Defines a scene in the form of the kernels: Model is constant while stepping, Data changes.
 
 A part that a scene lacks is None, and a part that has several forms is one of several classes: both are
-settled when a kernel is compiled (compile/variants.py says how), so that what a scene lacks costs nothing.
+resolved when a kernel is compiled (compile/variants.py), so that absent parts cost nothing.
 """
 
 from enum import IntEnum
@@ -13,7 +13,7 @@ from fowt_env.plant.compile.handle import by_reference
 
 
 class RigidBody(NamedTuple):
-    """Mass properties of the whole turbine about the body origin, theory.md Eq. (10)."""
+    """Holds the mass properties of the whole turbine about the body origin, theory.md Eq. (10)."""
 
     mass_matrix: np.ndarray  # (6, 6) M1
     mass: float
@@ -26,12 +26,12 @@ class RigidBody(NamedTuple):
     tilt: object  # tilt.Tilt of the shaft, or None where it lies along x
     platform_fixed: bool
     rotor_fixed: bool
-    plane: object = None  # True: surge, heave and platform pitch alone move; None: all six motions
+    plane: object = None  # True: only surge, heave and platform pitch move; None: all six motions
 
 
 @by_reference
 class Model(NamedTuple):
-    """Everything that does not change while stepping: one slot per physical question."""
+    """Holds the constants of a plant: one field per physical model."""
 
     rigid_body: RigidBody
     layout: object  # channels.Layout
@@ -40,7 +40,7 @@ class Model(NamedTuple):
     generator: object  # drivetrain.TorqueLimits
     hydro: object  # hydro.load.Hydro or None
     mooring: object  # mooring.Mooring or None
-    aero: object  # aero.load.Aero or None: no aerodynamics at all
+    aero: object  # aero.load.Aero or None: no aerodynamics
     integrator: object  # a class of integrators.INTEGRATORS
     user: object = None  # user_loads.UserLoads or None
     pitches: object = None  # blade_pitches.BladePitches, or None: one pitch for all blades
@@ -49,9 +49,9 @@ class Model(NamedTuple):
 
 
 class LoadCache(IntEnum):
-    """Entries of Data.cache: the last evaluation of the loads, which the state alone decides.
+    """Enumerates the entries of Data.cache: loads of the last evaluation, which depend on the state alone.
 
-    VALID is 1 while they belong to the present state (at TIME), so that an observation and the step after it
+    VALID is 1 while the loads belong to the current state (at TIME), so that an observation and the next step
     share one evaluation. STEPS counts the steps since the start, for the multistep integrators.
     """
 
@@ -60,15 +60,15 @@ class LoadCache(IntEnum):
     TORQUE = 2  # aerodynamic, about the shaft
     THRUST = 3
     TOTAL = 4  # six entries each: sum of all loads, ...
-    ROTOR = 10  # of the rotor: with a tower that bends in nacelle axes, about the nacelle frame's origin
+    ROTOR = 10  # with a flexible tower in nacelle axes, about the nacelle frame's origin
     TOWER = 16
     HYDRO = 22  # buoyancy, strips and linear damping
     MOORING = 28
     TIME = 34
-    ELEVATED = 35  # 1 while ELEVATION, of the surface at the origin, is of TIME
+    ELEVATED = 35  # 1 while ELEVATION (surface at the origin) belongs to TIME
     ELEVATION = 36
     TORQUE_LIMITED = 37  # 1 in a control period whose torque command the generator could not follow
-    MODAL = 38  # tower.modes.MOST_MODES entries: generalised forces on the deflections of a tower that bends
+    MODAL = 38  # tower.modes.MOST_MODES entries: generalised forces on the tower deflections
     SINES = 42  # six entries, state.fill_sines
     FACTORED = 48  # 1 while Data.matrix holds the factors of the state's mass matrix
 
@@ -78,9 +78,9 @@ N_CACHE = 49
 
 @by_reference
 class Data(NamedTuple):
-    """What changes: scratch of one plant.
+    """Holds the variables and work arrays of one plant.
 
-    lines, counters, cache, matrix, history, elastic, samples, radiation and blades last between calls.
+    lines, counters, cache, matrix, history, elastic, samples, radiation and blades persist between calls.
     """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
@@ -88,17 +88,17 @@ class Data(NamedTuple):
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
     bands: object  # hydro.wave_bands.BandScratch, the same for strips with wave bands
     excitation: np.ndarray  # hydro.excitation.excitation_scratch
-    member_nodes: np.ndarray  # (n, hydro.members.N_NODE) nodes of members that are laid at each evaluation
-    member_water: np.ndarray  # (n * N_WATER,) the water's motion at the members' nodes
+    member_nodes: np.ndarray  # (n, hydro.members.N_NODE) member nodes that are placed at each evaluation
+    member_water: np.ndarray  # (n * N_WATER,) water motion at the member nodes
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
     matrix: np.ndarray  # (6 + n, 6 + n) factors of mass with added mass; n: modes of the tower
     stages: np.ndarray  # (5, n_state) derivatives and states within a step
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
-    # (4, n) forces of the tower's structure on its deflections at past steps, latest first
+    # (4, n) structural forces on the tower deflections at past steps, latest first
     elastic: np.ndarray
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
-    radiation: np.ndarray  # hydro.radiation.memory_data: of the memory, empty without one
-    # (blades, 6) BladeLoad of each: as the cache while this is VALID; empty with one pitch for all blades
+    radiation: np.ndarray  # hydro.radiation.memory_data; empty without radiation memory
+    # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades
     blades: np.ndarray

@@ -1,9 +1,9 @@
-"""Mooring lines as quasi-static elastic catenaries on a flat seabed with friction (theory.md, 5.5).
+"""Computes mooring lines as quasi-static elastic catenaries on a flat seabed with friction (theory.md, 5.5).
 
-Equations (18)(19) and (18t)(19t) are solved in lengths of the line and forces of its weight,
-with h = H/(wL), v = V/(wL), kappa = wL/EA, and X, Z the spans over L. One unknown is eliminated in
-closed form, which leaves one strictly increasing scalar equation per regime; the regime is known
-before the first iteration. So a bracketed Newton iteration finds the one solution from any start.
+Equations (18)(19) and (18t)(19t) are solved in non-dimensional form, with h = H/(wL), v = V/(wL),
+kappa = wL/EA, and X, Z the spans over L. One unknown is eliminated in closed form, which leaves one
+strictly increasing scalar equation per regime; the regime is known before the first iteration. So a
+bracketed Newton iteration converges to the unique solution from any start.
 """
 
 from math import asinh, expm1, hypot, log1p, sqrt
@@ -20,26 +20,26 @@ SLACK, TOUCHDOWN, SUSPENDED = 0, 1, 2  # regimes, as written to the last column 
 N_LINE = 6  # columns of `lines`: H, V, fairlead tension, anchor tension, length on seabed, regime
 
 # The error after a Newton step is about the square of that step, so stopping on this relative step
-# leaves rounding, and a result that does not remember where the iteration started.
+# leaves rounding errors only, and a result that is independent of the start.
 LAST_STEP = 3e-8
-# Newton needs 2 or 3 steps warm and at most a dozen from nothing; after this many, halve the bracket instead.
+# Newton needs 2 or 3 steps from a warm start, at most a dozen from a cold one; then the bracket is halved.
 NEWTON_STEPS = 30
 MAX_STEPS = 120  # enough halvings (of the logarithm) for any bracket of finite doubles
 BRACKET_WIDTH = 4e-16  # relative: no double is left in between
 DEEPEST_SAG = 300.0  # above any root for spans that NEGLIGIBLE lets through; its sinh is finite
-# m: points of a LineTable, from so far inwards of the line's place at rest to so far outwards
+# m: spacing of a LineTable, and its range inwards and outwards of the line's spans at rest
 TABLE_X, TABLE_Z = 0.5, 1.0
 TABLE_INWARD, TABLE_OUTWARD, TABLE_HEIGHT = 60.0, 32.0, 30.0
-# A table is tried at half points up to so many from the line's place at rest. Where it misses the tension by
-# this share of it, as that of a tendon, which goes slack within a metre, the line is solved instead.
+# A table is checked between its points, up to this many from the spans at rest. Above this relative error of
+# the tension, as of a tendon, which goes slack within a metre, the line is solved instead.
 TRIED_X, TRIED_Z, TABLE_ERROR = 16, 4, 2e-2
-NEGLIGIBLE = 1e-100  # spans over L below this count as none, far below the rounding of any real one
+NEGLIGIBLE = 1e-100  # spans over L below this count as zero, far below the rounding of any real span
 
 
 class LineTable(NamedTuple):
-    """Tensions of n lines at the fairlead over its place, C1 in both spans; a quarter of Newton's time.
+    """Holds the fairlead tensions of n lines over their spans, C1 in both: four times as fast as Newton.
 
-    tension: (n, places, heights, 2) H and V, N, at TABLE_X, TABLE_Z metres from origin.
+    tension: (n, distances, heights, 2) H and V, N, in steps of TABLE_X, TABLE_Z metres from origin.
     """
 
     origin: np.ndarray  # (n, 2) horizontal and vertical span of the first point, m; nan: a line without table
@@ -47,7 +47,7 @@ class LineTable(NamedTuple):
 
 
 class Mooring(NamedTuple):
-    """All lines of a platform: anchors in inertial, fairleads in body coordinates."""
+    """Holds all mooring lines of a platform: anchors in inertial, fairleads in body coordinates."""
 
     anchor: np.ndarray  # (n, 3), m
     fairlead: np.ndarray  # (n, 3), m
@@ -55,11 +55,11 @@ class Mooring(NamedTuple):
     weight: np.ndarray  # (n,), in water per unstretched length, N/m
     EA: np.ndarray  # (n,), N
     friction: np.ndarray  # (n,), seabed friction coefficient C_B
-    table: object = None  # LineTable, or None: every line solved
+    table: object = None  # LineTable, or None: every line is solved
 
 
 class Catenary(NamedTuple):
-    """State of one line: tensions in N, lengths in m (unstretched)."""
+    """Holds the state of a mooring line: tensions in N, lengths in m (unstretched)."""
 
     H: float  # horizontal tension at the fairlead
     V: float  # vertical tension at the fairlead, pulling down
@@ -71,7 +71,7 @@ class Catenary(NamedTuple):
 
 
 def build_mooring(lines, tabulated=False):
-    """Mooring of a platform's `Line` records (tabulated: with a LineTable); None without any."""
+    """Return the Mooring of a platform's `Line` records (tabulated: with a LineTable); None without lines."""
     if not lines:
         return None
 
@@ -90,7 +90,7 @@ def build_mooring(lines, tabulated=False):
 
 
 def _line_table(mooring):
-    """LineTable of a Mooring about its lines' spans at rest."""
+    """Return the LineTable of a Mooring about the spans of its lines at rest."""
     span = mooring.anchor - mooring.fairlead
     rest = np.column_stack([np.hypot(span[:, 0], span[:, 1]), -span[:, 2]])
     first = rest - [TABLE_INWARD, 0.5 * TABLE_HEIGHT]
@@ -107,7 +107,7 @@ def _line_table(mooring):
 
 @kernel
 def _fill_tensions(origin, tension, mooring):
-    """Put the solutions at the points of a LineTable into tension."""
+    """Fill tension with the solutions at the points of a LineTable."""
     for i in range(tension.shape[0]):
         for j in range(tension.shape[1]):
             for k in range(tension.shape[2]):
@@ -126,11 +126,11 @@ def _fill_tensions(origin, tension, mooring):
 
 @kernel
 def suspended_residual(mu, X, Z, k):
-    """(f, df/dmu, v, dv/dmu) of a line clear of the seabed; f = 0 solves theory.md Eqs. (18)(19).
+    """Return (f, df/dmu, v, dv/dmu) of a line clear of the seabed; f = 0 solves theory.md Eqs. (18)(19).
 
     mu = (X - kappa h)/(2h) is the sag parameter (0 straight, growing with sag) and k = kappa/2.
     With it h = X/(2(mu + k)) and v = 1/2 + Z/(2(tanh mu + k)), and the length of the catenary,
-    (Z - 2kv + k)^2 + (2h sinh mu)^2 = 1, is the equation that is left. f increases with mu.
+    (Z - 2kv + k)^2 + (2h sinh mu)^2 = 1, is the remaining equation. f increases with mu.
     No difference of nearly equal terms occurs, however taut the line.
     """
     e = expm1(mu)
@@ -151,10 +151,10 @@ def suspended_residual(mu, X, Z, k):
 
 @kernel
 def touchdown_residual(h, Z, kappa, friction, s, excess):
-    """(f, df/dh, v, dv/dh) of a line on the seabed; f = 0 solves theory.md Eqs. (18t)(19t).
+    """Return (f, df/dh, v, dv/dh) of a line on the seabed; f = 0 solves theory.md Eqs. (18t)(19t).
 
-    s: hanging length of the slack line; excess = X - (1 - s) > 0, the span beyond the slack one.
-    (19t) is quadratic in v^2 and gives v(h) > s. What is left of (18t), less its slack limit, has
+    s: hanging length of the slack line; excess = X - (1 - s) > 0, the span in excess of the slack one.
+    (19t) is quadratic in v^2 and gives v(h) > s. The rest of (18t), less its slack limit, has
     the factor h in each term (through v - s = h drop), so that h keeps its digits as it vanishes.
     f increases with h.
     """
@@ -177,7 +177,7 @@ def touchdown_residual(h, Z, kappa, friction, s, excess):
 
 @kernel
 def next_iterate(x, step, low, high, n):
-    """Newton's iterate, or one inside the bracket (low, high) where Newton leaves it or dawdles."""
+    """Return Newton's iterate, or one inside the bracket (low, high) where Newton leaves it or is slow."""
     new = x + step
     if low < new < high and n < NEWTON_STEPS:
         return new
@@ -188,7 +188,7 @@ def next_iterate(x, step, low, high, n):
 
 @kernel
 def solve_suspended(X, Z, kappa, h0):
-    """(h, v, converged) of a line clear of the seabed, started from h0 if positive."""
+    """Return (h, v, converged) of a line clear of the seabed, started from h0 if positive."""
     k = 0.5 * kappa
     if X <= NEGLIGIBLE:
         return 0.0, 0.5 + (Z - 1.0) / kappa, True
@@ -219,7 +219,7 @@ def solve_suspended(X, Z, kappa, h0):
 
 @kernel
 def solve_touchdown(X, Z, kappa, friction, s, excess, high, h0):
-    """(h, v, converged) of a line partly on the seabed, h in (0, high), started from h0 if it fits."""
+    """Return (h, v, converged) of a line partly on the seabed; h0 is the start if in (0, high), as h is."""
     low = 0.0
     h = h0
     if not low < h < high:
@@ -244,12 +244,12 @@ def solve_touchdown(X, Z, kappa, friction, s, excess, high, h0):
 
 @kernel
 def catenary(x_f, z_f, length, weight, EA, friction, h0):
-    """Catenary of one line whose anchor lies on a flat seabed, for any finite spans (theory.md, 5.5).
+    """Return the Catenary of a line with its anchor on a flat seabed, for any finite spans (theory.md, 5.5).
 
-    x_f >= 0, z_f: horizontal and vertical distance from anchor to fairlead, m. h0: horizontal tension to
-    start from, N (0: none); the result depends on it by 1e-12 at most. A fairlead at or below the anchor
-    counts as lying on the seabed (V = 0); one straight above it gives H = 0. The rest of a slack line lies
-    without tension; beyond any real stretch the tension is that of linear elasticity. NaN in, NaN out.
+    x_f >= 0, z_f: horizontal and vertical distance from anchor to fairlead, m. h0: horizontal tension at the
+    start of the iteration, N (0: cold start), which changes the result by 1e-12 at most. A fairlead at or
+    below the anchor counts as lying on the seabed (V = 0); one straight above the anchor gives H = 0. A slack
+    line has no tension on the seabed; elasticity is linear for any stretch. NaN in, NaN out.
     """
     kappa = weight * length / EA
     W = weight * length
@@ -285,7 +285,7 @@ def catenary(x_f, z_f, length, weight, EA, friction, h0):
 
 @kernel
 def _cubic(x):
-    """Weights of four evenly spaced points for a value x of the way from the second to the third, C1."""
+    """Return the weights of four evenly spaced points at a fraction x from the second to the third, C1."""
     rest = 1.0 - x
     return (
         -0.5 * x * rest * rest,
@@ -297,7 +297,7 @@ def _cubic(x):
 
 @kernel
 def _tensions(x_f, z_f, i, table):
-    """(inside, H, V) of line i between the points of the table."""
+    """Return (inside, H, V) of line i, interpolated in the table."""
     x, z = (x_f - table.origin[i, 0]) / TABLE_X, (z_f - table.origin[i, 1]) / TABLE_Z
     value = table.tension[i]
     if not (1.0 <= x < value.shape[0] - 2.0 and 1.0 <= z < value.shape[1] - 2.0):
@@ -315,7 +315,7 @@ def _tensions(x_f, z_f, i, table):
 
 @kernel
 def _table_error(x_f, z_f, i, mooring, table):
-    """Largest error of line i's table about these spans, as a share of the tension at the fairlead."""
+    """Return the largest error of line i's table about these spans, relative to the fairlead tension."""
     worst = 0.0
     for j in range(-TRIED_X, TRIED_X):
         for k in range(-TRIED_Z, TRIED_Z):
@@ -332,7 +332,7 @@ def _table_error(x_f, z_f, i, mooring, table):
 
 @kernel
 def line_state(x_f, z_f, i, mooring, table, start):
-    """Catenary of line i; from the table where there is one and it reaches, else solved from H = start."""
+    """Return the Catenary of line i: from the table within its range, else solved from H = start."""
     length, weight, friction = mooring.length[i], mooring.weight[i], mooring.friction[i]
     if table is not None:
         inside, H, V = _tensions(x_f, z_f, i, table)
@@ -347,9 +347,9 @@ def line_state(x_f, z_f, i, mooring, table, start):
 
 @kernel
 def mooring_load(pose, mooring, lines, counters):
-    """Wrench of all mooring lines on the platform, body axes, about the body origin (theory.md, 5.5).
+    """Return the wrench of all mooring lines, body axes, about the body origin (theory.md, 5.5).
 
-    lines: (n, N_LINE), carried between calls, as H is where the next one starts; zeros are a cold start.
+    lines: (n, N_LINE), kept between calls: the next call starts from its H; zeros: cold start.
     counters[MOORING_UNCONVERGED] counts lines that missed the tolerance.
     """
     if mooring is None:
@@ -372,7 +372,7 @@ def mooring_load(pose, mooring, lines, counters):
         lines[i, 5] = line.regime
         if not line.converged:
             counters[Counter.MOORING_UNCONVERGED] += 1.0
-        pull = line.H / x_f if x_f > 0.0 else 0.0  # a vertical line pulls nowhere
+        pull = line.H / x_f if x_f > 0.0 else 0.0  # a vertical line has no horizontal direction
         X = pull * dx
         Y = pull * dy
         Z = -line.V
@@ -389,11 +389,11 @@ def mooring_load(pose, mooring, lines, counters):
 
 
 def line_shape(H, V, x_f, length, weight, EA, friction=0.0, n=41):
-    """Points of a line in its vertical plane, anchor first: (n, 2) distance and height from the anchor, m.
+    """Return (n, 2) points of a line in its vertical plane: distance and height from the anchor, m.
 
-    H, V: fairlead tensions, N, as `catenary` and the columns of `lines` have them; x_f: horizontal
-    span, m, which places the slack line (drawn straight along the seabed, then up).
-    The points are evenly spaced in unstretched length.
+    H, V: fairlead tensions, N, as of `catenary` and the columns of `lines`; x_f: horizontal span, m, of
+    a slack line (drawn straight along the seabed, then up).
+    The points are evenly spaced in unstretched length, anchor first.
     """
     along = np.linspace(0.0, length, n)
     seabed = min(max(length - V / weight, 0.0), length)
@@ -407,7 +407,7 @@ def line_shape(H, V, x_f, length, weight, EA, friction=0.0, n=41):
     taut = seabed if H >= grip * seabed else H / grip
 
     def elongation(d):
-        """Of the last d metres on the seabed; tension falls towards the anchor."""
+        """Return the elongation of the last d metres on the seabed; tension falls towards the anchor."""
         return (H - 0.5 * grip * d) * d / EA
 
     lying = np.minimum(along, seabed)

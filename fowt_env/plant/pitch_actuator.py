@@ -1,6 +1,6 @@
-"""Default blade-pitch actuator: first-order, with rate and position limits (theory.md, section 3).
+"""Models the default blade-pitch actuator: first-order, with rate and position limits (theory.md, section 3).
 
-pitch_drive.py has the second-order one, of which a turbine file or an option may make use.
+pitch_drive.py has the second-order drive, which a turbine file or an option may select.
 """
 
 from math import exp
@@ -11,7 +11,7 @@ from fowt_env.plant.drivetrain import clamp, rate_limit
 
 
 class PitchActuator(NamedTuple):
-    """First-order collective blade-pitch actuator with rate and position limits."""
+    """Holds the parameters of a first-order blade-pitch actuator with rate and position limits."""
 
     time_constant: float  # s; 0: the command is followed at once
     rate_limit: float  # rad/s
@@ -41,7 +41,7 @@ def pitch_rate(blade_pitch, command, actuator):
 
 @kernel
 def followed_pitch(blade_pitch, command, dt, actuator):
-    """Return the blade pitch at the start of a step of dt, rad: an actuator without lag has no rate.
+    """Return the blade pitch at the start of a step of dt, rad: an actuator without lag jumps.
 
     With lag: unchanged. Without: the command, within the position limits and the change that the rate
     limit allows in dt.

@@ -1,10 +1,10 @@
-"""Second-order blade-pitch drive with limits, deadband and friction (theory.md, section 3).
+"""Models a second-order blade-pitch drive with limits, deadband and friction (theory.md, section 3).
 
     pitch'' = w^2 (target - pitch) - 2 zeta w pitch' - w^2 friction sign(pitch')
 
-The command is constant over a control period, so the drive is solved by itself, piece by piece from one event
-(a limit, a stop) to the next. Friction is Coulomb's with an equal force to break away (Armstrong-Helouvry,
-Dupont and Canudas de Wit, Automatica 30 (1994) 1083): to slow commands a play of half width `friction`.
+The command is constant over a control period, so the drive is solved in closed form from one event (a limit,
+a stop) to the next. Friction is Coulomb friction with an equal breakaway force (Armstrong-Helouvry, Dupont
+and Canudas de Wit, Automatica 30 (1994) 1083): for slow commands a backlash of half width `friction`.
 """
 
 from math import cos, cosh, exp, sin, sinh, sqrt
@@ -14,32 +14,32 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.drivetrain import clamp
 from fowt_env.plant.state import Command
 
-# Of 1/w, the longest piece between two looks for events. Within it an acceleration may pass its limit unseen
-# by TURN^2/8 of it, and nothing else can happen twice.
+# Longest piece between two checks for events, times w. Within a piece an acceleration may exceed its limit
+# undetected by TURN^2/8 of the limit, and no other event can occur twice.
 TURN = 0.1
-HALVINGS = 45  # of a piece, to find an event in it
-PIECES = 10_000  # at most in a step: a bound that no drive comes near
-SETTLED = 1e-12  # rad: a blade so near its place of rest is there, and at w times it (rad/s) it rests
+HALVINGS = 45  # of a piece, to locate an event
+PIECES = 10_000  # upper bound in a step, far above any drive's number
+SETTLED = 1e-12  # rad: tolerance of the pitch at equilibrium; times w (rad/s) that of the rate
 
 
 class PitchDrive(NamedTuple):
-    """Second-order blade-pitch drive, collective or one of each blade."""
+    """Holds the parameters of a second-order blade-pitch drive, collective or one per blade."""
 
     natural_frequency: float  # rad/s
     damping: float  # ratio
     rate_limit: float  # rad/s
-    acceleration_limit: float  # rad/s2; infinite: none
-    deadband: float  # rad, change of the command that is not followed
+    acceleration_limit: float  # rad/s2; infinite: no limit
+    deadband: float  # rad, change of the command that is ignored
     friction: float  # rad, distance from the command at which a blade at rest begins to move
     minimum: float  # rad
     maximum: float  # rad
-    rate: int  # index in the state of the first blade's pitch rate; those of the others follow
-    held: object  # the same of the command that is followed, or None without a deadband
+    rate: int  # index in the state of the first blade's pitch rate, followed by the other blades
+    held: object  # the same of the followed command, or None without a deadband
 
 
 @kernel
 def propagator(t, drive):
-    """Return (a, b, c, d): distance from rest a e + b r and rate c e + d r after t (s), without limits."""
+    """Return (a, b, c, d) without limits: pitch error a e + b r and rate c e + d r after t (s)."""
     w, decay = drive.natural_frequency, drive.damping * drive.natural_frequency
     square = (1.0 - drive.damping * drive.damping) * w * w
     fade = exp(-decay * t)
@@ -56,14 +56,14 @@ def propagator(t, drive):
 
 @kernel
 def pull(pitch, rate, rest, drive):
-    """Return the acceleration of the drive towards a place of rest without limits, rad/s2."""
+    """Return the acceleration of the drive towards an equilibrium pitch (rest) without limits, rad/s2."""
     w = drive.natural_frequency
     return w * w * (rest - pitch) - 2.0 * drive.damping * w * rate
 
 
 @kernel
 def drive_after(pitch, rate, target, after, drive):
-    """Return (pitch, rate) a time `after` (s) later for a constant target within the position limits."""
+    """Return (pitch, rate) after a time `after` (s) for a constant target within the position limits."""
     w = drive.natural_frequency
     error = pitch - target
     reach = sqrt((w * error) ** 2 + rate * rate)  # never grows: it bounds rate, distance and acceleration
@@ -80,7 +80,7 @@ def drive_after(pitch, rate, target, after, drive):
 
 @kernel
 def _limited_after(pitch, rate, target, after, drive):
-    """Return drive_after where a limit or friction may act: in pieces, each of one law of motion."""
+    """Return drive_after where a limit or friction may act: in pieces, each with one equation of motion."""
     w, fastest, strongest = drive.natural_frequency, drive.rate_limit, drive.acceleration_limit
     pitch = clamp(pitch, drive.minimum, drive.maximum)
     rate = clamp(rate, -fastest, fastest)
@@ -100,8 +100,8 @@ def _limited_after(pitch, rate, target, after, drive):
             return rest, 0.0
         now = pull(pitch, rate, rest, drive)
         if abs(now) <= SETTLED * w * w:
-            now = 0.0  # what rounding leaves of it at the end of a slewing would change sign at once
-        if way * rate >= fastest and way * now > 0.0:  # slews until it no longer pulls
+            now = 0.0  # rounding at the end of slewing would change its sign at once
+        if way * rate >= fastest and way * now > 0.0:  # slews until the acceleration vanishes
             spell = min(way * (rest - pitch) / fastest - 2.0 * drive.damping / w, left)
             pitch += way * fastest * spell
             left -= spell
@@ -135,7 +135,7 @@ def _limited_after(pitch, rate, target, after, drive):
 
 @kernel
 def _piece(pitch, rate, rest, law, saturated, length, motion):
-    """Return (pitch, rate) after a piece of motion: at a constant acceleration, or of the drive alone."""
+    """Return (pitch, rate) after a piece of motion: at constant acceleration, or without limits."""
     if saturated:
         return pitch + length * (rate + 0.5 * length * law), rate + length * law
     a, b, c, d = motion
@@ -145,7 +145,7 @@ def _piece(pitch, rate, rest, law, saturated, length, motion):
 
 @kernel
 def _over(pitch, rate, way, rest, before, saturated, drive):
-    """Return whether a piece of motion ends before this end of it: turned, at a limit or off one."""
+    """Return whether an event ends the piece of motion before this state: reversal, a limit met or left."""
     if way * rate < 0.0 or abs(rate) > drive.rate_limit:
         return True
     if pitch < drive.minimum or pitch > drive.maximum:
@@ -158,7 +158,7 @@ def _over(pitch, rate, way, rest, before, saturated, drive):
 
 @kernel
 def drive_acceleration(pitch, rate, target, drive):
-    """Return the acceleration of the pitch now, rad/s2."""
+    """Return the current pitch acceleration, rad/s2."""
     if rate == 0.0:
         if abs(target - pitch) <= drive.friction:
             return 0.0
@@ -172,61 +172,61 @@ def drive_acceleration(pitch, rate, target, drive):
 
 
 @kernel
-def followed_command(held, command, drive):
-    """Return the command that is followed, within the position limits: the former one within the deadband."""
-    if abs(command - held) <= drive.deadband:
-        command = held
+def followed_command(previous, command, drive):
+    """Return the followed command, within the position limits: in the deadband the previous one."""
+    if abs(command - previous) <= drive.deadband:
+        command = previous
     return clamp(command, drive.minimum, drive.maximum)
 
 
 @kernel
-def target_of(blade, x, u, drive, held):
-    """Return the target of a blade, rad."""
+def target_of(blade, x, u, drive, followed):
+    """Return the target pitch of a blade, rad."""
     command = u[Command.BLADE_PITCH + blade]
-    if held is None:
+    if followed is None:
         return clamp(command, drive.minimum, drive.maximum)
-    return followed_command(x[held + blade], command, drive)
+    return followed_command(x[followed + blade], command, drive)
 
 
 @kernel
-def _hold(blade, target, held, y):
-    """Put the command that is followed into y; nothing without a deadband."""
-    if held is None:
+def _store_followed(blade, target, followed, y):
+    """Store the followed command of a blade in y; nothing without a deadband."""
+    if followed is None:
         return
-    y[held + blade] = target
+    y[followed + blade] = target
 
 
 @kernel
 def advance_drive(blade, i, x, u, after, actuator, y):
-    """Put into y what a blade's drive has a time `after` (s) the state x; i: index of its pitch."""
+    """Advance a blade's drive from state x to y over a time `after` (s); i: index of its pitch."""
     target = target_of(blade, x, u, actuator, actuator.held)
     pitch, rate = drive_after(x[i], x[actuator.rate + blade], target, after, actuator)
     y[i], y[actuator.rate + blade] = pitch, rate
-    _hold(blade, target, actuator.held, y)
+    _store_followed(blade, target, actuator.held, y)
 
 
 @kernel
 def fill_drive_rates(blade, i, x, u, actuator, dx):
-    """Put the rates of a blade's drive into dx; i: index of its pitch."""
+    """Fill dx with the rates of a blade's drive; i: index of its pitch."""
     target = target_of(blade, x, u, actuator, actuator.held)
     rate = x[actuator.rate + blade]
     dx[i], dx[actuator.rate + blade] = rate, drive_acceleration(x[i], rate, target, actuator)
-    _hold(blade, 0.0, actuator.held, dx)
+    _store_followed(blade, 0.0, actuator.held, dx)
 
 
 @kernel
 def halt_drive(blade, i, x, actuator):
-    """Bring a blade to rest where it is; i: index of its pitch."""
+    """Stop a blade at its current pitch; i: index of its pitch."""
     x[actuator.rate + blade] = 0.0
-    _hold(blade, x[i], actuator.held, x)
+    _store_followed(blade, x[i], actuator.held, x)
 
 
 @kernel
 def stays(blade, i, x, u, dt, actuator):
-    """Return False: a drive with inertia moves no blade at once."""
+    """Return False: a drive with inertia has no jumps of blade pitch."""
     return False
 
 
 @kernel
 def keep(blade, i, x, u, dt, actuator):
-    """Do nothing: a drive with inertia moves no blade at once."""
+    """Keep the blade pitch: a drive with inertia has no jumps."""

@@ -1,4 +1,4 @@
-"""The turbine as one rigid body with a spinning rotor: weight, momentum rate and attitude (theory.md, 2)."""
+"""Models the turbine as a rigid body with a rotor: weight, momentum rate, attitude (theory.md, 2)."""
 
 from math import cos, sin
 
@@ -26,7 +26,7 @@ def gravity_load(pose, body):
 
 @kernel
 def _off_centre(weight, pose, gravity, s_y):
-    """Add to the weight the moment of a centre of mass beside the plane of symmetry."""
+    """Add to the weight the moment of a centre of mass off the plane of symmetry."""
     if s_y is None:
         return weight
     moment = gravity * s_y
@@ -44,7 +44,7 @@ def _off_centre(weight, pose, gravity, s_y):
 def momentum_rate(pose, rotor_speed, mass_matrix, coupling, tilt):
     """Return C1 nu + C2 w_b: velocity-dependent part of the momentum rate, Eqs (9)-(10).
 
-    coupling: H of the rotor, whose angular momentum lies along the shaft; tilt of the shaft, or None.
+    coupling: H of the rotor, whose angular momentum lies along the shaft; tilt: of the shaft, or None.
     """
     m = mass_matrix
     vx, vy, vz, wx, wy, wz = pose.vx, pose.vy, pose.vz, pose.wx, pose.wy, pose.wz
@@ -69,7 +69,7 @@ def momentum_rate(pose, rotor_speed, mass_matrix, coupling, tilt):
 
 @kernel
 def attitude_rate(x, dx, plane):
-    """Put the rates of position and Euler angles into dx: r' = R v, phi' = J^-1 w.
+    """Fill dx with the rates of position and Euler angles: r' = R v, phi' = J^-1 w.
 
     Singular at 90 deg of platform pitch.
     """
@@ -82,7 +82,7 @@ def attitude_rate(x, dx, plane):
 
 @kernel
 def attitude_rate_at(pose, sines, dx, plane):
-    """Put the rates of attitude_rate into dx, by the pose and the sines (state.fill_sines) of the state."""
+    """Fill dx with the rates of attitude_rate, from the pose and the sines (state.fill_sines) of a state."""
     if plane is not None:
         dx[State.SURGE] = pose.r11 * pose.vx + pose.r13 * pose.vz
         dx[State.HEAVE] = pose.r31 * pose.vx + pose.r33 * pose.vz

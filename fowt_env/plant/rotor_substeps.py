@@ -1,4 +1,4 @@
-"""The rotor's load within a step of Adams-Bashforth 4, for a box of wind that it crosses fast."""
+"""Samples the rotor load within a step of Adams-Bashforth 4, for a wind box that the blades cross fast."""
 
 from typing import NamedTuple
 
@@ -17,21 +17,21 @@ from fowt_env.plant.tower.modes import bend_of, nacelle_pose
 from fowt_env.plant.tower.steps import add_tower_steps, fill_impulse
 
 BASHFORTH = (55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0)  # Adams-Bashforth 4, latest first
-N_SAMPLE = 7  # of a sample of the rotor's load: its wrench and its torque
+N_SAMPLE = 7  # entries of a sample of the rotor load: wrench and torque
 
 
 class RotorSubsteps(NamedTuple):
-    """How the rotor's load is followed within a step of Adams-Bashforth 4, see follow_rotor."""
+    """Holds the sampling of the rotor load within a step of Adams-Bashforth 4, see follow_rotor."""
 
-    samples: int  # evaluations of the rotor's load per step, evenly spaced from the step's beginning
+    samples: int  # evaluations of the rotor load per step, evenly spaced from the beginning of the step
     weight: np.ndarray  # (4 samples,) of the samples, latest first
 
 
 def build_substeps(samples):
-    """RotorSubsteps of a number of samples per step, None for one.
+    """Return the RotorSubsteps of a number of samples per step, None for one.
 
-    The weights are those of Adams-Bashforth 4 in `samples` shorter steps, less those of one step of it, so
-    that a load that varies slowly is left alone.
+    The weights are those of Adams-Bashforth 4 in `samples` shorter steps, less those of one step: zero in
+    effect for a slowly varying load.
     """
     if samples == 1:
         return None
@@ -44,10 +44,10 @@ def build_substeps(samples):
 
 @kernel
 def sample_rotor(t, x, u, dt, model, substeps, data):
-    """Put the rotor's loads within the step from t into data.samples, latest first, before those of the past.
+    """Put the rotor loads within the step from t into data.samples, latest first, ahead of the past ones.
 
-    Between the ends of the step the state is extrapolated from the last two derivatives: to second order,
-    while the platform hardly moves and the blades turn by 7 deg. Without substeps nothing is done.
+    Between the ends of the step the state is extrapolated from the last two derivatives, to second order:
+    the platform hardly moves while the blades rotate by 7 deg. Without substeps nothing is done.
     """
     if substeps is None:
         return
@@ -80,9 +80,9 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
 
 @kernel
 def shift_samples(was, torque, substeps, data):
-    """Add to the samples of past steps what a jump of the blade pitch has changed; nothing without any.
+    """Add the change of the rotor load by a jump of the blade pitch to the samples of past steps, if any.
 
-    was, torque: the rotor's wrench and torque before the jump; those after it are in the cache.
+    was, torque: wrench and torque of the rotor before the jump; the cache has those after the jump.
     """
     if substeps is None:
         return
@@ -99,10 +99,10 @@ def shift_samples(was, torque, substeps, data):
 
 @kernel
 def follow_rotor(dt, model, substeps, data, y):
-    """Add to the velocities y at the end of a step what sample_rotor found within it; nothing without any.
+    """Correct the velocities y at the end of a step for the rotor loads sampled within the step, if any.
 
-    To the velocities of Adams-Bashforth 4 comes the difference that short steps of it make to the impulse of
-    the rotor's load: dt M^-1 (sum of weight times sample), with the mass matrix of the step's beginning.
+    The correction is the difference between the impulses of the rotor load in short steps and in one step:
+    dt M^-1 (sum of weight times sample), with the mass matrix at the beginning of the step.
     """
     if substeps is None:
         return

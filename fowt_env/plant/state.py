@@ -1,4 +1,4 @@
-"""Names and order of the plant's states, and the small records that loads exchange (SI, radians).
+"""Defines the states of the plant, their order, and the records that loads exchange (SI, radians).
 
 Frames (theory.md, section 1): inertial frame O at the still-water level, x downwind, y left when
 looking downwind, z up; body frame P fixed in the platform, coinciding with O at rest.
@@ -12,7 +12,7 @@ from fowt_env.plant.compile.decorators import kernel
 
 
 class State(IntEnum):
-    """Index of each state in the flat (n_state,) float64 vector; further blocks begin at INTERNAL."""
+    """Indexes the states in the flat (n_state,) float64 vector; further blocks begin at INTERNAL."""
 
     SURGE = 0  # position of the body origin in O, m
     SWAY = 1
@@ -29,20 +29,20 @@ class State(IntEnum):
     WZ = 12
     ROTOR_SPEED = 13  # relative to the nacelle, rad/s
     BLADE_PITCH = 14  # collective or of the first blade, positive to feather, rad
-    INTERNAL = 15  # first of the internal states, which most scenes have none of: see Block
+    INTERNAL = 15  # first internal state, if the scene has any: see Block
 
 
 N_RIGID = int(State.INTERNAL)
 
 
 class Block(NamedTuple):
-    """States that belong together: a row of the table that a scene has of its state vector."""
+    """Describes a group of states: a row of the state table of a scene."""
 
     name: str
-    offset: int  # of the first
+    offset: int  # index of the first state
     size: int
     kind: str  # "position", "velocity", or "internal": a state of a load or an actuator
-    steady: str  # how a trim has it: "solved" for, "zero", "averaged" over, "settled": its own rate is zero
+    steady: str  # treatment in a trim: "solved" for, "zero", "averaged" over, "settled": its rate is zero
 
 
 RIGID_BLOCKS = (
@@ -54,7 +54,7 @@ RIGID_BLOCKS = (
 )
 
 
-FURTHER_BLOCKS = {  # kind and steady of those that are not an internal state that settles by its own rate
+FURTHER_BLOCKS = {  # (kind, steady) of blocks other than ("internal", "settled")
     "tower_deflection": ("position", "solved"),
     "tower_velocity": ("velocity", "zero"),
     "other_blade_pitches": ("internal", "solved"),
@@ -65,7 +65,7 @@ FURTHER_BLOCKS = {  # kind and steady of those that are not an internal state th
 
 
 def state_blocks(internal):
-    """Tuple of all Blocks of a scene with internal ones of these {name: size}, in order; none of size 0."""
+    """Return a tuple of all Blocks of a scene with these internal blocks {name: size}; size 0: omitted."""
     blocks, offset = list(RIGID_BLOCKS), N_RIGID
     for name, size in internal.items():
         if size:
@@ -75,11 +75,11 @@ def state_blocks(internal):
     return tuple(blocks)
 
 
-MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")  # of the platform, as names
+MOTIONS = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")  # of the platform
 
 
 class Command(IntEnum):
-    """Index of each command in the flat (N_COMMANDS,) float64 vector.
+    """Indexes the commands in the flat (N_COMMANDS,) float64 vector.
 
     With individual pitch the vector has N_INDIVIDUAL_COMMANDS entries, from BLADE_PITCH on
     one for each blade.
@@ -95,7 +95,7 @@ N_INDIVIDUAL_COMMANDS = N_COMMANDS + BLADES - 1
 
 
 class Wrench(NamedTuple):
-    """Force (N) and moment about the body origin (N m), body components."""
+    """Holds a force (N) and a moment about the body origin (N m), body components."""
 
     fx: float
     fy: float
@@ -110,12 +110,12 @@ NO_LOAD = Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def add(a, b):
-    """Sum of two wrenches."""
+    """Return the sum of two wrenches."""
     return Wrench(a.fx + b.fx, a.fy + b.fy, a.fz + b.fz, a.mx + b.mx, a.my + b.my, a.mz + b.mz)
 
 
 class Pose(NamedTuple):
-    """Where the platform is and how it moves, computed once per evaluation.
+    """Holds position, rotation and velocities of the platform, computed once per evaluation.
 
     x, y, z: body origin in O. r11..r33: rotation R, body to inertial components (Eq. 1).
     vx..vz, wx..wz: velocity and angular velocity, body components.
@@ -146,7 +146,7 @@ OUT_OF_PLANE = (State.SWAY, State.ROLL, State.YAW, State.VY, State.WX, State.WZ)
 
 @kernel
 def pose_in(x, plane):
-    """Return pose_of a state; with a plane (not None) of a platform whose OUT_OF_PLANE states are zero."""
+    """Return the Pose of a state; plane not None: of a platform whose OUT_OF_PLANE states are zero."""
     if plane is None:
         return pose_of(x)
     return _pose_in_plane(x, sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH]))
@@ -165,7 +165,7 @@ def fill_sines(x, plane, sines):
 
 @kernel
 def pose_by_sines(x, sines, plane):
-    """Return pose_in of a state whose fill_sines is known."""
+    """Return the Pose (pose_in) of a state from its sines and cosines (fill_sines)."""
     if plane is None:
         return _pose(x, sines[0], sines[1], sines[2], sines[3], sines[4], sines[5])
     return _pose_in_plane(x, sines[2], sines[3])
@@ -173,7 +173,7 @@ def pose_by_sines(x, sines, plane):
 
 @kernel
 def _pose_in_plane(x, s, c):
-    """Return the Pose of a platform in its plane by sine and cosine of its pitch."""
+    """Return the Pose of a platform with planar motion by sine and cosine of its pitch."""
     vx, vz, wy = x[State.VX], x[State.VZ], x[State.WY]
     return Pose(
         x[State.SURGE], 0.0, x[State.HEAVE], c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c, vx, 0.0, vz, 0.0, wy, 0.0
@@ -182,7 +182,7 @@ def _pose_in_plane(x, s, c):
 
 @kernel
 def pose_of(x):
-    """Pose of a state vector; R = Rz(yaw) Ry(pitch) Rx(roll), theory.md Eq. (1)."""
+    """Return the Pose of a state vector; R = Rz(yaw) Ry(pitch) Rx(roll), theory.md Eq. (1)."""
     s1, c1 = sin(x[State.ROLL]), cos(x[State.ROLL])
     s2, c2 = sin(x[State.PLATFORM_PITCH]), cos(x[State.PLATFORM_PITCH])
     s3, c3 = sin(x[State.YAW]), cos(x[State.YAW])
@@ -216,7 +216,7 @@ def _pose(x, s1, c1, s2, c2, s3, c3):
 
 @kernel
 def to_body(pose, a, b, c):
-    """R^T (a, b, c)."""
+    """Return the body components R^T (a, b, c) of an inertial vector."""
     return (
         pose.r11 * a + pose.r21 * b + pose.r31 * c,
         pose.r12 * a + pose.r22 * b + pose.r32 * c,
@@ -226,7 +226,7 @@ def to_body(pose, a, b, c):
 
 @kernel
 def to_inertial(pose, a, b, c):
-    """R (a, b, c)."""
+    """Return the inertial components R (a, b, c) of a body vector."""
     return (
         pose.r11 * a + pose.r12 * b + pose.r13 * c,
         pose.r21 * a + pose.r22 * b + pose.r23 * c,

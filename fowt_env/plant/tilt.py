@@ -1,7 +1,7 @@
-"""The tilted shaft: rotor axes, which are the body axes turned about y, and what a tilt adds elsewhere.
+"""Transforms between body axes and rotor axes: the body axes rotated about y by the shaft tilt.
 
 The shaft points downwind along s = (cos tilt, 0, -sin tilt): its upwind end is the higher one. A rotor whose
-shaft lies along x has the tilt None, and then nothing is turned.
+shaft lies along x has the tilt None, without any rotation.
 """
 
 from math import cos, sin
@@ -12,20 +12,20 @@ from fowt_env.plant.state import Pose, Wrench
 
 
 class Tilt(NamedTuple):
-    """Direction of the shaft."""
+    """Holds the direction of a tilted shaft."""
 
     cosine: float
     sine: float
 
 
 def build_tilt(angle):
-    """Tilt of a shaft_tilt (rad), None for zero."""
+    """Return the Tilt of a shaft_tilt (rad), None for zero."""
     return None if angle == 0.0 else Tilt(cos(angle), sin(angle))
 
 
 @kernel
 def rotor_pose(pose, tilt):
-    """The Pose in rotor axes: the same origin and motion, for a body whose x axis is the shaft."""
+    """Return the Pose in rotor axes, whose x axis is the shaft: same origin and motion."""
     if tilt is None:
         return pose
     c, s = tilt.cosine, tilt.sine
@@ -53,7 +53,7 @@ def rotor_pose(pose, tilt):
 
 @kernel
 def to_body_axes(wrench, tilt):
-    """The wrench, given in rotor axes, in body axes."""
+    """Return a wrench in rotor axes transformed to body axes."""
     if tilt is None:
         return wrench
     c, s = tilt.cosine, tilt.sine
@@ -69,7 +69,7 @@ def to_body_axes(wrench, tilt):
 
 @kernel
 def along_shaft(x, z, tilt):
-    """Component along the shaft of a vector with the body components x and z."""
+    """Return the component along the shaft of a vector with the body components x and z."""
     if tilt is None:
         return x
     return tilt.cosine * x - tilt.sine * z
@@ -77,7 +77,7 @@ def along_shaft(x, z, tilt):
 
 @kernel
 def in_rotor_axes(x, z, tilt):
-    """(x, z) components in rotor axes of a vector with these body components."""
+    """Return the (x, z) components in rotor axes of a vector with these body components."""
     if tilt is None:
         return x, z
     return tilt.cosine * x - tilt.sine * z, tilt.sine * x + tilt.cosine * z
@@ -85,14 +85,14 @@ def in_rotor_axes(x, z, tilt):
 
 @kernel
 def across_shaft(size, tilt):
-    """How far a vector of this size along the shaft points down, against the body's z axis."""
+    """Return the downward component, against the body's z axis, of a vector of this size along the shaft."""
     if tilt is None:
         return 0.0
     return tilt.sine * size
 
 
 def rotor_axes(x, z, angle):
-    """(x, z) of a point or vector, in rotor axes, from body components; angle: shaft_tilt, rad."""
+    """Return (x, z) of a point or vector in rotor axes, from body components; angle: shaft_tilt, rad."""
     if angle == 0.0:
         return x, z
     return cos(angle) * x - sin(angle) * z, sin(angle) * x + cos(angle) * z

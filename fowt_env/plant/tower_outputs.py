@@ -1,4 +1,4 @@
-"""Outputs about the tower: loads at its base; where it bends, displacement and acceleration of its top."""
+"""Computes tower outputs: base loads and, of a flexible tower, displacement and acceleration of the top."""
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
@@ -14,8 +14,8 @@ from fowt_env.plant.tower.rates import above_base_rate
 def record_tower(bend, ax, ay, row):
     """Fill the channels of the group "tower" into row; nothing with a rigid tower.
 
-    ax, ay: absolute acceleration of the tower top along its own axes, m/s2. As ElastoDyn has them, the
-    displacement is along the axes of the tower base, and the acceleration has no gravity in it.
+    ax, ay: absolute acceleration of the tower top along tower-top axes, m/s2. As in ElastoDyn, the
+    displacement is along the axes of the tower base, and the acceleration excludes gravity.
     """
     if bend is None:
         return
@@ -67,6 +67,6 @@ def _bent(pose, x, dx, loads, bend, body, layout, tower):
     )
 
 
-# (pose, x, dx, loads, bend, body, layout, tower) -> Wrench about the body origin, body axes, that the tower
-# base carries: aerodynamics, the user's loads and weight above it less the rate of momentum there
+# (pose, x, dx, loads, bend, body, layout, tower) -> Wrench on the tower base, body axes about body origin:
+# aerodynamics, user loads and weight above the base less the rate of momentum there
 carried_at_base = chosen_by_class("tower", {type(None): _rigid, TowerModes: _bent}, inlined=True)

@@ -1,7 +1,7 @@
-"""Users' own loads as a part of the plant: what their kernels are given, and the sum of what they return.
+"""Evaluates user-defined loads in the plant: the inputs of their kernels, and the sum of their outputs.
 
-A kernel is a first-class function of fixed signature: its address is data, so that a scene with loads is
-compiled once, whatever they are, and comes from the cache of compiled kernels afterwards.
+A kernel is a first-class function of fixed signature: its address is data, so that a scene with user loads
+is compiled once, for any loads, and comes from the cache of compiled kernels afterwards.
 """
 
 from enum import IntEnum
@@ -20,23 +20,23 @@ MOST_LOADS = 8
 
 
 class Motion(IntEnum):
-    """Entries of the array `motion` that a load kernel reads (SI, radians).
+    """Enumerates the entries of the array `motion` that a load kernel reads (SI, radians).
 
     Position and rotation are in inertial axes. Velocities, wind and water are in the axes of the load:
-    inertial ones, or those of the body where it was built with axes="body".
+    inertial axes, or body axes where the load was built with axes="body".
     """
 
     TIME = 0
-    X = 1  # the load's point, inertial, m
+    X = 1  # point of the load, inertial, m
     Y = 2
     Z = 3
-    VX = 4  # its velocity, m/s
+    VX = 4  # velocity of the point, m/s
     VY = 5
     VZ = 6
     WX = 7  # angular velocity of the platform, rad/s
     WY = 8
     WZ = 9
-    SURGE = 10  # the body origin, inertial, m
+    SURGE = 10  # body origin, inertial, m
     SWAY = 11
     HEAVE = 12
     ROLL = 13  # 3-2-1 Euler angles (yaw first), rad
@@ -61,22 +61,22 @@ class Motion(IntEnum):
     WATER_X = 32  # velocity of waves and current at the point, m/s; zero unless the load asks for water
     WATER_Y = 33
     WATER_Z = 34
-    WATER_AX = 35  # acceleration of the waves there, m/s2
+    WATER_AX = 35  # acceleration of the waves at the point, m/s2
     WATER_AY = 36
     WATER_AZ = 37
-    STATE = 38  # first of the load's own states, where it has some
+    STATE = 38  # first state of the load, if any
 
 
 class Force(IntEnum):
-    """Entries of the array `force` that a load kernel fills, in the axes of the load."""
+    """Enumerates the entries of the array `force` that a load kernel fills, in the axes of the load."""
 
-    FX = 0  # N, at the load's point
+    FX = 0  # N, at the point of the load
     FY = 1
     FZ = 2
-    MX = 3  # N m, about it
+    MX = 3  # N m, about the point
     MY = 4
     MZ = 5
-    RATE = 6  # first of the rates of the load's own states, 1/s
+    RATE = 6  # first rate of the states of the load, 1/s
 
 
 N_MOTION = int(Motion.STATE)
@@ -84,15 +84,15 @@ N_FORCE = int(Force.RATE)
 
 
 class UserLoads(NamedTuple):
-    """Up to MOST_LOADS loads, n of them in use."""
+    """Holds up to MOST_LOADS user loads, of which n are in use."""
 
-    parameters: np.ndarray  # of all loads, one after the other
-    first: np.ndarray  # (n + 1,) where those of each load start, int64
-    point: np.ndarray  # (n, 3) where each acts, body axes, m
+    parameters: np.ndarray  # of all loads, concatenated
+    first: np.ndarray  # (n + 1,) first parameter of each load, int64
+    point: np.ndarray  # (n, 3) point of each load, body axes, m
     body_axes: np.ndarray  # (n,) bool: axes of velocities and of the force
-    above: np.ndarray  # (n,) bool: above the tower base, which then carries it
-    water: np.ndarray  # (n,) bool: wants the motion of the water
-    first_state: np.ndarray  # (n + 1,) index in the state vector where the states of each begin, int64
+    above: np.ndarray  # (n,) bool: acts above the tower base, which then carries it
+    water: np.ndarray  # (n,) bool: needs the motion of the water
+    first_state: np.ndarray  # (n + 1,) index in the state vector of the first state of each, int64
     most_states: int  # of one load
     kernel0: object  # first-class functions; a tuple of them makes numba warn at every use
     kernel1: object
@@ -105,13 +105,13 @@ class UserLoads(NamedTuple):
 
 
 def user_data_size(count, most_states=0):
-    """Entries of Data.user that this many loads need: six of each, the first to fail, Motion and Force."""
+    """Return the size of Data.user: six entries of each load, the first failed load, Motion and Force."""
     return 6 * count + 1 + N_MOTION + N_FORCE + 2 * most_states if count else 0
 
 
 @inlined_kernel
 def call_kernel(i, user, parameters, motion, force):
-    """Have load i write its force and moment, and the rates of its states."""
+    """Call the kernel of load i, which fills force, moment and the rates of its states."""
     if i == 0:
         user.kernel0(parameters, motion, force)
     elif i == 1:
@@ -132,7 +132,7 @@ def call_kernel(i, user, parameters, motion, force):
 
 @kernel
 def fill_axes(pose, motion):
-    """Fill the rotation from the axes of a Pose to inertial ones."""
+    """Fill motion with the rotation from the axes of a Pose to inertial axes."""
     motion[Motion.R11], motion[Motion.R12], motion[Motion.R13] = pose.r11, pose.r12, pose.r13
     motion[Motion.R21], motion[Motion.R22], motion[Motion.R23] = pose.r21, pose.r22, pose.r23
     motion[Motion.R31], motion[Motion.R32], motion[Motion.R33] = pose.r31, pose.r32, pose.r33
@@ -140,7 +140,7 @@ def fill_axes(pose, motion):
 
 @kernel
 def carrier(above, pose, nacelle, bend, motion):
-    """Pose of what a load acts on, with its axes filled in: above the base of a bending tower the nacelle."""
+    """Return the Pose under a load, and fill its axes: the nacelle's above the base of a flexible tower."""
     if bend is None:
         return pose
     at = nacelle if above else pose
@@ -150,7 +150,7 @@ def carrier(above, pose, nacelle, bend, motion):
 
 @kernel
 def fill_common(t, pose, x, elevation, motion):
-    """Fill what is the same for every load."""
+    """Fill the entries of motion that are common to all loads."""
     motion[Motion.TIME] = t
     motion[Motion.SURGE], motion[Motion.SWAY], motion[Motion.HEAVE] = pose.x, pose.y, pose.z
     motion[Motion.ROLL] = x[State.ROLL]
@@ -165,7 +165,7 @@ def fill_common(t, pose, x, elevation, motion):
 
 @kernel
 def put(motion, start, pose, body_axes, a, b, c):
-    """Store a vector given in inertial axes in three entries, in the axes of the load."""
+    """Store a vector with inertial components in three entries, in the axes of the load."""
     if body_axes:
         a, b, c = to_body(pose, a, b, c)
     motion[start] = a
@@ -174,8 +174,8 @@ def put(motion, start, pose, body_axes, a, b, c):
 
 
 @kernel
-def fill_place(pose, px, py, pz, body_axes, motion):
-    """Fill where the point (body axes) is and how it moves."""
+def fill_point(pose, px, py, pz, body_axes, motion):
+    """Fill motion with position and velocity of a point (body axes), and the angular velocity."""
     a, b, c = to_inertial(pose, px, py, pz)
     motion[Motion.X], motion[Motion.Y], motion[Motion.Z] = pose.x + a, pose.y + b, pose.z + c
     u = pose.vx + pose.wy * pz - pose.wz * py
@@ -189,7 +189,7 @@ def fill_place(pose, px, py, pz, body_axes, motion):
 
 @kernel
 def fill_water(t, pose, hydro, needed, body_axes, motion):
-    """Fill the motion of the water at the point (above the still surface: that at it); zero if not needed."""
+    """Fill the motion of the water at the point, limited to the still-water level; zero if not needed."""
     u = v = w = du = dv = dw = 0.0
     if needed:
         z = min(motion[Motion.Z], 0.0)
@@ -200,7 +200,7 @@ def fill_water(t, pose, hydro, needed, body_axes, motion):
 
 @kernel
 def body_wrench(pose, px, py, pz, body_axes, force):
-    """Wrench about the body origin, body axes, of a force and moment (6,) at a point, in the load's axes."""
+    """Return the Wrench about the body origin, body axes, of a force and moment (6,) in axes of the load."""
     fx, fy, fz, mx, my, mz = force[0], force[1], force[2], force[3], force[4], force[5]
     if not body_axes:
         fx, fy, fz = to_body(pose, fx, fy, fz)
@@ -212,11 +212,11 @@ def body_wrench(pose, px, py, pz, body_axes, force):
 def evaluate_user_loads(t, pose, nacelle, bend, x, aero, hydro, user, data, dx):
     """Fill data.user (user_data_size(n, most),): the wrench of each load, body axes about the body origin.
 
-    Above the base of a tower that bends (bend: Bend, else None) they act on the nacelle: their motion is the
-    nacelle's, and the wrench has the axes and the origin of its pose.
+    Above the base of a flexible tower (bend: Bend, else None) loads act on the nacelle: their motion is that
+    of the nacelle, and the wrench has the axes and the origin of the nacelle pose.
 
-    Entry 6 n becomes the number, from 1, of the first load that gave a number that is not finite while
-    what it was given was finite. Rates of the loads' own states go into dx.
+    Entry 6 n becomes the number, from 1, of the first load with an output that is not finite for finite
+    input. Rates of the loads' states go into dx.
     """
     if user is None:
         return
@@ -228,7 +228,7 @@ def evaluate_user_loads(t, pose, nacelle, bend, x, aero, hydro, user, data, dx):
         px, py, pz = user.point[i, 0], user.point[i, 1], user.point[i, 2]
         axes = user.body_axes[i]
         at = carrier(user.above[i], pose, nacelle, bend, motion)
-        fill_place(at, px, py, pz, axes, motion)
+        fill_point(at, px, py, pz, axes, motion)
         u, v, w = wind_of(t, motion[Motion.X], motion[Motion.Y], motion[Motion.Z], aero)
         put(motion, Motion.WIND_X, at, axes, u, v, w)
         fill_water(t, at, hydro, user.water[i], axes, motion)
@@ -238,12 +238,12 @@ def evaluate_user_loads(t, pose, nacelle, bend, x, aero, hydro, user, data, dx):
         for j in range(force.shape[0]):
             force[j] = 0.0
         call_kernel(i, user, user.parameters[user.first[i] : user.first[i + 1]], motion, force)
-        total = given = 0.0
+        outputs = inputs = 0.0
         for j in range(N_FORCE + states):
-            total += force[j]
+            outputs += force[j]
         for j in range(N_MOTION + states):
-            given += motion[j]
-        if user_data[6 * n] == 0.0 and not isfinite(total) and isfinite(given):
+            inputs += motion[j]
+        if user_data[6 * n] == 0.0 and not isfinite(outputs) and isfinite(inputs):
             user_data[6 * n] = i + 1.0
         for j in range(states):
             dx[first + j] = force[Force.RATE + j]
@@ -255,7 +255,7 @@ def evaluate_user_loads(t, pose, nacelle, bend, x, aero, hydro, user, data, dx):
 
 @kernel
 def user_wrench(i, user_data):
-    """Wrench of load i, as evaluate_user_loads left it in data.user."""
+    """Return the Wrench of load i from data.user, as stored by evaluate_user_loads."""
     k = 6 * i
     return Wrench(
         user_data[k], user_data[k + 1], user_data[k + 2],
@@ -265,7 +265,7 @@ def user_wrench(i, user_data):
 
 @kernel
 def borne_wrench(i, bend, user, data):
-    """Wrench of load i about the body origin, body axes, wherever it acts."""
+    """Return the Wrench of load i about the body origin, body axes, on nacelle or platform."""
     if bend is None:
         return user_wrench(i, data.user)
     load = user_wrench(i, data.user)
@@ -274,7 +274,7 @@ def borne_wrench(i, bend, user, data):
 
 @kernel
 def add_user_loads(load, above, bend, user, data):
-    """The load with those of the user's added that act above the tower base, or those that do not."""
+    """Return the load plus the user loads above the tower base (above True), or the other user loads."""
     if user is None:
         return load
     for i in range(user.point.shape[0]):
@@ -285,7 +285,7 @@ def add_user_loads(load, above, bend, user, data):
 
 @kernel
 def add_modal_user_loads(bend, tower, user, data, modal):
-    """Add to modal (n,) the generalised forces of the user's loads on the nacelle."""
+    """Add to modal (n,) the generalised forces of the user loads on the nacelle."""
     if user is None:
         return
     for i in range(user.point.shape[0]):
@@ -295,7 +295,7 @@ def add_modal_user_loads(bend, tower, user, data, modal):
 
 @kernel
 def record_user_loads(pose, bend, user, data, row):
-    """Fill six channels of each load into row: force and moment about the body origin, inertial axes."""
+    """Fill six channels of each user load: force and moment about the body origin, inertial axes."""
     if user is None:
         return
     for i in range(user.point.shape[0]):
@@ -306,7 +306,7 @@ def record_user_loads(pose, bend, user, data, row):
 
 @kernel
 def user_channels(user):
-    """Number of output channels of the user's loads."""
+    """Return the number of output channels of the user loads."""
     if user is None:
         return 0
     return 6 * user.point.shape[0]

@@ -1,4 +1,4 @@
-"""Strip loads of a long-crested sea from wave bands at the nodes of a quadrature; its twin is morison.py."""
+"""Computes strip loads of a long-crested sea from wave bands at quadrature nodes; exact: morison.py."""
 
 from math import pi, sqrt
 
@@ -26,7 +26,7 @@ from fowt_env.plant.state import NO_LOAD, Wrench, add
 
 @kernel
 def band_surface(pose, quadrature, lean, reach, e0, e1, e2, e3):
-    """(z_surf, eta) as morison.axis_surface, from the surface's Taylor series e0..e3 (see compress).
+    """Return (z_surf, eta) as strips.axis_surface, from the surface's Taylor series e0..e3 (see compress).
 
     lean: distance along the heading per metre of height.
     """
@@ -46,7 +46,7 @@ def band_surface(pose, quadrature, lean, reach, e0, e1, e2, e3):
 
 @kernel
 def block_current(pose, depth, current, node):
-    """Current at a block's nodes, inertial axes."""
+    """Fill the current at a block's nodes, inertial axes."""
     if current is None:
         return
     for n in range(BLOCK):
@@ -58,7 +58,7 @@ def block_current(pose, depth, current, node):
 
 @kernel
 def block_load(pose, quadrature, table, bands, current, node):
-    """StripLoad of a block: Eq. (16) and the pressure on the taper, without the keel."""
+    """Return the StripLoad of a block: Eq. (16) and the pressure on the taper, without the keel."""
     added_line = 0.25 * pi * quadrature.density * quadrature.added_mass_coefficient
     froude_line = 0.25 * pi * quadrature.density * (1.0 + quadrature.added_mass_coefficient)
     drag_line = 0.5 * quadrature.density * quadrature.drag_coefficient
@@ -104,7 +104,7 @@ def block_load(pose, quadrature, table, bands, current, node):
 
 @kernel
 def keel_load(pose, quadrature, bands, current, node):
-    """Axial force on the keel: dynamic pressure, added mass and drag (theory.md, 5.4)."""
+    """Return the axial force on the keel: dynamic pressure, added mass and drag (theory.md, 5.4)."""
     zk = quadrature.keel_z
     sx = pose.vx + pose.wy * zk
     sy = pose.vy - pose.wx * zk
@@ -123,7 +123,7 @@ def keel_load(pose, quadrature, bands, current, node):
 
 @kernel
 def band_field(t, pose, quadrature, bands, scratch):
-    """(z_surf, eta, height of the reference point on the axis) with scratch.field filled."""
+    """Fill scratch.field; return (z_surf, eta, height of the reference point on the axis)."""
     z_ref = distance = lean = 0.0
     if quadrature.instantaneous_position:
         tilt = max(pose.r33, 0.1)
@@ -142,7 +142,7 @@ def band_field(t, pose, quadrature, bands, scratch):
 
 @kernel
 def still_surface(pose, quadrature):
-    """Body z where the axis meets still water."""
+    """Return the body z where the axis meets still water."""
     if not quadrature.instantaneous_position:
         return 0.0
     return -pose.z / max(pose.r33, 0.1)
@@ -150,7 +150,7 @@ def still_surface(pose, quadrature):
 
 @kernel
 def block_kinematics(pose, z_ref, eta, quadrature, bands, field, node, diffraction, block):
-    """Fill a block's U, W, DU, DW (along the heading and up) and P; nothing in still water."""
+    """Fill the kinematics U, W, DU, DW (along the heading and up) and P of a block; still water: nothing."""
     if bands is None:
         return
     stretch = 1.0
@@ -169,9 +169,9 @@ def block_kinematics(pose, z_ref, eta, quadrature, bands, field, node, diffracti
 
 @kernel
 def banded_strip_load(t, pose, quadrature, bands, current, scratch, diffraction=None):
-    """Strip load as morison.morison_load gives it, from StripQuadrature and WaveBands (None: still water).
+    """Return the StripLoad of morison.morison_load from StripQuadrature and WaveBands (None: still water).
 
-    diffraction: BandDiffraction or None, which leaves 1 + C_A.
+    diffraction: BandDiffraction, or None for the coefficient 1 + C_A.
     """
     if quadrature is None:
         return StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)

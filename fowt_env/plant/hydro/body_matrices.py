@@ -1,8 +1,8 @@
-"""Constant matrices of a floating body about its undisplaced pose (theory.md, 5.7).
+"""Applies constant matrices of a floating body about its undisplaced pose (theory.md, 5.7).
 
 Potential-flow hydrostatics and the added mass at infinite frequency, with the additional preload, stiffness
-and damping of the platform file. Linear theory knows the body in its undisplaced pose alone, so all of it is
-in inertial axes about the body origin, as in HydroDyn:
+and damping of the platform file. Linear theory assumes the undisplaced pose, so all matrices are in inertial
+axes about the body origin, as in HydroDyn:
 
     F = constant - stiffness q - linear_damping q' - quadratic_damping |q'| q' - added_mass q''
 """
@@ -16,7 +16,7 @@ from fowt_env.plant.state import State, Wrench, add, to_body, to_inertial
 
 
 class BodyMatrices(NamedTuple):
-    """Matrices in inertial axes about the body origin; q is surge, sway, heave, roll, platform pitch, yaw."""
+    """Holds matrices in inertial axes about the body origin; q: surge, sway, heave, roll, pitch, yaw."""
 
     constant: np.ndarray  # (6,) buoyancy of the undisplaced body and preload, N, N m
     stiffness: np.ndarray  # (6, 6)
@@ -26,7 +26,7 @@ class BodyMatrices(NamedTuple):
 
 
 def build_body_matrices(potential, additional, density, gravity):
-    """BodyMatrices of a PotentialFlow and AdditionalLoads, either or both None; None without both."""
+    """Return the BodyMatrices of a PotentialFlow and AdditionalLoads, each optional; None without both."""
     if potential is None and additional is None:
         return None
     constant, stiffness, added = np.zeros(6), np.zeros((6, 6)), np.zeros((6, 6))
@@ -51,9 +51,9 @@ def build_body_matrices(potential, additional, density, gravity):
 
 @kernel
 def add_body_matrices(pose, x, load, part, added):
-    """The load with that of BodyMatrices but for added mass times acceleration; adds to added (6, 6).
+    """Return load plus that of BodyMatrices except added mass times acceleration; add to added (6, 6).
 
-    As it is without the part. Velocities and accelerations are those of the body origin: R v and R w, and
+    part None: unchanged. Velocities and accelerations are of the body origin: R v and R w, and
     R (v' + w x v) and R w'.
     """
     if part is None:
@@ -73,7 +73,7 @@ def add_body_matrices(pose, x, load, part, added):
 
 @kernel
 def _matrix_force(i, x, u, w, part):
-    """Component i of the load in inertial axes."""
+    """Return component i of the matrix load in inertial axes."""
     total = part.constant[i]
     for j in range(6):
         total -= part.stiffness[i, j] * x[State.SURGE + j]
@@ -85,12 +85,12 @@ def _matrix_force(i, x, u, w, part):
 
 @kernel
 def _add_turned_mass(pose, mass, added):
-    """Add the added mass in body axes to `added`; returns its load by the turning velocity, -A (w x v, 0)."""
+    """Add the added mass in body axes to `added`; return its load by rotation, -A (w x v, 0)."""
     cx = pose.wy * pose.vz - pose.wz * pose.vy
     cy = pose.wz * pose.vx - pose.wx * pose.vz
     cz = pose.wx * pose.vy - pose.wy * pose.vx
     fx = fy = fz = mx = my = mz = 0.0
-    for j in range(3):  # columns of R, the body axes, and what the mass makes of each
+    for j in range(3):  # columns of R, the body axes, and their products with the mass
         a, b, c = _axis(j, pose)
         p0 = _product(0, mass, a, b, c, 0)
         p1 = _product(1, mass, a, b, c, 0)
@@ -128,7 +128,7 @@ def _add_turned_mass(pose, mass, added):
 
 @kernel
 def _axis(j, pose):
-    """Body axis j in inertial components."""
+    """Return body axis j in inertial components."""
     if j == 0:
         return pose.r11, pose.r21, pose.r31
     if j == 1:
@@ -138,5 +138,5 @@ def _axis(j, pose):
 
 @kernel
 def _product(i, mass, a, b, c, start):
-    """Row i of three columns of the mass from `start` on, times a vector."""
+    """Return row i of three columns of the mass matrix from `start` on, times a vector."""
     return mass[i, start] * a + mass[i, start + 1] * b + mass[i, start + 2] * c

@@ -1,8 +1,8 @@
-"""Diffraction by a slender vertical hull: MacCamy and Fuchs' cylinder, strip by strip (theory.md, 5.4).
+"""Computes diffraction by a slender vertical hull: MacCamy and Fuchs' cylinder per strip (theory.md, 5.4).
 
 The solution for a cylinder of radius a in a wave of number k replaces the inertia coefficient
-1 + C_A of a strip by a complex one that depends on k a alone. It multiplies each component's
-acceleration before the sum; the coefficient of a tapering section is a polynomial along the axis.
+1 + C_A of a strip by a complex coefficient that depends on k a alone and multiplies the acceleration of
+each component before the sum; the coefficient of a tapered section is a polynomial along the axis.
 """
 
 from typing import NamedTuple
@@ -16,18 +16,18 @@ TERMS = 6  # of the polynomial: within 3e-6 of the coefficient on the taper of O
 
 
 class StripDiffraction(NamedTuple):
-    """Coefficient over 1 + C_A of every component and section of a Strips part."""
+    """Holds the inertia coefficient over 1 + C_A of every wave component and section of a Strips part."""
 
     series: np.ndarray  # (n, m, 2 TERMS) powers of z - centre: TERMS real parts, TERMS imaginary parts
     centre: np.ndarray  # (m,) body z
 
 
 def inertia_coefficient(ka):
-    """Complex inertia coefficient (n,) of a vertical cylinder: 2 for long waves, smaller in short ones.
+    """Return the complex inertia coefficient (n,) of a vertical cylinder: 2 in long waves, less in shorter.
 
     ka   wave number times radius, > 0
-    The force per unit length is rho A times this times the acceleration that the undisturbed wave,
-    exp(i (k x - omega t)), has on the axis: a positive argument is a lag.
+    The force per unit length is rho A times the coefficient times the acceleration of the undisturbed
+    wave, exp(i (k x - omega t)), on the axis: a positive argument is a lag.
     Source: MacCamy and Fuchs (1954), Beach Erosion Board TM-69; theory.md Eq. (A20).
     """
     ka = np.asarray(ka, dtype=np.float64)
@@ -35,7 +35,7 @@ def inertia_coefficient(ka):
 
 
 def coefficient_series(wave_number, bottom, top, diameter_bottom, diameter_top):
-    """(n, TERMS) complex: the coefficient in powers of z - (bottom + top) / 2 over a section.
+    """Return (n, TERMS) complex: the inertia coefficient in powers of z - (bottom + top) / 2 over a section.
 
     wave_number (n,); diameters at the section's ends, linear between. Interpolates at Chebyshev points.
     """
@@ -52,7 +52,7 @@ def coefficient_series(wave_number, bottom, top, diameter_bottom, diameter_top):
 
 
 def build_strip_diffraction(waves, strips):
-    """StripDiffraction of a Waves and a Strips part."""
+    """Return the StripDiffraction of a Waves and a Strips part."""
     top, bottom = strips.section_top, strips.section_bottom
     upper = strips.diameter_bottom + strips.diameter_slope * (top - bottom)
     upper = np.where(strips.diameter_slope == 0.0, strips.diameter_bottom, upper)
@@ -66,7 +66,7 @@ def build_strip_diffraction(waves, strips):
 
 @kernel
 def factor_at(series, x):
-    """(real, imaginary) of a polynomial at x; series: (2 TERMS,) as in StripDiffraction."""
+    """Return (real, imaginary) of a coefficient series at x; series: (2 TERMS,) as in StripDiffraction."""
     re, im = series[TERMS - 1], series[2 * TERMS - 1]
     for i in range(TERMS - 2, -1, -1):
         re = series[i] + x * re

@@ -1,9 +1,9 @@
-"""Wave force on a potential-flow body, first and second order (theory.md, 5.9).
+"""Computes the wave force on a potential-flow body, first and second order (theory.md, 5.9).
 
-Linear theory knows the body in its undisplaced pose alone, so the forces are functions of time, in inertial
-axes about the body origin: the first order summed over components or tabulated over time, the second
-tabulated always, as coefficients of cubic B-splines. Where the waves are to meet the body at its slowly
-varying position, phases are those at a low-passed surge and sway, two states.
+Linear theory assumes the undisplaced pose, so the forces are functions of time, in inertial axes about the
+body origin: the first order summed over components or tabulated over time, the second always tabulated, as
+coefficients of cubic B-splines. For waves at the slowly varying position of the body, phases are taken at a
+low-passed surge and sway, two states.
 """
 
 from math import cos, floor, pi, sin
@@ -18,7 +18,7 @@ from fowt_env.plant.hydro.wave_bands import aligned, phasors
 from fowt_env.plant.hydro.waves import elevation, ramp_factor
 from fowt_env.plant.state import State, Wrench, add, to_body
 
-COLUMNS = 8  # of a table: six of the force, the elevation at the origin, and one that fills a cache line
+COLUMNS = 8  # of a table: six of the force, the elevation at the origin, and one to fill a cache line
 ELEVATION = 6
 # rows of a FastExcitation's components, phases in turns; the first three are scratch of phasors
 DISTANCE, RATE, TURN, ALONG_X, ALONG_Y, N_WAVE = range(6)
@@ -26,7 +26,7 @@ N_SCRATCH = 5  # rows: those three, cosine and sine
 
 
 class ExactExcitation(NamedTuple):
-    """First-order force by the plain sum: Re(force exp(i (omega t - phase - k (x cos b + y sin b))))."""
+    """Holds the first-order force by a sum of Re(force exp(i (omega t - phase - k (x cos b + y sin b))))."""
 
     omega: np.ndarray  # (n,) rad/s
     phase: np.ndarray  # (n,) e, rad
@@ -37,7 +37,7 @@ class ExactExcitation(NamedTuple):
 
 
 class TimeTable(NamedTuple):
-    """Coefficients of cubic B-splines over evenly spaced times from 0 to span."""
+    """Holds coefficients of cubic B-splines over evenly spaced times from 0 to span."""
 
     value: np.ndarray  # (rows + 3, COLUMNS): of times -step, 0, ... span + step
     rate: float  # rows per second
@@ -46,14 +46,14 @@ class TimeTable(NamedTuple):
 
 
 class ExcitationSeries(NamedTuple):
-    """First-order force and the elevation at the origin from a table, and the sum for times beyond it."""
+    """Holds first-order force and elevation at the origin as a table, and the sum for times outside."""
 
     table: TimeTable
     exact: ExactExcitation
 
 
 class FastExcitation(NamedTuple):
-    """First-order force by the sum at a position, with the phases of all components at once."""
+    """Holds the first-order force by the sum at a position, with vectorised phases of all components."""
 
     wave: np.ndarray  # (N_WAVE, n) rows DISTANCE (zeros) to ALONG_Y; n padded with zeros to whole lanes
     force: np.ndarray  # (12, n) of each component's amplitude, on cosine (6) and sine (6)
@@ -62,14 +62,14 @@ class FastExcitation(NamedTuple):
 
 
 class FilteredPosition(NamedTuple):
-    """Surge and sway behind a first-order low pass: where the waves meet the body."""
+    """Holds the low-passed surge and sway (first order) at which the waves act on the body."""
 
-    first: int  # of its two states in the state vector
+    first: int  # index of the two states in the state vector
     rate: float  # 1/s, of the filter
 
 
 class SecondOrder(NamedTuple):
-    """Difference-frequency force from a table; the mean force for times beyond it."""
+    """Holds the difference-frequency force as a table, and the mean force for times outside."""
 
     table: TimeTable
     mean: np.ndarray  # (6,) N and N m
@@ -77,7 +77,7 @@ class SecondOrder(NamedTuple):
 
 
 class Excitation(NamedTuple):
-    """Force of the waves on a potential-flow body."""
+    """Holds the wave force on a potential-flow body."""
 
     first: object  # ExactExcitation, ExcitationSeries or, with a position, FastExcitation
     second: object  # SecondOrder or None; at the undisplaced position
@@ -85,26 +85,26 @@ class Excitation(NamedTuple):
 
 
 def build_filtered_position(first, cutoff):
-    """FilteredPosition whose states begin at `first`, with a cutoff frequency in Hz."""
+    """Return a FilteredPosition whose states begin at `first`, with a cutoff frequency in Hz."""
     return FilteredPosition(int(first), float(2.0 * pi * cutoff))
 
 
 def position_states(hydro):
-    """Number of states of the filtered position of a Hydro part or None."""
+    """Return the number of states of the filtered position of a Hydro part or None."""
     part = None if hydro is None else hydro.excitation
     return 0 if part is None or part.position is None else 2
 
 
 def excitation_scratch(hydro):
-    """Fresh scratch array of a FastExcitation of a Hydro part or None; empty without one."""
+    """Return a new scratch array for the FastExcitation of a Hydro part; empty without FastExcitation."""
     part = None if hydro is None else hydro.excitation
     first = None if part is None else part.first
     return aligned(np.zeros((N_SCRATCH, first.amplitude.size if isinstance(first, FastExcitation) else 0)))
 
 
 @kernel
-def place_in(t, table):
-    """(row, fraction) of a time in a table; row -1: beyond it."""
+def row_at(t, table):
+    """Return (row, fraction) of a time in a table; row -1: outside the table."""
     if table.periodic:
         t -= table.span * floor(t / table.span)
     elif t < 0.0 or t > table.span:
@@ -116,7 +116,7 @@ def place_in(t, table):
 
 @kernel
 def spline_weights(u):
-    """Weights of the four coefficients about a time at this fraction (0 to 1) between two rows."""
+    """Return the B-spline weights of the four coefficients about a fraction (0 to 1) between two rows."""
     v = 1.0 - u
     cube, other = u * u * u, v * v * v
     return (
@@ -129,7 +129,7 @@ def spline_weights(u):
 
 @kernel
 def _entry(value, row, column, w):
-    """Value of one column."""
+    """Return the spline value of one column."""
     return (
         w[0] * value[row, column]
         + w[1] * value[row + 1, column]
@@ -140,7 +140,7 @@ def _entry(value, row, column, w):
 
 @kernel
 def _tabulated(value, row, fraction, scale):
-    """Wrench of a table's first six columns, times scale."""
+    """Return the Wrench of a table's first six columns, times scale."""
     w = spline_weights(fraction)
     return Wrench(
         scale * _entry(value, row, 0, w),
@@ -154,7 +154,7 @@ def _tabulated(value, row, fraction, scale):
 
 @kernel
 def exact_force(t, x, y, first, scratch):
-    """Wrench of an ExactExcitation at an inertial position, inertial axes."""
+    """Return the Wrench of an ExactExcitation at an inertial position, inertial axes."""
     force = first.force
     fx = fy = fz = mx = my = mz = 0.0
     for j in range(first.omega.shape[0]):
@@ -172,8 +172,8 @@ def exact_force(t, x, y, first, scratch):
 
 @kernel
 def series_force(t, x, y, first, scratch):
-    """Wrench of an ExcitationSeries, inertial axes, whatever the position."""
-    row, fraction = place_in(t, first.table)
+    """Return the Wrench of an ExcitationSeries, inertial axes; the position is ignored."""
+    row, fraction = row_at(t, first.table)
     if row < 0:
         return exact_force(t, 0.0, 0.0, first.exact, scratch)
     return _tabulated(first.table.value, row, fraction, ramp_factor(t, first.exact.ramp))
@@ -191,7 +191,7 @@ def _fill_phasors(t, x, y, wave, scratch):
 
 @kernel
 def fast_force(t, x, y, first, scratch):
-    """Wrench of a FastExcitation at an inertial position, inertial axes."""
+    """Return the Wrench of a FastExcitation at an inertial position, inertial axes."""
     _fill_phasors(t, x, y, first.wave, scratch)
     c, s, force, n = scratch[3], scratch[4], first.force, first.amplitude.shape[0]
     f = ramp_factor(t, first.ramp)
@@ -214,7 +214,7 @@ first_order_force = chosen_by_class(
 
 @kernel
 def meeting_point(x, position):
-    """(x, y) inertial position at which the waves meet the body."""
+    """Return the inertial position (x, y) at which the waves act on the body."""
     if position is None:
         return 0.0, 0.0
     return x[position.first], x[position.first + 1]
@@ -222,7 +222,7 @@ def meeting_point(x, position):
 
 @kernel
 def position_rates(x, part, dx):
-    """Put the rates of the filtered position of an Excitation, or None, into dx."""
+    """Fill dx with the rates of the filtered position of an Excitation or None."""
     if part is None:
         return
     _filter_rates(x, part.position, dx)
@@ -238,12 +238,12 @@ def _filter_rates(x, position, dx):
 
 @kernel
 def add_second_order(t, force, second):
-    """The force with that of SecondOrder; as it is without. The ramp is squared, as amplitudes are."""
+    """Return force plus the SecondOrder force; None: unchanged. The ramp is squared, as amplitudes are."""
     if second is None:
         return force
     f = ramp_factor(t, second.ramp)
     f *= f
-    row, fraction = place_in(t, second.table)
+    row, fraction = row_at(t, second.table)
     if row < 0:
         mean = second.mean
         return add(
@@ -254,7 +254,7 @@ def add_second_order(t, force, second):
 
 @kernel
 def add_excitation(t, pose, x, load, part, scratch):
-    """The load (body axes) with the force of the waves; as it is without the part."""
+    """Return load (body axes) plus the wave excitation; part None: unchanged."""
     if part is None:
         return load
     at_x, at_y = meeting_point(x, part.position)
@@ -271,7 +271,7 @@ def _summed_elevation(t, waves, first, scratch):
 
 @kernel
 def _tabulated_elevation(t, waves, first, scratch):
-    row, fraction = place_in(t, first.table)
+    row, fraction = row_at(t, first.table)
     if row < 0:
         return elevation(t, 0.0, 0.0, waves)
     value = _entry(first.table.value, row, ELEVATION, spline_weights(fraction))
@@ -296,7 +296,7 @@ _elevation = chosen_by_class(
 
 @kernel
 def elevation_beside(t, waves, part, scratch):
-    """Elevation at the origin, m: as an Excitation has it, else by the sum."""
+    """Return the elevation at the origin, m: from an Excitation, else by the plain sum."""
     if part is None:
         return elevation(t, 0.0, 0.0, waves)
     return _elevation(t, waves, part.first, scratch)

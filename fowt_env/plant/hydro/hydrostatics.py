@@ -1,7 +1,7 @@
-"""Buoyancy of the hull up to the still-water plane, theory.md Eq. (15).
+"""Computes the buoyancy of the hull up to the still-water plane, theory.md Eq. (15).
 
-Closed form while the plane cuts only the upper cylinder; otherwise circular slices are integrated
-numerically, which is counted (Counter.HYDROSTATIC_FALLBACK) so that a run can say so.
+The buoyancy has a closed form while the plane cuts only the upper cylinder; otherwise circular slices are
+integrated numerically, and counted (Counter.HYDROSTATIC_FALLBACK) for the report of a run.
 """
 
 from math import acos, pi, sqrt
@@ -17,14 +17,14 @@ SLICE_NODES = 24  # Gauss points per section in the partly wet zone; 1e-4 of the
 
 
 class BuoyantHull(NamedTuple):
-    """Outer shape of the floater and the constants of its closed-form buoyancy."""
+    """Holds the outer shape of the hull and the constants of its closed-form buoyancy."""
 
     specific_weight: float  # rho g, N/m3
     radius: float  # of the water-piercing cylinder, m
-    z_join: float  # its lower end, body z
+    z_join: float  # lower end of the cylinder, body z
     z_top: float
     volume_below: float  # V below z_join, m3
-    moment_below: float  # integral of z over that volume, m4
+    moment_below: float  # integral of z over V, m4
     z: np.ndarray  # (n,) section boundaries, keel first
     section_radius: np.ndarray  # (n,)
     gauss_x: np.ndarray  # (SLICE_NODES,) on [-1, 1]
@@ -32,7 +32,7 @@ class BuoyantHull(NamedTuple):
 
 
 def build_hull(hull, water_density, gravity):
-    """BuoyantHull of a descriptions.platform.Hull."""
+    """Return the BuoyantHull of a descriptions.platform.Hull."""
     z = np.ascontiguousarray(hull.z, dtype=np.float64)
     radius = np.ascontiguousarray(hull.diameter, dtype=np.float64) / 2.0
     volume = moment = 0.0
@@ -56,7 +56,7 @@ def build_hull(hull, water_density, gravity):
 
 
 def _frustum(lower, upper, a, b):
-    """Volume and first moment about z = 0 of a frustum, radius a at the lower and b at the upper end."""
+    """Return volume and first moment about z = 0 of a frustum, radius a at the lower, b at the upper end."""
     height = upper - lower
     volume = pi * height * (a * a + a * b + b * b) / 3.0
     centroid = height * (a * a + 2.0 * a * b + 3.0 * b * b) / (4.0 * (a * a + a * b + b * b))
@@ -65,7 +65,7 @@ def _frustum(lower, upper, a, b):
 
 @kernel
 def submerged(pose, hull, counters):
-    """(V, Qx, Qy, Qz): submerged volume and its first moment in body axes, still-water plane Z = 0."""
+    """Return (V, Qx, Qy, Qz): submerged volume and its first moment in body axes, still-water plane Z = 0."""
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     horizontal = sqrt(nx * nx + ny * ny)
     if nz > 1e-3:
@@ -84,7 +84,7 @@ def submerged(pose, hull, counters):
 
 @kernel
 def sliced(pose, hull):
-    """(V, Qx, Qy, Qz) by circular slices normal to the axis, any attitude and draft."""
+    """Return the submerged (V, Qx, Qy, Qz) by circular slices normal to the axis, any attitude and draft."""
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     horizontal = sqrt(nx * nx + ny * ny)
     volume = 0.0
@@ -94,8 +94,8 @@ def sliced(pose, hull):
         z0, z1 = hull.z[i], hull.z[i + 1]
         a0, a1 = hull.section_radius[i], hull.section_radius[i + 1]
         widest = max(a0, a1)
-        # heights at which a slice starts to leave the water and has left it; the pieces between
-        # them are smooth, so a Gauss rule on each converges fast
+        # heights between which the surface cuts slices; each piece is smooth, so that a Gauss rule
+        # converges fast
         if abs(nz) > 1e-12:
             mid = -pose.z / nz
             reach = widest * horizontal / abs(nz)
@@ -137,7 +137,7 @@ def sliced(pose, hull):
 
 @kernel
 def hydrostatic_load(pose, hull, counters):
-    """Buoyancy F = rho g V n, M = rho g Q x n with n the vertical in body axes."""
+    """Return the buoyancy F = rho g V n, M = rho g Q x n with n the vertical in body axes."""
     if hull is None:
         return NO_LOAD
     volume, qx, qy, qz = submerged(pose, hull, counters)

@@ -1,4 +1,4 @@
-"""Additional linear damping and yaw spring of the platform definition, theory.md 5.6."""
+"""Applies the additional linear damping and yaw spring of the platform definition, theory.md 5.6."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from fowt_env.plant.state import NO_LOAD, State, Wrench
 
 
 class LinearDamping(NamedTuple):
-    """Linear damping on the platform's own (body) velocity, and the delta lines' yaw spring."""
+    """Holds linear damping on the platform velocity (body axes), and the yaw spring of delta lines."""
 
     surge: float  # N s/m
     sway: float
@@ -19,7 +19,7 @@ class LinearDamping(NamedTuple):
 
 
 def build_damping(hydro):
-    """LinearDamping of a descriptions.platform.HydroCoefficients, or None where every coefficient is zero."""
+    """Return the LinearDamping of a descriptions.platform.HydroCoefficients; None if all are zero."""
     values = (*hydro.linear_damping, hydro.yaw_stiffness)
     if not any(values):
         return None
@@ -28,7 +28,7 @@ def build_damping(hydro):
 
 @kernel
 def damping_load(pose, x, damping):
-    """-diag(B) (v, w) and the yaw spring on the yaw angle, body components."""
+    """Return the damping load -diag(B) (v, w) with the yaw-spring moment, body components."""
     if damping is None:
         return NO_LOAD
     return Wrench(

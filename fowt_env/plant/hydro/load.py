@@ -1,4 +1,4 @@
-"""Water loads: buoyancy, waves, current and own motion on the hull, and the added mass of all of these."""
+"""Computes hydrodynamic loads: buoyancy, waves, current and motion of the hull, and the total added mass."""
 
 from typing import NamedTuple
 
@@ -21,14 +21,14 @@ from fowt_env.plant.state import NO_LOAD, Wrench, add
 
 
 class ExactStrips(NamedTuple):
-    """Strip loads by the plain sum over all wave components."""
+    """Computes strip loads by the plain sum over all wave components."""
 
     shape: Strips
     diffraction: object  # diffraction.StripDiffraction or None: 1 + C_A in every wave
 
 
 class BandedStrips(NamedTuple):
-    """The same by a few wave numbers at the nodes of a fixed quadrature."""
+    """Computes strip loads by a few wave numbers at the nodes of a fixed quadrature."""
 
     shape: Strips
     quadrature: object  # wave_bands.StripQuadrature
@@ -37,7 +37,7 @@ class BandedStrips(NamedTuple):
 
 
 class Hydro(NamedTuple):
-    """The floater in the water."""
+    """Holds the hydrodynamic parts of a floating platform."""
 
     hull: object  # hydrostatics.BuoyantHull or None
     strips: object  # ExactStrips, BandedStrips or None
@@ -53,10 +53,10 @@ class Hydro(NamedTuple):
 
 
 class HydroLoad(NamedTuple):
-    """Loads of the water but for the added mass times acceleration, body components about the body origin."""
+    """Holds hydrodynamic loads except added mass times acceleration, body components about body origin."""
 
     buoyancy: Wrench
-    # with those of members, of a linear body with its waves and memory, and of a constant added mass
+    # and members, potential-flow body with excitation and radiation memory, constant added mass
     strips: Wrench
     damping: Wrench
 
@@ -113,7 +113,7 @@ _elevation = chosen_by_class(
 
 @kernel
 def surface_at_origin(t, hydro, data):
-    """Surface elevation at the inertial origin, m."""
+    """Return the surface elevation at the inertial origin, m."""
     if hydro is None:
         return 0.0
     return _elevation(t, hydro.waves, hydro.strips, hydro.excitation, data)
@@ -121,7 +121,7 @@ def surface_at_origin(t, hydro, data):
 
 @kernel
 def water_at(t, X, Y, Z, hydro):
-    """(u, v, w, du, dv, dw), m/s and m/s2, of waves and current at an inertial point (m)."""
+    """Return (u, v, w, du, dv, dw), m/s and m/s2, of waves and current at an inertial point (m)."""
     if hydro is None:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return _water(t, X, Y, Z, hydro.waves, hydro.current, hydro.depth)
@@ -138,7 +138,7 @@ def _water(t, X, Y, Z, waves, current, depth):
 
 @inlined_kernel
 def hydro_load(t, pose, x, hydro, data):
-    """HydroLoad at a state; fills data.added_mass."""
+    """Return the HydroLoad at a state; fills data.added_mass."""
     if hydro is None:
         return NO_HYDRO_LOAD
     buoyancy = hydrostatic_load(pose, hydro.hull, data.counters)
@@ -155,7 +155,7 @@ def hydro_load(t, pose, x, hydro, data):
 
 @inlined_kernel
 def hydro_rates(x, hydro, dx):
-    """Put the rates of the water's internal states that have any into dx."""
+    """Fill dx with the rates of the hydrodynamic internal states, except radiation memory."""
     if hydro is None:
         return
     position_rates(x, hydro.excitation, dx)
@@ -163,7 +163,7 @@ def hydro_rates(x, hydro, dx):
 
 @kernel
 def fill_added_mass(strips, matrix):
-    """The symmetric (6, 6) added mass of a StripLoad, whose axis is the body's z."""
+    """Fill the symmetric (6, 6) added mass of a StripLoad, whose axis is the body's z."""
     for i in range(6):
         for j in range(6):
             matrix[i, j] = 0.0
@@ -176,7 +176,7 @@ def fill_added_mass(strips, matrix):
 
 @kernel
 def add_inertia(pose, load, inertia, matrix):
-    """The load with that of a constant added mass, which is added to the matrix; as it is without one."""
+    """Return load plus the constant added-mass load, and add its 6x6 to matrix; None: unchanged."""
     if inertia is None:
         return load
     for i in range(6):

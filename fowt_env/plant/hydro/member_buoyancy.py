@@ -1,7 +1,7 @@
-"""Buoyancy of straight cylinders and cones of any direction, up to still water (theory.md, 5.10).
+"""Computes the buoyancy of straight cylinders and cones of any direction, to still water (theory.md, 5.10).
 
-A member that is all under water, or all out of it, and a cylinder that the water cuts on its side alone have
-closed forms. Other cuts are circular slices across the axis, with a Gauss rule where they leave the water.
+A fully submerged or dry member, and a cylinder cut by the water on its side alone, have closed forms. Other
+cuts are integrated by circular slices across the axis, with a separate Gauss rule where the water cuts them.
 """
 
 from math import acos, pi, sqrt
@@ -20,7 +20,7 @@ N_BODY = 9
 
 
 class MemberBodies(NamedTuple):
-    """Members that have a buoyancy of their own."""
+    """Holds the members with individual buoyancy, outside any potential-flow body."""
 
     table: np.ndarray  # (n, N_BODY)
     specific_weight: float  # rho g, N/m3
@@ -29,7 +29,7 @@ class MemberBodies(NamedTuple):
 
 
 class Displaced(NamedTuple):
-    """Volume (m3) and its first moments (m4): along the axis from the start, and across it upwards."""
+    """Holds a displaced volume (m3) and its first moments (m4): along the axis from start, across upwards."""
 
     volume: float
     along: float
@@ -37,7 +37,7 @@ class Displaced(NamedTuple):
 
 
 def build_member_bodies(members, density, gravity):
-    """MemberBodies of the Member records that are not part of a potential-flow body; None without any."""
+    """Return the MemberBodies of the Member records outside a potential-flow body; None without any."""
     rows = []
     for member in members:
         if not member.potential_flow:
@@ -53,7 +53,7 @@ def build_member_bodies(members, density, gravity):
 
 @kernel
 def add_member_buoyancy(pose, load, members):
-    """The load with the buoyancy of Members; as it is without any."""
+    """Return load plus the buoyancy of Members; None: unchanged."""
     if members is None:
         return load
     return _add_buoyancy(pose, load, members.bodies)
@@ -61,7 +61,7 @@ def add_member_buoyancy(pose, load, members):
 
 @kernel
 def _add_buoyancy(pose, load, bodies):
-    """The load with the buoyancy F = rho g V n, M = rho g Q x n, n being the vertical in body axes."""
+    """Return load plus the buoyancy F = rho g V n, M = rho g Q x n, n being the vertical in body axes."""
     if bodies is None:
         return load
     volume, qx, qy, qz = displaced(pose, bodies)
@@ -79,7 +79,7 @@ def _add_buoyancy(pose, load, bodies):
 
 @kernel
 def displaced(pose, bodies):
-    """(V, Qx, Qy, Qz): volume below still water of all bodies and its first moment in body axes."""
+    """Return (V, Qx, Qy, Qz): volume below still water of all bodies and its first moment in body axes."""
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     volume = qx = qy = qz = 0.0
     for i in range(bodies.table.shape[0]):
@@ -93,18 +93,18 @@ def displaced(pose, bodies):
         qy += part.volume * row[1] + part.along * row[4]
         qz += part.volume * row[2] + part.along * row[5]
         if part.across != 0.0:  # in the direction across the axis that rises most
-            share = part.across / lean
-            qx += share * (nx - rise * row[3])
-            qy += share * (ny - rise * row[4])
-            qz += share * (nz - rise * row[5])
+            scale = part.across / lean
+            qx += scale * (nx - rise * row[3])
+            qy += scale * (ny - rise * row[4])
+            qz += scale * (nz - rise * row[5])
     return volume, qx, qy, qz
 
 
 @kernel
 def wet_cone(height, rise, lean, length, a, b, bodies):
-    """Displaced of a cone below still water, of radius a at its start and b at its end.
+    """Return the Displaced volume of a cone below still water, of radius a at its start and b at its end.
 
-    height: of its start above still water, m; rise, lean: vertical and horizontal part of its axis.
+    height: of the start above still water, m; rise, lean: vertical and horizontal part of the axis.
     """
     top = height + rise * length
     if height + lean * a <= 0.0 and top + lean * b <= 0.0:
@@ -129,9 +129,9 @@ def wet_cone(height, rise, lean, length, a, b, bodies):
 
 @kernel
 def _sliced(height, rise, lean, length, a, b, bodies):
-    """The same by circular slices across the axis."""
+    """Return the Displaced volume of wet_cone by circular slices across the axis."""
     slope = (b - a) / length
-    # where the lowest and the highest point of a slice meet the water: between them slices are cut
+    # positions where the lowest and the highest point of a slice meet the water: slices between are cut
     first = _crossing(height - lean * a, rise - lean * slope, length)
     second = _crossing(height + lean * a, rise + lean * slope, length)
     low, high = min(first, second), max(first, second)
@@ -164,7 +164,7 @@ def _sliced(height, rise, lean, length, a, b, bodies):
 
 @kernel
 def _crossing(value, slope, length):
-    """Where value + slope s is zero, held within 0 and length."""
+    """Return the position s on the axis where value + slope s is zero, limited to [0, length]."""
     if slope == 0.0:
         return 0.0
     return min(max(-value / slope, 0.0), length)

@@ -1,9 +1,9 @@
-"""Strip (Morison) loads on straight cylinders of any place, direction and taper (theory.md, 5.10).
+"""Computes strip (Morison) loads on straight cylinders of any position, direction, taper (theory.md, 5.10).
 
-A member has cells of two Gauss points along its wet part and a node at each end. Every node has an axis, what
-acts across it and what acts along it, so that one loop makes the load of all members. Where members stand
-still and end at still water, the nodes and their added mass are always the same, and the water's motion there
-can come from a table (member_series.py); else the nodes are laid anew at each evaluation.
+A member has cells of two Gauss points along its wet part and a node at each end. Every node has an axis, with
+coefficients across and along the axis, so that one loop computes the load of all members. With the
+undisplaced position and the still-water surface, nodes and added mass are constant, and the water motion can
+come from a table (member_series.py); else the nodes are placed at each evaluation.
 """
 
 from math import pi, sqrt
@@ -19,16 +19,14 @@ from fowt_env.plant.hydro.strips import GAUSS_OFFSET
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
 from fowt_env.plant.state import N_RIGID, Wrench, add, pose_of, to_body, to_inertial
 
-CELLS_PER_SIZE = (
-    20  # of the longest side of the box around all members: 3e-4 of the first harmonic at T = 5 s
-)
-CUT_ROUNDS = 12  # for the place where an axis meets the waves
+CELLS_PER_SIZE = 20  # of the longest side of the box around all members: 3e-4 of the first harmonic, T = 5 s
+CUT_ROUNDS = 12  # iterations for the intersection of an axis with the waves
 CUT_TOLERANCE = 1e-10  # m
 
-# columns of nodes: place and axis in body axes, what acts across the axis, what acts along it
+# columns of nodes: position and axis in body axes, coefficients across the axis, coefficients along the axis
 X, Y, Z, AX, AY, AZ = range(6)
-DRAG, ADDED, FROUDE = range(6, 9)  # N/(m/s)^2; kg of the body's acceleration; kg of the water's
-AXIAL_DRAG, AXIAL_ADDED, AREA = range(9, 12)  # the same of an end; m2 of pressure pushing along the axis
+DRAG, ADDED, FROUDE = range(6, 9)  # N/(m/s)^2; kg of body acceleration; kg of water acceleration
+AXIAL_DRAG, AXIAL_ADDED, AREA = range(9, 12)  # the same of an end; m2 of pressure along the axis
 N_NODE = 12
 
 # columns of the members: start, axis, length; diameters and coefficients at start and end; the two ends
@@ -39,32 +37,32 @@ N_MEMBER = 21
 
 
 class Members(NamedTuple):
-    """All members of a hull."""
+    """Holds all members of a hull."""
 
-    nodes: np.ndarray  # (n, N_NODE) of the undisplaced platform in still water, those with a load alone
+    nodes: np.ndarray  # (n, N_NODE) with a load, of the undisplaced platform in still water
     added_mass: np.ndarray  # (6, 6) of these nodes about the body origin
     table: np.ndarray  # (m, N_MEMBER)
     cells: np.ndarray  # (m,) int64
-    bodies: object  # member_buoyancy.MemberBodies or None: all are part of a potential-flow body
+    bodies: object  # member_buoyancy.MemberBodies or None: all belong to a potential-flow body
     series: WaterSeries  # of these nodes; without rows where the waves are summed
     density: float
     depth: float
-    inertial: bool  # whether any node has more than drag
+    inertial: bool  # whether any node has other loads than drag
     instantaneous_position: bool
     instantaneous_surface: bool
     wheeler: bool
 
     @property
     def scratch_nodes(self):
-        """How many nodes are laid at each evaluation; 0 where they are always the same."""
+        """Return the number of nodes that are placed at each evaluation; 0 for constant nodes."""
         moving = self.instantaneous_position or self.instantaneous_surface
         return int(np.sum(2 * self.cells + 2)) if moving else 0
 
 
 def build_members(members, *, density, gravity, depth, position, surface, stretching, cell=None):
-    """Members from descriptions.platform.Member records with the three kinematics switches; None without any.
+    """Return the Members of descriptions.platform.Member records with kinematics options; None without any.
 
-    cell: longest cell, m; None: a fraction of the size of the whole. The series has no rows yet.
+    cell: longest cell, m; None: a fraction of the overall size. The series has no rows yet.
     """
     if not members:
         return None
@@ -105,23 +103,23 @@ def build_members(members, *, density, gravity, depth, position, surface, stretc
 
 
 def _member_row(member, density):
-    """Row of the table of a Member."""
+    """Return the table row of a Member."""
     start, end = np.array(member.start), np.array(member.end)
     length = float(np.linalg.norm(end - start))
-    own = 0.0 if member.potential_flow else 1.0  # the potential-flow body has inertia and pressure already
+    factor = 0.0 if member.potential_flow else 1.0  # a potential-flow body already has inertia and pressure
     radius = 0.5 * np.array(member.diameter)
     area, half_sphere = pi * radius**2, 2.0 / 3.0 * pi * radius**3
     ends = np.column_stack(
         [
             0.5 * density * area * member.axial_drag_coefficient,
-            own * density * half_sphere * member.axial_added_mass_coefficient,
-            own * area * member.axial_pressure_coefficient * [1.0, -1.0],
+            factor * density * half_sphere * member.axial_added_mass_coefficient,
+            factor * area * member.axial_pressure_coefficient * [1.0, -1.0],
         ]
     )
     return np.concatenate(
         [
             start, (end - start) / length, [length], member.diameter, member.drag_coefficient,
-            own * np.array(member.added_mass_coefficient), own * np.array(member.pressure_coefficient),
+            factor * np.array(member.added_mass_coefficient), factor * np.array(member.pressure_coefficient),
             ends.ravel(),
         ]
     )  # fmt: skip
@@ -129,15 +127,15 @@ def _member_row(member, density):
 
 @kernel
 def axis_point(pose, m, along, members):
-    """Inertial place, m, of a point of a member's axis this far from its start."""
+    """Return the inertial position, m, of a point of a member's axis; along: distance from its start, m."""
     row = members.table[m]
     x, y, z = row[0] + along * row[3], row[1] + along * row[4], row[2] + along * row[5]
-    return _place(pose, x, y, z, members.instantaneous_position)
+    return _position(pose, x, y, z, members.instantaneous_position)
 
 
 @kernel
-def _place(pose, x, y, z, moved):
-    """Inertial place of a body-fixed point, of the platform where it is or undisplaced."""
+def _position(pose, x, y, z, moved):
+    """Return the inertial position of a body-fixed point; moved: of the displaced platform."""
     if not moved:
         return x, y, z
     dx, dy, dz = to_inertial(pose, x, y, z)
@@ -146,7 +144,7 @@ def _place(pose, x, y, z, moved):
 
 @kernel
 def _above(t, pose, m, along, members, waves):
-    """Height of a point of a member's axis above the water, m."""
+    """Return the height of a point of a member's axis above the water, m."""
     x, y, z = axis_point(pose, m, along, members)
     if members.instantaneous_surface:
         return z - elevation(t, x, y, waves)
@@ -155,7 +153,7 @@ def _above(t, pose, m, along, members, waves):
 
 @kernel
 def wet_part(t, pose, m, members, waves):
-    """(from, to): the part of a member's axis under water, m from its start; equal where it is dry."""
+    """Return (from, to) of the wet part of a member's axis, m from its start; equal for a dry member."""
     low, high = 0.0, members.table[m, LENGTH]
     above_low = _above(t, pose, m, low, members, waves)
     above_high = _above(t, pose, m, high, members, waves)
@@ -165,7 +163,7 @@ def wet_part(t, pose, m, members, waves):
         return 0.0, 0.0
     start_wet = above_low <= 0.0
     cut, last, side = 0.0, -1.0, 0
-    for _ in range(CUT_ROUNDS):  # false position, halving the end that stays (the Illinois method)
+    for _ in range(CUT_ROUNDS):  # false position, halving the value at a retained end (the Illinois method)
         cut = (low * above_high - high * above_low) / (above_high - above_low)
         if abs(cut - last) < CUT_TOLERANCE:
             break
@@ -184,7 +182,7 @@ def wet_part(t, pose, m, members, waves):
 
 @kernel
 def lay_nodes(t, pose, members, waves, nodes):
-    """Fill nodes (n, N_NODE) of all members on their wet parts."""
+    """Place the nodes (n, N_NODE) of all members on their wet parts."""
     n = 0
     for m in range(members.table.shape[0]):
         row = members.table[m]
@@ -201,30 +199,30 @@ def lay_nodes(t, pose, members, waves, nodes):
 
 
 @kernel
-def _put_place(row, along, node):
-    """Fill place and axis of a node."""
+def _fill_position(row, along, node):
+    """Fill position and axis of a node."""
     for i in range(3):
         node[X + i] = row[START + i] + along * row[AXIS + i]
         node[AX + i] = row[AXIS + i]
 
 
 @kernel
-def _linear(row, column, share):
-    """What is given at start and end, this share of the way from one to the other."""
-    return row[column] + share * (row[column + 1] - row[column])
+def _linear(row, column, fraction):
+    """Return the linear interpolation between the values at start and end of a member, at this fraction."""
+    return row[column] + fraction * (row[column + 1] - row[column])
 
 
 @kernel
 def _side_node(row, along, weight, density, node):
-    """Fill the node of a cell's Gauss point, weight (m) of the member."""
+    """Fill the node of a cell's Gauss point; weight: member length, m, of the node."""
     per_length = 1.0 / row[LENGTH] if row[LENGTH] > 0.0 else 0.0
-    share = along * per_length
-    diameter = _linear(row, DIAMETER, share)
+    fraction = along * per_length
+    diameter = _linear(row, DIAMETER, fraction)
     slope = (row[DIAMETER + 1] - row[DIAMETER]) * per_length
     mass = weight * density * 0.25 * pi * diameter * diameter
-    added, pressure = _linear(row, C_ADDED, share), _linear(row, C_PRESSURE, share)
-    _put_place(row, along, node)
-    node[DRAG] = weight * 0.5 * density * _linear(row, C_DRAG, share) * diameter
+    added, pressure = _linear(row, C_ADDED, fraction), _linear(row, C_PRESSURE, fraction)
+    _fill_position(row, along, node)
+    node[DRAG] = weight * 0.5 * density * _linear(row, C_DRAG, fraction) * diameter
     node[ADDED] = mass * added
     node[FROUDE] = mass * (added + pressure)
     node[AXIAL_DRAG] = node[AXIAL_ADDED] = 0.0
@@ -233,8 +231,8 @@ def _side_node(row, along, weight, density, node):
 
 @kernel
 def _end_node(row, end, wet, node):
-    """Fill the node of a member's start (0) or end (1)."""
-    _put_place(row, end * row[LENGTH], node)
+    """Fill the node at a member's start (0) or end (1)."""
+    _fill_position(row, end * row[LENGTH], node)
     node[DRAG] = node[ADDED] = node[FROUDE] = 0.0
     for i in range(3):
         node[AXIAL_DRAG + i] = row[AXIAL + 3 * end + i] if wet else 0.0
@@ -249,10 +247,10 @@ def add_node_mass(node, added):
     x, y, z = node[X], node[Y], node[Z]
     for i in range(3):
         # column i of the node's mass across / (I - a a') + along a a', and its moment about the origin
-        share = (along - across) * node[AX + i]
-        px = share * node[AX] + (across if i == 0 else 0.0)
-        py = share * node[AY] + (across if i == 1 else 0.0)
-        pz = share * node[AZ] + (across if i == 2 else 0.0)
+        scale = (along - across) * node[AX + i]
+        px = scale * node[AX] + (across if i == 0 else 0.0)
+        py = scale * node[AY] + (across if i == 1 else 0.0)
+        pz = scale * node[AZ] + (across if i == 2 else 0.0)
         kx, ky, kz = y * pz - z * py, z * px - x * pz, x * py - y * px
         added[0, i] += px
         added[1, i] += py
@@ -263,7 +261,7 @@ def add_node_mass(node, added):
         added[i, 3] += kx
         added[i, 4] += ky
         added[i, 5] += kz
-    # the moments by turning: -[r] m [r] with m = across I + (along - across) a a'
+    # moments by rotation: -[r] m [r] with m = across I + (along - across) a a'
     bx, by, bz = y * node[AZ] - z * node[AY], z * node[AX] - x * node[AZ], x * node[AY] - y * node[AX]
     extra = along - across
     square = x * x + y * y + z * z
@@ -283,9 +281,9 @@ def add_node_mass(node, added):
 
 @inlined_kernel
 def add_member_loads(t, pose, load, members, waves, current, data):
-    """The load with that of Members but for added mass times acceleration, which goes to data.added_mass.
+    """Return load plus that of Members except added mass times acceleration; add to data.added_mass.
 
-    As it is without members. Fills data.member_nodes and data.member_water, its scratch.
+    members None: unchanged. data.member_nodes and data.member_water are scratch.
     """
     if members is None:
         return load
@@ -297,7 +295,7 @@ def add_member_loads(t, pose, load, members, waves, current, data):
 
 @kernel
 def _load_of(t, pose, nodes, moving, members, waves, current, data):
-    """Wrench of these nodes; adds their mass."""
+    """Return the Wrench of these nodes; add their added mass."""
     if members.inertial and moving:
         for i in range(nodes.shape[0]):
             add_node_mass(nodes[i], data.added_mass)
@@ -311,7 +309,7 @@ def _load_of(t, pose, nodes, moving, members, waves, current, data):
 
 @kernel
 def fill_water(t, pose, nodes, members, waves, water):
-    """Fill water (n * channels,) with the waves' motion at the nodes; channels are the first of N_WATER."""
+    """Fill water (n * channels,) with the wave motion at the nodes; channels: the first ones of N_WATER."""
     if waves is None:
         return
     if members.series.values.shape[0] > 0:
@@ -319,7 +317,7 @@ def fill_water(t, pose, nodes, members, waves, water):
         return
     channels = N_WATER if members.inertial else VELOCITIES
     for i in range(nodes.shape[0]):
-        x, y, z = _place(pose, nodes[i, X], nodes[i, Y], nodes[i, Z], members.instantaneous_position)
+        x, y, z = _position(pose, nodes[i, X], nodes[i, Y], nodes[i, Z], members.instantaneous_position)
         if members.wheeler:
             eta = elevation(t, x, y, waves)
             z = members.depth * (z - eta) / (members.depth + eta)
@@ -333,7 +331,7 @@ def fill_water(t, pose, nodes, members, waves, water):
 
 @kernel
 def node_loads(pose, nodes, members, waves, current, water):
-    """Wrench of the nodes in this water: drag, inertia, pressure and the terms of the turning velocity."""
+    """Return the Wrench of the nodes: drag, inertia, pressure, and inertia terms of the angular velocity."""
     channels = N_WATER if members.inertial else VELOCITIES
     fx = fy = fz = mx = my = mz = 0.0
     for i in range(nodes.shape[0]):
@@ -358,7 +356,7 @@ def node_loads(pose, nodes, members, waves, current, water):
         axial = nodes[i, AXIAL_DRAG] * abs(along) * along
         px, py, pz = across * rx, across * ry, across * rz
         if members.inertial:
-            # acceleration of the section by the turning velocity alone; the rest is on the left-hand side
+            # acceleration of the section by its angular velocity; the rest is on the left-hand side
             cx = pose.wy * sz - pose.wz * sy
             cy = pose.wz * sx - pose.wx * sz
             cz = pose.wx * sy - pose.wy * sx

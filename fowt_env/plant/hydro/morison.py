@@ -1,8 +1,8 @@
-"""Strip (Morison) loads of waves, current and own motion on the hull, theory.md Eqs (16)-(17).
+"""Computes strip (Morison) loads of waves, current and motion of the hull, theory.md Eqs (16)-(17).
 
 Nodes lie in equal cells of two Gauss points per hull section. Along the axis the complex amplitude
-of a component is exp(kappa z), so it is carried from node to node by multiplication instead of an
-exponential, sine and cosine each; tests compare this with the plain sum (tests/naive).
+of a component is exp(kappa z), so one multiplication per node replaces exponential, sine and cosine;
+tests compare this with the plain sum (tests/naive).
 """
 
 from math import hypot, pi
@@ -16,7 +16,7 @@ from fowt_env.plant.state import NO_LOAD, Wrench
 
 
 class Current(NamedTuple):
-    """Steady current: velocity at the surface and power-law decay to the seabed (exponent 0: uniform)."""
+    """Holds a steady current: surface velocity, power-law decay to the seabed (exponent 0: uniform)."""
 
     u: float
     v: float
@@ -24,7 +24,7 @@ class Current(NamedTuple):
 
 
 class StripLoad(NamedTuple):
-    """Hydrodynamic wrench without the added-mass part, and that part's integrals S_k (kg m^k), A33."""
+    """Holds a hydrodynamic wrench without added mass, and the added-mass integrals S_k (kg m^k), A33."""
 
     wrench: Wrench
     s0: float
@@ -38,7 +38,7 @@ NO_STRIP_LOAD = StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)
 
 @kernel
 def current_at(z, depth, current):
-    """(u, v) of the current at inertial height z."""
+    """Return the (u, v) of the current at inertial height z."""
     if current is None:
         return 0.0, 0.0
     fraction = min(max((depth + z) / depth, 0.0), 1.0) ** current.exponent
@@ -47,9 +47,9 @@ def current_at(z, depth, current):
 
 @kernel
 def morison_load(t, pose, strips, waves, current, kin, diffraction=None):
-    """Strip load from the keel to the surface, Eqs (16)-(17), with the axial terms of theory.md 5.4.
+    """Return the StripLoad from keel to surface, Eqs (16)-(17), with the axial terms of theory.md 5.4.
 
-    kin: (7, n_nodes) scratch. diffraction: StripDiffraction or None, which leaves 1 + C_A.
+    kin: (7, n_nodes) scratch. diffraction: StripDiffraction, or None for the coefficient 1 + C_A.
     The section-acceleration term is returned as S_k for the left-hand side.
     """
     if strips is None:

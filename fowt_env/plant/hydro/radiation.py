@@ -1,10 +1,10 @@
-"""Radiation memory of a floating body: the waves that it made act on it later (theory.md, 5.8).
+"""Computes the radiation memory of a floating body: the load by waves of its past motion (theory.md, 5.8).
 
     F(t) = -integral of K(tau) q'(t - tau), tau from 0 to infinity
 
 about the body origin and in inertial axes, q' being R v and R w. Two forms: a sum of exponentials, with
-states that are advanced exactly while the velocities are linear over a step; and the integral itself by the
-trapezoid rule. The states are the last of the state vector and have no rates: integrators call what is here.
+states that are advanced exactly for velocities linear over a step; and the integral itself by the trapezoid
+rule. The states are the last of the state vector and have no rates: integrators call functions of this file.
 """
 
 from cmath import exp as complex_exp
@@ -21,47 +21,47 @@ MOTIONS = 6
 
 
 class StateSpaceMemory(NamedTuple):
-    """K(s) = sum over poles of r / (s - p), with the conjugate of each; one set of poles per motion.
+    """Holds K(s) = sum over poles of r / (s - p), with the conjugate of each; one set of poles per motion.
 
-    The states of motion j begin at first + 2 begin[j]: the real parts of its poles' states, then the
-    imaginary ones.
+    The states of motion j begin at first + 2 begin[j]: real parts of the states of all poles, then
+    imaginary parts.
     """
 
     first: int  # of the memory's states in the state vector
-    begin: np.ndarray  # (7,) first pole of each motion, and their number
+    begin: np.ndarray  # (7,) first pole of each motion, and the number of poles
     pole: np.ndarray  # (2, n) real and imaginary part, 1/s
-    row: np.ndarray  # (7,) first entry of K of each force, and their number
-    column: np.ndarray  # (e,) motion whose velocity it takes
+    row: np.ndarray  # (7,) first entry of K of each force, and the number of entries
+    column: np.ndarray  # (e,) motion of the velocity of each entry
     weight: np.ndarray  # (e, 2 m) 2 Re r and -2 Im r, in the order of the states of the column
 
 
 class ConvolutionMemory(NamedTuple):
-    """K at the instants of a step, times the weights of the trapezoid rule."""
+    """Holds K at multiples of the step, times the weights of the trapezoid rule."""
 
     dt: float  # s, of the step
     now: np.ndarray  # (6, 6) K(0)
     row: np.ndarray  # (e,) motion of the force of each entry of K
-    column: np.ndarray  # (e,) motion whose velocity it takes
-    half: np.ndarray  # (e, n) what the force half a step on takes of past velocities, latest first
-    whole: np.ndarray  # (e, n) the same a step on
+    column: np.ndarray  # (e,) motion of the velocity of each entry
+    half: np.ndarray  # (e, n) weights of past velocities in the force half a step later, latest first
+    whole: np.ndarray  # (e, n) the same a step later
 
 
-# Rows of the data of StateSpaceMemory: factor of the state, and of the velocities at the ends of the step,
+# Rows of the data of StateSpaceMemory: factors of the state, and of the velocities at both ends of the step,
 # real and imaginary, over a whole and over half a step; then the step and the velocities at its beginning.
 WHOLE, HALF, STEP = 0, 6, 12
-# Entries of the last row of the data of ConvolutionMemory, whose others are past velocities: where the latest
-# is, the weight of the present velocity and what is behind it (6): now, half a step on and a step on.
-PLACE, WEIGHT, TAIL, TAIL_HALF, TAIL_WHOLE, N_HEAD = 0, 1, 2, 8, 14, 20
+# Entries of the last row of the data of ConvolutionMemory; the other rows are past velocities: index of the
+# latest, weight of the current velocity, sums over past velocities (6): now, half a step and a step later.
+LATEST, WEIGHT, TAIL, TAIL_HALF, TAIL_WHOLE, N_HEAD = 0, 1, 2, 8, 14, 20
 
 
 def memory_states(hydro):
-    """Number of states of the memory of a Hydro part or None."""
+    """Return the number of states of the radiation memory of a Hydro part or None."""
     memory = None if hydro is None else hydro.radiation
     return 2 * memory.pole.shape[1] if isinstance(memory, StateSpaceMemory) else 0
 
 
 def memory_data(hydro):
-    """Fresh scratch array of a run for the memory of a Hydro part or None."""
+    """Return a new data array of a run for the radiation memory of a Hydro part or None."""
     memory = None if hydro is None else hydro.radiation
     if isinstance(memory, StateSpaceMemory):
         return np.zeros((STEP + 1, max(memory.pole.shape[1], MOTIONS + 1)))
@@ -71,7 +71,7 @@ def memory_data(hydro):
 
 
 def whole_groups(count, lanes):
-    """The least multiple of lanes that is not below a count."""
+    """Return the smallest multiple of lanes that is not below a count."""
     return -(-count // lanes) * lanes
 
 
@@ -102,7 +102,7 @@ _force = chosen_by_class("memory", {StateSpaceMemory: _state_force, ConvolutionM
 
 @kernel
 def add_radiation(pose, x, load, memory, data):
-    """The load with that of the memory, body components about the body origin; as it is without one."""
+    """Return load plus the radiation load, body components about the body origin; memory None: unchanged."""
     if memory is None:
         return load
     u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
@@ -119,7 +119,7 @@ def add_radiation(pose, x, load, memory, data):
 
 @kernel
 def _factors(p, dt, data, k, first):
-    """Put e^h and the weights of both velocities over dt into column k of data, from row `first` on.
+    """Fill column k of data, from row `first` on, with e^h and the weights of both velocities over dt.
 
     h = p dt; over a step in which the velocity is linear, z is e^h z + dt (f1 - f2) v0 + dt f2 v1 with
     f1 = (e^h - 1)/h and f2 = (e^h - 1 - h)/h^2, by their series where h is small.
@@ -145,7 +145,7 @@ def _factors(p, dt, data, k, first):
 
 @kernel
 def _put_velocity(x, plane, row):
-    """The inertial velocities of a state into row[1:7]."""
+    """Fill row[1:7] with the inertial velocities of a state."""
     pose = pose_in(x, plane)
     row[1], row[2], row[3] = to_inertial(pose, pose.vx, pose.vy, pose.vz)
     row[4], row[5], row[6] = to_inertial(pose, pose.wx, pose.wy, pose.wz)
@@ -153,7 +153,7 @@ def _put_velocity(x, plane, row):
 
 @kernel
 def _advance_states(x, y, first, plane, memory, data):
-    """The memory's states of y from those of x, over the step whose factors begin at row `first`."""
+    """Fill y with the memory's states, from those of x, over the step whose factors begin at row `first`."""
     pose = pose_in(y, plane)
     u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
     w = to_inertial(pose, pose.wx, pose.wy, pose.wz)
@@ -195,28 +195,28 @@ def _end_states(x, plane, memory, data):
 
 @kernel
 def _begin_past(x, dt, halves, plane, memory, data):
-    """Keep the velocities of x, and sum what is behind the present ones half a step and a step on."""
+    """Store the velocities of x, and sum over past velocities for the force half a step and a step later."""
     if abs(memory.dt - dt) > 1e-9 * dt:
-        raise ValueError("the convolution of radiation is of another time step: use Scene.with_step")
+        raise ValueError("the radiation convolution is for another time step: use Scene.with_step")
     head, size = data[MOTIONS], memory.whole.shape[1]
     pose = pose_in(x, plane)
     u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
     w = to_inertial(pose, pose.wx, pose.wy, pose.wz)
-    # the latest is in front, and all are there twice, so that they lie in one piece wherever that is
-    place = int(head[PLACE]) - 1
-    if place < 0:
-        place = size - 1
-    share = 0.5 if head[WEIGHT] == 0.0 else 1.0  # the trapezoid rule's, of the first of all
+    # ring buffer, latest first, stored twice, so that all velocities are contiguous from any index
+    index = int(head[LATEST]) - 1
+    if index < 0:
+        index = size - 1
+    weight = 0.5 if head[WEIGHT] == 0.0 else 1.0  # of the trapezoid rule, for the first velocity of a run
     for j in range(MOTIONS):
-        value = share * (u[j] if j < 3 else w[j - 3])
-        data[j, place] = value
-        data[j, place + size] = value
-    head[PLACE] = place
+        value = weight * (u[j] if j < 3 else w[j - 3])
+        data[j, index] = value
+        data[j, index + size] = value
+    head[LATEST] = index
     for i in range(MOTIONS):
         head[TAIL_HALF + i] = 0.0
         head[TAIL_WHOLE + i] = 0.0
     for e in range(memory.row.shape[0]):
-        i, past = memory.row[e], data[memory.column[e], place:]
+        i, past = memory.row[e], data[memory.column[e], index:]
         if halves:
             head[TAIL_HALF + i] += lane_dot(memory.half[e], past, size)
         head[TAIL_WHOLE + i] += lane_dot(memory.whole[e], past, size)
@@ -236,7 +236,7 @@ def _end_past(x, plane, memory, data):
     _past_after(x, x, False, plane, memory, data)
 
 
-# ---------------------------------------------------------------- what integrators call
+# ---------------------------------------------------------------- interface of integrators
 
 
 @kernel
@@ -264,7 +264,7 @@ def _integrated_with(x, memory):
 
 @inlined_kernel
 def integrated_states(x, hydro):
-    """Number of states that an integrator advances by their rates: all but those of a memory."""
+    """Return the number of states that an integrator advances by their rates: all but radiation states."""
     if hydro is None:
         return x.shape[0]
     return _integrated_with(x, hydro.radiation)
@@ -279,7 +279,7 @@ def _begin_with(x, dt, halves, plane, memory, data):
 
 @inlined_kernel
 def begin_memory(x, dt, halves, plane, hydro, data):
-    """Begin a step of dt from x; halves: whether memory_after is to be asked half a step on."""
+    """Begin a radiation-memory step of dt from x; halves: whether memory_after is called at half a step."""
     if hydro is None:
         return
     _begin_with(x, dt, halves, plane, hydro.radiation, data)
@@ -294,7 +294,7 @@ def _after_with(x, y, half, plane, memory, data):
 
 @inlined_kernel
 def memory_after(x, y, half, plane, hydro, data):
-    """Put the memory a step (half: half a step) after that of x into y, whose velocities are of then."""
+    """Fill y, of known velocities, with the radiation memory a step (half: half a step) after x."""
     if hydro is None:
         return
     _after_with(x, y, half, plane, hydro.radiation, data)
@@ -309,7 +309,7 @@ def _end_with(x, plane, memory, data):
 
 @inlined_kernel
 def end_memory(x, plane, hydro, data):
-    """End a step: x has its state but for the memory, which is still that of its beginning."""
+    """Advance the radiation memory of x to the end of a step; all other states of x are already there."""
     if hydro is None:
         return
     _end_with(x, plane, hydro.radiation, data)
@@ -317,7 +317,7 @@ def end_memory(x, plane, hydro, data):
 
 @kernel
 def forget_memory(data):
-    """Drop past velocities and what was computed of them: the state was changed from outside."""
+    """Clear past velocities and their sums: the state was changed from outside."""
     for i in range(data.shape[0]):
         for k in range(data.shape[1]):
             data[i, k] = 0.0

@@ -1,7 +1,7 @@
-"""Water velocity, acceleration and dynamic pressure at the strips' nodes: the sum over all wave components.
+"""Computes water velocity, acceleration and pressure at the strip nodes: the sum over all wave components.
 
-Along the axis a component is exp(kappa z), kappa complex, carried from node to node by a multiplication. The
-seabed's reflection runs down the axis with the same phase, growing, as a magnitude and a direction.
+Along the axis a component is exp(kappa z), kappa complex, advanced from node to node by a multiplication. The
+seabed's reflection has the same phase and grows downwards, stored as magnitude and direction.
 """
 
 from math import cos, exp, sin
@@ -19,7 +19,7 @@ U, V, W, DU, DV, DW, P = range(7)
 
 
 class Axis(NamedTuple):
-    """The hull's axis in the waves: inertial origin, direction, and how heights are stretched (Wheeler)."""
+    """Holds the hull axis in the waves: inertial origin, direction, and Wheeler stretching of heights."""
 
     x: float
     y: float
@@ -31,7 +31,7 @@ class Axis(NamedTuple):
 
 
 class Component(NamedTuple):
-    """A wave component on the axis: exp(level + up z) at body height z, in the phase start + rate z."""
+    """Holds a wave component on the axis: exp(level + up z) at body height z, with phase start + rate z."""
 
     number: float  # k, 1/m
     omega: float  # rad/s
@@ -44,11 +44,11 @@ class Component(NamedTuple):
     level: float
     up: float  # 1/m
     mirror: float  # 2 k h: exp(-level - up z - mirror) is the seabed's reflection
-    reflected: bool  # whether that reaches the keel
+    reflected: bool  # whether the reflection reaches the keel
 
 
 class Phasor(NamedTuple):
-    """A component at one height: the incident wave, the magnitude of its reflection and their direction."""
+    """Holds a wave component at one height: incident wave, magnitude of its reflection, common direction."""
 
     re: float
     im: float
@@ -58,7 +58,7 @@ class Phasor(NamedTuple):
 
 
 class Step(NamedTuple):
-    """What carries a phasor one cell down: incident factor, growth of the reflection, turn."""
+    """Holds the change of a phasor over one cell down: incident factor, growth of reflection, rotation."""
 
     re: float
     im: float
@@ -69,7 +69,7 @@ class Step(NamedTuple):
 
 @inlined_kernel
 def axis_in_waves(pose, eta, strips, depth):
-    """Axis at a pose, or upright in its place of rest where the strips are held there."""
+    """Return the Axis at a pose, or upright at the origin where strips have the undisplaced position."""
     stretch, drop = 1.0, 0.0
     if strips.wheeler:
         stretch = depth / (depth + eta)
@@ -81,7 +81,7 @@ def axis_in_waves(pose, eta, strips, depth):
 
 @inlined_kernel
 def component_on_axis(t, j, axis, keel_z, waves):
-    """Component number j along the axis."""
+    """Return wave Component number j along the axis."""
     k, omega = waves.wave_number[j], waves.omega[j]
     cb, sb = waves.cos_heading[j], waves.sin_heading[j]
     return Component(
@@ -102,13 +102,13 @@ def component_on_axis(t, j, axis, keel_z, waves):
 
 @inlined_kernel
 def reflection_at(wave, z):
-    """Magnitude of the seabed's reflection at body height z; 0 where it is left out."""
+    """Return the magnitude of the seabed's reflection at body height z; 0 where it is neglected."""
     return exp(-wave.level - wave.up * z - wave.mirror) if wave.reflected else 0.0
 
 
 @inlined_kernel
 def phasor_at(wave, z):
-    """Phasor at body height z."""
+    """Return the Phasor of a component at body height z."""
     m = exp(wave.level + wave.up * z)
     c, s = cos(wave.start + wave.rate * z), sin(wave.start + wave.rate * z)
     return Phasor(m * c, m * s, reflection_at(wave, z), c, s)
@@ -116,7 +116,7 @@ def phasor_at(wave, z):
 
 @inlined_kernel
 def second_point(wave, first, gap):
-    """Phasor of a cell's second Gauss point, a gap (m) below the first."""
+    """Return the Phasor of a cell's second Gauss point, a gap (m) below the first."""
     m = exp(-wave.up * gap)
     c, s = cos(wave.rate * gap), -sin(wave.rate * gap)
     reflection = first.reflection * exp(wave.up * gap) if wave.reflected else 0.0
@@ -128,7 +128,7 @@ def second_point(wave, first, gap):
 
 @inlined_kernel
 def cell_step(wave, height):
-    """Step from a cell to the next, of a height (m)."""
+    """Return the phasor Step from a cell to the next, for a cell height (m)."""
     m = exp(-wave.up * height)
     c, s = cos(wave.rate * height), -sin(wave.rate * height)
     return Step(m * c, m * s, exp(wave.up * height) if wave.reflected else 0.0, c, s)
@@ -136,7 +136,7 @@ def cell_step(wave, height):
 
 @inlined_kernel
 def carried(point, step, reflected):
-    """The phasor one cell further down."""
+    """Return the Phasor one cell further down."""
     re, im = point.re * step.re - point.im * step.im, point.re * step.im + point.im * step.re
     if not reflected:
         return Phasor(re, im, 0.0, point.c, point.s)
@@ -148,7 +148,7 @@ def carried(point, step, reflected):
 
 @inlined_kernel
 def factor_of(diffraction, j, section):
-    """Complex factor (real, imaginary) of a component's acceleration at a section, where it is one; or 1."""
+    """Return the diffraction factor (real, imaginary) of a component at a section without taper, or 1."""
     if diffraction is None:
         return 1.0, 0.0
     return factor_at(diffraction.series[j, section], 0.0)
@@ -156,7 +156,7 @@ def factor_of(diffraction, j, section):
 
 @inlined_kernel
 def diffracted(even, odd, even_s, odd_c, diffraction, factor, tapered, j, section, z):
-    """(sine part of the even motion, cosine part of the odd one) of the acceleration: scaled and turned."""
+    """Return (sine part of even motion, cosine part of odd motion) of the diffracted acceleration."""
     if diffraction is None:
         return even_s, odd_c
     gr, gi = factor
@@ -167,7 +167,7 @@ def diffracted(even, odd, even_s, odd_c, diffraction, factor, tapered, j, sectio
 
 @inlined_kernel
 def add_node(kin, node, wave, point, diffraction, factor, tapered, j, section, z):
-    """Add a component at a node: the incident wave with (even) and less (odd) its reflection."""
+    """Add a component to a node's kinematics: incident wave plus (even) and minus (odd) its reflection."""
     fr, fi = point.reflection * point.c, point.reflection * point.s
     even_c, even_s = wave.velocity * (point.re + fr), wave.velocity * (point.im + fi)
     odd_c, odd_s = wave.velocity * (point.re - fr), wave.velocity * (point.im - fi)
@@ -183,7 +183,7 @@ def add_node(kin, node, wave, point, diffraction, factor, tapered, j, section, z
 
 @inlined_kernel
 def add_section(kin, wave, section, z_surf, strips, diffraction, j):
-    """Add a component at a section's nodes, downwards; False once nothing of it is left."""
+    """Add a component at a section's nodes, downwards. Returns False once the component has decayed."""
     top, height = wet_cell(section, z_surf, strips)
     first = phasor_at(wave, top - GAUSS_OFFSET * height)
     second = second_point(wave, first, GAUSS_GAP * height)
@@ -205,7 +205,7 @@ def add_section(kin, wave, section, z_surf, strips, diffraction, j):
 
 @inlined_kernel
 def plus_keel(keel, wave, z):
-    """Kinematics at the keel (body height z) with a component added, which is not diffracted there."""
+    """Return the keel Kinematics (body height z) with a component added, without diffraction."""
     point = phasor_at(wave, z)
     m = exp(wave.level + wave.up * z)
     even, odd = wave.velocity * (m + point.reflection), wave.velocity * (m - point.reflection)
@@ -225,7 +225,7 @@ def strip_kinematics(t, pose, z_surf, eta, strips, waves, kin, diffraction=None)
     """Fill kin (7, n_nodes) with velocity, acceleration (inertial axes) and dynamic pressure at the nodes.
 
     z_surf, eta   from strips.axis_surface
-    diffraction   StripDiffraction or None; scales and turns the nodes' accelerations, not the keel's
+    diffraction   StripDiffraction or None; complex factors of the accelerations at the nodes, not the keel
     Returns the Kinematics at the keel.
     """
     kin[:] = 0.0

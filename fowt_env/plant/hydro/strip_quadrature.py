@@ -1,4 +1,4 @@
-"""Quadrature nodes of the hull for the strip loads of wave bands: side by side in blocks."""
+"""Defines the quadrature nodes of the hull for the strip loads of wave bands, grouped in blocks."""
 
 from math import log
 from typing import NamedTuple
@@ -7,27 +7,27 @@ import numpy as np
 
 from fowt_env.plant.compile.decorators import kernel
 
-BLOCK = 16  # nodes computed side by side; a hull with more of them takes several blocks
+BLOCK = 16  # nodes computed together; a hull with more nodes has several blocks
 SURFACE_NODES = 4  # Gauss nodes of the surface section
-# Gauss nodes of a section below: this + this * ln(depth ratio); 3 of the taper, 8 of the cylinder of OC3
+# Gauss nodes of a lower section: first + second * ln(depth ratio); 3 of the taper, 8 of the cylinder of OC3
 NODES_AT_LEAST, NODES_PER_LOG = -2, 4.2
-# in still water a node costs next to nothing, and a decay's drag may turn its sign along the hull
+# in still water a node costs next to nothing, and the drag of a decay test may change sign along the hull
 STILL_REFINEMENT = 2
 # rows of a block of StripQuadrature.table: the section's ends (body z), the node's fraction of the wet height
-# above the bottom, its weight's fraction of it, and its diameter D0 + D1 z
+# above the bottom, its weight as a fraction of that height, and its diameter D0 + D1 z
 BOTTOM, TOP, HEIGHT_FRACTION, WEIGHT_FRACTION, D0, D1, N_TABLE = range(7)
 # rows of a block of BandScratch.nodes
 Z, WEIGHT, AR, AI, BR, BI, U, W, DU, DW, P, CU, CV, N_ROWS = range(14)
 
 
 class StripQuadrature(NamedTuple):
-    """Quadrature nodes of the hull, BLOCK to a block; unused ones have no weight.
+    """Holds the quadrature nodes of the hull, BLOCK to a block; unused nodes have zero weight.
 
-    Few arrays on purpose: a call hands over seven words for each of them.
+    The arrays are few on purpose: a call passes seven words for each.
     """
 
-    table: np.ndarray  # (blocks, N_TABLE * BLOCK), rows BOTTOM to D1 (below) one after the other
-    keel: int  # node that holds the keel, without weight
+    table: np.ndarray  # (blocks, N_TABLE * BLOCK), rows BOTTOM to D1 (below) concatenated
+    keel: int  # node at the keel, of zero weight
     density: float
     added_mass_coefficient: float
     drag_coefficient: float
@@ -43,9 +43,9 @@ class StripQuadrature(NamedTuple):
 
 
 def build_quadrature(hull, strips, refinement=1):
-    """StripQuadrature of a descriptions.platform.Hull with the constants of its exact twin, a Strips part.
+    """Return the StripQuadrature of a descriptions.platform.Hull with the constants of its exact Strips.
 
-    refinement: times as many nodes below the surface section.
+    refinement: factor on the number of nodes below the surface section.
     """
     columns = []
     sections = list(zip(hull.z[:-1], hull.z[1:], hull.diameter[:-1], hull.diameter[1:], strict=True))[::-1]
@@ -85,13 +85,13 @@ def build_quadrature(hull, strips, refinement=1):
 
 
 def _gauss(n):
-    """Gauss-Legendre nodes and weights (n,) on [0, 1], from 0 on."""
+    """Return Gauss-Legendre nodes and weights (n,) on [0, 1], in ascending order."""
     x, w = np.polynomial.legendre.leggauss(n)
     return 0.5 * (1.0 + x), 0.5 * w
 
 
 def aligned(values):
-    """Copy of a float64 array that begins on a 64-byte boundary, where vector loads are fastest."""
+    """Return a copy of a float64 array aligned to 64 bytes, for the fastest vector loads."""
     values = np.asarray(values, dtype=np.float64)
     raw = np.empty(values.size + 8)
     start = (-raw.ctypes.data // 8) % 8
@@ -102,7 +102,7 @@ def aligned(values):
 
 @kernel
 def place_nodes(z_surf, table, node):
-    """Body z and weight of a block's nodes for the surface at z_surf; table: that of the block."""
+    """Fill body z and weight of a block's nodes for the surface at z_surf; table: of the block."""
     for n in range(BLOCK):
         bottom = table[BOTTOM * BLOCK + n]
         wet = min(max(z_surf, bottom), table[TOP * BLOCK + n]) - bottom

@@ -1,4 +1,4 @@
-"""The hull as strips: equal cells of two Gauss points per section, cut at the water surface on the axis."""
+"""Divides the hull into strips: equal cells of two Gauss points per section, cut at the water surface."""
 
 from math import pi, sqrt
 from typing import NamedTuple
@@ -8,24 +8,22 @@ import numpy as np
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.hydro.waves import elevation
 
-CELLS_PER_DRAFT = (
-    60  # at least, below the surface section (2 m of OC3): 1e-5 of the first harmonic at T = 5 s
-)
+CELLS_PER_DRAFT = 60  # minimum below the surface section (2 m of OC3): 1e-5 of the first harmonic at T = 5 s
 SURFACE_CELLS = 4  # cells between the last joint and the moving surface
-SURFACE_ROUNDS = 8  # fixed-point rounds for the surface on the axis; slope*tilt contracts by 10 or more
+SURFACE_ROUNDS = 8  # fixed-point iterations of the surface on the axis; slope*tilt contracts by 10 or more
 SURFACE_TOLERANCE = 1e-10  # m
 GAUSS_OFFSET = 0.5 * (1.0 - 1.0 / sqrt(3.0))  # first two-point Gauss node in a unit cell
 GAUSS_GAP = 1.0 / sqrt(3.0)
 
 
 class Strips(NamedTuple):
-    """Strip description of the hull. Sections run downwards from the surface one.
+    """Holds the strips of the hull. Sections run downwards from the surface section.
 
-    Each is cut at the water surface: nodes above it would meet the short waves of a linear sea where
-    their kinematics grow without bound.
+    Each section is cut at the water surface: above the surface the kinematics of the short waves of a
+    linear sea grow without bound.
     """
 
-    section_top: np.ndarray  # (m,) body z; the first is still water, in place of the hull's top
+    section_top: np.ndarray  # (m,) body z; the first is still water instead of the hull's top
     section_bottom: np.ndarray  # (m,)
     cells: np.ndarray  # (m,) int64
     first_node: np.ndarray  # (m,) int64
@@ -39,7 +37,7 @@ class Strips(NamedTuple):
     axial_drag_coefficient: float
     keel_z: float
     keel_area: float
-    top_z: float  # of the hull: the surface integral ends there
+    top_z: float  # of the hull: upper limit of the surface integral
     depth: float
     instantaneous_position: bool
     instantaneous_surface: bool
@@ -47,10 +45,10 @@ class Strips(NamedTuple):
 
 
 def build_strips(hull, hydro, *, density, depth, position, surface, stretching, cell=None):
-    """Strips from a Hull and HydroCoefficients (descriptions.platform) with the three kinematics switches.
+    """Return the Strips of a Hull and HydroCoefficients (descriptions.platform) with the kinematics options.
 
     cell: longest cell below the surface section, m; None: a fraction of the draft, so that models of any
-    scale are cut alike.
+    scale have the same division.
     """
     z = list(hull.z)
     if cell is None:
@@ -94,7 +92,7 @@ def build_strips(hull, hydro, *, density, depth, position, surface, stretching, 
 
 @kernel
 def axis_surface(t, pose, strips, waves):
-    """(z_surf, eta): body z where the axis meets the water surface, and the elevation there."""
+    """Return (z_surf, eta): body z where the axis meets the water surface, and the elevation there."""
     eta = 0.0
     if not strips.instantaneous_position:
         if waves is not None:
@@ -118,7 +116,7 @@ def axis_surface(t, pose, strips, waves):
 
 @kernel
 def wet_cell(section, z_surf, strips):
-    """(top, height of one cell) of a section cut at the surface; a dry section has height 0."""
+    """Return (top, height of one cell) of a section cut at the surface; a dry section has height 0."""
     top = z_surf
     if section > 0:
         top = min(z_surf, strips.section_top[section])

@@ -1,12 +1,12 @@
-"""Wave kinematics of a long-crested sea by a few wave numbers (theory.md, 5.4).
+"""Computes wave kinematics of a long-crested sea by a few wave numbers (theory.md, 5.4).
 
 1. A wave field of one heading is analytic: with zeta = Z' + i xi (stretched height, distance along the
    heading), u + i w = sum v_j z_j exp(k_j zeta), z_j = exp(i P_j) at a reference point.
-2. exp(k zeta) is smooth in log k at every depth, so each component is handed, by Lagrange's weights, to the
-   BAND nearest of a few fixed wave numbers K_m, half an octave apart: 300 components become 18.
+2. exp(k zeta) is smooth in log k at every depth, so each component is distributed, by Lagrange weights, to
+   the BAND nearest of a few fixed wave numbers K_m, half an octave apart: 300 components become 18.
 3. K_m and K_{m+2} differ by a factor 2: exp(K_{m+2} zeta) is the square of exp(K_m zeta).
 
-Phasors are computed anew from time and place, by a polynomial in vector registers: the load has no memory.
+Phasors are evaluated from time and position at each call, by a vectorised polynomial: the load has no memory.
 Every section is cut at the instantaneous surface. Errors against the plain sum, rms over the rms of a load,
 Hs 7.5 m, Tp 10 s: 2e-4 or less to 10 deg of tilt (BAND 4: 1e-3), 5e-3 at 30 deg.
 """
@@ -43,14 +43,14 @@ from fowt_env.plant.hydro.waves import elevation, ramp_factor
 
 BAND = 6  # wave numbers K that share one component; 4: 1e-3, 6: 1e-4, 8: 4e-5 of one component
 RATIO = sqrt(2.0)  # of neighbouring K; the squaring chains need a square root of 2
-EXTRA = 1  # K beyond the shortest and the longest component, so that interpolation is not one-sided there
+EXTRA = 1  # K outside the shortest and the longest component, so that interpolation is not one-sided there
 START = 0.06  # largest |K zeta| at which a squaring chain starts; exp(5) then errs by 1e-8
-REFLECTION_REACH = 12.0  # 2 K (depth below the keel) beyond which the seabed's reflection (6e-6) is left out
+REFLECTION_REACH = 12.0  # 2 K (depth below the keel) above which the seabed's reflection (6e-6) is neglected
 REACH = 1.5  # largest k xi of the cubic expansion of the surface about the reference point
 
 # rows of WaveBands.component: k / 2 pi, omega / 2 pi, phase / 2 pi
 WAVE_TURNS, RATE_TURNS, TURN = range(3)
-# rows of WaveBands.band: components FIRST <= j < LAST (multiples of 8) reach K_m; where their weights begin
+# rows of WaveBands.band: components FIRST <= j < LAST (multiples of 8) contribute to K_m; weight offset
 FIRST, LAST, OFFSET = range(3)
 # rows of WaveBands.number: K; rho / K; from rates to elevation; exp(-2 K h), the seabed's reflection
 WAVE_NUMBER, PRESSURE, HEIGHT, REFLECTION = range(4)
@@ -59,14 +59,14 @@ VR, VI, GR, GI, N_FIELD = range(5)
 
 
 class WaveBands(NamedTuple):
-    """A sea of one heading, prepared for the squaring chains; component[TURN] alone is random."""
+    """Holds a sea of one heading in the form of the squaring chains; only component[TURN] is random."""
 
     component: np.ndarray  # (3, n) rows WAVE_TURNS to TURN; n padded with zeros to a multiple of 8
     band: np.ndarray  # (3, M) int64, rows FIRST to OFFSET
     weight: np.ndarray  # (2, sum of bands) Lagrange weight times a omega / (1 - exp(-2 k h)); and omega
     number: np.ndarray  # (4, M) rows WAVE_NUMBER to REFLECTION; M even
     n_reflected: int  # K whose reflection from the seabed reaches the keel, even
-    lead: int  # squarings of the chains' start, beyond four, to reach K_0
+    lead: int  # squarings of the chains' start, in addition to four, to K_0
     cos_heading: float
     sin_heading: float
     ramp: float
@@ -74,14 +74,14 @@ class WaveBands(NamedTuple):
 
 
 class BandDiffraction(NamedTuple):
-    """Coefficient over 1 + C_A (diffraction.py) of every K at every node; 1 at the keel's."""
+    """Holds the inertia coefficient over 1 + C_A (diffraction.py) of every K at every node; 1 at the keel."""
 
     series: np.ndarray  # (blocks, M, 2 TERMS BLOCK): powers of z - centre, real parts first
     centre: np.ndarray  # (blocks, BLOCK) body z
 
 
 class BandScratch(NamedTuple):
-    """Scratch of banded_strip_load; nothing in it carries over between calls."""
+    """Holds the scratch of banded_strip_load; no entry persists between calls."""
 
     phasor: np.ndarray  # (2, n_components)
     field: np.ndarray  # (N_FIELD, M)
@@ -89,17 +89,17 @@ class BandScratch(NamedTuple):
 
 
 def can_use_bands(waves, strips):
-    """Whether build_wave_bands covers this sea: one heading, and nodes that stay below the surface.
+    """Return whether build_wave_bands covers this sea: one heading, and nodes that stay below the surface.
 
     Without stretching up to the instantaneous surface, or stretched but cut at still water, nodes
-    lie above Z' = 0, where a sum of short waves grows without bound: those two keep to the exact path.
+    lie above Z' = 0, where a sum of short waves grows without bound: these two cases use the exact sum.
     """
     same = np.ptp(waves.cos_heading) == 0.0 and np.ptp(waves.sin_heading) == 0.0
     return bool(same) and strips.wheeler == strips.instantaneous_surface
 
 
 def build_wave_bands(waves, strips):
-    """WaveBands of a Waves part that can_use_bands."""
+    """Return the WaveBands of a Waves part for which can_use_bands is true."""
     k = waves.wave_number
     top = k[-1] * RATIO**EXTRA
     count = max(BAND, int(np.ceil(log(top / k[0]) / log(RATIO) - 1e-9)) + 1 + EXTRA)
@@ -111,8 +111,8 @@ def build_wave_bands(waves, strips):
     dense[(start[:, None] + np.arange(BAND)).T, np.arange(k.size)] = (weights * waves.velocity[:, None]).T
     rates = dense * padded(waves.omega, size)
     reached = [np.flatnonzero(row) for row in dense]
-    first = [own[0] // 8 * 8 if own.size else 0 for own in reached]
-    last = [-(-(own[-1] + 1) // 8) * 8 if own.size else 0 for own in reached]
+    first = [indices[0] // 8 * 8 if indices.size else 0 for indices in reached]
+    last = [-(-(indices[-1] + 1) // 8) * 8 if indices.size else 0 for indices in reached]
     offset = np.concatenate([[0], np.cumsum(np.subtract(last, first))[:-1]])
     ends = list(zip(first, last, strict=True))
     weight = [
@@ -137,9 +137,9 @@ def build_wave_bands(waves, strips):
 
 
 def build_band_diffraction(bands, quadrature):
-    """BandDiffraction of WaveBands and StripQuadrature.
+    """Return the BandDiffraction of WaveBands and StripQuadrature.
 
-    The coefficient varies with ln K as smoothly as exp(K zeta) does, so the bands carry their product.
+    The coefficient varies with ln K as smoothly as exp(K zeta) does, so the bands represent their product.
     """
     rows = quadrature.table.reshape(-1, N_TABLE, BLOCK).transpose(1, 0, 2).reshape(N_TABLE, -1)
     bottom, top = rows[BOTTOM], rows[TOP]
@@ -159,12 +159,12 @@ def build_band_diffraction(bands, quadrature):
 
 
 def padded(values, size):
-    """(size,) array that begins with the values and goes on with zeros."""
+    """Return the values padded with zeros to (size,)."""
     return np.concatenate([values, np.zeros(size - values.size)])
 
 
 def _lagrange(k, grid):
-    """(start, weights): each component's first grid index (n,) and its (n, BAND) weights in log k."""
+    """Return (start, weights) of components: first grid index (n,), Lagrange weights (n, BAND) in log k."""
     at = np.log(k / grid[0]) / log(RATIO)
     start = np.clip(np.floor(at + 1e-9).astype(int) - (BAND // 2 - 1), 0, grid.size - BAND)
     local = at - start
@@ -177,7 +177,7 @@ def _lagrange(k, grid):
 
 
 def band_scratch(bands, quadrature):
-    """BandScratch for WaveBands (None: still water) and a StripQuadrature (None: exact strips need none)."""
+    """Return the BandScratch of WaveBands (None: still water) and a StripQuadrature (None: exact strips)."""
     components = 0 if bands is None else bands.component.shape[1]
     numbers = 0 if bands is None else bands.number.shape[1]
     blocks = 0 if quadrature is None else quadrature.table.shape[0]
@@ -190,7 +190,7 @@ def band_scratch(bands, quadrature):
 
 @kernel
 def phasors(t, distance, component, cosine, sine):
-    """Fill cosine and sine (n,) of every component's phase at a distance along the heading.
+    """Fill cosine and sine (n,) of the phase of every component at a distance along the heading.
 
     The phase is reduced in turns and halved, to [-pi/2, pi/2]; Taylor polynomials there are within
     1e-8. 0.13 microseconds for 300 components.
@@ -220,7 +220,7 @@ def phasors(t, distance, component, cosine, sine):
 
 @kernel
 def _component_sum(amplitude, cosine):
-    """Sum of amplitude (n,) times cosine, whose padding beyond n is left out."""
+    """Return the sum of amplitude (n,) times the first n entries of cosine; the rest is padding."""
     n = amplitude.shape[0]
     whole = n - n % SUM_LANES
     total = lane_dot(amplitude, cosine, whole)
@@ -231,7 +231,7 @@ def _component_sum(amplitude, cosine):
 
 @kernel
 def surface_elevation(t, waves, bands, scratch):
-    """Surface elevation at the origin, m: by the fast phasors where the scene has them; 0 without waves."""
+    """Return the surface elevation at the origin, m: by fast phasors where bands exist; 0 without waves."""
     if bands is None:
         return elevation(t, 0.0, 0.0, waves)
     if waves is None:
@@ -242,7 +242,7 @@ def surface_elevation(t, waves, bands, scratch):
 
 @kernel
 def compress(scale, band, weight, number, cosine, sine, field):
-    """Fill field (N_FIELD, M): complex sums of the components' velocity and rate at each K, times scale.
+    """Fill field (N_FIELD, M) with complex sums of the components' velocity and rate at each K, times scale.
 
     Returns the elevation at the reference point and its first three derivatives along the heading.
     """
@@ -268,7 +268,7 @@ def compress(scale, band, weight, number, cosine, sine, field):
 
 @kernel
 def small_exp(x, y):
-    """exp(16 (x + i y)) as (real, imaginary), from Taylor's fifth power at |x + i y| below START."""
+    """Return exp(16 (x + i y)) as (real, imaginary), by a Taylor series of order 5, |x + i y| below START."""
     er, ei = 1.0 + x / 5.0, y / 5.0
     er, ei = 1.0 + (x * er - y * ei) / 4.0, (x * ei + y * er) / 4.0
     er, ei = 1.0 + (x * er - y * ei) / 3.0, (x * ei + y * er) / 3.0
@@ -282,7 +282,7 @@ def small_exp(x, y):
 
 @kernel
 def chain_start(pose_z, rise, sway, z_ref, stretch, drop, scale, lead, node):
-    """Start both squaring chains of a block: exp(K zeta) for K_0 and K_1; Z' stays below 0.
+    """Fill the start of both squaring chains of a block: exp(K zeta) for K_0 and K_1, with Z' below 0.
 
     scale: K_0 / 2^(lead + 4), see small_exp.
     """
@@ -302,14 +302,14 @@ def chain_start(pose_z, rise, sway, z_ref, stretch, drop, scale, lead, node):
 
 @kernel
 def wave_terms(vr, vi, gr, gi, er, ei):
-    """(u, w, u', w', rate) of one K: u + i w = v e, u' + i w' = -i g e, pressure = rho / K rate."""
+    """Return (u, w, u', w', rate) of one K: u + i w = v e, u' + i w' = -i g e, pressure = rho / K rate."""
     rate, turn = gr * er - gi * ei, gr * ei + gi * er
     return vr * er - vi * ei, vr * ei + vi * er, turn, -rate, rate
 
 
 @kernel
 def node_factor(diffraction, block, m, n, z):
-    """(real, imaginary) coefficient over 1 + C_A of K_m at body z of a node."""
+    """Return the (real, imaginary) inertia coefficient over 1 + C_A of K_m at body z of a node."""
     series = diffraction.series
     x = z - diffraction.centre[block, n]
     re, im = 0.0, 0.0
@@ -335,7 +335,7 @@ def add_reflection(number, field, m, node, diffraction, block):
         node[U * BLOCK + n] += ua + ub
         node[W * BLOCK + n] += wa + wb
         if diffraction is not None:
-            # conjugate, as the amplitudes are
+            # conjugate factor, as the amplitudes are conjugate
             fr, fi = node_factor(diffraction, block, m, n, node[Z * BLOCK + n])
             da, za = da * fr + za * fi, za * fr - da * fi
             fr, fi = node_factor(diffraction, block, m + 1, n, node[Z * BLOCK + n])
@@ -347,9 +347,9 @@ def add_reflection(number, field, m, node, diffraction, block):
 
 @kernel
 def chain_sums(number, n_reflected, field, node, diffraction, block):
-    """Water velocity, acceleration and pressure at a block's nodes: two K at a time, then square.
+    """Fill water velocity, acceleration and pressure at a block's nodes: two K at a time, then square.
 
-    diffraction: BandDiffraction, which scales and turns the accelerations, or None.
+    diffraction: BandDiffraction, with complex factors of the accelerations, or None.
     """
     for n in range(BLOCK):
         node[U * BLOCK + n] = 0.0

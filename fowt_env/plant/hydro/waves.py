@@ -1,4 +1,4 @@
-"""Linear (Airy) waves as a sum of components: elevation and kinematics at a point (theory.md, 5.4)."""
+"""Computes linear (Airy) waves by a sum of components: elevation, kinematics at a point (theory.md, 5.4)."""
 
 from math import cos, exp, sin
 from typing import NamedTuple
@@ -7,12 +7,12 @@ import numpy as np
 
 from fowt_env.plant.compile.decorators import kernel
 
-# Beyond this k*depth-like product an exponential is below 1e-12 of its surface value.
+# Above this product of wave number and depth an exponential is below 1e-12 of its surface value.
 NEGLIGIBLE = 27.6
 
 
 class Waves(NamedTuple):
-    """Wave components; every array (n,), C-contiguous."""
+    """Holds wave components; every array (n,), C-contiguous."""
 
     omega: np.ndarray  # rad/s
     wave_number: np.ndarray  # 1/m
@@ -24,12 +24,12 @@ class Waves(NamedTuple):
     depth: float
     density: float
     ramp: float  # s over which the waves are raised from rest; 0: none
-    random: bool  # drawn from a spectrum: repeats after the duration it was drawn for
+    random: bool  # drawn from a spectrum: repeats after the duration of the draw
 
 
 @kernel
 def ramp_factor(t, ramp):
-    """Share of the wave amplitude at time t: raised linearly over ramp seconds."""
+    """Return the fraction of the wave amplitude at time t: linear over ramp seconds."""
     if ramp <= 0.0 or t >= ramp:
         return 1.0
     return max(t, 0.0) / ramp
@@ -37,7 +37,7 @@ def ramp_factor(t, ramp):
 
 @kernel
 def elevation(t, x, y, waves):
-    """Surface elevation at an inertial point, m; 0 without waves."""
+    """Return the surface elevation at an inertial point, m; 0 without waves."""
     if waves is None:
         return 0.0
     total = 0.0
@@ -50,7 +50,7 @@ def elevation(t, x, y, waves):
 
 
 class Kinematics(NamedTuple):
-    """Water velocity (m/s), local acceleration (m/s2) and dynamic pressure (Pa) at one point."""
+    """Holds water velocity (m/s), local acceleration (m/s2) and dynamic pressure (Pa) at one point."""
 
     u: float
     v: float
@@ -63,7 +63,7 @@ class Kinematics(NamedTuple):
 
 @kernel
 def wave_kinematics(t, x, y, z, waves):
-    """Kinematics at an inertial point with z used as given (stretch it before), plain component sum."""
+    """Return the Kinematics at an inertial point (z already stretched), plain component sum."""
     u = v = w = du = dv = dw = p = 0.0
     h = waves.depth
     for j in range(waves.omega.shape[0]):

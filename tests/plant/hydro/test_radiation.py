@@ -216,5 +216,5 @@ def test_what_is_forgotten_has_no_load(past):
 def test_a_convolution_refuses_steps_that_it_is_not_made_for(past):
     water, data = hydro(past), memory_data(hydro(past))
     x = moving(15)
-    with pytest.raises(ValueError, match="of another time step: use Scene.with_step"):
+    with pytest.raises(ValueError, match="for another time step: use Scene.with_step"):
         step(x, x.copy(), x.copy(), 0.05, False, False, water, data)
