@@ -105,8 +105,8 @@ def test_steady_field_is_the_mean_over_time_at_every_height():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"y": np.linspace(-50.0, 50.0, 11)}, "must hold the rotor"),
-        ({"u": np.zeros((4, 3, 3))}, "as z and y say"),
+        ({"y": np.linspace(-50.0, 50.0, 11)}, "must contain the rotor"),
+        ({"u": np.zeros((4, 3, 3))}, "from z and y"),
         ({"colour": 1}, "colour"),
         ({"dt": -1.0}, "dt"),
         ({"u": np.full((4, 9, 11), np.nan)}, "finite"),
