@@ -186,7 +186,7 @@ def complaint(path, wind=None):
     return "warned", str(caught[0].message)
 
 
-SHORT = "3 of 3 mooring lines are shorter than the way from anchor to fairlead"
+SHORT = "3 of 3 mooring lines are shorter than the distance from anchor to fairlead"
 SLACK = "all mooring lines hang slack"
 NONSENSE = {  # key, value, wind, what becomes of it, words of its message
     "too much ballast": (

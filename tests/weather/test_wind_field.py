@@ -243,7 +243,7 @@ SOUND = (8, 2, 2, 0, 1, 140.0, 140.0, 0.1, 12.0, 90.0, 20.0, 1.0, 0.0, 1.0, 0.0,
     [
         (0, 9, "identifier 9"),
         (1, 0, "0 x 2 points"),
-        (2, 2**31 - 1, "times of 2 x 2147483647 . 0 points take 25769803834 bytes; it has 94"),
+        (2, 2**31 - 1, "times of 2 x 2147483647 . 0 points take 25769803834 bytes; the file has 94"),
         (4, 2**31 - 1, "2147483647 times"),
         (17, -1, "-1 characters"),
         (7, float("nan"), "nan s"),
