@@ -48,9 +48,9 @@ def check_platform(platform, **options):
     """
     with muted():  # faults are listed in the Check instead
         scene = build_scene(platform, **options)
-    figures = statics(scene)
+    undisplaced = statics(scene)
     faults = geometry_faults(scene.platform)
-    faults |= _static_faults(scene, figures)
+    faults |= _static_faults(scene, undisplaced)
     rest, periods, tower = None, None, {}
     try:
         with muted():
@@ -65,20 +65,20 @@ def check_platform(platform, **options):
         periods, tower = natural_modes(scene, point)
         faults |= _rest_faults(scene, rest) | _period_faults(periods, scene.turbine.rotor.hub_height)
     return Check(
-        scene.label, scene.platform.draft, figures, rest, periods, tower,
+        scene.label, scene.platform.draft, undisplaced, rest, periods, tower,
         tuple(f"{text[0].upper()}{text[1:]}." for text in faults.values()),
     )  # fmt: skip
 
 
-def _static_faults(scene, figures):
+def _static_faults(scene, undisplaced):
     """Return {name: sentence} of weight, buoyancy, lines and stability of the undisplaced platform."""
     evaluation = Evaluation(scene)
     rest = np.zeros(scene.n_state)
     evaluation.at(rest, LoadCache.TOTAL)
     faults = causes_of(scene, evaluated(rest, evaluation.data))
-    tethered = figures.pull > 0.15 * figures.buoyancy  # a tension-leg platform: stabilised by its lines
-    if not min(figures.metacentric_height) > 0.0 and figures.buoyancy > 0.0 and not tethered:
-        faults["upright"] = metacentre(scene, figures)
+    tethered = undisplaced.pull > 0.15 * undisplaced.buoyancy  # tension-leg platform: stable by its lines
+    if not min(undisplaced.metacentric_height) > 0.0 and undisplaced.buoyancy > 0.0 and not tethered:
+        faults["upright"] = metacentre(scene, undisplaced)
     return faults
 
 
@@ -87,16 +87,16 @@ def _rest_faults(scene, rest):
     faults, depth, draft = {}, scene.platform.environment.water_depth, scene.platform.draft
     drift = hypot(rest["surge"], rest["sway"])
     if drift > DRIFT * depth:
-        faults["drift"] = f"without wind it rests {drift:.4g} m off its position, in water of {depth:g} m"
+        faults["drift"] = f"without wind the equilibrium is {drift:.4g} m off, in water of {depth:g} m"
     if abs(rest["heave"]) > 0.1 * draft:
         faults["heave"] = (
-            f"without wind it rests {rest['heave']:+.4g} m in heave, with a draft of {draft:.4g} m"
+            f"without wind the equilibrium is at {rest['heave']:+.4g} m in heave, at a draft of {draft:.4g} m"
         )
     tilt = max(abs(rest["roll"]), abs(rest["platform pitch"]))
     if tilt > TILT:
         faults["tilt"] = (
-            f"without wind it leans {tilt:.3g} deg (roll {rest['roll']:.3g}, platform pitch"
-            f" {rest['platform pitch']:.3g} deg)"
+            f"without wind the equilibrium is tilted by {tilt:.3g} deg (roll {rest['roll']:.3g}, platform"
+            f" pitch {rest['platform pitch']:.3g} deg)"
         )
     return faults
 
@@ -107,10 +107,10 @@ def _period_faults(periods, hub_height):
     for motion, period in periods.items():
         low, high = BANDS[motion][0] * min(scale, 1.0), BANDS[motion][1] * max(scale, 1.0)
         if not np.isfinite(period):
-            faults[motion] = f"nothing restores it in {motion}"
+            faults[motion] = f"there is no restoring in {motion}"
         elif not low <= period <= high:
             faults[motion] = (
-                f"its natural period in {motion} is {period:.3g} s, outside {low:.3g} to {high:.3g} s"
+                f"the natural period in {motion} is {period:.3g} s, outside {low:.3g} to {high:.3g} s"
             )
     return faults
 

@@ -60,7 +60,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     if impossible := impossible_place(scene, heave, upright):
         places = " and ".join(impossible.values())
         raise InputError(
-            f"{label(scene)}: its loads balance only with {places} ({_place(rest)})."
+            f"{label(scene)}: its loads balance only with {places} ({_position(rest)})."
             f" {_sentences(causes_of(scene, start))}".rstrip()
         )
     odd = {}
@@ -80,7 +80,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     key = hash((repr(scene.platform), scene.turbine.name, *odd))
     if "tilt" in odd or "unstable" in odd:
         causes["upright"] = metacentre(scene, statics(scene))
-    text = f"{label(scene)}: {'; '.join(odd.values())} ({_place(rest)}). {_sentences(causes)}"
+    text = f"{label(scene)}: {'; '.join(odd.values())} ({_position(rest)}). {_sentences(causes)}"
     warn_once(key, text.rstrip())
 
 
@@ -91,12 +91,12 @@ def unbalanced(scene, start, end, ending=None):
     """
     causes = causes_of(scene, start)
     if scene.model.mooring is None:
-        why = "mooring = False" if scene.platform.lines else "it has no mooring lines"
+        why = "mooring = False" if scene.platform.lines else "no mooring lines"
         causes["unheld"] = (
-            f"nothing holds it in surge and sway: {why} (a run can begin upright instead, start = 'zero')"
+            f"there is no restoring in surge and sway: {why} (a run can start upright: start = 'zero')"
         )
     text = f"no steady state found for {label(scene)}. {_sentences(causes)}".rstrip()
-    return f"{text} The search ended at {_place(end.x)}, {ending or _left(scene, end)}"
+    return f"{text} The search ended at {_position(end.x)}, {ending or _left(scene, end)}"
 
 
 def label(scene):
@@ -195,14 +195,14 @@ def _mooring_causes(mooring, start, weight, net):
     return causes
 
 
-def metacentre(scene, figures):
+def metacentre(scene, undisplaced):
     """Return a sentence on the stability of the undisplaced platform as a floating body, from its Statics."""
-    buoyancy, height = figures.buoyancy_centre[2], figures.metacentric_height
+    buoyancy, height = undisplaced.buoyancy_centre[2], undisplaced.metacentric_height
     shown = "" if isnan(buoyancy) else f", that of buoyancy at {buoyancy:.3g} m"
     return (
-        f"undisplaced its centre of mass is at z = {figures.mass_centre[2]:.3g} m{shown} and its metacentric"
-        f" height {min(height):.3g} m (ballast.cm_depth = {scene.platform.ballast.cm_depth:g} m is positive"
-        " downwards)"
+        f"undisplaced its centre of mass is at z = {undisplaced.mass_centre[2]:.3g} m{shown} and its"
+        f" metacentric height {min(height):.3g} m (ballast.cm_depth = {scene.platform.ballast.cm_depth:g} m"
+        " is positive downwards)"
     )
 
 
@@ -243,14 +243,14 @@ def _by_load(scene, end):
     wrenches = {name: end.cache[first : first + 6] for name, first in LOADS.items()}
     wrenches["weight"] = np.concatenate([weight, np.cross(centre, weight)])
     if scene.loads:
-        wrenches["own loads"] = end.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6] - sum(wrenches.values())
+        wrenches["custom loads"] = end.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6] - sum(wrenches.values())
     return {
         name: np.concatenate([to_inertial @ wrench[:3], wrench[3:] - np.cross(centre, wrench[:3])])
         for name, wrench in wrenches.items()
     }
 
 
-def _place(x):
+def _position(x):
     """Return the surge, heave and platform pitch of a state as a text."""
     return (
         f"surge {x[State.SURGE]:.4g} m, heave {x[State.HEAVE]:.4g} m, platform pitch"

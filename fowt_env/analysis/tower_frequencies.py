@@ -75,9 +75,9 @@ def bending(platform, turbine, count):
     moved = np.zeros((6, len(slope)))  # velocity of the top body, referred to the body origin
     moved[0], moved[1] = along * (1.0 - slope * height), across * (1.0 - slope * height)
     moved[3], moved[4] = -across * slope, along * slope
-    alike = np.outer(along, along) + np.outer(across, across)
+    aligned = np.outer(along, along) + np.outer(across, across)
     arm = top[0, 4] / top[0, 0] - height  # height of the top body's centre of mass above the tower top
-    hanging = tower.weight_stiffness + top[0, 0] * arm * np.outer(slope, slope) * alike
+    hanging = tower.weight_stiffness + top[0, 0] * arm * np.outer(slope, slope) * aligned
     inertia = top @ moved
     inertia[0] += along * tower.first_moment
     inertia[1] += across * tower.first_moment
@@ -86,5 +86,5 @@ def bending(platform, turbine, count):
     aside = gravity * (tower.first_moment + top[0, 0] * (1.0 + arm * slope))
     weight = np.zeros_like(inertia)
     weight[State.ROLL], weight[State.PLATFORM_PITCH] = across * aside, -along * aside
-    mass, stiffness = tower.mass * alike + moved.T @ top @ moved, tower.stiffness - gravity * hanging
+    mass, stiffness = tower.mass * aligned + moved.T @ top @ moved, tower.stiffness - gravity * hanging
     return Bending(along == 1.0, mass, stiffness, inertia, weight)

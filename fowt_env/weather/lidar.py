@@ -187,10 +187,10 @@ def _pairs(lidar, first):
     key = np.zeros(i.size, dtype=np.int64)
     for distance in apart:
         key = key * 2**21 + np.round(1000.0 * np.abs(distance)).astype(np.int64)
-    _, one, alike = np.unique(key, return_index=True, return_inverse=True)
+    _, one, group = np.unique(key, return_index=True, return_inverse=True)
     both = p.weight[i] * p.weight[j]
     products = (np.ones(i.size), p.across[i] * p.across[j], p.up[i] * p.up[j])
-    weight = np.array([np.bincount(alike, both * product) for product in products])
+    weight = np.array([np.bincount(group, both * product) for product in products])
     return *(np.abs(distance[one]) for distance in apart), weight
 
 
@@ -211,9 +211,9 @@ def shares(lidar, first, speed, sigma, height, radius, evolves=True):
     across, along, late, weight = _pairs(lidar, first)
     pair = np.exp(-np.outer(k, across)) * _along(f, along, speed, a, b)
     pair = pair * np.cos(np.outer(omega, late / speed))
-    own = np.array([pair @ row for row in weight])
+    auto = np.array([pair @ row for row in weight])
     rotor = disk_average(k * radius) if radius > 0.0 else np.ones(f.size)
-    return Shares(rotor, cross, own)
+    return Shares(rotor, cross, auto)
 
 
 def at_frequencies(values, frequency):
@@ -236,8 +236,8 @@ def lidar_spectra(lidar, frequency, speed, sigma, height, radius, first=0, evolv
 
 def _times(ratios, frequency, point):
     """Return (S_RR, S_RL, S_LL) of Shares at frequencies (n,) with spectra or variances (3, n) of a point."""
-    rotor, cross, own = (at_frequencies(values, frequency) for values in ratios)
-    return rotor * point[0], cross * point[0], (own * point).sum(axis=0)
+    rotor, cross, auto = (at_frequencies(values, frequency) for values in ratios)
+    return rotor * point[0], cross * point[0], (auto * point).sum(axis=0)
 
 
 def blocked_share(lidar, rotor, blade):
@@ -281,8 +281,8 @@ def tuning(lidar, first, speed, height, radius, blocked):
     point = amplitudes(speed, sigma, height, 2.0 * radius, samples, STEP, "point")
     variance = 0.5 * point[:3, 1 : frequency.size + 1] ** 2
     ratios = shares(lidar, first, speed, sigma, height, radius)
-    rotor, cross, own = _times(ratios, frequency, variance)
-    gain = np.abs(cross) / own
+    rotor, cross, auto = _times(ratios, frequency, variance)
+    gain = np.abs(cross) / auto
     below = np.flatnonzero(gain < MINUS_3_DB)
     corner = np.inf
     if below.size:
@@ -293,8 +293,8 @@ def tuning(lidar, first, speed, height, radius, blocked):
     turn = 2.0 * np.pi * np.outer(LEADS, frequency)
     common = np.cos(turn) @ (gain * cross).real - np.sin(turn) @ (gain * cross).imag
     lead = float(LEADS[np.argmax(common)])
-    left = rotor + np.abs(gain) ** 2 * own + np.abs(passed) ** 2 * held_noise(lidar, blocked, frequency, own)
-    error = np.sqrt(max(left.sum() - 2.0 * common.max(), 0.0))
+    mse = rotor + np.abs(gain) ** 2 * auto + np.abs(passed) ** 2 * held_noise(lidar, blocked, frequency, auto)
+    error = np.sqrt(max(mse.sum() - 2.0 * common.max(), 0.0))
     travel = (lidar.distances[first] - (lidar.behind_rotor or 0.0)) / speed
     return Tuning(first, float(corner), lead, travel - lead, float(error))
 
@@ -420,11 +420,11 @@ def _in_turbulence(scene, lidar, tuned, seed):
     frequency = np.arange(1, count // 2 + 1) / period
     wind_at = (drawn["speed"], drawn["sigma"], drawn["height"])
     ratios = shares(lidar, tuned.first, *wind_at, _radius(scene))
-    rotor, cross, own = (at_frequencies(values, frequency) for values in ratios)
+    rotor, cross, auto = (at_frequencies(values, frequency) for values in ratios)
     point = amplitudes(*wind_at, 2.0 * scene.turbine.rotor.tip_radius, count, period / count, "point")[:3, 1:]
     variance = 0.5 * point**2
     # negative only by rounding: the coherence is at most 1
-    rest = np.maximum((own * variance).sum(axis=0) - np.abs(cross) ** 2 / rotor * variance[0], 0.0)
+    rest = np.maximum((auto * variance).sum(axis=0) - np.abs(cross) ** 2 / rotor * variance[0], 0.0)
     spectrum = np.fft.rfft(wind[:-1])
     spectrum[0] *= _profile_factor(scene, lidar, tuned)
     spectrum[1:] = cross / rotor * spectrum[1:] + _noise(rest, count, seed, LIDAR_STREAM)

@@ -183,8 +183,8 @@ def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
     rest = np.sqrt(np.maximum(1.0 - shared**2, 0.0))
     spectrum = []
     for row in range(3):
-        common, own = (_phasor(seed, component, point.shape[1]) for component in (row, OWN_PHASES + row))
-        spectrum.append(0.5 * samples * point[row] * (shared * common + rest * own))
+        common, other = (_phasor(seed, component, point.shape[1]) for component in (row, OWN_PHASES + row))
+        spectrum.append(0.5 * samples * point[row] * (shared * common + rest * other))
     return samples * step, _one_period(spectrum, samples, 3)
 
 

@@ -223,7 +223,7 @@ NONSENSE = {  # key, value, wind, what becomes of it, words of its message
     ),
     "no lines": (
         "azimuth_deg", "[]", 18.0, "refused",
-        ("nothing holds it in surge and sway: it has no mooring lines", "kN left in surge: rotor"),
+        ("no restoring in surge and sway: no mooring lines", "kN left in surge: rotor"),
     ),
     "a mass beyond all numbers": ("mass", "1e300", None, "refused", ("too heavy", "9.81e+297 kN")),
 }  # fmt: skip
