@@ -40,7 +40,7 @@ ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in 
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FREQUENCY_ROUNDS = 4  # iterations of a period and the added mass at that period
-# internal blocks that linearize supports: radiation memory by its matrices; flat water has no wave position
+# internal blocks that linearize supports; the filtered position has no effect in flat water
 LINEAR = ("radiation", "filtered position", "wake")
 DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
 MEMORY = "radiation_"  # prefix of the states of radiation memory
@@ -484,7 +484,7 @@ def check_linear(scene, known=LINEAR):
 
 
 def steady_parts(scene, point):
-    """Return {path: part} of the model to be linearised: parts without play, friction or free platform."""
+    """Return {path: part} to replace for linearisation: platform fixed as in point, linear actuator."""
     body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
     return {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
 

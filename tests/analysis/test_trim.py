@@ -153,7 +153,7 @@ def test_a_scene_that_cannot_rest_is_refused(bare_scene):
     text = str(caught.value)
     assert "platform 'oc3_hywind' without wind" in text
     assert "Its weight of 79101 kN has no buoyancy: hydrodynamics = False" in text
-    assert "Nothing holds it in surge and sway: mooring = False" in text
+    assert "There is no restoring in surge and sway: mooring = False" in text
     assert "-79101 kN left in heave: weight -79101" in text
 
 

@@ -136,7 +136,7 @@ def _check_switches(main, parts):
 
 
 def _site(main, elastodyn, aerodyn, water):
-    """Return the Site from a module's file (before OpenFAST 3) or from the .fst."""
+    """Return the Site from the modules' files (older versions) or else from the .fst."""
     sources = {}
 
     def first(name, key, module, default=None, **limits):

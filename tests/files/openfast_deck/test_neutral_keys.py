@@ -358,7 +358,7 @@ def test_each_line_of_map_is_asked_when_it_breaks(tmp_path):
     before = set(differences(write_deck(tmp_path)))
     lines = "1 chain 450.0 1 2 damage_time 1e9\n2 chain 450.0 1 2 plot damage_time 100"
     changed = write_deck(tmp_path, MAP=[("1 chain 450.0 1 2 tension_fair", lines)])
-    assert set(differences(changed)) - before == {"a line that breaks (damage_time 100)"}
+    assert set(differences(changed)) - before == {"line failure at a time (damage_time 100)"}
 
 
 def test_lines_beyond_the_most_that_are_allowed_are_refused(tmp_path):
