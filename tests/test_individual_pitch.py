@@ -378,5 +378,5 @@ def test_moments_of_cyclic_pitch_are_those_of_a_run_with_it(scene, tilt, yaw):
 
 
 def test_a_scene_with_one_pitch_has_no_multi_blade_model(collective_scene):
-    with pytest.raises(InputError, match="linearize_blades: the scene has one pitch"):
+    with pytest.raises(InputError, match="linearize_blades: the scene has collective pitch"):
         linearize_blades(collective_scene)

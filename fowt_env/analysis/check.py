@@ -15,11 +15,11 @@ from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.geometry import geometry_faults
 
-DRIFT, TILT = 0.05, 5.0  # of the water depth; deg: a rest without wind that is odd
-SETTLED_HEAVE = 0.05  # of the draft: weight and buoyancy need not fit better than that
-ROUNDS, SETTLED = 40, 1e-6  # for the added mass at a mode's own frequency
-FULL_SIZE = 90.0  # m, hub height that BANDS are of; a model of it has shorter periods
-BANDS = {  # s, natural periods of floating turbines from tension legs and barges to spars, with much to spare
+DRIFT, TILT = 0.05, 5.0  # of the water depth; deg: limits of a plausible equilibrium without wind
+SETTLED_HEAVE = 0.05  # of the draft: tolerance of the balance of weight and buoyancy
+ROUNDS, SETTLED = 40, 1e-6  # of the iteration for the added mass at a mode's natural frequency
+FULL_SIZE = 90.0  # m, hub height for which BANDS hold; a scale model has shorter periods
+BANDS = {  # s, natural periods of floating turbines from tension legs and barges to spars, with wide margins
     "surge": (15.0, 600.0),
     "sway": (15.0, 600.0),
     "heave": (0.5, 100.0),
@@ -30,27 +30,27 @@ BANDS = {  # s, natural periods of floating turbines from tension legs and barge
 
 
 class Check(NamedTuple):
-    """What is known of a platform at rest in still water without wind."""
+    """Holds statics, equilibrium, natural periods and faults of a platform in still water without wind."""
 
     label: str
     draft: float  # m
     statics: Statics  # of the undisplaced platform
-    rest: dict[str, float] | None  # {motion: m or deg}; None where it has no place to rest
-    periods: dict[str, float] | None  # {motion: s}, undamped; inf: nothing restores it
-    tower: dict[str, TowerFrequency]  # of the bending modes that the file has; empty without a rest
-    faults: tuple[str, ...]  # sentences on what does not fit
+    rest: dict[str, float] | None  # equilibrium {motion: m or deg}; None if there is no equilibrium
+    periods: dict[str, float] | None  # {motion: s}, undamped; inf: no restoring
+    tower: dict[str, TowerFrequency]  # of the bending modes in the file; empty without an equilibrium
+    faults: tuple[str, ...]  # sentences on inconsistencies
 
 
 def check_platform(platform, **options):
-    """Check of a platform: a built-in name, a path or a descriptions.platform.Platform; options of the scene.
+    """Return the Check of a platform: a built-in name, a path or a Platform; options: of the scene.
 
     Raises: InputError for a file that cannot be read.
     """
-    with muted():  # the same faults follow, each of them once
+    with muted():  # faults are listed in the Check instead
         scene = build_scene(platform, **options)
-    figures = statics(scene)
+    undisplaced = statics(scene)
     faults = geometry_faults(scene.platform)
-    faults |= _static_faults(scene, figures)
+    faults |= _static_faults(scene, undisplaced)
     rest, periods, tower = None, None, {}
     try:
         with muted():
@@ -61,56 +61,56 @@ def check_platform(platform, **options):
         values = point.state[:6].tolist()
         rest = dict(zip(MOTION_LABELS, [*values[:3], *map(degrees, values[3:])], strict=True))
         if abs(rest["heave"]) <= SETTLED_HEAVE * scene.platform.draft:
-            faults.pop("vertical", None)  # a wide waterplane carries what is missing
+            faults.pop("vertical", None)  # a large waterplane compensates the difference
         periods, tower = natural_modes(scene, point)
         faults |= _rest_faults(scene, rest) | _period_faults(periods, scene.turbine.rotor.hub_height)
     return Check(
-        scene.label, scene.platform.draft, figures, rest, periods, tower,
+        scene.label, scene.platform.draft, undisplaced, rest, periods, tower,
         tuple(f"{text[0].upper()}{text[1:]}." for text in faults.values()),
     )  # fmt: skip
 
 
-def _static_faults(scene, figures):
+def _static_faults(scene, undisplaced):
     """Return {name: sentence} of weight, buoyancy, lines and stability of the undisplaced platform."""
     evaluation = Evaluation(scene)
     rest = np.zeros(scene.n_state)
     evaluation.at(rest, LoadCache.TOTAL)
     faults = causes_of(scene, evaluated(rest, evaluation.data))
-    held = figures.pull > 0.15 * figures.buoyancy  # upright by lines, as tension legs are
-    if not min(figures.metacentric_height) > 0.0 and figures.buoyancy > 0.0 and not held:
-        faults["upright"] = metacentre(scene, figures)
+    tethered = undisplaced.pull > 0.15 * undisplaced.buoyancy  # tension-leg platform: stable by its lines
+    if not min(undisplaced.metacentric_height) > 0.0 and undisplaced.buoyancy > 0.0 and not tethered:
+        faults["upright"] = metacentre(scene, undisplaced)
     return faults
 
 
 def _rest_faults(scene, rest):
-    """Return {name: sentence} of a rest far from where the platform's file puts it."""
+    """Return {name: sentence} of an equilibrium far from the undisplaced position."""
     faults, depth, draft = {}, scene.platform.environment.water_depth, scene.platform.draft
     drift = hypot(rest["surge"], rest["sway"])
     if drift > DRIFT * depth:
-        faults["drift"] = f"without wind it rests {drift:.4g} m from its place, in water of {depth:g} m"
+        faults["drift"] = f"without wind the equilibrium is {drift:.4g} m off, in water of {depth:g} m"
     if abs(rest["heave"]) > 0.1 * draft:
         faults["heave"] = (
-            f"without wind it rests {rest['heave']:+.4g} m in heave, with a draft of {draft:.4g} m"
+            f"without wind the equilibrium is at {rest['heave']:+.4g} m in heave, at a draft of {draft:.4g} m"
         )
     tilt = max(abs(rest["roll"]), abs(rest["platform pitch"]))
     if tilt > TILT:
         faults["tilt"] = (
-            f"without wind it leans {tilt:.3g} deg (roll {rest['roll']:.3g}, platform pitch"
-            f" {rest['platform pitch']:.3g} deg)"
+            f"without wind the equilibrium is tilted by {tilt:.3g} deg (roll {rest['roll']:.3g}, platform"
+            f" pitch {rest['platform pitch']:.3g} deg)"
         )
     return faults
 
 
 def _period_faults(periods, hub_height):
-    """Return {name: sentence} of natural periods that no floating turbine of this size has."""
-    faults, scale = {}, sqrt(hub_height / FULL_SIZE)  # Froude's, of times
+    """Return {name: sentence} of natural periods outside the BANDS of floating turbines of this size."""
+    faults, scale = {}, sqrt(hub_height / FULL_SIZE)  # Froude scale of times
     for motion, period in periods.items():
         low, high = BANDS[motion][0] * min(scale, 1.0), BANDS[motion][1] * max(scale, 1.0)
         if not np.isfinite(period):
-            faults[motion] = f"nothing restores it in {motion}"
+            faults[motion] = f"there is no restoring in {motion}"
         elif not low <= period <= high:
             faults[motion] = (
-                f"its natural period in {motion} is {period:.3g} s, outside {low:.3g} to {high:.3g} s"
+                f"the natural period in {motion} is {period:.3g} s, outside {low:.3g} to {high:.3g} s"
             )
     return faults
 
@@ -118,9 +118,9 @@ def _period_faults(periods, hub_height):
 def natural_modes(scene, point):
     """Return ({motion: undamped natural period s}, {mode: TowerFrequency}) about an operating point.
 
-    From stiffness and mass. A potential-flow body has the added mass of each mode's own frequency. Modes are
-    named by their largest motion about the centre of mass, angles weighted with half the draft; inf: nothing
-    restores it.
+    Periods follow from stiffness and mass, for a potential-flow body with the added mass at each mode's
+    natural frequency. Modes are named by their largest motion about the centre of mass, angles weighted with
+    half the draft; inf: no restoring.
     """
     evaluation = Evaluation(scene)
     x = point.state.copy()
@@ -146,18 +146,18 @@ def natural_modes(scene, point):
 
 def _kinematics(x):
     """Return (6, 6) rates of the motions by the velocities in body components, at a state."""
-    roll, pitch, found = x[State.ROLL], x[State.PLATFORM_PITCH], np.zeros((6, 6))
-    found[:3, :3] = rotation_of(pose_of(np.ascontiguousarray(x)))
-    found[3:, 3:] = [
+    roll, pitch, rates = x[State.ROLL], x[State.PLATFORM_PITCH], np.zeros((6, 6))
+    rates[:3, :3] = rotation_of(pose_of(np.ascontiguousarray(x)))
+    rates[3:, 3:] = [
         [1.0, sin(roll) * tan(pitch), cos(roll) * tan(pitch)],
         [0.0, cos(roll), -sin(roll)],
         [0.0, sin(roll) / cos(pitch), cos(roll) / cos(pitch)],
     ]
-    return found
+    return rates
 
 
 def _periods(mass, moved, slopes, height, arm):
-    """Return {motion: s} of the six modes of a mass matrix and the slopes of the loads over the motions."""
+    """Return {motion: period s} of the six modes of a mass matrix and the load slopes over the motions."""
     values, vectors = np.linalg.eig(moved @ np.linalg.solve(mass, slopes))
     shapes = vectors.copy()
     shapes[0] += height * vectors[4]  # at the water line a pitch mode moves more in surge than in pitch
@@ -168,7 +168,7 @@ def _periods(mass, moved, slopes, height, arm):
 
 
 def _at_own_frequency(motion, period, mass, potential, same):
-    """Return the natural period, s, of a motion with the added mass at its own frequency."""
+    """Return the natural period, s, of a motion with the added mass at the natural frequency."""
     for _ in range(ROUNDS):
         if not np.isfinite(period):
             return period
@@ -181,10 +181,10 @@ def _at_own_frequency(motion, period, mass, potential, same):
 
 
 def _added_mass(potential, omega):
-    """Return (6, 6) added mass of a PotentialFlow at a frequency, rad/s, linear between its own."""
-    known, values = potential.omega, potential.added_mass
+    """Return the (6, 6) added mass of a PotentialFlow at a frequency, rad/s, interpolated linearly."""
+    tabulated, values = potential.omega, potential.added_mass
     if potential.added_mass_zero is not None:
-        known = np.concatenate([[0.0], known])
+        tabulated = np.concatenate([[0.0], tabulated])
         values = np.concatenate([potential.added_mass_zero[None], values])
-    rows = values.reshape(len(known), 36).T
-    return np.array([np.interp(omega, known, row) for row in rows]).reshape(6, 6)
+    rows = values.reshape(len(tabulated), 36).T
+    return np.array([np.interp(omega, tabulated, row) for row in rows]).reshape(6, 6)

@@ -14,24 +14,24 @@ from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.geometry import in_radians
 
 MOTION_LABELS = ("surge", "sway", "heave", "roll", "platform pitch", "yaw")
-LOADS = {  # name: where Data.cache has its wrench
+LOADS = {  # name: first index of its wrench in Data.cache
     "rotor": LoadCache.ROTOR,
     "tower drag": LoadCache.TOWER,
     "buoyancy and water": LoadCache.HYDRO,
     "mooring": LoadCache.MOORING,
 }
-# What is odd in a steady state, but possible. The built-in platforms stay far from each.
+# limits of a plausible steady state: warnings; the built-in platforms stay far within
 HEAVE = 0.1  # of the draft
 TILT = 20.0  # deg
-WEAK = 1e-3  # tensions of all lines together, of the weight
-ONE_SIDED = 0.9  # horizontal pull of all lines together, of the sum of each one's
-GROWTH = 1e-3  # square of a motion's rate of growth, of gravity over the draft
+WEAK = 1e-3  # sum of line tensions, as a fraction of the weight
+ONE_SIDED = 0.9  # horizontal resultant of the lines, as a fraction of the sum of magnitudes
+GROWTH = 1e-3  # square of a motion's growth rate, as a fraction of gravity over draft
 MOORINGS = {"slack": "slack moorings", "weak": "loose moorings", "one-sided": "moorings to one side"}
-HEAVY = 0.02  # net vertical force on the undisplaced platform that is worth a word, of its weight
+HEAVY = 0.02  # net vertical force on the undisplaced platform that is reported, as a fraction of the weight
 
 
 class Evaluated(NamedTuple):
-    """A state and the loads there."""
+    """Holds a state vector and the loads at that state."""
 
     x: np.ndarray  # (n_state,)
     cache: np.ndarray  # Data.cache
@@ -39,16 +39,16 @@ class Evaluated(NamedTuple):
 
 
 def evaluated(x, data):
-    """Return the Evaluated of the state that the last evaluation was of."""
+    """Return the Evaluated of the state x, at which the loads in data were evaluated last."""
     return Evaluated(x.copy(), data.cache.copy(), data.lines.copy())
 
 
 def check_equilibrium(scene, rest, start, slope, fresh_slope):
-    """Refuse a steady state that no platform can be in; warn, once per platform, of one that is hardly meant.
+    """Refuse an impossible steady state of a platform; warn, once per platform, of an implausible one.
 
     rest: state vector; start: Evaluated of the undisplaced platform; slope: (n, n) derivatives of the
-    accelerations of the motions by the motions, at the state or near it (None: not known); fresh_slope()
-    returns them at it.
+    accelerations of the motions by the motions, at or near the state (None: unknown); fresh_slope()
+    computes these derivatives at the state.
 
     Raises: InputError.
     """
@@ -60,7 +60,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     if impossible := impossible_place(scene, heave, upright):
         places = " and ".join(impossible.values())
         raise InputError(
-            f"{label(scene)}: its loads balance only with {places} ({_place(rest)})."
+            f"{label(scene)}: its loads balance only with {places} ({_position(rest)})."
             f" {_sentences(causes_of(scene, start))}".rstrip()
         )
     odd = {}
@@ -69,7 +69,7 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
         odd["heave"] = f"heave of {heave:.3g} m, {abs(heave) / draft:.0%} of the draft of {draft:g} m"
     if tilt > TILT:
         odd["tilt"] = f"{tilt:.3g} deg from upright"
-    # the slope at hand says enough unless it has something grow: another costs a third of a trim
+    # recompute the slope only if the available one shows an unstable motion: it costs a third of a trim
     if (slope is None or _growing(scene, slope)) and (growing := _growing(scene, fresh_slope())):
         time = min(growing.values())
         odd["unstable"] = f"unstable in {' and '.join(growing)}, which grows by a factor e in {time:.2g} s"
@@ -80,23 +80,23 @@ def check_equilibrium(scene, rest, start, slope, fresh_slope):
     key = hash((repr(scene.platform), scene.turbine.name, *odd))
     if "tilt" in odd or "unstable" in odd:
         causes["upright"] = metacentre(scene, statics(scene))
-    text = f"{label(scene)}: {'; '.join(odd.values())} ({_place(rest)}). {_sentences(causes)}"
+    text = f"{label(scene)}: {'; '.join(odd.values())} ({_position(rest)}). {_sentences(causes)}"
     warn_once(key, text.rstrip())
 
 
 def unbalanced(scene, start, end, ending=None):
-    """Text of why a search found no steady state: what is wrong with the undisplaced platform, and its end.
+    """Return the message of a failed trim: faults of the undisplaced platform, and the search's last state.
 
-    start, end: Evaluated; ending: what is wrong at the end in words, where it is not the platform's balance.
+    start, end: Evaluated; ending: text on the last state, for a failure other than the platform's balance.
     """
     causes = causes_of(scene, start)
     if scene.model.mooring is None:
-        why = "mooring = False" if scene.platform.lines else "it has no mooring lines"
+        why = "mooring = False" if scene.platform.lines else "no mooring lines"
         causes["unheld"] = (
-            f"nothing holds it in surge and sway: {why} (a run can begin upright instead, start = 'zero')"
+            f"there is no restoring in surge and sway: {why} (a run can start upright: start = 'zero')"
         )
     text = f"no steady state found for {label(scene)}. {_sentences(causes)}".rstrip()
-    return f"{text} The search ended at {_place(end.x)}, {ending or _left(scene, end)}"
+    return f"{text} The search ended at {_position(end.x)}, {ending or _left(scene, end)}"
 
 
 def label(scene):
@@ -106,7 +106,7 @@ def label(scene):
 
 
 def impossible_place(scene, heave, upright):
-    """Return {what is beyond its bounds: text} of a platform's place that no platform can have.
+    """Return {bound: text} of the bounds that a platform's position violates.
 
     heave: m; upright: vertical component of the tower axis. Keys: "bed", "air", "tower base", "tilt".
     """
@@ -116,58 +116,58 @@ def impossible_place(scene, heave, upright):
     keel = heave - upright * scene.platform.draft - 0.5 * across * width
     base_height = scene.platform.tower.base_height
     base = heave + upright * base_height
-    found = {}
+    faults = {}
     if keel < -depth:
-        found["bed"] = f"its keel {-depth - keel:.3g} m below the sea bed"
+        faults["bed"] = f"its keel {-depth - keel:.3g} m below the sea bed"
     if keel > 0.0:
-        found["air"] = f"its keel {keel:.3g} m above the water"
+        faults["air"] = f"its keel {keel:.3g} m above the water"
     if base < 0.0 < base_height:
-        found["tower base"] = f"its tower base {-base:.3g} m under water"
+        faults["tower base"] = f"its tower base {-base:.3g} m under water"
     if (tilt := acos(upright)) > CAPSIZE:
-        found["tilt"] = f"its tower {degrees(tilt):.3g} deg from upright"
-    return found
+        faults["tilt"] = f"its tower {degrees(tilt):.3g} deg from upright"
+    return faults
 
 
 def causes_of(scene, start):
-    """Return {name: sentence} of what is wrong with the undisplaced platform."""
+    """Return {name: sentence} of the faults of the undisplaced platform."""
     model, platform = scene.model, scene.platform
     weight = model.rigid_body.mass * model.rigid_body.gravity
     net = start.cache[LoadCache.TOTAL + 2]
-    found = {}
+    causes = {}
     if model.mooring is not None:
-        found |= _mooring_causes(model.mooring, start, weight, net)
+        causes |= _mooring_causes(model.mooring, start, weight, net)
     if abs(net) <= HEAVY * weight:
-        return found
+        return causes
     if model.hydro is None:
-        found["vertical"] = f"its weight of {_kilo(weight)} kN has no buoyancy: hydrodynamics = False"
-        return found
+        causes["vertical"] = f"its weight of {_kilo(weight)} kN has no buoyancy: hydrodynamics = False"
+        return causes
     specific_weight = platform.environment.water_density * model.rigid_body.gravity
     buoyancy, pull = start.cache[LoadCache.HYDRO + 2], -start.cache[LoadCache.MOORING + 2]
     lines = f" and its lines pull down with {_kilo(pull)} kN" if model.mooring is not None else ""
-    found["vertical"] = (
+    causes["vertical"] = (
         f"undisplaced it weighs {_kilo(weight)} kN{lines}, against a buoyancy of {_kilo(buoyancy)} kN"
         f" ({_shown(buoyancy / specific_weight)} m3): {_kilo(abs(net))} kN"
         f" ({_shown(abs(net) / model.rigid_body.gravity / 1e3)} t) too {'light' if net > 0.0 else 'heavy'}"
     )
     ballast = platform.ballast.mass
     enough = ballast + net / model.rigid_body.gravity
-    if len(found) == 1 and enough > 0.0:  # with wrong moorings the ballast is not the cause
-        found["vertical"] += f"; ballast.mass = {enough:.6g} kg (now {ballast:.6g}) would float at this draft"
-    return found
+    if len(causes) == 1 and enough > 0.0:  # with wrong moorings the ballast is not the cause
+        causes["vertical"] += f"; ballast.mass = {enough:.6g} kg (now {ballast:.6g}) floats at this draft"
+    return causes
 
 
 def _mooring_causes(mooring, start, weight, net):
-    """{name: sentence} of what is wrong with the mooring of the undisplaced platform; net: vertical force."""
+    """Return {name: sentence} of faults of the undisplaced platform's mooring; net: vertical force, N."""
     span = mooring.anchor - mooring.fairlead
     along, up = np.hypot(span[:, 0], span[:, 1]), -span[:, 2]
     way = np.hypot(along, up)
     pull, tension, regime = start.lines[:, 0], start.lines[:, 2], start.lines[:, 5]
-    found = {}
-    # taut lines are short on purpose, but not against more than the platform's buoyancy
+    causes = {}
+    # taut lines are short on purpose, but must not exceed the excess buoyancy
     if net < -HEAVY * weight and (short := np.flatnonzero(mooring.length < way)).size:
         i = short[0]
-        found["short"] = (
-            f"{short.size} of {len(way)} mooring lines are shorter than the way from anchor to fairlead"
+        causes["short"] = (
+            f"{short.size} of {len(way)} mooring lines are shorter than the distance from anchor to fairlead"
             f" (line {i + 1}: length {mooring.length[i]:g} m against {way[i]:.4g} m, which takes"
             f" {_kilo(tension[i])} kN)"
         )
@@ -176,9 +176,9 @@ def _mooring_causes(mooring, start, weight, net):
         f" {mooring.EA[0]:g} N; {along[0]:.4g} m from anchor to fairlead and {up[0]:.4g} m up)"
     )
     if (regime == SLACK).all():
-        found["slack"] = f"all mooring lines hang slack and hold it nowhere {first}"
+        causes["slack"] = f"all mooring lines hang slack and provide no restoring force {first}"
     elif tension.sum() < WEAK * weight:
-        found["weak"] = (
+        causes["weak"] = (
             f"its mooring lines pull with {_kilo(tension.sum())} kN together, and it weighs"
             f" {_kilo(weight)} kN {first}"
         )
@@ -188,26 +188,26 @@ def _mooring_causes(mooring, start, weight, net):
         azimuths = in_radians(mooring.anchor, mooring.fairlead)
         shown = ", ".join(f"{azimuth:.4g}" for azimuth in (azimuths or ())[:4])
         hint = f": {shown} look like radians" if shown else ""
-        found["one-sided"] = (
+        causes["one-sided"] = (
             f"all mooring lines pull to the same side, with {_kilo(together)} kN (anchors at (x, y) ="
             f" {anchors} m; azimuth_deg is in degrees{hint})"
         )
-    return found
+    return causes
 
 
-def metacentre(scene, figures):
-    """Sentence on the stability of the undisplaced platform as a floating body; values: its Statics."""
-    buoyancy, height = figures.buoyancy_centre[2], figures.metacentric_height
+def metacentre(scene, undisplaced):
+    """Return a sentence on the stability of the undisplaced platform as a floating body, from its Statics."""
+    buoyancy, height = undisplaced.buoyancy_centre[2], undisplaced.metacentric_height
     shown = "" if isnan(buoyancy) else f", that of buoyancy at {buoyancy:.3g} m"
     return (
-        f"undisplaced its centre of mass is at z = {figures.mass_centre[2]:.3g} m{shown} and its metacentric"
-        f" height {min(height):.3g} m (ballast.cm_depth = {scene.platform.ballast.cm_depth:g} m is positive"
-        " downwards)"
+        f"undisplaced its centre of mass is at z = {undisplaced.mass_centre[2]:.3g} m{shown} and its"
+        f" metacentric height {min(height):.3g} m (ballast.cm_depth = {scene.platform.ballast.cm_depth:g} m"
+        " is positive downwards)"
     )
 
 
 def _growing(scene, slope):
-    """{motion: s in which it grows by a factor e} of what leaves an equilibrium with this slope by itself."""
+    """Return {motion: e-folding time s} of the unstable motions of an equilibrium with this slope."""
     draft = scene.platform.draft
     limit = GROWTH * scene.model.rigid_body.gravity / draft
     if np.max(np.linalg.eigvals(slope).real) <= limit:
@@ -215,15 +215,15 @@ def _growing(scene, slope):
     values, shapes = np.linalg.eig(slope)
     names = MOTION_LABELS if len(slope) == 6 else MOTION_LABELS[::2]  # in the plane: surge, heave, pitch
     arms = [0.5 * draft if name in MOTION_LABELS[3:] else 1.0 for name in names]
-    found = {}
+    times = {}
     for value, shape in zip(values, shapes.T, strict=True):
         if value.real > limit:
-            found[names[int(np.argmax(np.abs(shape) * arms))]] = 1.0 / sqrt(value.real)
-    return found
+            times[names[int(np.argmax(np.abs(shape) * arms))]] = 1.0 / sqrt(value.real)
+    return times
 
 
 def _left(scene, end):
-    """What is left of the balance at a state, in words: the largest force or moment, and of which loads."""
+    """Return a text on the imbalance at a state: the largest net force or moment, and its contributions."""
     loads = _by_load(scene, end)
     total = sum(loads.values())
     arm = 0.5 * scene.platform.draft
@@ -236,22 +236,22 @@ def _left(scene, end):
 
 
 def _by_load(scene, end):
-    """{load: (6,)} of all loads: force in inertial axes, moment about the centre of mass in body axes."""
+    """Return {load: (6,)}: force in inertial axes, moment about the centre of mass in body axes."""
     to_inertial, body = rotation_of(pose_of(end.x)), scene.model.rigid_body
     centre = np.array([body.s_x, body.s_y or 0.0, body.s_z]) / body.mass
     weight = -body.mass * body.gravity * to_inertial[2]
     wrenches = {name: end.cache[first : first + 6] for name, first in LOADS.items()}
     wrenches["weight"] = np.concatenate([weight, np.cross(centre, weight)])
     if scene.loads:
-        wrenches["own loads"] = end.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6] - sum(wrenches.values())
+        wrenches["custom loads"] = end.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6] - sum(wrenches.values())
     return {
         name: np.concatenate([to_inertial @ wrench[:3], wrench[3:] - np.cross(centre, wrench[:3])])
         for name, wrench in wrenches.items()
     }
 
 
-def _place(x):
-    """Return the surge, heave and platform pitch of a state, in words."""
+def _position(x):
+    """Return the surge, heave and platform pitch of a state as a text."""
     return (
         f"surge {x[State.SURGE]:.4g} m, heave {x[State.HEAVE]:.4g} m, platform pitch"
         f" {degrees(x[State.PLATFORM_PITCH]):.3g} deg"
@@ -259,15 +259,15 @@ def _place(x):
 
 
 def _sentences(causes):
-    """Return the causes as sentences in a row."""
+    """Return the causes as one text of sentences."""
     return " ".join(f"{text[0].upper()}{text[1:]}." for text in causes.values())
 
 
 def _shown(value):
-    """A number with at least three digits, and without an exponent where it is of any real platform."""
+    """Format a number with three significant digits, or as an integer from 100 to 1e9."""
     return f"{value:.0f}" if 100.0 <= abs(value) < 1e9 else f"{value:.3g}"
 
 
 def _kilo(value):
-    """Return a number of N or N m in kN or kN m."""
+    """Format a number of N or N m in kN or kN m."""
     return _shown(value / 1e3)

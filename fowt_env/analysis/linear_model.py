@@ -30,8 +30,8 @@ from fowt_env.scene.scene import check_scene
 
 # velocity steps are small because quadratic drag leaves a false damping proportional to them
 STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
-TOWER = ("tower_fore_aft", "tower_side_side", "tower_fore_aft_2", "tower_side_side_2")  # its deflections
-TOWER_BLOCKS = {"tower_deflection": ("", 1e-3), "tower_velocity": ("_rate", 1e-5)}  # ends of names, steps
+TOWER = ("tower_fore_aft", "tower_side_side", "tower_fore_aft_2", "tower_side_side_2")  # deflections
+TOWER_BLOCKS = {"tower_deflection": ("", 1e-3), "tower_velocity": ("_rate", 1e-5)}  # name suffixes, steps
 VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
 ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in a linear model, step)
     "pitch_rate": ("pitch_rate", 1e-5),
@@ -39,14 +39,14 @@ ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in 
 }
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
-FREQUENCY_ROUNDS = 4  # of finding a period and the added mass at it
-# internal blocks that linearize takes: memory has matrices of its own, and flat water has no waves to meet
+FREQUENCY_ROUNDS = 4  # iterations of a period and the added mass at that period
+# internal blocks that linearize supports; the filtered position has no effect in flat water
 LINEAR = ("radiation", "filtered position", "wake")
 DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
-MEMORY = "radiation_"  # begins the names of a memory's states
-WAKE = "wake_"  # begins the names of the states of dynamic inflow, four per annulus
+MEMORY = "radiation_"  # prefix of the states of radiation memory
+WAKE = "wake_"  # prefix of the states of dynamic inflow, four per annulus
 WAKE_STEP = 1e-3  # m/s, of the differences
-CYCLIC = ("tilt_", "yaw_")  # begin the names of states that single blades add, see multiblade.py
+CYCLIC = ("tilt_", "yaw_")  # prefixes of the cyclic states of individual pitch, see multiblade.py
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
 MEASURED = (
@@ -60,12 +60,12 @@ RECORDED = {  # output: column of the output row, SI
 }
 
 
-# what a state is measured as: the same quantity, or for velocities in body axes the rate of the position
+# state: field of a Measurement; for velocities in body axes the rate of the position
 MEASURED_AS = dict(zip(VELOCITIES, (f"{name}_rate" for name in MOTIONS), strict=True)) | {
     name: name for name in (*MOTIONS, "rotor_speed", "blade_pitch")
 }
 MEASURED_AS["generator_torque_in_force"] = "generator_torque"
-COLUMNS = {  # what it is recorded as, by simulate
+COLUMNS = {  # state: column of the output of simulate
     "surge": "PtfmSurge", "sway": "PtfmSway", "heave": "PtfmHeave",
     "roll": "PtfmRoll", "platform_pitch": "PtfmPitch", "yaw": "PtfmYaw",
     **dict(zip(VELOCITIES, (f"Ptfm{kind}V{axis}i" for kind in "TR" for axis in "xyz"), strict=True)),
@@ -90,7 +90,7 @@ def sampled(a, b, dt):
 
 
 def _state_space(matrices, states, inputs, outputs, name, *dt):
-    """Return control.StateSpace. Raises: InputError that names the extra to install."""
+    """Return a control.StateSpace. Raises: InputError naming the extra to install."""
     try:
         from control import ss
     except ImportError as error:
@@ -101,9 +101,9 @@ def _state_space(matrices, states, inputs, outputs, name, *dt):
 
 @dataclass(frozen=True)
 class DiscreteModel:
-    """x[k+1] = A x[k] + B u[k], y[k] = C x[k] + D u[k] of a LinearModel whose inputs are held over dt (s).
+    """Holds a LinearModel sampled by zero-order hold over dt (s): x[k+1] = A x[k] + B u[k], y = C x + D u.
 
-    The states are those of the LinearModel at the instants k dt, and so are names and units.
+    States, names and units are those of the LinearModel, at the instants k dt.
     """
 
     A: np.ndarray
@@ -116,24 +116,24 @@ class DiscreteModel:
     outputs: tuple
 
     def to_statespace(self):
-        """Return control.StateSpace in discrete time. Raises: InputError that names the extra to install."""
+        """Return a control.StateSpace in discrete time. Raises: InputError naming the extra to install."""
         matrices, names = (self.A, self.B, self.C, self.D), (self.states, self.inputs, self.outputs)
         return _state_space(matrices, *names, "fowt_sampled", self.dt)
 
 
 @dataclass(frozen=True)
 class LinearModel:
-    """dx/dt = A dx + B du + E df, dy = C dx + D du + F df about an operating point, azimuth-averaged (SI).
+    """Holds the linear model dx/dt = A dx + B du + E df, dy = C dx + D du + F df at an operating point (SI).
 
-    A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and outputs; E (m, 6)
-    and F (n, 6) take further forces on the hull (FORCES). point is the OperatingPoint. The first 14 states
-    are plant.state.STATES; those of dynamic inflow follow, wake_1 and so on, those of a flexible tower, its
-    deflections (TOWER) and their rates (tower_fore_aft_rate and so on), then those of ACTUATOR_STATES where
-    the plant has them, and last those of a body with radiation memory, radiation_1 and so on.
+    The model is azimuth-averaged. A (m, m), B (m, 3), C (n, m), D (n, 3) with the names in states, inputs and
+    outputs; E (m, 6) and F (n, 6) apply to further forces on the hull (FORCES). point is the OperatingPoint.
+    The first 14 states are plant.state.STATES, followed by the states that the plant has of: dynamic inflow
+    (wake_1 ...), deflections of a flexible tower (TOWER) and their rates (tower_fore_aft_rate ...),
+    ACTUATOR_STATES, and radiation memory (radiation_1 ...).
 
-    All are deviations from the operating point, whose states are `equilibrium` and whose inputs are
-    `equilibrium_inputs`; state() makes them from what is measured. Velocities (vx to wz) are those of the
-    body origin in body axes, the field of a Measurement that each is measured as is in MEASURED_AS.
+    All variables are deviations from the operating point, given by `equilibrium` and `equilibrium_inputs`;
+    state() computes the states from measurements. Velocities (vx to wz) are those of the body origin in body
+    axes; MEASURED_AS maps each state to its field of a Measurement.
     """
 
     A: np.ndarray
@@ -147,7 +147,7 @@ class LinearModel:
     outputs: tuple
     point: object
     cm_height: float  # of the whole turbine, body z, m
-    arm: float  # m, half the draft: weighs angles against translations when modes are named
+    arm: float  # m, half the draft: weight of angles relative to translations when modes are named
     scene: object = field(repr=False)
 
     def index(self, name):
@@ -166,64 +166,64 @@ class LinearModel:
         return self.outputs.index(name)
 
     def __repr__(self):
-        """Its size and where it holds, not the numbers of its matrices."""
+        """Return the size and the operating point as a text, without the matrices."""
         size = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs"
         return f"LinearModel({size}, at {self.point!r})"
 
     @property
     def x0(self):
-        """Return (m,) the states at the operating point."""
-        names, places, _ = plant_states(self.scene)
-        known = {name: self.point.state[each[0]] for name, each in zip(names, places, strict=True)}
-        return np.array([known.get(name, 0.0) for name in self.states])
+        """Return the states (m,) at the operating point."""
+        names, indices, _ = plant_states(self.scene)
+        values = {name: self.point.state[each[0]] for name, each in zip(names, indices, strict=True)}
+        return np.array([values.get(name, 0.0) for name in self.states])
 
     @property
     def equilibrium(self):
-        """Return pandas.Series (m,) of the states at the operating point, by name; units has their units."""
+        """Return a pandas.Series (m,) of the states at the operating point, by name; units: see `units`."""
         return pd.Series(self.x0, index=list(self.states), name="equilibrium")
 
     @property
     def equilibrium_inputs(self):
-        """pandas.Series (3,) of the inputs at the operating point, by name; the wind of none is NaN."""
+        """Return a pandas.Series (3,) of the inputs at the operating point, by name; NaN for no wind."""
         torque, blade_pitch = self.point.command[:2]
         wind = np.nan if self.point.wind_speed is None else self.point.wind_speed
         return pd.Series([torque, blade_pitch, wind], index=list(self.inputs), name="equilibrium")
 
     @property
     def units(self):
-        """Return {name: unit} of the states, inputs and outputs, SI; "" for those of memory and wake."""
-        known = UNITS | {name: "N" for name in self.outputs if name.startswith("fairlead_tension_")}
-        return {name: known.get(name, "") for name in (*self.states, *self.inputs, *self.outputs)}
+        """Return {name: unit} of the states, inputs and outputs, SI; "" for states of memory and wake."""
+        units = UNITS | {name: "N" for name in self.outputs if name.startswith("fairlead_tension_")}
+        return {name: units.get(name, "") for name in (*self.states, *self.inputs, *self.outputs)}
 
     @property
     def fields(self):
-        """Fields of a Measurement that state() reads: what a controller declares as its information."""
+        """Return the fields of a Measurement that state() reads, for a controller's `information`."""
         hidden = [name for name in self.states if name not in MEASURED_AS]
         if hidden:
             raise InputError(
-                f"state: {', '.join(hidden[:4])}{' ...' if len(hidden) > 4 else ''}: are not measured; take"
-                " the model without them (residualised of fowt_env.analysis.reduced_model), or an estimator"
+                f"state: {', '.join(hidden[:4])}{' ...' if len(hidden) > 4 else ''}: are not measured; use"
+                " a model without these states (fowt_env.analysis.reduced_model.residualised) or an estimator"
             )
         return tuple(MEASURED_AS[name] for name in self.states)
 
     @cached_property
     def _from_measurement(self):
-        """Return (places in a Measurement, (m, m) matrix, (m,) equilibrium) of state()."""
-        places = [int(Measure[field.upper()]) for field in self.fields]
-        return places, self._turning(euler=True), self.x0
+        """Return (indices in a Measurement, (m, m) matrix, (m,) equilibrium) for state()."""
+        indices = [int(Measure[field.upper()]) for field in self.fields]
+        return indices, self._turning(euler=True), self.x0
 
     @cached_property
     def _from_frame(self):
         """Return (columns of a run's DataFrame, (m, m) matrix times the factors to SI, (m,) equilibrium)."""
-        channels = {channel.name: channel for channel in FIXED_CHANNELS}
-        found = [channels[COLUMNS[name]] for name, _ in zip(self.states, self.fields, strict=True)]
-        columns = [channel.column for channel in found]
-        return columns, self._turning(euler=False) / [channel.scale for channel in found], self.x0
+        by_name = {channel.name: channel for channel in FIXED_CHANNELS}
+        channels = [by_name[COLUMNS[name]] for name, _ in zip(self.states, self.fields, strict=True)]
+        columns = [channel.column for channel in channels]
+        return columns, self._turning(euler=False) / [channel.scale for channel in channels], self.x0
 
     def _turning(self, euler):
-        """(m, m) from what is measured to the states: velocities into body axes at the operating point.
+        """Return the (m, m) matrix from measurements to states: velocities into body axes at the trim.
 
-        euler: angular velocities are given as rates of the Euler angles, else by inertial axes.
+        euler: angular velocities are rates of the Euler angles, else components in inertial axes.
         """
         turn = np.eye(len(self.states))
         body = rotation_of(pose_of(self.point.state)).T
@@ -239,16 +239,16 @@ class LinearModel:
         return turn
 
     def state(self, measured):
-        """Return (m,) deviation of the states from the operating point, from what is measured.
+        """Return the deviation (m,) of the states from the operating point, computed from measurements.
 
         measured: a Measurement (a controller has to declare `fields`), or a row of the DataFrame that
-        simulate returns, as a mapping of columns; of a whole DataFrame (rows, m).
-        Velocities are turned into body axes at the operating point's attitude, right to first order.
+        simulate returns, as a mapping of columns; a whole DataFrame gives (rows, m).
+        Velocities are rotated into body axes at the operating point's attitude, exact to first order.
         Raises: InputError if the model has states that are not measured, or a column is missing.
         """
         if isinstance(measured, Measurement):
-            places, turn, rest = self._from_measurement
-            return turn @ np.array([measured[place] for place in places]) - rest
+            indices, turn, rest = self._from_measurement
+            return turn @ np.array([measured[index] for index in indices]) - rest
         columns, turn, rest = self._from_frame
         if not isinstance(measured, Mapping) and not hasattr(measured, "loc"):
             raise InputError(
@@ -261,7 +261,7 @@ class LinearModel:
         return (turn @ np.array(values)).T - rest
 
     def discretize(self, dt):
-        """DiscreteModel whose inputs are held over dt (s), by the matrix exponential (zero-order hold).
+        """Return the DiscreteModel for inputs held over dt (s), by the matrix exponential (zero-order hold).
 
         Raises: InputError unless dt is positive.
         """
@@ -272,23 +272,23 @@ class LinearModel:
 
     @property
     def pitch_rests(self):
-        """Return whether the blade pitch rests on a limit: below rated, where no controller moves it."""
+        """Return whether the blade pitch is at a limit: below rated, where no controller moves the blades."""
         drive, pitch = self.scene.turbine.pitch_drive, self.point.state[State.BLADE_PITCH]
         return not drive.minimum + 1e-6 < pitch < drive.maximum - 1e-6
 
     def modes(self):
-        """Return [Mode] of the plant without control, slowest first."""
+        """Return the modes [Mode] of the plant without control, slowest first."""
         return modes(self.A, self.states, self.cm_height, self.arm)
 
     @cached_property
     def wave_filter(self):
-        """Return the WaveFilter: the causal model of the wave force that to_statespace() uses."""
+        """Return the WaveFilter, the causal model of the wave force that to_statespace() uses."""
         return fit_wave_filter(self.scene, self.point.state)
 
     def response(self, omega, inputs=("generator_torque", "blade_pitch_command", "wind_speed")):
-        """Return (n, outputs, inputs) complex frequency response at omega (n,) rad/s, waves without any fit.
+        """Return the complex frequency response (n, outputs, inputs) at omega (n,) rad/s, exact for waves.
 
-        inputs: names of inputs or "wave_elevation", the elevation at the hull's mean place.
+        inputs: names of inputs or "wave_elevation", the elevation at the hull's mean position.
         """
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
         every = (*self.inputs, "wave_elevation")
@@ -305,17 +305,17 @@ class LinearModel:
         return result
 
     def to_statespace(self, waves=None, inputs=None, outputs=None, name=None):
-        """Return control.StateSpace with named states, inputs and outputs (SI).
+        """Return a control.StateSpace with named states, inputs and outputs (SI).
 
-        waves: whether it has the force of waves; None: where the scene has a sea. It then has a last input,
-        wave_elevation, the elevation at the hull's mean place wave_filter.lead seconds ahead: the force of
-        waves at depth is not a causal function of the elevation. The states wave_1 ... are those of the
-        filter, whose errors wave_filter.errors lists by band; no input of the turbine moves them, so design
-        on the model without them.
-        inputs, outputs: names of those to keep, each one or several; None: all. To index a StateSpace of
-        python-control instead keeps them too, but plots then call it "fowt$indexed".
-        name: of the system, in titles of plots; None: "fowt", of a part "INPUTS to OUTPUTS".
-        Raises: InputError for unknown names, and that names the extra to install.
+        waves: whether to include the wave force; None: if the scene has a sea. The last input then is
+        wave_elevation, the elevation at the hull's mean position wave_filter.lead seconds ahead, because the
+        wave force at depth is not a causal function of the elevation. The states wave_1 ... are those of the
+        filter, whose errors are listed by band in wave_filter.errors; these states are not controllable, so
+        design on the model without waves.
+        inputs, outputs: names of those to keep, each one or several; None: all. Indexing a StateSpace of
+        python-control gives the same system, but plots then have the title "fowt$indexed".
+        name: of the system, in titles of plots; None: "fowt", or "INPUTS to OUTPUTS" for a subsystem.
+        Raises: InputError for unknown names, or naming the extra to install.
         """
         if waves is None:
             waves = sea_state_of(self.scene.sea).height > 0.0
@@ -329,7 +329,7 @@ class LinearModel:
         return _state_space((a, b[:, columns], c[rows], d[np.ix_(rows, columns)]), states, into, out, name)
 
     def _with_waves(self):
-        """(A, B, C, D, states) with the wave filter behind the plant and the elevation as last input."""
+        """Return (A, B, C, D, states) with the wave filter's states and the elevation as last input."""
         waves = self.wave_filter
         n, m = len(self.states), waves.B.size
         a = np.zeros((n + m, n + m))
@@ -342,7 +342,7 @@ class LinearModel:
 
 
 def chosen(kind, names, known):
-    """Tuple of names, one or several given, all known ones for None. Raises: InputError for unknown ones."""
+    """Return a tuple of names from one name, several, or None (all known). Raises: InputError if unknown."""
     if names is None:
         return tuple(known)
     names = (names,) if isinstance(names, str) else tuple(names)
@@ -353,29 +353,29 @@ def chosen(kind, names, known):
 
 
 def plant_states(scene):
-    """Return (names, places in the state vector, steps of differences) of the states, less memory.
+    """Return (names, indices in the state vector, difference steps) of the states, except radiation memory.
 
-    Of what each blade has the places are those of all blades, which move together.
+    A state of each blade has the indices of all blades, which move together.
     """
-    found = [(name, [int(i)], step) for name, i, step in zip(STATES, STATE_INDEX, STATE_STEPS, strict=True)]
+    rows = [(name, [int(i)], step) for name, i, step in zip(STATES, STATE_INDEX, STATE_STEPS, strict=True)]
     pitch = STATES.index("blade_pitch")
-    found[pitch] = ("blade_pitch", list(scene.pitch_states), STATE_STEPS[pitch])
+    rows[pitch] = ("blade_pitch", list(scene.pitch_states), STATE_STEPS[pitch])
     for name, first, size, *_ in scene.blocks:
         if name == "wake":
             each = size // scene.turbine.rotor.blades
-            places = (list(range(first + k, first + size, each)) for k in range(each))
-            found += [(f"{WAKE}{k}", blades, WAKE_STEP) for k, blades in enumerate(places, 1)]
+            indices = (list(range(first + k, first + size, each)) for k in range(each))
+            rows += [(f"{WAKE}{k}", blades, WAKE_STEP) for k, blades in enumerate(indices, 1)]
         elif name in TOWER_BLOCKS:
             end, step = TOWER_BLOCKS[name]
-            found += [(mode + end, [first + k], step) for k, mode in enumerate(TOWER[:size])]
+            rows += [(mode + end, [first + k], step) for k, mode in enumerate(TOWER[:size])]
         elif name in ACTUATOR_STATES:
             state, step = ACTUATOR_STATES[name]
-            found.append((state, list(range(first, first + size)), step))
-    return tuple(zip(*found, strict=True))
+            rows.append((state, list(range(first, first + size)), step))
+    return tuple(zip(*rows, strict=True))
 
 
 class Mode(NamedTuple):
-    """One oscillating mode."""
+    """Holds name, period and damping of one oscillating mode."""
 
     name: str  # the state with the largest participation
     period: float  # s
@@ -384,24 +384,24 @@ class Mode(NamedTuple):
 
 
 def modes(a, names, cm_height, arm):
-    """Return [Mode] of a system matrix a (n, n) with these state names, slowest first.
+    """Return the modes [Mode] of a system matrix a (n, n) with these state names, slowest first.
 
     A mode is named by its largest motion: translations of the centre of mass (at the water line a
     platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s,
-    deflections of the tower as they are.
-    Those of the radiation memory, of dynamic inflow, of a pitch drive with inertia and of single blades'
-    pitches are omitted: to which their states contribute most, by participation factors.
+    and tower deflections unscaled.
+    Modes dominated, by participation factors, by states of radiation memory, dynamic inflow, a pitch drive
+    with inertia or cyclic blade pitch are omitted.
     """
     values, vectors = np.linalg.eig(a)
-    found = []
+    result = []
     drive = DRIVE if "pitch_rate" in names else ()
-    remembered = [name.startswith((MEMORY, WAKE, *CYCLIC)) or name in drive for name in names]
-    water = np.zeros(len(values))
-    if any(remembered):
+    internal = [name.startswith((MEMORY, WAKE, *CYCLIC)) or name in drive for name in names]
+    fractions = np.zeros(len(values))
+    if any(internal):
         factors = np.abs(vectors * np.linalg.inv(vectors).T)
-        water = factors[remembered].sum(axis=0) / factors.sum(axis=0)
-    for value, vector, share in zip(values, vectors.T, water, strict=True):
-        if value.imag <= 1e-6 or share > 0.5:
+        fractions = factors[internal].sum(axis=0) / factors.sum(axis=0)
+    for value, vector, fraction in zip(values, vectors.T, fractions, strict=True):
+        if value.imag <= 1e-6 or fraction > 0.5:
             continue
         part = dict(zip(names, vector, strict=True))
         participation = {
@@ -414,8 +414,8 @@ def modes(a, names, cm_height, arm):
         }
         name = max(participation, key=participation.get)
         size = abs(value)
-        found.append(Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / size), float(size)))
-    return sorted(found, key=lambda mode: -mode.period)
+        result.append(Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / size), float(size)))
+    return sorted(result, key=lambda mode: -mode.period)
 
 
 @inlined_kernel
@@ -449,21 +449,21 @@ def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, m
 
 
 class Plant:
-    """State rates and outputs of a scene without fluctuations at any state, command and further force."""
+    """Computes state rates and outputs of a scene without fluctuations at a state, command and hull force."""
 
     def __init__(self, scene, n_lines):
         self.handle = scene.handle()
         self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + n_lines)]
         self.measures = [Measure[name.upper()] for name in MEASURED]
-        names, places, _ = plant_states(scene)
-        self.states = [each[0] for each in places]
+        names, indices, _ = plant_states(scene)
+        self.states = [each[0] for each in indices]
         self.wake = [i for i, name in enumerate(names) if name.startswith(WAKE)]
-        self.annuli = [places[i] for i in self.wake]  # in wind with shear their blades' rates differ
+        self.annuli = [indices[i] for i in self.wake]  # averaged over blades, whose rates differ in shear
         sizes = (scene.n_state, scene.n_measurements, len(scene.channels))
         self.scratch, self.means = tuple(map(np.zeros, sizes)), tuple(map(np.zeros, sizes))
 
     def __call__(self, x, u, force):
-        """Return the rates of plant_states and the outputs."""
+        """Return the rates of plant_states followed by the outputs."""
         _mean_response(self.handle, x, u, force, AZIMUTHS, *self.scratch, *self.means)
         rates, measured, recorded = self.means
         of_states = rates[self.states]
@@ -478,13 +478,13 @@ def check_linear(scene, known=LINEAR):
     if internal:
         hint = " (dynamic_inflow=False)" if "wake" in internal else ""
         raise InputError(
-            f"linearize: the states of {', '.join(internal)} are not linearised: build the scene without"
+            f"linearize: the states of {', '.join(internal)} cannot be linearised: build the scene without"
             f" them{hint}"
         )
 
 
 def steady_parts(scene, point):
-    """Return {path: part} of the model that is differentiated about an OperatingPoint."""
+    """Return {path: part} to replace for linearisation: platform fixed as in point, linear actuator."""
     body = scene.model.rigid_body._replace(platform_fixed=point.platform == "fixed")
     return {"rigid_body": body, "actuator": linear_actuator(scene.model.actuator)}
 
@@ -492,23 +492,23 @@ def steady_parts(scene, point):
 def linearize(scene, operating_point=None, *, wind=None):
     """Return the LinearModel of a scene about an operating point (default: its floating trim).
 
-    wind: mean hub wind of that trim (m/s) in place of the scene's own; a controller's `prepare` takes the
-    models over the wind with it.
+    wind: mean hub wind of the trim (m/s) instead of the scene's wind; a controller's `prepare` can linearise
+    over the wind speed by this argument.
 
-    The wind input moves the hub wind with its shear; waves are flat, and their small force comes in by
-    wave_force. Drag has no linear part at rest in still water, so viscous damping is absent there. Radiation
-    memory comes in exactly, in a scene with convolution by the fit that state_space takes. The wake of
-    dynamic inflow comes in by annulus: wake_1 to 4 are those of the innermost station (aero/wake.py). A pitch
-    drive counts without deadband and friction. blade_pitch is that of all blades together.
+    The wind input changes the hub wind together with its shear; waves are flat, and wave_force adds their
+    first-order force. Drag has no linear part at rest in still water, so viscous damping is absent there.
+    Radiation memory is included exactly, for the convolution by the fit of the state-space option. Dynamic
+    inflow has four states per annulus: wake_1 to 4 are those of the innermost station (aero/wake.py).
+    Deadband and friction of a pitch drive are omitted. blade_pitch is the collective pitch.
 
-    Raises: InputError if the scene has any, for a wind in a scene without aerodynamics, and for a wind beside
-    an operating point, which has its own.
+    Raises: InputError for a scene with other internal states, for a wind in a scene without aerodynamics, and
+    for a wind together with an operating point.
     """
     check_scene(scene)
     check_linear(scene)
     if wind is not None:
         if operating_point is not None:
-            raise InputError(f"wind = {short(wind)}: the operating point has its own wind; name one of them")
+            raise InputError(f"wind = {short(wind)}: an operating point has a wind already; give one only")
         scene = scene.with_weather(wind=check_number("wind", wind, 0.0))
     point = trim(scene) if operating_point is None else operating_point
     parts = steady_parts(scene, point)
@@ -518,13 +518,13 @@ def linearize(scene, operating_point=None, *, wind=None):
         return Plant(without_fluctuations(scene, speed).with_model(parts), scene.n_lines)
 
     plant = plant_at(point.wind_speed)
-    names, places, state_steps = plant_states(scene)
+    names, indices, state_steps = plant_states(scene)
 
-    def slopes(vector, indices, steps):
-        pairs = zip(indices, steps, strict=True)
+    def slopes(vector, entries, steps):
+        pairs = zip(entries, steps, strict=True)
         return [central_difference(lambda: plant(x, u, force), vector, *each) for each in pairs]
 
-    of_states = slopes(x, places, state_steps)
+    of_states = slopes(x, indices, state_steps)
     of_inputs = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
     of_inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force), point, of_inputs[0]))
     of_forces = slopes(force, range(6), FORCE_STEPS)
@@ -540,8 +540,8 @@ def wind_slope(evaluate, point, like):
 
 
 def assembled(scene, point, columns, states, inputs=(), outputs=()):
-    """Return the LinearModel of columns by states, inputs and forces, with additional names."""
-    of_states, of_inputs, of_forces = (np.array(found).T for found in columns)
+    """Return the LinearModel of derivative columns by states, inputs and forces, with additional names."""
+    of_states, of_inputs, of_forces = (np.array(group).T for group in columns)
     n, body = len(states), scene.model.rigid_body
     tensions = tuple(f"fairlead_tension_{i + 1}" for i in range(scene.n_lines))
     model = LinearModel(
@@ -553,9 +553,10 @@ def assembled(scene, point, columns, states, inputs=(), outputs=()):
 
 
 def with_memory(model, memory):
-    """Return LinearModel with the states of a scene.radiation_fit.LinearMemory; unchanged if that is None.
+    """Return the LinearModel with the states of a scene.radiation_fit.LinearMemory; unchanged for None.
 
-    The platform rests at the operating point, so velocities turn into inertial axes by its attitude alone.
+    The platform is at rest at the operating point, so velocities are rotated into inertial axes by the
+    attitude alone.
     """
     if memory is None:
         return model
@@ -580,9 +581,9 @@ def with_memory(model, memory):
 def natural_periods(scene):
     """Return {motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
-    Those of a flexible tower follow, named by TOWER. A motion without restoring (no moorings) gets inf.
+    Tower modes of a flexible tower follow, named by TOWER. A motion without restoring (no moorings) gets inf.
     Modes are named by their largest motion, angles weighted with half the draft. With radiation memory the
-    mass is that at the motion's own frequency.
+    added mass is taken at the natural frequency of the motion.
     """
     model = linearize(scene)
     periods = _periods(model, 0.0)
@@ -599,16 +600,16 @@ def _periods(model, omega):
     deflections = [name for name in TOWER if name in model.states]
     names = (*MOTIONS, *deflections)
     n = len(names)
-    places = [model.index(name) for name in names]
+    positions = [model.index(name) for name in names]
     speeds = [model.index(name) for name in (*VELOCITIES, *(f"{name}_rate" for name in deflections))]
     memory = [i for i, name in enumerate(model.states) if name.startswith(MEMORY)]
-    # velocities are body components, so positions move with kinematics K: q' = K v, v' = S q
-    kinematics, stiffness = model.A[np.ix_(places, speeds)], model.A[np.ix_(speeds, places)]
+    # velocities are body components, so positions follow from the kinematics K: q' = K v, v' = S q
+    kinematics, stiffness = model.A[np.ix_(positions, speeds)], model.A[np.ix_(speeds, positions)]
     if memory:
-        # v' = S q + N z, z' = Z z + L v: of the part of N z in phase with v' = i w v, at rest for w to 0
+        # v' = S q + N z, z' = Z z + L v: the part of N z in phase with v' = i w v acts as added mass
         into, out = model.A[np.ix_(memory, speeds)], model.A[np.ix_(speeds, memory)]
-        own = model.A[np.ix_(memory, memory)]
-        square = own @ own + omega**2 * np.eye(own.shape[0])
+        within = model.A[np.ix_(memory, memory)]
+        square = within @ within + omega**2 * np.eye(within.shape[0])
         stiffness = np.linalg.solve(np.eye(n) + out @ np.linalg.solve(square, into), stiffness)
     values, vectors = np.linalg.eig(kinematics @ stiffness)
     scale = np.array([model.arm if name in MOTIONS[3:] else 1.0 for name in names])

@@ -1,6 +1,6 @@
 """Computes stability margins of a linear model under a linear controller at the plant's input.
 
-With G from the controller's commands to its measurements and the law u = K y, the sensitivity is
+With G from the controller's commands to the measurements and the law u = K y, the sensitivity is
 S = (I - K G)^-1 and the loop transfer L = -K G. With one input opened and the others closed,
 1 + L_i = 1/S_ii. Sources: Skogestad and Postlethwaite, Multivariable Feedback Control, 2nd ed. (2005),
 sections 2.4 and 6.2 (margins, peak of S); Seiler, Packard and Gahinet, An introduction to disk margins, IEEE
@@ -21,31 +21,31 @@ from fowt_env.errors import InputError
 
 MOVED = ("generator_torque", "blade_pitch_command")  # inputs that a controller may move
 LOWEST, HIGHEST = 1e-4, 1e3  # rad/s, of the search
-PER_DECADE = 400  # frequencies; about each pole there are more
-AROUND_POLE = np.linspace(-4.0, 4.0, 41)  # in units of its real part
+PER_DECADE = 400  # frequencies, with additional ones about each pole
+AROUND_POLE = np.linspace(-4.0, 4.0, 41)  # in units of the pole's real part
 TOLERANCE = 1e-10  # rad/s over rad/s, of a crossing
 
 
 class LinearLaw(NamedTuple):
-    """dx/dt = A x + B y, u = C x + D y: a controller that reads y and moves inputs u of the plant."""
+    """Defines a linear controller dx/dt = A x + B y, u = C x + D y, plant outputs y and plant inputs u."""
 
     A: np.ndarray  # (n, n)
     B: np.ndarray  # (n, r)
     C: np.ndarray  # (m, n)
     D: np.ndarray  # (m, r)
-    outputs: tuple[str, ...]  # (r) that it reads: outputs or states of the LinearModel
-    inputs: tuple[str, ...]  # (m) of the LinearModel that it moves
+    outputs: tuple[str, ...]  # (r) y: outputs or states of the LinearModel
+    inputs: tuple[str, ...]  # (m) u: inputs of the LinearModel
 
 
 class LoopMargins(NamedTuple):
-    """Margins of one input, opened alone, the others closed; inf where no frequency limits it."""
+    """Holds the margins of one input with its loop opened and the others closed; inf: unlimited."""
 
-    gain: float  # smallest factor above 1 on the loop's gain that makes it unstable
-    gain_reduction: float  # largest factor below 1 that does; 0: none
-    phase: float  # deg of lag or lead, whichever is less, that make it unstable
-    delay: float  # s that make it unstable
+    gain: float  # smallest destabilising factor above 1 on the loop gain
+    gain_reduction: float  # largest destabilising factor below 1; 0: none
+    phase: float  # deg, smallest destabilising lag or lead
+    delay: float  # s, smallest destabilising delay
     modulus: float  # least |1 + L|: distance of the Nyquist curve from -1
-    gain_frequency: float  # rad/s, of each
+    gain_frequency: float  # rad/s; frequencies of the margins above
     gain_reduction_frequency: float
     phase_frequency: float
     delay_frequency: float
@@ -54,9 +54,9 @@ class LoopMargins(NamedTuple):
 
 @dataclass(frozen=True)
 class Margins:
-    """What margins() returns."""
+    """Holds the stability margins of a closed loop."""
 
-    stable: bool  # the closed loop; where it is not, the rest says what separates it from another state
+    stable: bool  # whether the closed loop is stable; if not, margins are distances to a stability boundary
     loops: dict[str, LoopMargins]  # by input
     sensitivity_peak: float  # Ms: largest singular value of S over frequency, inputs scaled as by least_size
     peak_frequency: float  # rad/s
@@ -64,7 +64,7 @@ class Margins:
 
     @property
     def modulus(self) -> float:
-        """Return 1/Ms, for one input the least distance of the Nyquist curve from -1."""
+        """Return 1/Ms: for one input, the least distance of the Nyquist curve from -1."""
         return 1.0 / self.sensitivity_peak
 
     @property
@@ -79,7 +79,7 @@ class Margins:
 
     @property
     def disk_gain(self) -> tuple[float, float]:
-        """Return (low, high) factors that all inputs may have at once, each its own."""
+        """Return the disk gain margin (low, high): gain factors that may vary independently in all inputs."""
         half = 0.5 * self.disk
         if half >= 1.0:
             return 0.0, inf
@@ -87,7 +87,7 @@ class Margins:
 
     @property
     def disk_phase(self) -> float:
-        """Return the largest phase (deg) that all inputs may have at once, each its own."""
+        """Return the disk phase margin (deg): phases up to it may vary independently in all inputs."""
         return degrees(2.0 * atan(0.5 * self.disk))
 
 
@@ -97,13 +97,13 @@ def linear_law(
     outputs: str | Sequence[str] | None = None,
     inputs: str | Sequence[str] | None = None,
 ) -> LinearLaw:
-    """Return the LinearLaw of a controller in any of its forms, see margins. Raises: InputError."""
+    """Return the LinearLaw of a controller in any of the forms listed in margins. Raises: InputError."""
     if isinstance(controller, LinearLaw):
         return controller
     known = (*model.outputs, *(name for name in model.states if name not in model.outputs))
     if all(hasattr(controller, name) for name in ("A", "B", "C", "D", "input_labels", "output_labels")):
         if getattr(controller, "dt", 0) not in (0, None):
-            raise InputError("controller: is in discrete time; margins are those of a continuous one")
+            raise InputError("controller: is in discrete time; must be in continuous time")
         read = chosen("output", controller.input_labels if outputs is None else outputs, known)
         moved = chosen("input", controller.output_labels if inputs is None else inputs, MOVED)
         matrices = tuple(np.atleast_2d(np.asarray(getattr(controller, n), dtype=float)) for n in "ABCD")
@@ -139,18 +139,19 @@ def margins(
 ) -> Margins:
     """Return the margins of a LinearModel under a linear controller, in continuous time.
 
-    controller: the law u = K y of deviations with the sign that it has on the turbine (the gain of an LQR,
-    u = -K x, is given as -K), as
+    controller: the law u = K y of deviations with the sign used on the turbine (for an LQR, u = -K x, pass
+    -K), as
 
         (KP, KI)             gains of a PI law, by default from generator speed to blade pitch: s, -
         a matrix (m, r)      gains, by default from all states to the blade pitch, or with m = 2 to generator
                              torque and blade pitch
-        a control.StateSpace from outputs or states of the model to its inputs, by its labels
+        a control.StateSpace from outputs or states of the model to the model's inputs, by its labels
         a LinearLaw
 
-    outputs, inputs: names of what it reads (outputs or states) and moves, in place of these.
-    A controller of a sampled system lags by half its period and by its computation: compare the delay margin.
-    Raises: InputError for names that the model has not, other shapes, and a controller in discrete time.
+    outputs, inputs: names of the controller's inputs (outputs or states of the model) and outputs (inputs of
+    the model), instead of these defaults.
+    A sampled controller lags by half its period plus its computation time: compare with the delay margin.
+    Raises: InputError for unknown names, other shapes, and a controller in discrete time.
     """
     law = linear_law(model, controller, outputs, inputs)
     plant = _plant_of(model, law)
@@ -173,11 +174,11 @@ def margins(
 
 
 def least_size(matrices: np.ndarray) -> np.ndarray:
-    """(k,) least of the largest singular values of D M D^-1 over diagonal D, of M (k, m, m) with m = 1 or 2.
+    """Return the minimum (k,) over diagonal D of the largest singular value of D M D^-1; M (k, m, m), m <= 2.
 
-    So units of the inputs do not matter, and it is the structured singular value of factors that each input
-    has of its own. Of two inputs the product of the singular values is |det M| whatever D, so that the larger
-    is least where the sum of their squares is: with entries beside the diagonal of the same size.
+    The result does not depend on the units of the inputs; it is the structured singular value for
+    independent factors on each input. For two inputs the product of the singular values is |det M| for any
+    D, so that the larger is least where the sum of squares is: for off-diagonal entries of equal magnitude.
     """
     if matrices.shape[-1] == 1:
         return np.abs(matrices[:, 0, 0])
@@ -189,17 +190,17 @@ def least_size(matrices: np.ndarray) -> np.ndarray:
 
 
 def _plant_of(model, law):
-    """Return (A, B, C, D) of the model from what the law moves to what it reads."""
+    """Return (A, B, C, D) of the model from the inputs to the outputs of the law."""
     columns = [model.inputs.index(name) for name in law.inputs]
-    known = (*model.outputs, *model.states)
-    rows = [known.index(name) for name in law.outputs]
+    signals = (*model.outputs, *model.states)
+    rows = [signals.index(name) for name in law.outputs]
     c = np.vstack([model.C, np.eye(len(model.states))])[rows]
     d = np.vstack([model.D, np.zeros((len(model.states), len(model.inputs)))])[np.ix_(rows, columns)]
     return model.A, model.B[:, columns], c, d
 
 
 def closed_loop(plant: tuple, law: LinearLaw) -> np.ndarray:
-    """Return (n + k, n + k) system matrix of a plant (A, B, C, D) and a law that reads its outputs."""
+    """Return the (n + k, n + k) system matrix of a plant (A, B, C, D) in closed loop with a law."""
     a, b, c, d = plant
     # u = N (Dk C x + Ck xk) with N = (I - Dk D)^-1
     inverse = np.linalg.inv(np.eye(b.shape[1]) - law.D @ d)
@@ -209,7 +210,7 @@ def closed_loop(plant: tuple, law: LinearLaw) -> np.ndarray:
 
 
 def _sensitivity(plant, law):
-    """Return the function of frequencies (k,) that returns S (k, m, m)."""
+    """Return the sensitivity S (k, m, m) as a function of frequencies (k,)."""
     a, b, c, d = plant
     m = b.shape[1]
 
@@ -228,7 +229,7 @@ def _sensitivity(plant, law):
 
 
 def _frequencies(poles):
-    """Return the increasing frequencies (rad/s) of the search, closer about each pole."""
+    """Return the increasing frequencies (rad/s) of the search, refined about each pole."""
     decades = np.log10(HIGHEST / LOWEST)
     even = np.logspace(np.log10(LOWEST), np.log10(HIGHEST), int(decades * PER_DECADE) + 1)
     near = (abs(pole.imag) + AROUND_POLE * max(abs(pole.real), 1e-9) for pole in poles)
@@ -237,19 +238,19 @@ def _frequencies(poles):
 
 
 def _largest(function: Callable[[float], float], grid, values):
-    """Return (largest value, frequency) of a function known on a grid, refined about its peak."""
+    """Return (largest value, frequency) of a function with values on a grid, refined about the peak."""
     k = int(np.argmax(values))
     low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
-    found = minimize_scalar(
+    peak = minimize_scalar(
         lambda w: -function(w), bounds=(low, high), method="bounded", options={"xatol": TOLERANCE * high}
     )
-    return (-found.fun, found.x) if -found.fun > values[k] else (values[k], grid[k])
+    return (-peak.fun, peak.x) if -peak.fun > values[k] else (values[k], grid[k])
 
 
 def _crossings(function, grid, values):
-    """Return the frequencies at which a real function, known on a grid, changes its sign."""
-    places = np.flatnonzero(np.diff(np.signbit(values)))
-    return [brentq(function, grid[k], grid[k + 1], xtol=TOLERANCE * grid[k], rtol=1e-13) for k in places]
+    """Return the frequencies at which a real function with values on a grid changes sign."""
+    cells = np.flatnonzero(np.diff(np.signbit(values)))
+    return [brentq(function, grid[k], grid[k + 1], xtol=TOLERANCE * grid[k], rtol=1e-13) for k in cells]
 
 
 def _loop_margins(loop: Callable[[float], complex], grid, values):
@@ -259,7 +260,7 @@ def _loop_margins(loop: Callable[[float], complex], grid, values):
         value = loop(w)
         if value.real < 0.0:
             gains.append((1.0 / abs(value), w))
-    # (lag in (0, 360) deg that puts it at -1, frequency) of each crossing of the unit circle
+    # (lag in (0, 360) deg from L to -1, frequency) at each crossing of the unit circle
     circle = _crossings(lambda w: abs(loop(w)) - 1.0, grid, np.abs(values) - 1.0)
     phases = [((degrees(np.angle(loop(w))) + 180.0) % 360.0, w) for w in circle]
     up = min((g for g in gains if g[0] > 1.0), default=(inf, inf))
@@ -267,5 +268,5 @@ def _loop_margins(loop: Callable[[float], complex], grid, values):
     phase = min(((min(lag, 360.0 - lag), w) for lag, w in phases), default=(inf, inf))
     delay = min(((lag * DEGREE / w, w) for lag, w in phases), default=(inf, inf))
     inverse, where = _largest(lambda w: 1.0 / abs(1.0 + loop(w)), grid, 1.0 / np.abs(1.0 + values))
-    found = (up[0], down[0], phase[0], delay[0], 1.0 / inverse, up[1], down[1], phase[1], delay[1], where)
-    return LoopMargins(*(float(value) for value in found))
+    row = (up[0], down[0], phase[0], delay[0], 1.0 / inverse, up[1], down[1], phase[1], delay[1], where)
+    return LoopMargins(*(float(value) for value in row))

@@ -2,7 +2,7 @@
 
 A quantity q_i of the blades i = 1, 2, 3 at the azimuths psi_i is q_i = q_0 + q_c cos psi_i + q_s sin psi_i,
 psi = 0 up: q_0 is collective, q_c the tilt and q_s the yaw component. At each azimuth the plant is
-differentiated by these coordinates and its outputs are transformed to them; the derivatives are averaged
+differentiated by these coordinates and the outputs are transformed to them; the derivatives are averaged
 over the azimuth. Variations at 3P in sheared wind are omitted.
 """
 
@@ -40,14 +40,14 @@ MOMENTS = (*NOT_TURNING, *(f"{name}{part}" for name in OF_ROOTS for part in ("",
 
 @entry
 def _mean_response(
-    handle, x, u, force, cyclic, places, azimuths, y, v, dx, measurement, row, rates, turned, measured,
+    handle, x, u, force, cyclic, blade_states, azimuths, y, v, dx, measurement, row, rates, turned, measured,
     moments, recorded,
 ):  # fmt: skip
-    """Fill the azimuth means of rates and outputs at a state with cyclic parts.
+    """Fill the azimuth means of rates and outputs at a state with cyclic components.
 
-    cyclic (k + 1, 2): cosine and sine parts of what each blade has, by the rows of places (k, 3), its indices
-    in the state, and of the pitch commands. turned (k, 2): those of the rates; moments: as MOMENTS. y, v, dx,
-    measurement, row: scratch.
+    cyclic (k + 1, 2): cosine and sine components of the blades' states, whose indices are the rows of
+    blade_states (k, 3), and of the pitch commands. turned (k, 2): cosine and sine components of the rates;
+    moments: as MOMENTS. y, v, dx, measurement, row: scratch.
     """
     model, data = model_of(handle), data_of(handle)
     rates[:] = 0.0
@@ -55,7 +55,7 @@ def _mean_response(
     measured[:] = 0.0
     moments[:] = 0.0
     recorded[:] = 0.0
-    blocks = places.shape[0]
+    blocks = blade_states.shape[0]
     for i in range(azimuths):
         azimuth = x[State.AZIMUTH] + i * (2.0 * pi / BLADES) / azimuths
         y[:] = x
@@ -64,7 +64,7 @@ def _mean_response(
         for blade in range(BLADES):
             psi = azimuth + blade * 2.0 * pi / BLADES
             for k in range(blocks):
-                y[places[k, blade]] += cyclic[k, 0] * cos(psi) + cyclic[k, 1] * sin(psi)
+                y[blade_states[k, blade]] += cyclic[k, 0] * cos(psi) + cyclic[k, 1] * sin(psi)
             v[Command.BLADE_PITCH + blade] += cyclic[blocks, 0] * cos(psi) + cyclic[blocks, 1] * sin(psi)
         fill_response(y, v, force, model, data, dx, measurement, row)
         rates += dx / azimuths
@@ -76,8 +76,8 @@ def _mean_response(
             psi = azimuth + blade * 2.0 * pi / BLADES
             c, s = 2.0 * cos(psi) / BLADES / azimuths, 2.0 * sin(psi) / BLADES / azimuths
             for k in range(blocks):
-                turned[k, 0] += c * dx[places[k, blade]]
-                turned[k, 1] += s * dx[places[k, blade]]
+                turned[k, 0] += c * dx[blade_states[k, blade]]
+                turned[k, 1] += s * dx[blade_states[k, blade]]
             for j in range(2):
                 root = measurement[N_MEASUREMENTS + BladeMeasure.ROOT_OUT_OF_PLANE_1 + BLADES * j + blade]
                 moments[4 + 3 * j] += root / BLADES / azimuths
@@ -86,27 +86,29 @@ def _mean_response(
     for k in range(blocks):
         mean = 0.0
         for blade in range(BLADES):
-            mean += rates[places[k, blade]] / BLADES
-        rates[places[k, 0]] = mean
-        # d(q_c cos psi + q_s sin psi)/dt: the coordinates stand still, the blades turn
+            mean += rates[blade_states[k, blade]] / BLADES
+        rates[blade_states[k, 0]] = mean
+        # d(q_c cos psi + q_s sin psi)/dt: the coordinates do not rotate with the blades
         turned[k, 0] -= x[State.ROTOR_SPEED] * cyclic[k, 1]
         turned[k, 1] += x[State.ROTOR_SPEED] * cyclic[k, 0]
     data.cache[LoadCache.VALID] = 0.0
 
 
 class _Plant(Plant):
-    """Rates and outputs of a scene without fluctuations, in multi-blade coordinates."""
+    """Computes rates and outputs of a scene without fluctuations, in multi-blade coordinates."""
 
-    def __init__(self, scene, places):
+    def __init__(self, scene, blade_states):
         super().__init__(scene, scene.n_lines)
-        self.places = places
+        self.blade_states = blade_states
         n, fields, rows = scene.n_state, scene.n_measurements, len(scene.channels)
         self.scratch = tuple(map(np.zeros, (n, scene.n_commands, n, fields, rows)))
-        self.means = tuple(map(np.zeros, (n, (len(places), 2), fields, len(MOMENTS), rows)))
+        self.means = tuple(map(np.zeros, (n, (len(blade_states), 2), fields, len(MOMENTS), rows)))
 
     def __call__(self, x, u, force, cyclic):
-        """Return the rates of the states and of the cyclic ones, then the outputs."""
-        _mean_response(self.handle, x, u, force, cyclic, self.places, AZIMUTHS, *self.scratch, *self.means)
+        """Return the rates of the states and of the cyclic components, then the outputs."""
+        _mean_response(
+            self.handle, x, u, force, cyclic, self.blade_states, AZIMUTHS, *self.scratch, *self.means
+        )
         rates, turned, measured, moments, recorded = self.means
         return np.r_[
             rates[self.states], turned.ravel(), measured[self.measures], recorded[self.columns], moments
@@ -114,41 +116,42 @@ class _Plant(Plant):
 
 
 def linearize_blades(scene, operating_point=None):
-    """LinearModel of a scene with pitch="individual" in multi-blade coordinates, averaged over the azimuth.
+    """Return the LinearModel of a scene with pitch="individual" in multi-blade coordinates (azimuth mean).
 
-    Beside the states, inputs and outputs of linearize it has the states tilt_pitch and yaw_pitch (of a drive
-    with inertia their rates too: CYCLIC), rad, the inputs CYCLIC_INPUTS, rad, and the outputs MOMENTS, N m:
-    those at hub and yaw bearing, and of the blade roots the mean, cosine (tilt) and sine (yaw) parts. States
-    and inputs of linearize are those of all blades together. operating_point: default, its floating trim,
-    at which all blades have the same pitch.
+    In addition to the states, inputs and outputs of linearize, the model has the states tilt_pitch and
+    yaw_pitch, rad (and tilt_pitch_rate, yaw_pitch_rate for a drive with inertia), the inputs CYCLIC_INPUTS,
+    rad, and the outputs MOMENTS, N m: moments at hub and yaw bearing, and mean, cosine (tilt) and sine (yaw)
+    components of the blade root moments. States and inputs of linearize are collective. operating_point:
+    default, the floating trim of the scene, at which all blades have the same pitch.
 
-    Raises: InputError for a scene with one pitch for all blades, and as linearize.
+    Raises: InputError for a scene with collective pitch, and as linearize.
     """
     if scene.model.pitches is None:
         raise InputError(
-            "linearize_blades: the scene has one pitch for all blades; build it with pitch='individual'"
+            "linearize_blades: the scene has collective pitch; build the scene with pitch='individual'"
         )
-    check_linear(scene, [name for name in LINEAR if name != "wake"])  # which would have cyclic parts too
+    check_linear(scene, [name for name in LINEAR if name != "wake"])  # cyclic wake states are not implemented
     point = trim(scene) if operating_point is None else operating_point
-    names, together, state_steps = plant_states(scene)
-    own = [i for i, indices in enumerate(together) if len(indices) == BLADES]
-    places = np.array([together[i] for i in own])
+    names, collective, state_steps = plant_states(scene)
+    bladed = [i for i, indices in enumerate(collective) if len(indices) == BLADES]
+    blade_states = np.array([collective[i] for i in bladed])
     parts = steady_parts(scene, point)
-    x, u, force, cyclic = point.state.copy(), point.command.copy(), np.zeros(6), np.zeros((len(own) + 1, 2))
+    x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
+    cyclic = np.zeros((len(bladed) + 1, 2))
 
     def plant_at(speed):
-        return _Plant(without_fluctuations(scene, speed).with_model(parts), places)
+        return _Plant(without_fluctuations(scene, speed).with_model(parts), blade_states)
 
     plant = plant_at(point.wind_speed)
 
     def slope(array, index, step):
         return central_difference(lambda: plant(x, u, force, cyclic), array, index, step)
 
-    columns = [slope(x, indices, step) for indices, step in zip(together, state_steps, strict=True)]
-    columns += [slope(cyclic, (k, part), state_steps[i]) for k, i in enumerate(own) for part in range(2)]
+    columns = [slope(x, indices, step) for indices, step in zip(collective, state_steps, strict=True)]
+    columns += [slope(cyclic, (k, part), state_steps[i]) for k, i in enumerate(bladed) for part in range(2)]
     inputs = [slope(u, 0, INPUT_STEPS[0]), slope(u, list(range(1, scene.n_commands)), INPUT_STEPS[1])]
     inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force, cyclic), point, inputs[0]))
-    inputs += [slope(cyclic, (len(own), part), INPUT_STEPS[1]) for part in range(2)]
+    inputs += [slope(cyclic, (len(bladed), part), INPUT_STEPS[1]) for part in range(2)]
     forces = [slope(force, i, FORCE_STEPS[i]) for i in range(6)]
-    states = (*names, *(f"{part}{names[i].removeprefix('blade_')}" for i in own for part in CYCLIC))
+    states = (*names, *(f"{part}{names[i].removeprefix('blade_')}" for i in bladed for part in CYCLIC))
     return assembled(scene, point, (columns, inputs, forces), states, CYCLIC_INPUTS, MOMENTS)

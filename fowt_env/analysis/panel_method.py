@@ -1,7 +1,7 @@
-"""First-order potential-flow coefficients of a hull from its panel mesh, by Capytaine's boundary elements.
+"""Computes first-order potential-flow coefficients of a hull from a panel mesh, by Capytaine.
 
-Capytaine (optional, `pip install "fowt-env[hydro]"`) solves the radiation and diffraction problems; what is
-done here is the choice of problems, the conventions and the hydrostatics that go into a PotentialFlow.
+Capytaine (optional, `pip install "fowt-env[hydro]"`) solves the radiation and diffraction problems by
+boundary elements; this module defines the problems, conventions and hydrostatics for a PotentialFlow.
 """
 
 from math import inf, sqrt
@@ -13,25 +13,25 @@ from fowt_env.descriptions.potential_flow import PotentialFlow
 from fowt_env.errors import InputError
 
 MOTIONS = ("Surge", "Sway", "Heave", "Roll", "Pitch", "Yaw")  # Capytaine's names
-SHALLOW = 0.1  # wave number times depth, below which its Green function of finite depth does not reach
+SHALLOW = 0.1  # wave number times depth, below which Capytaine's finite-depth Green function is not valid
 MOST_PANELS = 20_000  # dense matrices of this many panels take 13 GB
 
 
 def solve_mesh(
     path, omega, heading, *, water_depth, water_density=1025.0, gravity=9.80665, lid=True, report=None
 ):
-    """Return PotentialFlow of the hull whose panel mesh is in a file, about the mesh's origin at still water.
+    """Return the PotentialFlow of a hull from a panel mesh file, about the mesh's origin at still water.
 
-    path         of a mesh that Capytaine reads (.gdf, .pnl, .dat, .stl, .msh ...), in metres, z up from still
+    path         mesh file that Capytaine reads (.gdf, .pnl, .dat, .stl, .msh ...), in metres, z up from still
                  water, normals outwards; panels above the water are cut off
     omega        (n,) rad/s, increasing, > 0
     heading      (m,) rad, increasing, direction of travel of the waves
     water_depth  m
-    lid          close the interior water plane, which keeps irregular frequencies away
-    report       called with (text, problems done, problems in all)
-    Added mass at infinite frequency is solved too; that at zero is omitted, as Capytaine has no limit of it
-    in finite depth.
-    Raises: InputError without Capytaine, for a file that is no mesh, for frequencies that it cannot solve.
+    lid          close the interior water plane, which removes irregular frequencies
+    report       progress callback (text, problems done, total problems)
+    Added mass at infinite frequency is computed too; added mass at zero frequency is omitted, because
+    Capytaine has no such limit in finite depth.
+    Raises: InputError without Capytaine, for an invalid mesh file, and for frequencies below its range.
     """
     cpt = _capytaine()
     omega, heading = np.asarray(omega, dtype=float), np.asarray(heading, dtype=float)
@@ -63,7 +63,7 @@ def solve_mesh(
             result = solved(problem, f"waves at {w:.3g} rad/s")
             incident = cpt.bem.airy_waves.froude_krylov_force(problem)
             force = np.array([result.forces[name] + incident[name] for name in MOTIONS])
-            # Capytaine's time factor is exp(-i omega t), and its wave exp(i k x)
+            # Capytaine's convention is exp(-i omega t) with waves exp(i k x): conjugate
             excitation[i, j] = force.conj()
     volume, centre, stiffness = _hydrostatics(body.mesh, water_density, gravity)
     depth = -float(np.min(body.mesh.vertices[:, 2]))
@@ -87,24 +87,22 @@ def _capytaine():
     try:
         import capytaine
     except ImportError as error:
-        raise InputError(
-            f'panel meshes are solved by Capytaine 3 ({error}): pip install "fowt-env[hydro]"'
-        ) from error
+        raise InputError(f'panel meshes need Capytaine 3 ({error}): pip install "fowt-env[hydro]"') from error
     capytaine.set_logging("ERROR")
     return capytaine
 
 
 def _check_omega(omega, depth, gravity):
-    """Refuse frequencies that increase not, or whose waves are too long for the depth."""
+    """Refuse frequencies that do not increase, or whose waves are too long for the depth."""
     if not (omega.size and omega[0] > 0.0 and (np.diff(omega) > 0.0).all() and np.isfinite(omega).all()):
         raise InputError(f"omega = {omega.tolist()[:5]} ...: must increase and be > 0 rad/s")
-    lowest = SHALLOW * sqrt(gravity / depth)  # of the long waves' omega = k sqrt(g h)
+    lowest = SHALLOW * sqrt(gravity / depth)  # long waves: omega = k sqrt(g h)
     if omega[0] < lowest:
         raise InputError(f"omega = {omega[0]:g}: must be > {lowest:.3g} rad/s in {depth:g} m of water")
 
 
 def _body(cpt, path, lid):
-    """Return capytaine's body of a mesh file, cut at the water, with its six motions."""
+    """Return the Capytaine FloatingBody of a mesh file, cut at still water, with six rigid-body motions."""
     path = Path(path)
     if not path.is_file():
         raise InputError(f"mesh file {str(path)!r} does not exist")
@@ -112,7 +110,7 @@ def _body(cpt, path, lid):
         mesh = cpt.load_mesh(str(path))
         mesh = mesh.merged() if hasattr(mesh, "merged") else mesh
         wet = mesh.immersed_part()
-    except Exception as error:  # whatever one of its many readers meets
+    except Exception as error:  # the mesh readers may raise any exception
         raise InputError(f"mesh file {str(path)!r} cannot be read: {type(error).__name__}: {error}") from None
     if not 0 < wet.nb_faces <= MOST_PANELS:
         raise InputError(
@@ -128,7 +126,7 @@ def _body(cpt, path, lid):
 
 
 def _volume(mesh):
-    """(volume, centre of buoyancy (3,)) of the water that a cut mesh displaces, by the divergence theorem."""
+    """Return (volume, centre of buoyancy (3,)) of a cut mesh, by the divergence theorem."""
     centre, normal, area = mesh.faces_centers, mesh.faces_normals, mesh.faces_areas
     volume = float(np.sum(area * normal[:, 2] * centre[:, 2]))
     moment = 0.5 * np.sum((area * normal[:, 2] * centre[:, 2])[:, None] * centre, axis=0)
@@ -137,10 +135,10 @@ def _volume(mesh):
 
 
 def _hydrostatics(mesh, density, gravity):
-    """Return (volume, centre, (6, 6) stiffness without weight) of a cut mesh."""
+    """Return (volume, centre, (6, 6) hydrostatic stiffness without weight) of a cut mesh."""
     volume, centre = _volume(mesh)
     x, y = mesh.faces_centers[:, 0], mesh.faces_centers[:, 1]
-    plane = -mesh.faces_areas * mesh.faces_normals[:, 2]  # of the water plane, per panel below it
+    plane = -mesh.faces_areas * mesh.faces_normals[:, 2]  # water-plane area above each panel
     c = density * gravity
     stiffness = np.zeros((6, 6))
     stiffness[2, 2] = c * plane.sum()

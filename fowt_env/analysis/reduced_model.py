@@ -1,15 +1,15 @@
-"""Reduces linear models to the states of the rigid bodies, with a lag of the blades, for controller design.
+"""Reduces linear models to the rigid-body states, with a lag of the blade pitch, for controller design.
 
 The other states z, z' = A_zz z + A_zx x + B_z u + E_z f, are residualised (Kokotovic, Khalil and O'Reilly,
 Singular Perturbation Methods in Control, 1986), because truncation would remove their steady effect:
 
 - flexible tower, wake, second-order pitch drive and generator lag are in equilibrium,
-  z = -A_zz^-1 (A_zx x + B_z u + E_z f): a static spring that moves the top mass with the platform, a drive
-  with the same lag for slow commands;
+  z = -A_zz^-1 (A_zx x + B_z u + E_z f): a static tower deflection that moves the top mass with the platform,
+  and a pitch drive with the same lag for slow commands;
 - radiation memory, as slow as the platform, is replaced by its complex gain at a frequency w: the real part
-  acts with x, the imaginary part over w with dx/dt, which are added mass and damping at w.
+  multiplies x, the imaginary part over w multiplies dx/dt, which gives added mass and damping at w.
 
-Blades that follow their command at once have no state: designs use LEAST_LAG.
+Blades without a pitch actuator have no pitch state: designs use LEAST_LAG.
 """
 
 from dataclasses import replace
@@ -20,14 +20,14 @@ from fowt_env.analysis.linear_model import MEMORY, VELOCITIES
 from fowt_env.errors import InputError
 from fowt_env.plant.state import MOTIONS, STATES
 
-LEAST_LAG = 0.05  # s, of a pitch drive that has none
-SETTLES = 1e-6  # 1/s, slowest decay of a state that is taken where it comes to rest
-NAMES = ("platform_pitch", "surge", "heave")  # of modes that may be the platform's pitch, the likeliest first
-FAR = 0.3  # of the undamped frequency, within which its mode is
+LEAST_LAG = 0.05  # s, assigned to an ideal pitch drive
+SETTLES = 1e-6  # 1/s, slowest decay of a state that is replaced by its equilibrium
+NAMES = ("platform_pitch", "surge", "heave")  # names that the platform-pitch mode may have, likeliest first
+FAR = 0.3  # tolerance of the platform-pitch mode's frequency, as a fraction of the undamped one
 
 
 def with_pitch_lag(model):
-    """Return the LinearModel with blades that lag; unchanged if its pitch drive has a time constant."""
+    """Return the LinearModel with a lag of LEAST_LAG in the blade pitch; unchanged if its drive has a lag."""
     if model.scene.turbine.pitch_drive.lag > 0.0:
         return model
     a, b, blade = model.A.copy(), model.B.copy(), model.index("blade_pitch")
@@ -37,15 +37,15 @@ def with_pitch_lag(model):
 
 
 def platform_frequency(model):
-    """Return the frequency (rad/s) of platform_mode, or the undamped one where no mode oscillates near it."""
-    found = platform_mode(model)
-    return _undamped(model) if found is None else found.frequency
+    """Return the frequency (rad/s) of platform_mode; without such a mode, the undamped frequency."""
+    mode = platform_mode(model)
+    return _undamped(model) if mode is None else mode.frequency
 
 
 def platform_mode(model):
-    """The Mode of a LinearModel that is the platform's pitch; None where none is near the undamped frequency.
+    """Return the platform-pitch Mode of a LinearModel; None without a mode near the undamped frequency.
 
-    A hull that pitches about a point far off has one that is named after surge or heave.
+    For a hull that pitches about a distant point, this mode is named after surge or heave.
     """
     undamped = _undamped(model)
     modes = model.modes()
@@ -57,8 +57,8 @@ def platform_mode(model):
 
 
 def _undamped(model):
-    """Return the frequency (rad/s) of restoring and mass alone in which the pitch has its largest share."""
-    model = _settled(model)  # the mass on a flexible tower is the platform's too
+    """Return the undamped frequency (rad/s) of the mode with the largest fraction of platform pitch."""
+    model = _settled(model)  # so that the mass on a flexible tower moves with the platform
     positions = [model.index(name) for name in MOTIONS]
     speeds = [model.index(name) for name in VELOCITIES]
     kinematics, stiffness = model.A[np.ix_(positions, speeds)], model.A[np.ix_(speeds, positions)]
@@ -70,11 +70,10 @@ def _undamped(model):
 
 
 def residualised(model, omega=None):
-    """Return the LinearModel with the states of plant.state.STATES alone; unchanged if it has no others.
+    """Return the LinearModel reduced to the states of plant.state.STATES; unchanged if there are no others.
 
-    omega: rad/s, where added mass and damping of radiation memory are exact; None: platform_frequency of the
-    model without its other internal states.
-    Raises: InputError if some of those do not come to rest by themselves.
+    omega: rad/s, at which added mass and damping of radiation memory are exact; None: platform_frequency.
+    Raises: InputError if other internal states are not asymptotically stable.
     """
     model = _settled(model)
     memory = [name for name in model.states if name not in STATES]
@@ -84,30 +83,30 @@ def residualised(model, omega=None):
 
 
 def _settled(model):
-    """Return the LinearModel whose states besides STATES and radiation memory are where they come to rest."""
+    """Return the LinearModel with all states except STATES and radiation memory in equilibrium."""
     names = [name for name in model.states if name not in STATES and not name.startswith(MEMORY)]
     return _following(model, names, 0.0)
 
 
 def _following(model, names, omega):
-    """Return the LinearModel whose states of these names follow the others as at omega, rad/s; 0: at rest."""
+    """Return the LinearModel without the named states, replaced by their gain at omega, rad/s; 0: static."""
     if not names:
         return model
     gone = [model.index(name) for name in names]
     kept = [i for i in range(len(model.states)) if i not in gone]
-    own = model.A[np.ix_(gone, gone)]
+    within = model.A[np.ix_(gone, gone)]
     if omega == 0.0:
-        _check_settling(own, names)
-    response = np.linalg.inv(1j * omega * np.eye(len(gone)) - own)
+        _check_settling(within, names)
+    response = np.linalg.inv(1j * omega * np.eye(len(gone)) - within)
 
     def moved(drive):
-        """Return (with the value, with its rate) of the states that go per what drives them."""
+        """Return the gains of the removed states from a driving variable and from that variable's rate."""
         gain = response @ drive
         return gain.real, gain.imag / omega if omega else np.zeros_like(drive)
 
     by_state, by_rate = moved(model.A[np.ix_(gone, kept)])
     into, out = model.A[np.ix_(kept, gone)], model.C[:, gone]
-    # the inputs change slowly beside the platform: what their rates do to these states is omitted
+    # inputs change slowly compared with the platform: the gains from their rates are omitted
     inertia = np.linalg.inv(np.eye(len(kept)) - into @ by_rate)
     rates = {
         "A": inertia @ (model.A[np.ix_(kept, kept)] + into @ by_state),
@@ -125,13 +124,13 @@ def _following(model, names, omega):
     )
 
 
-def _check_settling(own, names):
-    """Raise InputError unless states of this system matrix come to rest while all others are held."""
-    values, vectors = np.linalg.eig(own)
+def _check_settling(within, names):
+    """Raise InputError unless the removed states, of this system matrix, decay with all others fixed."""
+    values, vectors = np.linalg.eig(within)
     slowest = np.argmax(values.real)
     if values[slowest].real > -SETTLES:
         name = names[np.argmax(np.abs(vectors[:, slowest]))]
         raise InputError(
-            f"linear model: state {name!r} does not come to rest by itself (it goes with"
-            f" exp({values[slowest].real:.2g} s^-1 t)): a design that does not keep it would not hold"
+            f"linear model: state {name!r} is not asymptotically stable (it changes with"
+            f" exp({values[slowest].real:.2g} s^-1 t)): a design without this state would be invalid"
         )

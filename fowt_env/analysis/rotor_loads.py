@@ -1,4 +1,4 @@
-"""Aerodynamic loads of a rotor on a standing platform: about the hub in shaft axes, and at blade roots."""
+"""Computes aerodynamic loads of a rotor on a fixed platform, at the hub in shaft axes and at blade roots."""
 
 from typing import NamedTuple
 
@@ -18,19 +18,19 @@ from fowt_env.scene.parts import build_elements
 
 
 class RotorLoads(NamedTuple):
-    """Aerodynamic loads of a rotor, N and N m. Shaft axes: x along the shaft downwind, y to the left."""
+    """Holds aerodynamic rotor loads, N and N m. Shaft axes: x along the shaft downwind, y to the left."""
 
-    force: np.ndarray  # (3,) shaft axes, which do not turn with the rotor
+    force: np.ndarray  # (3,) shaft axes, which do not rotate with the rotor
     moment: np.ndarray  # (3,) about the rotor centre, shaft axes
     root_in_plane: np.ndarray  # (blades,) about the root, around the normal of the coned blade: RootMxc
     root_out_of_plane: np.ndarray  # (blades,) around the direction against the rotation: RootMyc
 
 
 def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
-    """RotorLoads of a scene's rotor by blade element momentum, the platform at rest where it was described.
+    """Return the RotorLoads of a scene's rotor by blade element momentum theory, on the undisplaced platform.
 
-    rotor_speed rad/s, blade_pitch rad, azimuth rad, time s. Induction is quasi-steady, whatever the scene's
-    rotor model; skewed_wake and blade_stations are those of the scene.
+    rotor_speed rad/s, blade_pitch rad, azimuth rad, time s. Induction is quasi-steady for any rotor model of
+    the scene; skewed_wake and blade_stations are those of the scene.
     Raises: InputError for a scene without wind.
     """
     aero, turbine = scene.model.aero, scene.turbine
@@ -41,7 +41,7 @@ def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
     if rotor.shape is None:
         rotor = build_blade_elements(turbine, density, chosen_stations(count, turbine), shaped=True)
     skew = build_skewed_wake() if scene.options["skewed_wake"] else None
-    pitches = BladePitches(N_RIGID)  # which has the load of every blade written
+    pitches = BladePitches(N_RIGID)  # individual pitch, for which the load of each blade is stored
     x = np.zeros(N_RIGID + rotor.blades - 1)
     x[State.ROTOR_SPEED], x[State.AZIMUTH], x[State.BLADE_PITCH :] = rotor_speed, azimuth, blade_pitch
     pose = rotor_pose(pose_of(x), build_tilt(turbine.rotor.shaft_tilt))

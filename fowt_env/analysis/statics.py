@@ -1,4 +1,4 @@
-"""Computes the statics of an undisplaced platform, and tools of other analyses: differences, modes."""
+"""Computes the statics of an undisplaced platform, and differences and mode names for other analyses."""
 
 from math import pi
 from typing import NamedTuple
@@ -47,7 +47,7 @@ def rotation_of(pose):
 
 
 def central_difference(evaluate, array, index, step):
-    """Return the central difference of evaluate(), whose results are new arrays, by entries of an array."""
+    """Return the central difference of evaluate(), which returns new arrays, by entries of an array."""
     keep, sides = np.array(array[index]), []
     for sign in (1.0, -1.0):
         array[index] = keep + sign * step
@@ -59,15 +59,15 @@ def central_difference(evaluate, array, index, step):
 def named_periods(values, shapes, names):
     """Return {name: undamped natural period s} of modes x'' = value x; inf without restoring.
 
-    Each mode, a column of shapes (n, n) >= 0, is named by its largest row that is free, dominant modes first.
+    Each mode, a column of shapes (n, n) >= 0, is named by its largest unassigned row, dominant modes first.
     """
-    found, free = {}, set(range(len(names)))
+    periods, free = {}, set(range(len(names)))
     for mode in np.argsort(-shapes.max(axis=0)):
         row = max(free, key=lambda i: shapes[i, mode])
         free.discard(row)
         square = -values[mode].real
-        found[names[row]] = float(2.0 * pi / np.sqrt(square)) if square > 1e-9 else float("inf")
-    return {name: found[name] for name in names}
+        periods[names[row]] = float(2.0 * pi / np.sqrt(square)) if square > 1e-9 else float("inf")
+    return {name: periods[name] for name in names}
 
 
 class Evaluation:
@@ -80,13 +80,13 @@ class Evaluation:
         self.dx, self.mean = np.zeros(scene.n_state), np.zeros(scene.n_state)
 
     def at(self, x, block):
-        """Return (6,) wrench of an entry of LoadCache at a state."""
+        """Return the wrench (6,) of an entry of LoadCache at a state."""
         mean_derivative(self.handle, x, self.u, 1, self.dx, self.mean)
         return self.data.cache[block : block + 6].copy()
 
 
 def statics(scene):
-    """Return the statics of a scene without fluctuations; one without water displaces nothing."""
+    """Return the Statics of a scene without fluctuations; without hydrodynamics buoyancy is zero."""
     body, site, evaluation = scene.model.rigid_body, scene.platform.environment, Evaluation(scene)
     rest = np.zeros(scene.n_state)
     water = evaluation.at(rest, LoadCache.HYDRO)
@@ -101,7 +101,7 @@ def statics(scene):
             x = rest.copy()
             x[motion] = side
             load = evaluation.at(x, LoadCache.HYDRO)
-            about = load[3:] - np.cross(centre, load[:3])  # the weight has no moment about its own centre
+            about = load[3:] - np.cross(centre, load[:3])  # the weight has no moment about the centre of mass
             righting.append(about[motion - State.ROLL])
         slope = (righting[1] - righting[0]) / (2.0 * TILT_STEP)
         heights.append(-slope / water[2] if water[2] > 0.0 else float("nan"))
@@ -118,7 +118,7 @@ def statics(scene):
 
 
 def _buoyancy_centre(hydro, water):
-    """(3,) centre of buoyancy of the undisplaced platform with this load of the water; nan where unknown."""
+    """Return the centre of buoyancy (3,) of the undisplaced platform from its water load; nan if unknown."""
     if hydro is None or not water[2] > 0.0:
         return np.full(3, np.nan)
     volume = moment = 0.0

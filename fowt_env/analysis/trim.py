@@ -1,4 +1,4 @@
-"""Steady operating point of a scene, averaged over the rotor's azimuth, in its mean wind and still water."""
+"""Computes the steady operating point of a scene, azimuth-averaged, in mean wind and still water."""
 
 from collections.abc import Mapping
 from math import cos, pi, sin
@@ -27,7 +27,7 @@ from fowt_env.scene.scene import Scene, check_scene
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
 
-AZIMUTHS = 12  # samples over the 120 degrees after which three blades repeat
+AZIMUTHS = 12  # samples over 120 degrees, the period of three blades
 NEWTON_ROUNDS = 40
 TOLERANCE = 1e-11  # m/s2 and rad/s2 of remaining acceleration
 OUTER_ROUNDS = 30
@@ -39,12 +39,12 @@ DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     int(State.ROTOR_SPEED): 1e-4,
     int(State.BLADE_PITCH): 1e-5,
 }
-DEFLECTION_STEP = 1e-3  # m, of those of a flexible tower
+DEFLECTION_STEP = 1e-3  # m, of the deflections of a flexible tower
 PLATFORM_MODES = ("floating", "fixed")
 
 
 class OperatingPoint(Mapping):
-    """Steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] or op["RotThrust_[kN]"].
+    """Holds a steady state as a mapping of OpenFAST channels, e.g. op["RotThrust"] or op["RotThrust_[kN]"].
 
     Attributes: state (n_state,) and command (n_commands,): generator torque N m, blade pitch rad, both SI;
     wind_speed (m/s or None); platform ("floating" or "fixed").
@@ -80,7 +80,7 @@ class OperatingPoint(Mapping):
         )
 
     def _repr_html_(self):
-        """What a notebook shows: each channel with its unit and meaning."""
+        """Return the HTML shown in a notebook: each channel with its unit and meaning."""
         wind = "without wind" if self.wind_speed is None else f"at {self.wind_speed:g} m/s"
         rows = [(name, value, channel_unit(name), channel_meaning(name)) for name, value in self.items()]
         title = f"Operating point {wind}, platform {self.platform}"
@@ -95,7 +95,7 @@ class OperatingPoint(Mapping):
 def without_fluctuations(scene, wind_speed=None):
     """Return the scene in steady mean wind and flat water: same types, so no recompilation.
 
-    Nothing of its waves is left in it. A box of wind becomes its mean over time, which is its own.
+    Waves are removed entirely. A box of wind is replaced by its time mean, which keeps the box's profile.
     """
     parts = {}
     aero, hydro = scene.model.aero, scene.model.hydro
@@ -118,7 +118,7 @@ def without_fluctuations(scene, wind_speed=None):
 
 @entry
 def settle_wake(handle, x, dx):
-    """Set the wake states of x to their steady values for the rest of it; the rotor must have such states."""
+    """Set the wake states of x to their steady values for the other states; needs dynamic inflow."""
     aero = model_of(handle).aero
     pose, now, data = rotor_pose(pose_of(x), aero.tilt), wind_now(0.0, aero.wind), data_of(handle)
     settled_wake(
@@ -126,11 +126,11 @@ def settle_wake(handle, x, dx):
     )
 
 
-SETTLING = 8  # Newton steps for a block of internal states; one is enough where they are linear
+SETTLING = 8  # Newton steps for a block of internal states; one is enough for linear states
 
 
 class _Steady(Evaluation):
-    """Residual evaluations of a scene without fluctuations about one state vector."""
+    """Evaluates residuals of a scene without fluctuations, and solves for the steady state."""
 
     def __init__(self, scene):
         super().__init__(scene)
@@ -140,7 +140,7 @@ class _Steady(Evaluation):
         self.slope = None  # last Jacobian of the motions
 
     def rates(self):
-        """Return the azimuth-averaged derivative at the present state and command, with actuators at rest."""
+        """Return the azimuth-averaged derivative at the current state and command, with actuators at rest."""
         rest_actuators(self.scene.model, self.x, self.u)
         for block in self.scene.blocks:
             if block.steady == "settled":
@@ -151,15 +151,15 @@ class _Steady(Evaluation):
         return self.mean
 
     def settle_internal(self, block):
-        """Set a block of internal states to where its rates are zero, for the rest held as it is.
+        """Set a block of internal states to its equilibrium, with all other states fixed.
 
-        Raises: InputError if there is no such place, as of an integral.
+        Raises: InputError if there is no equilibrium, as for an integrator.
         """
         if block.name == "wake":
             settle_wake(self.handle, self.x, self.dx)
             return
         rows = slice(block.offset, block.offset + block.size)
-        if block.name == "radiation":  # of a platform at rest
+        if block.name == "radiation":  # zero for a platform at rest
             self.x[rows] = 0.0
             return
 
@@ -187,7 +187,7 @@ class _Steady(Evaluation):
         self.x[rows] = values
 
     def rotor_acceleration(self, rotor_speed, blade_pitch):
-        """w_b' with the torque of the static curve, platform as it is and a flexible tower at rest."""
+        """Return the rotor acceleration, rad/s2, for the static torque curve and a tower at rest."""
         ratio = self.scene.turbine.drivetrain.gear_ratio
         self.x[State.ROTOR_SPEED] = rotor_speed
         self.u[Command.GENERATOR_TORQUE] = generator_torque(ratio * rotor_speed, blade_pitch, self.curve)
@@ -195,12 +195,12 @@ class _Steady(Evaluation):
         rates, model = self.rates(), self.scene.model
         if model.tower is None:
             return rates[State.ROTOR_SPEED]
-        # far from its rest the nacelle accelerates, and the rotor with it: that is no lack of torque
+        # far from equilibrium the nacelle accelerates with the rotor: remove this part from the imbalance
         body = model.rigid_body
         return rates[State.ROTOR_SPEED] + body.coupling / body.rotor_row * self._shaft_turning(rates)
 
     def _shaft_turning(self, rates):
-        """Return the angular acceleration of the nacelle about the shaft, rad/s2, of a turbine at rest."""
+        """Return the nacelle's angular acceleration about the shaft, rad/s2, for a turbine at rest."""
         tower = self.scene.model.tower
         bent, bending = self.x[self.deflections()], rates[[self._acceleration(i) for i in self.deflections()]]
         a, b = tower.slope[0::2] @ bent[0::2], -tower.slope[1::2] @ bent[1::2]  # about y, then about x
@@ -208,8 +208,8 @@ class _Steady(Evaluation):
         turned_y = np.array([[cos(a), 0.0, sin(a)], [0.0, 1.0, 0.0], [-sin(a), 0.0, cos(a)]])
         turned_x = np.array([[1.0, 0.0, 0.0], [0.0, cos(b), -sin(b)], [0.0, sin(b), cos(b)]])
         carried = (turned_y @ turned_x).T @ rates[State.WX : State.WZ + 1]
-        own = np.array([about_x, about_y * cos(b), -about_y * sin(b)])
-        return tower.shaft @ (carried + own)
+        relative = np.array([about_x, about_y * cos(b), -about_y * sin(b)])
+        return tower.shaft @ (carried + relative)
 
     def set_pitch(self, blade_pitch):
         """Set the pitch (rad) of all blades, and its command."""
@@ -217,7 +217,7 @@ class _Steady(Evaluation):
         self.u[Command.BLADE_PITCH :] = blade_pitch
 
     def settle_rotor(self):
-        """Set rotor speed, blade pitch and torque to their steady values for the present platform."""
+        """Set rotor speed, blade pitch and torque to steady values at the current platform position."""
         turbine = self.scene.turbine
         drive = turbine.pitch_drive
         wind, rated, finest = self.scene.wind_speed, turbine.rated_rotor_speed, drive.minimum
@@ -235,13 +235,13 @@ class _Steady(Evaluation):
         self.rotor_acceleration(speed, pitch)
 
     def _root(self, excess, low, high):
-        """Zero of the rotor's acceleration. Raises: InputError if a falling platform leaves none."""
+        """Return the zero of the rotor acceleration. Raises: InputError if no zero is bracketed."""
         if not excess(low) * excess(high) <= 0.0:
             raise self.refusal("where no rotor speed and blade pitch balance the torque")
         return brentq(excess, low, high, xtol=1e-14, rtol=1e-14)
 
     def motions(self):
-        """Return the indices of the positions that the scene's platform can change."""
+        """Return the indices of the platform motions that are free in the scene."""
         body = self.scene.model.rigid_body
         if body.platform_fixed:
             return []
@@ -257,7 +257,7 @@ class _Steady(Evaluation):
         return self.motions() + self.deflections()
 
     def free_states(self):
-        """Return indices of the states that a trim finds: positions, pitch or speed of a turning rotor."""
+        """Return the indices of the unknowns of a trim: positions, and pitch or speed of a rotating rotor."""
         positions, wind, turbine = self.positions(), self.scene.wind_speed, self.scene.turbine
         if wind is None or not 0.0 < wind <= turbine.cut_out_wind_speed:
             return positions
@@ -266,7 +266,7 @@ class _Steady(Evaluation):
         return [*positions, int(State.ROTOR_SPEED)] if self.x[State.ROTOR_SPEED] > 0.0 else positions
 
     def residual(self, free):
-        """Return the accelerations of the free states, which vanish in the steady one."""
+        """Return the accelerations of the free states, which are zero in the steady state."""
         if free[-1:] in ([State.BLADE_PITCH], [State.ROTOR_SPEED]):
             self.rotor_acceleration(self.x[State.ROTOR_SPEED], self.x[State.BLADE_PITCH])
         else:
@@ -274,13 +274,13 @@ class _Steady(Evaluation):
         return self.mean[[self._acceleration(index) for index in free]]
 
     def _acceleration(self, index):
-        """Return the index of the state whose rate is the acceleration that balances with a free state."""
+        """Return the index of the state whose rate is the residual of a free state."""
         if index in (State.BLADE_PITCH, State.ROTOR_SPEED):
             return State.ROTOR_SPEED
         return State.VX + index if index < State.AZIMUTH else index + len(self.deflections())
 
     def jacobian(self, free):
-        """Return the derivatives of the residual by the free states, central differences."""
+        """Return the derivatives of the residual by the free states, from central differences."""
         steps = [DIFFERENCE_STEPS.get(index, DEFLECTION_STEP) for index in free]
         columns = [
             central_difference(lambda: self.residual(free), self.x, index, step)
@@ -289,13 +289,13 @@ class _Steady(Evaluation):
         return np.array(columns).T
 
     def settle(self, free):
-        """Solve for zero acceleration by Newton's method on the free states; return the remaining one.
+        """Solve for zero acceleration by Newton's method on the free states; return the largest residual.
 
-        The Jacobian is kept while it brings the residual down tenfold a round. A step that does not
-        lower the residual is halved: far from the solution lines go taut within metres.
+        The Jacobian is kept while the residual falls tenfold per iteration. A step that does not lower the
+        residual is halved, because far from the solution lines become taut within metres.
         """
         residual = self.residual(free)
-        if self.start is None:  # at the first call the platform has not moved yet
+        if self.start is None:  # at the first call the platform is undisplaced
             self.start = evaluated(self.x, self.data)
         size = np.max(np.abs(residual))
         jacobian = None
@@ -308,7 +308,7 @@ class _Steady(Evaluation):
                 if not np.isfinite(jacobian).all():
                     break
                 self.slope = self._of_motions(jacobian)
-            # least squares: without moorings nothing restores surge and sway, which then stay as they are
+            # least squares: without moorings there is no restoring in surge and sway, which stay unchanged
             change = np.linalg.lstsq(jacobian, -residual, rcond=1e-9)[0]
             before, start = size, self.x[free].copy()
             for _ in range(HALVINGS):
@@ -320,26 +320,26 @@ class _Steady(Evaluation):
                 change *= 0.5
             if not size < before:
                 if fresh:
-                    break  # as near as rounding lets it
-                self.x[free] = start  # the old Jacobian does not serve here
+                    break  # limited by rounding
+                self.x[free] = start  # retry with a new Jacobian
                 residual, size = self.residual(free), before
             if not size < 0.1 * before:
                 jacobian = None
         return size
 
     def _of_motions(self, jacobian):
-        """Return the part of a Jacobian that has the motions alone."""
+        """Return the block of a Jacobian for the platform motions."""
         n = len(self.motions())
         return jacobian[:n, :n]
 
     def refusal(self, ending=None):
-        """InputError of a search that ends at this state without a steady one; ending as in unbalanced."""
+        """Return the InputError of a search that failed at the current state; ending: as in unbalanced."""
         self.rates()
         end = evaluated(self.x, self.data)
         return InputError(unbalanced(self.scene, self.start or end, end, ending))
 
     def check(self):
-        """Refuse a state in which no platform can be, and warn of one that is odd."""
+        """Refuse an impossible state of the platform, and warn of an implausible one."""
         rest = self.x.copy()
 
         def fresh_slope():
@@ -350,16 +350,15 @@ class _Steady(Evaluation):
 
 
 def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
-    """Return the OperatingPoint of a scene: steady state in its mean wind, waves flat.
+    """Return the OperatingPoint of a scene: the steady state in mean wind and flat waves.
 
-    platform: "floating" finds the six motions too; "fixed" holds them at zero. Deflections of a tower that
-    bends are found either way. Rotor speed and
-    blade pitch follow the torque curve below rated and rated speed above; beyond the cut-out wind
-    the rotor is parked with feathered blades, and without wind it stands.
+    platform: "floating" solves for the six motions; "fixed" holds them at zero. Deflections of a flexible
+    tower are solved for in both modes. Rotor speed and blade pitch follow the torque curve below rated and
+    rated speed above; above the cut-out wind speed the rotor is parked with feathered blades, and without
+    wind the rotor is at standstill.
 
-    Raises: InputError for an unknown platform mode, if no steady state is found, or if the platform cannot
-    be in it (keel in the sea bed, tower base under water). Warns once of a platform that rests where hardly
-    one is meant to.
+    Raises: InputError for an unknown platform mode, if no steady state is found, or if the steady state is
+    impossible (keel in the sea bed, tower base under water). Warns once of an implausible equilibrium.
     """
     check_scene(scene)
     if platform not in scene.trims:
@@ -376,12 +375,12 @@ def _steady(scene, platform, rotor_fixed):
 
 
 def _trim(scene, platform):
-    """Recompute a trim."""
+    """Compute the OperatingPoint of a scene without the scene's cache."""
     steady = _steady(scene, platform, False)
     steady.settle_rotor()
     if steady.positions():
         for _ in range(OUTER_ROUNDS):
-            # which of pitch and speed is free follows from the rotor's balance on the platform as it is
+            # whether pitch or speed is free follows from the rotor's balance at the current platform position
             free = steady.free_states()
             steady.settle(free)
             steady.settle_rotor()
@@ -395,8 +394,8 @@ def _trim(scene, platform):
 def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
     """Return the OperatingPoint with the rotor driven at a speed (rad/s) and a locked blade pitch (rad).
 
-    For model tests, where a motor holds the rotor speed: theory.md Eq. (20). Mean wind, waves flat.
-    Raises: InputError as trim does.
+    This represents model tests with a motor-driven rotor: theory.md Eq. (20). Mean wind, flat waves.
+    Raises: InputError as trim.
     """
     steady = _steady(scene, platform, True)
     steady.x[State.ROTOR_SPEED] = rotor_speed
@@ -409,7 +408,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
 
 
 def _point(scene, steady, platform):
-    """Return the OperatingPoint at the present state, channels averaged over the azimuth."""
+    """Return the OperatingPoint at the current state, with channels averaged over the azimuth."""
     rest_actuators(scene.model, steady.x, steady.u)
     state, command = steady.x.copy(), steady.u.copy()
     rows = []

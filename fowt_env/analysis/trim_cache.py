@@ -1,4 +1,4 @@
-"""Operating points to start episodes from, remembered within the process."""
+"""Caches the operating points at which episodes start, within the process."""
 
 import hashlib
 import pickle
@@ -14,7 +14,7 @@ _TRIMS = Cache(4096)  # (plant, water, shear exponent, wind speed) -> (state, co
 
 
 def plant_key(scene):
-    """Return the hash of all that a trim depends on, apart from the wind; the same in every process."""
+    """Return the hash of all inputs of a trim except the wind; the same in every process."""
     weather = ("duration", "wave_components")
     options = {name: _values(value) for name, value in scene.options.items() if name not in weather}
     loads = tuple(load.key() for load in scene.loads)
@@ -23,22 +23,22 @@ def plant_key(scene):
 
 
 def water_key(scene):
-    """What a trim's last bits depend on beside the plant: the form and the nodes of strips in a current."""
+    """Return the weather kind and strip nodes, which, besides the plant, affect the last bits of a trim."""
     hydro = scene.model.hydro
     quadrature = None if hydro is None else getattr(hydro.strips, "quadrature", None)
     return scene.weather_kind, None if quadrature is None else quadrature.table.shape
 
 
 def _values(part):
-    """Return a record as plain values: as an object it carries a set, whose order is each process's own."""
+    """Return a record as plain values: its pickle contains a set, whose order differs between processes."""
     return part.model_dump() if isinstance(part, Record) else part
 
 
 def cached_trim(scene, key, speed):
     """Return (state, command) of trim() at a mean wind speed (m/s); computed once per process.
 
-    The arrays are shared: copy before writing. A box of wind has a profile of its own, so that its
-    trim is not remembered.
+    The arrays are shared: copy before writing. The trim in a box of wind is not cached, because the profile
+    differs between boxes.
     """
     if scene.model.aero.field is not None:
         return _state_and_command(trim(scene))
@@ -53,7 +53,7 @@ def _state_and_command(point):
 def interpolated_trim(scene, key, speed):
     """Return (state, command) at a mean wind speed (m/s), linear between exact trims GRID apart.
 
-    Exact in the cell that holds the cut-out wind, where the operating point jumps.
+    The state is exact in the cell that contains the cut-out wind speed, where the operating point jumps.
     """
     cell = floor(speed / GRID)
     weight = speed / GRID - cell

@@ -1,9 +1,9 @@
 """Computes the first-order wave force on a hull over frequency, and fits a causal state-space model.
 
-The strip force is not a causal function of the elevation at the hull, because deep water averages elevations
-before and after. The state-space model therefore takes the elevation some seconds ahead (its lead). The
-elevation is that at the hull's mean position, because no low-order model fits the dispersion from the origin
-(for a potential-flow body the undisplaced position).
+The strip force is not a causal function of the elevation at the hull, because the force at depth depends on
+earlier and later elevations. The input of the state-space model is therefore the elevation some seconds ahead
+(the lead). The elevation is taken at the hull's mean position (for a potential-flow body at the undisplaced
+position), because no low-order model fits the dispersion from the origin.
 """
 
 from dataclasses import dataclass
@@ -24,33 +24,32 @@ from fowt_env.weather.waves import build_waves
 
 BAND = (0.15, 2.0)  # rad/s, of the fit: periods of 3.1 to 42 s
 GRID = 150  # frequencies of the fit
-AMPLITUDE = 1e-3  # m; the force is odd in it but for drag, which is omitted: first order to 1e-6
+AMPLITUDE = 1e-3  # m; the force without drag is an odd function of amplitude: first order to 1e-6
 PAIRS = 8  # pairs of poles: 16 states
-POLE_DAMPING = 0.5  # neighbours then overlap
-LEADS = np.arange(0.0, 12.01, 0.5)  # s, of which the best fit is taken
-# of a potential-flow body, between whose columns waves interfere
+POLE_DAMPING = 0.5  # so that neighbouring poles overlap
+LEADS = np.arange(0.0, 12.01, 0.5)  # s, candidates
+# for a potential-flow body, where waves interfere between columns
 BODY_PAIRS, BODY_POLE_DAMPING, BODY_LEADS = 24, 0.25, np.arange(0.0, 18.01, 0.5)
-NOISE = 1e-6  # of the largest force, or moment: what a symmetric body has of the others in its file
+NOISE = 1e-6  # of the largest force or moment: numerical noise of a symmetric body's other components
 WEIGHT_FLOOR = 0.1  # fraction of a component's largest force below which errors count as absolute
 BANDS = ((0.2, 0.4), (0.4, 0.8), (0.8, 1.2), (1.2, 1.8))  # rad/s, for the report of the fit
 
 
 @entry
 def _strip_force(strips, waves, x, t, kinematics, out):
-    """Strip wrench at a state into out (6,)."""
+    """Fill out (6,) with the strip wrench at a state."""
     load = morison_load(t, pose_of(x), strips, waves, None, kinematics).wrench
     out[0], out[1], out[2] = load.fx, load.fy, load.fz
     out[3], out[4], out[5] = load.mx, load.my, load.mz
 
 
 def wave_force(scene, state, omega):
-    """(n, 6) complex force (N/m, N m/m; body components about the body origin) per elevation at the hull.
+    """Return the complex wave force (n, 6) per elevation at the hull, N/m and N m/m, body axes and origin.
 
-    Force and elevation are the real parts of these times exp(i omega t), for waves travelling along x
-    past the hull at rest in `state`. Computed by the scene's own strip load for a small regular wave,
-    without drag, which is quadratic; of members the same at their undisplaced nodes, and of a potential-flow
-    body the excitation of its table, as the plant interpolates it. omega: (n,) rad/s. Zero without
-    hydrodynamics.
+    Force and elevation are the real parts of these amplitudes times exp(i omega t), for waves travelling
+    along x past the hull at rest in `state`. The force of strips is the scene's strip load in a small regular
+    wave, without quadratic drag; members use that load at the undisplaced nodes, and a potential-flow body
+    the excitation table, interpolated as in the plant. omega: (n,) rad/s. Zero without hydrodynamics.
     """
     omega = np.atleast_1d(np.asarray(omega, dtype=float))
     result = np.zeros((omega.size, 6), dtype=complex)
@@ -74,17 +73,17 @@ def wave_force(scene, state, omega):
 def _waves(scene, sea):
     """Return the Waves of a regular sea or of components at the site of a scene."""
     site = scene.platform.environment
-    place = {"depth": site.water_depth, "density": site.water_density, "gravity": site.gravity}
-    return build_waves(sea, **place, seed=0, duration=1.0)
+    water = {"depth": site.water_depth, "density": site.water_density, "gravity": site.gravity}
+    return build_waves(sea, **water, seed=0, duration=1.0)
 
 
 def _strip_forces(scene, state, omega, strips):
-    """Return (n, 6) complex force of the strips."""
+    """Return the complex force (n, 6) of the strips."""
     result = np.zeros((omega.size, 6), dtype=complex)
     strips = strips._replace(drag_coefficient=0.0, axial_drag_coefficient=0.0)
     x = np.zeros_like(state)
     x[: State.AZIMUTH] = state[: State.AZIMUTH]
-    x[State.SURGE] = x[State.SWAY] = 0.0  # the wave's phase counts from the hull
+    x[State.SURGE] = x[State.SWAY] = 0.0  # the wave phase is relative to the hull
     kinematics, quarters = np.zeros((7, strips.nodes)), np.zeros((4, 6))
     for i, frequency in enumerate(omega):
         sea = sea_state_of({"kind": "regular", "H": 2.0 * AMPLITUDE, "T": 2.0 * pi / frequency})
@@ -98,16 +97,16 @@ def _strip_forces(scene, state, omega, strips):
 
 
 def _member_forces(scene, state, omega, members):
-    """Return (n, 6) complex force of the members' fluid inertia and pressure."""
+    """Return the complex force (n, 6) of the members' fluid inertia and pressure."""
     nodes, rotation = members.nodes, rotation_of(pose_of(state))
     still = np.zeros(omega.size)
     sea = SeaState(kind="components", omega=omega, amplitude=still + 1.0, phase=still, heading=still)
     waves = _waves(scene, sea)
-    place = nodes[:, :3]
+    position = nodes[:, :3]
     if members.instantaneous_position:
-        place = place @ rotation.T + [0.0, 0.0, state[State.HEAVE]]
-    # of Re(A exp(-i omega t)), from the longest wave to the shortest
-    motion = motion_amplitudes(waves, place, N_WATER).conj().reshape(len(nodes), N_WATER, -1)
+        position = position @ rotation.T + [0.0, 0.0, state[State.HEAVE]]
+    # amplitudes A of Re(A exp(-i omega t)), from the longest wave to the shortest
+    motion = motion_amplitudes(waves, position, N_WATER).conj().reshape(len(nodes), N_WATER, -1)
     acceleration = np.einsum("ji,njk->nik", rotation, motion[:, 3:6])
     axis = nodes[:, AX : AX + 3]
     along = np.einsum("ni,nik->nk", axis, acceleration)
@@ -122,10 +121,10 @@ def _member_forces(scene, state, omega, members):
 
 @dataclass(frozen=True)
 class WaveFilter:
-    """State-space model of the wave force: dz/dt = A z + B eta(t + lead), force = C z.
+    """Defines a state-space model of the wave force: dz/dt = A z + B eta(t + lead), force = C z.
 
-    A (m, m), B (m,), C (6, m); lead in s; errors {(low, high) rad/s: largest error of the force vector
-    in that band over its size, each component in fractions of its greatest}.
+    A (m, m), B (m,), C (6, m); lead in s; errors {(low, high) rad/s: largest relative error of the force
+    vector in that band, with each component scaled by its maximum}.
     """
 
     A: np.ndarray
@@ -135,7 +134,7 @@ class WaveFilter:
     errors: dict
 
     def response(self, omega):
-        """Return (n, 6) complex force per elevation at the hull (the lead taken back)."""
+        """Return the complex force (n, 6) per elevation at the hull, with the lead removed."""
         omega = np.atleast_1d(np.asarray(omega, dtype=float))
         eye = np.eye(self.A.shape[0])
         filtered = np.array([np.linalg.solve(1j * w * eye - self.A, self.B) for w in omega])
@@ -145,8 +144,8 @@ class WaveFilter:
 def fit_wave_filter(scene, state):
     """Return the WaveFilter fitted to wave_force over BAND, with the lead that fits best.
 
-    Poles are fixed, evenly spread over the band, so the fit is linear least squares and the model stable:
-    PAIRS of them for strips, BODY_PAIRS for a potential-flow body.
+    Poles are fixed and evenly spread over the band, so the fit is linear least squares and the model stable:
+    PAIRS pole pairs for strips, BODY_PAIRS for a potential-flow body.
     """
     omega = np.linspace(*BAND, GRID)
     force = wave_force(scene, state, omega)
@@ -178,13 +177,13 @@ def fit_wave_filter(scene, state):
 
 
 def _resonators(frequencies, damping):
-    """Return (A, B) of second-order resonators side by side, all driven by the input."""
+    """Return (A, B) of parallel second-order resonators."""
     a = block_diag(*([[0.0, w], [-w, -2.0 * damping * w]] for w in frequencies))
     return a, np.kron(frequencies, [0.0, 1.0])
 
 
 def _band_errors(omega, force, fitted):
-    """{band: largest relative error of the force vector} with each component in fractions of its greatest."""
+    """Return {band: largest relative error of the force vector}, each component scaled by its maximum."""
     scale = np.abs(force).max(axis=0)
     used = scale > 1e-9 * scale.max()
     if not used.any():

@@ -1,12 +1,11 @@
-"""Tables in Markdown: the one writer of those in reports, pages and docstrings."""
+"""Writes Markdown tables for reports, pages and docstrings."""
 
 
 def markdown_table(header, rows, aligned=False):
-    """Markdown text of a table, without a line end after it.
+    """Return the Markdown text of a table, without a trailing newline.
 
-    header, rows   cells: texts, or what str makes a text of; a bar in one is escaped
-    aligned        whether columns are as wide as their widest cell, as in pages that people edit; else the
-                   cells stand as they are
+    header, rows   cells, converted by str; bars in cells are escaped
+    aligned        whether to pad columns to their widest cell, for pages that are edited by hand
     """
     cells = [[str(cell).replace("|", "\\|") for cell in row] for row in (header, *rows)]
     widths = [max(map(len, column)) if aligned else 0 for column in zip(*cells, strict=True)]

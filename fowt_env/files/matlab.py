@@ -1,4 +1,4 @@
-"""MATLAB files of linear models."""
+"""Writes linear models to MATLAB files."""
 
 from pathlib import Path
 from typing import Any
@@ -8,11 +8,11 @@ from fowt_env.files.atomic import replacing
 
 
 def write_mat(model: Any, path: str | Path) -> Path:
-    """The path written: a MATLAB file (version 5) of an analysis.linear_model.LinearModel, SI and radians.
+    """Write an analysis.linear_model.LinearModel to a MATLAB file (version 5, SI, radians); return the path.
 
-    It holds the model's matrices by their names (A, B and those of outputs where it has them), the cell
-    arrays states, inputs and outputs, and the operating point: x0 and u0 in the order of states and inputs
-    (a wind speed that there is none of is NaN) and the struct operating_point of its OpenFAST channels.
+    The file contains the model's matrices by name (A, B, and C to F if present), the cell arrays states,
+    inputs and outputs, and the operating point: x0 and u0 in the order of states and inputs (NaN for no wind)
+    and the struct operating_point of OpenFAST channels.
     In MATLAB: m = load("model.mat"); plant = ss(m.A, m.B, eye(size(m.A)), 0, "StateName", m.states).
     Raises: InputError if the path does not end with .mat.
     """

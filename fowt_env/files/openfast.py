@@ -1,4 +1,4 @@
-"""Binary output of OpenFAST (.outb), written and read."""
+"""Writes and reads OpenFAST binary output (.outb)."""
 
 import os
 import re
@@ -12,17 +12,17 @@ import numpy as np
 from fowt_env.errors import InputError
 
 TIME = "Time_[s]"
-# OpenFAST's FileIDs. 3 is double precision, time by its start and step; the others round to 16 bits
+# OpenFAST's FileIDs. 3 is double precision, with start and step of the time; the others are packed (16 bits)
 WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH = 1, 2, 3, 4
-NAME_LENGTH = 10  # characters of a channel name and of a unit, its brackets included
+NAME_LENGTH = 10  # characters of a channel name and of a unit with brackets
 EVEN = 1e-6  # largest deviation of a time from the even grid, as a fraction of its step
 
 
 def write_outb(frame, path, description="fowt_env"):
-    """Write a run {OpenFAST channel: values} as binary output that OpenFAST's tools read, bit for bit.
+    """Write a run {OpenFAST channel: values} as binary output for OpenFAST's tools, in double precision.
 
-    frame: DataFrame whose first column is Time_[s], evenly spaced. path: written as it is, not atomically.
-    Raises: InputError for another frame, or names that the format has no room for.
+    frame: DataFrame whose first column is Time_[s], evenly spaced. path: written directly, not atomically.
+    Raises: InputError for another frame, or names that are too long for the format.
     """
     if len(frame.columns) < 2 or frame.columns[0] != TIME:
         raise InputError(f".outb: the first column must be {TIME}, with at least one channel after it")
@@ -42,23 +42,23 @@ def write_outb(frame, path, description="fowt_env"):
 
 
 def _name_and_unit(column):
-    """("RotSpeed", "(rpm)") of "RotSpeed_[rpm]"."""
-    found = re.fullmatch(r"([\x21-\x7e]{1,10})_\[([\x20-\x7e]{0,8})\]", str(column))
-    if found is None:
+    """Return ("RotSpeed", "(rpm)") for the column "RotSpeed_[rpm]"."""
+    match = re.fullmatch(r"([\x21-\x7e]{1,10})_\[([\x20-\x7e]{0,8})\]", str(column))
+    if match is None:
         raise InputError(
             f".outb: column {column!r}: must be NAME_[UNIT] in ASCII, at most {NAME_LENGTH} and"
             f" {NAME_LENGTH - 2} characters"
         )
-    return found[1], f"({found[2]})"
+    return match[1], f"({match[2]})"
 
 
 def read_outb(path):
-    """DataFrame of a binary output file of OpenFAST, its columns named as those of simulate: RotSpeed_[rpm].
+    """Return the DataFrame of an OpenFAST binary output file; column names as in simulate: RotSpeed_[rpm].
 
-    All four FileIDs are read: 1 (packed times), 2 and 4 (packed values), 3 (double precision, what write_outb
-    writes). float64 values as the file holds them, NaN included; the first column is the time (s).
-    Memory: at most some ten times the size of the file, since every count in it is checked against that size.
-    Raises: InputError that names the file, the place in it and what is wrong; also for a channel named twice.
+    All four FileIDs are read: 1 (packed times), 2 and 4 (packed values), 3 (double precision, as written by
+    write_outb). Values are float64, NaN included; the first column is the time (s).
+    Memory: at most some ten times the size of the file, since all counts are checked against that size.
+    Raises: InputError naming the file, the byte position and the fault; also for a duplicate channel.
     """
     import pandas as pd
 
@@ -76,18 +76,18 @@ def read_outb(path):
 
 
 class _Reader(NamedTuple):
-    """A file that is read from its start on, each part only where the file is long enough for it."""
+    """Reads a binary file sequentially, with a check of the remaining length before each read."""
 
     file: object
     path: str
     size: int  # bytes
 
     def refuse(self, what):
-        """InputError at the present place."""
+        """Return an InputError with the current byte position."""
         return InputError(f".outb file {self.path!r}: {what}, before byte {self.file.tell()} of {self.size}")
 
     def take(self, count, kind, what):
-        """(count,) little-endian numbers of a numpy type; what: for the message."""
+        """Read (count,) little-endian numbers of a numpy type; what: for the message."""
         kind = np.dtype(kind).newbyteorder("<")
         left = self.size - self.file.tell()
         if count < 0 or count * kind.itemsize > left:
@@ -98,21 +98,21 @@ class _Reader(NamedTuple):
         return np.frombuffer(content, dtype=kind)
 
     def whole(self, kind, what, low):
-        """One whole number of at least low."""
+        """Read one integer >= low."""
         value = int(self.take(1, kind, what)[0])
         if value < low:
             raise self.refuse(f"{what} is {value}: must be at least {low}")
         return value
 
     def scales(self, count, kind, what):
-        """(slopes, offsets) (count,), finite and no slope zero."""
+        """Read (slopes, offsets) (count,), finite and without zero slopes."""
         slope, offset = (self.take(count, kind, f"{word} of {what}") for word in ("slopes", "offsets"))
         if not (np.isfinite(slope).all() and np.isfinite(offset).all() and slope.all()):
             raise self.refuse(f"slopes and offsets of {what} must be finite, and no slope zero")
         return slope.astype(np.float64), offset.astype(np.float64)
 
     def words(self, count, length, what):
-        """List of count texts of length characters, stripped."""
+        """Read a list of `count` texts of `length` characters, stripped."""
         content = self.take(count * length, "u1", what)
         if not ((content >= 32) & (content < 127)).all():
             raise self.refuse(f"{what} must be printable ASCII")
@@ -121,7 +121,7 @@ class _Reader(NamedTuple):
 
 
 def _outb(reader):
-    """(column names, values (n, columns)) of an open .outb file."""
+    """Return (column names, values (n, columns)) of an open .outb file."""
     kind = int(reader.take(1, "i2", "FileID")[0])
     if kind not in (WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH):
         raise reader.refuse(f"FileID is {kind}: must be 1, 2, 3 or 4")
@@ -144,7 +144,7 @@ def _outb(reader):
     columns = [f"{name}_[{unit}]" for name, unit in zip(names, units, strict=True)]
     if len(set(columns)) < len(columns):
         twice = Counter(columns).most_common(1)[0][0]
-        raise reader.refuse(f"channel {twice!r} is there twice")
+        raise reader.refuse(f"channel {twice!r} occurs twice")
     size = (4 * rows if kind == WITH_TIME else 0) + rows * channels * (2 if packed else 8)
     if size != (left := reader.size - reader.file.tell()):
         raise reader.refuse(f"{rows} rows of {channels} channels take {size} bytes, {left} are left")

@@ -1,4 +1,4 @@
-"""Tables written and read: CSV, Parquet, and OpenFAST's .outb of a time series."""
+"""Writes and reads tables: CSV, Parquet, and for time series OpenFAST's .outb."""
 
 from pathlib import Path
 
@@ -6,14 +6,11 @@ from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 
 TABLE_SUFFIXES = (".csv", ".parquet")
-SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series, which OpenFAST's format can hold too
+SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series
 
 
 def table_path(path, allowed=TABLE_SUFFIXES, what="output file"):
-    """`path` as a Path, once its ending is known to be one of those allowed.
-
-    Raises: InputError for another ending.
-    """
+    """Return `path` as a Path after a check of its suffix. Raises: InputError for a suffix not in allowed."""
     path = Path(path)
     if path.suffix.lower() not in allowed:
         *others, last = allowed
@@ -23,7 +20,7 @@ def table_path(path, allowed=TABLE_SUFFIXES, what="output file"):
 
 
 def write_table(frame, path):
-    """The path written: CSV (10 significant digits), Parquet or OpenFAST's .outb (exact), by its ending."""
+    """Write a table as CSV (10 significant digits), Parquet or .outb (exact), by suffix; return the path."""
     path = table_path(path, SERIES_SUFFIXES)
     with replacing(path) as temporary:
         if path.suffix.lower() == ".csv":
@@ -38,9 +35,9 @@ def write_table(frame, path):
 
 
 def read_series(path):
-    """DataFrame of a time series that write_table wrote, or of OpenFAST's binary output (.outb).
+    """Return the DataFrame of a time series written by write_table, or of OpenFAST's binary output (.outb).
 
-    Raises: InputError if there is no such file, its ending is another, or it is broken.
+    Raises: InputError for a missing or broken file, or another suffix.
     """
     path = table_path(path, SERIES_SUFFIXES, "file")
     if path.suffix.lower() != ".outb":
@@ -51,9 +48,9 @@ def read_series(path):
 
 
 def read_table(path):
-    """DataFrame of a CSV or Parquet file that write_table wrote.
+    """Return the DataFrame of a CSV or Parquet file written by write_table.
 
-    Raises: InputError if there is no such file, its ending is another, or it is broken.
+    Raises: InputError for a missing or broken file, or another suffix.
     """
     import pandas as pd
 
@@ -62,5 +59,5 @@ def read_table(path):
         raise InputError(f"file {str(path)!r}: not found")
     try:
         return pd.read_csv(path) if path.suffix.lower() == ".csv" else pd.read_parquet(path.absolute())
-    except Exception as error:  # whatever a broken file makes pandas and pyarrow raise
+    except Exception as error:  # a broken file may raise any exception in pandas and pyarrow
         raise InputError(f"file {str(path)!r} cannot be read: {error!s:.300}") from None

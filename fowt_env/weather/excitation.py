@@ -27,22 +27,22 @@ from fowt_env.plant.hydro.wave_bands import aligned, padded
 from fowt_env.weather.harmonics import constant_table, table_of
 from fowt_env.weather.second_order import build_second_order
 
-QUIET, MOST = 1e-3, 0.5  # share of a sea's energy beyond the table that is passed over, and that is rejected
-SAME_HEADING = 1e-4  # rad, of headings that the values of files cannot tell apart
+QUIET, MOST = 1e-3, 0.5  # fraction of a sea's energy outside the table that is ignored, and that is rejected
+SAME_HEADING = 1e-4  # rad, tolerance for equal headings: the precision of the files
 OUT_OF_PLANE = (1, 3, 5)  # sway, roll, yaw
 
 
 def build_excitation(body, waves, *, duration, fast, planar, position=None, second_order=None, cutoff=None):
     """Return the excitation of a PotentialFlow in Waves; None without either.
 
-    duration      s that the table of a sea that does not repeat has to cover
+    duration      s that the table of a non-periodic sea has to cover
     fast          first order from a table; else by the sum over components
-    planar        forces in the plane alone
+    planar        whether sway, roll and yaw are zeroed
     position      FilteredPosition at which the waves meet the body; None: undisplaced
     second_order  None, "none", "mean_drift", "newman" or "full"; cutoff: rad/s, of the differences, or None
 
-    Raises: InputError for a sea beyond the body's headings or frequencies. Warns: PlantWarning where
-    frequencies of some energy lie beyond them.
+    Raises: InputError for a sea outside the body's headings or frequencies. Warns: PlantWarning if some of
+    the energy lies outside the frequencies.
     """
     if body is None or waves is None:
         return None
@@ -79,7 +79,7 @@ def _first_order_table(waves, force, duration):
 
 
 def _fast_sum(exact, amplitude):
-    """Return the FastExcitation of an ExactExcitation, whose phase has the opposite sign."""
+    """Return the FastExcitation of an ExactExcitation, whose phase has the opposite sign, in SIMD lanes."""
     size = -(-amplitude.size // SUM_LANES) * SUM_LANES
     wave = np.zeros((N_WAVE, size))
     for row, values in ((RATE, exact.omega), (TURN, exact.phase % (2.0 * pi)), (ALONG_X, exact.along_x),
@@ -109,51 +109,51 @@ def excitation_at(body, omega, heading):
     """Return the complex force (n, 6) per metre of amplitude, N/m and N m/m, of waves of omega (n,) rad/s.
 
     heading: rad, a number or (n,). Below the table's frequencies the force tends to the hydrostatic limit of
-    long waves, above them it is zero. Raises: InputError for a heading outside the table.
+    long waves, above them the force is zero. Raises: InputError for a heading outside the table.
     """
     omega = np.asarray(omega, dtype=float)
-    known = np.concatenate([[0.0], body.excitation_omega])
+    nodes = np.concatenate([[0.0], body.excitation_omega])
     limit = np.zeros((1, body.heading.size, 6), dtype=complex)
     limit[0, :, 2:5] = body.stiffness[2:5, 2]
     table = np.concatenate([limit, body.excitation])
-    left, right, share = _headings(body, np.broadcast_to(np.asarray(heading, dtype=float), omega.shape))
-    row = np.clip(np.searchsorted(known, omega, side="right") - 1, 0, known.size - 2)
-    above = (omega - known[row]) / (known[row + 1] - known[row])
-    # the last figure of a frequency must not decide between the table's end and nothing
-    beyond = above > 1.0 + 1e-6 * known[row + 1] / (known[row + 1] - known[row])
+    left, right, fraction = _headings(body, np.broadcast_to(np.asarray(heading, dtype=float), omega.shape))
+    row = np.clip(np.searchsorted(nodes, omega, side="right") - 1, 0, nodes.size - 2)
+    above = (omega - nodes[row]) / (nodes[row + 1] - nodes[row])
+    # rounding of a frequency at the table's end must not zero the force
+    beyond = above > 1.0 + 1e-6 * nodes[row + 1] / (nodes[row + 1] - nodes[row])
     above = np.minimum(above, 1.0)
-    share, above = share[:, None], above[:, None]
-    lower = (1.0 - share) * table[row, left] + share * table[row, right]
-    upper = (1.0 - share) * table[row + 1, left] + share * table[row + 1, right]
+    fraction, above = fraction[:, None], above[:, None]
+    lower = (1.0 - fraction) * table[row, left] + fraction * table[row, right]
+    upper = (1.0 - fraction) * table[row + 1, left] + fraction * table[row + 1, right]
     return np.where(beyond[:, None], 0.0, (1.0 - above) * lower + above * upper)
 
 
 def _headings(body, heading):
-    """Return (left, right, share): columns of the table beside headings (n,), and the right one's share."""
-    known = body.heading
-    turned = known[0] + np.mod(heading - known[0] + SAME_HEADING, 2.0 * pi) - SAME_HEADING
-    gap = float(np.diff(known).max()) if known.size > 1 else 0.0
-    closing = known[0] + 2.0 * pi - known[-1]
-    around = known.size > 1 and closing <= gap * (1.0 + 1e-6) + SAME_HEADING
-    beyond = turned > known[-1] + SAME_HEADING
+    """Return (left, right, fraction): the columns that enclose headings (n,), and the weight of the right."""
+    table = body.heading
+    turned = table[0] + np.mod(heading - table[0] + SAME_HEADING, 2.0 * pi) - SAME_HEADING
+    gap = float(np.diff(table).max()) if table.size > 1 else 0.0
+    closing = table[0] + 2.0 * pi - table[-1]
+    around = table.size > 1 and closing <= gap * (1.0 + 1e-6) + SAME_HEADING
+    beyond = turned > table[-1] + SAME_HEADING
     if beyond.any() and not around:
-        low, high = np.degrees(known[[0, -1]])
+        low, high = np.degrees(table[[0, -1]])
         raise InputError(
             f"sea: heading {np.degrees(heading[np.argmax(beyond)]):g} deg lies outside the excitation table"
             f" of {_name(body)}, which has {low:g} to {high:g} deg"
         )
-    if known.size == 1:
+    if table.size == 1:
         none = np.zeros(heading.shape, dtype=int)
         return none, none, np.zeros(heading.shape)
-    left = np.clip(np.searchsorted(known, turned, side="right") - 1, 0, known.size - 1)
-    right = np.where(left == known.size - 1, 0, left + 1)
-    width = np.where(left == known.size - 1, closing, np.take(known, right) - known[left])
-    share = np.where(width > SAME_HEADING, (turned - known[left]) / np.maximum(width, SAME_HEADING), 0.0)
-    return left, right, np.clip(share, 0.0, 1.0)
+    left = np.clip(np.searchsorted(table, turned, side="right") - 1, 0, table.size - 1)
+    right = np.where(left == table.size - 1, 0, left + 1)
+    width = np.where(left == table.size - 1, closing, np.take(table, right) - table[left])
+    fraction = np.where(width > SAME_HEADING, (turned - table[left]) / np.maximum(width, SAME_HEADING), 0.0)
+    return left, right, np.clip(fraction, 0.0, 1.0)
 
 
 def check_frequencies(body, waves):
-    """Check the energy outside the table's frequencies. Raises: InputError for most; warns for some of it."""
+    """Check the energy outside the table's frequencies. Raises: InputError above MOST; warns above QUIET."""
     energy = waves.amplitude**2
     total = float(energy.sum())
     if total == 0.0:
@@ -163,14 +163,14 @@ def check_frequencies(body, waves):
     above = float(energy[waves.omega > high * (1.0 + 1e-6)].sum()) / total
     if below + above <= QUIET:
         return
-    said = (
+    message = (
         f"sea: {100.0 * (below + above):.3g} % of its energy lies outside the excitation table of"
         f" {_name(body)}, which has {low:.4g} to {high:.4g} rad/s"
     )
     if below + above > MOST:
-        raise InputError(said)
+        raise InputError(message)
     warnings.warn(
-        f"{said}: interpolated to the limit of long waves below ({100.0 * below:.3g} %), without force above"
+        f"{message}: interpolated to the long-wave limit below ({100.0 * below:.3g} %), without force above"
         f" ({100.0 * above:.3g} %)",
         PlantWarning,
         stacklevel=level_outside(),

@@ -1,8 +1,8 @@
 """Computes deterministic gusts of IEC 61400-1 (ed. 3), 6.3.2 "Extreme wind conditions".
 
-Each gust takes the hub speed and returns (duration, value): value (n, 5) with the columns of WindSeries,
+Each function takes the hub speed and returns (duration, value): value (n, 5) with the columns of WindSeries,
 evenly spaced over the duration; the wind is constant before the first and after the last row. Numbers in the
-docstrings are those of the standard; speeds in m/s, lengths in m, times in s.
+docstrings are from the standard; speeds in m/s, lengths in m, times in s.
 """
 
 from math import atan, ceil, pi, radians
@@ -15,13 +15,13 @@ STEP = 0.01  # s; linear interpolation is then within 1e-4 of the gust's amplitu
 
 
 def _rows(duration):
-    """Return the times from 0 to the duration, and the empty rows that belong to them."""
+    """Return the times from 0 to the duration, and zeroed rows of the wind at these times."""
     time = np.linspace(0.0, duration, ceil(duration / STEP) + 1)
     return time, np.zeros((time.size, 5))
 
 
 def _turned(speed, angle, value):
-    """Return the rows of a horizontal wind of some speed, turned by an angle (rad) towards +y."""
+    """Fill and return the rows of a horizontal wind of a given speed, turned by an angle (rad) towards +y."""
     value[:, 0] = speed * np.cos(angle)
     value[:, 1] = speed * np.sin(angle)
     return value

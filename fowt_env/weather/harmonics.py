@@ -8,20 +8,20 @@ from scipy.fft import ifft, next_fast_len
 
 from fowt_env.plant.hydro.excitation import COLUMNS, TimeTable
 
-EVEN = 1e-6  # of a spacing: what frequencies may miss a harmonic by, a phase of 6e-6 rad after one period
+EVEN = 1e-6  # of a spacing: tolerance of a harmonic's frequency, a phase of 6e-6 rad after one period
 SPLINE_ERROR = 1.3e-3  # of an interpolated exponential, times (omega step)^4: rms over times and phases
 TOLERANCE = 5e-6  # rms error of a table over its standard deviation
-ROUNDED = 1e-4  # of a gap: what values of files may miss a multiple by
-MOST_HARMONICS = 20_000  # from the lowest to the highest frequency, where they are not that many themselves
-LONG_PERIOD = 3600.0  # s, beyond which a table does not cover a period but the duration
+ROUNDED = 1e-4  # of a gap: tolerance of a multiple, for rounded values of files
+MOST_HARMONICS = 20_000  # from the lowest to the highest frequency, or twice their number if more
+LONG_PERIOD = 3600.0  # s, above which a table covers the duration instead of a period
 LONGEST = 1.2  # omega times step of the highest frequency
-MARGIN = 5.0  # s of table beyond the time that was requested
+MARGIN = 5.0  # s of table after the requested time
 MOST_ROWS = 2_000_000  # 128 MB
-BLOCK_NUMBERS = 4_000_000  # complex numbers of a block of a direct sum at most: 64 MB
+BLOCK_NUMBERS = 4_000_000  # maximum of complex numbers in a block of a direct sum: 64 MB
 
 
 class Harmonics(NamedTuple):
-    """Frequencies start + index * spacing, rad/s."""
+    """Defines evenly spaced frequencies start + index * spacing, rad/s."""
 
     start: float
     spacing: float
@@ -40,14 +40,14 @@ class Harmonics(NamedTuple):
 
 
 def harmonics_of(omega):
-    """Return harmonics of frequencies (n,) rad/s in any order, or None where they are not evenly spaced."""
+    """Return the Harmonics of frequencies (n,) rad/s in any order; None if these are not evenly spaced."""
     start = float(omega.min())
     gaps = np.diff(np.unique(omega))
     spacing = _common_part(gaps[gaps > EVEN * start], start)
     if float(omega.max()) - start > max(MOST_HARMONICS, 2 * omega.size) * spacing:
         return None
     index = np.round((omega - start) / spacing)
-    if index.any():  # one gap carries the rounding of two values; all of them together carry less
+    if index.any():  # a fit over all frequencies averages the rounding that a single gap carries
         spacing = float((omega - start) @ index / (index @ index))
     if np.abs((omega - start) / spacing - index).max() > EVEN:
         return None
@@ -55,7 +55,7 @@ def harmonics_of(omega):
 
 
 def _common_part(gaps, without):
-    """Return the common divisor of gaps (n,) by Euclid's rule with tolerance; `without` if there are none."""
+    """Return the common divisor of gaps (n,) by Euclid's algorithm with tolerance; `without` if n is 0."""
     if gaps.size == 0:
         return without
     common = float(gaps.min())
@@ -69,7 +69,8 @@ def _common_part(gaps, without):
 
 
 def step_for(omega, coefficient):
-    """Step (s) at which a cubic spline of sums of (n, m) exponentials errs by TOLERANCE of each deviation."""
+    """Return the step (s) that keeps the rms error of a cubic spline of sums of (n, m) exponentials at
+    TOLERANCE of each column's standard deviation."""
     step = LONGEST / omega.max()
     power = np.abs(coefficient) ** 2
     total = power.sum(axis=0)
@@ -83,27 +84,27 @@ def step_for(omega, coefficient):
 def table_of(omega, coefficient, duration):
     """Return the TimeTable of Re(sum of coefficient (n, m) exp(i omega t)), m up to COLUMNS.
 
-    It covers a period and repeats where the frequencies are multiples of one; else it covers the duration
-    (s) or, of evenly spaced frequencies, the period of their differences if it is somewhat longer.
+    The table covers one period and repeats if the frequencies are multiples of one; else it covers the
+    duration (s) or, for evenly spaced frequencies, the period of the differences if not much longer.
     """
     step = step_for(omega, coefficient)
-    found = harmonics_of(omega)
-    if found is None or found.period > max(2.0 * duration, LONG_PERIOD):
+    harmonics = harmonics_of(omega)
+    if harmonics is None or harmonics.period > max(2.0 * duration, LONG_PERIOD):
         rows = min(ceil((duration + MARGIN) / step), MOST_ROWS)
         values = direct_sum(omega, _prefiltered(omega, coefficient, step), step, rows + 3).real
         return pack_table(values, step, rows * step, False)
-    within = next_fast_len(max(8, ceil(found.period / step)))
-    step = found.period / within
-    periodic = found.periodic and within <= MOST_ROWS
-    length = max(found.period, duration) if not periodic else found.period
+    within = next_fast_len(max(8, ceil(harmonics.period / step)))
+    step = harmonics.period / within
+    periodic = harmonics.periodic and within <= MOST_ROWS
+    length = max(harmonics.period, duration) if not periodic else harmonics.period
     rows = within if periodic else min(ceil((length + MARGIN) / step), MOST_ROWS)
     spectrum = np.zeros((within, coefficient.shape[1]), dtype=complex)
-    np.add.at(spectrum, found.index, _prefiltered(omega, coefficient, step))
+    np.add.at(spectrum, harmonics.index, _prefiltered(omega, coefficient, step))
     envelope = ifft(spectrum, axis=0, norm="forward", overwrite_x=True)
     at = np.arange(-1, rows + 2)
-    turn = np.exp(1j * found.start * step * at)
+    turn = np.exp(1j * harmonics.start * step * at)
     values = (envelope[at % within] * turn[:, None]).real
-    return pack_table(values, step, found.period if periodic else rows * step, periodic)
+    return pack_table(values, step, harmonics.period if periodic else rows * step, periodic)
 
 
 def pack_table(values, step, span, periodic):
@@ -119,7 +120,7 @@ def constant_table(value):
 
 
 def response_of_spline(omega, step):
-    """Return the response of a cubic B-spline whose coefficients are samples of exponentials."""
+    """Return the frequency response of a cubic B-spline whose coefficients are samples of exponentials."""
     return (4.0 + 2.0 * np.cos(omega * step)) / 6.0
 
 
@@ -130,7 +131,7 @@ def _prefiltered(omega, coefficient, step):
 def direct_sum(omega, coefficient, step, rows):
     """Return (rows, m) complex sums of coefficient (n, m) exp(i omega t) at t = -step, 0, step, ...
 
-    exp(i omega (t1 + t2)) is a product, so a block of times takes two short tables of exponentials.
+    exp(i omega (t1 + t2)) is a product, so a block of times needs only two short tables of exponentials.
     """
     n, m = coefficient.shape
     block = max(1, min(ceil(rows**0.5), BLOCK_NUMBERS // (n * m)))

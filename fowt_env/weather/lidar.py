@@ -8,9 +8,9 @@ each advanced by its travel time at the mean wind, then filtered and buffered. S
 - averaging along the beam: Gaussian (pulsed) or Lorentzian (continuous wave);
 - evolution of the wind: squared coherence exp(-a sqrt((f d/V)^2 + (b d)^2)) of points d apart along the
   wind, a = 8.4 sigma/V + 0.05 with sigma^2 = sigma_u^2 + sigma_v^2 + sigma_w^2, b = 0.25 L^-1.24 and
-  L = 8.1 Lambda_1 (m) (Simley and Pao, American Control Conference 2015, Eq. 7), its root multiplied with the
-  IEC coherence across the wind (Chen, Guo, Schlipf, Cheng, Wind Energ. Sci. 7, 539, 2022);
-- sequential beams, each held until its next shot, and shots blocked by passing blades;
+  L = 8.1 Lambda_1 (m) (Simley and Pao, American Control Conference 2015, Eq. 7), whose root is multiplied by
+  the IEC coherence across the wind (Chen, Guo, Schlipf, Cheng, Wind Energ. Sci. 7, 539, 2022);
+- sequential beams, each value held until the next shot, and shots blocked by passing blades;
 - the low pass with its corner where the transfer function S_RL/S_LL falls below 1 by 3 dB, and its delay;
 - the power law at the measured points. The motion of the nacelle adds to each line of sight (Motion).
 
@@ -18,7 +18,7 @@ In a rotor-averaged wind R the estimate is L(f) = (S_RL/S_RR) R(f) + N(f) with n
 S_LL - |S_RL|^2/S_RR from a separate random stream. A box of wind is sampled along the beams and evolves in
 addition. Gusts, steps and user series are uniform over the disc and do not evolve.
 
-Omitted: induction zone, yaw misalignment, tilt of the beams, drift and sideways motion, noise of the speed.
+Omitted: induction zone, yaw misalignment, tilt of the beams, drift and sideways motion, line-of-sight noise.
 """
 
 from bisect import bisect_left
@@ -51,14 +51,14 @@ LIDAR_STREAM = 16  # random generator of the noise N (16), and of held shots (17
 BEAM_NODES = np.arange(-5.0, 6.0)  # along a beam, in units of z_R or of a quarter of the pulse length
 FREQUENCIES = np.geomspace(1e-4, 5.0, 120)  # Hz
 DISK_NODES = 60  # in each part of a disc seen from a point
-TUNING_CLASS = "B"  # turbulence class for which the filter is designed in all weather
+TUNING_CLASS = "B"  # turbulence class for which the filter is designed, whatever the actual class
 TUNING_PERIOD = 600.0  # s of wind in the design of the filter
 TUNING_HIGHEST = 1.0  # Hz
 MINUS_3_DB = 10.0 ** (-3.0 / 20.0)
 LEADS = np.arange(0.0, 60.0, 0.05)  # s; candidate delays of the filter
 SLOWEST = 1.0  # m/s of mean wind
 LEAST_INSIDE = 0.8  # smallest sum of a lidar's weights inside a box of wind
-STEP = 0.1  # s between values of a wind without even times
+STEP = 0.1  # s between values of a wind resampled to even times
 SETTLING = 300.0  # s added at both ends of such a wind for the transients of the filter
 
 
@@ -75,11 +75,11 @@ class Points(NamedTuple):
 
 
 class Shares(NamedTuple):
-    """Holds spectra of lidar and rotor over those of a point, at FREQUENCIES."""
+    """Holds spectra of lidar and rotor divided by the spectra of a point, at FREQUENCIES."""
 
     rotor: np.ndarray  # (m,) S_RR over S_u
     cross: np.ndarray  # (m,) complex S_RL over S_u, with the lidar's wind advanced to the rotor
-    own: np.ndarray  # (3, m) of S_u, S_v, S_w in S_LL
+    own: np.ndarray  # (3, m) contributions of S_u, S_v, S_w to S_LL
 
 
 class Tuning(NamedTuple):
@@ -93,7 +93,7 @@ class Tuning(NamedTuple):
 
 
 def directions(lidar):
-    """Return (slope y, slope z) (n,) of each beam over its distance along the wind."""
+    """Return (slope y, slope z) (n,) of each beam per distance along the wind."""
     if lidar.beams is not None:
         angle = 2.0 * np.pi * np.arange(lidar.beams) / lidar.beams
         slope = np.tan(np.radians(lidar.half_angle))
@@ -103,7 +103,7 @@ def directions(lidar):
 
 
 def beam_weights(lidar, length):
-    """Return (offset m, weight) (k,) of the average along a beam about its range (m)."""
+    """Return (offset m, weight) (k,) of the probe volume along a beam about a range `length` (m)."""
     if lidar.pulse_length is not None:
         offset = 0.25 * lidar.pulse_length * BEAM_NODES
         weight = np.exp(-4.0 * np.log(2.0) * (offset / lidar.pulse_length) ** 2)
@@ -127,11 +127,11 @@ def points(lidar, first=0):
         for distance in distances:
             offset, weight = beam_weights(lidar, distance * stretch)
             along = distance + offset / stretch
-            place = (slope_y * along, slope_z * along + lidar.above_shaft)
+            position = (slope_y * along, slope_z * along + lidar.above_shaft)
             weight = weight / (len(slopes) * len(distances))
             cross = np.outer([-slope_y, -slope_z], np.ones(along.size))
             upwind = along - (lidar.behind_rotor or 0.0)
-            parts.append([upwind, along - distance, *place, weight, *cross])
+            parts.append([upwind, along - distance, *position, weight, *cross])
     return Points(*np.concatenate(parts, axis=1))
 
 
@@ -154,7 +154,7 @@ def _nodes():
 
 
 def disk_coherence(k, distance, radius):
-    """Return the mean (m,) of exp(-k r) over a disc, r from a point at a distance from its centre.
+    """Return the mean (m,) of exp(-k r) over a disc, r from a point at a distance from the disc's centre.
 
     k (m,) 1/m, lengths in m. The quadrature uses rings about the point; radius 0: the centre alone.
     """
@@ -187,10 +187,10 @@ def _pairs(lidar, first):
     key = np.zeros(i.size, dtype=np.int64)
     for distance in apart:
         key = key * 2**21 + np.round(1000.0 * np.abs(distance)).astype(np.int64)
-    _, one, alike = np.unique(key, return_index=True, return_inverse=True)
+    _, one, group = np.unique(key, return_index=True, return_inverse=True)
     both = p.weight[i] * p.weight[j]
     products = (np.ones(i.size), p.across[i] * p.across[j], p.up[i] * p.up[j])
-    weight = np.array([np.bincount(alike, both * product) for product in products])
+    weight = np.array([np.bincount(group, both * product) for product in products])
     return *(np.abs(distance[one]) for distance in apart), weight
 
 
@@ -198,7 +198,7 @@ def _pairs(lidar, first):
 def shares(lidar, first, speed, sigma, height, radius, evolves=True):
     """Return the Shares of a lidar that uses its distances from `first` onwards; sigma of u at a point, m/s.
 
-    radius: of the rotor, m; 0: the wind of the centre fills the disc.
+    radius: of the rotor, m; 0: the wind at the centre is uniform over the disc.
     """
     f, p = FREQUENCIES, points(lidar, first)
     k, omega = coherence_wave_number(f, speed, height), 2.0 * np.pi * f
@@ -211,16 +211,16 @@ def shares(lidar, first, speed, sigma, height, radius, evolves=True):
     across, along, late, weight = _pairs(lidar, first)
     pair = np.exp(-np.outer(k, across)) * _along(f, along, speed, a, b)
     pair = pair * np.cos(np.outer(omega, late / speed))
-    own = np.array([pair @ row for row in weight])
+    auto = np.array([pair @ row for row in weight])
     rotor = disk_average(k * radius) if radius > 0.0 else np.ones(f.size)
-    return Shares(rotor, cross, own)
+    return Shares(rotor, cross, auto)
 
 
 def at_frequencies(values, frequency):
-    """Interpolate values (..., m) of Shares at frequencies (n,) Hz, linearly in their logarithm."""
-    place = np.interp(np.log(frequency), np.log(FREQUENCIES), np.arange(FREQUENCIES.size))
-    low = np.minimum(place.astype(int), FREQUENCIES.size - 2)
-    part = place - low
+    """Interpolate values (..., m) of Shares at frequencies (n,) Hz, linearly in log frequency."""
+    position = np.interp(np.log(frequency), np.log(FREQUENCIES), np.arange(FREQUENCIES.size))
+    low = np.minimum(position.astype(int), FREQUENCIES.size - 2)
+    part = position - low
     return (1.0 - part) * values[..., low] + part * values[..., low + 1]
 
 
@@ -234,10 +234,10 @@ def lidar_spectra(lidar, frequency, speed, sigma, height, radius, first=0, evolv
     return _times(shares(lidar, first, speed, sigma, height, radius, evolves), frequency, point)
 
 
-def _times(found, frequency, point):
+def _times(ratios, frequency, point):
     """Return (S_RR, S_RL, S_LL) of Shares at frequencies (n,) with spectra or variances (3, n) of a point."""
-    rotor, cross, own = (at_frequencies(values, frequency) for values in found)
-    return rotor * point[0], cross * point[0], (own * point).sum(axis=0)
+    rotor, cross, auto = (at_frequencies(values, frequency) for values in ratios)
+    return rotor * point[0], cross * point[0], (auto * point).sum(axis=0)
 
 
 def blocked_share(lidar, rotor, blade):
@@ -255,13 +255,13 @@ def blocked_share(lidar, rotor, blade):
 
 
 def sampling(lidar, blocked, frequency):
-    """Return the complex gain (n,) of shots held for one scan, or longer if the next shots are blocked.
+    """Return the complex gain (n,) of sample and hold over one scan, or longer if the next shots are blocked.
 
     A beam with randomly blocked shots holds a value for a geometric number of scans.
     """
-    turn = 2.0 * np.pi * frequency * lidar.scan_period
-    held = np.sinc(frequency * lidar.scan_period) * np.exp(-0.5j * turn)
-    return held * (1.0 - blocked) / (1.0 - blocked * np.exp(-1j * turn))
+    phase = 2.0 * np.pi * frequency * lidar.scan_period
+    hold = np.sinc(frequency * lidar.scan_period) * np.exp(-0.5j * phase)
+    return hold * (1.0 - blocked) / (1.0 - blocked * np.exp(-1j * phase))
 
 
 def low_pass(frequency, corner):
@@ -280,9 +280,9 @@ def tuning(lidar, first, speed, height, radius, blocked):
     samples = int(round(TUNING_PERIOD / STEP))
     point = amplitudes(speed, sigma, height, 2.0 * radius, samples, STEP, "point")
     variance = 0.5 * point[:3, 1 : frequency.size + 1] ** 2
-    found = shares(lidar, first, speed, sigma, height, radius)
-    rotor, cross, own = _times(found, frequency, variance)
-    gain = np.abs(cross) / own
+    ratios = shares(lidar, first, speed, sigma, height, radius)
+    rotor, cross, auto = _times(ratios, frequency, variance)
+    gain = np.abs(cross) / auto
     below = np.flatnonzero(gain < MINUS_3_DB)
     corner = np.inf
     if below.size:
@@ -293,16 +293,16 @@ def tuning(lidar, first, speed, height, radius, blocked):
     turn = 2.0 * np.pi * np.outer(LEADS, frequency)
     common = np.cos(turn) @ (gain * cross).real - np.sin(turn) @ (gain * cross).imag
     lead = float(LEADS[np.argmax(common)])
-    left = rotor + np.abs(gain) ** 2 * own + np.abs(passed) ** 2 * held_noise(lidar, blocked, frequency, own)
-    error = np.sqrt(max(left.sum() - 2.0 * common.max(), 0.0))
+    mse = rotor + np.abs(gain) ** 2 * auto + np.abs(passed) ** 2 * held_noise(lidar, blocked, frequency, auto)
+    error = np.sqrt(max(mse.sum() - 2.0 * common.max(), 0.0))
     travel = (lidar.distances[first] - (lidar.behind_rotor or 0.0)) / speed
     return Tuning(first, float(corner), lead, travel - lead, float(error))
 
 
 def held_noise(lidar, blocked, frequency, variance):
-    """Return the aliased variance (n,) in bins at frequencies k/period, as much as sampling removes.
+    """Return the aliased variance (n,) in bins at k/period; its sum is the variance that sampling removes.
 
-    Its spectrum is that of independent values, each held for a geometric number of scans.
+    The spectrum is that of independent values, each held for a geometric number of scans.
     """
     if lidar.scan_period == 0.0:
         return np.zeros(frequency.size)
@@ -312,30 +312,30 @@ def held_noise(lidar, blocked, frequency, variance):
 
 
 def lidar_horizon(scene, preset="four_beam_pulsed"):
-    """Return the longest preview time (s) of a lidar in a scene, that of its farthest distance.
+    """Return the longest preview time (s) of a lidar in a scene, set by the farthest distance.
 
     preset: as in lidar_preview. Raises: InputError for a scene without wind.
     """
-    lidar, place = _placed(scene, preset)
-    return tuning(lidar, len(lidar.distances) - 1, *place).horizon
+    lidar, site = _placed(scene, preset)
+    return tuning(lidar, len(lidar.distances) - 1, *site).horizon
 
 
 def lidar_tuning(scene, preset="four_beam_pulsed", ahead=0.0):
     """Return the Tuning of a lidar in the mean wind of a scene for a preview time `ahead` (s).
 
-    It uses all distances with a sufficient preview time after the filter. preset: as in lidar_preview.
+    The filter averages all distances with a sufficient preview time. preset: as in lidar_preview.
     Raises: InputError for a longer time than that of the farthest distance, and for a scene without wind.
     """
-    lidar, place = _placed(scene, preset)
+    lidar, site = _placed(scene, preset)
     last = len(lidar.distances) - 1
-    horizon = tuning(lidar, last, *place).horizon
+    horizon = tuning(lidar, last, *site).horizon
     if ahead > horizon:
         raise InputError(
-            f"preview_times: {ahead:g} s ahead: must be <= {max(horizon, 0.0):.3g} s, what the lidar"
-            f" {lidar.name!r} knows at {place[0]:g} m/s"
+            f"preview_times: {ahead:g} s ahead: must be <= {max(horizon, 0.0):.3g} s, the horizon of lidar"
+            f" {lidar.name!r} at {site[0]:g} m/s"
         )
-    first = bisect_left(range(last), True, key=lambda first: tuning(lidar, first, *place).horizon >= ahead)
-    return tuning(lidar, first, *place)
+    first = bisect_left(range(last), True, key=lambda first: tuning(lidar, first, *site).horizon >= ahead)
+    return tuning(lidar, first, *site)
 
 
 def _placed(scene, preset):
@@ -343,7 +343,7 @@ def _placed(scene, preset):
     lidar = read_lidar(preset)
     if scene.model.aero is None:
         raise InputError(f"lidar {lidar.name!r}: needs a scene with wind to look ahead")
-    # that convects gusts to the rotor
+    # the speed at which gusts travel to the rotor
     speed = float(scene.wind.speed if isinstance(scene.wind, WindBox) else scene.wind_speed)
     if speed < SLOWEST:
         raise InputError(f"lidar {lidar.name!r}: mean wind = {speed:g}: must be >= {SLOWEST:g} m/s")
@@ -351,33 +351,33 @@ def _placed(scene, preset):
     blocked = blocked_share(lidar, rotor, scene.turbine.blade)
     if blocked > 0.9:
         raise InputError(
-            f"lidar {lidar.name!r}: the blades of {scene.turbine.name!r} take away {100.0 * blocked:.0f} %"
-            " of its shots: must be at most 90 %; mount it elsewhere (behind_rotor, above_shaft)"
+            f"lidar {lidar.name!r}: the blades of {scene.turbine.name!r} block {100.0 * blocked:.0f} %"
+            " of the shots: must be at most 90 %; change behind_rotor or above_shaft"
         )
     return lidar, (speed, rotor.hub_height, _radius(scene), blocked)
 
 
 def _radius(scene):
-    """Return the radius (m) of the rotor average; 0 if the wind of a point fills the disc."""
+    """Return the radius (m) of the rotor average; 0 if the wind of a point is uniform over the disc."""
     drawn = _drawn(scene)
     return 0.0 if drawn is not None and drawn["average"] == "point" else scene.turbine.rotor.tip_radius
 
 
 def _drawn(scene):
-    """Return the arguments of turbulence() of a scene, None for a wind that is not drawn from spectra."""
+    """Return the arguments of turbulence() for a scene; None for a wind that is not drawn from spectra."""
     if isinstance(scene.wind, WindBox):
         return None
     rotor, duration = scene.turbine.rotor, scene.options["duration"]
-    place = {"reference_height": rotor.hub_height, "rotor_diameter": 2.0 * rotor.tip_radius}
-    return drawn_turbulence(scene.wind, **place, seed=scene.seed, duration=duration)
+    size = {"reference_height": rotor.hub_height, "rotor_diameter": 2.0 * rotor.tip_radius}
+    return drawn_turbulence(scene.wind, **size, seed=scene.seed, duration=duration)
 
 
 def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
-    """Return the Preview of the rotor-averaged wind at times (k,) s ahead, as a nacelle lidar estimates it.
+    """Return the Preview of the rotor-averaged wind at times (k,) s ahead, estimated by a nacelle lidar.
 
     preset  name of a built-in lidar (descriptions.lidar.lidars), a path to a TOML file with its keys, or a
             Lidar
-    seed    of the noise of the lidar; None: that of the scene
+    seed    of the lidar's noise; None: the seed of the scene
     One filter, designed for the last time, and one buffer serve all times.
     Raises: InputError for times that do not increase from 0 to 600 s or exceed the lidar's horizon in this
     wind, and for a scene without wind.
@@ -406,7 +406,7 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
 
 
 def _profile_factor(scene, lidar, tuned):
-    """Return the factor on the rotor's series for the power law at the measured points."""
+    """Return the factor on the rotor's series that accounts for the power law at the measured points."""
     series, p = scene.model.aero.wind, points(lidar, tuned.first)
     height = np.maximum(series.reference_height + p.z, LOWEST_HEIGHT)
     seen = p.weight @ (height / series.reference_height) ** series.shear_exponent
@@ -414,17 +414,17 @@ def _profile_factor(scene, lidar, tuned):
 
 
 def _in_turbulence(scene, lidar, tuned, seed):
-    """Return the unfiltered (time, wind, period) of the lidar at the rotor, of a wind drawn from spectra."""
+    """Return the lidar's unfiltered (time, wind, period) at the rotor, in a wind drawn from spectra."""
     start, wind, period = rotor_wind_series(scene)
     drawn, count = _drawn(scene), wind.size - 1
     frequency = np.arange(1, count // 2 + 1) / period
-    place = (drawn["speed"], drawn["sigma"], drawn["height"])
-    found = shares(lidar, tuned.first, *place, _radius(scene))
-    rotor, cross, own = (at_frequencies(values, frequency) for values in found)
-    point = amplitudes(*place, 2.0 * scene.turbine.rotor.tip_radius, count, period / count, "point")[:3, 1:]
+    wind_at = (drawn["speed"], drawn["sigma"], drawn["height"])
+    ratios = shares(lidar, tuned.first, *wind_at, _radius(scene))
+    rotor, cross, auto = (at_frequencies(values, frequency) for values in ratios)
+    point = amplitudes(*wind_at, 2.0 * scene.turbine.rotor.tip_radius, count, period / count, "point")[:3, 1:]
     variance = 0.5 * point**2
     # negative only by rounding: the coherence is at most 1
-    rest = np.maximum((own * variance).sum(axis=0) - np.abs(cross) ** 2 / rotor * variance[0], 0.0)
+    rest = np.maximum((auto * variance).sum(axis=0) - np.abs(cross) ** 2 / rotor * variance[0], 0.0)
     spectrum = np.fft.rfft(wind[:-1])
     spectrum[0] *= _profile_factor(scene, lidar, tuned)
     spectrum[1:] = cross / rotor * spectrum[1:] + _noise(rest, count, seed, LIDAR_STREAM)
@@ -432,15 +432,15 @@ def _in_turbulence(scene, lidar, tuned, seed):
 
 
 def _noise(variance, count, seed, stream):
-    """Return complex Gaussian Fourier sums (n,) of a series of `count` values with a variance in each bin."""
+    """Return Gaussian Fourier coefficients (n,) of a series of `count` values with a variance per bin."""
     drawn = component_generator(seed, stream).normal(size=(2, variance.size))
     return 0.5 * count * np.sqrt(variance) * (drawn[0] + 1j * drawn[1])
 
 
 def _in_box(scene, lidar, tuned, seed):
-    """Return the unfiltered (time, wind, period) of the lidar at the rotor, of a box of wind.
+    """Return the lidar's unfiltered (time, wind, period) at the rotor, in a box of wind.
 
-    Points outside the grid are omitted, as the far ends of beams in a narrow box.
+    Points outside the grid, such as the far ends of beams in a narrow box, are omitted.
     Raises: InputError if too few points remain.
     """
     box, p = scene.wind, points(lidar, tuned.first)
@@ -450,9 +450,9 @@ def _in_box(scene, lidar, tuned, seed):
     if p.weight[inside].sum() < LEAST_INSIDE:
         raise InputError(
             f"wind: the grid from y = {box.y[0]:g} to {box.y[-1]:g} m and z = {box.z[0]:g} to {box.z[-1]:g} m"
-            f" must hold {LEAST_INSIDE:g} of what the lidar {lidar.name!r} looks at, y to"
-            f" {np.abs(p.y).max():.0f} m either way and z from {height.min():.0f} to {height.max():.0f} m:"
-            f" it holds {p.weight[inside].sum():.2f}"
+            f" must contain at least {LEAST_INSIDE:g} of the weight of the points of lidar {lidar.name!r},"
+            f" |y| up to {np.abs(p.y).max():.0f} m and z from {height.min():.0f} to {height.max():.0f} m: it"
+            f" contains {p.weight[inside].sum():.2f}"
         )
     weight = p.weight * inside / p.weight[inside].sum()
     seen = np.zeros(box.velocity.shape[0])
@@ -461,8 +461,8 @@ def _in_box(scene, lidar, tuned, seed):
     count, radius = seen.size, scene.turbine.rotor.tip_radius
     frequency = np.arange(1, count // 2 + 1) / (count * box.dt)
     sigma = ntm_sigma(speed, TUNING_CLASS)
-    found = (shares(lidar, tuned.first, speed, sigma, hub, radius, evolves) for evolves in (True, False))
-    evolved, frozen = (at_frequencies(np.abs(each.cross), frequency) for each in found)
+    ratios = (shares(lidar, tuned.first, speed, sigma, hub, radius, evolves) for evolves in (True, False))
+    evolved, frozen = (at_frequencies(np.abs(each.cross), frequency) for each in ratios)
     kept = np.where(frozen > 1e-12, evolved / np.maximum(frozen, 1e-12), 0.0)
     spectrum = np.fft.rfft(seen)
     variance = 2.0 * np.abs(spectrum[1:] / count) ** 2
@@ -482,7 +482,7 @@ def _look(field, late, y, z, weight, across, up, seen):
 
 
 def _uniform(scene, lidar, tuned):
-    """Return the unfiltered (time, wind, period) of the lidar at even times, of a uniform wind."""
+    """Return the lidar's unfiltered (time, wind, period) at even times, in a uniform wind."""
     start, wind, period = rotor_wind_series(scene)
     span = max(start[-1] - start[0], STEP) if period is None else period
     count = int(np.ceil(span / STEP - 1e-9))
@@ -491,9 +491,9 @@ def _uniform(scene, lidar, tuned):
 
 
 def _filtered(time, value, period, lidar, blocked, tuned, seed):
-    """Return the wind (n,) at even times (n,) s after sampling and low pass, with their delay removed.
+    """Return the wind (n,) at even times (n,) s after sampling and low pass, with the filter delay removed.
 
-    seed: of the aliased noise; None: no noise. A wind without a period is extended by its end values.
+    seed: of the aliased noise; None: no noise. A non-periodic wind is extended by its end values.
     """
     count, step = value.size, time[1] - time[0] if time.size > 1 else STEP
     folded = np.zeros(count)

@@ -1,4 +1,4 @@
-"""Prepares the wind preview of a controller: series of the wind some times ahead, over the run."""
+"""Prepares the wind preview of a controller: time series of the wind at look-ahead times, over the run."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from fowt_env.errors import InputError
 from fowt_env.weather.wind_field import WindBox, rotor_average
 
 LONGEST = 600.0  # s ahead
-SAME_INSTANT = 1e-9  # s within which two instants are one
+SAME_INSTANT = 1e-9  # s, tolerance for equal instants
 
 
 class Motion(NamedTuple):
@@ -26,15 +26,15 @@ class Motion(NamedTuple):
 
 
 class Preview(NamedTuple):
-    """Holds the rotor wind along x some times ahead: values[j] at time t is that of t + times[j]."""
+    """Holds the rotor wind along x at look-ahead times: values[j] at time t is the wind at t + times[j]."""
 
-    time: np.ndarray  # (n,) s, increasing; constant beyond the ends
+    time: np.ndarray  # (n,) s, increasing; values are constant outside
     values: np.ndarray  # (len(times), n) m/s
     motion: Motion | None = None  # effect of the nacelle's motion; None: none
 
 
 def check_times(times):
-    """Check look-ahead times (s), increasing from 0 to LONGEST; return them (k,). Raises: InputError."""
+    """Check and return look-ahead times (k,) s, increasing from 0 to LONGEST. Raises: InputError."""
     if isinstance(times, (str, bytes)) or not np.iterable(times):
         raise InputError(f"preview_times = {times!r}: must be a list of times in s")
     times = tuple(times)
@@ -64,21 +64,22 @@ def rotor_wind_series(scene):
 def exact_preview(scene, times):
     """Return the exact Preview of the rotor-averaged wind at times (k,) s ahead.
 
-    Linear between the samples of the scene's wind; random wind repeats with its period, other wind keeps its
-    last value, as in the plant.
+    Values are linear between the samples of the scene's wind; random wind repeats with its period, other wind
+    keeps its last value, as in the plant.
     Raises: InputError for times that do not increase from 0 to 600 s, or a scene without wind.
     """
     return series_ahead(scene, *rotor_wind_series(scene), check_times(times))
 
 
 def series_ahead(scene, start, speed, period, times):
-    """Return the Preview of a speed (n,) m/s at times start (n,) s, periodic (s) or extended by its ends."""
+    """Return the Preview of a speed (n,) m/s at times start (n,) s, repeated by its period (s) or, for None,
+    extended by its end values."""
     end = max(scene.options["duration"], start[-1])
     knots = start
     if period is not None:
         first, last = np.floor(-start[0] / period), np.ceil((end + LONGEST) / period)
         knots = (start + period * np.arange(first, last + 1.0)[:, None]).ravel()
-    # every instant at which the slope of a value changes
+    # all instants at which the slope of a value changes
     time = np.concatenate([[0.0, end], *(knots - ahead for ahead in times)])
     time = np.sort(time[(time >= 0.0) & (time <= end)])
     time = time[np.concatenate([[True], np.diff(time) > SAME_INSTANT])]

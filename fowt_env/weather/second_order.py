@@ -27,20 +27,20 @@ from fowt_env.weather.harmonics import (
 )
 
 METHODS = ("mean_drift", "newman", "full")
-QUIET = 1e-2  # fraction of the sea's energy beyond the QTF's frequencies that is passed over
+QUIET = 1e-2  # fraction of the sea's energy outside the QTF's frequencies that is ignored
 SAME_HEADING = 1e-4  # rad
-EDGE = 24  # rows beyond both ends of a table whose spline is fitted: an end's influence falls by 3.7 per row
-SAMPLES = 12  # per shortest period of a difference, of a sea whose frequencies are not evenly spaced
+EDGE = 24  # extra rows at both ends of a fitted spline: the influence of an end falls by 3.7 per row
+SAMPLES = 12  # per shortest difference period of a sea whose frequencies are not evenly spaced
 
 
 def build_second_order(body, waves, method, *, duration, cutoff=None):
-    """Return SecondOrder of a PotentialFlow with a QTF, in Waves, by one of METHODS; None for None or "none".
+    """Return the SecondOrder of a PotentialFlow with a QTF in Waves, by one of METHODS (else None or "none").
 
-    mean_drift  the mean force alone
-    newman      the diagonal of the QTF alone: |sum a_i sqrt(Q_ii) exp(i w_i t)|^2 of the positive Q_ii, less
-                the same of the negative ones
-    full        all pairs
-    cutoff      rad/s: forces of differences above it are omitted; None: of none
+    mean_drift  the mean force only
+    newman      Newman's approximation from the diagonal of the QTF: |sum a_i sqrt(Q_ii) exp(i w_i t)|^2 over
+                positive Q_ii, less the same sum over negative Q_ii
+    full        all pairs of frequencies
+    cutoff      rad/s: forces at higher difference frequencies are omitted; None: no cutoff
 
     Raises: InputError for a sea whose headings or pairs of frequencies the QTF lacks.
     """
@@ -58,14 +58,14 @@ def build_second_order(body, waves, method, *, duration, cutoff=None):
     if method == "mean_drift":
         return SecondOrder(constant_table(mean), mean, ramp)
     form = (_full if method == "full" else _newman)(qtf, omega, wave, groups)
-    found = harmonics_of(omega)
-    if found is None:
+    harmonics = harmonics_of(omega)
+    if harmonics is None:
         return SecondOrder(_uneven_table(omega, form, duration, cutoff), mean, ramp)
-    return SecondOrder(_even_table(found, form, cutoff), mean, ramp)
+    return SecondOrder(_even_table(harmonics, form, cutoff), mean, ramp)
 
 
 def _inside(qtf, waves):
-    """Return components (n,) that the QTF covers. Warns: PlantWarning where the others have some energy."""
+    """Return a mask (n,) of the components that the QTF covers. Warns: PlantWarning above QUIET outside."""
     low, high = qtf.omega[0] * (1.0 - 1e-6), qtf.omega[-1] * (1.0 + 1e-6)
     used = (waves.omega >= low) & (waves.omega <= high)
     energy = waves.amplitude**2
@@ -73,7 +73,7 @@ def _inside(qtf, waves):
     if left_out > QUIET:
         warnings.warn(
             f"sea: {100.0 * left_out:.3g} % of its energy lies outside the difference-frequency QTF, which"
-            f" has {qtf.omega[0]:.4g} to {qtf.omega[-1]:.4g} rad/s, and makes no second-order force",
+            f" has {qtf.omega[0]:.4g} to {qtf.omega[-1]:.4g} rad/s, and causes no second-order force",
             PlantWarning,
             stacklevel=level_outside(),
         )
@@ -81,7 +81,7 @@ def _inside(qtf, waves):
 
 
 def _heading_groups(qtf, heading):
-    """Return [(components, {other group: row of the QTF, whether exchanged})] for each heading of the sea."""
+    """Return [(components, {other group: (row of the QTF, exchanged)})] for each heading of the sea."""
     values = []
     for angle in heading:
         if not any(_same(angle, other) for other in values):
@@ -94,15 +94,15 @@ def _heading_groups(qtf, heading):
 
 
 def _pair(qtf, first, second):
-    """Return (row of the QTF, whether its two waves are exchanged) for a pair of headings."""
-    for turned, wanted in ((False, (first, second)), (True, (second, first))):
+    """Return (row of the QTF, whether the row has the two waves exchanged) for a pair of headings."""
+    for exchanged, requested in ((False, (first, second)), (True, (second, first))):
         for row, pair in enumerate(qtf.heading):
-            if all(map(_same, wanted, pair)):
-                return row, turned
-    known = ", ".join(f"({one:g}, {other:g})" for one, other in np.degrees(qtf.heading)[:12])
+            if all(map(_same, requested, pair)):
+                return row, exchanged
+    available = ", ".join(f"({one:g}, {other:g})" for one, other in np.degrees(qtf.heading)[:12])
     raise InputError(
         f"sea: the difference-frequency QTF has no pair of headings ({np.degrees(first):.4g},"
-        f" {np.degrees(second):.4g}) deg; it has {known} deg"
+        f" {np.degrees(second):.4g}) deg; it has {available} deg"
     )
 
 
@@ -110,10 +110,10 @@ def _same(a, b):
     return abs((a - b + pi) % (2.0 * pi) - pi) < SAME_HEADING
 
 
-def _table(qtf, row, turned):
+def _table(qtf, row, exchanged):
     """Return Q (k, k, 6) of a pair of headings; missing values are conjugates of the exchanged pair."""
     value = qtf.value[row]
-    if turned:
+    if exchanged:
         return np.conj(value.transpose(1, 0, 2))
     one, other = qtf.heading[row]
     if _same(one, other):
@@ -122,50 +122,50 @@ def _table(qtf, row, turned):
 
 
 def _hats(qtf, omega):
-    """Return (low, share): the file's frequency below each of omega (n,), and the share of the next one."""
+    """Return (low, weight): index of the QTF frequency below each omega (n,), and the next one's weight."""
     if qtf.omega.size == 1:
         return np.zeros(omega.size, dtype=int), np.zeros(omega.size)
     low = np.clip(np.searchsorted(qtf.omega, omega, side="right") - 1, 0, qtf.omega.size - 2)
-    share = (omega - qtf.omega[low]) / (qtf.omega[low + 1] - qtf.omega[low])
-    return low, np.clip(share, 0.0, 1.0)
+    weight = (omega - qtf.omega[low]) / (qtf.omega[low + 1] - qtf.omega[low])
+    return low, np.clip(weight, 0.0, 1.0)
 
 
 def _diagonal(qtf, omega, row):
-    """Return the real Q(w, w) (n, 6) of a heading; linear along the diagonal without neighbouring values."""
+    """Return the real Q(w, w) (n, 6) of a heading; without off-diagonal values linear along the diagonal."""
     table = _table(qtf, row, False)
-    low, share = _hats(qtf, omega)
-    high, share = np.minimum(low + 1, qtf.omega.size - 1), share[:, None]
+    low, weight = _hats(qtf, omega)
+    high, weight = np.minimum(low + 1, qtf.omega.size - 1), weight[:, None]
     lower, upper = table[low, low].real, table[high, high].real
-    beside = table[high, low].real
-    beside = np.where(np.isnan(beside), 0.5 * (lower + upper), beside)
-    found = (1.0 - share) ** 2 * lower + 2.0 * share * (1.0 - share) * beside + share**2 * upper
-    if np.isnan(found).any():
+    cross = table[high, low].real
+    cross = np.where(np.isnan(cross), 0.5 * (lower + upper), cross)
+    value = (1.0 - weight) ** 2 * lower + 2.0 * weight * (1.0 - weight) * cross + weight**2 * upper
+    if np.isnan(value).any():
         raise InputError("the difference-frequency QTF lacks pairs of equal frequencies that the sea needs")
-    return found
+    return value
 
 
 def _mean(qtf, omega, wave, groups):
-    """Return (6,) mean force: of each component with itself."""
+    """Return the mean force (6,): the sum over each component paired with itself."""
     total = np.zeros(6)
-    for number, (own, pairs) in enumerate(groups):
-        total += np.abs(wave[own]) ** 2 @ _diagonal(qtf, omega[own], pairs[number][0])
+    for number, (members, pairs) in enumerate(groups):
+        total += np.abs(wave[members]) ** 2 @ _diagonal(qtf, omega[members], pairs[number][0])
     return total
 
 
 class _Form(NamedTuple):
-    """Computes forces from sums of components."""
+    """Holds a quadratic form: the sums of components A_p(t) and the force as a function of these sums."""
 
     coefficient: np.ndarray  # (n, m) of the components
     force: Callable  # (rows, m) complex sums -> (rows, 6)
 
 
 def _newman(qtf, omega, wave, groups):
-    """Return _Form of Newman's approximation: |positive|^2 - |negative|^2 of each force and heading."""
+    """Return the _Form of Newman's approximation: |positive|^2 - |negative|^2 of each force and heading."""
     columns = np.zeros((omega.size, 2, 6, len(groups)), dtype=complex)
-    for number, (own, pairs) in enumerate(groups):
-        diagonal = _diagonal(qtf, omega[own], pairs[number][0])
-        columns[own, 0, :, number] = wave[own, None] * np.sqrt(np.maximum(diagonal, 0.0))
-        columns[own, 1, :, number] = wave[own, None] * np.sqrt(np.maximum(-diagonal, 0.0))
+    for number, (members, pairs) in enumerate(groups):
+        diagonal = _diagonal(qtf, omega[members], pairs[number][0])
+        columns[members, 0, :, number] = wave[members, None] * np.sqrt(np.maximum(diagonal, 0.0))
+        columns[members, 1, :, number] = wave[members, None] * np.sqrt(np.maximum(-diagonal, 0.0))
     shape = columns.shape[1:]
 
     def force(sums):
@@ -176,29 +176,29 @@ def _newman(qtf, omega, wave, groups):
 
 
 def _full(qtf, omega, wave, groups):
-    """Return _Form of the full QTF: hat functions of its frequencies for each heading."""
-    low, share = _hats(qtf, omega)
+    """Return the _Form of the full QTF: hat functions of the QTF frequencies for each heading."""
+    low, weight = _hats(qtf, omega)
     high = np.minimum(low + 1, qtf.omega.size - 1)
-    nodes = np.unique(np.concatenate([low, high[share > 0.0]]))
+    nodes = np.unique(np.concatenate([low, high[weight > 0.0]]))
     size = nodes.size
     columns = np.zeros((omega.size, len(groups) * size), dtype=complex)
     matrix = np.zeros((6, columns.shape[1], columns.shape[1]), dtype=complex)
-    for number, (own, pairs) in enumerate(groups):
-        at = number * size + np.searchsorted(nodes, low[own])
-        np.add.at(columns, (own, at), wave[own] * (1.0 - share[own]))
-        upper = own[share[own] > 0.0]
+    for number, (members, pairs) in enumerate(groups):
+        at = number * size + np.searchsorted(nodes, low[members])
+        np.add.at(columns, (members, at), wave[members] * (1.0 - weight[members]))
+        upper = members[weight[members] > 0.0]
         at = number * size + np.searchsorted(nodes, high[upper])
-        np.add.at(columns, (upper, at), wave[upper] * share[upper])
-        for other, (row, turned) in pairs.items():
-            block = _table(qtf, row, turned)[np.ix_(nodes, nodes)].transpose(2, 0, 1)
-            place = slice(number * size, (number + 1) * size), slice(other * size, (other + 1) * size)
-            matrix[:, *place] = block
+        np.add.at(columns, (upper, at), wave[upper] * weight[upper])
+        for other, (row, exchanged) in pairs.items():
+            block = _table(qtf, row, exchanged)[np.ix_(nodes, nodes)].transpose(2, 0, 1)
+            position = slice(number * size, (number + 1) * size), slice(other * size, (other + 1) * size)
+            matrix[:, *position] = block
     if np.isnan(matrix).any():
         raise InputError(
             "the difference-frequency QTF lacks pairs of frequencies that the sea needs"
             f" (between {qtf.omega[nodes[0]]:.4g} and {qtf.omega[nodes[-1]]:.4g} rad/s)"
         )
-    # the real part of the form is that of the Hermitian part of its matrix
+    # only the Hermitian part of the matrix contributes to the real part of the form
     matrix = 0.5 * (matrix + np.conj(matrix.transpose(0, 2, 1)))
 
     def force(sums):
@@ -207,25 +207,25 @@ def _full(qtf, omega, wave, groups):
     return _Form(columns, force)
 
 
-def _even_table(found, form, cutoff):
-    """Return the TimeTable of a sea of Harmonics: it repeats with the period of the differences."""
-    highest = int(found.index.max())
+def _even_table(harmonics, form, cutoff):
+    """Return the TimeTable of a sea of Harmonics, which repeats with the period of the differences."""
+    highest = int(harmonics.index.max())
     size = next_fast_len(2 * highest + 2)
     spectrum = np.zeros((size, form.coefficient.shape[1]), dtype=complex)
-    np.add.at(spectrum, found.index, form.coefficient)
+    np.add.at(spectrum, harmonics.index, form.coefficient)
     force = form.force(ifft(spectrum, axis=0, norm="forward", overwrite_x=True))
     change = rfft(force, axis=0, norm="forward")[: highest + 1]
-    omega = found.spacing * np.arange(highest + 1)
+    omega = harmonics.spacing * np.arange(highest + 1)
     if cutoff is not None:
         change[omega > cutoff * (1.0 + 1e-9)] = 0.0
     rows = max(8, size)
     if highest > 0 and np.abs(change[1:]).any():
-        rows = next_fast_len(max(rows, ceil(found.period / step_for(omega[1:], change[1:]))), real=True)
+        rows = next_fast_len(max(rows, ceil(harmonics.period / step_for(omega[1:], change[1:]))), real=True)
     rows = min(rows, MOST_ROWS)
-    step = found.period / rows
+    step = harmonics.period / rows
     change = change / response_of_spline(omega, step)[:, None]
     values = irfft(change, n=rows, axis=0, norm="forward")
-    return pack_table(values[np.arange(-1, rows + 2) % rows], step, found.period, True)
+    return pack_table(values[np.arange(-1, rows + 2) % rows], step, harmonics.period, True)
 
 
 def _uneven_table(omega, form, duration, cutoff):
@@ -233,12 +233,12 @@ def _uneven_table(omega, form, duration, cutoff):
     spread = float(np.ptp(omega))
     if cutoff is not None and cutoff < spread:
         raise InputError(
-            f"second_order_cutoff = {cutoff:g} rad/s: needs a sea of evenly spaced frequencies, of a spectrum"
-            " or of harmonics of one period"
+            f"second_order_cutoff = {cutoff:g} rad/s: needs a sea of evenly spaced frequencies, from a"
+            " spectrum or from harmonics of one period"
         )
     step = 2.0 * pi / (SAMPLES * spread)
     rows = min(ceil((duration + MARGIN) / step), MOST_ROWS)
-    # rows from -step on, and EDGE more on both sides, where the fit of the spline is not yet its own
+    # rows from -step, and EDGE more on both sides, where the spline fit still depends on the ends
     turned = form.coefficient * np.exp(-1j * omega * EDGE * step)[:, None]
     sums = direct_sum(omega, turned, step, rows + 3 + 2 * EDGE)
     values = spline_filter1d(form.force(sums), order=3, axis=0, mode="mirror")

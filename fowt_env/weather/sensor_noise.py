@@ -1,4 +1,4 @@
-"""Sensors of one run: a chain's values at its control period, and its noise, drawn beforehand."""
+"""Builds the sensors of one run: settings of a chain at the control period, and noise drawn beforehand."""
 
 from math import exp
 
@@ -8,32 +8,32 @@ from fowt_env.descriptions.sensors import SensorChain
 from fowt_env.loop.sensing import Sensors, Setting, open_chain
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measurement
 
-NOISE_STREAM, BLADE_NOISE_STREAM = 3, 4  # of a run's seed: apart from that of its weather
+NOISE_STREAM, BLADE_NOISE_STREAM = 3, 4  # random streams of a run's seed, separate from the weather's
 
 
 def draw_noise(std: np.ndarray, seed: int, readings: int) -> np.ndarray:
     """Return (readings, n) white noise of standard deviations (n,), by the weather's seed.
 
-    A longer run goes on from a shorter one's. Fields of BladeMeasurement, which follow those of Measurement,
-    have a stream of their own, so that the noise of the others is the same with and without them.
+    A longer run continues the noise of a shorter one. Fields of BladeMeasurement, which follow the fields of
+    Measurement, have a separate stream, so that the noise of Measurement is the same with and without them.
     """
     rng = np.random.default_rng([seed, NOISE_STREAM])
     noise = std[:N_MEASUREMENTS] * rng.normal(size=(readings, N_MEASUREMENTS))
-    others = std[N_MEASUREMENTS:]
-    if not others.size:
+    blades = std[N_MEASUREMENTS:]
+    if not blades.size:
         return noise
     rng = np.random.default_rng([seed, BLADE_NOISE_STREAM])
-    return np.hstack([noise, others * rng.normal(size=(readings, others.size))])
+    return np.hstack([noise, blades * rng.normal(size=(readings, blades.size))])
 
 
 def draw_sensors(
     chain: SensorChain | None, control_dt: float, seed: int, readings: int, individual: bool = False
 ) -> Sensors:
-    """Return the sensors of a run with so many readings, one per control period (s); None: exact ones.
+    """Return the Sensors of a run for a number of readings, one per control period (s); None: exact sensors.
 
-    individual: whether the scene's blades have individual pitch, with a BladeMeasurement to read. A delay
-    counts as the nearest whole number of control periods. Fields that the chain does not have are left as
-    they are measured: it is for the caller to hide them.
+    individual: whether the blades have individual pitch, and so a BladeMeasurement. A delay is rounded to the
+    nearest whole number of control periods. Fields that the chain lacks are passed unchanged: the caller has
+    to hide them.
     """
     fields = Measurement._fields + (BladeMeasurement._fields if individual else ())
     settings = open_chain(len(fields))

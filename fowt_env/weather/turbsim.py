@@ -1,4 +1,4 @@
-"""TurbSim's full-field wind files (.bts), read by openfast_io once their head is known to be sound."""
+"""Reads TurbSim full-field wind files (.bts) by openfast_io, after a check of the file header."""
 
 import os
 import struct
@@ -7,7 +7,7 @@ import numpy as np
 
 from fowt_env.errors import InputError
 
-NOT_PERIODIC, PERIODIC = 7, 8  # identifiers: whether the box repeats
+NOT_PERIODIC, PERIODIC = 7, 8  # file identifiers
 HEAD = struct.Struct("<h4i12fi")  # kind; counts; spacings, hub and scales; length of the description
 
 
@@ -15,8 +15,8 @@ def read_bts(path):
     """Return (velocity, y, z, dt, speed, periodic) of a TurbSim file.
 
     velocity (n_time, n_z, n_y, 3) float32 m/s; y, z (m); dt (s); speed: mean wind at the hub (m/s); periodic:
-    whether the file says so. Memory: at most some ten times the size of the file.
-    Raises: InputError that names the file and what is wrong with it.
+    from the file's identifier. Memory: at most some ten times the size of the file.
+    Raises: InputError that names the file and the fault.
     """
     where = f"wind.path = {str(path)!r}"
     try:
@@ -31,25 +31,25 @@ def read_bts(path):
         from openfast_io.turbsim_file import TurbSimFile
     except ImportError:
         raise InputError(
-            "TurbSim boxes are read by openfast_io, which is not installed: pip install 'fowt-env[openfast]'"
+            "TurbSim boxes need openfast_io, which is not installed: pip install 'fowt-env[openfast]'"
         ) from None
     try:
         with np.errstate(over="ignore"):
             file = TurbSimFile(str(path))
-    except Exception as error:  # whatever a broken file makes the reader raise
+    except Exception as error:  # a broken file may raise any exception in the reader
         raise InputError(f"{where}: not a TurbSim full-field file ({error})") from None
     with np.errstate(over="ignore"):
         velocity = np.ascontiguousarray(np.transpose(file["u"], (1, 3, 2, 0)), dtype=np.float32)
     if not np.isfinite(velocity).all():
-        raise InputError(f"{where}: holds winds that are not finite")
+        raise InputError(f"{where}: contains wind speeds that are not finite")
     y, z = np.asarray(file["y"]), np.asarray(file["z"])
     return velocity, y, z, float(file["dt"]), float(file["uRef"]), int(file["ID"]) == PERIODIC
 
 
 def _check_head(path, where):
-    """Raises: InputError if the head of a TurbSim file is not that of a file of its size.
+    """Check that the header of a TurbSim file is consistent with the file size. Raises: InputError.
 
-    The reader believes the counts that it finds, and takes the memory and the time that they ask for.
+    The reader would trust wrong counts, and take the memory and the time that these imply.
     """
     with path.open("rb") as file:
         head = file.read(HEAD.size)
@@ -67,12 +67,13 @@ def _check_head(path, where):
     needed = HEAD.size + length + 6 * n_time * (n_z * n_y + n_tower)
     if needed != size:
         raise InputError(
-            f"{where}: {n_time} times of {n_z} x {n_y} + {n_tower} points take {needed} bytes; it has {size}"
+            f"{where}: {n_time} times of {n_z} x {n_y} + {n_tower} points take {needed} bytes; the file has"
+            f" {size}"
         )
     dz, dy, dt, speed, *rest = numbers
     scales = rest[2::2]
     if not (np.isfinite(numbers).all() and min(dz, dy, dt, speed) > 0.0 and all(scales)):
         raise InputError(
             f"{where}: spacings {dz:g} m, {dy:g} m, {dt:g} s, wind {speed:g} m/s, scales {scales}:"
-            " all numbers of the head must be finite, these positive, and no scale zero"
+            " all numbers of the header must be finite, these positive, and no scale zero"
         )

@@ -1,10 +1,10 @@
 """Generates turbulent wind of IEC 61400-1 (Kaimal spectrum, exponential coherence) averaged over the rotor.
 
 A hub-point series applied to the whole disk overestimates the turbulence of a rotor, because gusts smaller
-than the rotor cancel. The point spectrum is therefore multiplied with the coherence averaged over all pairs
-of points of the disk, (A22) of theory.md; gradients of u follow from pairs weighted with their positions.
-The coherence exp(-k r), k = 12 sqrt((f/V)^2 + (0.12/Lc)^2), Lc = 8.1 Lambda_1 (Annex B), makes the averages
-functions of k R alone: one table serves every rotor, wind speed and frequency.
+than the rotor average out. The point spectrum is therefore multiplied by the coherence averaged over all
+pairs of points of the disk, (A22) of theory.md; gradients of u follow from pairs weighted with their
+positions. With the coherence exp(-k r), k = 12 sqrt((f/V)^2 + (0.12/Lc)^2), Lc = 8.1 Lambda_1 (Annex B), the
+averages are functions of k R alone: one table serves every rotor, wind speed and frequency.
 
 Assumptions that the standard does not specify:
 - Area weighting. With weights chord x radius, to which thrust and torque respond at constant rotor speed, the
@@ -25,11 +25,11 @@ LENGTH_RATIO = np.array([8.1, 2.7, 0.66])  # L_u, L_v, L_w over Lambda_1 (IEC An
 SIGMA_RATIO = np.array([1.0, 0.8, 0.5])  # sigma of u, v, w over sigma_1 (IEC Annex B)
 COHERENCE_DECAY = 12.0
 COHERENCE_OFFSET = 0.12
-SHORTEST_PERIOD = 600.0  # s; sigma_1 is defined over 10 min, a shorter record would squeeze it into gusts
+SHORTEST_PERIOD = 600.0  # s; sigma_1 is defined over 10 min: shorter records would exaggerate fast gusts
 STEP = 0.1  # s
-OWN_PHASES = 5  # first random generator of what a point has beyond the disc average (0 to 4: turbulence)
+OWN_PHASES = 5  # first random generator of a point's part uncorrelated with the disc (0 to 4: turbulence)
 SIGMA_STREAM = 8  # random generator of a drawn sigma_1 (OWN_PHASES has 5 to 7)
-TABLE_RANGE = (1e-6, 1e4)  # of k R; beyond it the averages are 1 and 0 to 1e-6 and 1e-7
+TABLE_RANGE = (1e-6, 1e4)  # of k R; outside, the averages are 1 and 0 to 1e-6 and 1e-7
 TABLE_SIZE = 2000  # log-spaced; log-log interpolation is then within 1e-5
 PAIR_NODES = 200  # quadrature over pair distances, quadratically denser towards 0
 
@@ -69,7 +69,7 @@ def disk_average(kr):
 def disk_gradient(kr):
     """Return the variance of R times the gradient of u over the point variance, for k R = kr.
 
-    The gradient is that along one axis of the plane fitted to u over the disk (area weighting).
+    The gradient is the slope along one axis of the plane fitted to u over the disk (area weighting).
     """
     log_kr, _, gradient = _pair_tables()
     return np.exp(np.interp(np.log(kr), log_kr, gradient))
@@ -78,7 +78,7 @@ def disk_gradient(kr):
 def centre_average(kr):
     """Return the mean coherence of the disc's centre with its points, for k R = kr > 0 (any shape)."""
     kr = np.asarray(kr, dtype=np.float64)
-    series = 1.0 - kr * (2.0 / 3.0 - 0.25 * kr)  # where the difference below loses its digits
+    series = 1.0 - kr * (2.0 / 3.0 - 0.25 * kr)  # for small k R, where the difference below cancels
     exact = -2.0 * (np.expm1(-kr) + kr * np.exp(-kr)) / kr**2
     return np.where(kr < 1e-3, series, exact)
 
@@ -104,8 +104,8 @@ def amplitudes(speed, sigma, height, diameter, samples, step, average):
     """Return the amplitudes (m/s) of u, v, w, vertical_shear, horizontal_shear at k/(samples step); (5, m).
 
     The shears are per rotor diameter. average: "rotor", or "point" for the hub point without shears.
-    The frequency bins carry the exact integral of the spectrum, scaled so that the point's standard
-    deviation over the period is sigma (2 % for what lies outside 1/period and the Nyquist frequency).
+    Each frequency bin has the exact integral of the spectrum, scaled so that the point's standard deviation
+    over the period is sigma (by 2 %, for energy below 1/period and above the Nyquist frequency).
     """
     frequency = np.arange(samples // 2 + 1) / (samples * step)
     half_bin = 0.5 * frequency[1]
@@ -132,9 +132,9 @@ def fft_length(minimum):
 
 
 def component_generator(seed, component):
-    """Return the random generator of one wind component, so that leaving one out does not change the others.
+    """Return the random generator of one wind component, independent of those of the other components.
 
-    seed: non-negative int or SeedSequence (which is left as it is).
+    seed: non-negative int or SeedSequence (unchanged).
     """
     if not isinstance(seed, np.random.SeedSequence):
         seed = np.random.SeedSequence(seed)
@@ -145,9 +145,9 @@ def component_generator(seed, component):
 def drawn_ntm_sigma(speed, turbulence_class, seed):
     """Return sigma_1 (m/s) of the normal turbulence model, drawn from its log-normal distribution.
 
-    A seed draws one number, its place in the distribution, from a stream of its own (SIGMA_STREAM), so that
-    the phases of a seed are those that it has without. sigma_1 follows from that place and the mean wind:
-    a seed that is gusty is so at every wind speed. seed: as in component_generator.
+    A seed draws one quantile of the distribution from a separate stream (SIGMA_STREAM), so that the phases
+    are the same with and without the draw. sigma_1 follows from that quantile and the mean wind: a gusty seed
+    is gusty at every wind speed. seed: as in component_generator.
     """
     return ntm_sigma_at(speed, turbulence_class, component_generator(seed, SIGMA_STREAM).normal())
 
@@ -158,8 +158,8 @@ def turbulence(
     """Return (period, value (n + 1, 5)) of one period of turbulence with zero mean; last row = first row.
 
     Columns as in WindSeries, the shears per rotor diameter; sigma is the standard deviation (m/s) of
-    u at a point. The returned period is the one requested (s), rounded up to a length that transforms
-    quickly. The phases belong to the frequencies k/period, so another period gives another wind.
+    u at a point. The returned period is the requested one (s), rounded up to a length of a fast FFT. The
+    phases belong to the frequencies k/period, so another period gives another wind.
     """
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
     amplitude = amplitudes(speed, sigma, height, diameter, samples, step, average)
@@ -170,10 +170,10 @@ def turbulence(
 
 
 def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
-    """Return (period, value (n + 1, 3)) of turbulence at the hub, with the disc average turbulence(...).
+    """Return (period, value (n + 1, 3)) of turbulence at the hub that matches the disc average turbulence().
 
     u, v and w have the complete Kaimal spectrum: a part correlated with the disc average, by the mean
-    coherence of the centre with the disc, and an independent rest. Arguments as turbulence.
+    coherence of the centre with the disc, and an independent remainder. Arguments as in turbulence.
     """
     samples = fft_length(int(np.ceil(period / step - 1e-9)))
     point = amplitudes(speed, sigma, height, diameter, samples, step, "point")[:3]
@@ -183,13 +183,13 @@ def hub_turbulence(speed, sigma, *, height, diameter, period, seed, step=STEP):
     rest = np.sqrt(np.maximum(1.0 - shared**2, 0.0))
     spectrum = []
     for row in range(3):
-        common, own = (_phasor(seed, component, point.shape[1]) for component in (row, OWN_PHASES + row))
-        spectrum.append(0.5 * samples * point[row] * (shared * common + rest * own))
+        common, other = (_phasor(seed, component, point.shape[1]) for component in (row, OWN_PHASES + row))
+        spectrum.append(0.5 * samples * point[row] * (shared * common + rest * other))
     return samples * step, _one_period(spectrum, samples, 3)
 
 
 def _phasor(seed, component, count):
-    """Return (count,) complex numbers of size 1 and random phase."""
+    """Return (count,) complex numbers of modulus 1 and random phase."""
     return np.exp(1j * component_generator(seed, component).uniform(0.0, 2.0 * np.pi, count))
 
 

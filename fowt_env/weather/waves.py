@@ -12,15 +12,15 @@ from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.waves import Waves
 
-FLAT_PERIOD = 10.0  # s, of the component that stands for still water
-MOST_COMPONENTS = 1_000_000  # of a sea drawn without a number of them: more take minutes and gigabytes
+FLAT_PERIOD = 10.0  # s, of the zero-height component that represents still water
+MOST_COMPONENTS = 1_000_000  # limit: more take minutes and gigabytes
 
 
 def wave_number(omega, depth, gravity):
-    """Return k of omega^2 = g k tanh(k depth), (n,), to machine precision."""
+    """Return the wave numbers k (n,) that solve omega^2 = g k tanh(k depth), to machine precision."""
     omega = np.asarray(omega, dtype=np.float64)
     deep = omega**2 / gravity
-    # Guo's explicit start is within 1 %; Newton on the log-free form then converges in 3-4 steps
+    # Guo's explicit approximation is within 1 %; Newton's method then converges in 3-4 steps
     x = omega * np.sqrt(depth / gravity)
     k = x**2 / depth * (1.0 - np.exp(-(x**2.5))) ** -0.4
     for _ in range(20):
@@ -33,7 +33,7 @@ def wave_number(omega, depth, gravity):
 
 
 def jonswap(omega, significant_height, peak_period, gamma):
-    """Return one-sided JONSWAP spectrum S(omega), m2 s/rad (gamma = 1: Pierson-Moskowitz); theory.md, 5.4."""
+    """Return the one-sided JONSWAP spectrum, m2 s/rad (gamma = 1: Pierson-Moskowitz); theory.md, 5.4."""
     omega = np.asarray(omega, dtype=np.float64)
     peak = 2.0 * pi / peak_period
     sigma = np.where(omega <= peak, 0.07, 0.09)
@@ -44,10 +44,10 @@ def jonswap(omega, significant_height, peak_period, gamma):
 
 
 def build_waves(sea, *, depth, density, gravity, seed, duration, components=None):
-    """Return the waves part of a descriptions.platform.SeaState, or None for still water (exactly no waves).
+    """Return the Waves of a descriptions.platform.SeaState; None for still water.
 
-    components: number of components of a spectrum; default one per harmonic of 1/duration, so that
-    the record does not repeat within it, over the band that holds 99.8 % of the energy (at least 200).
+    components: number of components of a spectrum; default (at least 200) one per harmonic of 1/duration, so
+    that the record does not repeat during the run, over the band that contains 99.8 % of the energy.
     """
     if sea is None or sea.kind == "still":
         return None
@@ -72,19 +72,19 @@ def build_waves(sea, *, depth, density, gravity, seed, duration, components=None
 
 
 def flat_waves(*, depth, density, gravity):
-    """Return waves part of one component without height: still water in a scene whose kernels sum waves."""
+    """Return Waves of one component of zero height: still water in a scene whose kernels sum waves."""
     omega, none = np.array([2.0 * pi / FLAT_PERIOD]), np.zeros(1)
     k = wave_number(omega, depth, gravity)
     return _pack(omega, k, none, none, none, depth, density, 0.0, False)
 
 
 def is_flat(waves):
-    """Return whether a Waves part, or None, is still water."""
+    """Return whether Waves, or None, represent still water."""
     return waves is None or not waves.amplitude.any()
 
 
 def _pack(omega, k, amplitude, phase, heading, depth, density, ramp, random):
-    """Return the waves from plain arrays, shortest wave last so that loops may stop early."""
+    """Return Waves of plain arrays, sorted by wave number so that loops over the waves may stop early."""
     order = np.argsort(k, kind="stable")
     velocity = amplitude * omega / -np.expm1(-2.0 * k * depth)
     arrays = (omega, k, amplitude, phase, np.cos(heading), np.sin(heading), velocity)
@@ -95,8 +95,8 @@ def _pack(omega, k, amplitude, phase, heading, depth, density, ramp, random):
 def _spectral_components(significant_height, peak_period, gamma, duration, components):
     """Return (omega, amplitude) of a spectrum, renormalised so that 4 sqrt(m0) = Hs.
 
-    Band 0.5 to 5 peak frequencies: outside it 0.1 % (gamma 3.3) to 0.2 % (gamma 1) of the variance lies,
-    which the renormalisation returns.
+    The band is 0.5 to 5 peak frequencies; the 0.1 % (gamma 3.3) to 0.2 % (gamma 1) of the variance outside
+    are restored by the renormalisation.
     """
     if significant_height == 0.0:
         return np.array([2.0 * pi / peak_period]), np.zeros(1)
@@ -108,7 +108,7 @@ def _spectral_components(significant_height, peak_period, gamma, duration, compo
     if components > MOST_COMPONENTS:
         raise InputError(
             f"sea: Tp = {peak_period:g} s over duration = {duration:g} s needs {components} wave components,"
-            f" more than {MOST_COMPONENTS}; give wave_components, a longer Tp or a shorter duration"
+            f" more than {MOST_COMPONENTS}; set wave_components, a longer Tp or a shorter duration"
         )
     step = (high - low) / components
     omega = low + step * (np.arange(components) + 0.5)

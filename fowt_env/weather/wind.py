@@ -19,12 +19,12 @@ from fowt_env.plant.aero.wind import LOWEST_HEIGHT, WindSeries
 from fowt_env.weather import gusts
 from fowt_env.weather.turbulence import SHORTEST_PERIOD, drawn_ntm_sigma, hub_turbulence, turbulence
 
-OPENING = 60.0  # s; the platform trims to the mean of this much of a user's series
+OPENING = 60.0  # s; the trim uses the mean of a user's series over this time
 
 
 @cached(64)
 def rotor_factor(exponent, height, diameter):
-    """Mean over radius and azimuth of the power law (Z/height)**exponent, every length of blade alike."""
+    """Return the mean over radius and azimuth of the power law (Z/height)**exponent, with uniform weights."""
     if exponent == 0.0:
         return 1.0
     node, weight = np.polynomial.legendre.leggauss(20)
@@ -35,34 +35,34 @@ def rotor_factor(exponent, height, diameter):
 
 
 def make_series(time, value, *, reference_height, reference_length, shear_exponent, period=0.0):
-    """Return the WindSeries of samples value (n, 5) at time (n,) s; finds out whether the time is uniform."""
+    """Return the WindSeries of samples value (n, 5) at time (n,) s; uniform time steps are detected."""
     time, value = _kernel_array(time), _kernel_array(value)
     inverse_step = 0.0
     if time.size > 1:
         step = (time[-1] - time[0]) / (time.size - 1)
-        # every sample on its grid line, so that the index cannot be off by more than rounding
+        # each sample lies on the uniform grid, so that the index is exact up to rounding
         if np.abs(time - time[0] - step * np.arange(time.size)).max() <= 1e-6 * step:
             inverse_step = 1.0 / step
-    place = tuple(map(float, (shear_exponent, reference_height, reference_length)))
-    return WindSeries(time, value, float(inverse_step), float(period), *place, rotor_factor(*place))
+    profile = tuple(map(float, (shear_exponent, reference_height, reference_length)))
+    return WindSeries(time, value, float(inverse_step), float(period), *profile, rotor_factor(*profile))
 
 
 def _kernel_array(values):
-    """Return values as float64 of the one type that kernels are compiled for: C-contiguous and writeable."""
+    """Return values in the array type that kernels are compiled for: float64, C-contiguous, writeable."""
     return np.require(values, np.float64, "CAW")
 
 
 def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, duration):
-    """Return the WindSeries of what a user requested, None for no aerodynamics at all.
+    """Return the WindSeries of a wind specification; None for no aerodynamics.
 
     spec               None; a speed in m/s (0: still air); a dictionary with "kind", or the WindSpec that
-                       read_wind made of one (kinds and keys: descriptions.wind.KINDS); a WindSeries, which is
-                       returned as it is, but for types
+                       read_wind returns for one (kinds and keys: descriptions.wind.KINDS); a WindSeries,
+                       which is returned unchanged but for types
     reference_height   hub height, m
     shear_exponent     power law of the site, unless the spec gives one (ewm: 0.11 of the standard)
     seed               of turbulence: int >= 0 or numpy SeedSequence, unless the spec gives one
-    duration           s, which turbulence has to cover before it repeats
-    Raises: InputError naming the key, its value and what is allowed.
+    duration           s, minimum period of turbulence
+    Raises: InputError naming the key, its value and the allowed range.
     """
     if spec is None:
         return None
@@ -80,8 +80,8 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
     period = 0.0
     if spec.kind in GUSTS:
         gust, keys = GUSTS[spec.kind]
-        known = {**spec.values, "height": height, "diameter": diameter}
-        length, value = gust(spec["speed"], **{key: known[SPELT.get(key, key)] for key in keys})
+        available = {**spec.values, "height": height, "diameter": diameter}
+        length, value = gust(spec["speed"], **{key: available[SPELT.get(key, key)] for key in keys})
         time = spec["start"] + np.linspace(0.0, length, len(value))
     elif _is_turbulent(spec):
         period, value = _turbulent(spec, height, diameter, seed, duration)
@@ -97,21 +97,21 @@ def build_wind(spec, *, reference_height, rotor_diameter, shear_exponent, seed, 
         vertical = spec.values.get("vertical", 0.0)
         time = np.zeros(1)
         value = np.array([[speed * cos(direction), speed * sin(direction), vertical, 0.0, 0.0]])
-    place = {"reference_height": height, "reference_length": diameter, "shear_exponent": exponent}
-    return make_series(time, value, **place, period=period)
+    profile = {"reference_height": height, "reference_length": diameter, "shear_exponent": exponent}
+    return make_series(time, value, **profile, period=period)
 
 
 @cached(8)
 def _even_times(period, samples):
-    """Sample times (samples,) from 0 to the period, s: one array for all series alike, never written."""
+    """Return the sample times (samples,) from 0 to the period, s, as a shared array: don't write."""
     return np.linspace(0.0, period, samples)
 
 
 def nominal_speed(spec):
-    """Return the horizontal hub speed (m/s) that the episode starts from, for trim; spec as in build_wind.
+    """Return the horizontal hub speed (m/s) at which a run is trimmed; spec as in build_wind.
 
-    The nominal speed of steady, turbulent and gusty wind, the first of steps; of a series the mean
-    over its first 60 s, since a platform does not follow the single first sample. None gives 0.
+    This is the nominal speed of steady, turbulent and gusty wind, the first speed of steps, and for a series
+    the mean over the first 60 s, since a platform does not follow the single first sample. None gives 0.
     """
     if spec is None:
         return 0.0
@@ -129,8 +129,8 @@ def nominal_speed(spec):
 
 
 def mean_wind(series):
-    """Return constant WindSeries that the episode starts from, for trim: the mean of a repeating series over
-    its period, of another over its first 60 s (before its first sample that one holds). None: None."""
+    """Return the constant WindSeries at which a run is trimmed: the mean over the period of a periodic series
+    or else over the first 60 s (with the first sample extended to earlier times). None: None."""
     if series is None:
         return None
     end = series.period if series.period > 0.0 else OPENING
@@ -141,14 +141,14 @@ def mean_wind(series):
 
 
 def _opening_mean(time, value, length=OPENING):
-    """Return the mean of the piecewise linear value over [0, length], constant beyond its ends; exact."""
+    """Return the exact mean over [0, length] of a piecewise linear value, constant outside its samples."""
     inside = time[(time > 0.0) & (time < length)]
     nodes = np.concatenate(([0.0], inside, [length]))
     return float(np.trapezoid(np.interp(nodes, time, value), nodes) / length)
 
 
 def _stepped(spec):
-    """Return the samples of a staircase: each speed lasts `every`, then ramps to the next; the last holds."""
+    """Return (time, value) of a staircase: each speed lasts `every`, then ramps to the next."""
     speeds = spec["speeds"]
     edges = spec["every"] * np.arange(1, speeds.size)
     time = np.concatenate(([0.0], np.stack([edges, edges + spec["ramp"]], axis=1).ravel()))
@@ -158,7 +158,7 @@ def _stepped(spec):
 
 
 def _is_turbulent(spec):
-    """Return whether the spec needs random numbers."""
+    """Return whether a WindSpec defines random turbulence."""
     return spec.kind in ("ntm", "etm") or (spec.kind == "ewm" and spec["turbulent"])
 
 
@@ -192,24 +192,24 @@ def _drawn(spec, height, diameter, seed, duration):
         sigma = drawn_ntm_sigma(speed, spec["class"], seed)
     else:
         sigma = ntm_sigma(speed, spec["class"])
-    place = {"height": height, "diameter": diameter}
-    return {"speed": speed, "sigma": sigma, **place, "period": period, "seed": seed}
+    rotor = {"height": height, "diameter": diameter}
+    return {"speed": speed, "sigma": sigma, **rotor, "period": period, "seed": seed}
 
 
 def _turn(value, direction):
-    """Turn the rows by a direction (rad, from +x towards +y)."""
+    """Rotate the wind of the rows by a direction (rad, from +x towards +y)."""
     if direction == 0.0:
         return
     along, across = value[:, 0].copy(), value[:, 1].copy()
     value[:, 0] = along * cos(direction) - across * sin(direction)
     value[:, 1] = along * sin(direction) + across * cos(direction)
-    # of the gradients of the turned wind only the part that changes u along z and y can be carried
+    # WindSeries represents only gradients of u along z and y: those of v and along x are dropped
     value[:, 3:4] *= cos(direction)
     value[:, 4:5] *= cos(direction) ** 2
 
 
 def drawn_turbulence(spec, *, reference_height, rotor_diameter, seed, duration):
-    """Return the arguments of turbulence() and "average" for a wind drawn from spectra; None for others.
+    """Return the arguments of turbulence() and "average" for a wind drawn from spectra; else None.
 
     Arguments as in build_wind.
     """
@@ -225,7 +225,7 @@ def drawn_turbulence(spec, *, reference_height, rotor_diameter, seed, duration):
 def hub_series(spec, **arguments):
     """Return (time, value (n, 3)) of u, v, w at the hub over one period of a rotor-averaged wind.
 
-    Arguments as in build_wind. None for other winds, which are those of a point.
+    Arguments as in build_wind. Returns None for other winds, which already are the wind at a point.
     """
     drawn = drawn_turbulence(spec, **arguments)
     if drawn is None or drawn.pop("average") != "rotor":
@@ -237,8 +237,8 @@ def hub_series(spec, **arguments):
 
 
 _CLASS, _PLACE = "turbulence_class", ("height", "diameter")
-SPELT = {_CLASS: "class"}  # key of a specification of an argument
-GUSTS = {  # kind: (function of the speed, its further arguments)
+SPELT = {_CLASS: "class"}  # argument of a gust function: key of the specification, if different
+GUSTS = {  # kind: (function of the speed, names of further arguments)
     "eog": (gusts.operating_gust, (_CLASS, "turbine_class", *_PLACE)),
     "edc": (gusts.direction_change, (_CLASS, *_PLACE, "sign")),
     "ecd": (gusts.coherent_gust, ("sign",)),

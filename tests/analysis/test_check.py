@@ -113,9 +113,9 @@ def test_a_semi_of_members_floats_upright():
 
 NONSENSE = {  # key, value, words of the faults; test_trim.py has more, which trims are refused or warned for
     "too much ballast": ("mass", "8.47e6", ("weighs 88944 kN", "9843 kN (1004 t) too heavy")),
-    "lines far too short": ("length", "500.0", ("45.3 m below the sea bed", "shorter than the way")),
+    "lines far too short": ("length", "500.0", ("45.3 m below the sea bed", "shorter than the distance")),
     "azimuths in radians": (
-        "azimuth_deg", "[0.0, 2.0944, 4.18879]", ("look like radians", "rests 199.9 m from its place"),
+        "azimuth_deg", "[0.0, 2.0944, 4.18879]", ("look like radians", "equilibrium is 199.9 m off"),
     ),
     "fairleads in dm": ("fairlead_radius", "52.0", ("52 m from the tower axis", "the hull reaches 4.7 m")),
     "anchors too high": ("anchor_z", "-120.0", ("200 m above the sea bed",)),

@@ -121,7 +121,7 @@ def test_the_wind_of_the_operating_point_can_be_named(storm_scene, still_scene):
     expected = linearize(storm_scene.with_weather(15.0, storm_scene.sea, 9))
     assert model.point.wind_speed == 15.0
     assert np.array_equal(model.A, expected.A) and np.array_equal(model.B, expected.B)
-    with pytest.raises(InputError, match="wind = 15.0: the operating point has its own"):
+    with pytest.raises(InputError, match="wind = 15.0: an operating point has a wind already"):
         linearize(storm_scene, model.point, wind=15.0)
     with pytest.raises(InputError, match="wind = -1.0: "):
         linearize(storm_scene, wind=-1.0)

@@ -86,5 +86,5 @@ def test_a_state_that_does_not_come_to_rest_by_itself_is_named(model, rate):
     a[:n, :n], a[n, n], a[n, 0] = model.A, rate, 1.0
     more = {name: np.pad(getattr(model, name), ((0, 1), (0, 0))) for name in ("B", "E")}
     grown = replace(model, A=a, C=np.pad(model.C, ((0, 0), (0, 1))), states=(*model.states, "wake_1"), **more)
-    with pytest.raises(InputError, match="state 'wake_1' does not come to rest by itself"):
+    with pytest.raises(InputError, match="state 'wake_1' is not asymptotically stable"):
         residualised(grown)

@@ -153,7 +153,7 @@ def test_a_scene_that_cannot_rest_is_refused(bare_scene):
     text = str(caught.value)
     assert "platform 'oc3_hywind' without wind" in text
     assert "Its weight of 79101 kN has no buoyancy: hydrodynamics = False" in text
-    assert "Nothing holds it in surge and sway: mooring = False" in text
+    assert "There is no restoring in surge and sway: mooring = False" in text
     assert "-79101 kN left in heave: weight -79101" in text
 
 
@@ -186,7 +186,7 @@ def complaint(path, wind=None):
     return "warned", str(caught[0].message)
 
 
-SHORT = "3 of 3 mooring lines are shorter than the way from anchor to fairlead"
+SHORT = "3 of 3 mooring lines are shorter than the distance from anchor to fairlead"
 SLACK = "all mooring lines hang slack"
 NONSENSE = {  # key, value, wind, what becomes of it, words of its message
     "too much ballast": (
@@ -223,7 +223,7 @@ NONSENSE = {  # key, value, wind, what becomes of it, words of its message
     ),
     "no lines": (
         "azimuth_deg", "[]", 18.0, "refused",
-        ("nothing holds it in surge and sway: it has no mooring lines", "kN left in surge: rotor"),
+        ("no restoring in surge and sway: no mooring lines", "kN left in surge: rotor"),
     ),
     "a mass beyond all numbers": ("mass", "1e300", None, "refused", ("too heavy", "9.81e+297 kN")),
 }  # fmt: skip

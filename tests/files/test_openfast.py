@@ -229,7 +229,7 @@ HEAD = 2 + 4 + 4 + 16 + 4 + 8  # bytes of a file of write_outb before its names;
         (lambda content: content[:HEAD] + b"\x80" + content[HEAD + 1 :], "names must be printable ASCII"),
         (
             lambda content: content[: HEAD + 10] + content[HEAD + 20 : HEAD + 30] + content[HEAD + 20 :],
-            "is there twice",
+            "occurs twice",
         ),
     ],
 )

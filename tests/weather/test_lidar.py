@@ -509,7 +509,7 @@ def test_a_box_that_evolves_has_the_strength_of_one_that_does_not(monkeypatch):
 def test_a_box_must_hold_what_the_beams_look_at():
     grid = np.linspace(-64.0, 64.0, 5)
     scene = in_box(np.full((200, 5, 5), 18.0), grid)
-    with pytest.raises(InputError, match="must hold 0.8 of what the lidar 'wide' looks at"):
+    with pytest.raises(InputError, match="at least 0.8 of the weight of the points of lidar 'wide'"):
         lidar_preview(scene, (1.0,), remade("circular_cw", name="wide", half_angle=25.0))
 
 
@@ -577,5 +577,5 @@ def test_scenes_without_wind_and_lidars_that_look_through_the_hub_are_refused():
         with pytest.raises(InputError, match=words):
             lidar_preview(scene, (1.0,))
     blind = remade("four_beam_pulsed", name="blind", above_shaft=0.0, behind_rotor=0.5)
-    with pytest.raises(InputError, match="'blind': the blades of .* take away 100 % of its shots"):
+    with pytest.raises(InputError, match="'blind': the blades of .* block 100 % of the shots"):
         lidar_preview(scene_in(), (1.0,), blind)

@@ -105,8 +105,8 @@ def test_steady_field_is_the_mean_over_time_at_every_height():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"y": np.linspace(-50.0, 50.0, 11)}, "must hold the rotor"),
-        ({"u": np.zeros((4, 3, 3))}, "as z and y say"),
+        ({"y": np.linspace(-50.0, 50.0, 11)}, "must contain the rotor"),
+        ({"u": np.zeros((4, 3, 3))}, "from z and y"),
         ({"colour": 1}, "colour"),
         ({"dt": -1.0}, "dt"),
         ({"u": np.full((4, 9, 11), np.nan)}, "finite"),
@@ -243,7 +243,7 @@ SOUND = (8, 2, 2, 0, 1, 140.0, 140.0, 0.1, 12.0, 90.0, 20.0, 1.0, 0.0, 1.0, 0.0,
     [
         (0, 9, "identifier 9"),
         (1, 0, "0 x 2 points"),
-        (2, 2**31 - 1, "times of 2 x 2147483647 . 0 points take 25769803834 bytes; it has 94"),
+        (2, 2**31 - 1, "times of 2 x 2147483647 . 0 points take 25769803834 bytes; the file has 94"),
         (4, 2**31 - 1, "2147483647 times"),
         (17, -1, "-1 characters"),
         (7, float("nan"), "nan s"),

@@ -1,5 +1,5 @@
-"""Decks of OpenFAST and FAST 8 read, and converted to the text files of this project.
+"""Reads decks of OpenFAST and FAST 8, and converts these to the text files of this project.
 
-parser.py finds values by their keys; a module per part file knows which keys it has; deck.py reads them all,
-conversion.py works out platform and turbine, output.py writes them, report.py says what became of the deck.
+parser.py finds values by keys; one module per part file defines the keys to read; deck.py reads all files,
+conversion.py computes platform and turbine, output.py writes the files, report.py lists all differences.
 """

@@ -1,4 +1,4 @@
-"""AeroDyn 15's files: blade geometry, polars and the drag of the tower."""
+"""Reads AeroDyn 15 files: blade geometry, polars and tower drag."""
 
 import re
 from itertools import islice
@@ -10,25 +10,25 @@ from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
 
 MOST_AIRFOILS = 1000
-FULL = 180.0  # deg, to which a polar must reach
+FULL = 180.0  # deg, required range of a polar
 
 
 class AeroDyn(NamedTuple):
-    """What the conversion takes of AeroDyn's files."""
+    """Holds the data of AeroDyn's files that the conversion uses."""
 
     file: PartFile
     blade_file: PartFile
     blade: np.ndarray  # (n, 5) m from the root along the pitch axis, chord, twist (deg), BlCrvAC, BlSwpAC
     airfoil: list  # (n,) names
     polars: dict  # name: (m, 4) alpha (deg), cl, cd, cm
-    tables: dict  # name: (number of the table taken, tables in the file, its Reynolds number in millions)
+    tables: dict  # name: (number of the table used, tables in the file, Reynolds number in millions)
     tower: np.ndarray  # (k, 3) height above still water, diameter, drag coefficient
     tower_loads: bool
-    notes: list  # (what the deck has, what the plant has)
+    notes: list  # (feature of the deck, treatment in the plant)
 
 
 def read_aerodyn(path, folders=(), blades=3):
-    """AeroDyn of an AeroDyn 15 file, with the blade file and polars that it names. Raises: InputError."""
+    """Read an AeroDyn 15 file with the blade file and polars named there. Raises: InputError."""
     file = PartFile(path, "AeroDyn")
     if not file.has("NumAFfiles"):
         if file.has("StallMod", "NumFoil", "InfModel"):
@@ -62,7 +62,7 @@ def read_aerodyn(path, folders=(), blades=3):
 
 
 def _blade(file, count):
-    """((n, 5) figures as AeroDyn.blade, (n,) numbers of the polars, of which there are count)."""
+    """Return ((n, 5) values as AeroDyn.blade, (n,) polar numbers from 1 to count) of a blade file."""
     rows = file.table("NumBlNds", needs=("BlSpn", "BlTwist", "BlChord", "BlAFID"), high=10_000)
     if len(rows) < 2:
         raise file.refusal("NumBlNds must be at least 2")
@@ -81,17 +81,17 @@ def _blade(file, count):
                 raise file.refusal(what, line)
         before = cells["blspn"]
     names = ("blspn", "blchord", "bltwist", "blcrvac", "blswpac")
-    figures = np.array([[cells.get(name, 0.0) for name in names] for _, cells in rows])
-    return figures, [int(cells["blafid"]) for _, cells in rows]
+    values = np.array([[cells.get(name, 0.0) for name in names] for _, cells in rows])
+    return values, [int(cells["blafid"]) for _, cells in rows]
 
 
 def _airfoil_files(file, count, folders):
-    """Paths of the polar files: AFNames and the lines below it."""
-    found = file.find("AFNames")
-    if found is None:
+    """Return the paths of the polar files, from AFNames and the lines below."""
+    entry = file.find("AFNames")
+    if entry is None:
         raise file.refusal("AFNames is missing: must name the polar files, one a line")
     paths = []
-    for line in range(found[0], found[0] + count):
+    for line in range(entry[0], entry[0] + count):
         words = file.words(line) if line < len(file.lines) else []
         name = bare(words[0]) if words else ""
         path = locate(name, (file.path.parent, *folders)) if name else None
@@ -102,9 +102,9 @@ def _airfoil_files(file, count, folders):
 
 
 def _names(files, numbers):
-    """{number of a polar that the blade has: (name, path)}, by the files' stems; equal stems get a number."""
+    """Return {number of a used polar: (name, path)}, named by file stem; equal stems get a number."""
     used = sorted(set(numbers))
-    # names of files of ours: neither commas nor marks of comments
+    # file names of this project must not contain commas or comment characters
     stems = [re.sub(r"[^\w.-]", "_", files[number - 1].stem) for number in used]
     return {
         number: (stem if stems.count(stem) == 1 else f"{stem}_{number}", files[number - 1])
@@ -113,8 +113,8 @@ def _names(files, numbers):
 
 
 def _polar(file, columns, moment, mode):
-    """((m, 4) alpha (deg), cl, cd, cm, (table taken, tables, Reynolds number)) of a polar file."""
-    heads, reynolds = [], None  # of a table: line of NumAlf, its number, Reynolds number
+    """Return ((m, 4) alpha (deg), cl, cd, cm; (table used, tables, Reynolds number)) of a polar file."""
+    heads, reynolds = [], None  # of each table: (line of NumAlf, value, Reynolds number)
     for line, text in enumerate(file.lines):
         words = words_of(text[:400])
         key = words[1].lower() if len(words) >= 2 else ""
@@ -124,15 +124,15 @@ def _polar(file, columns, moment, mode):
             heads.append((line, bare(words[0]), reynolds))
     if not heads:
         raise file.refusal("NumAlf is missing: must be the number of rows of the table of coefficients")
-    taken = 0 if mode == 1 else len(heads) // 2
-    line, count, reynolds = heads[taken]
+    chosen = 0 if mode == 1 else len(heads) // 2
+    line, count, reynolds = heads[chosen]
     if not count.isdigit() or not 2 <= int(count) <= 10_000:
         raise file.refusal(f"NumAlf = {count[:20]}: must be a whole number from 2 to 10000", line)
     rows, filled = [], (number for number in range(line + 1, len(file.lines)) if file.lines[number].strip())
     below = list(islice(filled, int(count)))
     for number in below:
         text = file.lines[number].strip()[:60]
-        words = ["0", *file.words(number)]  # column 0: none
+        words = ["0", *file.words(number)]  # column 0: absent, zero
         values = [number_of(words[i]) if i < len(words) else None for i in columns]
         if None in values or max(map(abs, values)) > 1e4:
             raise file.refusal(f"{text!r}: must be finite numbers in columns {columns}", number)
@@ -149,4 +149,4 @@ def _polar(file, columns, moment, mode):
         covered = f"alpha covers {polar[0, 0]:g} to {polar[-1, 0]:g} deg"
         raise file.refusal(f"{covered}: must cover -180 to 180 deg", line)
     polar[[0, -1], 0] = -FULL, FULL
-    return polar, (taken + 1, len(heads), reynolds)
+    return polar, (chosen + 1, len(heads), reynolds)

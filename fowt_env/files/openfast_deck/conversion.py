@@ -1,7 +1,7 @@
-"""From a deck to the figures of this project's platform and turbine files, each with its source.
+"""Converts a deck to the values of this project's platform and turbine files, each value with its source.
 
-A table of a file is a list of rows (key, value, comment); a value is a number, a list, or a text, and None
-leaves the row out. Nothing is written here.
+A table of a file is a list of rows (key, value, comment); a value is a number, a list, or a text; rows with
+value None are omitted. output.py writes the files.
 """
 
 import math
@@ -20,7 +20,7 @@ DEFAULT_SHEAR = 0.14
 
 
 def mass_properties(deck):
-    """{name: figure} of the parts and their sum, kg: what ElastoDyn's summary lists too."""
+    """Return {name: mass} of the parts and the total, kg, as in ElastoDyn's summary."""
     values = deck.elastodyn
     parts = {
         "blade": float(values.blade.mass.sum()),
@@ -38,7 +38,7 @@ def mass_properties(deck):
 
 
 def rotor_mass(deck):
-    """RotorMass of straight blades along the coned pitch axis, as ElastoDyn has them."""
+    """Return the RotorMass of straight blades along the coned pitch axis, as in ElastoDyn."""
     values = deck.elastodyn
     if values["HubMass"] + values.blade.mass.sum() <= 0.0:
         raise values.file.wrong("HubMass", values["HubMass"], "> 0 with massless blades")
@@ -49,53 +49,53 @@ def rotor_mass(deck):
 
 
 def ballast(deck):
-    """(mass, centre (3,), inertia tensor (3, 3) about it) of the platform with the water in its members."""
+    """Return (mass, centre (3,), inertia tensor (3, 3) about it) of the platform with ballast water."""
     values = deck.elastodyn
     xy, yz, xz = values.platform_products
     inertia = np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
     inertia += np.diag([values[f"Ptfm{axis}Iner"] for axis in "RPY"])
-    place = np.array([values[f"PtfmCM{axis}t"] for axis in "xyz"])
-    bodies = [(values["PtfmMass"], place, inertia)]
+    position = np.array([values[f"PtfmCM{axis}t"] for axis in "xyz"])
+    bodies = [(values["PtfmMass"], position, inertia)]
     bodies += [(fill.mass, np.array(fill.centre), fill.inertia) for fill in deck.hydrodyn.fills]
     mass = sum(body[0] for body in bodies)
     if mass <= 0.0:
         raise values.file.wrong("PtfmMass", values["PtfmMass"], "> 0: a floating platform")
     centre = sum(body[0] * body[1] for body in bodies) / mass
     total = np.zeros((3, 3))
-    for part, at, own in bodies:
+    for part, at, tensor in bodies:
         d = at - centre
-        total += own + part * (d @ d * np.eye(3) - np.outer(d, d))
+        total += tensor + part * (d @ d * np.eye(3) - np.outer(d, d))
     return mass, centre, total
 
 
 def additional_stiffness(deck):
-    """((6, 6) stiffness, comment): AddCLin, less what the weight of water in members has by itself.
+    """Return ((6, 6) stiffness, comment): AddCLin, for old files (is_old) less the ballast water's restoring.
 
-    Of old files alone (hydrodyn.is_old); in all others the weight moves with the members.
+    In all other files the weight of the water moves with the members.
     """
     hydro, source = deck.hydrodyn, deck.hydrodyn.file.source("AddCLin")
     stiffness = np.array(hydro.added["AddCLin"])
     if not hydro.fills or not is_old(hydro.file):
         return stiffness, source
-    own = np.zeros((6, 6))
+    of_water = np.zeros((6, 6))
     for fill in hydro.fills:
         x, y, z = np.array(fill.centre) * fill.mass * deck.site.gravity
-        own[[3, 4], [3, 4]] -= z
-        own[[3, 4], 5] += x, y
-    rest = stiffness - own
-    rest[np.abs(rest) < 1e-6 * np.abs(own).max()] = 0.0
-    return rest, f"{source}, less what the weight of the water in members restores"
+        of_water[[3, 4], [3, 4]] -= z
+        of_water[[3, 4], 5] += x, y
+    rest = stiffness - of_water
+    rest[np.abs(rest) < 1e-6 * np.abs(of_water).max()] = 0.0
+    return rest, f"{source}, less the restoring moment of the ballast water's weight"
 
 
 def hub_place(deck):
-    """(overhang, hub height): the rotor centre upwind of the tower axis and above still water, m."""
+    """Return (overhang, hub height): the rotor centre upwind of the tower axis and above still water, m."""
     values, tilt = deck.elastodyn, deck.elastodyn["ShftTilt"]
     height = values["TowerHt"] + values["Twr2Shft"] + values["OverHang"] * math.sin(tilt)
     return -values["OverHang"] * math.cos(tilt), height
 
 
 def stations(deck):
-    """(n, 5) radius, chord, twist (deg), prebend, sweep and the airfoils of the blade."""
+    """Return ((n, 5) radius, chord, twist (deg), prebend, sweep; airfoils) of the blade stations."""
     aero, hub, tip = deck.aerodyn, deck.elastodyn["HubRad"], deck.elastodyn["TipRad"]
     span = aero.blade[:, 0]
     radius = hub + span
@@ -104,7 +104,7 @@ def stations(deck):
         raise aero.blade_file.refusal(f"BlSpn ends at {span[-1]:g} m: {allowed}")
     radius = np.clip(radius, hub + NEAR, tip - NEAR)
     keep = np.concatenate([[True], np.diff(radius) > 1e-6])
-    if not keep[-1]:  # the moved tip counts, not what came to lie upon it
+    if not keep[-1]:  # the tip station replaces a station at the same radius
         keep[np.flatnonzero(keep)[-1]], keep[-1] = len(np.flatnonzero(keep)) == 1, True
     if keep.sum() < 2:
         raise aero.blade_file.refusal("needs two nodes between root and tip")
@@ -113,7 +113,7 @@ def stations(deck):
 
 
 def tower_drag(deck):
-    """(base diameter, top diameter, drag coefficient) whose load is that of the deck's tower in even wind."""
+    """Return (base diameter, top diameter, drag coefficient) of equal drag on the tower in uniform wind."""
     table, values = deck.aerodyn.tower, deck.elastodyn
     base, top = values["TowerBsHt"], values["TowerHt"]
     if len(table) < 2 or not (table[:, 1] > 0.0).all():
@@ -130,7 +130,7 @@ def tower_drag(deck):
 
 
 def platform_rows(deck, name, turbine, coefficients, distribution):
-    """{table: rows} of platform.toml; "" is its head, "lines" and "members" are lists of tables."""
+    """Return {table: rows} of platform.toml; "": top level; "lines" and "members" are lists of tables."""
     site, hydro = deck.site, deck.hydrodyn
     exponent = deck.inflow.shear_exponent
     shear = "InflowWind" if exponent is not None else "offshore value of IEC 61400-3: not in the deck"
@@ -140,7 +140,7 @@ def platform_rows(deck, name, turbine, coefficients, distribution):
     def source(*keys):
         return deck.elastodyn.file.source(*keys) + water
 
-    def beside(value):
+    def nonzero(value):
         return value if abs(value) > 1e-9 else None
 
     tables = {
@@ -153,8 +153,8 @@ def platform_rows(deck, name, turbine, coefficients, distribution):
         "ballast": [
             ("mass", mass, source("PtfmMass")),
             ("cm_depth", -centre[2], source("PtfmCMzt")),
-            ("cm_downwind", beside(centre[0]), source("PtfmCMxt")),
-            ("cm_left", beside(centre[1]), source("PtfmCMyt")),
+            ("cm_downwind", nonzero(centre[0]), source("PtfmCMxt")),
+            ("cm_left", nonzero(centre[1]), source("PtfmCMyt")),
             ("inertia", list(np.diag(inertia)), source("PtfmRIner", "PtfmPIner", "PtfmYIner")),
         ],
     } | _tower_rows(deck, distribution)  # fmt: skip
@@ -176,7 +176,7 @@ def platform_rows(deck, name, turbine, coefficients, distribution):
         tables["additional"] = [row for row in added if np.any(row[1])]
     tables["members"] = [
         _member_rows(member) for member in hydro.members
-        # one in the potential-flow body has drag alone
+        # members inside the potential-flow body have drag only
         if not member.potential_flow or any(member.drag) or any(any(end[:2]) for end in member.axial)
     ]  # fmt: skip
     tables["lines"] = [
@@ -194,7 +194,7 @@ def platform_rows(deck, name, turbine, coefficients, distribution):
 
 
 def _tower_rows(deck, distribution):
-    """The tables [tower] and, where the deck has shapes of its modes, [tower.modes]."""
+    """Return the tables [tower] and, for a deck with mode shapes, [tower.modes]."""
     values, modes = deck.elastodyn, deck.elastodyn.bending
     source, aero = values.file.source, deck.aerodyn.file.source
     base, extra, length = values["TowerBsHt"], values["YawBrMass"], values["TowerHt"] - values["TowerBsHt"]
@@ -233,13 +233,13 @@ def _tower_rows(deck, distribution):
 
 
 def draft(deck):
-    """Depth of the lowest end of a member (m), or None where none is below water."""
+    """Return the depth of the lowest member end (m); None if no end is below water."""
     depths = [-end[2] for member in deck.hydrodyn.members for end in (member.start, member.end)]
     return max(depths) if depths and max(depths) > 0.0 else None
 
 
 def _member_rows(member):
-    """Rows of a table of members."""
+    """Return the rows of one [[members]] table."""
     inside = member.potential_flow
     drag, mass, pressure = zip(*member.axial, strict=True)
     return [
@@ -258,7 +258,7 @@ def _member_rows(member):
 
 
 def turbine_rows(deck, name):
-    """{table: rows} of turbine.toml."""
+    """Return {table: rows} of turbine.toml."""
     values, control = deck.elastodyn, deck.control
     source, figures = values.file.source, control.figures
     rotor = rotor_mass(deck)
@@ -270,7 +270,7 @@ def turbine_rows(deck, name):
         raise values.file.wrong("NacYIner", values["NacYIner"], allowed)
     blades, lumps = source("BldFile(1)", "HubMass", "HubIner"), source("BldFile(1)") + ", BldNodes elements"
     span = values.blade.radius - values["HubRad"]
-    own = [float(values.blade.mass @ span**power) for power in range(3)]
+    moments = [float(values.blade.mass @ span**power) for power in range(3)]
 
     def of_control(key, name=None, unit=1.0):
         value, comment = figures[name or key]
@@ -294,13 +294,13 @@ def turbine_rows(deck, name):
             ("hub_radius", values["HubRad"], source("HubRad")),
             ("tip_radius", values["TipRad"], source("TipRad")),
             ("inertia", rotor.inertia, blades + ", PreCone"),
-            ("inertia_diameter", rotor.inertia_diameter, blades + ", PreCone; of the hub none"),
+            ("inertia_diameter", rotor.inertia_diameter, blades + ", PreCone; without the hub"),
             ("shaft_tilt_deg", -math.degrees(values["ShftTilt"]) + 0.0, "minus " + source("ShftTilt")),
             ("cone_deg", -math.degrees(values["PreCone"]) + 0.0, "minus " + source("PreCone(1)")),
             ("cm_offset", rotor.cm_offset, blades + ", HubCM, PreCone"),
-            ("blade_mass", own[0], lumps),
-            ("blade_first_moment", own[1], "the same, about the root"),
-            ("blade_second_moment", own[2], "the same, about the root"),
+            ("blade_mass", moments[0], lumps),
+            ("blade_first_moment", moments[1], "the same, about the root"),
+            ("blade_second_moment", moments[2], "the same, about the root"),
         ],
         "nacelle": [
             ("mass", values["NacMass"], source("NacMass")),
@@ -325,9 +325,9 @@ def turbine_rows(deck, name):
         ],
     }  # fmt: skip
     if "damping" in figures:
-        frequency, said = figures["natural_frequency"]
+        frequency, comment = figures["natural_frequency"]
         tables["pitch_drive.second_order"] = [
-            ("natural_frequency", frequency, said + "; used where a scene asks for it"),
+            ("natural_frequency", frequency, comment + "; used with the option pitch_drive"),
             of_control("damping"),
         ]
     power = control["rated_torque"] * control["rated_speed"]
@@ -341,7 +341,7 @@ def turbine_rows(deck, name):
         tables[f"gains.{gain_set}"] = [
             ("KP", proportional, LEGACY_SOURCE),
             ("KI", integral, LEGACY_SOURCE),
-            ("gain_schedule_pitch", half, "rad, at which the gains are half"),
+            ("gain_schedule_pitch", half, "rad, at which the gains are halved"),
         ]
     tables["blade"] = [("stations", "blade.csv"), ("polars", "polars")]
     return tables

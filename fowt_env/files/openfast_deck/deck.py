@@ -1,4 +1,4 @@
-"""A whole deck: the .fst file, or part files one by one, and everything that they name."""
+"""Reads a complete deck: the .fst file or individual part files, and all files named there."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from fowt_env.files.openfast_deck.mooring import read_mooring
 from fowt_env.files.openfast_deck.parser import PartFile
 from fowt_env.files.openfast_deck.servodyn import Control, read_control
 
-PARTS = {  # option: key of the .fst, and the switch there
+PARTS = {  # option: key of the file and module switch in the .fst
     "elastodyn": ("EDFile", "CompElast"),
     "aerodyn": ("AeroFile", "CompAero"),
     "servodyn": ("ServoFile", "CompServo"),
@@ -27,7 +27,7 @@ POSITIVE = {"low": 0.0, "high": 1e5, "open_low": True}
 
 
 class Site(NamedTuple):
-    """Figures of the site, with their sources."""
+    """Holds the site's constants, with their sources."""
 
     gravity: float
     water_density: float
@@ -37,7 +37,7 @@ class Site(NamedTuple):
 
 
 class Deck(NamedTuple):
-    """Everything that was read; notes: (what the deck has, what the plant has)."""
+    """Holds the contents of a deck; notes: (feature of the deck, treatment in the plant)."""
 
     name: str
     fst: PartFile | None
@@ -45,7 +45,7 @@ class Deck(NamedTuple):
     elastodyn: ElastoDyn
     aerodyn: AeroDyn
     hydrodyn: HydroDyn
-    water: PartFile  # SeaState's file, or HydroDyn's, which was it before OpenFAST 4
+    water: PartFile  # SeaState's file, or HydroDyn's before OpenFAST 4
     lines: list
     sea: Sea
     inflow: Inflow
@@ -55,10 +55,10 @@ class Deck(NamedTuple):
 
 
 def read_deck(fst=None, parts=None, folders=(), discon=None):
-    """Deck of an .fst file, of part files ({"elastodyn": path ...}, PARTS), or of both: parts replace files.
+    """Read a Deck from an .fst file, part files ({"elastodyn": path ...}, PARTS), or both; parts override.
 
-    folders: further ones in which files that the deck names are looked for. discon: a DISCON.IN instead of
-    the deck's. Raises: InputError naming file, line, key, value and what is allowed.
+    folders: additional search folders for files named in the deck. discon: a DISCON.IN instead of
+    the deck's. Raises: InputError naming file, line, key, value and the allowed range.
     """
     parts = {name: Path(path) for name, path in (parts or {}).items() if path is not None}
     folders, main, kind, notes = tuple(map(Path, folders)), None, None, []
@@ -68,7 +68,7 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
         if "mooring" not in parts:
             kind = main.whole("CompMooring", default=0) or None
         parts |= _named(main, parts, folders)
-        folders = (*folders, main.path.parent)  # FAST 8 finds files beside the .fst as well
+        folders = (*folders, main.path.parent)  # FAST 8 searches the folder of the .fst as well
         notes += differences(main)
     if missing := [f"{name} ({PARTS[name][0]})" for name in NEEDED if name not in parts]:
         where = "the deck" if main is None else f"OpenFAST file {str(main.path)!r}"
@@ -102,21 +102,21 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
 
 
 def _named(main, parts, folders):
-    """{part: path} of the files of modules that the .fst names and switches on, beside the given parts."""
-    found = {}
+    """Return {part: path} of the module files that the .fst names and enables, without the parts passed."""
+    paths = {}
     for name, (key, switch) in PARTS.items():
         if name in parts or (main.has(switch) and main.whole(switch) == 0):
             continue
         try:
-            found[name] = main.other(key, f"{key}(1)", folders=folders, default=None)  # (1): OpenFAST 5
+            paths[name] = main.other(key, f"{key}(1)", folders=folders, default=None)  # (1): OpenFAST 5
         except InputError:
-            if name != "inflow":  # the wind is a suggestion
+            if name != "inflow":  # the wind file is optional
                 raise
-    return {name: path for name, path in found.items() if path is not None}
+    return {name: path for name, path in paths.items() if path is not None}
 
 
 def _check_switches(main, parts):
-    """Raises: InputError for modules that cannot be represented."""
+    """Check the module switches of an .fst. Raises: InputError for modules that cannot be represented."""
     for key, choices, why in (
         ("CompElast", (1, 2), "3, simplified ElastoDyn, cannot be read"),
         ("NumTurbines", (1,), "several turbines cannot be represented"),
@@ -127,7 +127,7 @@ def _check_switches(main, parts):
     ):
         main.one_of(key, choices, default=choices[0], why=why)
     if "mooring" not in parts:
-        why = "FEAMooring and OrcaFlex cannot be read; give a file of MAP++ or MoorDyn with --mooring"
+        why = "FEAMooring and OrcaFlex cannot be read; pass a file of MAP++ or MoorDyn with --mooring"
         main.one_of("CompMooring", (0, 1, 3), default=0, why=why)
     if main.whole("CompHydro", default=1) == 0:
         raise main.wrong("CompHydro", 0, "1: only floating turbines can be imported")
@@ -136,7 +136,7 @@ def _check_switches(main, parts):
 
 
 def _site(main, elastodyn, aerodyn, water):
-    """Site of what the .fst says, or the module that said it before."""
+    """Return the Site from the modules' files (older versions) or else from the .fst."""
     sources = {}
 
     def first(name, key, module, default=None, **limits):

@@ -1,7 +1,7 @@
-"""ElastoDyn's files: masses and geometry of rotor, nacelle, tower and platform.
+"""Reads ElastoDyn files: masses and geometry of rotor, nacelle, tower and platform.
 
-Blades and tower are lumped at the midpoints of ElastoDyn's elements, as it does it: totals then are those
-of its summary. All heights are of still water, angles in rad with ElastoDyn's signs.
+Blades and tower are lumped at the midpoints of ElastoDyn's elements, as in ElastoDyn, so that totals equal
+those of its summary. All heights are relative to still water, angles in rad with ElastoDyn's signs.
 """
 
 import math
@@ -46,7 +46,7 @@ FLEXIBLE = {
 
 @dataclass(frozen=True)
 class ElastoDyn:
-    """What the conversion takes of ElastoDyn's files; names of figures as in the files."""
+    """Holds the data of ElastoDyn's files that the conversion uses; names as in the files."""
 
     file: PartFile
     values: dict  # key of ElastoDyn: number in SI
@@ -55,17 +55,17 @@ class ElastoDyn:
     tower: tuple  # mass (kg), first (kg m) and second (kg m2) moment about the base of the tower
     bending: TowerBending | None  # of a tower file with mode shapes
     platform_products: list  # PtfmXYIner, PtfmYZIner, PtfmXZIner, kg m2
-    flexible: list  # names of degrees of freedom that are on and that the plant does not have
-    notes: list  # (what the deck has, what the plant has)
+    flexible: list  # names of enabled degrees of freedom that the plant lacks
+    notes: list  # (feature of the deck, treatment in the plant)
 
     def __getitem__(self, key):
         return self.values[key]
 
 
 def read_elastodyn(path, folders=()):
-    """ElastoDyn of an ElastoDyn file, with the blade and tower files that it names.
+    """Read an ElastoDyn file with the blade and tower files named there.
 
-    folders: further ones in which these are looked for. Raises: InputError.
+    folders: additional search folders for these. Raises: InputError.
     """
     file = PartFile(path, "ElastoDyn")
     blades = file.one_of("NumBl", (1, 2, 3), why="blades of a rotor in ElastoDyn")
@@ -84,7 +84,7 @@ def read_elastodyn(path, folders=()):
         values[name], *others = (file.number(f"{name}({i})", **limits) for i in range(1, blades + 1))
         for i, value in enumerate(others, 2):
             if value != values[name]:
-                raise file.wrong(f"{name}({i})", value, f"{values[name]:g}, as of blade 1: blades are alike")
+                raise file.wrong(f"{name}({i})", value, f"{values[name]:g}, blades must be identical")
     values["PreCone"] = math.radians(values["PreCone"])
     for key, least in (("TipRad", "HubRad"), ("TowerHt", "TowerBsHt")):
         if values[key] <= values[least]:
@@ -100,17 +100,17 @@ def read_elastodyn(path, folders=()):
 
 
 def _distributed(file, count_key, first, *columns):
-    """((n,) fraction of the length, then (n,) of each column) of a blade or tower file.
+    """Return [(n,) fraction of the length, then (n,) of each column] of a blade or tower file.
 
-    columns: (name, unit, key of the factor on it); values are from 0 to 1e9 kg/m or to 1e18 N m2.
+    columns: (name, unit, key of the column's factor); values are from 0 to 1e9 kg/m or to 1e18 N m2.
     """
     count = file.whole(count_key, low=2, high=10_000)
     rows = file.headed(first, count)
-    place = np.array([cells[first.lower()] for _, cells in rows])
+    station = np.array([cells[first.lower()] for _, cells in rows])
     for i, (line, _) in enumerate(rows):
-        if not 0.0 <= place[i] <= 1.0 or (i and place[i] <= place[i - 1]):
-            raise file.refusal(f"{first} = {place[i]:g}: must increase from 0 to 1", line)
-    found = [place]
+        if not 0.0 <= station[i] <= 1.0 or (i and station[i] <= station[i - 1]):
+            raise file.refusal(f"{first} = {station[i]:g}: must increase from 0 to 1", line)
+    result = [station]
     for name, unit, factor in columns:
         file.need(rows[0], name)
         adjust = file.number(factor, default=1.0, low=0.0, high=1e3)
@@ -118,45 +118,45 @@ def _distributed(file, count_key, first, *columns):
             if not 0.0 <= cells[name.lower()] <= LARGEST[unit]:
                 allowed = f"must be from 0 to {LARGEST[unit]:g} {unit}"
                 raise file.refusal(f"{name} = {cells[name.lower()]:g}: {allowed}", line)
-        found.append(adjust * np.array([cells[name.lower()] for _, cells in rows]))
-    return found
+        result.append(adjust * np.array([cells[name.lower()] for _, cells in rows]))
+    return result
 
 
 def _blade(file, folders, values, blades):
-    """(file, BladeMass) of the blade file, with the mass at the tip."""
+    """Return (file, BladeMass) of the blade file, including the tip mass."""
     nodes = file.whole("BldNodes", default=50, **NODES)
     part = PartFile(file.blade("BldFile", blades, folders), "ElastoDyn blade")
-    place, density = _distributed(part, "NBlInpSt", "BlFract", ("BMassDen", "kg/m", "AdjBlMs"))
+    station, density = _distributed(part, "NBlInpSt", "BlFract", ("BMassDen", "kg/m", "AdjBlMs"))
     tip = values["TipRad"]
-    blade = blade_mass(place, density, values["HubRad"], tip, nodes)
+    blade = blade_mass(station, density, values["HubRad"], tip, nodes)
     return part, BladeMass(np.append(blade.radius, tip), np.append(blade.mass, values["TipMass"]))
 
 
 def _tower(file, folders, values):
-    """(file, moments of its mass, TowerBending or None) of the tower file."""
+    """Return (file, mass moments, TowerBending or None) of the tower file."""
     path = file.other("TwrFile", folders=folders)
     if path is None:
-        raise file.wrong("TwrFile", "unused", "the tower file: the mass of the tower is in it")
+        raise file.wrong("TwrFile", "unused", "the tower file, which defines the tower mass")
     nodes = file.whole("TwrNodes", default=20, **NODES)
     tower = PartFile(path, "tower")
-    place, density = _distributed(tower, "NTwInpSt", "HtFract", ("TMassDen", "kg/m", "AdjTwMa"))
+    station, density = _distributed(tower, "NTwInpSt", "HtFract", ("TMassDen", "kg/m", "AdjTwMa"))
     length = values["TowerHt"] - values["TowerBsHt"]
     middle = (np.arange(nodes) + 0.5) / nodes
-    mass, s = np.interp(middle, place, density) * length / nodes, middle * length
+    mass, s = np.interp(middle, station, density) * length / nodes, middle * length
     moments = float(mass.sum()), float(mass @ s), float(mass @ s**2)
     return tower, moments, _bending(tower, nodes, values["YawBrMass"])
 
 
 def _bending(tower, nodes, top_mass):
-    """TowerBending of a tower file; None of one without shapes, or without mass or stiffness somewhere."""
+    """Return the TowerBending of a tower file; None without mode shapes, or with zero mass or stiffness."""
     if not tower.has("TwFAM1Sh(2)"):
         return None
     columns = _distributed(
         tower, "NTwInpSt", "HtFract", ("TMassDen", "kg/m", "AdjTwMa"), ("TwFAStif", "N m2", "AdjFASt"),
         ("TwSSStif", "N m2", "AdjSSSt"),
     )  # fmt: skip
-    place = columns[0]
-    if min(map(np.min, columns[1:])) <= 0.0 or (place[0], place[-1]) != (0.0, 1.0):
+    station = columns[0]
+    if min(map(np.min, columns[1:])) <= 0.0 or (station[0], station[-1]) != (0.0, 1.0):
         return None
 
     def of_modes(name, factor=1.0, **limits):
@@ -168,7 +168,7 @@ def _bending(tower, nodes, top_mass):
         )
 
     damping, tuner = {"factor": 0.01, "low": 0.0, "high": 99.0}, {"low": 0.0, "high": 1e3, "open_low": True}
-    given = dict(zip(COLUMNS, (tuple(column.tolist()) for column in columns), strict=True)) | {
+    values = dict(zip(COLUMNS, (tuple(column.tolist()) for column in columns), strict=True)) | {
         "fore_aft": shapes("FA"),
         "side_side": shapes("SS"),
         "fore_aft_damping": of_modes("TwrFADmp", **damping),
@@ -178,7 +178,7 @@ def _bending(tower, nodes, top_mass):
         "top_mass": top_mass,
         "elements": nodes,
     }
-    found, problems = validate(TowerBending, given)
+    modes, problems = validate(TowerBending, values)
     if problems:
         raise tower.refusal("; ".join(problems))
-    return found
+    return modes

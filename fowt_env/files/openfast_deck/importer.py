@@ -1,4 +1,4 @@
-"""A deck turned into a folder of this project's files, checked by reading them back."""
+"""Imports a deck into a folder of this project's files, and checks these by reading them back."""
 
 import tempfile
 from dataclasses import replace
@@ -27,43 +27,43 @@ def import_deck(
     fst, folder, *, parts=None, search=(), discon=None, excitation=None, name=None, replace_files=False,
     head=(),
 ):  # fmt: skip
-    """Report of a deck written as platform.toml, turbine/, hydro.npz, tower.csv and report.md into a folder.
+    """Write a deck as platform.toml, turbine/, hydro.npz, tower.csv and report.md; return the Report.
 
     fst            the .fst file, or None with parts
-    folder         made if need be; its files are left alone unless replace_files
-    parts          {"elastodyn": path ...} (deck.PARTS), in place of what the .fst names
-    search         further folders in which files that the deck names are looked for
-    discon         a DISCON.IN of ROSCO in place of the deck's
-    excitation     (omega, heading, force) in place of WAMIT's .3, as descriptions.wamit.read_wamit takes it
-    name           of platform and turbine; default: the folder's
-    head           further lines of comment in the files: sources, licence
-    Raises: InputError naming file, line, key, value and what is allowed; the folder then is as before.
+    folder         created if missing; existing files are kept unless replace_files
+    parts          {"elastodyn": path ...} (deck.PARTS), instead of the files named in the .fst
+    search         additional search folders for files named in the deck
+    discon         a DISCON.IN of ROSCO instead of the deck's
+    excitation     (omega, heading, force) instead of WAMIT's .3, as in descriptions.wamit.read_wamit
+    name           of platform and turbine; default: name of the folder
+    head           further comment lines for the files: sources, licence
+    Raises: InputError naming file, line, key, value and the allowed range; the folder then is unchanged.
     """
     folder = Path(folder)
     name = name or folder.resolve().name
     if folder.exists() and not folder.is_dir():
-        raise InputError(f"folder {str(folder)!r} is a file; must be a folder, or not there yet")
+        raise InputError(f"folder {str(folder)!r} is a file; must be a folder, or not exist")
     deck = read_deck(fst, parts, search, discon)
     body = _coefficients(deck, excitation)
     report = make_report(deck, name, body)
     texts = {"report.md": markdown(report), **_texts(deck, name, head)}
-    there = [file for file in (COEFFICIENTS, *texts) if (folder / file).exists()]
-    if there and not replace_files:
-        raise InputError(f"folder {str(folder)!r} has a {there[-1]} already: give another, or --overwrite")
+    existing = [file for file in (COEFFICIENTS, *texts) if (folder / file).exists()]
+    if existing and not replace_files:
+        raise InputError(f"folder {str(folder)!r} already has a {existing[-1]}: use another, or --overwrite")
     with tempfile.TemporaryDirectory(prefix="fowt-import-") as temporary:
         _write(Path(temporary), texts, body)
         try:
             read_turbine(read_platform(Path(temporary) / "platform.toml").turbine)
         except InputError as error:
             problem = str(error).replace(f"{temporary}/", "")
-            what = f"deck {deck.name!r}: its figures cannot be used as they are: {problem}"
+            what = f"deck {deck.name!r}: values cannot be used: {problem}"
             raise InputError(what) from None
         _write(folder, texts, body)
     return report
 
 
 def _coefficients(deck, excitation):
-    """PotentialFlow of a deck, or None."""
+    """Return the PotentialFlow of a deck, or None."""
     potential, site = deck.hydrodyn.potential, deck.site
     if potential is None:
         return None
@@ -75,14 +75,14 @@ def _coefficients(deck, excitation):
 
 
 def _texts(deck, name, head):
-    """{path in the folder: text} of all text files but the report, the platform's last."""
+    """Return {path in the folder: text} of all text files except the report, platform.toml last."""
     control, aero, bending = deck.control, deck.aerodyn, deck.elastodyn.bending
     files = {"OpenFAST": deck.fst, "ElastoDyn": deck.elastodyn.file, "AeroDyn": aero.file,
              "HydroDyn": deck.hydrodyn.file, "DISCON.IN": control.discon}  # fmt: skip
     named = ", ".join(f"{kind} {file.path.name}" for kind, file in files.items() if file is not None)
     title = [f"Imported from the OpenFAST deck {deck.name} by fowt import. {UNITS}",
              "Origin on the tower axis at still water; x downwind, z up, y to the left looking downwind.",
-             f"Beside each figure: the file and the keys that it is from. Files: {named}.",
+             f"Each comment names the file and the keys of the value. Files: {named}.",
              *head]  # fmt: skip
     texts = {
         f"turbine/polars/{airfoil}.csv": polar_text(
@@ -96,11 +96,11 @@ def _texts(deck, name, head):
         texts[f"turbine/{DISCON}"] = discon_text(control.discon, control.performance)
     if bending is not None:
         file = deck.elastodyn.file.text("TwrFile")
-        said = f"Tower of {file}: mass density in kg/m, stiffness (EI) in N m2."
-        texts[DISTRIBUTION] = tower_text(bending, [said, *head])
+        title_line = f"Tower of {file}: mass density in kg/m, stiffness (EI) in N m2."
+        texts[DISTRIBUTION] = tower_text(bending, [title_line, *head])
     blade = aero.blade_file.path.name
     texts["turbine/blade.csv"] = blade_text(*stations(deck), [
-        f"Blade of {blade}: its nodes, the end ones 0.05 m inside root and tip, where loads are 0.",
+        f"Nodes of blade {blade}, with the end nodes 0.05 m inside root and tip, where loads are 0.",
         "radius from the rotor centre along the pitch axis, m; twist in degrees; prebend downwind, m.", *head,
     ])  # fmt: skip
     texts["turbine/turbine.toml"] = toml_text(turbine_rows(deck, name), title)
@@ -109,7 +109,7 @@ def _texts(deck, name, head):
 
 
 def _write(folder, texts, body):
-    """All files of an import, each whole or not at all; the platform's last, which makes them one."""
+    """Write all files of an import atomically, platform.toml last, which completes the folder."""
     (folder / "turbine" / "polars").mkdir(parents=True, exist_ok=True)
     if body is not None:
         with replacing(folder / COEFFICIENTS) as path, path.open("wb") as file:

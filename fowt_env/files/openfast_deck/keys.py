@@ -1,8 +1,8 @@
-"""What becomes of every key of a deck: read, without effect here, neutral at some value, or unknown.
+"""Classifies all keys of a deck: read, without effect here, neutral at some value, or unknown.
 
-KEYS has a table per kind of file. A key (or a column of a table) that is in no list of its table, or that is
-away from its neutral value, makes a row of the report, or an InputError where the result would be another
-machine: `differences`. The names are those of OpenFAST's readers, from FAST 8.16 to OpenFAST 5.
+KEYS has a table per kind of file. A key (or a column of a table) that is not listed, or that differs from its
+neutral value, adds a row to the report, or raises InputError if the result would be a different machine:
+`differences`. The names are those of OpenFAST's readers, from FAST 8.16 to OpenFAST 5.
 """
 
 import re
@@ -11,18 +11,18 @@ from typing import Any, NamedTuple
 
 from fowt_env.files.openfast_deck.parser import bare, number_of, same_key, truth_of
 
-LATE = 9000.0  # s: events at such a time are outside of every run
-UNKNOWN = "not looked at: the importer does not know this key"
+LATE = 9000.0  # s: events at or after this time are outside all runs
+UNKNOWN = "ignored: the importer does not know this key"
 
 
 class Otherwise(NamedTuple):
-    """What a key means that is away from its neutral value.
+    """Defines the effect of a key that differs from its neutral value.
 
-    neutral    values (numbers, truths, texts in small letters) without effect, or a function of the number
-    deck       what the deck has otherwise; of a refusal what is allowed, and why
-    here       what is here instead; None: such a deck is refused
-    cases      {value: (deck, here)} of values that mean something of their own
-    when       whether the key counts, of the file; None: always
+    neutral    values (numbers, booleans, lower-case texts) without effect, or a predicate of the number
+    deck       feature of the deck otherwise; for a refusal: the allowed value and the reason
+    here       treatment here; None: such a deck is refused
+    cases      {value: (deck, here)} of values with a separate meaning
+    when       predicate of the file, whether the key applies; None: always
     """
 
     neutral: Any
@@ -37,7 +37,7 @@ def _names(text):
 
 
 def _keys(read, ignored, **neutral):
-    """{key as same_key has it, "#" for a number at its end: None where it is read, a reason or Otherwise}."""
+    """Return {normalised key ("#": final number): None if the key is read, else a reason or Otherwise}."""
     table = dict.fromkeys(_names(read))
     for reason, text in ignored.items():
         table |= dict.fromkeys(_names(text), reason)
@@ -45,37 +45,37 @@ def _keys(read, ignored, **neutral):
 
 
 def known(table, key):
-    """The form in which a table has a key, or None."""
+    """Return the form of a key in a table, or None."""
     return next((form for form in (key, re.sub(r"\d+$", "#", key)) if form in table), None)
 
 
 def _all(names, value):
-    """{key: the same Otherwise} of several keys."""
+    """Return {key: value} of several keys with the same Otherwise."""
     return dict.fromkeys(names.split(), value)
 
 
 def _blade_element_wake(file):
-    """Whether an AeroDyn file has the switch by which DBEMT_Mod counts."""
+    """Return whether DBEMT_Mod applies in an AeroDyn file: Wake_Mod is 1."""
     return file.has("Wake_Mod") and file.whole("Wake_Mod") == 1
 
 
-def _late(deck, here="no such event: faults and stops are given to a run"):
+def _late(deck, here="no such event: faults and stops are arguments of a run"):
     return Otherwise(lambda seconds: seconds >= LATE, deck, here)
 
 
 def differences(file):
-    """List of (what the deck has, what is here) of a part file whose tables have been read.
+    """Return a list of (feature of the deck, treatment here) of a part file whose tables have been read.
 
-    Raises: InputError for a key whose value would make another machine.
+    Raises: InputError for a key whose value would define a different machine.
     """
     table, rows, unknown = KEYS[file.kind], [], set()
-    found = [(name, line, values) for name, line, values in file.entries.values()]
-    found += [
+    entries = [(name, line, values) for name, line, values in file.entries.values()]
+    entries += [
         (name, line, [f"{value:g}" if isinstance(value, float) else str(value)])
         for name, cells in file.columns.items()
         for line, value in cells
     ]
-    for name, line, values in found:
+    for name, line, values in entries:
         form = known(table, same_key(name))
         value = " ".join(map(bare, values))
         if form is None:
@@ -89,7 +89,7 @@ def differences(file):
 
 
 def _row(file, name, line, values, otherwise):
-    """[(deck, here)] of a key with an Otherwise; [] at its neutral value."""
+    """Return [(deck, here)] of a key with an Otherwise; [] at the neutral value."""
     if otherwise.when is not None and not otherwise.when(file):
         return []
     words = [bare(word) for word in values]
@@ -121,9 +121,9 @@ def _is_neutral(word, neutral):
     return False
 
 
-OUTPUT = "output alone"
+OUTPUT = "output only"
 STEPS = "time steps, iterations and interpolation"
-INITIAL = "where a run begins, which is at the steady state of its wind here"
+INITIAL = "initial conditions: here a run starts at the steady state of its wind"
 _MODULE_OUTPUT = "Echo SumPrint OutFile TabDelim OutFmt TStart DecFact OutList"
 
 OPENFAST = _keys(
@@ -136,12 +136,12 @@ OPENFAST = _keys(
         " VTK_fields VTK_fps",
         STEPS: "TMax DT InterpOrder NumCrctn DT_UJac UJacSclFact ModCoupling RhoInf ConvTol MaxConvIter"
         " AbortLevel",
-        "linearization, for which this project has its own": "Linearize CalcSteady TrimCase TrimTol"
+        "linearization, replaced by that of this project": "Linearize CalcSteady TrimCase TrimTol"
         " TrimGain Twr_Kdmp Bld_Kdmp NLinTimes LinTimes LinInputs LinOutputs LinOutJac LinOutMod",
-        "properties of the fluid that no load here has": "KinVisc SpdSound Patm Pvap",
-        "files of modules that a switch leaves out or refuses": "BDBldFile# SubFile IceFile SoilFile",
+        "fluid properties that no load here depends on": "KinVisc SpdSound Patm Pvap",
+        "files of modules that a switch disables or refuses": "BDBldFile# SubFile IceFile SoilFile",
     },
-    MirrorRotor=Otherwise(False, "False: a rotor that turns the other way cannot be represented", None),
+    MirrorRotor=Otherwise(False, "False: a rotor with reversed rotation cannot be represented", None),
     NRotors=Otherwise(1, "1: several rotors cannot be represented", None),
     CompSoil=Otherwise(0, "0: a soil model cannot be represented", None),
 )
@@ -161,16 +161,16 @@ ELASTODYN = _keys(
         " PtfmHeave PtfmRoll PtfmPitch PtfmYaw",
         "teetering and furling, which are refused": "Delta3 TeetMod TeetDmpP TeetDmp TeetCDmp TeetSStP"
         " TeetHStP TeetSSSp TeetHSSp HubIner_Teeter FurlFile",
-        "of a degree of freedom whose own row says that it is rigid here": "DTTorSpr DTTorDmp YawFrctMod"
+        "of a degree of freedom that is rigid here, see its row": "DTTorSpr DTTorDmp YawFrctMod"
         " M_CSmax M_FCSmax M_MCSmax M_CD M_FCD M_MCD sig_v sig_v2 OmgCut PBrIner# BlPIner#",
     },
     PitchDOF=Otherwise(False, "blade pitch as a degree of freedom", "the pitch drive of the turbine file"),
-    NacYaw=Otherwise(0, "nacelle turned out of the wind", "nacelle along x"),
+    NacYaw=Otherwise(0, "nacelle yawed out of the wind", "nacelle along x"),
     PtfmRefxt=Otherwise(0, "0: the origin lies on the tower axis", None),
     PtfmRefyt=Otherwise(0, "0: the origin lies on the tower axis", None),
-    GenDOF=_HELD._replace(deck="rotor speed held", here="free: the controller's torque acts on it"),
+    GenDOF=_HELD._replace(deck="fixed rotor speed", here="free: the controller's torque acts on the rotor"),
     **{
-        key: _HELD._replace(deck=f"{motion} of the platform held", here="free" + more)
+        key: _HELD._replace(deck=f"platform {motion} disabled", here="free" + more)
         for key, motion, more in (
             ("PtfmSgDOF", "surge", ""), ("PtfmHvDOF", "heave", ""), ("PtfmPDOF", "pitch", ""),
             ("PtfmSwDOF", "sway", "; the option planar holds sway, roll and yaw"),
@@ -182,7 +182,7 @@ ELASTODYN = _keys(
 ELASTODYN_BLADE = _keys(
     "NBlInpSt AdjBlMs BlFract BMassDen",
     {
-        "stiffness, damping and shapes of blades that bend: FlapDOF1, FlapDOF2 and EdgeDOF make the rows":
+        "stiffness, damping and shapes of flexible blades, see the rows of FlapDOF1, FlapDOF2 and EdgeDOF":
         "BldFlDmp# BldEdDmp# FlStTunr# AdjFlSt AdjEdSt BldFl1Sh# BldFl2Sh# BldEdgSh# PitchAxis StrcTwst"
         " FlpStff EdgStff",
         "columns and switches that ElastoDyn does not use": "CalcBMode GJStff EAStff Alpha FlpIner EdgIner"
@@ -199,9 +199,9 @@ TOWER = _keys(
     NTwCMass=Otherwise(0, "0: add concentrated masses of the tower to TMassDen", None),
 )
 
-_INDUCTION = Otherwise(True, "", "with it")
-_QUASI_STEADY = "quasi-steady induction; the option dynamic_inflow has a dynamic one"
-_SKEWED = "with the option skewed_wake that of Pitt and Peters, 15 pi / 32"
+_INDUCTION = Otherwise(True, "", "included")
+_QUASI_STEADY = "quasi-steady induction; dynamic with the option dynamic_inflow"
+_SKEWED = "with the option skewed_wake the correction of Pitt and Peters, 15 pi / 32"
 AERODYN = _keys(
     "NumAFfiles InCol_Alfa InCol_Cl InCol_Cd InCol_Cm UseBlCm AFTabMod AFNames ADBlFile# ADBlFile"
     " NumTwrNds AirDens TwrAero TwrElev TwrDiam TwrCd",
@@ -209,16 +209,16 @@ AERODYN = _keys(
         OUTPUT: _MODULE_OUTPUT + " NBlOuts BlOutNd NTwOuts TwOutNd BldNd_BladesOut BldNd_BlOutNd CompAA"
         " AA_InputFile CavitCheck InCol_Cpmin",
         STEPS: "DTAero IndToler MaxIter",
-        "linearization, for which this project has its own": "FrozenWake",
-        "properties of the fluid that no load here has": "KinVisc SpdSound Patm Pvap FluidDepth AddedMass",
-        "of a model that a key of its own switches on": "tau1_const OLAFInputFileName FVWFile AoA34 UAMod"
+        "linearization, replaced by that of this project": "FrozenWake",
+        "fluid properties that no load here depends on": "KinVisc SpdSound Patm Pvap FluidDepth AddedMass",
+        "of a model with a separate switch": "tau1_const OLAFInputFileName FVWFile AoA34 UAMod"
         " FLookup IntegrationMethod UAStartRad UAEndRad SectAvgWeighting SectAvgNPoints SectAvgPsiBwd"
         " SectAvgPsiFwd VolHub HubCenBx VolNac NacCenB NacArea NacCd NacDragAC TFinFile TwrTI TwrCb TwrCp"
         " TwrCa TwrCpCS SkewMomCorr",
     },
     **{
         key: Otherwise(1, "another model of induction", "blade-element momentum theory", {
-            "0": ("no induction", "blade-element momentum theory: induction is there"),
+            "0": ("no induction", "blade-element momentum theory: induction always on"),
             "2": ("dynamic wake", _QUASI_STEADY),
             "3": ("free vortex wake", "blade-element momentum theory"),
         })
@@ -237,7 +237,7 @@ AERODYN = _keys(
         0,
         "skewed-wake correction",
         f"none; {_SKEWED}",
-        cases={"-1": ("wind across the rotor taken off", "it is there")},
+        cases={"-1": ("cross-flow wind removed", "included")},
     ),
     SkewMod=Otherwise(1, "skewed-wake correction", f"none; {_SKEWED}"),
     SkewRedistr_Mod=Otherwise(("default", 1), "another skewed-wake redistribution", _SKEWED),
@@ -254,8 +254,7 @@ AERODYN_BLADE = _keys(
     "NumBlNds BlSpn BlCrvAC BlSwpAC BlTwist BlChord BlAFID",
     {
         "the slope of BlCrvAC": "BlCrvAng",
-        "of a model that a key of its own switches on": "BlCb BlCenBn BlCenBt BlCpn BlCpt BlCan BlCat"
-        " BlCam t_c",
+        "of a model with a separate switch": "BlCb BlCenBn BlCenBt BlCpn BlCpt BlCan BlCat BlCam t_c",
     },
 )
 POLAR = _keys(
@@ -264,8 +263,8 @@ POLAR = _keys(
         "counted": "NumTabs",
         STEPS: "InterpOrd",
         "coordinates and boundary layer, for pictures and noise": "NonDimArea NumCoords BL_file RelThickness",
-        "choice between tables, which AFTabMod and the row of several tables say": "UserProp Ctrl",
-        "unsteady airfoil aerodynamics, whose row is of UA_Mod or AFAeroMod": "InclUAdata alpha0 alpha1"
+        "choice between tables, see AFTabMod and the row of several tables": "UserProp Ctrl",
+        "unsteady airfoil aerodynamics, see the row of UA_Mod or AFAeroMod": "InclUAdata alpha0 alpha1"
         " alpha2 alphaUpper alphaLower eta_e C_nalpha C_lalpha T_f0 T_V0 T_p T_VL b1 b2 b5 A1 A2 A5 S1 S2"
         " S3 S4 Cn1 Cn2 St_sh Cd0 Cm0 k0 k1 k2 k3 k1_hat x_cp_bar UACutout UACutout_delta filtCutOff",
     },
@@ -279,27 +278,27 @@ SERVODYN = _keys(
         STEPS: "DT DLL_DT DLL_Ramp",
         "the induction generator of VSContrl 0, which is refused": "GenModel SIG_SlPc SIG_SySp SIG_RtTq"
         " SIG_PORt TEC_Freq TEC_NPol TEC_SRes TEC_RRes TEC_VLL TEC_SLR TEC_RLR TEC_MR",
-        "of what a key of its own switches on": "BlPitchF# SpdGenOn THSSBrDp HSSBrDT HSSBrTqF TYCOn"
+        "of a feature with a separate switch": "BlPitchF# SpdGenOn THSSBrDp HSSBrDT HSSBrTqF TYCOn"
         " YawManRat NacYawF AfC_Mean AfC_Amp AfC_Phase BStCfiles NStCfiles TStCfiles SStCfiles BStCfile"
         " NStCfile TStCfile SStCfile NTMDfile TTMDfile",
-        "of a degree of freedom whose own row says that it is rigid here": "YawSpr YawDamp PitNeut#"
+        "of a degree of freedom that is rigid here, see its row": "YawSpr YawDamp PitNeut#"
         " PitSpr# PitDamp#",
-        "values handed to a library that asks for them, which ROSCO does not": "DLL_ProcName EXavrSWAP"
+        "values passed to a controller library, not used by ROSCO": "DLL_ProcName EXavrSWAP"
         " NacYaw_North Ptch_Cntrl Ptch_SetPnt Ptch_Min Ptch_Max PtchRate_Min PtchRate_Max Gain_OM"
         " GenSpd_MinOM GenSpd_MaxOM GenSpd_Dem GenTrq_Dem GenPwr_Dem DLL_NumTrq GenSpd_TLU GenTrq_TLU",
     },
-    PCMode=Otherwise(5, "pitch control by other than a library", "that of the controller of a run",
-                     {"0": ("no pitch control", "that of the controller of a run")}),
-    TPCOn=Otherwise(lambda seconds: seconds <= 0.0, "pitch control from a later time on", "from the start"),
-    **{f"TPitManS({i})": _late("override of the blade pitch from a time on") for i in (1, 2, 3)},
-    GenTiStr=Otherwise(True, "generator started by its speed", "on from the start"),
-    GenTiStp=Otherwise(True, "generator stopped by its power", "on"),
-    TimGenOn=Otherwise(lambda seconds: seconds <= 0.0, "generator on from a later time on", "from the start"),
-    TimGenOf=_late("generator off from a time on"),
+    PCMode=Otherwise(5, "pitch control not by a library", "pitch control by the controller of a run",
+                     {"0": ("no pitch control", "pitch control by the controller of a run")}),
+    TPCOn=Otherwise(lambda seconds: seconds <= 0.0, "delayed start of pitch control", "from the start"),
+    **{f"TPitManS({i})": _late("override of the blade pitch after a time") for i in (1, 2, 3)},
+    GenTiStr=Otherwise(True, "generator start by speed", "on from the start"),
+    GenTiStp=Otherwise(True, "generator stop by power", "on"),
+    TimGenOn=Otherwise(lambda seconds: seconds <= 0.0, "delayed start of the generator", "from the start"),
+    TimGenOf=_late("generator off after a time"),
     HSSBrMode=Otherwise(0, "shaft brake", "none"),
     YCMode=Otherwise(0, "nacelle-yaw control", "the nacelle does not yaw"),
-    YawNeut=Otherwise(0, "nacelle turned out of the wind", "nacelle along x"),
-    TYawManS=_late("yaw manoeuvre from a time on", "the nacelle does not yaw"),
+    YawNeut=Otherwise(0, "nacelle yawed out of the wind", "nacelle along x"),
+    TYawManS=_late("yaw manoeuvre after a time", "the nacelle does not yaw"),
     AfCmode=Otherwise(0, "flaps or other control of airfoils", "none"),
     NumBStC=_DAMPER._replace(deck="structural controllers (tuned mass dampers) of the blades"),
     NumNStC=_DAMPER._replace(deck="structural controllers (tuned mass dampers) of the nacelle"),
@@ -311,7 +310,7 @@ SERVODYN = _keys(
     BPCutoff=Otherwise(lambda hertz: hertz >= 100.0, "low pass on the commanded blade pitch", "none"),
 )  # fmt: skip
 
-_LONG_WAVES = "inertia coefficients of long waves; of a spar the option diffraction has it"
+_LONG_WAVES = "inertia coefficients of long waves; for a spar see the option diffraction"
 SEASTATE = _keys(
     "WtrDens WtrDpth MSL2SWL X_HalfWidth Y_HalfWidth Z_Depth WaveMod WaveHs WaveTp WavePkShp WvLowCOff"
     " WvHiCOff WaveDir CurrMod CurrSSV0 CurrSSDir CurrNSRef CurrNSV0 CurrNSDir CurrDIV CurrDIDir",
@@ -320,21 +319,21 @@ SEASTATE = _keys(
         " WaveKinyi WaveKinzi",
         STEPS: "NX NY NZ WaveTMax WaveDT",
         "one realisation of a random sea": "WaveSeed# WaveNDAmp",
-        "of what a key of its own switches on": "WaveDirSpread WaveNDir WaveDirRange WvKinFile WvLowCOffD"
+        "of a feature with a separate switch": "WaveDirSpread WaveNDir WaveDirRange WvKinFile WvLowCOffD"
         " WvHiCOffD WvLowCOffS WvHiCOffS CrestHmax CrestTime CrestXi CrestYi",
     },
-    WaveStMod=Otherwise(0, "waves stretched to the surface", "as the options stretching and surface say"),
+    WaveStMod=Otherwise(0, "waves stretched to the surface", "see the options stretching and surface"),
     WaveDirMod=Otherwise(0, "short-crested waves", "long-crested waves"),
     WvDiffQTF=Otherwise(False, "second-order wave kinematics of difference frequencies", "first order"),
     WvSumQTF=Otherwise(False, "second-order wave kinematics of sum frequencies", "first order"),
     ConstWaveMod=Otherwise(0, "a constrained wave", "a random sea"),
-    WvCrntMod=Otherwise(0, "waves that ride on the current", "waves as without current"),
+    WvCrntMod=Otherwise(0, "waves on a current", "waves as without current"),
     MCFD=Otherwise(lambda radius: radius <= 0.0, "MacCamy-Fuchs diffraction of members", _LONG_WAVES),
 )  # fmt: skip
 
 
 def _potential(file):
-    """Whether a file of HydroDyn has a potential-flow body."""
+    """Return whether a file of HydroDyn has a potential-flow body."""
     return file.whole("PotMod", default=0) == 1
 
 
@@ -359,31 +358,31 @@ HYDRODYN = _keys(
         " MemberCpMG# MemberAxCdMG# MemberAxCaMG# MemberAxCpMG# MemberCbMG#",
         "rectangular members, which are refused": "NCoefDpthRec MSpinOrient FDMod VnCOffA VnCOffB FDLoFScA"
         " FDLoFScB",
-        "of what a key of its own switches on": "ExctnCutOff PtfmYCutOff NExctnHdg AxVnCOff",
+        "of a feature with a separate switch": "ExctnCutOff PtfmYCutOff NExctnHdg AxVnCOff",
     },
-    ExctnMod=Otherwise(1, "another wave excitation", "from the coefficients themselves", {
-        "0": ("no wave excitation", "wave excitation: it is there in waves"),
-        "2": ("state-space fit of the wave excitation", "from the coefficients themselves"),
+    ExctnMod=Otherwise(1, "another wave excitation", "directly from the coefficients", {
+        "0": ("no wave excitation", "wave excitation always included"),
+        "2": ("state-space fit of the wave excitation", "directly from the coefficients"),
     }, when=_potential),
     ExctnDisp=Otherwise(0, "wave excitation at the displaced position",
                         "undisplaced; see the option excitation_position", when=_potential),
-    PtfmYMod=Otherwise(0, "wave loads that follow large platform yaw", "wave loads about zero yaw"),
+    PtfmYMod=Otherwise(0, "wave loads at large platform yaw", "wave loads at zero yaw"),
     NAddDOF=Otherwise(0, "0: further degrees of freedom cannot be represented", None, when=_potential),
     **_all("PtfmRefxt PtfmRefyt PtfmRefzt PtfmRefztRot PtfmRefY", _REFERENCE),
     **_all("PtfmSgF PtfmSwF PtfmHvF PtfmRF PtfmPF PtfmYF", _FORCE),
     WaveDisp=Otherwise(0, "wave kinematics at the displaced members",
                        "at the undisplaced ones; see the option kinematics_position"),
     AMMod=Otherwise(0, "added mass of members up to the wave's surface", "up to still water"),
-    HstMod=Otherwise(0, "buoyancy of members up to the wave's surface", "as the option surface has it"),
+    HstMod=Otherwise(0, "buoyancy of members up to the wave's surface", "see the option surface"),
     JointOvrlp=Otherwise(0, "overlap of members removed at joints", "members overlap there"),
-    AxFDMod=Otherwise(0, "low-passed or one-sided axial drag", "axial drag of the present velocity"),
+    AxFDMod=Otherwise(0, "low-passed or one-sided axial drag", "axial drag of the instantaneous velocity"),
     AxFDLoFSc=Otherwise(1, "axial drag of slow motions scaled", "the same at all frequencies"),
     **_all("SimplMCF DpthMCF MemberMCF",
            Otherwise(0, "MacCamy-Fuchs diffraction of members", _LONG_WAVES)),
 )  # fmt: skip
 
 
-_KINDS = "of another kind of wind than the deck's, or of a box or file that is given with --wind"
+_KINDS = "of another kind of wind, or of a box or file set with --wind"
 INFLOWWIND = _keys(
     "WindType HWindSpeed RefHt PLexp Filename_Uni Filename RefHt_Uni",
     {
@@ -392,17 +391,17 @@ INFLOWWIND = _keys(
         _KINDS: "RefLength FileName_BTS FilenameRoot TowerFile FileName_u FileName_v FileName_w nx ny nz"
         " dx dy dz RefHt_HAWC ScaleMethod SFx SFy SFz SigmaFx SigmaFy SigmaFz TStart TEnd URef WindProfile"
         " PLExp_HAWC Z0 XOffset CTTS_CoherentTurbFlag CTTS_FileName CTTS_Path WindFileName",
-        "measurements of a lidar, of which this project has its own": "SensorType NumPulseGate"
+        "lidar, replaced by that of this project": "SensorType NumPulseGate"
         " PulseSpacing NumBeam FocalDistanceX FocalDistanceY FocalDistanceZ RotorApexOffsetPos URefLid"
         " MeasurementInterval LidRadialVel ConsiderHubMotion",
     },
     PropagationDir=Otherwise(
         0, "wind from another direction", "wind along x, with the heading of a wind file"
     ),
-    VFlowAng=Otherwise(0, "wind that is inclined to the horizontal", "horizontal wind"),
+    VFlowAng=Otherwise(0, "wind inclined to the horizontal", "horizontal wind"),
 )
 
-_LINE = "dynamics of lines, whose row says that they are quasi-static here"
+_LINE = "line dynamics: lines are quasi-static here, see the row"
 MOORDYN = _keys(
     "g gravity rhoW rho WtrDpth depth WaterDepth Name Diam MassDen EA ID Type X Y Z M V FX FY FZ LineType"
     " AttachA AttachB UnstrLen",
@@ -418,7 +417,7 @@ MOORDYN = _keys(
     CA=Otherwise(0, "added mass of a point on the vessel", "none"),
     WaterKin=Otherwise((0, "default"), "waves and current on the lines", "none"),
     mu_kT=Otherwise(0, "friction across the lines on the bed", "none"),
-    mu_kA=Otherwise(0, "friction along the lines on the bed", "none: give seabed_friction in [[lines]]"),
+    mu_kA=Otherwise(0, "friction along the lines on the bed", "none: set seabed_friction in [[lines]]"),
 )
 MAP = _keys(
     "repeat LineType Diam MassDenInAir EA CB Node Type X Y Z M B FX FY FZ Line UnstrLen NodeAnch NodeFair"
@@ -436,7 +435,7 @@ MAP = _keys(
     lm_model=Otherwise(False, "dynamic lines (lumped masses)", "quasi-static catenaries"),
     wave_kinematics=Otherwise(False, "waves and current on the lines", "none"),
     ref_position=Otherwise(0, "0 0 0: lines hang from the platform at its origin", None),
-    damage_time=Otherwise(lambda seconds: seconds >= LATE, "a line that breaks", "a line that holds"),
+    damage_time=Otherwise(lambda seconds: seconds >= LATE, "line failure at a time", "no line failure"),
 )
 
 KEYS = {
@@ -448,7 +447,7 @@ KEYS = {
     "AeroDyn blade": AERODYN_BLADE,
     "polar": POLAR,
     "ServoDyn": SERVODYN,
-    "HydroDyn": HYDRODYN | SEASTATE,  # before OpenFAST 4 the sea is in HydroDyn's file
+    "HydroDyn": HYDRODYN | SEASTATE,  # before OpenFAST 4 the sea was defined in HydroDyn's file
     "SeaState": SEASTATE,
     "InflowWind": INFLOWWIND,
     "MoorDyn": MOORDYN,

@@ -1,4 +1,4 @@
-"""Mooring lines of MAP++'s and MoorDyn's files: from anchors to the vessel, without points between."""
+"""Reads mooring lines of MAP++ and MoorDyn files: from anchors to the vessel, without intermediate points."""
 
 import math
 import re
@@ -14,7 +14,7 @@ MAP_LINE = ("Line", "LineType", "UnstrLen", "NodeAnch", "NodeFair")
 VERSION_1 = ("Line", "LineType", "UnstrLen", "NumSegs", "NodeAnch", "NodeFair")  # of MoorDyn
 VERSION_2 = ("ID", "LineType", "AttachA", "AttachB", "UnstrLen", "NumSegs")
 _SECTION = "---"
-_SECTIONS = {  # of MoorDyn: what a header may have, in the order of MoorDyn's own tests
+_SECTIONS = {  # of MoorDyn: words that identify a header, in MoorDyn's order of checks
     "types": ("line dictionary", "line types"),
     "rod types": ("rod dictionary", "rod types"),
     "bodies": ("bodies", "body list", "body properties"),
@@ -34,7 +34,7 @@ _DYNAMIC = "dynamic lines (MoorDyn): drag, added mass, damping and inertia of th
 
 
 class MooringLine(NamedTuple):
-    """One line; anchor and fairlead in m, wet weight in N/m, EA in N."""
+    """Defines a mooring line; anchor and fairlead in m, wet weight in N/m, EA in N."""
 
     anchor: tuple
     fairlead: tuple
@@ -46,14 +46,14 @@ class MooringLine(NamedTuple):
 
 
 class _Mooring:
-    """Types and points of a mooring file, and the lines between them; sea: (depth, density, gravity)."""
+    """Collects line types and points of a mooring file to build the lines; sea: (depth, density, gravity)."""
 
     def __init__(self, file, sea):
         self.file, self.sea = file, sea
         self.types, self.points = {}, {}
 
     def add_type(self, number, words, stiffness, friction=0.0):
-        """A type of line, of the name, diameter and mass per length that begin its row."""
+        """Add a line type; the row starts with name, diameter and mass per length."""
         name = self.file.new(number, self.types, words[0].lower(), "line type")
         diameter, mass = (number_of(word) for word in words[1:3])
         if None in (diameter, mass) or not (0.0 <= diameter <= 100.0 and 0.0 <= mass <= 1e6):
@@ -62,41 +62,41 @@ class _Mooring:
         _, density, gravity = self.sea
         weight = (mass - density * 0.25 * math.pi * diameter**2) * gravity
         if weight <= 0.0:
-            what = f"line type {words[0]}: weighs {weight:.4g} N/m in water: must be > 0: lines may not float"
+            what = f"line type {words[0]}: weighs {weight:.4g} N/m in water: must be > 0 (no buoyant lines)"
             raise self.file.refusal(what, number)
         self.types[name] = weight, self.positive(number, "EA", stiffness), friction
 
     def add_point(self, number, words, what):
-        """(name, whether on the vessel) of the new point of a row; what: it is called in messages."""
+        """Add the point of a row; return (name, whether on the vessel). what: term for messages."""
         name = self.file.new(number, self.points, bare(words[0]).lower(), what)
         if len(words) < 5:
             raise self.file.refusal("must be Node, Type, X, Y, Z", number, "node")
-        place = [number_of(word.lstrip("#")) for word in words[2:5]]
+        position = [number_of(word.lstrip("#")) for word in words[2:5]]
         if any(mark in words[4].lower() for mark in _ON_BED):
-            place[2] = -self.sea[0]
-        if None in place or max(map(abs, place)) > 1e5:
-            what = f"node {words[0]}: its place must be numbers, Z also 'depth'"
+            position[2] = -self.sea[0]
+        if None in position or max(map(abs, position)) > 1e5:
+            what = f"node {words[0]}: X, Y, Z must be numbers, Z also 'depth'"
             raise self.file.refusal(what, number)
-        self.points[name] = number, words[1].lower(), tuple(place)
+        self.points[name] = number, words[1].lower(), tuple(position)
         return name, KINDS_OF_ENDS.get(words[1].lower()) == "fairlead"
 
-    def check_fairlead(self, number, words, place, names):
-        """Raises: InputError for a point of the vessel with a mass, a volume or a force of its own."""
-        for name, word in zip(names, words[place:], strict=False):
+    def check_fairlead(self, number, words, start, names):
+        """Check that a point of the vessel has no mass, volume or force. Raises: InputError."""
+        for name, word in zip(names, words[start:], strict=False):
             if value := number_of(word):
-                allowed = "must be 0: give its mass and buoyancy to the platform"
+                allowed = "must be 0: add mass and buoyancy to the platform"
                 what = f"point {words[0]} on the vessel: {name} = {value:g}: {allowed}"
                 raise self.file.refusal(what, number)
 
     def positive(self, number, key, word):
-        """The number > 0 of a word in a line."""
+        """Return the number > 0 of a word in a line. Raises: InputError."""
         value = number_of(word)
         if value is None or not 0.0 < value <= 1e15:
             raise self.file.refusal(f"{key}: must be a number > 0", number)
         return value
 
     def lines(self, rows, columns):
-        """MooringLines of rows (line from 0, words) with these columns, by the ends and types named there."""
+        """Return the MooringLines of rows (line from 0, words) with these columns."""
         lines = []
         for number, words in rows:
             if len(words) < len(columns):
@@ -112,28 +112,28 @@ class _Mooring:
         return lines
 
     def ends(self, number, names, line):
-        """Places of (anchor, fairlead) of a line in a row, its points named in either order."""
-        places = {}
+        """Return the positions (anchor, fairlead) of a line, whose points may be in either order."""
+        positions = {}
         for name in names:
             if name.lower() not in self.points:
-                what = f"line {line}: {name!r} is no point here (rods and bodies cannot be represented)"
+                what = f"line {line}: {name!r} is not a point (rods and bodies cannot be represented)"
                 raise self.file.refusal(what, number)
-            row, kind, place = self.points[name.lower()]
+            row, kind, position = self.points[name.lower()]
             if kind not in KINDS_OF_ENDS:
                 raise self.file.refusal(
-                    f"line {line}: its end has the type {kind!r} (line {row + 1}); must be fixed or"
+                    f"line {line}: end of type {kind!r} (line {row + 1}): must be fixed or"
                     " on the vessel: points between lines, bodies and rods cannot be represented",
                     number,
                 )
-            places[KINDS_OF_ENDS[kind]] = place
-        if len(places) < 2:
-            found = f"both its ends are {next(iter(places))}s"
-            raise self.file.refusal(f"line {line}: must go from an anchor to the vessel, {found}", number)
-        return places["anchor"], places["fairlead"]
+            positions[KINDS_OF_ENDS[kind]] = position
+        if len(positions) < 2:
+            fault = f"both ends are {next(iter(positions))}s"
+            raise self.file.refusal(f"line {line}: must go from an anchor to the vessel, {fault}", number)
+        return positions["anchor"], positions["fairlead"]
 
 
 def read_mooring(kind, path, depth, density, gravity):
-    """(lines, notes) of a mooring file; kind: 1 for MAP++, 3 for MoorDyn, None: by its contents.
+    """Return (lines, notes) of a mooring file; kind: 1 for MAP++, 3 for MoorDyn, None: from its contents.
 
     Raises: InputError.
     """
@@ -153,7 +153,7 @@ def read_mooring(kind, path, depth, density, gravity):
 
 
 def _map_lines(file, sea):
-    """(lines, notes) of a MAP++ file."""
+    """Return (lines, notes) of a MAP++ file."""
     mooring, rows, angles, notes = _Mooring(file, sea), [], [], []
     file.entries, section = {}, ""
     for number, text in enumerate(file.lines):
@@ -167,7 +167,7 @@ def _map_lines(file, sea):
         if words[0].startswith(("!", "#")):
             if "solver" in section or not section:
                 continue
-            why = "MAP++ has no comments in this table, where OpenFAST takes it for a row: must be removed"
+            why = "MAP++ has no comments in this table (OpenFAST reads a row): must be removed"
             raise file.refusal(f"{text.strip()[:40]!r}: {why}", number)
         if head in ("linetype", "node", "line", "option"):
             continue
@@ -179,7 +179,7 @@ def _map_lines(file, sea):
         elif "node" in section:
             name, on_vessel = mooring.add_point(number, words, "node")
             if name != str(len(mooring.points)):
-                what = f"node {words[0]}: must be {len(mooring.points)}: MAP++ counts its rows"
+                what = f"node {words[0]}: must be {len(mooring.points)}: MAP++ numbers nodes by row"
                 raise file.refusal(what, number)
             if on_vessel:
                 mooring.check_fairlead(number, words, 5, ("M", "B", "FX", "FY", "FZ"))
@@ -205,14 +205,14 @@ def _map_lines(file, sea):
 
 
 def _turned(line, angle):
-    """The line turned about the vertical axis by an angle in rad."""
+    """Return the line rotated about the vertical axis by an angle in rad."""
     c, s = math.cos(angle), math.sin(angle)
     ends = ((round(c * x - s * y, 9), round(s * x + c * y, 9), z) for x, y, z in (line.anchor, line.fairlead))
     return line._replace(**dict(zip(("anchor", "fairlead"), ends, strict=True)))
 
 
 def _moordyn_rows(file):
-    """Rows (section, line from 0, words) of a MoorDyn file, without the two lines that name columns."""
+    """Yield rows (section, line from 0, words) of a MoorDyn file, without the two header lines of a table."""
     section, heads = None, 0
     for number, text in enumerate(file.lines):
         words = words_of(text[:2000])
@@ -220,8 +220,8 @@ def _moordyn_rows(file):
             continue
         if _SECTION in text:
             lower = text.lower()
-            found = (name for name, marks in _SECTIONS.items() if any(mark in lower for mark in marks))
-            section = next(found, None)
+            matches = (name for name, marks in _SECTIONS.items() if any(mark in lower for mark in marks))
+            section = next(matches, None)
             heads = 0 if section in ("options", "output") else 2
         elif len(words) > 1 and words[1].lower() in _COUNTS:
             continue
@@ -232,7 +232,7 @@ def _moordyn_rows(file):
 
 
 def _moordyn_lines(file, sea):
-    """(lines, notes) of a MoorDyn file, version 1 or 2."""
+    """Return (lines, notes) of a MoorDyn file, version 1 or 2."""
     of = {name: [] for name in _SECTIONS}
     for section, number, words in _moordyn_rows(file):
         if section in _REFUSED:
@@ -243,9 +243,9 @@ def _moordyn_lines(file, sea):
     gravity = file.positive("g", "gravity", default=gravity, high=100.0)
     mooring = _Mooring(file, (depth, file.number("rhoW", "rho", default=density, low=0.0, high=1e5), gravity))
 
-    def keep(number, words, place, names):
-        """Put values of a row into the columns of the file, for the report."""
-        for name, word in zip(names, words[place:], strict=False):
+    def keep(number, words, start, names):
+        """Store values of a row in the columns of the file, for the report."""
+        for name, word in zip(names, words[start:], strict=False):
             if (value := number_of(word)) is not None:
                 file.columns.setdefault(name.lower(), []).append((number, value))
 
@@ -269,14 +269,14 @@ def _moordyn_lines(file, sea):
                 mooring.check_fairlead(number, words, 7, ("FX", "FY", "FZ"))
             keep(number, words, -2 if len(words) < 12 else 10, ("CdA", "CA"))
     old = any("nodeanch" in text.lower() or "nodefair" in text.lower() for text in file.lines)
-    known = set()
+    names = set()
     for number, words in of["lines"]:
-        known.add(file.new(number, known, words[0].lower(), "line"))
+        names.add(file.new(number, names, words[0].lower(), "line"))
     return mooring.lines(of["lines"], VERSION_1 if old else VERSION_2), notes
 
 
 def _moordyn_options(file, rows, depth, density, gravity):
-    """Rows of the report on the site that MoorDyn has of its own; entries of the file become its options."""
+    """Yield report rows on MoorDyn's separate site data; set the file's entries to MoorDyn's options."""
     file.entries = {}
     for number, words in rows:
         if len(words) < 2:
@@ -284,15 +284,15 @@ def _moordyn_options(file, rows, depth, density, gravity):
         file.entries[same_key(words[1])] = (words[1], number, words[:1])
         file.places[same_key(words[1])] = (number, words[:1])
     names = ("WtrDpth", "depth", "WaterDepth")
-    found = bare(file.find(*names)[1][0]) if file.has(*names) else ""
-    if re.search("[a-df-z]", found.lower()):
-        yield f"bathymetry from a file (WtrDpth {found[:60]})", f"a flat bed at {depth:g} m"
-    elif found:
-        own = file.positive(*names)
-        if abs(own - depth) > 1e-6 * depth:
-            raise file.wrong("WtrDpth", own, f"{depth:g}, the depth of the site", *names[1:])
+    word = bare(file.find(*names)[1][0]) if file.has(*names) else ""
+    if re.search("[a-df-z]", word.lower()):
+        yield f"bathymetry from a file (WtrDpth {word[:60]})", f"a flat bed at {depth:g} m"
+    elif word:
+        value = file.positive(*names)
+        if abs(value - depth) > 1e-6 * depth:
+            raise file.wrong("WtrDpth", value, f"{depth:g}, the depth of the site", *names[1:])
     for key, also, site in (("g", "gravity", gravity), ("rhoW", "rho", density)):
-        own = file.positive(key, also, default=site, high=1e5)
-        if own != site:
-            said = f"{own:g} in the weight of the lines in water, {site:g} elsewhere"
-            yield f"{key} {own:g} of MoorDyn and {site:g} of the site", said
+        value = file.positive(key, also, default=site, high=1e5)
+        if value != site:
+            here = f"{value:g} in the weight of the lines in water, {site:g} elsewhere"
+            yield f"{key} {value:g} of MoorDyn and {site:g} of the site", here

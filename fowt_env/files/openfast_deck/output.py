@@ -1,4 +1,4 @@
-"""The files of an import: text with a source beside each figure, and the coefficients."""
+"""Formats the text files of an import, with the source of each value as a comment."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ WIDTH = 40  # characters of a line before its comment
 
 
 def value_text(value):
-    """A value of TOML: numbers of ten digits, a float always with a point or an exponent."""
+    """Return a TOML value as text: numbers with ten digits, floats always with a point or an exponent."""
     if isinstance(value, str):
         quoted = value.replace("\\", "\\\\").replace('"', '\\"')
         return '"' + "".join(c if c.isprintable() else " " for c in quoted) + '"'
@@ -26,7 +26,7 @@ def value_text(value):
 
 
 def toml_text(tables, head):
-    """Text of {table: rows (key, value, comment)}; of a list of them a table each. head: comments."""
+    """Return the TOML text of {table: rows (key, value, comment)} or lists of tables. head: comment lines."""
     lines = [f"# {line}" for line in head]
     for name, rows in tables.items():
         several = bool(rows) and isinstance(rows[0], list)
@@ -43,12 +43,12 @@ def _line(key, value, comment=""):
 
 
 def table_text(columns, rows, head):
-    """Text of a CSV file of columns and rows of texts. head: lines of comment."""
+    """Return the text of a CSV file of column names and rows of texts. head: comment lines."""
     return "\n".join([*(f"# {line}" for line in head), *map(",".join, [columns, *rows])]) + "\n"
 
 
 def blade_text(columns, airfoils, head):
-    """Text of blade.csv; columns (n, 5): radius, chord, twist (deg), prebend, sweep."""
+    """Return the text of blade.csv; columns (n, 5): radius, chord, twist (deg), prebend, sweep."""
     more = ("prebend_m", "sweep_m") if np.any(columns[:, 3:]) else ()
     rows = []
     for row, name in zip(columns, airfoils, strict=True):
@@ -58,12 +58,12 @@ def blade_text(columns, airfoils, head):
 
 
 def tower_text(modes, head):
-    """Text of the distribution file of a descriptions.tower_modes.TowerBending."""
+    """Return the text of the distribution file of a descriptions.tower_modes.TowerBending."""
     rows = zip(*(getattr(modes, name) for name in COLUMNS), strict=True)
     return table_text(COLUMNS, [[f"{value + 0.0:.10g}" for value in row] for row in rows], head)
 
 
 def polar_text(polar, head):
-    """Text of a polar's CSV file; polar (m, 4): alpha (deg), cl, cd, cm."""
+    """Return the text of a polar's CSV file; polar (m, 4): alpha (deg), cl, cd, cm."""
     rows = [[f"{value + 0.0:.7g}" for value in row] for row in polar]
     return table_text(["alpha_deg", "cl", "cd", "cm"], rows, head)

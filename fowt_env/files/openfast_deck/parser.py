@@ -1,10 +1,10 @@
-"""Values of OpenFAST's part files by their keys: "value key - comment", whatever the order and the comments.
+"""Parses OpenFAST part files by keys: "value key - comment", in any order and with any comments.
 
-A key is the first word of a line that is not a value, after at least one that is. Letters of either case;
-`BldFile(1)` and `BldFile1` are the same key. Errors name the file, the line, the key and what is allowed.
+A key is the first word of a line that is not a value, after at least one value. Keys are case-insensitive;
+`BldFile(1)` and `BldFile1` are the same key. Errors name the file, the line, the key and the allowed range.
 
-A part file keeps what it has beside what is asked of it: `entries`, its lines that set a key, and `columns`
-of the tables that were read. keys.py says which of these change nothing here.
+A part file also stores all lines that set a key (`entries`) and the `columns` of the tables that were read,
+for keys.py, which reports keys that are not used.
 """
 
 import math
@@ -19,17 +19,17 @@ _WORD = re.compile(r"""@?"[^"]*"?|@?'[^']*'?|[^\s,;]+""")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eEdD][-+]?\d+)?")
 _KEY = re.compile(r"[A-Za-z_]\w*(\(\d+\))?")
 _TRUE, _FALSE = ("true", "t", ".true.", ".t."), ("false", "f", ".false.", ".f.")
-REQUIRED = object()  # mark of a key that a file must have
-COMMENT = re.compile("[!#%]")  # begins what NWTC_IO.f90 (ReadLine) drops, also between quotes
-COMMENTED = (  # kinds of files that OpenFAST reads without their comments (ProcessComFile)
+REQUIRED = object()  # default of a required key
+COMMENT = re.compile("[!#%]")  # start of a comment in NWTC_IO.f90 (ReadLine), also within quotes
+COMMENTED = (  # kinds of files from which OpenFAST removes comments (ProcessComFile)
     "AeroDyn", "AeroDyn blade", "ElastoDyn blade", "HydroDyn", "InflowWind", "MoorDyn", "SeaState",
     "ServoDyn", "polar",
 )  # fmt: skip
-_TITLES = 2  # lines at the top of a part file, whatever they say
+_TITLES = 2  # title lines at the top of a part file
 
 
 def number_of(word):
-    """The finite number that a Fortran word means, or None."""
+    """Return the finite number of a Fortran word, or None."""
     if _NUMBER.fullmatch(word) is None:
         return None
     value = float(word.replace("d", "e").replace("D", "e"))
@@ -37,18 +37,18 @@ def number_of(word):
 
 
 def bare(word):
-    """A word without its quotes."""
+    """Return a word without quotes."""
     word = word.lstrip("@")
     return word.strip("\"'").strip() if word[:1] in "\"'" else word
 
 
 def same_key(key):
-    """A key as it is looked up."""
+    """Return the normalised key for look-ups: lower case, without parentheses."""
     return key.lower().replace("(", "").replace(")", "")
 
 
 def truth_of(word):
-    """The truth value that a word means, or None; a number is none."""
+    """Return the Boolean of a word, or None; numbers give None."""
     text = word.lower()
     return True if text in _TRUE else False if text in _FALSE else None
 
@@ -63,14 +63,14 @@ def _is_value(word):
 
 
 def words_of(line):
-    """Words of a line: split at blanks and commas, quoted ones whole."""
+    """Split a line into words at blanks and commas; quoted words are kept whole."""
     return _WORD.findall(line)
 
 
 def _key_of(words):
-    """Position of the key in the words of a line, or None.
+    """Return the index of the key in the words of a line, or None.
 
-    The first word is a value whatever it looks like: a file name need not be quoted.
+    The first word is always a value, because file names need not be quoted.
     """
     if not words or words[0].startswith(("---", "===", "!", "#")):
         return None
@@ -83,7 +83,7 @@ def _key_of(words):
 
 
 def _in_outputs(line, words, before):
-    """Whether a line belongs to a list of output channels, which ends with END."""
+    """Return whether a line belongs to a list of output channels, which ends with END."""
     if not words:
         return before
     head = bare(words[0]).lower()
@@ -92,28 +92,28 @@ def _in_outputs(line, words, before):
     return head == "outlist" or (before and not head.startswith("end"))
 
 
-def _sets(words, place):
-    """Whether a line with a key at this place sets it, rather than names columns or says something."""
-    ends = place + 1 == len(words) or words[place + 1][0] in "-\u2013!"
-    return "-" not in words[:place] and (_is_value(words[0]) or (place == 1 and ends))
+def _sets(words, index):
+    """Return whether a line with a key at this index sets the key, and is no column header or plain text."""
+    ends = index + 1 == len(words) or words[index + 1][0] in "-\u2013!"
+    return "-" not in words[:index] and (_is_value(words[0]) or (index == 1 and ends))
 
 
 class PartFile:
-    """A part file: its lines without comments, the place of every key, and what was read of its tables.
+    """Holds a part file: lines without comments, the position of each key, and the tables that were read.
 
-    lines     texts; of the kinds in COMMENTED what is in front of a mark of comment
+    lines     texts; for the kinds in COMMENTED without comments
     places    {key: (line from 0, values)}
-    entries   {key: (name as in the file, line, values)} of the lines that set a key, not of lists of outputs
-    columns   {column in small letters: [(line, value)]} of the tables that were read
+    entries   {key: (name as in the file, line, values)} of the lines that set a key, except output lists
+    columns   {column in lower case: [(line, value)]} of the tables that were read
     """
 
     def __init__(self, path, kind):
-        """path: the file. kind: "ElastoDyn" ..., for messages. Raises: InputError if it cannot be read."""
+        """Read and index a file. kind: "ElastoDyn" ..., for messages. Raises: InputError if unreadable."""
         self.path, self.kind = Path(path), kind
-        # old files have degree signs and superscripts of Windows
+        # old files contain degree signs and superscripts in a Windows encoding
         text = read_text(self.path, kind, fallback="latin-1")
         if "\0" in text:
-            raise self.refusal("is not a text file: it has a zero byte")
+            raise self.refusal("is not a text file: contains a zero byte")
         self.lines = text.splitlines()
         if len(self.lines) > MAX_ROWS:
             raise self.refusal(f"has {len(self.lines)} lines; allowed: at most {MAX_ROWS}")
@@ -124,73 +124,73 @@ class PartFile:
         for number, line in enumerate(self.lines):
             words = words_of(line[:2000])
             outputs = _in_outputs(line, words, outputs)
-            place = _key_of(words)
-            if place is None:
+            index = _key_of(words)
+            if index is None:
                 continue
-            values = [word for word in words[:place] if word not in ("!", "-")]
+            values = [word for word in words[:index] if word not in ("!", "-")]
             if not values:
                 continue
-            key = same_key(words[place])
+            key = same_key(words[index])
             self.places.setdefault(key, (number, values))
-            if not outputs and number >= _TITLES and _sets(words, place):
-                self.entries.setdefault(key, (words[place], number, values))
+            if not outputs and number >= _TITLES and _sets(words, index):
+                self.entries.setdefault(key, (words[index], number, values))
 
     # ------------------------------------------------------------------ messages
 
     def refusal(self, what, line=None, key=None):
-        """InputError about this file, the line (from 0) and the key."""
+        """Return an InputError naming this file, the line (from 0) and the key."""
         at = "" if line is None else f", line {line + 1}"
         named = "" if key is None else f"{key}: "
         return InputError(f"{self.kind} file {str(self.path)!r}{at}: {named}{what}")
 
     def new(self, line, known, name, what):
-        """The name, or the whole number, of a row that no row above has. Raises: InputError."""
+        """Return the name or integer of a row, which no row above may have. Raises: InputError."""
         if not isinstance(name, str):
             if name != int(name):
                 raise self.refusal(f"{what} {name:g}: must be a whole number", line)
             name = int(name)
         if name in known:
-            raise self.refusal(f"{what} {name}: must be of one row alone", line)
+            raise self.refusal(f"{what} {name}: must be in one row only", line)
         return name
 
     def wrong(self, key, value, allowed, *also):
-        """InputError for a value that is not allowed."""
-        found = self.find(key, *also)
+        """Return an InputError for a value that is not allowed."""
+        entry = self.find(key, *also)
         return self.refusal(
-            f"{key} = {str(value)[:60]}: must be {allowed}", None if found is None else found[0]
+            f"{key} = {str(value)[:60]}: must be {allowed}", None if entry is None else entry[0]
         )
 
     def source(self, *keys):
-        """ "ElastoDyn: keys", the comment beside a figure that was worked out of them."""
+        """Return "ElastoDyn: keys", the comment for a value computed from these keys."""
         return f"{self.kind}: {', '.join(keys)}"
 
     # ------------------------------------------------------------------ values
 
     def words(self, line):
-        """Words of a line (from 0)."""
+        """Return the words of a line (from 0)."""
         return words_of(self.lines[line][:2000])
 
     def find(self, key, *also):
-        """(line from 0, values) of the first of some names of a key, or None."""
+        """Return (line from 0, values) of a key by the first of its names in the file, or None."""
         for name in (key, *also):
             if same_key(name) in self.places:
                 return self.places[same_key(name)]
         return None
 
     def has(self, key, *also):
-        """Whether the file has the key."""
+        """Return whether the file has the key."""
         return self.find(key, *also) is not None
 
     def _one(self, key, also, default):
-        found = self.find(key, *also)
-        if found is None:
+        entry = self.find(key, *also)
+        if entry is None:
             if default is REQUIRED:
                 raise self.refusal(f"{key} is missing: there must be a line 'value  {key}'")
             return None, default
-        return found[0], found[1][0]
+        return entry[0], entry[1][0]
 
     def number(self, key, *also, default=REQUIRED, low=-math.inf, high=math.inf, open_low=False):
-        """Number of a key; default also where the file says DEFAULT. also: other names of the key."""
+        """Return the number of a key; the default if missing or DEFAULT. also: other names of the key."""
         line, word = self._one(key, also, default)
         if line is None:
             return word
@@ -205,11 +205,11 @@ class PartFile:
         return value
 
     def positive(self, key, *also, default=REQUIRED, high=math.inf):
-        """Number > 0 of a key."""
+        """Return the number > 0 of a key."""
         return self.number(key, *also, default=default, low=0.0, high=high, open_low=True)
 
     def whole(self, key, *also, default=REQUIRED, low=None, high=None):
-        """Whole number of a key."""
+        """Return the integer of a key."""
         value = self.number(key, *also, default=default)
         if not isinstance(value, float):
             return value
@@ -219,7 +219,7 @@ class PartFile:
         return int(value)
 
     def one_of(self, key, choices, *also, default=REQUIRED, why=""):
-        """Whole number of a key, one of a few. why: what the others would be, for the message."""
+        """Return the integer of a key, one of choices. why: reason for the message."""
         value = self.whole(key, *also, default=default)
         if value not in choices:
             allowed = " or ".join(str(choice) for choice in choices)
@@ -227,7 +227,7 @@ class PartFile:
         return value
 
     def flag(self, key, *also, default=REQUIRED):
-        """Truth value of a key; a number is true unless zero, as some versions write switches."""
+        """Return the Boolean of a key; non-zero numbers, the switches of some versions, are true."""
         line, word = self._one(key, also, default)
         if line is None:
             return word
@@ -241,25 +241,25 @@ class PartFile:
         raise self.refusal(f"{key} = {word[:60]}: must be True or False", line)
 
     def text(self, key, *also, default=REQUIRED):
-        """Text of a key, without quotes."""
+        """Return the text of a key, without quotes."""
         line, word = self._one(key, also, default)
         return word if line is None else bare(word)
 
     def matrix(self, key, size=6):
-        """size x size numbers: the row of a key and those below it; zeros where the file lacks the key."""
-        found = self.find(key)
-        if found is None:
+        """Return size x size numbers from the row of a key and the rows below; zeros if key is missing."""
+        entry = self.find(key)
+        if entry is None:
             return [[0.0] * size for _ in range(size)]
-        return [self._row(found[0] + i, size, key) for i in range(size)]
+        return [self._row(entry[0] + i, size, key) for i in range(size)]
 
     def vector(self, key, size=6):
-        """size numbers: before a key, or one there and the others below it; zeros if it is missing."""
-        found = self.find(key)
-        if found is None:
+        """Return size numbers in the row of a key, or one per row from there; zeros if the key is missing."""
+        entry = self.find(key)
+        if entry is None:
             return [0.0] * size
-        if len(found[1]) > 1:
-            return self._row(found[0], size, key)
-        return [self._row(found[0] + i, 1, key)[0] for i in range(size)]
+        if len(entry[1]) > 1:
+            return self._row(entry[0], size, key)
+        return [self._row(entry[0] + i, 1, key)[0] for i in range(size)]
 
     def _row(self, line, size, key):
         words = self.words(line)[:size] if line < len(self.lines) else []
@@ -271,11 +271,10 @@ class PartFile:
     # ------------------------------------------------------------------ tables
 
     def table(self, key, *also, default=0, texts=(), needs=(), high=MAX_ROWS):
-        """Rows of the table below a count: a list of (line from 0, {column in small letters: number}).
+        """Return the rows of the table below a count: a list of (line from 0, {lower-case column: number}).
 
-        The line after the count names the columns. texts: columns that hold texts, in small letters. needs:
-        columns that there must be. A row may be followed by a comment; it must have a value of every column
-        but the last texts.
+        The line after the count names the columns. texts: text columns, in lower case. needs: required
+        columns. A row may be followed by a comment, and needs values in all columns except the last texts.
         """
         count = self.whole(key, *also, default=default, low=0, high=high)
         if not count:
@@ -287,20 +286,20 @@ class PartFile:
         return rows
 
     def headed(self, column, count, texts=()):
-        """The same, of the table whose first column has this name."""
+        """Return rows, as in table(), of the table whose first column has this name."""
         for line, text in enumerate(self.lines):
             if text.split()[:1] and text.split()[0].lower() == column.lower():
                 return self.rows_below(line, count, column, texts)
         raise self.refusal(f"the table with the first column {column} is missing")
 
     def rows_below(self, line, count, key, texts=()):
-        """The same, of a table whose names of columns stand in this line."""
+        """Return rows, as in table(), of a table whose column names are in this line."""
         while line < len(self.lines) and not self.lines[line].strip():
             line += 1
         head = self.lines[line] if line < len(self.lines) else ""
         columns = [word.lower() for word in words_of(re.split(r"[\[!]", head)[0])]
         if not columns or number_of(columns[0]) is not None:
-            raise self.refusal("the line below must name the columns of the table", line - 1, key)
+            raise self.refusal("the next line must name the columns of the table", line - 1, key)
         rows = []
         for number in range(line + 1, len(self.lines)):
             words = self.words(number)
@@ -314,7 +313,7 @@ class PartFile:
                 self.columns.setdefault(name, []).append((number, value))
             if len(rows) == count:
                 return rows
-        raise self.refusal(f"{count} rows are announced, {len(rows)} are there", line - 1, key)
+        raise self.refusal(f"{count} rows are declared, {len(rows)} found", line - 1, key)
 
     def _cells(self, number, words, columns, texts, key):
         cells = {}
@@ -332,7 +331,7 @@ class PartFile:
         return cells
 
     def need(self, row, *names):
-        """Raises: InputError unless a row (line, cells) of a table has the columns."""
+        """Check that a row (line, cells) of a table has the columns. Raises: InputError."""
         for name in names:
             if name.lower() not in row[1]:
                 raise self.refusal(f"the column {name} is missing", row[0] - 1)
@@ -340,7 +339,7 @@ class PartFile:
     # ------------------------------------------------------------------ other files
 
     def other(self, key, *also, folders=(), default=REQUIRED):
-        """Path of the file that a key names, or None where it names none ("unused", "none", empty)."""
+        """Return the path of the file named by a key, or None for no file ("unused", "none", empty)."""
         name = self.text(key, *also, default=default)
         if not isinstance(name, str) or name.lower() in ("", "none", "unused", "default"):
             return None
@@ -350,18 +349,18 @@ class PartFile:
         return path
 
     def blade(self, key, blades, folders):
-        """Path of the file of blade 1, KEY(1), of a rotor whose blades are alike."""
+        """Return the path of the file of blade 1, KEY(1), of a rotor with identical blades."""
         path = self.other(f"{key}(1)", key, folders=folders)
         if path is None:
             raise self.wrong(f"{key}(1)", "unused", "the blade file")
         for i in range(2, min(blades, 3) + 1):
             name = self.text(f"{key}({i})", default=None)
             if name not in (None, self.text(f"{key}(1)", key)):
-                raise self.wrong(f"{key}({i})", name, "the file of blade 1: blades are alike")
+                raise self.wrong(f"{key}({i})", name, "the file of blade 1: blades must be identical")
         return path
 
 
-# columns that only newer versions have, behind those that every version has
+# columns of newer versions, to the right of the columns of all versions
 OPTIONAL_COLUMNS = (
     "axfdmod", "axvncoff", "axfdlofsc", "blcb", "blcenbn", "blcenbt", "blcpn", "blcpt", "blcan", "blcat",
     "blcam", "twrti", "twrcb", "twrcp", "twrca", "simplmcf", "dpthmcf", "membermcf",
@@ -370,25 +369,25 @@ OPTIONAL_COLUMNS = (
 
 
 def locate(name, folders):
-    """Path of a file named in a deck: relative to a folder, either slash, letters of either case; or None.
+    """Return the path of a file named in a deck (relative, either slash, case-insensitive), or None.
 
-    In the second and further folders a file is also found by its bare name.
+    The second and further folders are also searched for the bare file name.
     """
     text = name.replace("\\", "/").strip()
     try:
-        for place, folder in enumerate(folders):
-            for candidate in (text, text.rsplit("/", 1)[-1])[: 1 + (place > 0)]:
+        for number, folder in enumerate(folders):
+            for candidate in (text, text.rsplit("/", 1)[-1])[: 1 + (number > 0)]:
                 path = Path(folder) / Path(candidate)
-                found = path if path.is_file() else _either_case(path)
-                if found is not None:
-                    return found
+                match = path if path.is_file() else _either_case(path)
+                if match is not None:
+                    return match
     except (OSError, ValueError):
         return None
     return None
 
 
 def _either_case(path):
-    """The file that differs from a path in the case of letters alone, or None."""
+    """Return the file that matches a path case-insensitively, or None."""
     here = Path(path.anchor)
     for part in path.parts[bool(path.anchor) :]:
         if part != ".." and not (here / part).exists():

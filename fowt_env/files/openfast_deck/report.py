@@ -1,4 +1,4 @@
-"""What became of a deck: figures, what is approximated, what is left out, how to go on."""
+"""Reports on an imported deck: key values, approximations, omissions, suggested wind and sea."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ from fowt_env.files.openfast_deck.consistency import contradictions
 from fowt_env.files.openfast_deck.conversion import ballast, hub_place, mass_properties, rotor_mass
 from fowt_env.files.openfast_deck.hydrodyn import is_old
 
-TOWER_OPTIONS = {  # what a degree of freedom's name begins with: the option of a scene that has it
+TOWER_OPTIONS = {  # prefix of a degree of freedom's name: scene option that includes it
     "first fore-aft": 'tower = "modes"',
     "first side-to-side": 'tower = "modes"',
     "second fore-aft": 'tower = "modes2"',
@@ -18,18 +18,18 @@ TOWER_OPTIONS = {  # what a degree of freedom's name begins with: the option of 
 
 
 class Report(NamedTuple):
-    """Rows of tables: figures (name, value), differences (deck, here), contradictions, files."""
+    """Holds the rows of a report's tables: figures (name, value), differences (deck, here), and others."""
 
     title: str
     figures: list
     differences: list
-    contradictions: list  # (what the deck says, what follows)
+    contradictions: list  # (values in the deck, consequence)
     files: list
     suggestions: list
 
 
 def make_report(deck, name, body=None):
-    """Report of a deck imported under a name; body: its PotentialFlow, or None."""
+    """Return the Report of a deck imported under a name; body: the deck's PotentialFlow, or None."""
     return Report(
         title=f"{name}: imported from {deck.name}",
         figures=list(_figures(deck, body)),
@@ -50,11 +50,11 @@ def _figures(deck, body):
     yield "rotor inertia about the shaft", f"{rotor_mass(deck).inertia:.6g} kg m2"
     yield "hub height, overhang", f"{height:.3f} m, {overhang:.3f} m"
     yield "platform centre of mass", ", ".join(f"{x:.4g}" for x in centre) + " m"
-    yield "platform inertia about it", ", ".join(f"{x:.5g}" for x in np.diag(inertia)) + " kg m2"
+    yield "platform inertia about this centre", ", ".join(f"{x:.5g}" for x in np.diag(inertia)) + " kg m2"
     if hydro.potential is not None:
         lift = deck.site.water_density * hydro.potential.volume - masses["total"]
         yield "displaced volume", f"{hydro.potential.volume:.6g} m3"
-        yield "buoyancy less weight, which lines and members hold", f"{lift / 1e3:,.1f} t".replace(",", " ")
+        yield "buoyancy less weight, balanced by lines and members", f"{lift / 1e3:,.1f} t".replace(",", " ")
     if body is not None:
         low, high = body.omega[0], body.omega[-1]
         yield "radiation coefficients", f"{len(body.omega)} frequencies, {low:.3g} to {high:.3g} rad/s"
@@ -71,40 +71,40 @@ def _figures(deck, body):
 
 
 def _differences(deck):
-    """(what the deck has, what the plant has) of everything that is not alike."""
+    """Yield (feature of the deck, treatment in the plant) of all differences."""
     values, hydro = deck.elastodyn, deck.hydrodyn
     for what in values.flexible:
         option = next((option for word, option in TOWER_OPTIONS.items() if what.startswith(word)), None)
-        known = values.bending is not None and option
-        yield what, f"rigid; with the option {option} as in the deck" if known else "rigid"
+        available = values.bending is not None and option
+        yield what, f"rigid; with the option {option} as in the deck" if available else "rigid"
     yield from values.notes
     if any(values.platform_products):
         names = "PtfmXYIner, PtfmYZIner, PtfmXZIner"
-        yield f"products of inertia of the platform ({names})", "left out: its principal axes are the body's"
+        yield f"products of inertia of the platform ({names})", "left out: principal axes are the body axes"
     _, _, inertia = ballast(deck)
     across = np.abs(inertia - np.diag(np.diag(inertia))).max()
     if hydro.fills and across > 1e-3 * np.diag(inertia).min():
-        what = "ballast water whose principal axes are not the body's"
+        what = "ballast water whose principal axes are not the body axes"
         yield what, f"products of inertia of {across:.3g} kg m2 left out"
     yield from deck.aerodyn.notes
     many = [(name, table) for name, table in deck.aerodyn.tables.items() if table[1] > 1]
     if many:
-        name, (taken, tables, reynolds) = many[0]
-        said = f"one table each: number {taken} (Reynolds number {reynolds} million)"
-        yield f"{len(many)} polars of several tables, such as {tables} of {name}", said
-    said = "a straight taper and one drag coefficient of the same load in even wind"
-    yield "tower drag of a table over height (TwrDiam, TwrCd)", said
+        name, (used, tables, reynolds) = many[0]
+        here = f"one table each: number {used} (Reynolds number {reynolds} million)"
+        yield f"{len(many)} polars with several tables, such as {tables} of {name}", here
+    here = "a straight taper and one drag coefficient with the same load in uniform wind"
+    yield "tower drag from a table over height (TwrDiam, TwrCd)", here
     if values["GBoxEff"] != 100.0:
         what = f"gearbox efficiency {values['GBoxEff']:g} % (GBoxEff)"
-        yield what, "mesh_loss, the same part of the torque"
+        yield what, "mesh_loss, the same fraction of the torque"
     yield from hydro.notes
     if hydro.fills and is_old(hydro.file):
         yield (
-            "water in members that restores nothing, its moment in AddCLin (HydroDyn before OpenFAST 3)",
-            "water whose weight turns with the platform; AddCLin less that moment",
+            "water in members without restoring, included in AddCLin (HydroDyn before OpenFAST 3)",
+            "water whose weight moves with the platform; AddCLin less the restoring of the water",
         )
     if hydro.memory == 0 and hydro.potential is not None:
-        yield "no memory of radiated waves (RdtnMod 0)", "radiation with its memory"
+        yield "no memory of radiated waves (RdtnMod 0)", "radiation with memory"
     if hydro.memory == 2:
         yield "state-space fit of the radiation in a file (.ss)", "from the coefficients themselves"
     for key, value in hydro.second_order.items():
@@ -113,29 +113,29 @@ def _differences(deck):
         else:
             yield f"second-order forces ({key} {value})", "left out"
     if any(end[0] for member in hydro.members for end in member.axial):
-        said = "axial_drag_coefficient, on rho A |v| v / 2: half of AxCd"
-        yield "axial drag of joints, which HydroDyn has on rho A |v| v / 4", said
+        here = "axial_drag_coefficient, on rho A |v| v / 2: half of AxCd"
+        yield "axial drag of joints, on rho A |v| v / 4 in HydroDyn", here
     yield from deck.notes
     yield from deck.control.notes
 
 
 def markdown(report):
-    """Text of report.md."""
+    """Return the text of report.md."""
     parts = [
         f"# {report.title}",
-        "Figures of `platform.toml` and `turbine/turbine.toml` name the file and the keys they are from.",
-        "## Key figures",
-        markdown_table(("figure", "value"), report.figures),
-        "## What is not as in the deck",
+        "Comments in `platform.toml` and `turbine/turbine.toml` name the file and the keys of each value.",
+        "## Key values",
+        markdown_table(("quantity", "value"), report.figures),
+        "## Differences from the deck",
         markdown_table(("in the deck", "here"), report.differences),
     ]
     if report.contradictions:
-        parts.append("## Where the deck contradicts itself")
-        parts.append(markdown_table(("the deck", "what follows"), report.contradictions))
+        parts.append("## Contradictions in the deck")
+        parts.append(markdown_table(("in the deck", "consequence"), report.contradictions))
     parts += [
         "## Wind and sea",
         "\n".join(f"- {line}" for line in report.suggestions),
         "## Files read",
-        "\n".join(f"- `{row[0]}` and what it names" for row in report.files),
+        "\n".join(f"- `{row[0]}` and the files named there" for row in report.files),
     ]
     return "\n\n".join(parts) + "\n"

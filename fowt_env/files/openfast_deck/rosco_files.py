@@ -1,7 +1,7 @@
-"""What is taken along of ROSCO's own files: its DISCON.IN, and the table of the rotor that it names.
+"""Copies ROSCO's files: DISCON.IN, and the rotor performance table named there.
 
-Both are written anew, line by line, from what can be read of them, so that a deck which names another file
-does not have that file copied into a folder that is then passed on.
+Both files are rewritten line by line from parsed entries, so that a deck cannot copy an arbitrary file into
+a folder that is later shared.
 """
 
 import re
@@ -12,7 +12,7 @@ from fowt_env.files.openfast_deck.parser import PartFile, number_of
 DISCON = "DISCON.IN"  # names in the folder of the turbine
 PERFORMANCE = "rotor_performance.txt"
 _ENTRY = re.compile(r"[^!\n]*\S\s*!\s*\w+\b")
-_PARTS = {  # words of a heading, and the heading as it is written
+_PARTS = {  # words of a heading: heading as written
     "pitch angle vector": "# Pitch angle vector - x axis (matrix columns) (deg)",
     "tsr vector": "# TSR vector - y axis (matrix rows) (-)",
     "wind speed vector": "# Wind speed vector - z axis (m/s)",
@@ -23,22 +23,22 @@ _PARTS = {  # words of a heading, and the heading as it is written
 
 
 class Performance(NamedTuple):
-    """Table of a rotor's coefficients."""
+    """Holds the performance table of a rotor."""
 
     name: str
-    text: str  # as ROSCO reads it
-    largest: float | None  # power coefficient that a rotor can have
+    text: str  # in ROSCO's format
+    largest: float | None  # largest plausible power coefficient
 
 
 def read_performance(path):
-    """Performance of a file. Raises: InputError naming the line of no such table, not its text."""
+    """Read the Performance of a file. Raises: InputError naming an invalid line, without the line's text."""
     file = PartFile(path, "rotor performance")
     values, lines, part = {heading: [] for heading in _PARTS}, [], None
     for number, line in enumerate(file.lines):
         if line.lstrip().startswith("#"):
-            found = next((heading for heading in _PARTS if heading in line.lower()), None)
-            part = found or part
-            lines.append(_PARTS.get(found, "#"))
+            title = next((heading for heading in _PARTS if heading in line.lower()), None)
+            part = title or part
+            lines.append(_PARTS.get(title, "#"))
             continue
         words = line.split()
         numbers = [number_of(word) for word in words]
@@ -47,8 +47,8 @@ def read_performance(path):
         if words:
             values[part] += numbers
         lines.append("   ".join(words))
-    pitch, ratio, wind, *found = map(len, values.values())
-    for heading, count in zip(tuple(_PARTS)[3:], found, strict=True):
+    pitch, ratio, wind, *counts = map(len, values.values())
+    for heading, count in zip(tuple(_PARTS)[3:], counts, strict=True):
         if not count or count != pitch * ratio * max(wind, 1):
             raise file.refusal(
                 f"{count} numbers below {heading!r}: must be one for each of {pitch} pitch angles,"
@@ -59,7 +59,7 @@ def read_performance(path):
 
 
 def discon_text(file, performance):
-    """Text of a DISCON.IN (PartFile): its entries and comments; it names the table beside itself."""
+    """Return the text of a DISCON.IN (PartFile) with entries and comments only, and PerfFileName adapted."""
     lines = []
     for line in file.lines:
         if not _ENTRY.match(line):

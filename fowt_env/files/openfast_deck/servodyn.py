@@ -1,6 +1,6 @@
-"""Controller of a deck: ServoDyn's file and the DISCON.IN of ROSCO or of the legacy 5 MW controller.
+"""Reads the controller of a deck: ServoDyn's file and the DISCON.IN of ROSCO, or the legacy 5 MW controller.
 
-The figures are what a torque law and a pitch drive of this project need, all in SI on the high-speed shaft.
+The values are those of a torque law and a pitch drive of this project, in SI on the high-speed shaft.
 """
 
 import math
@@ -16,29 +16,29 @@ from fowt_env.files.openfast_deck.rosco_files import Performance, read_performan
 
 @dataclass(frozen=True)
 class Control:
-    """Controller of a deck; figures and law: {name: (value, comment)}, the law's as in turbine files."""
+    """Holds the controller of a deck; figures and law: {name: (value, comment)}, law as in turbine files."""
 
     figures: dict
     law: dict
     gains: dict = field(default_factory=dict)  # set: (KP in s, KI, pitch in rad at which they are halved)
     notes: tuple = ()
-    discon: PartFile | None = None  # written beside the turbine, with the table that it names
+    discon: PartFile | None = None  # written to the turbine's folder, with the performance table
     performance: Performance | None = None
 
     def __getitem__(self, name):
         return self.figures[name][0]
 
 
-USUAL = {  # of what no file of a deck says
+USUAL = {  # defaults for values missing in a deck
     "generator_efficiency": (1.0, "not in the deck"),
-    "time_constant": (0.0, "followed at once: no actuator in the deck"),  # s
+    "time_constant": (0.0, "no lag: no actuator in the deck"),  # s
     "minimum_pitch": (0.0, "usual value"),  # rad
     "maximum_pitch": (0.5 * math.pi, "usual value"),
-    "rated_wind_speed": (11.4, "a guess"),
+    "rated_wind_speed": (11.4, "estimate"),
     "cut_in_wind_speed": (3.0, "usual value"),
-    "cut_out_wind_speed": (25.0, "usual"),
+    "cut_out_wind_speed": (25.0, "usual value"),
 }
-# NREL 5 MW: constants of its DISCON source (OpenFAST/r-test), which reads no file
+# NREL 5 MW: constants in the DISCON source (OpenFAST/r-test), which reads no file
 LEGACY_LAW = {
     "cut_in_speed": 70.16224, "region2_start_speed": 91.21091, "region2_constant": 2.332287,
     "transition_speed": 121.6805, "slip_percent": 10.0, "region3_min_pitch": 0.01745329,
@@ -53,9 +53,9 @@ LEGACY_SOURCE = "legacy controller of the NREL 5 MW turbine (source of its libra
 
 
 def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, radius=None):
-    """Control of a ServoDyn file and of the DISCON.IN that it names.
+    """Read the Control from a ServoDyn file and the DISCON.IN named there.
 
-    discon: a DISCON.IN instead of that. path: None where a deck has no ServoDyn file. Raises: InputError.
+    discon: a DISCON.IN instead of the deck's. path: None for a deck without ServoDyn. Raises: InputError.
     """
     figures, servo, notes = USUAL, None, []
     if path is not None:
@@ -66,16 +66,16 @@ def read_control(path, gear_ratio, discon=None, folders=(), air_density=1.225, r
     chosen = Path(discon) if discon is not None else None
     mode = 5 if servo is None else servo.whole("VSContrl", default=5)
     if chosen is None and mode not in (1, 3, 4, 5):
-        allowed = "1, 3, 4 or 5: give the DISCON.IN of another torque law with --discon"
+        allowed = "1, 3, 4 or 5: pass the DISCON.IN of another torque law with --discon"
         raise servo.wrong("VSContrl", mode, allowed)
     if mode in (3, 4) or (chosen is not None and mode != 5):
-        notes.append((f"generator torque by another law (VSContrl {mode})", "that of DISCON.IN"))
+        notes.append((f"generator torque by another law (VSContrl {mode})", "torque law of DISCON.IN"))
     if chosen is None and servo is not None and mode != 1:
         library = servo.text("DLL_FileName", default="").lower()
         if "discon_oc3" not in library and "discon_iti" not in library:  # these read no file
             chosen = _optional(servo, "DLL_InFile", folders)
         if chosen is not None and not _is_rosco(PartFile(chosen, "DISCON.IN")) and 96.0 < gear_ratio < 98.0:
-            chosen = None  # the legacy controller of the NREL 5 MW turbine reads none
+            chosen = None  # the legacy controller of the NREL 5 MW turbine reads no file
     if chosen is not None:
         control = _rosco(PartFile(chosen, "DISCON.IN"), figures, air_density, radius, folders)
     elif servo is not None and mode == 1:
@@ -90,29 +90,29 @@ def _is_rosco(file):
 
 
 def _optional(file, key, folders):
-    """Path of the file that a key names, or None where it is not there."""
+    """Return the path of the file named by a key, or None if the file does not exist."""
     name = file.text(key, default="unused")
     return None if name.lower() in ("", "none", "unused") else locate(name, (file.path.parent, *folders))
 
 
 def _legacy(servo, gear_ratio):
-    """Control of the NREL 5 MW turbine's own controller, known by its gear ratio; else refused."""
+    """Return the Control of the NREL 5 MW legacy controller, identified by gear ratio. Raises: InputError."""
     library = "" if servo is None else servo.text("DLL_FileName", default="").lower()
     if not 96.0 <= gear_ratio <= 98.0 or (library and "discon" not in library):
         where = "the deck" if servo is None else f"ServoDyn file {str(servo.path)!r}"
         raise InputError(
-            f"{where}: DLL_InFile names no DISCON.IN that is there, and the torque law is not of VSContrl 1:"
-            " give the DISCON.IN with --discon"
+            f"{where}: DLL_InFile names no existing DISCON.IN, and the torque law is not that of VSContrl 1:"
+            " pass the DISCON.IN with --discon"
         )
     figures, law = (
         {name: (value, LEGACY_SOURCE) for name, value in table.items()} for table in (LEGACY, LEGACY_LAW)
     )
-    said = ("no ServoDyn file", "torque law and limits of the NREL 5 MW turbine, by the gear ratio")
-    return Control(figures, law, LEGACY_GAINS, notes=(said,) if servo is None else ())
+    note = ("no ServoDyn file", "torque law and limits of the NREL 5 MW turbine, by the gear ratio")
+    return Control(figures, law, LEGACY_GAINS, notes=(note,) if servo is None else ())
 
 
 def _simple(servo):
-    """Control of ServoDyn's own simple variable speed."""
+    """Return the Control of ServoDyn's simple variable-speed controller."""
     speed, torque = servo.positive("VS_RtGnSp", high=1e5) * RPM, servo.positive("VS_RtTq", high=1e12)
     constant = servo.positive("VS_Rgn2K", high=1e14) / RPM**2
     slip = servo.positive("VS_SlPc", high=100.0)
@@ -129,12 +129,12 @@ def _simple(servo):
             "region2_constant": (constant, source),
             "slip_percent": (slip, source),
         },
-        notes=(("no limits of torque, no filter of the speed", "those of the NREL 5 MW turbine, scaled"),),
+        notes=(("no torque limits, no speed filter", "those of the NREL 5 MW turbine, scaled"),),
     )
 
 
 def _values(file, key):
-    """Numbers of a key of ROSCO's file, or None; also of one that stands at the end of a very long line."""
+    """Return the numbers of a key of ROSCO's file, or None; lines may be very long."""
     for text in file.lines:
         front, mark, behind = text[:200_000].partition("!")
         words = words_of(behind)
@@ -145,9 +145,9 @@ def _values(file, key):
 
 
 def _rosco(file, usual, air_density, radius, folders):
-    """Control of ROSCO's input file, its versions 2.5 to 2.10."""
+    """Return the Control of a ROSCO input file, versions 2.5 to 2.10."""
     if not _is_rosco(file):
-        raise file.refusal("is not of ROSCO: PC_RefSpd, VS_RefSpd and VS_RtTq are missing")
+        raise file.refusal("is not a file of ROSCO: PC_RefSpd, VS_RefSpd and VS_RtTq are missing")
     source = file.source
 
     def figure(key, *also, **limits):
@@ -159,7 +159,7 @@ def _rosco(file, usual, air_density, radius, folders):
     torque, speed = file.positive("VS_RtTq", high=1e12), file.positive("PC_RefSpd", "VS_RefSpd", high=1e5)
     constant = file.positive("VS_Rgn2K", high=1e14)
     slowest = figure("VS_MinOMSpd", default=0.0, low=0.0, high=1e5)
-    # the law of a turbine file needs some region 1 1/2, which ROSCO may have at standstill
+    # the law of a turbine file needs a region 1 1/2, which ROSCO may have at zero speed
     if not 0.0 < slowest[0] < 0.85 * speed:
         slowest = 0.3 * speed, "30 % of rated speed: not in the deck"
     law = {
@@ -189,12 +189,12 @@ def _rosco(file, usual, air_density, radius, folders):
         "maximum_pitch": high,
         "pitch_rate": (file.positive("PC_MaxRat", high=10.0), source("PC_MaxRat")),
         "rated_wind_speed": wind,
-        "time_constant": (0.0, "followed at once: " + why),
+        "time_constant": (0.0, "no lag: " + why),
     }
     winds = _values(file, "WE_FOPoles_v") or _values(file, "PS_WindSpeeds") or []
-    known = len(winds) > 1 and 0.0 < winds[0] < wind[0] < winds[-1]
+    valid = len(winds) > 1 and 0.0 < winds[0] < wind[0] < winds[-1]
     for name, end in (("cut_in_wind_speed", 0), ("cut_out_wind_speed", -1)):
-        figures[name] = winds[end] if known else usual[name][0], source("WE_FOPoles_v")
+        figures[name] = winds[end] if valid else usual[name][0], source("WE_FOPoles_v")
     if actuator == 2:  # an actuator of second order
         figures["natural_frequency"] = file.positive("PA_CornerFreq", high=100.0), source("PA_CornerFreq")
         figures["damping"] = file.positive("PA_Damping", default=0.707, high=5.0), source("PA_Damping")
@@ -202,29 +202,29 @@ def _rosco(file, usual, air_density, radius, folders):
 
 
 def _rosco_notes(file, actuator):
-    """What the plain torque law of the turbine file has not, of ROSCO's."""
+    """Yield the features of ROSCO that the torque law of the turbine file lacks."""
     mode = file.whole("VS_ControlMode", default=2)
     yield (
         f"ROSCO's torque law (VS_ControlMode {mode:g}, minimum speed VS_MinOMSpd)",
-        "for the built-in controllers the law of regions 1 to 3: VS_Rgn2K from VS_MinOMSpd on, with a steep"
-        " line below and one to VS_RtTq above it",
+        "for the built-in controllers the law of regions 1 to 3: VS_Rgn2K above VS_MinOMSpd, a steep line"
+        " below, and a line to VS_RtTq above region 2",
     )
     yield (
-        "pitch gains of a table (PC_GS_angles, PC_GS_KP, PC_GS_KI)",
-        "in the controller rosco, which runs the DISCON.IN; those of the others are derived from the rotor",
+        "pitch gains from a table (PC_GS_angles, PC_GS_KP, PC_GS_KI)",
+        "in the controller rosco, which runs the DISCON.IN; other controllers derive gains from the rotor",
     )
     if file.whole("PS_Mode", default=0):
-        yield "peak shaving (PS_Mode)", "in the controller rosco alone, which runs the DISCON.IN"
+        yield "peak shaving (PS_Mode)", "in the controller rosco only, which runs the DISCON.IN"
     if actuator:
         option = ", or the option pitch_drive = 'second_order'" if actuator == 2 else ""
-        said = "pitch_drive.time_constant 0: set it for other controllers" + option
-        yield "pitch actuator within ROSCO (PA_Mode)", said
+        here = "pitch_drive.time_constant 0: set a value for other controllers" + option
+        yield "pitch actuator within ROSCO (PA_Mode)", here
     if file.whole("IPC_ControlMode", default=0):
         yield "individual pitch control (IPC_ControlMode)", "collective pitch"
 
 
 def _rated_wind(file, power, air_density, radius, performance):
-    """(m/s, where it is from): of ROSCO's own tables, or of power and the largest power coefficient."""
+    """Return (rated wind speed m/s, source): from ROSCO's tables, or rated power at the largest Cp."""
     ramp = _values(file, "IPC_Vramp")
     if ramp and len(ramp) > 1 and 5.0 < ramp[1] < 30.0:
         return ramp[1], file.source("IPC_Vramp, its second value")
@@ -234,6 +234,6 @@ def _rated_wind(file, power, air_density, radius, performance):
         name = f"the largest power coefficient {largest:.3f} of {performance.name}"
     reach = file.positive("WE_BladeRadius", default=radius)
     if reach is None:
-        return 11.4, "a guess: no radius is known"
+        return 11.4, "estimate: radius unknown"
     speed = (power / (0.5 * air_density * math.pi * reach**2 * largest)) ** (1.0 / 3.0)
     return min(max(speed, 5.0), 20.0), f"rated power at {name}"

@@ -92,14 +92,14 @@ def test_a_comment_in_a_table_of_map_is_refused_as_map_takes_it_for_a_row(tmp_pa
 @pytest.mark.parametrize(
     ("part", "key", "value", "deck", "here"),
     [
-        ("ElastoDyn", "GenDOF", "False", "rotor speed held", "free"),
-        ("ElastoDyn", "PtfmSgDOF", "False", "surge of the platform held", "free"),
-        ("ElastoDyn", "PtfmYDOF", "False", "yaw of the platform held", "planar"),
-        ("ElastoDyn", "NacYaw", "30", "nacelle turned out of the wind", "along x"),
-        ("ElastoDyn", "NewKey", "3", "NewKey 3 (ElastoDyn)", "not looked at"),
-        ("AeroDyn", "TipLoss", "False", "no tip loss", "with it"),
+        ("ElastoDyn", "GenDOF", "False", "fixed rotor speed", "free"),
+        ("ElastoDyn", "PtfmSgDOF", "False", "platform surge disabled", "free"),
+        ("ElastoDyn", "PtfmYDOF", "False", "platform yaw disabled", "planar"),
+        ("ElastoDyn", "NacYaw", "30", "nacelle yawed out of the wind", "along x"),
+        ("ElastoDyn", "NewKey", "3", "NewKey 3 (ElastoDyn)", "ignored"),
+        ("AeroDyn", "TipLoss", "False", "no tip loss", "included"),
         ("AeroDyn", "Skew_Mod", "1", "skewed-wake correction", "skewed_wake"),
-        ("AeroDyn", "Wake_Mod", "0", "no induction", "induction is there"),
+        ("AeroDyn", "Wake_Mod", "0", "no induction", "induction always on"),
         ("AeroDyn", "DBEMT_Mod", "2", "dynamic wake", "dynamic_inflow"),
         ("AeroDyn", "UA_Mod", "3", "unsteady airfoil", "quasi-steady"),
         ("AeroDyn", "TwrShadow", "True", "tower shadow", "no influence"),
@@ -110,10 +110,10 @@ def test_a_comment_in_a_table_of_map_is_refused_as_map_takes_it_for_a_row(tmp_pa
         ("ServoDyn", "BPCutoff", "2", "low pass", "none"),
         ("SeaState", "MCFD", "5", "MacCamy-Fuchs", "diffraction"),
         ("SeaState", "WvDiffQTF", "True", "second-order wave kinematics", "first order"),
-        ("HydroDyn", "ExctnMod", "0", "no wave excitation", "it is there"),
+        ("HydroDyn", "ExctnMod", "0", "no wave excitation", "always included"),
         ("HydroDyn", "WaveDisp", "1", "displaced members", "kinematics_position"),
         ("InflowWind", "PropagationDir", "20", "another direction", "along x"),
-        ("AeroDyn", "Skew_Mod", "-1", "wind across the rotor taken off", "it is there"),
+        ("AeroDyn", "Skew_Mod", "-1", "cross-flow wind removed", "included"),
     ],
 )
 def test_what_the_plant_does_not_have_is_said(tmp_path, part, key, value, deck, here):
@@ -161,7 +161,7 @@ def test_the_buoyancy_coefficient_of_a_member_must_be_1(tmp_path):
     write_deck(tmp_path)
     text = (tmp_path / NAMES["HydroDyn"]).read_text()
     read_deck(write_deck(tmp_path, HydroDyn=simple_members(text, "SimplCb", 1.0)))
-    with pytest.raises(InputError, match="member 81: its simplcb = 0.5: must be 1"):
+    with pytest.raises(InputError, match="member 81: simplcb = 0.5: must be 1"):
         read_deck(write_deck(tmp_path, HydroDyn=simple_members(text, "SimplCb", 0.5)))
     # of coefficients that no member outside of the body has
     read_deck(write_deck(tmp_path, HydroDyn=simple_members(text, "SimplCb", 0.5, model="2")))
@@ -195,15 +195,15 @@ MAP_TYPE, MAP_NODE = "chain  0.1  100.0  4.0E8  0.7  0 0 0 0\n", "1 fix    400 0
     [
         ("MoorDyn", "5 0  -10 0 0", "5 0  -10 1e6 0", ("M = 1e+06", "must be 0")),
         ("MoorDyn", "5 0  -10 0 0", "5 0  -10 0 100", ("V = 100", "must be 0")),
-        ("MoorDyn", POINT, 2 * POINT, ("point 1", "one row alone")),
+        ("MoorDyn", POINT, 2 * POINT, ("point 1", "one row only")),
         ("MoorDyn", TYPE, 2 * TYPE, ("line type chain", "one row")),
-        ("MoorDyn", "1 chain 1 2", "1 chain 1 2 450.0 20 -\n1 chain 1 2", ("line 1", "one row alone")),
+        ("MoorDyn", "1 chain 1 2", "1 chain 1 2 450.0 20 -\n1 chain 1 2", ("line 1", "one row only")),
         ("MoorDyn", "0.001 dtM - step", "150 WtrDpth", ("WtrDpth = 150", "must be 200")),
         ("MoorDyn", "4.0E8 -1.0 0", "4.0E8 -1.0 stiff.dat", ("EI = stiff.dat", "must be a number")),
         ("MAP", "5 0 -10.0 0 0", "5 0 -10.0 1e5 0", ("M = 100000", "must be 0")),
         ("MAP", "5 0 -10.0 0 0", "5 0 -10.0 0 5", ("B = 5", "must be 0")),
-        ("MAP", MAP_NODE, 2 * MAP_NODE, ("node 1", "one row alone")),
-        ("MAP", MAP_TYPE, 2 * MAP_TYPE, ("line type chain", "one row alone")),
+        ("MAP", MAP_NODE, 2 * MAP_NODE, ("node 1", "one row only")),
+        ("MAP", MAP_TYPE, 2 * MAP_TYPE, ("line type chain", "one row only")),
     ],
 )
 def test_a_mooring_of_another_kind_is_refused(tmp_path, part, old, new, said):
@@ -239,7 +239,7 @@ def test_a_section_of_moordyn_that_nothing_here_has_must_be_empty(tmp_path, sect
         ("1 WaterKin", "waves and current on the lines (WaterKin 1)", "none"),
         ("0.3 mu_kA", "friction along the lines on the bed (mu_kA 0.3)", "seabed_friction"),
         ("9.7 g", "g 9.7 of MoorDyn and 9.81 of the site", "9.7 in the weight of the lines"),
-        ("1 NewOption", "NewOption 1 (MoorDyn)", "not looked at"),
+        ("1 NewOption", "NewOption 1 (MoorDyn)", "ignored"),
     ],
 )
 def test_options_of_moordyn_are_said(tmp_path, option, deck, here):
@@ -316,7 +316,7 @@ def test_a_grid_of_waves_that_does_not_reach_the_members_is_said_with_the_remedy
     assert said == "a grid of waves up to X_HalfWidth 5 m, members up to 30 m"
     assert "X_HalfWidth 50 m" in follows
     import_deck(path, tmp_path / "out")
-    assert "## Where the deck contradicts itself" in (tmp_path / "out" / "report.md").read_text()
+    assert "## Contradictions in the deck" in (tmp_path / "out" / "report.md").read_text()
 
 
 @pytest.mark.parametrize(
@@ -358,7 +358,7 @@ def test_each_line_of_map_is_asked_when_it_breaks(tmp_path):
     before = set(differences(write_deck(tmp_path)))
     lines = "1 chain 450.0 1 2 damage_time 1e9\n2 chain 450.0 1 2 plot damage_time 100"
     changed = write_deck(tmp_path, MAP=[("1 chain 450.0 1 2 tension_fair", lines)])
-    assert set(differences(changed)) - before == {"a line that breaks (damage_time 100)"}
+    assert set(differences(changed)) - before == {"line failure at a time (damage_time 100)"}
 
 
 def test_lines_beyond_the_most_that_are_allowed_are_refused(tmp_path):

@@ -60,7 +60,7 @@ def test_a_table_is_read_by_the_names_of_its_columns(tmp_path):
         {"id": 2.0, "name": "two", "size": 3.0},
     ]
     assert [line for line, _ in rows] == [4, 6]
-    with pytest.raises(InputError, match="3 rows are announced, 2 are there"):
+    with pytest.raises(InputError, match="3 rows are declared, 2 found"):
         part(tmp_path, "3 NThings\nID Name Size\n(-) (-) (m)\n1 a 1\n2 b 2\n").table(
             "NThings", texts=("name",)
         )
