@@ -164,7 +164,7 @@ def test_costs_are_those_of_the_limits_passed():
     env.reset(seed=1)
     info = env.step(np.zeros(2, dtype=np.float32))[4]
     assert (info["cost"], info["cost_rotor_speed"], info["cost_platform_pitch"]) == (1.0, 1.0, 0.0)
-    cases = (({}, "give a limit"), ({"speed": 1.0}, "unknown limit"), ({"surge": -1.0}, "surge"))
+    cases = (({}, "needs a limit"), ({"speed": 1.0}, "unknown limit"), ({"surge": -1.0}, "surge"))
     for limits, message in cases:
         with pytest.raises(InputError, match=message):
             SafetyCosts(env, **limits)
