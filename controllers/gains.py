@@ -141,9 +141,9 @@ def derived_gains(turbine, frequency, damping=DAMPING, density=AIR):
 
 
 def published_set(turbine, gain_set):
-    """Return the PitchGains of a turbine's file by name; None where it has none, and they are to be derived.
+    """Return the PitchGains in a turbine's file by name; None if the file has none.
 
-    gain_set: a name in the file, or one of SETS or OTHER_NAMES, of which "floating" and "oc3" are the same.
+    gain_set: a name in the file, or one of SETS or OTHER_NAMES ("floating" and "oc3" are the same set).
     Raises: InputError for any other name.
     """
     if gain_set in turbine.gains:

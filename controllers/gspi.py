@@ -18,7 +18,7 @@ from fowt_env.controllers.pi import END, PI, Memory, PISettings, pi_step
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.measurement import Measure
 
-SAMPLING = 0.0125  # s, longest period of the law itself
+SAMPLING = 0.0125  # s, longest period of the law
 
 
 PERIODS = END  # parameter in addition to those of the PI law: law periods in one control_dt

@@ -1,4 +1,4 @@
-"""Runs ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
+"""Runs ROSCO, the reference open-source controller, through its library, with the published OC3 gains.
 
 Abbas et al., Wind Energ. Sci. 7, 2022. libdiscon of the PyPI wheel `rosco` (its toolbox is not used) is
 called through the Bladed interface, as in OpenFAST. If the turbine file names a DISCON.IN, this file is used

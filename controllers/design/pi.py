@@ -1,7 +1,7 @@
 """Designs PI gains and schedule for a frequency and damping ratio, on linear models over wind speed.
 
-As in the published design (theory.md, Eq. (A6)) the design model is the rotor alone, without the aerodynamic
-damping of its speed; the effect on the platform is computed afterwards from the complete plant.
+As in the published design (theory.md, Eq. (A6)) the design model is the isolated rotor without aerodynamic
+damping of rotor speed; the effect on the platform is computed afterwards from the complete plant.
 """
 
 from dataclasses import dataclass

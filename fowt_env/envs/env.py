@@ -111,15 +111,15 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     a full-field wind box cannot be replaced by another wind. A rejected reset leaves the episode unchanged.
 
     Actions outside [-1, 1] are clipped; info["saturated_actions"] counts such periods. The torque stays
-    within the generator's range and rate limit, the blade pitch within its actuator's;
-    info["torque_limited"] counts periods with a limited torque command. "individual" commands the
+    within the generator's range and rate limit, the blade pitch within the range and rate limit of its
+    actuator; info["torque_limited"] counts periods with a limited torque command. "individual" commands the
     pitch of each blade in a scene with pitch="individual"; the other action modes command one pitch for all
-    blades. In residual mode the baseline lqr continues from the sum, so an addition in every period is an
-    addition to its rates.
+    blades. In residual mode the baseline lqr continues from the applied command, so an addition in every
+    period is an addition to its rates.
 
-    An episode is terminated by failure: rotor speed above the turbine file's overspeed, capsize (platform
-    pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It is truncated at
-    the end of its duration by the environment itself, so spec.max_episode_steps is None;
+    Failure terminates an episode: rotor speed above the turbine file's overspeed, capsize (platform pitch
+    beyond 80 deg) or a state that is not finite; info["termination"] has the reason. The environment
+    truncates an episode at the end of its duration, so spec.max_episode_steps is None;
     gymnasium.make(..., max_episode_steps=n) ends episodes earlier.
 
     protection, faults, sensors and preview have the same meaning as in simulate. With protection or faults
@@ -129,9 +129,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     {"kind": "stuck_pitch", "time": (60.0, 300.0)}. With record=True frame() returns the episode in the format
     of simulate. fowt_env.training.evaluation.case_environment has the settings of a load case.
 
-    Observation, baseline, estimator and measurement() use the same sensor reading in a control period; its
-    noise is determined by the weather seed. Azimuth, last action and the exact preview have no noise;
-    rewards and failures use true motions.
+    Observation, baseline, estimator and measurement() use the same sensor reading in a control period. The
+    weather seed determines its noise. Azimuth, last action and the exact preview have no noise; rewards and
+    failures use true motions.
 
     In a task with `shutdown` the baseline operates the turbine within reset for the drawn time. The episode
     begins at the stop signal; its duration includes the operation by the baseline.
