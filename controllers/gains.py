@@ -168,7 +168,7 @@ def gains_of_turbine(turbine, gain_set="oc3"):
     return derived_gains(turbine, (LAND if gain_set == "land" else FLOATING) * speed)
 
 
-_MODES = Cache(64)  # (plant, water) -> eigenvalues, shares
+_MODES = Cache(64)  # (plant, water) -> eigenvalues, fractions of motions
 
 
 def platform_frequency(scene, motion=State.PLATFORM_PITCH):
@@ -179,8 +179,8 @@ def platform_frequency(scene, motion=State.PLATFORM_PITCH):
     flexible tower; other states (wake, radiation memory) are held constant. Results are cached per plant.
     Raises: InputError as trim, and for a motion without restoring force.
     """
-    values, shares = _MODES.get((plant_key(scene), water_key(scene)), lambda: _modes(scene))
-    square = -float(values[np.argmax(shares[motion])].real)
+    values, fractions = _MODES.get((plant_key(scene), water_key(scene)), lambda: _modes(scene))
+    square = -float(values[np.argmax(fractions[motion])].real)
     if not square > 0.0:
         what = "pitch" if motion == State.PLATFORM_PITCH else State(motion).name.lower()
         raise InputError(

@@ -121,7 +121,7 @@ def notch_coefficients(frequency, damping, dt):
 def filtered(value, coefficients, memory, at, started):
     """Return the output of a second-order filter and advance its two states in memory by one period.
 
-    Before the start (started False) the states are initialised to a steady value.
+    If not started, the states are first initialised to the steady state of this value.
     """
     b0, b1, b2, a1, a2 = coefficients
     if not started:

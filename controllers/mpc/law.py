@@ -98,7 +98,7 @@ def move(estimated, p, memory, curve, command):
     command[0] = rate_limit(command[0], torque, dt * p[Entry.TORQUE_RATE_LIMIT])
 
 
-LIDAR_HORIZON = 3.0  # s, usable look-ahead time at 24 m/s of four beams focused 160 m ahead of the rotor
+LIDAR_HORIZON = 3.0  # s, usable look-ahead time at 24 m/s of four beams measuring 160 m ahead of the rotor
 _MODELS = Cache(16)  # inputs -> (design models, table, (first wind, WindModel of all winds))
 
 

@@ -57,7 +57,7 @@ class InterfaceSettings:
     # preview for the channel wind_preview and the baseline: "exact" (rotor-averaged), a lidar, a Preview or a
     # function; None: exact for the baseline, wind at the hub for the channel
     preview: Any = None
-    protection: Any = None  # trips; with protection or faults the turbine's overspeed limit is disabled
+    protection: Any = None  # trips; with these or faults, the turbine file's overspeed ends no episode
     faults: Any = None  # Faults or mappings of Fault keys; times and values may be ranges (low, high)
     record: bool = False  # whether output rows are stored for frame()
 

@@ -345,7 +345,7 @@ START: dict[str, tuple[float, float]] = {  # about one standard deviation in ope
     "RotSpeed": (-0.5, 0.5),
     "Azimuth": (0.0, 360.0),
 }
-# Favours a quick stop with little motion of platform and tower; the fastest feathering loads both heavily.
+# Favours a quick stop with little motion of platform and tower; feathering at full rate excites both.
 STOP_WEIGHTS: dict[str, float] = {
     "standstill": 4.0,
     "platform_rate": 6.0,
