@@ -187,5 +187,5 @@ def test_bad_wishes_are_named(models, turbine):
         design_pi(models, turbine, 0.2, float("nan"))
     with pytest.raises(InputError, match="Did you mean 'published'"):
         design_pi(models, turbine, 0.2, 0.7, "publised")
-    with pytest.raises(InputError, match="winds: at least two"):
+    with pytest.raises(InputError, match="winds: must include at least two"):
         design_pi({11.0: models[11.0]}, turbine, 0.2, 0.7)
