@@ -1,4 +1,4 @@
-"""Built-in controllers. fowt_env.control asks here for what a name stands for."""
+"""Provides the built-in controllers and resolves controller names for fowt_env.control."""
 
 from fowt_env.control import CheckedController, CompiledController, Controller, make
 from fowt_env.controllers.design.saved_files import DESIGN_PREFIX as DESIGN
@@ -24,13 +24,13 @@ __all__ = [
     "make",
     "named",
 ]
-PREFIXES = (DESIGN, POLICY)  # of names that are no "module:Name"
+PREFIXES = (DESIGN, POLICY)  # of names other than "module:Name"
 
 
 def named(name):
-    """Factory(turbine, control_dt) of a name of CONTROLLERS, of "policy:NAME or PATH" or of "design:FILE".
+    """Return the factory (turbine, control_dt) of a built-in name, "policy:NAME or PATH" or "design:FILE".
 
-    Raises: InputError for unknown names (with a suggestion) and files that cannot be used.
+    Raises: InputError for unknown names (with a suggestion) and invalid files.
     """
     if name.startswith(DESIGN):
         return load_design(name.removeprefix(DESIGN))
@@ -43,9 +43,9 @@ def named(name):
 
 
 def information(name, turbine=None):
-    """Return what a controller of CONTROLLERS or an agent uses: Measurement fields and PRIVILEGED_INPUTS.
+    """Return the inputs of a controller or agent: Measurement fields and PRIVILEGED_INPUTS.
 
-    turbine: a descriptions.turbine.Turbine; None: the NREL 5 MW one. Without published gains a law also uses
+    turbine: a descriptions.turbine.Turbine; None: NREL 5 MW. Without published gains a control law also uses
     the plant's equations. Raises: InputError for an unknown name.
     """
     return make(name, read_turbine("nrel5mw") if turbine is None else turbine, 0.1).information

@@ -1,4 +1,4 @@
-"""Constant commands: what is measured at the start, or given values."""
+"""Defines a controller with constant commands: specified values or those measured at the start."""
 
 from enum import IntEnum
 
@@ -10,7 +10,7 @@ from fowt_env.plant.compile.decorators import control_kernel
 
 
 class Memory(IntEnum):
-    """Entries of the law's memory array."""
+    """Enumerates the entries of the law's memory array."""
 
     TORQUE_COMMAND = 0  # N m, high-speed shaft
     PITCH_COMMAND = 1  # rad
@@ -18,15 +18,15 @@ class Memory(IntEnum):
 
 @control_kernel
 def constant_law(parameters, memory, measurement, command):
-    """Command what the memory holds."""
+    """Command the torque and blade pitch stored in memory."""
     command[0] = memory[Memory.TORQUE_COMMAND]
     command[1] = memory[Memory.PITCH_COMMAND]
 
 
 class Constant(CompiledController):
-    """Constant generator torque and blade pitch; None: the one measured at reset.
+    """Commands constant generator torque and blade pitch; None: the value measured at reset.
 
-    Raises: InputError for a figure that is not finite.
+    Raises: InputError for a value that is not finite.
     """
 
     kernel = staticmethod(constant_law)
@@ -41,13 +41,13 @@ class Constant(CompiledController):
         self.blade_pitch = blade_pitch
 
     def reset(self, measurement):
-        """Take what is measured for each figure that was not given."""
+        """Store the commands, using the measured value for each that is None."""
         torque, pitch = self.torque, self.blade_pitch
         self.memory[Memory.TORQUE_COMMAND] = measurement.generator_torque if torque is None else torque
         self.memory[Memory.PITCH_COMMAND] = measurement.blade_pitch if pitch is None else pitch
 
 
 def constant(turbine, control_dt):
-    """Generator torque and blade pitch held at what is measured at the start."""
+    """Hold the generator torque and blade pitch measured at the start."""
     check_control_dt(control_dt)
     return Constant()

@@ -1,10 +1,10 @@
 """Defines the PI law with feedback of the platform's fore-aft motion to blade pitch and torque.
 
 Blade-pitch control of the rotor speed reduces thrust as the relative wind rises, which removes aerodynamic
-damping of the platform pitch. Feathering while the tower top moves downwind restores it at the cost of
-rotor-speed deviations, of which the torque channel can compensate a part. The signal passes a first-order
-high pass, which removes mean motion, and two equal first-order low passes, which remove most of the waves.
-The blade-pitch part fades in over the first degree (the region-3 pitch) of the PI law's target.
+damping of the platform pitch. Feathering while the tower top moves downwind restores this damping at the
+cost of rotor-speed deviations, which the torque channel can partly compensate. The signal passes a
+first-order high pass, which removes mean motion, and two equal first-order low passes, which remove most of
+the wave motion. The feedback fades in over the first degree (the region-3 pitch) of the PI law's target.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ SIGNALS = {"nacelle_velocity": Measure.NACELLE_VELOCITY, "platform_pitch_rate": 
 
 @dataclass(frozen=True)
 class FeedbackSettings(Settings):
-    """What is fed back and how. Raises: InputError naming the key, value and allowed range."""
+    """Holds the feedback settings. Raises: InputError naming the key, value and allowed range."""
 
     RANGES = {
         "pitch_gain": {},
@@ -48,10 +48,10 @@ class FeedbackSettings(Settings):
 
     signal: str = "nacelle_velocity"
     pitch_gain: float = 0.01  # rad per m/s of nacelle velocity, or per rad/s of platform pitch rate
-    torque_gain: float = 0.0  # N m on the high-speed shaft per the same
+    torque_gain: float = 0.0  # N m on the high-speed shaft per unit of the signal
     high_pass: float = 0.02  # rad/s
     low_pass: float = 0.5  # rad/s, of each of the two poles; inf: none
-    scheduled: bool = False  # pitch_gain times the PI law's gain schedule
+    scheduled: bool = False  # multiply pitch_gain by the PI law's gain schedule
 
     def __post_init__(self):
         if self.signal not in SIGNALS:
@@ -62,27 +62,27 @@ class FeedbackSettings(Settings):
 
 
 class FeedbackParameter(IntEnum):
-    """Entries of the law's parameter array beyond those it shares with the PI law."""
+    """Enumerates the law's parameters that follow those of the PI law."""
 
     SIGNAL = END  # index of the fed-back entry of the measurement
     PITCH_GAIN = SIGNAL + 1
     TORQUE_GAIN = SIGNAL + 2
-    HIGH_DECAY = SIGNAL + 3  # fraction of the slow part that one period leaves
-    LOW_DECAY = SIGNAL + 4  # fraction of each low pass that one period leaves
+    HIGH_DECAY = SIGNAL + 3  # fraction of the slow part that remains after one period
+    LOW_DECAY = SIGNAL + 4  # fraction of each low pass that remains after one period
     SCHEDULED = SIGNAL + 5  # 1: pitch_gain follows the gain schedule
 
 
 class FeedbackMemory(IntEnum):
-    """Entries of the law's memory array beyond those it shares with the PI law."""
+    """Enumerates the law's memory entries that follow those of the PI law."""
 
-    SLOW = len(Memory)  # what the high pass takes out, in the unit of the signal
+    SLOW = len(Memory)  # component removed by the high pass, in the unit of the signal
     LOW_ONE = len(Memory) + 1
     LOW_TWO = len(Memory) + 2
 
 
 @kernel
 def band_passed(signal, parameters, memory):
-    """Return the signal after high pass and low passes; advances them by one period."""
+    """Return the signal after high pass and low passes, and advance these filters by one period."""
     decay = parameters[FeedbackParameter.HIGH_DECAY]
     slow = (1.0 - decay) * signal + decay * memory[FeedbackMemory.SLOW]
     memory[FeedbackMemory.SLOW] = slow
@@ -96,7 +96,7 @@ def band_passed(signal, parameters, memory):
 
 @control_kernel
 def feedback_law(parameters, memory, measurement, command):
-    """Advance the PI law by one period, with the band-passed motion on blade pitch and torque."""
+    """Advance the PI law by one period, with feedback of band-passed motion to blade pitch and torque."""
     p = parameters
     error = speed_error(p, memory, measurement[Measure.GENERATOR_SPEED])
     pitch = schedule_pitch_of(p, memory, measurement[Measure.BLADE_PITCH])
@@ -111,7 +111,7 @@ def feedback_law(parameters, memory, measurement, command):
 
 
 class FloatingFeedback(PI):
-    """PI of a PISettings with the motion feedback of a FeedbackSettings."""
+    """Implements the PI law of a PISettings with the motion feedback of a FeedbackSettings."""
 
     kernel = staticmethod(feedback_law)
 
@@ -119,13 +119,13 @@ class FloatingFeedback(PI):
         self.feedback, dt = feedback, check_control_dt(control_dt)
         self.inputs = (*PI.inputs, feedback.signal)
         decays = exp(-dt * feedback.high_pass), exp(-dt * feedback.low_pass)
-        own = (
+        extra = (
             SIGNALS[feedback.signal], feedback.pitch_gain, feedback.torque_gain, *decays, feedback.scheduled,
         )  # fmt: skip
-        super().__init__(settings, dt, name, len(FeedbackMemory), own)
+        super().__init__(settings, dt, name, len(FeedbackMemory), extra)
 
     def reset(self, measurement):
-        """Start as PI.reset, with the present motion taken as the mean one: nothing is fed back yet."""
+        """Start as PI.reset, with the present motion as mean motion, so that the initial feedback is zero."""
         super().reset(measurement)
         passing = self.feedback.high_pass == 0.0
         self.memory[FeedbackMemory.SLOW] = 0.0 if passing else getattr(measurement, self.feedback.signal)
@@ -133,6 +133,6 @@ class FloatingFeedback(PI):
 
 
 def floating_feedback(turbine, control_dt):
-    """OC3 gains with nacelle-velocity feedback to the blade pitch, which damps the platform's pitch."""
+    """Apply OC3 gains with nacelle-velocity feedback to blade pitch, which damps platform pitch."""
     settings = FeedbackSettings(**tuned_for("floating_feedback", turbine))
     return FloatingFeedback(PISettings.published(turbine), settings, control_dt)

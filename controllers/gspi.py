@@ -2,12 +2,13 @@
 
 Sources: NREL/TP-500-38060 (land: constant power above rated) and NREL/TP-500-47535 (OC3-Hywind: detuned
 gains, constant torque above rated). The published laws run at every step of FAST, 0.0125 s. With a longer
-control_dt the law runs periods of at most SAMPLING on the line through the last two measured speeds, so that
-filter, integral and rate limits are those of the published sampling; commands change at control instants.
+control_dt the law runs periods of at most SAMPLING with speeds interpolated between the last two
+measurements, so that filter, integral and rate limits are those of the published sampling; commands change
+at control instants.
 
-One difference: the rate limit of the blade pitch counts from the last command, in the published code from
-the measured pitch, which with an actuator lag of 0.2 s would limit the blades to 0.5 deg/s
-(controllers/openfast_baseline.py does so, for the deck without an actuator).
+One difference: the blade-pitch rate is limited relative to the last command, in the published code relative
+to the measured pitch, which with an actuator lag of 0.2 s would limit the blades to 0.5 deg/s
+(controllers/openfast_baseline.py follows the published code, for the deck without an actuator).
 """
 
 from math import ceil, isnan, nan
@@ -17,20 +18,20 @@ from fowt_env.controllers.pi import END, PI, Memory, PISettings, pi_step
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.measurement import Measure
 
-SAMPLING = 0.0125  # s, longest period of the law itself
+SAMPLING = 0.0125  # s, longest period of the law
 
 
-PERIODS = END  # parameter beyond those of the PI law: of the law in one control_dt
-LAST_SPEED = len(Memory)  # memory beyond that of it: generator speed of the last call, rad/s; NaN: none yet
+PERIODS = END  # parameter in addition to those of the PI law: law periods in one control_dt
+LAST_SPEED = len(Memory)  # additional memory entry: generator speed of the last call, rad/s; NaN: no call yet
 
 
 @control_kernel
 def gspi_law(parameters, memory, measurement, command):
-    """One control_dt: the PI law at its own periods, on the line from the last to this measured speed."""
+    """Advance the PI law by one control_dt in shorter periods, interpolating the measured speed linearly."""
     periods = int(parameters[PERIODS])
     speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
     last = memory[LAST_SPEED]
-    if isnan(last):  # the first call: no time has passed yet
+    if isnan(last):  # first call: no time has elapsed
         periods, last = 1, speed
     for k in range(1, periods + 1):
         fraction = k / periods
@@ -39,7 +40,7 @@ def gspi_law(parameters, memory, measurement, command):
 
 
 class GSPI(PI):
-    """Gain-scheduled PI of a PISettings with periods of at most SAMPLING inside each control_dt."""
+    """Implements the gain-scheduled PI of a PISettings in periods of at most SAMPLING per control_dt."""
 
     kernel = staticmethod(gspi_law)
 
@@ -49,16 +50,16 @@ class GSPI(PI):
         super().__init__(settings, control_dt / self.periods, name, 1, [self.periods])
 
     def reset(self, measurement):
-        """Start so that act() on this same measurement commands the measured blade pitch, as PI.reset."""
+        """Initialise as PI.reset: act() on the same measurement commands the measured blade pitch."""
         super().reset(measurement)
         self.memory[LAST_SPEED] = nan
 
 
 def gspi_oc3(turbine, control_dt):
-    """Jonkman's gain-scheduled PI with the OC3-Hywind changes: detuned, constant torque above rated."""
+    """Apply Jonkman's gain-scheduled PI for OC3-Hywind: detuned, constant torque above rated."""
     return GSPI(PISettings.published(turbine), control_dt, "gspi_oc3")
 
 
 def gspi_land(turbine, control_dt):
-    """Jonkman's gain-scheduled PI as published for land: constant power above rated. For comparison only."""
+    """Apply Jonkman's gain-scheduled PI for land: constant power above rated. For comparison only."""
     return GSPI(PISettings.published(turbine, "land", "constant_power"), control_dt, "gspi_land")

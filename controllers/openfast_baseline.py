@@ -5,9 +5,9 @@ the Bladed interface with the measured generator speed and blade pitch. It diffe
 
 - at the start the integral balances the measured blade pitch for any speed error, and the torque is on the
   curve;
-- the rate limit of the blade pitch counts from the measured pitch, not from the last command;
-- every call advances by its elapsed time, the first by none;
-- a command takes effect one sample later (OpenFAST applies it at the next step).
+- the blade-pitch rate is limited relative to the measured pitch, not to the last command;
+- every call advances by the elapsed time, the first call by zero;
+- a command takes effect one sample later (OpenFAST applies commands at the next step).
 """
 
 from enum import IntEnum
@@ -19,7 +19,7 @@ from fowt_env.plant.measurement import Measure
 
 
 class Memory(IntEnum):
-    """Entries of the law's memory array."""
+    """Enumerates the entries of the law's memory array."""
 
     FILTERED_SPEED = 0  # GenSpeedF, generator speed, rad/s
     INTEGRAL = 1  # IntSpdErr, rad on the high-speed shaft
@@ -30,7 +30,7 @@ class Memory(IntEnum):
 
 @control_kernel
 def discon_law(p, memory, measurement, command):
-    """Command the result of the last call and store that of this call in memory."""
+    """Command the result of the last call and store the result of this call in memory."""
     first = memory[Memory.CALLS] == 0.0
     dt = 0.0 if first else p[Parameter.CONTROL_DT]
     decay = 1.0 if first else p[Parameter.FILTER_DECAY]
@@ -61,7 +61,7 @@ def discon_law(p, memory, measurement, command):
 
 
 class Discon(GainScheduled):
-    """OC3-Hywind DISCON law as OpenFAST calls it, every control_dt."""
+    """Implements the OC3-Hywind DISCON law as called by OpenFAST, every control_dt."""
 
     kernel = staticmethod(discon_law)
     inputs = ("generator_speed", "blade_pitch")
@@ -70,7 +70,7 @@ class Discon(GainScheduled):
         super().__init__(settings, control_dt, name, len(Memory))
 
     def reset(self, measurement):
-        """Start at the measured speed and blade pitch, the integral holding that pitch at no speed error."""
+        """Start at measured speed and blade pitch, with the integral of this pitch at zero speed error."""
         p = self.parameters
         pitch = measurement.blade_pitch
         slope = schedule_gain(pitch, p[Parameter.SCHEDULE_PITCH]) * p[Parameter.INTEGRAL]
@@ -79,5 +79,5 @@ class Discon(GainScheduled):
 
 
 def openfast_oc3(turbine, control_dt):
-    """The OC3-Hywind controller of the OpenFAST reference runs, one-sample delay included."""
+    """Apply the OC3-Hywind controller of the OpenFAST reference runs, with its one-sample delay."""
     return Discon(PISettings.published(turbine), control_dt)

@@ -1,6 +1,6 @@
 """Defines the baseline: torque law and gain-scheduled PI on rotor speed, Eq. (8), theory.md sections 3 and 4.
 
-Above rated the torque (or, by name, the power) is constant and blade pitch controls the rotor speed; below
+Above rated the torque (or optionally the power) is constant and blade pitch controls the rotor speed; below
 rated the pitch is at its minimum and the torque follows its curve.
 """
 
@@ -21,14 +21,14 @@ from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, ge
 from fowt_env.plant.measurement import Measure
 
 SCHEDULE_ON = ("commanded", "measured")
-BUMPLESS = 1e-9  # rad, largest step of the first command that still counts as none
+BUMPLESS = 1e-9  # rad, largest step of the first command that counts as bumpless
 
 
 class Parameter(IntEnum):
-    """Entries of the law's parameter array; the fields of TorqueCurve follow from CURVE on."""
+    """Enumerates the law's parameter array; the fields of TorqueCurve start at CURVE."""
 
     CONTROL_DT = 0  # s
-    FILTER_DECAY = 1  # fraction of the filtered speed that one period leaves
+    FILTER_DECAY = 1  # fraction of the filtered speed that remains after one period
     GEAR_RATIO = 2
     RATED_SPEED = 3  # w_b0, the set-point of the rotor speed, rad/s
     PROPORTIONAL = 4  # G, s
@@ -42,11 +42,11 @@ class Parameter(IntEnum):
     CURVE = 12
 
 
-END = Parameter.CURVE + len(TorqueCurve._fields)  # where the parameters of laws begin that extend this one
+END = Parameter.CURVE + len(TorqueCurve._fields)  # first parameter of laws that extend the PI law
 
 
 class Memory(IntEnum):
-    """Entries of the law's memory array."""
+    """Enumerates the entries of the law's memory array."""
 
     FILTERED_SPEED = 0  # generator speed, rad/s
     PITCH_COMMAND = 1  # rad
@@ -56,7 +56,7 @@ class Memory(IntEnum):
 
 @dataclass(frozen=True)
 class PISettings(Settings):
-    """Everything that shapes the PI law. Raises: InputError naming the key, value and allowed range."""
+    """Holds the settings of the PI law. Raises: InputError naming the key, value and allowed range."""
 
     RANGES = {
         **dict.fromkeys(("KI", "rated_speed", "gear_ratio"), POSITIVE),
@@ -76,8 +76,8 @@ class PISettings(Settings):
     curve: TorqueCurve
     speed_filter_corner: float = inf  # rad/s; inf: no filter
     gain_schedule_pitch: float = inf  # beta_K, rad; inf: no schedule
-    schedule_on: str = "commanded"  # which blade pitch sets the gain and forces region 3
-    derived: str = ""  # gain set that stands for a platform's own, until for_scene; "": gains as given
+    schedule_on: str = "commanded"  # blade pitch that determines gain and torque region
+    derived: str = ""  # gain set to be replaced by that of the platform in for_scene; "": none
 
     def __post_init__(self):
         super().__post_init__()
@@ -90,10 +90,10 @@ class PISettings(Settings):
 
     @classmethod
     def published(cls, turbine, gain_set="oc3", region3="constant_torque", scheduled=True, **changes):
-        """Settings of a descriptions.turbine.Turbine with one of its gain sets, "oc3" ("floating") or "land".
+        """Return settings of a descriptions.turbine.Turbine with a gain set, "oc3" ("floating") or "land".
 
-        changes: fields of PISettings that replace the published ones. A turbine without published gains has
-        those of controllers/gains.py, which for_scene makes the platform's own.
+        changes: fields of PISettings that replace the published values. Without published gains, those of
+        controllers/gains.py are used, which for_scene adapts to the platform.
         """
         published, law, drive = gains_of_turbine(turbine, gain_set), turbine.torque_law, turbine.pitch_drive
         return cls(
@@ -112,20 +112,20 @@ class PISettings(Settings):
         ).changed(**changes)
 
     def for_scene(self, scene):
-        """These settings with the gains of a scene's platform, where none are published; else as they are.
+        """Return settings with gains for a scene's platform, if none are published; otherwise self.
 
-        Factors on the gains and on their schedule stay.
+        Factors on the gains and on their schedule are preserved.
         """
         if not self.derived:
             return self
-        alone = gains_of_turbine(scene.turbine, self.derived)
-        here = published_set(with_gains(scene), self.derived)
+        default = gains_of_turbine(scene.turbine, self.derived)
+        adapted = published_set(with_gains(scene), self.derived)
         keys = ("KP", "KI", "gain_schedule_pitch")
-        changes = {key: getattr(self, key) * (getattr(here, key) / getattr(alone, key)) for key in keys}
+        changes = {key: getattr(self, key) * (getattr(adapted, key) / getattr(default, key)) for key in keys}
         return replace(self, derived="", **changes)
 
     def parameters(self, control_dt):
-        """Return (n,) parameter array of the law at this control period, in the order of Parameter."""
+        """Return the parameter array (n,) of the law at a control period (s), in the order of Parameter."""
         values = {
             Parameter.CONTROL_DT: control_dt,
             Parameter.FILTER_DECAY: exp(-control_dt * self.speed_filter_corner),  # 0 without a filter
@@ -145,7 +145,7 @@ class PISettings(Settings):
 
 @kernel
 def curve_at(p, i):
-    """Return the TorqueCurve stored in a parameter array from the entry i onwards."""
+    """Return the TorqueCurve stored in a parameter array from entry i."""
     return TorqueCurve(
         p[i], p[i + 1], p[i + 2], p[i + 3], p[i + 4], p[i + 5],
         p[i + 6], p[i + 7], p[i + 8], p[i + 9], p[i + 10], p[i + 11],
@@ -160,13 +160,13 @@ def curve_of(parameters):
 
 @kernel
 def schedule_gain(blade_pitch, schedule_pitch):
-    """GK(beta) = 1/(1 + beta/beta_K), theory.md Eq. (8); 1 for an infinite beta_K."""
+    """Return GK(beta) = 1/(1 + beta/beta_K), theory.md Eq. (8); 1 for an infinite beta_K."""
     return 1.0 / (1.0 + blade_pitch / schedule_pitch)
 
 
 @kernel
 def schedule_pitch_of(parameters, memory, measured_pitch):
-    """Return blade pitch that sets the gain and the torque region: the last command or the measured one."""
+    """Return the blade pitch for gain schedule and torque region: the last command or the measurement."""
     if parameters[Parameter.SCHEDULE_MEASURED] > 0.5:
         low, high = parameters[Parameter.PITCH_MINIMUM], parameters[Parameter.PITCH_MAXIMUM]
         return clamp(measured_pitch, low, high)
@@ -175,9 +175,9 @@ def schedule_pitch_of(parameters, memory, measured_pitch):
 
 @kernel
 def speed_error(parameters, memory, generator_speed):
-    """Return the error e = w_f - w_b0 of the filtered rotor speed, rad/s; advances the filter by one period.
+    """Return the error e = w_f - w_b0 of the filtered rotor speed, rad/s, and advance the filter.
 
-    The filter is a single pole held exactly over the period (exponential smoothing).
+    The filter is a single pole with exact discretisation over the period (exponential smoothing).
     """
     decay = parameters[Parameter.FILTER_DECAY]
     speed = (1.0 - decay) * generator_speed + decay * memory[Memory.FILTERED_SPEED]
@@ -187,9 +187,9 @@ def speed_error(parameters, memory, generator_speed):
 
 @kernel
 def write_commands(blade_pitch, target, extra_torque, parameters, memory, command):
-    """Write the torque of the curve and the pitch target, within their limits of value and rate per period.
+    """Write the commands: torque of the curve and pitch target, within their value and rate limits.
 
-    blade_pitch: that which may force region 3; extra_torque is added to the curve.
+    blade_pitch: determines the torque region; extra_torque (N m) is added to the curve.
     """
     dt = parameters[Parameter.CONTROL_DT]
     torque, pitch = memory[Memory.TORQUE_COMMAND], memory[Memory.PITCH_COMMAND]
@@ -206,9 +206,9 @@ def write_commands(blade_pitch, target, extra_torque, parameters, memory, comman
 
 @kernel
 def pi_target(pitch, error, parameters, memory):
-    """Blade pitch that the PI law asks for, rad, before its limits; advances the integral by one period.
+    """Return the blade-pitch target of the PI law, rad, before limits, and advance the integral.
 
-    pitch: the one that sets the gain. Anti-windup: the integral term GK (G/tau_i) I_e stays within the
+    pitch: input of the gain schedule. Anti-windup: the integral term GK (G/tau_i) I_e stays within the
     pitch limits.
     """
     gain = schedule_gain(pitch, parameters[Parameter.SCHEDULE_PITCH])
@@ -233,38 +233,38 @@ def pi_step(parameters, memory, generator_speed, measured_pitch, command):
 
 @control_kernel
 def pi_law(parameters, memory, measurement, command):
-    """Apply pi_step in the common form of control laws."""
+    """Apply pi_step with the common arguments of control laws."""
     speed, pitch = measurement[Measure.GENERATOR_SPEED], measurement[Measure.BLADE_PITCH]
     pi_step(parameters, memory, speed, pitch, command)
 
 
 class GainScheduled(CompiledController):
-    """Base of the laws of a PISettings; prepare(scene) takes a platform's gains where none are published."""
+    """Implements laws with PISettings; prepare(scene) sets gains for the platform if none are published."""
 
     def __init__(self, settings, control_dt, name, n_memory, own=()):
-        """own: parameters of the law beyond those of the PI law."""
+        """Store settings and parameters; own: parameters of the law in addition to those of the PI law."""
         self.settings, self.law_dt = settings, check_control_dt(control_dt)
         super().__init__(name, np.append(settings.parameters(self.law_dt), own), n_memory)
 
     @property
     def information(self):
-        """Return what the law is given; the plant's equations too, where its gains are derived from them."""
+        """Return the inputs of the law, with "plant_model" if its gains are derived from the plant."""
         if self.settings.derived and "plant_model" not in self.inputs:
             return (*self.inputs, "plant_model")
         return self.inputs
 
     def prepare(self, scene):
-        """Take the gains of the scene's platform where the turbine has no published ones."""
+        """Set the gains for the scene's platform if the turbine has no published gains."""
         if self.settings.derived:
-            own = self.settings.for_scene(scene).parameters(self.law_dt)
-            self.parameters[: len(own)] = own
+            adapted = self.settings.for_scene(scene).parameters(self.law_dt)
+            self.parameters[: len(adapted)] = adapted
 
 
 class PI(GainScheduled):
-    """PI law of theory.md Eq. (8) and torque law, sampled every control_dt.
+    """Implements the PI law of theory.md Eq. (8) and the torque law, sampled every control_dt.
 
-    bumpless, set by reset(): False where no integral within the anti-windup limits gives the
-    measured blade pitch as first command; the command then moves from it at most at the rate limit.
+    bumpless, set by reset(): False if no integral within the anti-windup limits gives the measured blade
+    pitch as first command; the command then departs from the measured pitch within the rate limit.
     """
 
     kernel = staticmethod(pi_law)
@@ -275,11 +275,11 @@ class PI(GainScheduled):
         self.bumpless = True
 
     def reset(self, measurement):
-        """Start so that act() on the same measurement commands the measured blade pitch.
+        """Initialise the law such that act() on the same measurement commands the measured blade pitch.
 
-        The filter starts at the measured speed and the torque at the measured torque (without one on the
-        curve); the integral balances the proportional term within the anti-windup limits. With the blade at
-        a limit the integral term is that limit, so that no windup remains.
+        The filter starts at the measured speed and the torque at the measured torque (on the curve if not
+        measured); the integral balances the proportional term within the anti-windup limits. With the blade
+        at a limit the integral term equals this limit, which avoids windup.
         """
         p = self.parameters
         low, high = p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM]
@@ -290,14 +290,14 @@ class PI(GainScheduled):
         term = pitch if pitch in (low, high) else min(max(pitch - proportional, low), high)
         first = min(max(proportional + term, low), high)
         self.bumpless = bool(abs(first - measurement.blade_pitch) <= BUMPLESS)
-        # the first act() adds this instant's error before it uses the integral
+        # the first act() adds the present error before using the integral
         integral = term / (gain * p[Parameter.INTEGRAL]) - error * p[Parameter.CONTROL_DT]
         self.memory[Memory.INTEGRAL] = integral
         start_commands(self.memory, p, pitch, measurement)
 
 
 def start_commands(memory, parameters, pitch, measurement):
-    """Set the filter and the last commands in memory from what is measured."""
+    """Set the filter and the last commands in memory from a measurement."""
     speed, torque = measurement.generator_speed, measurement.generator_torque
     curve = curve_of(parameters)
     if not isfinite(torque):
@@ -308,27 +308,27 @@ def start_commands(memory, parameters, pitch, measurement):
 
 
 def pi(turbine, control_dt):
-    """OC3 gains with their schedule, constant torque above rated: the default baseline."""
+    """Apply OC3 gains with their schedule, constant torque above rated: the default baseline."""
     return PI(PISettings.published(turbine), control_dt, "pi")
 
 
 def pi_unscheduled(turbine, control_dt):
-    """OC3 gains without schedule (GK = 1 at every blade pitch), constant torque above rated."""
+    """Apply OC3 gains without schedule (GK = 1 at every blade pitch), constant torque above rated."""
     return PI(PISettings.published(turbine, scheduled=False), control_dt, "pi_unscheduled")
 
 
 def pi_land(turbine, control_dt):
-    """Land-based gains with their schedule, constant torque above rated: for comparison only."""
+    """Apply land-based gains with their schedule, constant torque above rated: for comparison only."""
     return PI(PISettings.published(turbine, "land"), control_dt, "pi_land")
 
 
 def pi_land_power(turbine, control_dt):
-    """Land-based gains with their schedule, constant power above rated, as published for land."""
+    """Apply land-based gains with their schedule, constant power above rated, as published for land."""
     return PI(PISettings.published(turbine, "land", "constant_power"), control_dt, "pi_land_power")
 
 
 def pi_tuned(turbine, control_dt):
-    """OC3 gains times stored factors: least deviations at no more pitch travel than `pi`, on other seeds."""
+    """Apply OC3 gains times factors tuned for least deviations at no more pitch travel than `pi`."""
     published = PISettings.published(turbine)
     changes = {name: getattr(published, name) * factor for name, factor in tuned("pi_tuned").items()}
     return PI(published.changed(**changes), control_dt, "pi_tuned")

@@ -1,7 +1,7 @@
 """Defines the PI law with feedforward of the previewed wind.
 
-The steady schedule beta_ss(V) determines the pitch change d beta = (d beta_ss/dV) dV. The law adds it to its
-integral, dI = d beta (1 + 2 beta/beta_K)/KI by theory.md (A7), so that anti-windup, schedule and limits are
+The steady schedule beta_ss(V) determines the pitch change d beta = (d beta_ss/dV) dV. The law increases its
+integral by dI = d beta (1 + 2 beta/beta_K)/KI, theory.md (A7), so that anti-windup, schedule and limits are
 those of the PI law and the integral corrects errors of beta_ss. The wind is the rotor-averaged preview at
 `preview_time`. Two equal first-order low passes, whose delay with that of the blade-pitch actuator and half a
 control period equals the preview time, smooth the gusts.
@@ -33,7 +33,7 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.plant.state import State
 
 SCHEDULE_SPEEDS = 15  # trims from rated to cut-out wind, square-root spaced: the schedule is steep at rated
-BELOW_RATED = 0.5  # m/s below the published rated wind that the schedule starts
+BELOW_RATED = 0.5  # m/s, start of the schedule below the published rated wind
 
 
 @dataclass(frozen=True)
@@ -42,29 +42,29 @@ class PreviewSettings(Settings):
 
     RANGES = {"preview_time": {"low": 0.5, "high": 60.0}, "gain": {"low": 0.0, "high": 2.0}}
 
-    preview_time: float = 3.0  # s that the wind is known ahead
+    preview_time: float = 3.0  # s, look-ahead time of the wind
     gain: float = 1.0  # fraction of the steady schedule that is fed forward
 
 
 class PreviewParameter(IntEnum):
-    """Entries of the law's parameter array beyond those of the PI law."""
+    """Enumerates the law's parameters that follow those of the PI law."""
 
     GAIN = END
-    DECAY = GAIN + 1  # fraction of each low pass that one period leaves
+    DECAY = GAIN + 1  # fraction of each low pass that remains after one period
     WIND = GAIN + 2  # SCHEDULE_SPEEDS winds of the steady schedule, m/s
-    PITCH = WIND + SCHEDULE_SPEEDS  # and the blade pitch there, rad
+    PITCH = WIND + SCHEDULE_SPEEDS  # blade pitch of the schedule at these winds, rad
 
 
 class PreviewMemory(IntEnum):
-    """Entries of the law's memory array beyond those it shares with the PI law."""
+    """Enumerates the law's memory entries that follow those of the PI law."""
 
     LOW_ONE = len(Memory)  # blade pitch of the schedule for the wind ahead after one low pass, rad
-    LOW_TWO = len(Memory) + 1  # and after both
+    LOW_TWO = len(Memory) + 1  # the same after both low passes
 
 
 @kernel
 def scheduled_pitch(wind, parameters):
-    """Return the blade pitch (rad) times GAIN of the steady schedule at a wind (m/s); its ends are held."""
+    """Return GAIN times the steady blade pitch (rad) at a wind (m/s), constant outside the schedule."""
     first, last = PreviewParameter.WIND, PreviewParameter.PITCH - 1
     gain, pitch = parameters[PreviewParameter.GAIN], PreviewParameter.PITCH - PreviewParameter.WIND
     if wind <= parameters[first]:
@@ -80,7 +80,7 @@ def scheduled_pitch(wind, parameters):
 
 @kernel
 def foreseen_change(wind, parameters, memory):
-    """Change (rad) over this period of the filtered blade pitch for the wind ahead; advances the filter."""
+    """Return the change (rad) of the filtered blade pitch for the wind ahead; advance the filter."""
     decay = parameters[PreviewParameter.DECAY]
     one = (1.0 - decay) * scheduled_pitch(wind, parameters) + decay * memory[PreviewMemory.LOW_ONE]
     two = (1.0 - decay) * one + decay * memory[PreviewMemory.LOW_TWO]
@@ -103,7 +103,7 @@ def preview_law(parameters, memory, measurement, command):
 
 
 class Preview(PI):
-    """PI of a PISettings with the feedforward of a PreviewSettings; needs prepare(scene) before reset."""
+    """Implements the PI law with wind feedforward of a PreviewSettings; call prepare(scene) before reset."""
 
     kernel = staticmethod(preview_law)
     inputs = (*PI.inputs, "wind_preview", "plant_model")
@@ -115,9 +115,9 @@ class Preview(PI):
         self.prepared = False
 
     def prepare(self, scene):
-        """Look up the steady blade pitch of the scene's plant over the wind.
+        """Compute the steady blade pitch of the scene's plant over wind speed.
 
-        Raises: InputError for a scene without wind, and where the preview is shorter than the blades' lag.
+        Raises: InputError for a scene without wind, and if the preview is shorter than the actuator lag.
         """
         if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind to look ahead")
@@ -136,7 +136,7 @@ class Preview(PI):
         self.prepared = True
 
     def reset(self, measurement):
-        """Start as PI.reset, the wind ahead taken as a steady one. Raises: InputError without prepare()."""
+        """Start as PI.reset, the filter steady at the wind ahead. Raises: InputError without prepare()."""
         if not self.prepared:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         super().reset(measurement)
@@ -151,7 +151,7 @@ class Preview(PI):
 
 
 def steady_pitch(scene):
-    """(wind m/s, blade pitch rad) of the steady schedule, platform fixed, from below rated to cut-out."""
+    """Return (wind m/s, pitch rad) of the steady schedule, platform fixed, from below rated to cut-out."""
     turbine = scene.turbine
     low, high = turbine.rated_wind_speed - BELOW_RATED, turbine.cut_out_wind_speed
     speeds = low + (high - low) * np.linspace(0.0, 1.0, SCHEDULE_SPEEDS) ** 2
@@ -161,5 +161,5 @@ def steady_pitch(scene):
 
 
 def preview(turbine, control_dt):
-    """OC3 gains with feedforward of the rotor-averaged wind 3 s ahead."""
+    """Apply OC3 gains with feedforward of the rotor-averaged wind 3 s ahead."""
     return Preview(PISettings.published(turbine), PreviewSettings(), control_dt)

@@ -1,8 +1,8 @@
 """DEMONSTRATION ONLY: defines Eq. (8) of the source paper as printed, whose gain grows with time.
 
-The printed law has t (w_b - w_b0) instead of the integral of the speed error (theory.md, section 4): a
-proportional controller with the gain G (1 + t/tau_i), whose speed offset decays as 1/t, which depends on the
-choice of t = 0 and becomes unstable.
+The printed law has t (w_b - w_b0) instead of the integral of the speed error (theory.md, section 4). The
+result is a proportional controller with the gain G (1 + t/tau_i): its speed offset decays as 1/t, it depends
+on the choice of t = 0 and becomes unstable.
 """
 
 from enum import IntEnum
@@ -23,7 +23,7 @@ from fowt_env.plant.measurement import Measure
 
 
 class LiteralMemory(IntEnum):
-    """Entries of the law's memory beyond those it shares with the PI law (Memory, before INTEGRAL)."""
+    """Enumerates the law's memory entries that follow those of the PI law (Memory, before INTEGRAL)."""
 
     START_TIME = Memory.INTEGRAL  # s
     START_PITCH = Memory.INTEGRAL + 1  # rad
@@ -31,13 +31,13 @@ class LiteralMemory(IntEnum):
 
 @kernel
 def literal_gain(time, parameters):
-    """Return gain of the printed law, rad per rad/s of rotor speed: G (1 + t/tau_i), without the schedule."""
+    """Return the gain G (1 + t/tau_i) of the printed law, rad per rad/s of rotor speed, without schedule."""
     return parameters[Parameter.PROPORTIONAL] + parameters[Parameter.INTEGRAL] * time
 
 
 @control_kernel
 def literal_law(parameters, memory, measurement, command):
-    """Advance the printed law by one period; filter, schedule, limits and torque are those of the PI law."""
+    """Advance the printed law by one period with filter, schedule, limits and torque of the PI law."""
     error = speed_error(parameters, memory, measurement[Measure.GENERATOR_SPEED])
     pitch = schedule_pitch_of(parameters, memory, measurement[Measure.BLADE_PITCH])
     time = measurement[Measure.TIME] - memory[LiteralMemory.START_TIME]
@@ -46,9 +46,9 @@ def literal_law(parameters, memory, measurement, command):
 
 
 class Eq8Literal(GainScheduled):
-    """The printed Eq. (8), as a demonstration: t = 0 and the blade pitch of zero error are those at reset.
+    """Demonstrates the printed Eq. (8) with t = 0 at reset and the measured blade pitch at zero error.
 
-    Without that pitch the printed law would have no operating point above rated at all.
+    Without this pitch offset the printed law would have no operating point above rated.
     """
 
     kernel = staticmethod(literal_law)
@@ -58,7 +58,7 @@ class Eq8Literal(GainScheduled):
         super().__init__(settings, control_dt, name, LiteralMemory.START_PITCH + 1)
 
     def reset(self, measurement):
-        """Start the clock of the printed law here, from the measured speed, blade pitch and torque."""
+        """Set t = 0 of the printed law and start from the measured speed, blade pitch and torque."""
         p = self.parameters
         low, high = p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM]
         pitch = float(min(max(measurement.blade_pitch, low), high))
@@ -68,5 +68,5 @@ class Eq8Literal(GainScheduled):
 
 
 def eq8_literal(turbine, control_dt):
-    """DEMONSTRATION ONLY: Eq. (8) as printed, with OC3 gains; its gain grows with time."""
+    """DEMONSTRATION ONLY: apply Eq. (8) as printed, with OC3 gains; its gain grows with time."""
     return Eq8Literal(PISettings.published(turbine), control_dt)

@@ -1,4 +1,4 @@
-"""Lists the built-in controllers by name. A file may name only these, because any other name runs code."""
+"""Lists the built-in controllers by name. Files may use only these names, because other names run code."""
 
 from fowt_env.controllers.constant import constant
 from fowt_env.controllers.floating_feedback import floating_feedback

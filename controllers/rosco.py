@@ -1,13 +1,13 @@
-"""Runs ROSCO, the reference open-source controller, through its own library, with the published OC3 gains.
+"""Runs ROSCO, the reference open-source controller, through its library, with the published OC3 gains.
 
 Abbas et al., Wind Energ. Sci. 7, 2022. libdiscon of the PyPI wheel `rosco` (its toolbox is not used) is
-called through the Bladed interface, as OpenFAST does. If the turbine file names a DISCON.IN, that file is
-used unchanged with its table, or with a computed table if it has none. Otherwise DISCON.IN is written from
+called through the Bladed interface, as in OpenFAST. If the turbine file names a DISCON.IN, this file is used
+unchanged with its rotor table, or with a computed table if it names none. Otherwise DISCON.IN is written from
 the turbine's description and the Cp, Ct, Cq table from the blade elements; gains and schedule are those
-published for OC3-Hywind (or of controllers/gains.py), as the automatic tuning has a positive proportional
-gain above 16 deg. Individual pitch control has the integral gain of `ipc` (ipc/design.py) at zero pitch.
+published for OC3-Hywind (or of controllers/gains.py), because the automatic tuning gives a positive
+proportional gain above 16 deg. Individual pitch control uses the integral gain of `ipc` at zero pitch.
 
-A loaded library is one controller that can start once: every reset() loads a private copy of the file.
+A loaded library is a single controller that can start once: every reset() loads a private copy of the file.
 """
 
 import ctypes
@@ -42,40 +42,40 @@ from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import performance
 
 INSTALL = "pip install --no-deps rosco"
-PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with it; a copy elsewhere cannot find them
-SWAP_SIZE = 4096  # floats: the library touches entries beyond 3,300 whatever the interface
-TEXT_SIZE = 1024  # of the message that the library returns
+PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with libdiscon; not found from a copy
+SWAP_SIZE = 4096  # floats: the library accesses entries above 3,300 with every interface
+TEXT_SIZE = 1024  # length of the library's message
 RATIOS = np.linspace(2.0, 20.0, 37)  # tip-speed ratios of the table
 PITCHES = DEGREE * np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)])
 SCHEDULE = 0.5 * pi * np.linspace(0.0, 1.0, 40) ** 2  # blade pitch of the gain table, rad
 POLE_SPEEDS = 45  # winds of the estimator's table of poles
-MINIMUM_SPEED = 1.1  # times the cut-in speed: where region 2 starts below that, this is a minimum speed
-INDIVIDUAL = "IPC_ControlMode"  # loads of single blades, which the individual variant is given
-# Modes of a DISCON.IN that need what it is not given here: yaw, flaps, files, sockets
+MINIMUM_SPEED = 1.1  # times cut-in speed: if region 2 starts below, cut-in is the minimum speed
+INDIVIDUAL = "IPC_ControlMode"  # needs blade root loads, provided with individual=True
+# Modes of a DISCON.IN that need inputs not provided here: yaw, flaps, files, sockets
 OFF = (
     "Y_ControlMode", "Flp_Mode", "OL_Mode", "AWC_Mode", "Ext_Mode", "ZMQ_Mode", "CC_Mode",
     "StC_Mode",
 )  # fmt: skip
-IPC_AMPLITUDE = 0.2618  # rad, greatest cyclic pitch: IPC_IntSat of its toolbox
-IPC_RAMP = (0.8, 1.0)  # of rated wind, over which it fades in: IPC_Vramp of its toolbox
-SILENT = {"LoggingLevel": 0, "Echo": 0, "Ext_Interface": 0}  # no files beside the run's, the plain interface
+IPC_AMPLITUDE = 0.2618  # rad, largest cyclic pitch: IPC_IntSat of ROSCO's toolbox
+IPC_RAMP = (0.8, 1.0)  # of rated wind, range over which IPC fades in: IPC_Vramp of ROSCO's toolbox
+SILENT = {"LoggingLevel": 0, "Echo": 0, "Ext_Interface": 0}  # no log files, standard interface
 ENTRY = re.compile(r"^(?P<value>[^!]*?)(?P<gap>\s*!\s*)(?P<name>\w+)\b")
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
 
 
 @dataclass(frozen=True)
 class RoscoSettings(Settings):
-    """Floating feedback of ROSCO (Fl_Mode), and its pitch gains.
+    """Holds the floating feedback of ROSCO (Fl_Mode) and factors on its pitch gains.
 
     Raises: InputError naming the key, value and allowed range.
     """
 
     RANGES = dict.fromkeys(("low_pass", "high_pass", "kp", "ki"), POSITIVE) | {
-        "gain": {"high": 0.0, "allowed": "finite and <= 0 (beyond it drives the platform)"}
+        "gain": {"high": 0.0, "allowed": "finite and <= 0 (a positive gain excites the platform)"}
     }
 
     mode: int = 0  # Fl_Mode: 0 none, 1 of the tower-top acceleration, 2 of the nacelle's pitch acceleration
-    gain: float = 0.0  # Fl_Kp, rad per m/s (mode 1) or s (mode 2); negative damps the platform
+    gain: float = 0.0  # Fl_Kp, rad per m/s (mode 1) or s (mode 2); negative values damp the platform
     low_pass: float = 0.21  # rad/s, second-order low pass with damping ratio 1
     high_pass: float = 0.01  # rad/s, first-order high pass
     kp: float = 1.0  # factor on the published proportional gain
@@ -87,46 +87,46 @@ class RoscoSettings(Settings):
 
 
 class Discon:
-    """A DISCON.IN of ROSCO, of a turbine's own.
+    """Reads and modifies the DISCON.IN of a turbine for ROSCO.
 
-    individual: whether it controls the pitch of each blade, which is switched on where the file has it off.
-    Raises: InputError for a file that is none, and for modes that need more than the library is given.
+    individual: whether to control the pitch of each blade; switched on if disabled in the file.
+    Raises: InputError for other files, and for modes that need inputs not provided to the library.
     """
 
     def __init__(self, path, individual=False):
         self.path = Path(path)
         self.text = read_text(self.path, "DISCON.IN")
-        entries = [found for line in self.text.splitlines() if (found := ENTRY.match(line))]
-        # the first of a name counts
-        self.values = {found["name"]: found["value"].strip() for found in reversed(entries)}
+        entries = [match for line in self.text.splitlines() if (match := ENTRY.match(line))]
+        # the first entry of a name is used
+        self.values = {match["name"]: match["value"].strip() for match in reversed(entries)}
         where = f"DISCON.IN {str(path)!r}"
         for key in ("PerfFileName", "PerfTableSize", "Fl_Mode", "LoggingLevel", INDIVIDUAL, *OFF):
             if key not in self.values:
-                raise InputError(f"{where}: {key} is missing: it is no file of ROSCO 2.9 or later")
+                raise InputError(f"{where}: {key} is missing: must be a file of ROSCO 2.9 or later")
         self.switched = {INDIVIDUAL: 1} if individual and self.values[INDIVIDUAL] == "0" else {}
         for key in OFF if individual else (INDIVIDUAL, *OFF):
             if self.values[key] != "0":
                 raise InputError(f"{where}: {key} = {self.values[key]}: must be 0 here")
         if self.values["Fl_Mode"] not in ("0", "1", "2"):
             raise InputError(f"{where}: Fl_Mode = {self.values['Fl_Mode']}: must be 0, 1 or 2")
-        self.mode = int(self.values["Fl_Mode"])  # says what acceleration the library is given
+        self.mode = int(self.values["Fl_Mode"])  # determines which acceleration the library receives
 
     def texts(self, changes, table):
-        """(text of DISCON.IN with changes, text of its rotor table); table(): Table where it has no file."""
+        """Return the texts of DISCON.IN with changes and rotor table; table(): Table if there is no file."""
         _check_entries(changes, self.values)
         changes = SILENT | {"PerfFileName": '"rotor.txt"'} | self.switched | changes
         named = self.path.parent / self.values["PerfFileName"].strip("\"'")
         if named.is_file():
             rows = read_text(named, "rotor performance")
         else:
-            made = table()
-            changes["PerfTableSize"] = (len(made.blade_pitch), len(made.ratio))
-            rows = table_text(made)
+            computed = table()
+            changes["PerfTableSize"] = (len(computed.blade_pitch), len(computed.ratio))
+            rows = table_text(computed)
         lines = []
         for line in self.text.splitlines():
-            found = ENTRY.match(line)
-            if found and found["name"] in changes:
-                line = f"{_words(changes[found['name']])}{line[found.end('value') :]}"
+            match = ENTRY.match(line)
+            if match and match["name"] in changes:
+                line = f"{_words(changes[match['name']])}{line[match.end('value') :]}"
             lines.append(line)
         return "\n".join([*lines, ""]), rows
 
@@ -138,11 +138,11 @@ def _check_entries(changes, known):
 
 
 def find_library():
-    """Return (path of libdiscon, [paths of the libraries that it needs]) of the installed wheel.
+    """Return (path of libdiscon, [paths of required libraries]) of the installed wheel.
 
-    Raises: InputError with what to install.
+    Raises: InputError with the install command.
     """
-    spec = importlib.util.find_spec("rosco")  # finds without importing: the toolbox needs far more
+    spec = importlib.util.find_spec("rosco")  # without importing the toolbox, which needs more packages
     if spec is None or not spec.submodule_search_locations:
         raise InputError(f"controller 'rosco': the ROSCO library is not installed; {INSTALL}")
     package = Path(next(iter(spec.submodule_search_locations)))
@@ -157,24 +157,24 @@ _needed = []  # libraries of the wheel, loaded once per process
 
 
 def _preload(paths):
-    """Load what private copies of libdiscon need. Raises: InputError if that fails."""
+    """Load the libraries required by private copies of libdiscon. Raises: InputError if loading fails."""
     if not _needed:
         try:
             _needed.extend(ctypes.CDLL(str(path), mode=ctypes.RTLD_GLOBAL) for path in paths)
         except OSError as error:
-            raise InputError(f"controller 'rosco': cannot load what it needs ({error}); {INSTALL}") from error
+            raise InputError(f"controller 'rosco': cannot load libraries ({error}); {INSTALL}") from error
 
 
-_redirecting = threading.Lock()  # of two threads at it, one would keep the other's redirection for good
+_redirecting = threading.Lock()  # overlapping redirections could leave standard output redirected
 
 
 class Rosco:
-    """One ROSCO controller; needs prepare(scene) before reset. See the module's text.
+    """Runs one ROSCO controller, see the module docstring; call prepare(scene) before reset.
 
-    settings: RoscoSettings, with which DISCON.IN is written for a scene, or a Discon, taken as it is.
-    changes: {name in DISCON.IN: value} that replace what is written there.
-    individual: whether it is given the loads of single blades and commands the pitch of each; a Discon then
-    is made for it too.
+    settings: RoscoSettings, from which DISCON.IN is written for a scene, or a Discon, used unchanged.
+    changes: {name in DISCON.IN: value} that replace values of DISCON.IN.
+    individual: whether the controller receives blade root loads and commands the pitch of each blade; a
+    Discon must be created with the same value.
     """
 
     def __init__(self, settings, control_dt, name="rosco", changes=None, individual=False):
@@ -184,16 +184,16 @@ class Rosco:
         self.name = str(name)
         self.individual = bool(individual)
         self._files = self._remove = None
-        # a turbine measures the rate of its pitching: its own DISCON.IN is given the change of that
-        turning = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
-        felt = {0: (), 1: ("nacelle_acceleration",), 2: (turning,)}[settings.mode]
+        # with a DISCON.IN of the turbine the acceleration is the difference of the measured pitch rate
+        rotation = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
+        motion = {0: (), 1: ("nacelle_acceleration",), 2: (rotation,)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
         blades = tuple(SWAPPED.values()) if self.individual else ()
-        self.information = (*used, *felt, *blades, "plant_model")
-        self._felt = felt
+        self.information = (*used, *motion, *blades, "plant_model")
+        self._motion = motion
 
     def __getstate__(self):
-        """Everything but the running library: a copy needs prepare() and reset() of its own."""
+        """Return the settings without the running library; call prepare() and reset() on a copy."""
         kept = ("settings", "control_dt", "name", "changes", "individual")
         return {key: getattr(self, key) for key in kept}
 
@@ -201,12 +201,12 @@ class Rosco:
         self.__init__(**state)
 
     def prepare(self, scene):
-        """Write DISCON.IN and the rotor's table for a scene, or those of the Discon.
+        """Write DISCON.IN and the rotor table for a scene, or those of the Discon.
 
-        Raises: InputError without wind or library, and for a change of what DISCON.IN does not have.
+        Raises: InputError without wind or library, and for changes of names not in DISCON.IN.
         """
         if scene.model.aero is None:
-            raise InputError(f"controller {self.name!r}: needs a scene with wind, for the rotor's table")
+            raise InputError(f"controller {self.name!r}: needs a scene with wind for the rotor table")
         self._source, needed = find_library()
         _preload(needed)
         turbine, density = scene.turbine, scene.platform.environment.air_density
@@ -214,12 +214,12 @@ class Rosco:
         if isinstance(self.settings, Discon):
             text, table = self.settings.texts(self.changes, lambda: _table(turbine, density))
         else:
-            made = _table(turbine, density)
-            values = deck(with_gains(scene), density, made, self.settings)
+            computed = _table(turbine, density)
+            values = deck(with_gains(scene), density, computed, self.settings)
             if self.individual:
                 values |= individual_entries(turbine, self.control_dt)
             _check_entries(self.changes, values)
-            text, table = deck_text(values | self.changes), table_text(made)
+            text, table = deck_text(values | self.changes), table_text(computed)
         if self._remove is not None:
             self._remove()
         self._files = tempfile.mkdtemp(prefix="fowt_rosco_")
@@ -228,10 +228,10 @@ class Rosco:
             Path(self._files, name).write_text(content)
 
     def reset(self, measurement):
-        """Load a fresh copy of the library and start it at a Measurement.
+        """Load a new copy of the library and start the controller at a Measurement.
 
         Raises: InputError if prepare() was not called or the library does not load; ControllerError with
-        the message of ROSCO if it does not start.
+        ROSCO's message if the controller does not start.
         """
         if self._files is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
@@ -242,14 +242,14 @@ class Rosco:
         self._first = (measurement.time, self._call(0, measurement))
 
     def act(self, measurement):
-        """Return (generator torque, blade pitch or that of each blade).
+        """Return (generator torque, blade pitch) or, with individual pitch, (torque, pitch of each blade).
 
-        Raises: ControllerError with ROSCO's own words where it fails.
+        Raises: ControllerError with ROSCO's message if the call fails.
         """
         if self._first is not None:
             time, commands = self._first
             self._first = None
-            if time == measurement.time:  # reset() has made this call
+            if time == measurement.time:  # reset() has already made this call
                 return commands
         return self._call(1, measurement)
 
@@ -262,8 +262,8 @@ class Rosco:
         s[19], s[20], s[22], s[26] = m.generator_speed, m.rotor_speed, m.generator_torque, m.wind_speed
         s[48], s[49], s[50] = TEXT_SIZE, len(self._deck), len(OUT_NAME)
         for entry, name in ((52, "nacelle_acceleration"), (82, "platform_pitch_acceleration")):
-            s[entry] = getattr(m, name) if name in self._felt else 0.0
-        if "platform_pitch_rate" in self._felt:
+            s[entry] = getattr(m, name) if name in self._motion else 0.0
+        if "platform_pitch_rate" in self._motion:
             rate = m.platform_pitch_rate
             s[82] = 0.0 if self._rate is None else (rate - self._rate) / self.control_dt
             self._rate = rate
@@ -275,7 +275,7 @@ class Rosco:
         failed = self._library.call(s, self._deck)
         if failed is not None:
             raise ControllerError(
-                f"controller {self.name!r} failed at t = {m.time:.3f} s: ROSCO says {failed!r}",
+                f"controller {self.name!r} failed at t = {m.time:.3f} s: ROSCO reports {failed!r}",
                 controller=self.name,
                 time=m.time,
                 returned=None,
@@ -286,11 +286,11 @@ class Rosco:
 # entries of the interface's array
 SWAPPED = {59: "azimuth", 3: "blade_pitch_1", 32: "blade_pitch_2", 33: "blade_pitch_3"}
 SWAPPED |= {28 + blade: f"root_out_of_plane_{blade}" for blade in (1, 2, 3)}
-OUT_NAME = b"rosco"  # root of the files that ROSCO would write at higher logging levels
+OUT_NAME = b"rosco"  # root name of log files at higher logging levels
 
 
 class _Copy:
-    """A private copy of libdiscon, unloaded with its owner."""
+    """Loads a private copy of libdiscon, which is unloaded with this object."""
 
     def __init__(self, source, folder):
         handle, path = tempfile.mkstemp(suffix=".so", dir=folder)
@@ -302,45 +302,45 @@ class _Copy:
         except (OSError, AttributeError) as error:
             raise InputError(f"controller 'rosco': {path} cannot be used ({error}); {INSTALL}") from error
         finally:
-            os.unlink(path)  # once loaded the file is not needed
+            os.unlink(path)  # the file is not needed after loading
         self._discon.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
         self._discon.restype = None
         self._message = ctypes.create_string_buffer(TEXT_SIZE)
         self._failure = ctypes.c_int32(0)
-        # writes out what the Fortran library has buffered for standard output
+        # flushes the Fortran library's buffer of standard output
         flushing = (library for library in _needed if hasattr(library, "_gfortran_flush_i4"))
         self._flush = getattr(next(flushing, None), "_gfortran_flush_i4", lambda unit: None)
-        self._nowhere = os.open(os.devnull, os.O_WRONLY)
-        self._end = weakref.finalize(self, _unload, library._handle, self._nowhere)
+        self._null = os.open(os.devnull, os.O_WRONLY)
+        self._end = weakref.finalize(self, _unload, library._handle, self._null)
 
     def call(self, swap, deck):
-        """Call DISCON on the swap array; None, or its message where it fails.
+        """Call DISCON on the swap array; return None, or the message of a failure.
 
-        File descriptor 1 leads nowhere meanwhile: the library greets every start with six lines there, and
-        says once a run that its wind estimator has left its bounds, whatever its logging level.
+        Standard output is suppressed during the call, because at every logging level the library prints six
+        lines at each start and a message when its wind estimator leaves its bounds.
         """
         with _redirecting:
-            kept = os.dup(1)
-            os.dup2(self._nowhere, 1)
+            saved = os.dup(1)
+            os.dup2(self._null, 1)
             try:
                 self._discon(swap.ctypes.data, ctypes.addressof(self._failure), deck, OUT_NAME, self._message)
                 self._flush(None)
             finally:
-                os.dup2(kept, 1)
-                os.close(kept)
+                os.dup2(saved, 1)
+                os.close(saved)
         if self._failure.value < 0:
             return self._message.value.decode(errors="replace").strip()
         return None
 
 
-def _unload(library, nowhere):
-    """Drop a library by its handle, and the file that its words went to."""
+def _unload(library, null):
+    """Unload a library by its handle and close the null device."""
     dlclose(library)
-    os.close(nowhere)
+    os.close(null)
 
 
 class Table(NamedTuple):
-    """Rotor performance over tip-speed ratio (n,) and blade pitch (m,) rad; coefficients (n, m)."""
+    """Holds rotor performance over tip-speed ratio (n,) and blade pitch (m,) rad; coefficients (n, m)."""
 
     ratio: np.ndarray
     blade_pitch: np.ndarray
@@ -349,7 +349,7 @@ class Table(NamedTuple):
     cq: np.ndarray
 
 
-_tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table): runs of one scene share it
+_tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table)
 
 
 def _table(turbine, density):
@@ -358,13 +358,13 @@ def _table(turbine, density):
 
     def make():
         cp, ct, cq = performance(build_blade_elements(turbine, density), RATIOS, PITCHES)
-        return turbine, Table(RATIOS, PITCHES, cp, ct, cq)  # with the turbine, whose id is then its own
+        return turbine, Table(RATIOS, PITCHES, cp, ct, cq)  # keeps the turbine, so that its id stays valid
 
     return _tables.get(key, make)[1]
 
 
 def poles(turbine, density, table):
-    """Return (wind m/s, pole 1/s) of the rotor speed alone at its steady states, from cut-in to cut-out."""
+    """Return (wind m/s, pole 1/s) of the isolated rotor speed at steady states, from cut-in to cut-out."""
     radius = turbine.rotor.tip_radius
     scale = 0.5 * density * pi * radius**3
     inertia = _inertia(turbine)
@@ -385,20 +385,20 @@ def poles(turbine, density, table):
 
 
 def best_ratio(turbine, table):
-    """Return the tip-speed ratio of most power at the finest blade pitch."""
+    """Return the tip-speed ratio of maximum power at minimum blade pitch."""
     power = RectBivariateSpline(table.ratio, table.blade_pitch, table.cp)
     fine = np.linspace(table.ratio[0], table.ratio[-1], 2000)
     return float(fine[np.argmax(power(fine, turbine.pitch_drive.minimum)[:, 0])])
 
 
 def _inertia(turbine):
-    """Of rotor and generator about the low-speed shaft, kg m2."""
+    """Return the inertia of rotor and generator about the low-speed shaft, kg m2."""
     drive = turbine.drivetrain
     return turbine.rotor.inertia + drive.gear_ratio**2 * drive.generator_inertia
 
 
 def pitch_gains(turbine):
-    """(KP, KI), each (n,), over SCHEDULE in ROSCO's sign: blade pitch over reference less measured speed."""
+    """Return (KP, KI), each (n,), over SCHEDULE with ROSCO's sign: pitch per (reference - measured speed)."""
     published = published_set(turbine, "oc3")
     schedule = 1.0 / (1.0 + SCHEDULE / published.gain_schedule_pitch)
     return -published.KP * schedule, -published.KI * schedule
@@ -488,11 +488,11 @@ def deck(turbine, density, table, settings):
 
 
 def individual_entries(turbine, control_dt):
-    """{name: value} of DISCON.IN that switch on individual pitch control at 1P."""
+    """Return the {name: value} of DISCON.IN that enable individual pitch control at 1P."""
     gain = BANDWIDTH * turbine.rated_rotor_speed / -root_slope(turbine).at_zero
     return {
         INDIVIDUAL: 1,
-        "IPC_Vramp": tuple(share * turbine.rated_wind_speed for share in IPC_RAMP),
+        "IPC_Vramp": tuple(fraction * turbine.rated_wind_speed for fraction in IPC_RAMP),
         "IPC_SatMode": 2,
         "IPC_IntSat": IPC_AMPLITUDE,
         "IPC_KP": (0.0, 0.0),
@@ -510,13 +510,13 @@ def _words(value):
 
 
 def deck_text(values):
-    """Return DISCON.IN of a deck: a value and its name on each line."""
+    """Return the text of DISCON.IN with a value and its name on each line."""
     lines = [f"{_words(value)}   ! {name} -" for name, value in values.items()]
     return "\n".join(["! ROSCO deck, written for one run", *lines, ""])
 
 
 def table_text(table):
-    """Return the text of a Table as ROSCO reads it."""
+    """Return the text of a Table in ROSCO's format."""
     lines = ["# Rotor performance", "#", "#", "# Pitch angle vector (deg)"]
     lines += [_words(table.blade_pitch / DEGREE), "# TSR vector", _words(table.ratio)]
     lines += ["# Wind speed vector", "0", ""]
@@ -527,21 +527,21 @@ def table_text(table):
 
 
 def _made(turbine, control_dt, name, individual=False, **settings):
-    """Return a Rosco with the turbine's own DISCON.IN, else with RoscoSettings."""
-    own = RoscoSettings(**settings) if turbine.discon is None else Discon(turbine.discon, individual)
-    return Rosco(own, control_dt, name, individual=individual)
+    """Return a Rosco with the turbine's DISCON.IN if any, otherwise with RoscoSettings."""
+    chosen = RoscoSettings(**settings) if turbine.discon is None else Discon(turbine.discon, individual)
+    return Rosco(chosen, control_dt, name, individual=individual)
 
 
 def rosco(turbine, control_dt):
-    """The ROSCO library: with the turbine's own DISCON.IN, else the OC3 gains and no floating feedback."""
+    """Run the ROSCO library with the turbine's DISCON.IN, or OC3 gains without floating feedback."""
     return _made(turbine, control_dt, "rosco")
 
 
 def rosco_float(turbine, control_dt):
-    """The ROSCO library with OC3 gains and its floating feedback, tuned on training cases; or as rosco."""
+    """Run the ROSCO library with OC3 gains and floating feedback tuned on training cases; or as rosco."""
     return _made(turbine, control_dt, "rosco_float", mode=1, **tuned_for("rosco_float", turbine))
 
 
 def rosco_ipc(turbine, control_dt):
-    """The ROSCO library as rosco, with its individual pitch control at 1P."""
+    """Run the ROSCO library as rosco, with its individual pitch control at 1P."""
     return _made(turbine, control_dt, "rosco_ipc", individual=True)

@@ -1,4 +1,4 @@
-"""Settings of the laws: frozen numbers, each within its range."""
+"""Defines the base class of control-law settings, which checks the range of each value."""
 
 from dataclasses import fields, replace
 from typing import ClassVar
@@ -12,10 +12,10 @@ POSITIVE_OR_INF = {"low": 0.0, "low_open": True, "infinite": True, "allowed": "p
 
 
 class Settings:
-    """Base of frozen dataclasses of settings. Raises: InputError naming the key, value and allowed range."""
+    """Checks the values of a frozen settings dataclass. Raises: InputError with key, value, allowed range."""
 
-    RANGES: ClassVar = {}  # of the numbers: arguments of check_number
-    NAME: ClassVar = ""  # before the key in messages
+    RANGES: ClassVar = {}  # {key: arguments of check_number}
+    NAME: ClassVar = ""  # prefix of the key in messages
 
     def __post_init__(self):
         for key, limits in self.RANGES.items():

@@ -1,7 +1,7 @@
-"""Reads the settings that training/design/tune.py found on OC3-Hywind (tuned.toml), for any turbine.
+"""Reads the settings tuned by training/design/tune.py on OC3-Hywind (tuned.toml), for any turbine.
 
-For turbines other than the NREL 5 MW they are scaled: velocities by the rated wind, frequencies by the rated
-rotor speed, torques by the rated torque. They are not tuned again.
+For turbines other than the NREL 5 MW the settings are scaled, not tuned again: velocities by rated wind,
+frequencies by rated rotor speed, torques by rated torque.
 """
 
 import tomllib
@@ -14,7 +14,7 @@ TUNED = Path(__file__).parent / "tuned.toml"
 
 
 def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
-    """Return settings of a controller in the units of a turbine; as they are for the NREL 5 MW turbine."""
+    """Return the tuned settings of a controller scaled to a turbine; unchanged for the NREL 5 MW turbine."""
     wind = turbine.rated_wind_speed / RATED_WIND
     frequency = turbine.rated_rotor_speed / ROTOR_SPEED
     factors = {

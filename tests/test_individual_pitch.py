@@ -319,8 +319,14 @@ def test_the_guard_feathers_all_blades():
     ("settings", "message"),
     [
         ({"pitch": "collective", "action_mode": "individual"}, "pitch = 'collective': action_mode"),
-        ({"pitch": "collective", "observation": ("hub_yaw_moment",)}, "'hub_yaw_moment': is measured with"),
-        ({"observation": ("hub_yaw_moment",), "sensors": "standard"}, "the sensor chain 'standard' does not"),
+        (
+            {"pitch": "collective", "observation": ("hub_yaw_moment",)},
+            "'hub_yaw_moment': is measured only with",
+        ),
+        (
+            {"observation": ("hub_yaw_moment",), "sensors": "standard"},
+            "not measured by the sensor chain 'standard'",
+        ),
     ],
 )
 def test_settings_that_do_not_go_together_are_refused(settings, message):

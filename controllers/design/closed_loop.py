@@ -1,4 +1,4 @@
-"""Linear closed loop of a plant and the PI law: what its gains do to every mode, theory.md, section 4."""
+"""Analyses the linear closed loop of a plant and the PI law, mode by mode (theory.md, section 4)."""
 
 from math import isinf, pi
 
@@ -19,19 +19,19 @@ TORQUE_STEP = 1e-4  # rad/s of rotor speed, for the slope of the torque curve
 
 
 def closed_loop_matrix(model: LinearModel, settings: PISettings):
-    """(A, names): the plant's states, then filtered rotor speed and speed-error integral, continuous in time.
+    """Return the continuous-time (A, names) of plant states, filtered rotor speed, speed-error integral.
 
-    The gain schedule counts with its slope: the integral term is GK(beta) times the integral, so a rise
-    of beta lowers GK. With the schedule on the last command that divides every gain by 2 - GK; on the
-    measured pitch it adds -(1 - GK) times that pitch to the command.
-    Raises: InputError if the pitch rests on a limit (below rated the loop is open).
+    The slope of the gain schedule is included: the integral term is GK(beta) times the integral, so an
+    increase of beta lowers GK. With the schedule on the last command this divides every gain by 2 - GK; on
+    the measured pitch it adds -(1 - GK) times this pitch to the command.
+    Raises: InputError if the pitch is at a limit (below rated the loop is open).
     """
     model = with_pitch_lag(model)
     point = model.point
     pitch = float(point.state[State.BLADE_PITCH])
     if not settings.pitch_minimum < pitch < settings.pitch_maximum:
         raise InputError(
-            f"blade pitch {pitch / DEGREE:.4g} deg rests on a limit: the pitch loop is open there;"
+            f"blade pitch {pitch / DEGREE:.4g} deg is at a limit, where the pitch loop is open;"
             " choose a wind above rated"
         )
     n = len(model.states)
@@ -66,12 +66,12 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
 def platform_damping(model, settings):
     """Return the damping ratio of the platform-pitch mode of a LinearModel under a PI law.
 
-    Of the modes of that name (or all) it has the period nearest to the platform's own, with blades and torque
-    held: the rotor loop may come near.
+    Of the modes with this name (or all modes), the one with the period nearest to the open-loop period with
+    fixed blade pitch and torque is taken, because the rotor loop may have a similar period.
     """
     a, names = closed_loop_matrix(model, settings)
-    found = modes(a, names, model.cm_height, model.arm)
-    pitching = [mode for mode in found if mode.name == "platform_pitch"] or found
+    computed = modes(a, names, model.cm_height, model.arm)
+    pitching = [mode for mode in computed if mode.name == "platform_pitch"] or computed
     period = 2.0 * pi / platform_frequency(model)
     return min(pitching, key=lambda mode: abs(mode.period - period)).damping_ratio
 

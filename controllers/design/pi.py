@@ -1,7 +1,7 @@
-"""Designs PI gains and schedule for a frequency and damping ratio, on linear models over the wind.
+"""Designs PI gains and schedule for a frequency and damping ratio, on linear models over wind speed.
 
-As in the published design (theory.md, Eq. (A6)) the design model is the rotor alone, without the aerodynamic
-damping of its speed; the effect on the platform is computed afterwards from the complete plant.
+As in the published design (theory.md, Eq. (A6)) the design model is the isolated rotor without aerodynamic
+damping of rotor speed; the effect on the platform is computed afterwards from the complete plant.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ SCHEDULES = ("loop", "published")
 
 @dataclass(frozen=True)
 class PIDesign:
-    """Gains on generator speed and what they give: table has one row per wind above rated."""
+    """Holds gains on generator speed and the resulting loops: table has one row per wind above rated."""
 
     KP: float  # s, at zero pitch
     KI: float
@@ -29,12 +29,12 @@ class PIDesign:
 
 
 def design_pi(models, turbine, omega, zeta, schedule="loop"):
-    """PIDesign of a turbine for a rotor loop of frequency omega (rad/s) and damping ratio zeta.
+    """Return the PIDesign of a turbine for a rotor loop of frequency omega (rad/s) and damping ratio zeta.
 
-    models: {wind: LinearModel}; those whose pitch rests on a limit are passed over. The rotor's response to
-    blade pitch is fitted by s (1 + pitch/p). schedule "loop" makes the small-signal gain of the scheduled
-    law follow its inverse: since the schedule multiplies the integral (theory.md, Eq. (A7)) that takes
-    gain_schedule_pitch = 2 p. "published" takes p, as Jonkman did, and its loop is slower than designed.
+    models: {wind: LinearModel}; models with the pitch at a limit are skipped. The rotor's response to blade
+    pitch is fitted by s (1 + pitch/p). With schedule "loop" the small-signal gain of the scheduled law
+    follows the inverse of this fit: because the schedule multiplies the integral (theory.md, Eq. (A7)),
+    gain_schedule_pitch = 2 p. "published" uses p, as Jonkman, and gives a loop slower than designed.
     Raises: InputError for omega or zeta outside their ranges, or fewer than two winds above rated.
     """
     for key, value, high in (("omega", omega, 3.0), ("zeta", zeta, 5.0)):
@@ -49,7 +49,7 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
             pitches.append(float(model.point.state[State.BLADE_PITCH]))
             slopes.append(-model.A[model.index("rotor_speed"), model.index("blade_pitch")])
     if len(winds) < 2:
-        raise InputError("winds: at least two with the blade pitch off its limits are needed, above rated")
+        raise InputError("winds: must include at least two above rated, with the blade pitch off its limits")
     pitches, slopes = np.array(pitches), np.array(slopes)
     columns = np.column_stack([np.ones(len(winds)), pitches]) / slopes[:, None]
     at_zero, growth = np.linalg.lstsq(columns, np.ones(len(winds)), rcond=None)[0]

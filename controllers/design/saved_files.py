@@ -1,7 +1,7 @@
-"""Saves and loads controllers as JSON files with a version, whose every value is checked.
+"""Saves and loads controllers as versioned JSON files and checks every value.
 
-A design of kind "pi" contains gains and schedule, one of kind "lqr" its settings and linear models, so that
-it runs at any control period and independently of later changes of the plant. Used by name as design:FILE.
+A design of kind "pi" contains gains and schedule, a design of kind "lqr" settings and linear models, so that
+designs run at any control period, independently of later changes of the plant. Controller name: design:FILE.
 """
 
 import json
@@ -27,11 +27,11 @@ SPACING = 1.0  # m/s, between the models of a design of kind "lqr"
 
 
 def save_design(path, kind, scene, settings, command, **further):
-    """Return the path written: a design for the scene's platform and turbine.
+    """Write a design for the scene's platform and turbine; return its path.
 
-    settings: PI_KEYS, or "lqg" and "models" for kind "lqr" (lqr_settings); command: what made it, to be
-    read by people; further: tables of the design, which are not read back.
-    Raises: InputError unless path ends with .json and the settings are those of the kind.
+    settings: PI_KEYS, or "lqg" and "models" for kind "lqr" (lqr_settings); command: command line of the
+    design, for information only; further: tables of the design, which are not read back.
+    Raises: InputError unless path ends with .json and the settings match the kind.
     """
     path = Path(path)
     if path.suffix.lower() != ".json":
@@ -46,7 +46,7 @@ def save_design(path, kind, scene, settings, command, **further):
 
 
 def lqr_settings(chosen, models):
-    """Return the settings of kind "lqr" for save_design, of LQGSettings and DesignModels."""
+    """Return the settings of kind "lqr" for save_design, from LQGSettings and DesignModels."""
     rows = [{key: np.asarray(value).tolist() for key, value in vars(model).items()} for model in models]
     return {"lqg": asdict(chosen), "models": rows}
 
@@ -54,7 +54,7 @@ def lqr_settings(chosen, models):
 def load_design(path):
     """Return the factory (turbine, control_dt) -> controller of a saved design.
 
-    Raises: InputError that names file, key and value; on the call, for a turbine it was not made for.
+    Raises: InputError that names file, key and value; the factory raises InputError for another turbine.
     """
     where = f"design file {str(path)!r}"
     text = read_text(Path(path), "design")
@@ -68,11 +68,11 @@ def load_design(path):
 def _factory(content, where, name="design"):
     """Return the factory of the checked contents of a design."""
     if not isinstance(content, dict) or content.get("format") != FORMAT:
-        raise InputError(f'{where}: no design of a controller ("format" must be {FORMAT!r})')
+        raise InputError(f'{where}: is not a controller design ("format" must be {FORMAT!r})')
     if content.get("version") != VERSION:
         raise InputError(
-            f"{where}: version = {content.get('version')!r}: this program reads {VERSION};"
-            " make the design again (its command is in the file)"
+            f"{where}: version = {content.get('version')!r}: must be {VERSION};"
+            " repeat the design (its command is in the file)"
         )
     for key in KEYS:
         if key not in content:
@@ -94,27 +94,27 @@ def _factory(content, where, name="design"):
     return factory
 
 
-def _check_keys(given, expected, place, where):
-    """Raises InputError unless given is a table with exactly the expected keys."""
-    if not isinstance(given, dict):
-        raise InputError(f"{where}: {place}: must be an object with {', '.join(expected)}")
-    for key in given:
+def _check_keys(table, expected, entry, where):
+    """Raise InputError unless table is a dict with exactly the expected keys."""
+    if not isinstance(table, dict):
+        raise InputError(f"{where}: {entry}: must be an object with {', '.join(expected)}")
+    for key in table:
         if key not in expected:
-            raise InputError(f"{where}: {unknown(f'key in {place}:', key, expected)}")
+            raise InputError(f"{where}: {unknown(f'key in {entry}:', key, expected)}")
     for key in expected:
-        if key not in given:
-            raise InputError(f"{where}: {place}.{key} is missing")
+        if key not in table:
+            raise InputError(f"{where}: {entry}.{key} is missing")
 
 
 def _finite(key, value):
-    """Return a finite number as a float. Raises: InputError that shows a text without quotation marks."""
+    """Return a finite number as a float. Raises: InputError with the value as plain text."""
     if not is_number(value):
         raise InputError(f"{key} = {str(value)[:60]}: must be a finite number")
     return float(value)
 
 
 def _pi(settings, where):
-    """Return maker of a PI controller from its settings; a gain_schedule_pitch of null means no schedule."""
+    """Return a function that makes a PI controller; a gain_schedule_pitch of null means no schedule."""
     values = {}
     for key, value in settings.items():
         free = key == "gain_schedule_pitch" and value is None
@@ -123,7 +123,7 @@ def _pi(settings, where):
 
 
 def _lqr(settings, where):
-    """Return the maker of an lqr controller from its LQGSettings and models."""
+    """Return a function that makes an lqr controller from its LQGSettings and models."""
     known = [item.name for item in fields(LQGSettings)]
     _check_keys(settings["lqg"], known, "settings.lqg", where)
     values = {key: _finite(f"{where}: settings.lqg.{key}", value) for key, value in settings["lqg"].items()}
@@ -133,7 +133,7 @@ def _lqr(settings, where):
         raise InputError(f"{where}: settings.lqg: {error}") from None
     rows = settings["models"]
     if not isinstance(rows, list) or len(rows) < 2:
-        raise InputError(f"{where}: settings.models: must list models of two winds or more")
+        raise InputError(f"{where}: settings.models: must list models of at least two winds")
     models = [_model(row, f"settings.models[{i}]", where) for i, row in enumerate(rows)]
     for i in range(1, len(models)):
         if not math.isclose(models[i].wind - models[i - 1].wind, SPACING, rel_tol=1e-9):
@@ -146,36 +146,35 @@ def _lqr(settings, where):
         lowest = lowest_design_wind(turbine)
         if models[-1].wind < lowest:
             raise InputError(
-                f"settings.models: the last wind is {models[-1].wind:g} m/s; one of {lowest} m/s or more is"
-                " needed"
+                f"settings.models: the last wind is {models[-1].wind:g} m/s: must be at least {lowest} m/s"
             )
         try:
             return LQR(turbine, control_dt, chosen, name, models=models)
         except (np.linalg.LinAlgError, ValueError) as error:
             if isinstance(error, InputError):
                 raise
-            raise InputError(f"models: no gains stabilise them: {error}") from None
+            raise InputError(f"models: cannot be stabilised: {error}") from None
 
     return make
 
 
-def _model(row, place, where):
+def _model(row, entry, where):
     """Return the DesignModel of one entry of settings.models."""
-    _check_keys(row, MODEL_SHAPES, place, where)
+    _check_keys(row, MODEL_SHAPES, entry, where)
     values = {}
     for key, shape in MODEL_SHAPES.items():
         if not shape:
-            values[key] = _finite(f"{where}: {place}.{key}", row[key])
+            values[key] = _finite(f"{where}: {entry}.{key}", row[key])
             continue
         try:
             array = np.array(row[key], dtype=float)
         except (TypeError, ValueError):
             array = np.empty(0)
         if array.shape != shape or not np.isfinite(array).all():
-            raise InputError(f"{where}: {place}.{key}: must be {' x '.join(map(str, shape))} finite numbers")
+            raise InputError(f"{where}: {entry}.{key}: must be {' x '.join(map(str, shape))} finite numbers")
         values[key] = array
     return DesignModel(**values)
 
 
-# kind: keys of settings, maker's maker
+# kind: (keys of settings, function that returns the maker of the controller)
 DESIGN_KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("lqg", "models"), _lqr)}

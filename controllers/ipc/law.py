@@ -2,16 +2,16 @@
 
 The out-of-plane root moments are transformed to the hub's tilt and yaw moment M
 (controllers/ipc/design.py). The moment without cyclic pitch theta is estimated as M - G theta with the
-slope G of the root moment, scheduled on the mean pitch; it passes a notch at 3P, and theta follows -(M - G
-theta)/G with a first-order lag, which without the notch is integral control of M with the gain
+slope G of the root moment, scheduled on the mean pitch. The estimate passes a notch at 3P, and theta follows
+-(M - G theta)/G with a first-order lag; without the notch this is integral control of M with the gain
 bandwidth/|G|. The azimuth of the inverse transformation leads by the lag of pitch drive and control period
 at 1P, which decouples tilt and yaw.
 
-The cyclic amplitude is limited to `amplitude`, by the drive's rate at the present rotor speed, and to the
-distance of the mean pitch from the drive's ends; there is no windup. With a `bound` theta follows -(1 -
-bound/|M - G theta|) (M - G theta)/G, and zero within the bound: output-constrained control of tilt and yaw
-together, Hummel, Kober and Mulders, Wind Energ. Sci. 10, 2005-2024, 2025. The yaw moment, which yaws the
-platform, is cancelled below `yaw_corner` only, and the tilt moment, whose control excites sway and roll,
+The cyclic amplitude is limited to `amplitude`, by the drive's rate at the present rotor speed, and by the
+distance of the mean pitch from the drive's limits, without windup. With a `bound` theta follows -(1 -
+bound/|M - G theta|) (M - G theta)/G, and zero within the bound: output-constrained control of the combined
+tilt and yaw, Hummel, Kober and Mulders, Wind Energ. Sci. 10, 2005-2024, 2025. The yaw moment, which yaws the
+platform, is cancelled only below `yaw_corner`, and the tilt moment, whose control excites sway and roll,
 passes `tilt_notches`.
 """
 
@@ -35,9 +35,9 @@ from fowt_env.plant.state import BLADES, Command, State
 
 TILT_NOTCHES = 3  # at most, in addition at 3P
 COEFFICIENTS = 5  # of a notch: b0, b1, b2, a1, a2
-NYQUIST_SHARE = 0.9  # of half the sampling frequency, beyond which no notch is placed
+NYQUIST_SHARE = 0.9  # of the Nyquist frequency, upper limit of notch frequencies
 BELOW_PLATFORM = 0.25  # of the slowest platform frequency: corner of the yaw moment of ipc_floating
-CONSTRAINED_BOUND = 0.1  # of the greatest root moment in steady wind, of ipc_constrained
+CONSTRAINED_BOUND = 0.1  # of the largest root moment in steady wind, bound of ipc_constrained
 
 
 @dataclass(frozen=True)
@@ -54,12 +54,12 @@ class IPCSettings(Settings):
     }
 
     bandwidth: float = BANDWIDTH
-    amplitude: float = 5.0 * DEGREE  # rad, greatest cyclic pitch
-    rate_share: float = 0.8  # of the drive's rate limit that the cyclic pitch may use
+    amplitude: float = 5.0 * DEGREE  # rad, largest cyclic pitch
+    rate_share: float = 0.8  # fraction of the drive's rate limit available to the cyclic pitch
     notch_damping: float = 0.5  # of the notch at 3P: half its width over its frequency
     lead: bool = True  # whether the azimuth leads by the drive's lag
-    bound: float = 0.0  # of the moment that is left, as a fraction of the greatest steady root moment
-    tilt_notches: tuple[float, ...] = ()  # rad/s, of the platform
+    bound: float = 0.0  # tolerated moment, fraction of the largest steady root moment
+    tilt_notches: tuple[float, ...] = ()  # rad/s, platform frequencies removed from the tilt moment
     tilt_damping: float = 0.5  # of these notches
     yaw_corner: float = inf  # rad/s, of a first-order low pass of the yaw moment; inf: none
 
@@ -67,16 +67,16 @@ class IPCSettings(Settings):
         super().__post_init__()
         if len(self.tilt_notches) > TILT_NOTCHES:
             raise InputError(
-                f"tilt_notches: {len(self.tilt_notches)} frequencies: at most {TILT_NOTCHES} fit"
+                f"tilt_notches: {len(self.tilt_notches)} frequencies: must be at most {TILT_NOTCHES}"
             )
         for frequency in self.tilt_notches:
             check_number("tilt_notches", frequency, **POSITIVE)
 
 
 class CyclicParameter(IntEnum):
-    """Entries of the law's parameter array beyond those it shares with the PI law."""
+    """Enumerates the law's parameters that follow those of the PI law."""
 
-    DECAY = END  # of the distance to the target, in a period
+    DECAY = END  # fraction of the distance to the target that remains after one period
     SLOPE = DECAY + 1  # G at zero pitch, N m/rad
     DOUBLING = DECAY + 2  # rad
     AMPLITUDE = DECAY + 3  # rad
@@ -84,7 +84,7 @@ class CyclicParameter(IntEnum):
     NOTCH_DAMPING = DECAY + 5
     LEAD_TIME = DECAY + 6  # s
     BOUND = DECAY + 7  # N m
-    YAW_DECAY = DECAY + 8  # of the yaw moment's low pass, in a period
+    YAW_DECAY = DECAY + 8  # fraction of the yaw moment's low pass that remains after one period
     NOTCHES = DECAY + 9  # coefficients of the tilt moment's notches
 
 
@@ -92,7 +92,7 @@ N_PARAMETERS = CyclicParameter.NOTCHES + TILT_NOTCHES * COEFFICIENTS
 
 
 class CyclicMemory(IntEnum):
-    """Entries of the law's memory array beyond those it shares with the PI law."""
+    """Enumerates the law's memory entries that follow those of the PI law."""
 
     STARTED = len(Memory)  # 0 before the first period
     BLADES = STARTED + 1  # last commands of the three blades, rad
@@ -109,7 +109,7 @@ N_MEMORY = CyclicMemory.FILTERS + 2 * (2 + TILT_NOTCHES)
 def notch_coefficients(frequency, damping, dt):
     """Return (b0, b1, b2, a1, a2) of (s^2 + w^2)/(s^2 + 2 damping w s + w^2) at w = frequency, rad/s.
 
-    Bilinear, exact at w.
+    Bilinear transformation, exact at w.
     """
     k = tan(0.5 * min(frequency * dt, NYQUIST_SHARE * pi))
     scale = 1.0 / (1.0 + 2.0 * damping * k + k * k)
@@ -119,9 +119,9 @@ def notch_coefficients(frequency, damping, dt):
 
 @kernel
 def filtered(value, coefficients, memory, at, started):
-    """Return the output of a second-order filter; advances its two states in memory by one period.
+    """Return the output of a second-order filter and advance its two states in memory by one period.
 
-    Where it has not started it rests at this value.
+    If not started, the states are first initialised to the steady state of this value.
     """
     b0, b1, b2, a1, a2 = coefficients
     if not started:
@@ -148,14 +148,14 @@ def without_platform(tilt, yaw, parameters, memory, started):
 
 @kernel
 def share_beyond(tilt, yaw, bound):
-    """Return the fraction of a moment (N m) by which its magnitude exceeds the bound; 0 within it."""
+    """Return the fraction of a moment (N m) by which its magnitude exceeds the bound; 0 within the bound."""
     magnitude = hypot(tilt, yaw)
     return 0.0 if magnitude <= bound else 1.0 - bound / magnitude
 
 
 @kernel
 def greatest_amplitude(mean_pitch, rotor_speed, parameters):
-    """Return the greatest cyclic pitch (rad) at a mean pitch (rad) and rotor speed, rad/s."""
+    """Return the largest permitted cyclic pitch (rad) at a mean pitch (rad) and rotor speed, rad/s."""
     p = parameters
     room = min(mean_pitch - p[Parameter.PITCH_MINIMUM], p[Parameter.PITCH_MAXIMUM] - mean_pitch)
     room = min(room, p[CyclicParameter.AMPLITUDE])
@@ -187,9 +187,9 @@ def cyclic_step(parameters, memory, measurement, command):
     yaw = filtered(yaw - slope * across, third, memory, at + 2, started)
     tilt, yaw = without_platform(tilt, yaw, p, memory, started)
 
-    share, follow = share_beyond(tilt, yaw, p[CyclicParameter.BOUND]), 1.0 - p[CyclicParameter.DECAY]
-    along += follow * (-share * tilt / slope - along)
-    across += follow * (-share * yaw / slope - across)
+    fraction, follow = share_beyond(tilt, yaw, p[CyclicParameter.BOUND]), 1.0 - p[CyclicParameter.DECAY]
+    along += follow * (-fraction * tilt / slope - along)
+    across += follow * (-fraction * yaw / slope - across)
     limit, amplitude = greatest_amplitude(mean, rotor_speed, p), hypot(along, across)
     if amplitude > limit:
         along, across = along * limit / amplitude, across * limit / amplitude
@@ -214,7 +214,7 @@ def ipc_law(parameters, memory, measurement, command):
 
 
 class IPC(PI):
-    """PI law of a PISettings with the cyclic pitch of an IPCSettings; needs prepare(scene) before reset."""
+    """Implements the PI law with the cyclic pitch of an IPCSettings; call prepare(scene) before reset."""
 
     kernel = staticmethod(ipc_law)
     individual = True
@@ -224,8 +224,8 @@ class IPC(PI):
     )  # fmt: skip
 
     def __init__(self, settings, cyclic, control_dt, name="ipc"):
-        own = np.full(N_PARAMETERS - END, np.nan)  # until prepare
-        super().__init__(settings, control_dt, name, N_MEMORY - len(Memory), own)
+        extra = np.full(N_PARAMETERS - END, np.nan)  # until prepare
+        super().__init__(settings, control_dt, name, N_MEMORY - len(Memory), extra)
         self.cyclic = cyclic
 
     def cyclic_settings(self, scene):
@@ -249,7 +249,7 @@ class IPC(PI):
             exp(-self.law_dt * cyclic.yaw_corner),  # 0 without a corner
         )
         coefficients = np.zeros((TILT_NOTCHES, COEFFICIENTS))
-        coefficients[:, 0] = 1.0  # passes everything
+        coefficients[:, 0] = 1.0  # all-pass
         for k, frequency in enumerate(cyclic.tilt_notches):
             coefficients[k] = notch_coefficients(float(frequency), cyclic.tilt_damping, self.law_dt)
         p[CyclicParameter.NOTCHES :] = coefficients.ravel()
@@ -268,7 +268,7 @@ class IPC(PI):
 
 
 class FloatingIPC(IPC):
-    """IPC that does not act at the platform's frequencies of sway, roll and yaw."""
+    """Implements IPC without action at the platform's frequencies of sway, roll and yaw."""
 
     inputs = (*IPC.inputs, "plant_model")
 
@@ -280,16 +280,16 @@ class FloatingIPC(IPC):
 
 
 def ipc(turbine, control_dt):
-    """PI law with 1P individual pitch control: tilt and yaw moment of the hub to cyclic pitch."""
+    """Apply the PI law with 1P individual pitch control: hub tilt and yaw moment to cyclic pitch."""
     return IPC(PISettings.published(turbine), IPCSettings(), control_dt, "ipc")
 
 
 def ipc_constrained(turbine, control_dt):
-    """As ipc, as far as the hub's moments exceed a bound: most of the relief for half of the pitch travel."""
+    """Apply ipc to hub moments above a bound: most of the load reduction for half of the pitch travel."""
     settings = IPCSettings(bound=CONSTRAINED_BOUND)
     return IPC(PISettings.published(turbine), settings, control_dt, "ipc_constrained")
 
 
 def ipc_floating(turbine, control_dt):
-    """As ipc, but leaves sway, roll and yaw of the platform alone."""
+    """Apply ipc without exciting sway, roll and yaw of the platform."""
     return FloatingIPC(PISettings.published(turbine), IPCSettings(), control_dt, "ipc_floating")

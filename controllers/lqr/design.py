@@ -1,13 +1,13 @@
 """Designs LQG control of blade pitch and generator torque on the linear models of a scene.
 
-Per wind speed: surge, platform pitch, rotor and pitch actuator in the plane, the rotor-averaged wind as a
-second-order filter fitted to its Kaimal spectrum, the waves of the site's sea as one resonance with the
-hull's force at the spectrum's peak. The controls are the rates of torque and blade-pitch command. Other
-internal states are residualised (analysis/reduced_model.py); the estimator represents the rest by a moment
-on the platform.
+The model at each wind speed has surge, platform pitch, rotor and pitch actuator in the plane, the
+rotor-averaged wind as a second-order filter fitted to its Kaimal spectrum, and the waves of the site's sea as
+one resonance with the hull's force at the spectrum's peak. The controls are the rates of torque and
+blade-pitch command. Other internal states are residualised (analysis/reduced_model.py); the estimator
+represents unmodelled effects by a moment on the platform.
 
 Winds, travels and moments of the NREL 5 MW turbine are scaled to other turbines: winds by the difference of
-the rated ones, blade-pitch travel by the rated rotor speed, moments by swept area and hub height.
+rated winds, blade-pitch travel by rated rotor speed, moments by swept area and hub height.
 """
 
 from dataclasses import dataclass, replace
@@ -32,32 +32,32 @@ from fowt_env.plant.state import State
 from fowt_env.weather.turbulence import amplitudes
 
 SITE = "gulf_of_maine_normal"  # joint sea states, as in the named suites
-LAST_SEA_WIND = 24.0  # m/s, where the table ends: the sea beyond is designed for as there
+LAST_SEA_WIND = 24.0  # m/s, end of the table: its sea is also used at higher winds
 TURBULENCE_CLASS = "B"
-ABOVE_RATED = 0.1  # m/s, least distance of the lowest wind that is designed for from the rated one
+ABOVE_RATED = 0.1  # m/s, minimum distance of the lowest design wind from rated wind
 PLANT = ("surge", "platform_pitch", "vx", "wy", "rotor_speed", "blade_pitch")
 SENSORS = ("rotor_speed", "blade_pitch", "platform_pitch", "platform_pitch_rate", "nacelle_acceleration")
 N_PLANT, N_SENSORS = len(PLANT), len(SENSORS)
 N_STATE = N_PLANT + 5  # estimated: plant, two wind states, two wave states, slow moment on the platform
 N_FEEDBACK = N_PLANT + 7  # fed back: plant, torque, pitch command, speed integral, wind and wave states
 WIND, WAVE, MOMENT = N_PLANT, N_PLANT + 2, N_PLANT + 4
-SHARE_WIND = 18.0  # m/s, where the fraction of platform pitch holds as given
-SHARE_RANGE = (0.02, 0.98)  # over the wind
-WAVE_DAMPING = 0.2  # of the resonance that stands for the sea's spectrum
-# Per sample: rad/s, rad, rad, rad/s, m/s2. With that of the blade pitch as large as a cheap encoder's, what
-# the feedback sees of it is nearly the actuator's model, and its noise does not come back as travel.
+SHARE_WIND = 18.0  # m/s, wind at which the setting `share` applies
+SHARE_RANGE = (0.02, 0.98)  # limits of share over the wind
+WAVE_DAMPING = 0.2  # damping ratio of the resonance that represents the wave spectrum
+# Per sample: rad/s, rad, rad, rad/s, m/s2. The noise of blade pitch is that of a cheap encoder: the estimate
+# then follows the actuator model, so that measurement noise does not cause pitch travel.
 SENSOR_NOISE = (3e-3, 5e-3, 1e-3, 2e-4, 3e-2)
 MODEL_NOISE = (1e-3, 1e-4, 1e-2, 1e-4, 3e-3, 1e-3)  # per root second, on the plant's states
-MOMENT_NOISE = 2e5  # N m per root second: random walk of what no other state explains
+MOMENT_NOISE = 2e5  # N m per root second: random walk of the moment of unmodelled effects
 
 
 @dataclass(frozen=True)
 class LQGSettings(Settings):
-    """What the feedback of lqr aims at and may spend, see controllers/lqr/optimum.py.
+    """Holds objective and limits of the feedback of lqr, see controllers/lqr/optimum.py.
 
-    The limits are on deviations of the linear loop; those near rated wind hold at lowest_design_wind. The
-    defaults are what `fowt design tune lqr` found on OC3-Hywind; winds and travels in them are those of the
-    NREL 5 MW turbine and are scaled to others.
+    The limits are on deviations of the linear loop; limits near rated wind apply at lowest_design_wind. The
+    defaults are results of `fowt design tune lqr` on OC3-Hywind; winds and travels are those of the NREL 5 MW
+    turbine and are scaled to other turbines.
     """
 
     NAME = "lqr"
@@ -69,10 +69,10 @@ class LQGSettings(Settings):
         **dict.fromkeys(("shaft_near_rated", "torque_rate", "schedule_time"), POSITIVE),
     }
 
-    share: float = 0.577  # of platform pitch in the aim, at SHARE_WIND; the rest is rotor speed
+    share: float = 0.577  # weight of platform pitch in the objective at SHARE_WIND; rotor speed: 1 - share
     share_growth: float = -0.00345  # of the share, per m/s
     travel: float = 0.9843  # blade-pitch travel, over that of gspi_oc3
-    travel_cap: float = 0.1399  # deg/s, of the same
+    travel_cap: float = 0.1399  # deg/s, upper limit of blade-pitch travel
     travel_near_rated: float = 0.2418  # deg/s
     power: float = 1.0  # deviation of power, over that of gspi_oc3
     torque: float = 0.08  # deviation of generator torque, of rated
@@ -90,9 +90,9 @@ class LQGSettings(Settings):
 
 @dataclass(frozen=True)
 class DesignModel:
-    """One wind speed's plant with its weather: dx = A x + B (torque, pitch command) + G noise (SI).
+    """Holds the plant and weather model at one wind speed: dx = A x + B (torque, pitch) + G noise (SI).
 
-    x: N_STATE states (PLANT, wind filter, wind speed, wave, wave quadrature, moment), less the trim.
+    x: N_STATE deviations from trim (PLANT, wind filter, wind speed, wave, wave quadrature, moment).
     """
 
     wind: float
@@ -117,35 +117,35 @@ def design_winds(turbine):
 
 
 def lowest_design_wind(turbine):
-    """Lowest wind (m/s) that is designed for; below, its gains act and the pitch rests on its minimum."""
+    """Return the lowest design wind (m/s); below, its gains are used with the pitch at the minimum."""
     return ceil(turbine.rated_wind_speed + ABOVE_RATED)
 
 
 def winds_above_rated(turbine):
-    """Return the whole winds (m/s) at which the blades of a turbine are pitched, up to cut-out."""
+    """Return the integer winds (m/s) above rated, up to cut-out."""
     return tuple(range(lowest_design_wind(turbine), floor(turbine.cut_out_wind_speed) + 1))
 
 
 def equivalent_wind(turbine, wind):
-    """Return the wind of the NREL 5 MW turbine that is as far from rated wind, m/s."""
+    """Return the wind of the NREL 5 MW turbine with the same difference from rated wind, m/s."""
     return wind - (turbine.rated_wind_speed - RATED_WIND)
 
 
 def travel_scale(turbine):
-    """Return blade-pitch travel of a turbine over that of the NREL 5 MW turbine: as much in as many turns."""
+    """Return the ratio of pitch travel to that of the NREL 5 MW turbine: equal travel per revolution."""
     return turbine.rated_rotor_speed / ROTOR_SPEED
 
 
 def moment_scale(turbine):
-    """Return the moments on a turbine's platform over those on the NREL 5 MW turbine's."""
+    """Return the ratio of platform moments to those of the NREL 5 MW turbine."""
     return (turbine.rotor.tip_radius / TIP_RADIUS) ** 2 * (turbine.rotor.hub_height / HUB_HEIGHT)
 
 
 @cached(64)
 def wind_filter(speed, height, diameter):
-    """Return (T1, T2, noise): v = noise white / ((1 + T1 s)(1 + T2 s)) like the rotor-averaged Kaimal wind.
+    """Return (T1, T2, noise) of v = noise white / ((1 + T1 s)(1 + T2 s)), the rotor-averaged Kaimal wind.
 
-    Fitted to the log spectrum from 1/300 to 0.2 Hz; noise so that the variances agree.
+    Time constants are fitted to the log spectrum from 1/300 to 0.2 Hz; noise matches the variance.
     """
     samples, step = 6000, 0.1
     sigma = ntm_sigma(speed, TURBULENCE_CLASS)
@@ -178,7 +178,7 @@ def design_model(scene, speed):
     except InputError as error:
         name = scene.turbine.name
         raise InputError(
-            f"no design of lqr, mpc and relatives for turbine {name!r} in wind of {speed:g} m/s: {error}"
+            f"no design of lqr or mpc controllers for turbine {name!r} in wind of {speed:g} m/s: {error}"
         ) from error
     model = with_pitch_lag(residualised(linearize(scene_at(scene, speed))))
     rows = [model.index(name) for name in PLANT]
@@ -204,7 +204,7 @@ def design_model(scene, speed):
     a[WIND, WIND] = -1.0 / t1
     a[WIND + 1, [WIND, WIND + 1]] = 1.0 / t2, -1.0 / t2
     g[WIND, 0] = noise / t1
-    # elevation and its rate over the peak frequency: a quarter period ahead
+    # elevation, and elevation rate over peak frequency: a quarter period ahead
     a[WAVE, WAVE + 1] = peak
     a[WAVE + 1, [WAVE, WAVE + 1]] = -peak, -2.0 * WAVE_DAMPING * peak
     g[WAVE + 1, 1] = 0.25 * sea.Hs * sqrt(4.0 * WAVE_DAMPING * peak)
@@ -213,11 +213,11 @@ def design_model(scene, speed):
     return DesignModel(float(speed), a, b, g, c, full, float(point.command[0]), float(point.command[1]))
 
 
-_MODELS = Cache(16)  # all that a design depends on -> DesignModels
+_MODELS = Cache(16)  # all inputs of a design -> DesignModels
 
 
 def design_models(scene):
-    """DesignModels of the scene's plant over design_winds; remembered per plant, whatever its weather."""
+    """Return the DesignModels of the scene's plant over design_winds, cached per plant for any weather."""
     aero = scene.model.aero
     key = (plant_key(scene), water_key(scene), aero.wind.shear_exponent, aero.field is None)
     winds = design_winds(scene.turbine)
@@ -225,7 +225,7 @@ def design_models(scene):
 
 
 def sampled_noise(a, q, dt):
-    """Return the covariance that noise of intensity q adds over dt (Van Loan)."""
+    """Return the discrete-time covariance of noise of intensity q over dt (Van Loan)."""
     n = a.shape[0]
     block = np.zeros((2 * n, 2 * n))
     block[:n, :n], block[:n, n:], block[n:, n:] = -a, q, a.T
@@ -234,7 +234,7 @@ def sampled_noise(a, q, dt):
 
 
 def estimator_gain(model, dt, moments=1.0):
-    """(N_STATE, N_SENSORS) steady Kalman gain of the correction at each sample; moments: moment_scale."""
+    """Return the steady Kalman gain (N_STATE, N_SENSORS) of the correction; moments: moment_scale."""
     intensity = model.G @ model.G.T
     intensity[:N_PLANT, :N_PLANT] += np.diag(np.square(MODEL_NOISE))
     intensity[MOMENT, MOMENT] += (MOMENT_NOISE * moments) ** 2
@@ -251,7 +251,7 @@ def estimator_gain(model, dt, moments=1.0):
 
 
 def feedback_plant(model, rated_speed):
-    """(A, B, G) with torque (in rated torques), pitch command and speed integral as states; inputs are rates.
+    """Return (A, B, G) with torque (of rated), pitch command and speed integral as states; inputs: rates.
 
     State order: PLANT, torque, pitch command, integral, wind filter, wind, wave, wave quadrature.
     """

@@ -1,7 +1,7 @@
 """Defines the Kalman filter of lqr: platform, rotor-averaged wind and waves from measured channels.
 
-Parameters are a head, the torque curve and a block per wind, between which they are interpolated; the memory
-begins with the estimate.
+The parameter array has a head, the torque curve and one block per wind, interpolated between winds; the
+memory begins with the estimate.
 """
 
 from enum import IntEnum
@@ -11,11 +11,11 @@ from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import TorqueCurve, clamp
 from fowt_env.plant.measurement import Measure
 
-ROTOR = 4  # place of the rotor speed in PLANT
+ROTOR = 4  # index of rotor speed in PLANT
 
 
 class Head(IntEnum):
-    """First entries of the parameter array; the torque curve follows, then a block per wind."""
+    """Enumerates the first parameters; the torque curve follows, then one block per wind."""
 
     CONTROL_DT = 0
     RATED_SPEED = 1
@@ -37,7 +37,7 @@ class Head(IntEnum):
 
 
 BLOCKS = Head.CURVE + len(TorqueCurve._fields)
-# places within the block of one wind
+# offsets within the block of one wind
 TRIM = 0
 TORQUE = TRIM + N_PLANT
 PITCH = TORQUE + 1
@@ -47,7 +47,7 @@ C = B + N_STATE * 2
 L = C + N_SENSORS * N_STATE
 K = L + N_STATE * N_SENSORS
 BLOCK = K + 2 * N_FEEDBACK
-# places in the memory: absolute estimate, then
+# indices in the memory: absolute estimate, then
 OPERATING_WIND = N_STATE
 INTEGRAL = OPERATING_WIND + 1
 TORQUE_COMMAND = INTEGRAL + 1
@@ -55,19 +55,19 @@ PITCH_COMMAND = TORQUE_COMMAND + 1
 INNOVATION = PITCH_COMMAND + 1
 DEVIATION = INNOVATION + N_SENSORS
 FED_BACK = DEVIATION + N_STATE
-STARTED = FED_BACK + N_FEEDBACK  # whether a command is in force yet
+STARTED = FED_BACK + N_FEEDBACK  # 0 until a command is in force
 N_MEMORY = STARTED + 1
 
 
 @kernel
-def between(p, low, fraction, place):
-    """Return the entry of the blocks at `place`, between two winds."""
-    return (1.0 - fraction) * p[low + place] + fraction * p[low + BLOCK + place]
+def between(p, low, fraction, offset):
+    """Return the block entry at `offset`, interpolated between two winds."""
+    return (1.0 - fraction) * p[low + offset] + fraction * p[low + BLOCK + offset]
 
 
 @kernel
 def deviate(p, low, fraction, memory):
-    """Fill DEVIATION: estimate less the trim of the operating wind."""
+    """Fill DEVIATION with the estimate minus the trim of the operating wind."""
     for i in range(N_STATE):
         memory[DEVIATION + i] = memory[i]
     for i in range(N_PLANT):
@@ -110,18 +110,18 @@ def predict(p, low, fraction, memory, torque, pitch):
 
 @kernel
 def block_of(p, memory):
-    """Return (start of the block below the operating wind, fraction of the distance to the next block)."""
+    """Return (offset of the block below the operating wind, interpolation fraction to the next block)."""
     last = p[Head.FIRST_WIND] + (p[Head.WINDS] - 1.0) * p[Head.WIND_STEP]
-    place = (clamp(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[Head.WIND_STEP]
-    node = min(int(place), int(p[Head.WINDS]) - 2)
-    return BLOCKS + node * BLOCK, place - node
+    index = (clamp(memory[OPERATING_WIND], p[Head.FIRST_WIND], last) - p[Head.FIRST_WIND]) / p[Head.WIND_STEP]
+    node = min(int(index), int(p[Head.WINDS]) - 2)
+    return BLOCKS + node * BLOCK, index - node
 
 
 @kernel
 def estimate(p, memory, measurement, command):
-    """Advance the estimate over the last period under its command, then correct it by the measurement.
+    """Predict the estimate over the last period under its command, then correct by the measurement.
 
-    At the first instant the estimate is that of reset, without a command.
+    At the first instant the estimate of reset is corrected without prediction.
     """
     if memory[STARTED] != 0.0:
         low, fraction = block_of(p, memory)
@@ -136,5 +136,5 @@ def estimate(p, memory, measurement, command):
 
 @control_kernel
 def estimator_law(parameters, memory, measurement, command):
-    """Advance the estimate; the applied command is read and not changed."""
+    """Advance the estimate; the applied command is an input and not changed."""
     estimate(parameters, memory, measurement, command)

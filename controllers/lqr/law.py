@@ -5,8 +5,8 @@ the estimates sets the rates of both commands, so that limits cause no windup. M
 controllers/lqr/design.py are interpolated in a slow mean of the estimated wind. Near the minimum pitch the
 torque law of theory.md, section 3, is applied.
 
-Filter and feedback start from the applied command: an addition of the residual mode of the environment stays
-in the next command, so that it is an addition to the rates.
+Filter and feedback start from the applied command: an addition in the environment's residual mode remains in
+the next command and is therefore an addition to the rates.
 """
 
 from math import exp
@@ -47,15 +47,15 @@ from fowt_env.plant.compile.decorators import control_kernel, kernel
 from fowt_env.plant.drivetrain import build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
-HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque by the curve below, by feedback above
+HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque from the curve below, from feedback above
 TORQUE_RANGE = (0.5, 1.1)  # of rated, for the feedback's torque
 INTEGRAL_LIMIT = 1.0  # rad, of the speed integral
-FORGETTING = 0.1  # 1/s, of the same while the blades rest
+FORGETTING = 0.1  # 1/s, decay rate of the speed integral at minimum pitch
 
 
 @kernel
 def feed_back(p, low, fraction, memory, row):
-    """Rate that row 0 (torque, rated torques a second) or 1 (pitch command, rad/s) of the gain asks for."""
+    """Return the rate by row 0 (torque, rated torques/s) or 1 (pitch command, rad/s) of the gain."""
     total = 0.0
     for j in range(N_FEEDBACK):
         total -= between(p, low, fraction, K + row * N_FEEDBACK + j) * memory[FED_BACK + j]
@@ -63,9 +63,9 @@ def feed_back(p, low, fraction, memory, row):
 
 
 @kernel
-def speed_integral(integral, error, turning, dt):
-    """Integral of the speed error (rad/s) after a period dt (s); forgotten while slow with resting blades."""
-    if turning or error > 0.0:
+def speed_integral(integral, error, pitching, dt):
+    """Return the integral of the speed error (rad/s) after dt (s); decays below rated at minimum pitch."""
+    if pitching or error > 0.0:
         return clamp(integral + dt * error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
     return integral * (1.0 - FORGETTING * dt)
 
@@ -102,7 +102,7 @@ def lqr_law(p, memory, measurement, command):
 
 
 def blocks(models, settings, turbine, dt):
-    """Return (n, BLOCK) trims, estimator and feedback of each wind, sampled every dt."""
+    """Return (n, BLOCK) trims, estimators and feedback gains of each wind, sampled every dt."""
     rows = []
     for model, gain in zip(models, optimal_gains(models, settings, turbine, dt), strict=True):
         a, b = design.sampled(model.A, model.B, dt)
@@ -116,7 +116,7 @@ _BLOCKS = Cache(32)  # (id of models, settings, control period) -> (models, thei
 
 
 def limits_of(turbine, control_dt):
-    """Return {entry: value} of the first entries of Head, which mpc has too."""
+    """Return {entry: value} of the first entries of Head, which mpc also uses."""
     law, drive = turbine.torque_law, turbine.pitch_drive
     return {
         Head.CONTROL_DT: control_dt,
@@ -131,7 +131,7 @@ def limits_of(turbine, control_dt):
 
 
 class LQR(CompiledController):
-    """LQG law of LQGSettings; prepare(scene) designs it on the scene's platform unless models are given."""
+    """Implements the LQG law of LQGSettings, designed on the scene's platform by prepare() or on models."""
 
     kernel = staticmethod(lqr_law)
     information = (
@@ -144,15 +144,15 @@ class LQR(CompiledController):
         self.turbine, self.control_dt = turbine, check_control_dt(control_dt)
         self.settings = LQGSettings() if settings is None else settings
         self.prepared = False
-        self._plant = None  # the models it was designed on last, in prepare
+        self._plant = None  # models of the last design in prepare
         self.designed = models is not None
         if self.designed:
             self.take(models)
 
     def prepare(self, scene):
-        """Linearise the scene's platform over the winds and design the gains (remembered per platform).
+        """Linearise the scene's platform over the winds and design the gains (cached per platform).
 
-        Models given on making stay as they are: such a controller does not know the scene's plant.
+        Models passed to the constructor are kept: such a controller ignores the scene's plant.
         Raises: InputError for a scene without wind.
         """
         if scene.model.aero is None:
@@ -161,12 +161,12 @@ class LQR(CompiledController):
             return
         models = design.design_models(scene)
         if models is not self._plant:
-            self.turbine = with_gains(scene)  # of the law that the design is compared with
+            self.turbine = with_gains(scene)  # gains of the reference law of the design
             self._plant = models
             self.take(models)
 
     def take(self, models):
-        """Take the gains for DesignModels of winds 1 m/s apart."""
+        """Design and install the gains for DesignModels of winds 1 m/s apart."""
         known = (id(models), self.settings, self.control_dt)
 
         def make():  # the models are kept with their blocks, so that their id stays valid
@@ -175,7 +175,7 @@ class LQR(CompiledController):
         self.install(models[0].wind, _BLOCKS.get(known, make)[1])
 
     def install(self, first_wind, table):
-        """Take the blocks of winds 1 m/s apart."""
+        """Set the parameters from the blocks of winds 1 m/s apart."""
         turbine, law = self.turbine, self.turbine.torque_law
         values = {
             **limits_of(turbine, self.control_dt),
@@ -192,7 +192,7 @@ class LQR(CompiledController):
         self.prepared = True
 
     def reset(self, measurement):
-        """Start the estimate at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured.
+        """Start the estimate at the trim with the measured pitch (or, at minimum pitch, rotor speed).
 
         Raises: InputError if prepare() was not called.
         """
@@ -202,7 +202,7 @@ class LQR(CompiledController):
         table = p[BLOCKS:].reshape(-1, BLOCK)
         winds = p[Head.FIRST_WIND] + p[Head.WIND_STEP] * np.arange(len(table))
         speed = measurement.generator_speed / p[Head.GEAR_RATIO]
-        # one increasing quantity over all winds: speed below rated, pitch above
+        # speed plus pitch increases over all winds: speed below rated, pitch above
         known = table[:, TRIM + ROTOR] / p[Head.RATED_SPEED] + table[:, TRIM + ROTOR + 1]
         wind = np.interp(speed / p[Head.RATED_SPEED] + measurement.blade_pitch, known, winds)
         memory[:] = 0.0
@@ -220,9 +220,9 @@ class LQR(CompiledController):
 
 
 class WindEstimator(LQR):
-    """The Kalman filter of LQR without its feedback: given the commands in force, it only estimates.
+    """Runs the Kalman filter of LQR without feedback, with the commands in force as inputs.
 
-    memory begins with what it estimates, in the order of ESTIMATED of fowt_env/envs/observations.py.
+    memory begins with the estimates, in the order of ESTIMATED of fowt_env/envs/observations.py.
     """
 
     kernel = staticmethod(estimator_law)
@@ -232,5 +232,5 @@ class WindEstimator(LQR):
 
 
 def lqr(turbine, control_dt):
-    """LQG on torque and blade pitch with estimated wind, tuned on training seeds (fowt design lqr)."""
+    """Apply LQG control of torque and blade pitch with estimated wind, tuned on training seeds."""
     return LQR(turbine, control_dt)

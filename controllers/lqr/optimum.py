@@ -1,10 +1,10 @@
 """Computes the feedback of lqr at one wind: the linear optimum at the control period under limits.
 
-Minimised is (1 - share) var(rotor speed) + share var(platform pitch), each over that of gspi_oc3 on the same
-linear model, with limits on blade-pitch travel and on the deviations of power, torque and shaft torque. By
-duality that is a quadratic cost with a multiplier per limit, found by iteration: it increases while its
-limit is exceeded and decreases otherwise. Deviations are those of the sampled loop with Kalman filter and
-sensor noise.
+The objective is (1 - share) var(rotor speed) + share var(platform pitch), each over that of gspi_oc3 on the
+same linear model, with limits on blade-pitch travel and on the deviations of power, torque and shaft torque.
+By duality this is a quadratic cost with one multiplier per limit, computed by iteration: a multiplier
+increases while its limit is exceeded and decreases otherwise. Deviations are those of the sampled loop with
+Kalman filter and sensor noise.
 """
 
 from dataclasses import dataclass
@@ -34,26 +34,26 @@ from fowt_env.descriptions.units import DEGREE
 
 SPEED, LEAN, BLADE = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "blade_pitch"))
 TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2  # after the plant, in the states fed back
-ESTIMATED = [*range(N_PLANT), *range(N_PLANT + 3, N_FEEDBACK)]  # of the states fed back, by the filter
-OF_FILTER = [*range(N_PLANT), *range(WIND, MOMENT)]  # the same among the states of the filter
+ESTIMATED = [*range(N_PLANT), *range(N_PLANT + 3, N_FEEDBACK)]  # feedback states estimated by the filter
+OF_FILTER = [*range(N_PLANT), *range(WIND, MOMENT)]  # indices of ESTIMATED in the filter's states
 GAUSSIAN_MEAN = sqrt(2.0 / np.pi)  # mean |x| of a Gaussian over its standard deviation
 LIMITED = ("travel", "power", "torque", "shaft")  # fields of Deviations
-# m/s, below which travel and shaft torque have limits of their own: lulls take the turbine out of its region
+# m/s, below which travel and shaft torque have separate limits: lulls bring the turbine below rated
 NEAR_RATED, NO_LULLS = 14.0, 16.0  # of the NREL 5 MW turbine
-# What gspi_oc3 is held to where its own linear model says more or, as near rated wind, is unstable
+# Upper limits of the deviations of gspi_oc3, used if its linear model gives more or, near rated, is unstable
 SPEED_CEILING, POWER_CEILING, LEAN_CEILING = 0.09, 0.09, 1.2 * DEGREE  # of rated, of rated, rad
-SHAFT_CEILING = 0.018  # of rated torque, where its loop is unstable
-LOWEST, HIGHEST = np.log(1e-3), np.log(1e4)  # of a multiplier; beside aims of order one
+SHAFT_CEILING = 0.018  # of rated torque, if the loop is unstable
+LOWEST, HIGHEST = np.log(1e-3), np.log(1e4)  # range of log multipliers; the objective is of order one
 TOLERANCE = 5e-3  # of the limits, relative
 ROUNDS = 60
-STEP = 2.0  # of a multiplier's logarithm over the relative excess of its limit, at first
-LONGER, SHORTER = 1.2, 0.5  # factor of the step where the excess keeps its sign, and where it changes
-LARGEST = 2.0  # step of a multiplier's logarithm
+STEP = 2.0  # initial step of a log multiplier over the relative excess of its limit
+LONGER, SHORTER = 1.2, 0.5  # factors of the step if the excess keeps or changes its sign
+LARGEST = 2.0  # largest step of a log multiplier
 
 
 @dataclass(frozen=True)
 class Deviations:
-    """Standard deviations of a closed loop; travel is a mean absolute rate."""
+    """Holds the standard deviations of a closed loop; travel is a mean absolute rate."""
 
     speed: float  # of the rotor, rad/s
     lean: float  # platform pitch, rad
@@ -75,10 +75,10 @@ def stationary_covariance(a, q):
 
 
 class SampledLoop:
-    """One wind's plant with its weather and the filter of lqr, sampled at the control period.
+    """Computes gains and deviations of one wind's plant with weather and Kalman filter, sampled.
 
     States fed back: as feedback_plant of design.py; inputs: rates of torque (rated torques/s) and of the
-    pitch command (rad/s). A command changes at an instant and holds over the period, as the law's do.
+    pitch command (rad/s). Commands change at control instants and are constant over a period, as in the law.
     """
 
     def __init__(self, model, turbine, dt):
@@ -115,16 +115,16 @@ class SampledLoop:
 
     @property
     def _inertia(self):
-        """Of the generator on the slow shaft, over rated torque there: s2."""
+        """Return the generator inertia over rated torque, both on the low-speed shaft, s2."""
         drive = self.turbine.drivetrain
         return drive.gear_ratio * drive.generator_inertia / self.model.torque
 
     def gain(self, weights, integral, torque_rate):
-        """Return (2, N_FEEDBACK) gain K of least cost: inputs are -K x.
+        """Return the optimal gain K (2, N_FEEDBACK): inputs are -K x.
 
         weights: {field of Deviations: weight of its square}; integral, torque_rate: of the squared speed
-        integral and torque input. Travel is paid for at the command: a price on the blades' own rate would
-        make the command jump ahead of them. Raises: LinAlgError where there is no gain.
+        integral and torque input. The cost of travel is on the command rate: a cost on the blade rate would
+        make the command lead the blades in jumps. Raises: LinAlgError if there is no stabilising gain.
         """
         q, s = np.zeros_like(self.a), np.zeros_like(self.b)
         r = np.diag([torque_rate, GAUSSIAN_MEAN**2 * weights["travel"]])
@@ -140,10 +140,10 @@ class SampledLoop:
         return np.linalg.solve(r + self.b.T @ p @ self.b, self.b.T @ p @ self.a + s.T)
 
     def closed(self, k, noise=SENSOR_NOISE):
-        """Return (A, Q, u, v): the loop under gain k on the filter's estimates, as the law runs it.
+        """Return (A, Q, u, v) of the loop with gain k on the filter's estimates, as in the law.
 
-        States: those fed back, then the filter's prediction (N_STATE,); Q: covariance of what a period adds;
-        inputs are u x + v white, with white noise of the sensors. noise: their standard deviations.
+        States: feedback states, then the filter's prediction (N_STATE,); Q: noise covariance per period;
+        inputs are u x + v white with white sensor noise; noise: standard deviations of the sensors.
         """
         n, model, correction = N_FEEDBACK, self.model, self.filter_gain
         on_estimate, on_known = np.zeros((2, N_STATE)), np.zeros((2, n))
@@ -169,27 +169,27 @@ class SampledLoop:
         return a, q, u, v
 
     def deviations(self, k, noise=SENSOR_NOISE):
-        """Deviations under gain k on the filter's estimates, with sensors of these standard deviations."""
+        """Return the Deviations with gain k on the filter's estimates; noise: sensor standard deviations."""
         a, q, u, v = self.closed(k, noise)
         x = stationary_covariance(a, q)
-        found = {}
+        values = {}
         for name, (on_state, on_input) in self.rows.items():
             row, white = on_input @ u, (on_input @ v) * noise
             row[:N_FEEDBACK] += on_state
-            found[name] = sqrt(row @ x @ row + white @ white)
-        return Deviations(**found)
+            values[name] = sqrt(row @ x @ row + white @ white)
+        return Deviations(**values)
 
     def baseline(self):
-        """Deviations of gspi_oc3, sampled, at no more than the ceilings; these alone where it is unstable.
+        """Return the Deviations of sampled gspi_oc3, limited to the ceilings; the ceilings if unstable.
 
-        The law is the published PI with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
+        The law is the published PI with the slope of its schedule (theory.md, Eq. (A7)) and speed filter.
         """
         rated = self.turbine.rated_rotor_speed
         speed, power, lean = SPEED_CEILING * rated, POWER_CEILING, LEAN_CEILING
         settings = PISettings.published(self.turbine)
         gain = schedule_gain(self.model.pitch, settings.gain_schedule_pitch)
         gain *= settings.gear_ratio / (2.0 - gain)
-        n, dt = MOMENT, self.dt  # then the filtered speed and its integral, both of the last instant
+        n, dt = MOMENT, self.dt  # followed by filtered speed and its integral at the last instant
         keep = np.exp(-settings.speed_filter_corner * dt)
         filtered, integral = np.zeros(n + 2), np.zeros(n + 2)
         filtered[[SPEED, n]] = 1.0 - keep, keep
@@ -209,15 +209,15 @@ class SampledLoop:
         acceleration = self.model.B[SPEED, 1] * command
         acceleration[:n] += self.model.A[SPEED, :n]
         rows = (eye[SPEED], eye[LEAN], a[BLADE] - eye[BLADE], acceleration)
-        own = [sqrt(row @ x @ row) for row in rows]
-        travel, shaft = GAUSSIAN_MEAN / dt * own[2], self._inertia * own[3]
+        std = [sqrt(row @ x @ row) for row in rows]
+        travel, shaft = GAUSSIAN_MEAN / dt * std[2], self._inertia * std[3]
         return Deviations(
-            min(own[0], speed), min(own[1], lean), travel, min(own[0] / rated, power), 0.0, shaft
+            min(std[0], speed), min(std[1], lean), travel, min(std[0] / rated, power), 0.0, shaft
         )
 
 
 def limits(settings, wind, baseline, turbine):
-    """{name of LIMITED: limit} of a turbine at a wind (m/s), beside the Deviations of gspi_oc3 there."""
+    """Return {name of LIMITED: limit} at a wind (m/s), from the Deviations of gspi_oc3 at this wind."""
     lowest = equivalent_wind(turbine, lowest_design_wind(turbine))
     wind, degree = equivalent_wind(turbine, wind), DEGREE * travel_scale(turbine)
     if wind < NEAR_RATED:
@@ -235,14 +235,14 @@ def limits(settings, wind, baseline, turbine):
 
 
 def optimal_gain(loop, settings, start=None):
-    """Return (gain (2, N_FEEDBACK), its Deviations, logarithms of the multipliers) for LQGSettings at a wind.
+    """Return (gain (2, N_FEEDBACK), Deviations, log multipliers) for LQGSettings at the wind of a loop.
 
-    start: multipliers of a neighbouring wind. Where not all limits are met within ROUNDS rounds, it is the
-    gain of the round whose largest excess is the smallest.
+    start: log multipliers of a neighbouring wind. If not all limits are met within ROUNDS iterations, the
+    gain with the smallest largest excess is returned.
     """
     rated, baseline, wind = loop.turbine.rated_rotor_speed, loop.baseline(), loop.model.wind
     limited = limits(settings, wind, baseline, loop.turbine)
-    wanted = np.array([limited[name] for name in LIMITED])
+    bounds = np.array([limited[name] for name in LIMITED])
     share = settings.share_at(equivalent_wind(loop.turbine, wind))
     aims = {"speed": (1.0 - share) / baseline.speed**2, "lean": share / baseline.lean**2}
     integral = settings.speed_integral / (0.5 * rated) ** 2
@@ -250,10 +250,10 @@ def optimal_gain(loop, settings, start=None):
     steps, before = np.full(len(LIMITED), STEP), np.zeros(len(LIMITED))
     least, nearest = np.inf, None
     for _ in range(ROUNDS):
-        prices = dict(zip(LIMITED, np.exp(multipliers) / wanted**2, strict=True))
+        prices = dict(zip(LIMITED, np.exp(multipliers) / bounds**2, strict=True))
         gain = loop.gain(aims | prices, integral, settings.torque_rate / 0.05**2)
         reached = loop.deviations(gain)
-        excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / wanted)
+        excess = np.log(np.array([getattr(reached, name) for name in LIMITED]) / bounds)
         slack = (excess < 0.0) & (multipliers <= LOWEST)
         if np.all((np.abs(excess) < TOLERANCE) | slack):
             return gain, reached, multipliers
@@ -266,12 +266,12 @@ def optimal_gain(loop, settings, start=None):
 
 
 def optimal_gains(models, settings, turbine, dt):
-    """Return [(2, N_FEEDBACK)] gains of DesignModels in rising order of wind.
+    """Return the gains [(2, N_FEEDBACK)] of DesignModels in ascending order of wind.
 
-    Below lowest_design_wind, where the pitch rests, those of the first wind designed for hold.
+    Below lowest_design_wind, with the pitch at its minimum, the gain of the lowest design wind is used.
     """
     gains, start, lowest = [], None, lowest_design_wind(turbine)
-    for model in reversed(models):  # from strong wind, where all limits are met, down to rated
+    for model in reversed(models):  # from strong wind, where all limits can be met, down to rated
         if model.wind < lowest and gains:
             gains.append(gains[-1])
             continue

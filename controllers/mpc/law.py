@@ -1,10 +1,10 @@
 """Defines model predictive control of torque and blade pitch on the estimate of lqr's Kalman filter.
 
-Every period a horizon of half a minute is predicted: platform and waves by the linear models of
+Every period the law predicts a horizon of half a minute: platform and waves by the linear models of
 controllers/lqr/design.py, rotor loads by a coefficient table, the wind by its filter. An exact preview
-replaces the predicted wind, another corrects it (ahead.py). One Newton step (plan.py) improves the plan of
-torque and blade-pitch rates; if it would exceed a limit, OSQP computes the step. The rates are constant until
-the next period. An integral of the speed error removes the offset.
+replaces the predicted wind, other previews correct the prediction (ahead.py). One Newton step (plan.py)
+improves the plan of torque and blade-pitch rates; if this step violates a limit, OSQP computes the step. The
+rates are constant until the next period. An integral of the speed error removes the offset.
 """
 
 from enum import IntEnum
@@ -32,12 +32,12 @@ from fowt_env.plant.drivetrain import build_torque_curve, clamp, generator_torqu
 from fowt_env.plant.measurement import Measure
 
 PERIOD = 0.5  # s between plans
-RESTING = 0.01745  # rad of pitch command, up to which the integral is forgotten while the rotor is slow
-CURVE_WINDS = (8.5, 9.5)  # m/s, of the NREL 5 MW turbine: curve and resting blades below, plan above
+RESTING = 0.01745  # rad of pitch command, below which the speed integral decays at low rotor speed
+CURVE_WINDS = (8.5, 9.5)  # m/s, of the NREL 5 MW turbine: torque curve and minimum pitch below, plan above
 
 
 class Entry(IntEnum):
-    """Entries of the parameter array; the first are those of Head."""
+    """Enumerates the parameter array, which begins with entries of Head."""
 
     CONTROL_DT = 0
     RATED_SPEED = 1
@@ -55,18 +55,18 @@ class Entry(IntEnum):
 
 
 class Memory(IntEnum):
-    """Entries of the memory array."""
+    """Enumerates the entries of the memory array."""
 
     OPERATING_WIND = 0
     INTEGRAL = 1
-    BIAS = 2  # of the wind ahead against the estimate, m/s
-    TORQUE_RATE = 3  # held, N m/s
+    BIAS = 2  # of the estimated wind over the preview, m/s
+    TORQUE_RATE = 3  # of the present period, N m/s
     PITCH_RATE = 4
 
 
 @entry
 def observe(estimator, estimated, measurement, command, p, memory):
-    """Bring the estimate, the operating wind and the integral to the present."""
+    """Update the estimate, the operating wind and the speed integral to the present instant."""
     estimate(estimator, estimated, measurement, command)
     decay, dt = p[Entry.DECAY], p[Entry.CONTROL_DT]
     wind = estimated[ESTIMATED_WIND + 1]
@@ -77,9 +77,9 @@ def observe(estimator, estimated, measurement, command, p, memory):
 
 @entry
 def move(estimated, p, memory, curve, command):
-    """Move the command by the rates in force, within limits.
+    """Integrate the command with the rates in force, within limits.
 
-    In light winds, of now and of late, the torque follows the turbine's curve and the blades rest.
+    If both the present and the operating wind are low, torque follows the turbine's curve at minimum pitch.
     """
     dt = p[Entry.CONTROL_DT]
     before = command[1]
@@ -98,17 +98,17 @@ def move(estimated, p, memory, curve, command):
     command[0] = rate_limit(command[0], torque, dt * p[Entry.TORQUE_RATE_LIMIT])
 
 
-LIDAR_HORIZON = 3.0  # s: what four beams 160 m ahead of the rotor leave at 24 m/s
+LIDAR_HORIZON = 3.0  # s, usable look-ahead time at 24 m/s of four beams measuring 160 m ahead of the rotor
 _MODELS = Cache(16)  # inputs -> (design models, table, (first wind, WindModel of all winds))
 
 
 class MPC:
-    """Predictive law of an MPCSettings; call prepare(scene) before reset.
+    """Implements model predictive control with MPCSettings; call prepare(scene) before reset.
 
     preview: use a wind preview. exact: the preview is exact; another preview corrects the predicted wind.
     nonlinear: rotor loads from the table, else linear about the operating wind. constrained: plans satisfy
     limits; applied commands always do.
-    Attribute unsolved: plans since reset without a solution of OSQP, in which the LQ feedback is applied.
+    Attribute unsolved: number of plans since reset without a solution of OSQP, replaced by LQ feedback.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class MPC:
         self.preview_times = ()
         if preview:
             self.information = (*LQR.information, "wind_preview")
-            periods = int(self.settings.preview_time / self.period + 1e-9)  # not beyond what a lidar sees
+            periods = int(self.settings.preview_time / self.period + 1e-9)  # within the range of a lidar
             self.preview_times = tuple(self.period * i for i in range(periods + 1))
         self.estimator = WindEstimator(turbine, self.control_dt)
         self.curve = build_torque_curve(turbine.torque_law)
@@ -151,9 +151,9 @@ class MPC:
         return np.array([values[entry] for entry in Entry], dtype=np.float64)
 
     def prepare(self, scene):
-        """Take the models of the scene's plant over the winds (remembered per plant).
+        """Compute the models of the scene's plant over the winds (cached per plant).
 
-        Raises: InputError for a scene without wind, and where OSQP is missing.
+        Raises: InputError for a scene without wind, and if OSQP is not installed.
         """
         load()
         if scene.model.aero is None:
@@ -163,17 +163,17 @@ class MPC:
         self.table = rotor_table(scene.turbine, density)
         known = (id(models), id(self.table), self.turbine.torque_law.rated_torque, self.settings, self.period)
 
-        def make():  # with its inputs, so that their ids stay valid
+        def make():  # returned with the inputs, so that their ids stay valid
             lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
             same = (self.settings, self.turbine, self.table, self.period)
-            made = [wind_model(m, m if m.wind >= lowest.wind else lowest, *same) for m in models]
-            rows = WindModel(*(np.array(rows) for rows in zip(*made, strict=True)))
+            wind_models = [wind_model(m, m if m.wind >= lowest.wind else lowest, *same) for m in models]
+            rows = WindModel(*(np.array(rows) for rows in zip(*wind_models, strict=True)))
             return models, self.table, (models[0].wind, rows)
 
         self.first_wind, self.models = _MODELS.get(known, make)[2]
 
     def reset(self, measurement):
-        """Start at the trim whose pitch (or, at the pitch minimum, rotor speed) is measured, without a plan.
+        """Start at the trim with the measured pitch (or, at minimum pitch, rotor speed) and an empty plan.
 
         Raises: InputError if prepare() was not called.
         """
@@ -206,11 +206,11 @@ class MPC:
 
     @property
     def _slow(self):
-        """Return the factor per period by which what is learnt of the wind ahead is forgotten."""
+        """Return the forgetting factor per period of the preview's statistics."""
         return exp(-self.period / self.settings.schedule_time)
 
     def _ahead(self, measurement):
-        """(n, 2) states of the wind's filter ahead, less the operating wind; (0, 2) without a preview."""
+        """Return previewed states (n, 2) of the wind filter minus the operating wind; n = 0: no preview."""
         if not self.preview_times:
             return np.zeros((0, 2))
         seen, estimated = np.array(measurement.wind_preview, dtype=np.float64), self.estimator.memory
@@ -222,7 +222,7 @@ class MPC:
         if self.exact:
             ahead = seen + bias - wind
             ahead = np.r_[ahead, (a[0, 0] + a[1, 1]) * ahead[-1] - a[0, 0] * a[1, 1] * ahead[-2]]
-            # the filter's first state is the one that leads from each wind to the next
+            # the first filter state follows from each pair of successive winds
             return np.column_stack([(ahead[1:] - a[1, 1] * ahead[:-1]) / a[1, 0], ahead[:-1]])
         ahead = np.empty((len(seen), 2))
         ahead[0] = estimated[ESTIMATED_WIND : ESTIMATED_WIND + 2] - wind
@@ -230,20 +230,20 @@ class MPC:
             ahead[k] = a @ ahead[k - 1]
         expected = wind + ahead[:, 1]
         differing = seen + bias - expected
-        # a change of the wind that lasts, as its slow part does, is one of both states
+        # the correction applies to both states, as for a lasting change of wind
         return ahead + (self.share.learn(now, expected, differing) * differing)[:, None]
 
     def _model(self):
-        """Return (WindModel, wind m/s) of the operating wind, within those of the models."""
+        """Return (WindModel, wind m/s) at the operating wind, limited to the range of the models."""
         count = len(self.models.trim)
-        place = min(max(self.memory[Memory.OPERATING_WIND] - self.first_wind, 0.0), count - 1.0)
-        node = min(int(place), count - 2)
-        f = place - node
+        index = min(max(self.memory[Memory.OPERATING_WIND] - self.first_wind, 0.0), count - 1.0)
+        node = min(int(index), count - 2)
+        f = index - node
         model = WindModel(*((1.0 - f) * part[node] + f * part[node + 1] for part in self.models))
-        return model, self.first_wind + place
+        return model, self.first_wind + index
 
     def _replan(self, ahead):
-        """Improve the plan, and take its first move."""
+        """Improve the plan and set the rates to its first move."""
         model, wind = self._model()
         turbine, settings = self.turbine, self.settings
         rated, torque, drive = turbine.rated_rotor_speed, turbine.torque_law.rated_torque, turbine.pitch_drive
@@ -267,7 +267,7 @@ class MPC:
         shifted(self.plan, self.grid, old)
         step = np.zeros_like(old)
         gain = model.K.copy()
-        if len(ahead) and self.exact:  # what the wind asks for comes from the plan alone
+        if len(ahead) and self.exact:  # only the plan, not the feedback, responds to the previewed wind
             gain[:, FILTER : FILTER + 2] = 0.0
         kept = newton_step(
             model, gain, wind, self.table, self.nonlinear, self.rows, references, end, ahead, limits, units,
@@ -287,26 +287,26 @@ class MPC:
         self.memory[Memory.PITCH_RATE] = min(max(u[1], -drive.rate_limit), drive.rate_limit)
 
     def __getstate__(self):
-        """Without the solver, which is recreated: each solution starts from what it is given."""
+        """Return the state without the solver, which is recreated: each solution has an explicit start."""
         return self.__dict__ | {"program": None}
 
 
 def mpc(turbine, control_dt):
-    """Model predictive control on lqr's estimate: limits and the rotor's nonlinear loads are foreseen."""
+    """Apply model predictive control on lqr's estimate, with limits and nonlinear rotor loads."""
     return MPC(turbine, control_dt)
 
 
 def mpc_preview(turbine, control_dt):
-    """mpc that is shown the rotor-averaged wind of the coming seconds."""
+    """Apply mpc with a preview of the rotor-averaged wind of the next seconds."""
     return MPC(turbine, control_dt, PREVIEW, "mpc_preview", preview=True)
 
 
 def mpc_lidar(turbine, control_dt):
-    """mpc that corrects its wind by a preview of 3 s that errs, as nacelle lidars give up to cut-out wind."""
+    """Apply mpc with predicted wind corrected by a preview of 3 s with errors, as of a nacelle lidar."""
     settings = MPCSettings(preview_time=LIDAR_HORIZON)
     return MPC(turbine, control_dt, settings, "mpc_lidar", preview=True, exact=False)
 
 
 def lq_preview(turbine, control_dt):
-    """Linear-quadratic preview: mpc_preview with linear loads and no limits in its plan."""
+    """Apply linear-quadratic preview control: mpc_preview with linear loads and without limits."""
     return MPC(turbine, control_dt, PREVIEW, "lq_preview", preview=True, nonlinear=False, constrained=False)

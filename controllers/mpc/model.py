@@ -1,7 +1,7 @@
 """Computes the discrete model of each wind, the LQ feedback and the terminal cost of the prediction.
 
-States are those of feedback_plant in controllers/lqr/design.py, less the trim of the wind: platform, rotor
-and blades, torque (rated torques), pitch command, integral of the rotor speed's error, wind filter and
+States are those of feedback_plant in controllers/lqr/design.py relative to the trim at the wind: platform,
+rotor and blades, torque (rated torques), pitch command, integral of the rotor-speed error, wind filter and
 waves. Inputs are the rates of torque and pitch command, constant over a period.
 """
 
@@ -27,26 +27,26 @@ SURGE_RATE, SPEED, LEAN, LEAN_RATE, BLADE = (
 )
 TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2
 FILTER, WIND = N_PLANT + 3, N_PLANT + 4
-WEIGHT_WIND = 18.0  # m/s of the NREL 5 MW turbine, where the weights hold as given
+WEIGHT_WIND = 18.0  # m/s of the NREL 5 MW turbine, wind at which the weights of the settings apply
 N_COST = 8  # squared terms: speed, platform pitch and rate, torque, power, integral, rates of both commands
 
 
 class WindModel(NamedTuple):
-    """What the prediction needs of one wind; arrays alone, so that it can be interpolated between winds."""
+    """Holds the prediction model at one wind; only arrays, which can be interpolated between winds."""
 
     trim: np.ndarray  # (8,) PLANT, torque in rated torques, pitch command
     loads: np.ndarray  # (8,) rotor_loads at the trim
     motion: np.ndarray  # (2,) wind at the rotor per surge rate and platform pitch rate
     A: np.ndarray  # (n, n)
     B: np.ndarray  # (n, 2)
-    G: np.ndarray  # (n, 2) of thrust (N) and torque (N m) beyond the linear ones, held over a period
+    G: np.ndarray  # (n, 2) input of nonlinear thrust (N) and torque (N m), constant over a period
     K: np.ndarray  # (2, n) LQ gain
     P: np.ndarray  # (n, n) cost to go
     weights: np.ndarray  # (N_COST,) of the squared terms over a period
 
 
 def cost_rows(rated_speed):
-    """Return (N_COST, n) of the states in the squared terms; those of the two rates are zero."""
+    """Return the rows (N_COST, n) of states in the squared terms; rows of the two rates are zero."""
     rows = np.zeros((N_COST, N_FEEDBACK))
     for row, state in enumerate((SPEED, LEAN, LEAN_RATE, TORQUE)):
         rows[row, state] = 1.0
@@ -56,7 +56,7 @@ def cost_rows(rated_speed):
 
 
 def cost_weights(settings, wind, rated_speed, period):
-    """Return (N_COST,) weights of the squared terms over a period (s) at an equivalent_wind, m/s."""
+    """Return the weights (N_COST,) of the squared terms over a period (s) at an equivalent_wind, m/s."""
     s, ratio = settings, wind / WEIGHT_WIND
     below = ratio < 1.0
     pitch_rate = s.pitch_rate * ratio ** (s.pitch_rate_growth if below else s.pitch_rate_growth_above)
@@ -82,12 +82,12 @@ def _loads_at(wind, rotor_speed, blade_pitch, table, loads):
 
 
 def wind_model(model, feedback, settings, turbine, table, period):
-    """Return WindModel of a DesignModel, its feedback and cost to go designed on another (or the same)."""
+    """Return the WindModel of a DesignModel, with gain and cost to go of the DesignModel `feedback`."""
     rated, law = turbine.rated_rotor_speed, turbine.torque_law
     a, b = _plant(model, turbine)
     loads = np.empty(8)
     _loads_at(model.wind, model.trim[SPEED], model.trim[BLADE], table, loads)
-    # per newton of thrust and newton metre of torque, as the linear model moves with the wind
+    # state derivatives per N of thrust and per N m of torque, from the linear response to wind
     g = np.zeros((N_FEEDBACK, 2))
     moved = [SURGE_RATE, LEAN_RATE]
     g[moved, 0] = a[moved, WIND] / loads[1]
@@ -103,14 +103,14 @@ def wind_model(model, feedback, settings, turbine, table, period):
 
 
 def _plant(model, turbine):
-    """Return (A, B) of feedback_plant with the torque in rated torques at every wind."""
+    """Return (A, B) of feedback_plant with torque normalised by rated torque at every wind."""
     a, b, _ = feedback_plant(model, turbine.rated_rotor_speed)
     a[:N_PLANT, TORQUE] *= turbine.torque_law.rated_torque / model.torque
     return a, b
 
 
 def lq(a, b, weights, rated_speed, period):
-    """Return (K, P) of the discrete LQ problem with the squared terms of cost_rows at each period's start."""
+    """Return (K, P) of the discrete LQ problem with squared terms of cost_rows at each period's start."""
     ad, bd = sampled(a, b, period)
     rows = cost_rows(rated_speed)
     q, r = rows.T @ (weights[:, None] * rows), np.diag(weights[-2:])

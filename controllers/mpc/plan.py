@@ -1,9 +1,9 @@
 """Computes one Newton step of the optimal control problem: prediction, sensitivities, quadratic program.
 
-Moves are u = -K x + c with corrections c that are constant over blocks. With the LQ gain as K, c = 0 is the
-plan without active limits, without a preview and with linear rotor loads (Rossiter, Kouvaritakis and Rice,
-Automatica 34, 1998). Rotor loads are those of the table; their difference from the linear model is an
-additional input. One step is taken per period, from the previous plan (real-time iteration: Diehl, Bock and
+Moves are u = -K x + c with corrections c that are constant over blocks. With the LQ gain K, c = 0 is the plan
+without active limits, without a preview and with linear rotor loads (Rossiter, Kouvaritakis and Rice,
+Automatica 34, 1998). Rotor loads come from the table; their difference from the linear model is an additional
+input. One step is computed per period, from the previous plan (real-time iteration: Diehl, Bock and
 Schloeder, SIAM J. Control Optim. 43, 2005).
 """
 
@@ -18,14 +18,14 @@ from fowt_env.controllers.mpc.rotor_table import rotor_loads
 from fowt_env.plant.compile.decorators import entry, kernel
 
 BLADE = SPEED + 1
-FIRST_BLOCKS = 4  # of one period each; later ones grow
-GROWTH = 1.5  # of the length of a block over that of the one before
-RATED_BLOCKS = 4  # blocks at whose start the rates have limits
-LIMITED = (TORQUE, COMMAND, SPEED)  # states with limits, at the end of each block
+FIRST_BLOCKS = 4  # number of blocks of one period; later blocks grow
+GROWTH = 1.5  # ratio of the lengths of successive blocks
+RATED_BLOCKS = 4  # number of blocks with rate limits at their start
+LIMITED = (TORQUE, COMMAND, SPEED)  # states with limits at the end of each block
 
 
 class Limit(IntEnum):
-    """Entries of the array of limits; each kind has a low and a high one."""
+    """Enumerates the array of limits; each kind has a low and a high limit."""
 
     TORQUE_RATE = 0  # rated torques/s
     PITCH_RATE = 2  # rad/s
@@ -35,14 +35,14 @@ class Limit(IntEnum):
 
 
 class Grid(NamedTuple):
-    """Blocks of the horizon."""
+    """Holds the blocks of the horizon."""
 
     block_of: np.ndarray  # (steps,) block of each period
     ends: np.ndarray  # (blocks,) periods at the end of each
 
 
 class Work(NamedTuple):
-    """Arrays that a step fills: trajectory, its slopes, the program min z'Hz/2 + g'z, low <= C z <= high."""
+    """Holds the arrays of a step: trajectory, slopes, program min z'Hz/2 + g'z, low <= C z <= high."""
 
     states: np.ndarray  # (steps + 1, n)
     slopes: np.ndarray  # (steps + 1, n, moves)
@@ -51,7 +51,7 @@ class Work(NamedTuple):
     C: np.ndarray
     low: np.ndarray
     high: np.ndarray
-    loads: np.ndarray  # (8,) and below: in passing
+    loads: np.ndarray  # (8,) this and the following: scratch
     excess: np.ndarray  # (2,)
     gain: np.ndarray  # (2, 3)
     by_load: np.ndarray  # (2, moves)
@@ -81,9 +81,9 @@ def work_of(grid):
 
 @kernel
 def _extra_loads(model, wind, table, x, loads, excess, gain):
-    """Fill excess (2,), loads of the table beyond the linear ones, and gain (2, 3), their slopes.
+    """Fill excess (2,), table loads minus linear loads, and gain (2, 3), slopes of excess.
 
-    Slopes are over the wind at the rotor, rotor speed and blade pitch.
+    Slopes are over wind at the rotor, rotor speed and blade pitch.
     """
     base = model.loads
     change = (
@@ -101,9 +101,9 @@ def _extra_loads(model, wind, table, x, loads, excess, gain):
 
 @kernel
 def _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed):
-    """Fill the states under the moves, from the first, and their slopes over the moves.
+    """Predict the states under the moves from the first state, with their slopes over the moves.
 
-    ahead: (n, 2) states of the wind's filter at the first n periods, less the operating wind.
+    ahead: (n, 2) states of the wind filter at the first n periods, minus the operating wind.
     """
     n, width = N_FEEDBACK, len(moves)
     x, s = work.states, work.slopes
@@ -142,7 +142,7 @@ def _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed):
 
 @kernel
 def _condense(model, rows, references, end, grid, moves, work, gain):
-    """Fill H and g: the squared terms less their references, and the cost to go about the state `end`."""
+    """Fill H and g from the squared deviations from references and the cost to go about the state `end`."""
     n, width = N_FEEDBACK, len(moves)
     h, g, x, s = work.H, work.g, work.states, work.slopes
     y = work.row
@@ -154,7 +154,7 @@ def _condense(model, rows, references, end, grid, moves, work, gain):
         for q in range(N_COST):
             rate = q - (N_COST - 2)  # 0 and 1: torque and pitch command
             if k == 0 and rate < 0:
-                continue  # the first state is given
+                continue  # the first state is constant
             value = -references[q]
             for c in range(used):
                 y[c] = 0.0
@@ -194,7 +194,7 @@ def _condense(model, rows, references, end, grid, moves, work, gain):
 
 @kernel
 def _limit(limits, units, grid, moves, work, gain):
-    """Fill C, low and high: how far each limited quantity may change from the plan, in its unit."""
+    """Fill C, low and high: permitted change of each limited quantity from the plan, in its unit."""
     n, width = N_FEEDBACK, len(moves)
     row = 0
     for block in range(RATED_BLOCKS):
@@ -214,12 +214,12 @@ def _limit(limits, units, grid, moves, work, gain):
             row += 1
     for block in range(len(grid.ends)):
         k = grid.ends[block]
-        for place in range(len(LIMITED)):
-            state, unit = LIMITED[place], units[2 + place]
+        for j in range(len(LIMITED)):
+            state, unit = LIMITED[j], units[2 + j]
             for c in range(width):
                 work.C[row, c] = work.slopes[k, state, c] / unit
-            work.low[row] = (limits[4 + 2 * place] - work.states[k, state]) / unit
-            work.high[row] = (limits[5 + 2 * place] - work.states[k, state]) / unit
+            work.low[row] = (limits[4 + 2 * j] - work.states[k, state]) / unit
+            work.high[row] = (limits[5 + 2 * j] - work.states[k, state]) / unit
             row += 1
 
 
@@ -227,9 +227,9 @@ def _limit(limits, units, grid, moves, work, gain):
 def newton_step(
     model, gain, wind, table, nonlinear, rows, references, end, ahead, limits, units, grid, moves, work, step
 ):
-    """Fill work about the plan `moves` and step (moves,) with the best change where no limit binds.
+    """Fill work about the plan `moves`, and step (moves,) with the optimal change without limits.
 
-    Returns whether that keeps all limits. The state now is work.states[0], the feedback -gain x.
+    Returns whether this step satisfies all limits. The present state is work.states[0], the feedback -gain x.
     """
     closed = model.A - model.B @ gain
     _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed)
@@ -247,7 +247,7 @@ def newton_step(
 
 @entry
 def shifted(moves, grid, later):
-    """Fill `later` with the plan of moves as it stands one period on."""
+    """Fill `later` with the plan of moves shifted by one period."""
     steps = len(grid.block_of)
     later[:] = 0.0
     for k in range(steps):

@@ -1,4 +1,4 @@
-"""Thrust and torque coefficients of a rotor with their slopes, as the prediction looks them up."""
+"""Computes rotor thrust and torque with slopes from a coefficient table, for the prediction of MPC."""
 
 from typing import NamedTuple
 
@@ -12,11 +12,11 @@ from fowt_env.plant.drivetrain import clamp
 
 RATIOS = np.linspace(1.5, 16.0, 146)  # tip-speed ratio
 PITCHES = np.radians(np.linspace(-2.0, 40.0, 169))
-SLOWEST = 3.0  # m/s: below this wind at the rotor, loads are those of it
+SLOWEST = 3.0  # m/s, lower limit of the wind at the rotor
 
 
 class RotorTable(NamedTuple):
-    """Coefficients over tip-speed ratio and blade pitch (rad), both evenly spaced."""
+    """Holds coefficients over tip-speed ratio and blade pitch (rad), both evenly spaced."""
 
     values: np.ndarray  # (6, n, m): thrust, its slopes over ratio and over pitch, the same of torque
     first_ratio: float
@@ -42,7 +42,7 @@ def rotor_table(turbine, density):
         grid = (RATIOS[0], RATIOS[1] - RATIOS[0], PITCHES[0], PITCHES[1] - PITCHES[0])
         numbers = map(float, (*grid, radius, 0.5 * density * np.pi * radius**2))
         table = RotorTable(np.ascontiguousarray(parts), *numbers)
-        return turbine, table  # with the turbine, whose id is then its own
+        return turbine, table  # keeps the turbine, so that its id stays valid
 
     return _tables.get((id(turbine), float(density)), make)[1]
 
@@ -53,12 +53,12 @@ def rotor_loads(wind, rotor_speed, blade_pitch, table, loads):
     v = max(wind, SLOWEST)
     ratio = rotor_speed * table.radius / v
     rows, columns = table.values.shape[1:]
-    place = clamp((ratio - table.first_ratio) / table.ratio_step, 0.0, rows - 1.0)
-    i = min(int(place), rows - 2)
-    f = place - i
-    place = clamp((blade_pitch - table.first_pitch) / table.pitch_step, 0.0, columns - 1.0)
-    j = min(int(place), columns - 2)
-    g = place - j
+    position = clamp((ratio - table.first_ratio) / table.ratio_step, 0.0, rows - 1.0)
+    i = min(int(position), rows - 2)
+    f = position - i
+    position = clamp((blade_pitch - table.first_pitch) / table.pitch_step, 0.0, columns - 1.0)
+    j = min(int(position), columns - 2)
+    g = position - j
     for load in range(2):
         k = 3 * load
         c = _between(table.values, k, i, j, f, g)
@@ -73,7 +73,7 @@ def rotor_loads(wind, rotor_speed, blade_pitch, table, loads):
 
 @kernel
 def _between(values, k, i, j, f, g):
-    """Return the entry k of the table between four of its nodes."""
+    """Return entry k of the table by bilinear interpolation in the cell (i, j)."""
     low = (1.0 - g) * values[k, i, j] + g * values[k, i, j + 1]
     high = (1.0 - g) * values[k, i + 1, j] + g * values[k, i + 1, j + 1]
     return (1.0 - f) * low + f * high

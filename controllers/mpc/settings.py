@@ -1,4 +1,4 @@
-"""Settings of the predictive law: weights of its cost, horizon and limits."""
+"""Defines the settings of MPC: weights of the cost, horizon and limits."""
 
 from dataclasses import dataclass
 
@@ -14,9 +14,9 @@ GROWTHS = (
 
 @dataclass(frozen=True)
 class MPCSettings(Settings):
-    """Cost of each squared term in units of the scale in its comment, and what bounds the moves.
+    """Holds the weights of squared terms (scale of each in the comment), horizon and limits of MPC.
 
-    The weights of defaults are what `fowt design tune mpc` found.
+    The default weights are results of `fowt design tune mpc`.
 
     Raises: InputError naming the key, value and allowed range.
     """
@@ -40,18 +40,18 @@ class MPCSettings(Settings):
     torque: float = 0.2046  # over 5 % of rated
     speed_integral: float = 0.0045  # over 5 % of rated times 10 s
     pitch_rate: float = 2.342  # blade-pitch command, over 0.2 deg/s
-    torque_rate: float = 1.049  # over 5 % of rated torque a second
-    pitch_rate_growth: float = 1.738  # pitch_rate holds at 18 m/s and below goes with this power of the wind
+    torque_rate: float = 1.049  # over 5 % of rated torque per second
+    pitch_rate_growth: float = 1.738  # exponent of wind/(18 m/s) in the weight pitch_rate, below 18 m/s
     pitch_rate_growth_above: float = -2.617  # the same above 18 m/s
     power_growth: float = -1.0  # the same for power, below 18 m/s
     power_growth_above: float = -1.1  # the same above 18 m/s
     torque_growth: float = 2.1  # the same for torque, below and above
-    schedule_time: float = 240.7  # s, over which the operating wind follows the estimate; no cost
+    schedule_time: float = 240.7  # s, time constant of the operating wind; not a weight
     horizon: float = 30.0  # s
-    preview_time: float = 10.0  # s that the wind is known ahead, for the law that is shown it
+    preview_time: float = 10.0  # s, look-ahead time of laws with preview
     speed_limit: float = 1.15  # of rated, soft
     torque_low: float = 0.5  # of rated
     torque_high: float = 1.1  # of rated
 
 
-PREVIEW = MPCSettings(power=0.1, torque=0.1)  # with the wind ahead torque has less to make up for
+PREVIEW = MPCSettings(power=0.1, torque=0.1)  # with preview less torque action is needed

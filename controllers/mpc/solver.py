@@ -1,4 +1,4 @@
-"""Solves quadratic programs of the predictive law by OSQP (Stellato et al., Math. Prog. Comp. 12, 2020)."""
+"""Solves the quadratic programs of MPC by OSQP (Stellato et al., Math. Prog. Comp. 12, 2020)."""
 
 import numpy as np
 from scipy import sparse
@@ -13,7 +13,7 @@ SETTINGS = {
     "eps_rel": 1e-5,
     "max_iter": 1000,
     "check_termination": 10,
-    "adaptive_rho": False,  # its changes would outlast a solution: runs would depend on those before
+    "adaptive_rho": False,  # a changed rho would make a solution depend on earlier runs
     "rho": 10.0,
     "scaling": 0,  # the program is scaled here
     "polishing": False,
@@ -21,7 +21,7 @@ SETTINGS = {
 
 
 def load():
-    """Return the module osqp. Raises: InputError that names the extra where it is missing."""
+    """Return the module osqp. Raises: InputError naming the extra to install if osqp is missing."""
     try:
         import osqp
     except ImportError as error:
@@ -32,17 +32,17 @@ def load():
 
 
 class Program:
-    """min z'Hz/2 + g'z + SOFT |v|^2 with low <= C z - v <= high, of one size; anew from each start.
+    """Minimises z'Hz/2 + g'z + SOFT |v|^2 with low <= C z - v <= high, for one size and any start.
 
-    All limits are soft, so that there is a solution always: what is applied is limited after it.
+    All limits are soft, so that a solution always exists; applied commands are limited afterwards.
     """
 
     def __init__(self, moves, rows):
         self.moves, self.rows = moves, rows
         self.soft, self.minus = np.full(rows, 2.0 * SOFT), -np.ones(rows)
-        # the upper triangle column by column, which is the lower one of a symmetric matrix row by row
+        # the upper triangle by columns equals the lower triangle of a symmetric matrix by rows
         self.lower = np.tril_indices(moves)
-        # only places count here: the numbers come with each program
+        # only the sparsity pattern is used here: values are set by each program
         full = np.triu(np.ones((moves, moves))) + moves * np.eye(moves)
         p = sparse.block_diag([full, sparse.diags(self.soft)], format="csc")
         a = sparse.hstack([np.ones((rows, moves)), sparse.diags(self.minus)], format="csc")
@@ -52,7 +52,7 @@ class Program:
         self.solver.setup(p, self.gradient, a, -wide, wide, **SETTINGS)
 
     def solve(self, h, g, c, low, high, start):
-        """Return (moves,) solution, or None where the solver did not find it; start: a first guess."""
+        """Return the solution (moves,), or None if the solver fails; start: initial guess."""
         size = 1.0 / np.sqrt(np.diag(h))
         h, c = h * size[:, None] * size, c * size
         self.gradient[: self.moves] = g * size

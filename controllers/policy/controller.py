@@ -1,8 +1,8 @@
-"""Exported policy network as a controller: plain arrays, evaluated with numpy alone.
+"""Runs an exported policy network as a controller, evaluated with numpy only.
 
-A policy file (network_file.py) is read without pickle, so that loading one runs no code of its author.
-`policy:NAME` is a file of the folder agents, `policy:PATH` any other; a stable-baselines3 zip is
-refused here, since loading one executes code from it.
+A policy file (network_file.py) is read without pickle, so that loading runs no code of the file's author.
+`policy:NAME` is a file in the folder agents, `policy:PATH` any other file; a stable-baselines3 zip is
+rejected, because loading a zip executes code from it.
 """
 
 from dataclasses import replace
@@ -42,12 +42,12 @@ AGENTS = Path(__file__).parent / "agents"
 
 
 def shipped_agents():
-    """Sorted names of the agents in controllers/policy/agents."""
+    """Return the sorted names of the agents in controllers/policy/agents."""
     return sorted(path.stem for path in AGENTS.glob("*.npz"))
 
 
 def policy_path(name):
-    """Path of a policy file from what follows "policy:". Raises: InputError."""
+    """Return the path of a policy file from the name after "policy:". Raises: InputError."""
     path = Path(name)
     if path.suffix == ".zip":
         raise InputError(
@@ -64,10 +64,10 @@ def policy_path(name):
 
 
 class PolicyController:
-    """The agent of a policy file; what it sees, how it decides and acts is as in its training.
+    """Runs the agent of a policy file with observations, decisions and actions as in its training.
 
-    information: measurements that it or its baseline uses, "wind_preview" where the wind ahead is an input.
-    Raises: InputError where the file, the turbine or the control period do not fit.
+    information: measurements used by the agent or its baseline, and "wind_preview" if used.
+    Raises: InputError for an invalid file, turbine or control period.
     """
 
     def __init__(self, path, turbine, control_dt, name):
@@ -81,7 +81,7 @@ class PolicyController:
         preview = tuple(settings["wind_preview"])
         names = tuple(settings["observation"])
         if "azimuth" in names:
-            raise InputError(f"{where}: the rotor's azimuth is not among the measurements of a controller")
+            raise InputError(f"{where}: the rotor azimuth is not a measurement of controllers")
         observed = entries(names, turbine, preview)
         self._observation_map = build_observation_map(observed, preview)
         chosen = DecisionSettings(**settings["decisions"])
@@ -119,32 +119,33 @@ class PolicyController:
         self._accepted = np.zeros(N_ACTIONS)
         self._calls = 0
         self.information = self._information(names)
-        own = preview if "wind_preview" in names else ()
-        based = () if self._baseline is None else self._baseline.preview_times
-        self.preview_times = tuple(sorted({*own, *based}))
-        self._own_leads, self._baseline_leads = (
-            np.array([self.preview_times.index(lead) for lead in leads], dtype=int) for leads in (own, based)
+        observed_leads = preview if "wind_preview" in names else ()
+        baseline_leads = () if self._baseline is None else self._baseline.preview_times
+        self.preview_times = tuple(sorted({*observed_leads, *baseline_leads}))
+        self._agent_leads, self._baseline_leads = (
+            np.array([self.preview_times.index(lead) for lead in leads], dtype=int)
+            for leads in (observed_leads, baseline_leads)
         )
         self._hidden = None if self._baseline is None else hidden(self._baseline)
 
     def _information(self, names):
-        """Measurements and extras that the agent and its baseline use, each once."""
+        """Return the unique measurements and other inputs used by the agent and its baseline."""
         parts = [part for part in (self._baseline, self._estimator) if part is not None]
         used = [name for part in parts for name in part.information]
         used += [name for name in names if name in Measurement._fields or name == "wind_preview"]
-        used += ["generator_torque", "blade_pitch"]  # where the commands start
+        used += ["generator_torque", "blade_pitch"]  # initial commands
         if self._mode != ActionMode.RESIDUAL:
             used.append("rotor_speed")
         return tuple(dict.fromkeys(used))
 
     def prepare(self, scene):
-        """Hand the plant to the parts that are designed on it."""
+        """Prepare baseline and estimator, which are designed on the plant."""
         for part in (self._baseline, self._estimator):
             if part is not None:
                 part.prepare(scene)
 
     def reset(self, measurement):
-        """Start afresh: the command in force is the measured one, the history is empty."""
+        """Restart with the measured torque and pitch as command in force and an empty history."""
         self._u[:] = measurement.generator_torque, measurement.blade_pitch
         if self._baseline is not None:
             ahead = np.array(wind_ahead(measurement))[self._baseline_leads]
@@ -159,15 +160,15 @@ class PolicyController:
         self._calls = 0
 
     def act(self, measurement):
-        """Return (generator torque, blade pitch); every `hold` calls the network decides anew."""
+        """Return (generator torque, blade pitch); the network is evaluated every `hold` calls."""
         values = np.array([*measurement], dtype=np.float64)
         ahead = np.array(wind_ahead(measurement))
         decisions = self._decisions
-        if self._estimator is not None and self._calls > 0:  # the first instant is that of the reset
+        if self._estimator is not None and self._calls > 0:  # reset has processed the first instant
             call_law(self._estimator.law, self._estimator.parameters, self._estimator.memory, values, self._u)
         if self._calls % decisions.settings.hold == 0:
             estimate = None if self._estimator is None else self._estimator.memory
-            fill_signals(values, 0.0, self._accepted, estimate, 0.0, ahead[self._own_leads], self._signals)
+            fill_signals(values, 0.0, self._accepted, estimate, 0.0, ahead[self._agent_leads], self._signals)
             fill_observation(self._signals, self._observation_map, self._observation)
             if self._calls == 0:
                 decisions.restart(0, self._observation, self._accepted)
@@ -190,6 +191,6 @@ class PolicyController:
 
 
 def policy(name):
-    """Factory (turbine, control_dt) of the agent that "policy:NAME" or "policy:PATH" names."""
+    """Return the factory (turbine, control_dt) of the agent "policy:NAME" or "policy:PATH"."""
     path = policy_path(name.removeprefix(POLICY_PREFIX))
     return lambda turbine, control_dt: PolicyController(path, turbine, control_dt, name)

@@ -1,8 +1,8 @@
-"""Files of policies: arrays and one JSON text in a .npz, read without pickle and checked to the last value.
+"""Reads policy files: arrays and one JSON text in a .npz, read without pickle, every value checked.
 
-Loading one runs no code of its author: what it names is looked up among names that are known, its baseline
-among CONTROLLERS; descriptions/array_files.py reads its arrays, MAX_BYTES of them at most.
-training/rl/export.py writes such files.
+Loading runs no code of the file's author: names in the file must be known names, the baseline one of
+CONTROLLERS; descriptions/array_files.py reads the arrays, at most MAX_BYTES. training/rl/export.py writes
+these files.
 """
 
 from dataclasses import fields
@@ -24,13 +24,13 @@ from fowt_env.errors import InputError
 FORMAT = 1
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 SQUASHES = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
-MAX_BYTES = 100_000_000  # of all arrays; the largest policy made so far has 200 kB
+MAX_BYTES = 100_000_000  # of all arrays; typical policies have 200 kB
 MAX_LAYERS = 100
 PAIR = Annotated[list[Finite], Field(min_length=2, max_length=2)]
 
 
 class PolicySettings(Record):
-    """The JSON text of a policy file."""
+    """Defines the JSON text of a policy file."""
 
     format: Literal[FORMAT]
     activation: Literal[tuple(ACTIVATIONS)]
@@ -51,7 +51,7 @@ class PolicySettings(Record):
 
 
 class Network:
-    """A multilayer perceptron on normalised features, float32.
+    """Evaluates a multilayer perceptron on normalised features, float32.
 
     weights, biases: lists of (out, in) and (out,) arrays; mean, scale: of the features; clip: of the
     normalised features. Calling it with features (..., size) returns actions (..., 2) in [-1, 1].
@@ -74,16 +74,16 @@ class Network:
 
 
 def read_policy(path):
-    """(settings dict, Network) of a policy file.
+    """Return (settings dict, Network) of a policy file.
 
-    Raises: InputError naming the file and what is wrong with it.
+    Raises: InputError naming the file and the problem.
     """
     path = Path(path)
     where = f"policy file {str(path)!r}"
     try:
         arrays = read_arrays(path, MAX_BYTES)
         settings = parse_json(str(arrays["settings"]))
-    except Exception as error:  # whatever a broken file makes zipfile, zlib, numpy and json raise
+    except Exception as error:  # zipfile, zlib, numpy and json raise various errors for broken files
         raise InputError(f"{where}: cannot be read: {error!s:.300}") from error
     _check_settings(where, settings)
     try:
@@ -98,29 +98,29 @@ def read_policy(path):
 
 
 def _numbers(array):
-    """An array of numbers. Raises: ValueError."""
+    """Return the array if it is numeric. Raises: ValueError."""
     if array.dtype.kind not in "fiu":
         raise ValueError(f"of {array.dtype}: must hold numbers")
     return array
 
 
 def _check_settings(where, settings):
-    """Raises: InputError unless settings are those of a policy of this format."""
+    """Raise InputError unless settings are valid for a policy of this format."""
     if not isinstance(settings, dict):
         raise InputError(f"{where}: its settings must be a JSON object")
-    found, problems = validate(PolicySettings, settings)
+    record, problems = validate(PolicySettings, settings)
     raise_problems(where, problems)
     known = [field.name for field in fields(DecisionSettings)]
-    problems = [unknown_key(f"decisions.{key}", key, known) for key in found.decisions if key not in known]
+    problems = [unknown_key(f"decisions.{key}", key, known) for key in record.decisions if key not in known]
     raise_problems(where, problems)
     try:
-        DecisionSettings(**found.decisions)
+        DecisionSettings(**record.decisions)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
 
 
 def _check_shapes(where, weights, biases, mean, scale):
-    """Raise InputError unless the arrays form one network of finite numbers with two outputs."""
+    """Raise InputError unless the arrays form a network of finite numbers with two outputs."""
     size = mean.shape
     good = len(size) == 1 and scale.shape == size and bool(np.all(scale > 0.0))
     for weight, bias in zip(weights, biases, strict=True):

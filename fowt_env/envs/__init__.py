@@ -1,4 +1,4 @@
-"""Gymnasium environments of fowt_env, their tasks, and their tables."""
+"""Provides the Gymnasium environments of fowt_env with their tasks and Markdown tables."""
 
 from fowt_env.envs.env import FowtEnv
 from fowt_env.envs.safety import SafetyCosts, SafetyLayer

@@ -1,7 +1,7 @@
-"""What the actions in [-1, 1] mean: the action modes as physical commands.
+"""Maps actions in [-1, 1] to physical commands in each action mode.
 
-The first action belongs to the rotor-speed channel (generator torque), the second to blade pitch. In the mode
-"individual" the second to fourth belong to the pitch of each blade.
+The first action commands generator torque (or the rotor-speed set-point), the second blade pitch. In mode
+"individual" the second to fourth command the pitch of each blade.
 """
 
 from enum import IntEnum
@@ -15,14 +15,14 @@ from fowt_env.plant.drivetrain import TorqueLimits, build_drivetrain, build_torq
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command
 
-# Set-point mode: PI on rotor speed through torque, this natural frequency and damping ratio of the
-# rigid rotor. Fast beside the platform's pitch (0.21 rad/s), slow beside the torque rate limit.
+# Set-point mode: PI control of rotor speed by torque with this natural frequency and damping ratio of the
+# rigid rotor; faster than platform pitch (0.21 rad/s), slow enough for the torque rate limit.
 TRACKING_FREQUENCY = 0.5  # rad/s
 TRACKING_DAMPING = 1.0
 
 
 class ActionMode(IntEnum):
-    """Action modes."""
+    """Enumerates the action modes."""
 
     DIRECT = 0
     SETPOINT = 1
@@ -34,7 +34,7 @@ ACTION_MODES = {mode.name.lower(): mode for mode in ActionMode}
 
 
 class ActionMap(NamedTuple):
-    """Ranges of one action mode; SI."""
+    """Holds the command ranges of one action mode; SI."""
 
     mode: int
     low: float  # of the first action: N m (direct), rad/s (set-point)
@@ -51,15 +51,15 @@ class ActionMap(NamedTuple):
 
 
 def n_actions(mode):
-    """Number of actions of an ActionMode."""
+    """Return the number of actions of an ActionMode."""
     return N_INDIVIDUAL_COMMANDS if mode == ActionMode.INDIVIDUAL else N_COMMANDS
 
 
 def build_action_map(mode, task, turbine, control_dt, individual=False):
-    """ActionMap of a ActionMode, a Task and a descriptions.turbine.Turbine.
+    """Return the ActionMap of an ActionMode, a Task and a descriptions.turbine.Turbine.
 
     individual: whether the baseline of the residual mode commands each blade.
-    Raises: InputError where the pitch action exceeds the range of the actuator.
+    Raises: InputError if the pitch action exceeds the range of the actuator.
     """
     law, drive = turbine.torque_law, turbine.pitch_drive
     reach = tuple(angle * pi / 180.0 for angle in task.blade_pitch)
@@ -94,7 +94,7 @@ def build_action_map(mode, task, turbine, control_dt, individual=False):
 
 @kernel
 def accept(action, accepted):
-    """Copy an action, clipped to [-1, 1]. Returns 0, 1 if it was clipped, -1 if it is not finite."""
+    """Copy an action, clipped to [-1, 1]. Returns 0; 1 if an entry was clipped, -1 if one is not finite."""
     saturated = 0
     for i in range(accepted.shape[0]):
         if not isfinite(action[i]):
@@ -108,19 +108,19 @@ def accept(action, accepted):
 
 @kernel
 def unscale(action, low, high):
-    """The value in [low, high] that an action in [-1, 1] asks for."""
+    """Return the value in [low, high] commanded by an action in [-1, 1]."""
     return low + 0.5 * (action + 1.0) * (high - low)
 
 
 @kernel
 def scale(value, low, high):
-    """The action in [-1, 1] that asks for a value, or for the end of [low, high] that it passes."""
+    """Return the action in [-1, 1] that commands a value, limited to [low, high]."""
     return clamp(2.0 * (value - low) / (high - low) - 1.0, -1.0, 1.0)
 
 
 @kernel
 def tracking_torque(speed, setpoint, memory, actions):
-    """Torque that drives the rotor speed (rad/s) to its set-point; memory[0]: integral part, N m."""
+    """Return the torque, N m, that tracks a rotor-speed set-point (rad/s); memory[0]: integral part, N m."""
     error = speed - setpoint
     integral = memory[0] + actions.tracking_rate * error * actions.control_dt
     memory[0] = clamp(integral, 0.0, actions.generator.maximum)
@@ -129,7 +129,7 @@ def tracking_torque(speed, setpoint, memory, actions):
 
 @kernel
 def call_baseline(baseline_law, parameters, memory, reading, command):
-    """Call the law of the baseline; without one the command stays."""
+    """Call the baseline law; None: the command is unchanged."""
     if baseline_law is None:
         return
     baseline_law(parameters, memory, reading, command)
@@ -139,7 +139,7 @@ def call_baseline(baseline_law, parameters, memory, reading, command):
 def command_of(action, actions, baseline_law, parameters, memory, reading, command):
     """Fill the command (generator torque N m, blade pitch or that of each blade rad) of an accepted action.
 
-    reading: what the baseline's law reads; command: in force until now, as far as the law declares it.
+    reading: input of the baseline law; command: on entry the command in force, masked for this law.
     """
     if actions.mode == ActionMode.RESIDUAL:
         call_baseline(baseline_law, parameters, memory, reading, command)
@@ -160,9 +160,9 @@ def command_of(action, actions, baseline_law, parameters, memory, reading, comma
 
 @kernel
 def action_of(u, rotor_speed, actions, action):
-    """Set the action that asks for what is already there: u, and the rotor speed as set-point.
+    """Set the action that commands the present state: u, with the rotor speed as set-point.
 
-    In residual mode that is zero: nothing added to the baseline.
+    In residual mode this action is zero: no addition to the baseline.
     """
     if actions.mode == ActionMode.RESIDUAL:
         action[0] = 0.0
@@ -175,5 +175,5 @@ def action_of(u, rotor_speed, actions, action):
 
 
 def start_tracking(memory, measurement, actions):
-    """Set the integral so that the set-point of the present speed asks for the present torque."""
+    """Set the integral part such that the present speed as set-point commands the present torque."""
     memory[0] = min(max(measurement.generator_torque, 0.0), actions.generator.maximum)

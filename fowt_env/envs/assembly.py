@@ -1,4 +1,4 @@
-"""Assembly of an environment from its settings: task, compiled controllers, constant parts and arrays."""
+"""Assembles an environment from its settings: task, compiled controllers, constant parts and arrays."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -33,19 +33,19 @@ def adapted_task(task: Task, settings: Settings) -> Task:
 
 
 def check_shown(names, chain):
-    """Refuse observation channels that a chain (name, fields) of sensors does not show."""
+    """Raise InputError for observation channels that a sensor chain (name, fields) does not measure."""
     for name in names:
         if name in (*Measurement._fields, *BLADE_CHANNELS) and name not in chain[1]:
             raise InputError(
-                f"observation: {name!r}: the sensor chain {chain[0]!r} does not have it; it has"
+                f"observation: {name!r}: is not measured by the sensor chain {chain[0]!r}; available:"
                 f" {', '.join(chain[1])}"
             )
 
 
 def named_baseline(name, turbine, control_dt):
-    """Return the compiled controller of a name, as controllers.make takes it.
+    """Return the compiled controller of a name or object accepted by controllers.make.
 
-    Raises: InputError for unknown ones and those written in Python.
+    Raises: InputError for unknown names and for controllers written in Python.
     """
     names = catalogue().CONTROLLERS
     if isinstance(name, str) and ":" not in name and name not in names:
@@ -59,7 +59,7 @@ def named_baseline(name, turbine, control_dt):
 def nominal_parts(setting):
     """Return {"platform", "turbine"} of the setting nominal_plant. Raises: InputError."""
     if not isinstance(setting, Mapping) or "platform" not in setting:
-        raise InputError(f"nominal_plant = {setting!r}: must be a dict with a platform, and a turbine or not")
+        raise InputError(f"nominal_plant = {setting!r}: must be a dict with platform and optional turbine")
     for key in setting:
         if key not in ("platform", "turbine"):
             raise unknown("key of nominal_plant", key, ("platform", "turbine"))
@@ -91,7 +91,7 @@ def build_config(scene, task, mode, observed, timing, laws, interface, ahead):
 
 
 def allocate_episode(scene, config, laws, periods):
-    """Return EpisodeData for a config; periods: control instants whose output rows are kept, 0: none."""
+    """Return EpisodeData for a config; periods: control instants whose output rows are stored, 0: none."""
     baseline, estimator = laws
     low, leads = config.observation_map.low, config.observation_map.preview.shape[0]
     n, size = scene.n_state, scene.n_measurements

@@ -1,13 +1,12 @@
-"""Decisions of an agent: kept for some control periods, smoothed, and made from a short history.
+"""Holds, smooths and limits the decisions of an agent, and builds features from a short history.
 
-What an agent adds to a baseline (residual mode) can be made to leave the baseline's operating point alone,
-whatever the agent has learned. washout: a high pass, so that what is added sums to no more than a bounded
-amount and a constant decision comes to nothing. authority: the decisions count in proportion to how much
-the estimated wind has moved lately, and not at all below a floor, so that the baseline alone decides what
-happens about the operating point in steady wind.
+Two options keep the additions of any agent (residual mode) from shifting the baseline's operating point.
+washout: a high-pass filter, which bounds the sum of the additions and removes a constant decision.
+authority: the decisions are weighted by the recent standard deviation of the estimated wind, with weight 0
+below a threshold, so that the baseline alone controls the operating point in steady wind.
 
-The same few lines of numpy serve the training environments and the exported policy, so that an agent is
-scored on what it learned from.
+Training environments and the exported policy use the same numpy code, so that an agent is scored with the
+decisions and features of its training.
 """
 
 from dataclasses import dataclass
@@ -20,21 +19,21 @@ from fowt_env.envs.actions import ActionMode
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.errors import InputError
 
-WIND_CHANNEL = "estimated_wind"  # whose movement gives authority
+WIND_CHANNEL = "estimated_wind"  # its standard deviation determines authority
 
 
 @dataclass(frozen=True)
 class DecisionSettings:
-    """How decisions are made. Raises: InputError naming the key, value and allowed range."""
+    """Holds the settings of decisions. Raises: InputError naming the key, value and allowed range."""
 
     hold: int = 5  # control periods from one decision to the next
     smoothing: float = 0.5  # s, time constant of the low pass from decision to action; 0: none
-    history: int = 8  # earlier decision instants that are inputs beside the present one
-    washout: float = 0.0  # s, time constant of the high pass of what is added to a baseline; 0: none
-    # m/s, standard deviation of the estimated wind below which a decision counts nothing, and from which on
-    # it counts in full; None: always in full
+    history: int = 8  # number of earlier decision instants among the inputs
+    washout: float = 0.0  # s, time constant of the high pass of additions to a baseline; 0: none
+    # m/s, standard deviations of the estimated wind below which decisions have weight 0 and above which
+    # weight 1; None: always 1
     authority: tuple | None = None
-    authority_time: float = 60.0  # s, over which that standard deviation is taken
+    authority_time: float = 60.0  # s, averaging time of this standard deviation
 
     def __post_init__(self):
         for key, low, high in (("hold", 1, 100), ("history", 0, 200)):
@@ -55,9 +54,9 @@ class DecisionSettings:
 
 
 def wind_entry(settings, mode, observed):
-    """(index, m/s per unit, centre m/s) of the estimated wind among observed Entries; None: not needed.
+    """Return (index, m/s per unit, centre m/s) of the estimated wind in Entries, None if not needed.
 
-    Raises: InputError where the DecisionSettings do not go with the action mode or the channels.
+    Raises: InputError if the DecisionSettings do not match the action mode or the channels.
     """
     if settings.washout == 0.0 and settings.authority is None:
         return None
@@ -71,24 +70,24 @@ def wind_entry(settings, mode, observed):
         if entry.name == WIND_CHANNEL:
             return i, entry.scale, entry.centre
     raise InputError(
-        f"decisions.authority = {settings.authority!r}: needs the channel {WIND_CHANNEL!r} among the observed"
+        f"decisions.authority = {settings.authority!r}: needs the channel {WIND_CHANNEL!r} in the observation"
     )
 
 
-MEAN, VARIANCE = 2 * N_ACTIONS, 2 * N_ACTIONS + 1  # places in the memory of Decisions
+MEAN, VARIANCE = 2 * N_ACTIONS, 2 * N_ACTIONS + 1  # columns in the memory of Decisions
 
 
 def _fraction(step, time_constant):
-    """Share of the way to its input that a first-order low pass goes in a step (s)."""
+    """Return the fraction of the input step that a first-order low pass follows in a time step (s)."""
     return 1.0 if time_constant == 0.0 else 1.0 - exp(-step / time_constant)
 
 
 class Decisions:
-    """History and smoothed actions of n environments.
+    """Holds the observation history and computes the smoothed actions of n environments.
 
     observations (n, history + 1, channels) float32: observations at decision instants, newest first.
-    action (n, 2): in force, in [-1, 1].
-    wind: what wind_entry returns.
+    action (n, 2): present actions, in [-1, 1].
+    wind: result of wind_entry for the settings.
     """
 
     def __init__(self, n, channels, settings, control_dt, wind=None):
@@ -97,22 +96,22 @@ class Decisions:
         self.action = np.zeros((n, N_ACTIONS))
         self.fraction = _fraction(control_dt, settings.smoothing)
         if (wind is None) != (settings.authority is None):
-            raise ValueError("wind: what wind_entry returns for these settings")
+            raise ValueError("wind: must be the result of wind_entry for these settings")
         self.wind = wind
         self.shaped = settings.washout > 0.0 or wind is not None
         self.passing = _fraction(control_dt, settings.washout) if settings.washout else 0.0
         self.lasting = _fraction(control_dt * settings.hold, settings.authority_time)
-        # of each row, where anything is shaped: smoothed decision (2), low pass of the action (2), mean and
-        # variance of the estimated wind
+        # columns, used with washout or authority: smoothed decision (2), low pass of the action (2), mean
+        # and variance of the estimated wind
         self.memory = np.zeros((n, 2 * N_ACTIONS + 2))
 
     @property
     def size(self):
-        """Number of features."""
+        """Return the number of features."""
         return self.observations.shape[1] * self.observations.shape[2]
 
     def restart(self, rows, observations, actions):
-        """Forget the past of some rows: all history is the observation, the action is the one in force."""
+        """Reset the history of some rows to one observation and their actions to those in force."""
         self.observations[rows] = np.asarray(observations, dtype=np.float32)[..., None, :]
         self.action[rows] = actions
         self.memory[rows] = 0.0
@@ -121,7 +120,7 @@ class Decisions:
             self.memory[rows, MEAN] = self._estimated_wind()[rows]
 
     def append(self, observations):
-        """Take the observations (n, channels) of a new decision instant."""
+        """Append the observations (n, channels) of a new decision instant."""
         self.observations[:, 1:] = self.observations[:, :-1].copy()
         self.observations[:, 0] = observations
         if self.wind is not None:
@@ -130,47 +129,47 @@ class Decisions:
             self.memory[:, VARIANCE] += self.lasting * (deviation**2 - self.memory[:, VARIANCE])
 
     def _estimated_wind(self):
-        """(n,) m/s, of the newest observations."""
+        """Return the estimated wind (n,), m/s, of the newest observations."""
         index, scale, centre = self.wind
         return centre + scale * self.observations[:, 0, index].astype(np.float64)
 
     def authority(self):
-        """(n,) fraction in [0, 1] by which decisions count."""
+        """Return the weights (n,) of the decisions, in [0, 1]."""
         if self.wind is None:
             return np.ones(len(self.action))
         low, high = self.settings.authority
         return np.clip((np.sqrt(self.memory[:, VARIANCE]) - low) / (high - low), 0.0, 1.0)
 
     def features(self):
-        """(n, size) float32: the newest observation, then its change over each earlier interval.
+        """Return features (n, size) float32: newest observation, then the change over each earlier interval.
 
-        Changes, as they carry the rates that plain lags would hide in differences of nearly equal numbers
-        once everything is scaled to unit variance.
+        Changes represent the rates directly; with lagged observations scaled to unit variance, rates would
+        be small differences of nearly equal numbers.
         """
         return features_of(self.observations)
 
     def last_features(self, row, observation):
-        """(size,) features of a row if the observation came next; nothing is remembered."""
+        """Return the features (size,) of a row for a next observation, without storing the observation."""
         newest = np.asarray(observation, dtype=np.float32)[None]
         observations = np.concatenate([newest, self.observations[row, :-1]])
         return features_of(observations[None])[0]
 
     def smooth(self, decision):
-        """(n, 2) action of the next control period, towards the decision."""
+        """Return the smoothed actions (n, 2) of the next control period."""
         if not self.shaped:
             self.action += self.fraction * (decision - self.action)
             return self.action
         smoothed, lasting = self.memory[:, :N_ACTIONS], self.memory[:, N_ACTIONS:MEAN]
         smoothed += self.fraction * (decision - smoothed)
         counted = self.authority()[:, None] * smoothed
-        # the low pass is of what is applied, so that its limit bounds the sum of all that is ever applied
+        # filter the clipped action: the limit of the low pass then bounds the sum of all applied actions
         self.action[:] = np.clip(counted - lasting, -1.0, 1.0)
         lasting += self.passing * self.action
         return self.action
 
 
 def features_of(observations):
-    """(n, features) of observations (n, instants, channels), see Decisions.features."""
+    """Return features (n, features) of observations (n, instants, channels), see Decisions.features."""
     changes = observations[:, :-1] - observations[:, 1:]
     n = len(observations)
     return np.concatenate([observations[:, 0], changes.reshape(n, -1)], axis=1)

@@ -1,4 +1,4 @@
-"""The Gymnasium environment: a task, a scene and the compiled control period, glued together."""
+"""Defines the Gymnasium environment, which couples a task, a scene and the compiled control period."""
 
 from collections.abc import Sequence
 from copy import deepcopy
@@ -76,87 +76,87 @@ from fowt_env.scene.build import build_scene
 from fowt_env.scene.scene import Scene
 from fowt_env.weather.preview import exact_preview
 
-SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # of a scene whose first draw happens to have no waves
+SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # used if the first draw of a task has no waves
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
-CLOSED = "the environment was closed: make another"
+CLOSED = "the environment was closed: create another"
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 REFERENCE_SHUTDOWN = Reference._fields.index("shutdown")
 REWARD_KEYS = tuple(f"reward/{name}" for name in REWARD_TERMS)
-# attributes that hold what a kernel reads and writes: made anew in a copy, and filled from a Snapshot
+# attributes with arrays that kernels read and write: rebuilt in a copy and filled from a Snapshot
 COMPILED = (
     "_view", "_baseline", "_estimator", "_baseline_law", "_estimator_law", "_config", "_episode", "_handle",
 )  # fmt: skip
 
 
 class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
-    """Gymnasium environment of a floating wind turbine with torque and blade-pitch commands.
+    """Simulates a floating wind turbine under torque and blade-pitch commands as a Gymnasium environment.
 
     task          name in TASKS ("above_rated", ...), scaled to the platform's turbine, or a Task
     platform      built-in name, path or descriptions.platform.Platform
     episode, plant, control, interface
-                  records of settings (EpisodeSettings, PlantSettings, ControlSettings, InterfaceSettings in
-                  fowt_env.envs). Every field of a record is a keyword too, as are the options of build_scene:
+                  settings records (EpisodeSettings, PlantSettings, ControlSettings, InterfaceSettings in
+                  fowt_env.envs). Each field of a record is also a keyword, as are the options of build_scene:
                   FowtEnv(action_mode="residual", sensors="standard", loads=[...])
-    render_mode   None, "rgb_array" (render() returns a picture) or "human" (every step shows one in a window)
-    render_size   pixels (width, height) of the picture; None: (960, 640)
+    render_mode   None, "rgb_array" (render() returns an image) or "human" (every step draws into a window)
+    render_size   image size (width, height), pixels; None: (960, 640)
 
     An episode starts at the operating point of its mean wind plus the task's offsets, in wind and sea drawn
-    from the task's ranges with the environment's seed: the same seed gives the same bits. Where the mean
-    wind is drawn, the operating point is interpolated between exact ones 0.25 m/s apart, within 0.05 m of
-    surge and 0.03 deg of blade pitch, in the cells next to rated wind within 0.9 m and 0.6 deg.
-    reset(options=...) takes "wind", "sea", "weather_seed", "offsets", "shutdown" and "faults" in place of
-    drawn values, wind, sea and offsets as ranges too; info["sampled"] of a reset has the drawn values and,
+    from the task's ranges with the environment's seed: the same seed gives the same bits. If the mean wind
+    is drawn, the operating point is interpolated between exact ones 0.25 m/s apart, to within 0.05 m of surge
+    and 0.03 deg of blade pitch (0.9 m and 0.6 deg in the intervals next to rated wind).
+    reset(options=...) accepts "wind", "sea", "weather_seed", "offsets", "shutdown" and "faults" in place of
+    drawn values; wind, sea and offsets may be ranges. info["sampled"] of a reset holds the drawn values and,
     passed as options, replays the episode. New weather compiles no kernels: an environment whose task has a
-    sea takes any sea, None for still water; one built in still water takes none, and a box of full-field wind
-    cannot be exchanged for another wind. A refused reset leaves the environment in its episode.
+    sea accepts any sea, None for still water; an environment built in still water accepts no waves, and
+    a full-field wind box cannot be replaced by another wind. A rejected reset leaves the episode unchanged.
 
-    Actions outside [-1, 1] are clipped, and info["saturated_actions"] counts such periods. The torque stays
-    within the generator's range and rate limit, the blade pitch within its actuator's;
-    info["torque_limited"] counts periods whose torque differs from the command. "individual" commands the
-    pitch of each blade in a scene with pitch="individual", where the other action modes give one pitch to all
-    blades. In the residual mode lqr continues from the sum, so that an addition in every period is an
-    addition to its rates.
+    Actions outside [-1, 1] are clipped; info["saturated_actions"] counts such periods. The torque stays
+    within the generator's range and rate limit, the blade pitch within the range and rate limit of its
+    actuator; info["torque_limited"] counts periods with a limited torque command. "individual" commands the
+    pitch of each blade in a scene with pitch="individual"; the other action modes command one pitch for all
+    blades. In residual mode the baseline lqr continues from the applied command, so an addition in every
+    period is an addition to its rates.
 
-    An episode is terminated by failure: rotor speed above the turbine file's overspeed, capsize (platform
-    pitch beyond 80 deg) or a state that is not finite; info["termination"] has the reason. It is truncated at
-    the end of its duration by the environment itself, so spec.max_episode_steps is None;
+    Failure terminates an episode: rotor speed above the turbine file's overspeed, capsize (platform pitch
+    beyond 80 deg) or a state that is not finite; info["termination"] has the reason. The environment
+    truncates an episode at the end of its duration, so spec.max_episode_steps is None;
     gymnasium.make(..., max_episode_steps=n) ends episodes earlier.
 
-    protection, faults, sensors and preview mean what they mean for simulate. With protection or faults the
-    overspeed of the turbine file no longer ends an episode: a trip stops the turbine, actions are ignored
-    from then on (info["stopping"]) and the episode continues to its end, as a run of a suite does; a trip
-    with the stop "end" terminates it. The last info has "tripped" (s), "trip", "stop". Faults may be drawn:
-    {"kind": "stuck_pitch", "time": (60.0, 300.0)}. With record=True frame() returns the episode as simulate
-    returns a run. fowt_env.training.evaluation.case_environment has the settings of a load case.
+    protection, faults, sensors and preview have the same meaning as in simulate. With protection or faults
+    the overspeed of the turbine file no longer ends an episode: a trip stops the turbine, later actions are
+    ignored (info["stopping"]) and the episode continues to its end, as a run of a suite does; a trip with the
+    stop "end" terminates the episode. The last info has "tripped" (s), "trip", "stop". Faults may be drawn:
+    {"kind": "stuck_pitch", "time": (60.0, 300.0)}. With record=True frame() returns the episode in the format
+    of simulate. fowt_env.training.evaluation.case_environment has the settings of a load case.
 
-    One reading per control period serves observation, baseline and estimator, and measurement() returns it;
-    its noise follows from the weather's seed. Azimuth, last action and the exact preview have no noise;
-    rewards and failures use true motions.
+    Observation, baseline, estimator and measurement() use the same sensor reading in a control period. The
+    weather seed determines its noise. Azimuth, last action and the exact preview have no noise; rewards and
+    failures use true motions.
 
     In a task with `shutdown` the baseline operates the turbine within reset for the drawn time. The episode
-    begins at the signal to stop; its duration includes the operation.
+    begins at the stop signal; its duration includes the operation by the baseline.
 
-    A picture shows one control period: 30 pictures a second are three times real time.
-    gymnasium.make(..., render_mode="rgb_array_list") collects them.
+    An image shows one control period: 30 images per second are three times real time.
+    gymnasium.make(..., render_mode="rgb_array_list") collects the images.
 
     copy.deepcopy and pickle return an independent environment at the same instant: both then give the same
     bits for the same actions, and the same later episodes. A copy shares constant parts such as the scene; a
-    pickle contains it (some 13 MB at fidelity "standard", most of it the rotor's table). The window of render
-    mode "human" stays with the original.
+    pickle contains the scene (about 13 MB at fidelity "standard", mainly the rotor table). The window of
+    render mode "human" stays with the original.
 
-    Domain randomisation: plants differ by settings (platform, turbine, sensors, with nominal_plant for the
-    controllers' knowledge). fowt_env.training.rl.randomisation.randomised draws lists of such settings of
+    Domain randomisation: plants differ by settings (platform, turbine, sensors; nominal_plant is the plant
+    known to the controllers). fowt_env.training.rl.randomisation.randomised draws lists of such settings of
     OC3-Hywind, for gymnasium.make(name, **settings) or make_vec(name, n, per_env=list).
 
-    Constraints and several objectives: SafetyCosts adds info["cost"] as Safety-Gymnasium has it. The reward
+    Constraints and multiple objectives: SafetyCosts adds info["cost"] as in Safety-Gymnasium. The reward
     vector of MO-Gymnasium is [info["reward/" + term] for term in terms], from a gymnasium.Wrapper whose step
-    returns it and whose reward_space is a Box of the terms' ranges (REWARD_TERMS).
+    returns this vector and whose reward_space is a Box of the terms' ranges (REWARD_TERMS).
 
     info of each step: "time" (s), "saturated_actions", "torque_limited", "reward/<term>" of each term before
-    weighting; at a reset and at the end of an episode "events" too: {name: count} of rare events of the plant
-    (fowt_env.plant.events).
+    weighting; at a reset and at the end of an episode also "events": {name: count} of rare events of the
+    plant (fowt_env.plant.events).
 
-    Raises: InputError for settings and actions that cannot be used.
+    Raises: InputError for invalid settings and actions.
     """
 
     metadata = {"render_modes": ["human", "rgb_array"], "render_fps": 30}
@@ -177,7 +177,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if render_mode is not None:
             if render_mode not in self.metadata["render_modes"]:
                 raise unknown("render_mode", render_mode, self.metadata["render_modes"])
-            from fowt_env.visual.rendering import check_size, load_pygame  # only for pictures
+            from fowt_env.visual.rendering import check_size, load_pygame  # only for images
 
             load_pygame()
             check_size("render_size", render_size)
@@ -198,7 +198,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.render_size = render_size
         turbine = turbine_of(platform, options.get("turbine"))
         reward = settings.episode.reward
-        self._own_reward = check_own_reward("reward", reward) if callable(reward) else None
+        self._custom_reward = check_own_reward("reward", reward) if callable(reward) else None
         task = self.task = adapted_task(task_of(task, turbine), settings)
         self.action_mode, self.baseline = control.action_mode, control.baseline
         control_dt = control.control_dt
@@ -216,7 +216,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         }
         self.scene = build_scene(platform, **common, **options)
         check_duration(self.scene, task.duration)
-        self._nominal = None  # the scene of the nominal plant, where it differs from the true one
+        self._nominal = None  # scene of the nominal plant, if different from the true plant
         if control.nominal_plant is not None:
             parts = nominal_parts(control.nominal_plant)
             self._nominal = build_scene(
@@ -232,7 +232,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 self._sensors.available + (self._sensors.available_of_blades if self.individual else ()),
             )
             check_shown(task.observation, self._chain)
-        self._limits = None  # Protection, where there are trips or faults
+        self._limits = None  # Protection, with trips or faults
         if settings.interface.protection is not None or settings.interface.faults is not None:
             ratio = turbine.overspeed / turbine.rated_rotor_speed
             self._limits = read_protection(settings.interface.protection, turbine.protection, ratio)
@@ -248,7 +248,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running, self._closed = False, False
         self._end = ""  # why the last episode ended, and when
-        # what a snapshot must agree with: the same numbers then mean the same
+        # a snapshot is valid only for an environment with equal values of these
         observed = (self.scene.weather_kind, task.observation, task.wind_preview)
         nominal_key = None if self._nominal is None else plant_key(self._nominal)
         baseline = control.baseline if isinstance(control.baseline, str) else type(control.baseline).__name__
@@ -259,21 +259,21 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def individual(self) -> bool:
-        """Whether each blade is pitched individually."""
+        """Return whether each blade is pitched individually."""
         return self.scene.model.pitches is not None
 
     @property
     def is_protected(self) -> bool:
-        """Whether the turbine has trips or faults."""
+        """Return whether the turbine has trips or faults."""
         return self._limits is not None
 
     @property
     def is_stopping(self) -> bool:
-        """Whether a trip or a fault is stopping the turbine, so that actions are ignored."""
+        """Return whether a trip or a fault is stopping the turbine, so that actions are ignored."""
         return self.is_protected and bool(self._episode.link.watch[Watch.STOP] >= 0.0)
 
     def twin(self) -> "FowtEnv":
-        """Return another environment of the same settings, not reset; constant parts are shared."""
+        """Return a new environment with the same settings, not reset; constant parts are shared."""
         other = object.__new__(type(self))
         other.__dict__.update(self.__dict__)
         other._np_random = other._np_random_seed = None
@@ -283,14 +283,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return other
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the contents of a copy: the attributes less the compiled ones, and a Snapshot."""
+        """Return the state of a copy: all attributes except compiled ones, and a Snapshot."""
         kept = {name: value for name, value in self.__dict__.items() if name not in COMPILED}
         return kept | {
             "_snapshot": None if self._handle is None else self.get_state(),
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Become a copy."""
+        """Restore the environment from the state of a copy."""
         state = dict(state)
         snapshot = state.pop("_snapshot")
         self.__dict__.update(state)
@@ -300,7 +300,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._restore(snapshot)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "FowtEnv":
-        """Return an independent environment at the same instant, which shares what is never written."""
+        """Return an independent environment at the same instant; constant parts are shared."""
         for shared in (self.scene, self._nominal, self.task, self._kind, self._sensors, self.observed):
             memo[id(shared)] = shared
         other = object.__new__(type(self))
@@ -309,26 +309,26 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return other
 
     def _build(self, mode, per_control):
-        """Allocate the arrays of a run and fill what never changes."""
+        """Allocate the arrays of a run and fill the constant ones."""
         scene, task, individual = self.scene, self.task, self.individual
         observed = self.observed = entries(
             task.observation, scene.turbine, task.wind_preview, n_actions(mode), individual
         )
         self._baseline = None
-        self._hidden = None  # of what is measured, for the baseline's law
+        self._hidden = None  # measurements that the baseline law must not read
         if mode == ActionMode.RESIDUAL:
-            copy = deepcopy(self.baseline)  # environments of a batch do not share the memory of an object
+            copy = deepcopy(self.baseline)  # each environment of a batch needs separate controller memory
             self._baseline = named_baseline(copy, self.design_scene.turbine, self.control_dt)
             preview_leads(self._baseline)
             self._hidden = hidden(self._baseline, self._chain, individual)
         self._estimator = None
         if set(ESTIMATE_CHANNELS) & set(task.observation):
             self._estimator = catalogue().WindEstimator(self.design_scene.turbine, self.control_dt)
-            hidden(self._estimator, self._chain, individual)  # refuses what the sensors do not show
+            hidden(self._estimator, self._chain, individual)  # raises for inputs that the sensors lack
         laws = (self._baseline, self._estimator)
         self._baseline_law, self._estimator_law = (Handle(None, law and law.law) for law in laws)
         self._per_control = per_control
-        # a range is drawn at each reset: these are faults of the same kinds and number
+        # ranges are drawn again at each reset; kinds and number of the faults stay the same
         self._faults = draw_faults(self._interface.faults, np.random.default_rng(0))
         interface, ahead = self._connect(scene, self._guard(scene, self._faults))
         timing = (self.dt, per_control, self.control_dt)
@@ -338,7 +338,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._handle = None
 
     def _guard(self, scene, faults):
-        """Return the Guard of an episode, None without trips and faults.
+        """Return the Guard of an episode; None without trips and faults.
 
         Raises: InputError for faults of parts that the scene lacks.
         """
@@ -372,14 +372,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Return (observation, info) at the start of a new episode.
 
-        options: "wind", "sea", "weather_seed", "offsets" ({channel: added to the operating point}) in
-        place of what is drawn; "exact_start": whether the operating point is exact (the default
-        where the wind is one value) or interpolated. wind, sea and offsets may be ranges (low, high), the
-        wind a mixture and the sea {"kind": "joint"}, as in a Task; drawn after the task's draws, with the
-        same generator. The default sea is the task's, for the wind that the task drew.
+        options: "wind", "sea", "weather_seed", "offsets" ({channel: offset from the operating point})
+        replace the drawn values; "exact_start": whether the operating point is exact (the default for a
+        single wind value) or interpolated. wind, sea and offsets may be ranges (low, high), wind a
+        mixture and sea {"kind": "joint"}, as in a Task; these are drawn after the task's draws, with the
+        same generator. The default sea is that of the task for the wind drawn by the task.
 
-        Raises: InputError for other keys and values that cannot be used; the environment is then as it was
-        before. ClosedEnvironmentError after close().
+        Raises: InputError for unknown keys and invalid values, with the environment unchanged;
+        ClosedEnvironmentError after close().
         """
         if self._closed:
             raise ClosedEnvironmentError(CLOSED)
@@ -388,7 +388,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._begin(planned)
 
     def _plan(self, seed, options):
-        """Draw the Start of a new episode; nothing but the generator changes. Raises as reset."""
+        """Draw the Start of a new episode; only the random generator changes. Raises as reset."""
         super().reset(seed=seed)
         episode = with_options(self.task.draw(self.np_random), options, self.np_random)
         faults = self._interface.faults if (options or {}).get("faults") is None else options["faults"]
@@ -406,7 +406,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _begin(self, planned):
         """Return (observation, info) at the start of the planned episode."""
-        self._running, self._end = False, ""  # until all of it has worked
+        self._running, self._end = False, ""  # until every step below has succeeded
         self._enter(planned.scene, planned.nominal, planned.episode.faults, planned.guard)
         run = self._episode
         run.x[:] = planned.state
@@ -434,7 +434,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return run.observation.copy(), info
 
     def _operate(self, seconds):
-        """Operate the turbine with the baseline for so many seconds; then signal the stop."""
+        """Operate the turbine with the baseline for the given time (s), then signal the stop."""
         turbine = self.design_scene.turbine
         controller = named_baseline(deepcopy(self.baseline), turbine, self.control_dt)
         leads = preview_leads(controller)
@@ -446,7 +446,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             torque, *blade_pitch = controller.act(self.measurement(leads))
             command[0], command[1:] = torque, blade_pitch
             status, _ = act_physical(self._handle, self._estimator_law, command)
-            if status != RUNNING:  # and the first step of the episode ends it
+            if status != RUNNING:  # the first step of the episode then ends the episode
                 break
         run.counts[1:] = 0
         run.reference[REFERENCE_SHUTDOWN] = int(run.counts[STEP]) * self.dt
@@ -454,7 +454,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         rewrite_observation(self._handle)
 
     def restart_loops(self) -> None:
-        """Start the baseline of residual mode, or the loop of set-point mode, from the present measurement.
+        """Restart the baseline of residual mode or the loop of set-point mode from the present measurement.
 
         Call after driving with step_physical: internal controller states were not updated meanwhile.
         """
@@ -466,9 +466,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def step(self, action: npt.ArrayLike) -> StepResult:
         """Advance one control period; return (observation, reward, terminated, truncated, info)."""
         if not self._running:
-            raise self._standing()
+            raise self._not_running()
         try:
-            requested = np.array(action, dtype=np.float64)  # a copy of one type
+            requested = np.array(action, dtype=np.float64)  # a float64 copy for the kernel
         except (TypeError, ValueError):
             raise InputError(f"action = {action!r}: must be {self._episode.action.size} numbers") from None
         if requested.shape != self._episode.action.shape:
@@ -478,7 +478,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise InputError(f"action = {action!r}: must be finite")
         return self._result(status, reward)
 
-    def _standing(self):
+    def _not_running(self):
         """Return the error of a step without a running episode."""
         if self._closed:
             return ClosedEnvironmentError(CLOSED)
@@ -487,13 +487,13 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return ResetNeeded("call reset() first: no episode is running")
 
     def step_physical(self, torque: float, *blade_pitch: float) -> StepResult:
-        """Advance as step, under a generator torque (N m) and blade pitch (rad), applied as simulate does.
+        """Advance one period under a generator torque (N m) and blade pitch (rad), applied as in simulate.
 
-        blade_pitch: one for all blades, or three with individual pitch. The generator and the pitch actuator
-        follow it as far as their limits allow.
+        blade_pitch: one value for all blades, or three with individual pitch. The generator and the actuator
+        follow the command within their limits. Returns as step.
         """
         if not self._running:
-            raise self._standing()
+            raise self._not_running()
         command = np.empty(self._episode.u.shape)
         if len(blade_pitch) not in (1, command.size - 1):
             many = "one" if command.size == N_COMMANDS else f"one, or {command.size - 1}"
@@ -521,28 +521,28 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if terminated or truncated:
             info |= self._facts()
             self._finish(status)
-        if self._own_reward is not None:
-            reward = self._own(info)
+        if self._custom_reward is not None:
+            reward = self._reward_of(info)
         self._reward = reward
         if self.render_mode == "human":
             self.render()
         return run.observation.copy(), reward, terminated, truncated, info
 
     def _finish(self, status):
-        """End the episode, and keep why and when for the error of a further step."""
+        """End the episode and store its reason and time for the error of a further step."""
         self._running = False
         if status == RUNNING and self._interface.record:
             record_last(self._handle)
-        # the words before the explanation in brackets
+        # without the explanation in brackets
         why = "end of its duration" if status == RUNNING else self._reason(status).partition(" (")[0]
         self._end = f"the episode ended ({why}) at {self._episode.counts[STEP] * self.dt:.1f} s"
 
-    def _own(self, info):
-        """Return the reward of the user's function for the step of this info."""
-        return paid(self._own_reward, info, self.true_measurement())
+    def _reward_of(self, info):
+        """Return the reward of the user-defined function for the step described by info."""
+        return paid(self._custom_reward, info, self.true_measurement())
 
     def _reason(self, status):
-        """Return why an episode was terminated, with the user load that caused it, if one did."""
+        """Return the reason of a termination, with the user load that caused the termination, if any."""
         reason = STOP_REASONS[status]
         if status == TRIPPED:
             reason = f"{trip_name(self._episode.link.watch)} ({reason})"
@@ -550,15 +550,15 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return f"{reason}: {fault}" if fault else reason
 
     def _facts(self):
-        """Return {"events": ...}, and with trips or faults those of stop_facts."""
+        """Return {"events": ...}, and with trips or faults the entries of stop_facts."""
         facts = {"events": counted(self._episode.data.counters)}
         return facts if self._limits is None else facts | stop_facts(self._episode.link.watch)
 
     def get_state(self) -> Snapshot:
-        """Return a Snapshot of all that determines the rest of the run: plant, controller, weather, draws.
+        """Return a Snapshot of all that determines the later run: plant, controller, weather, generator.
 
-        For what-if: set_state(get_state()) and the same actions give the same bits, in this environment
-        or in another of the same settings. The weather is shared, not copied; a snapshot can be pickled.
+        For what-if studies: set_state(get_state()) and the same actions give the same bits, in this
+        environment or another with the same settings. The weather is shared; a snapshot can be pickled.
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
@@ -576,14 +576,14 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         )
 
     def set_state(self, snapshot: Snapshot) -> None:
-        """Continue from a Snapshot. Raises: InputError for one from an environment of other settings."""
+        """Continue from a Snapshot. Raises: InputError for a Snapshot from other settings."""
         if self._closed:
             raise ClosedEnvironmentError(CLOSED)
         self._check_snapshot(snapshot)
         self._restore(snapshot)
 
     def _restore(self, snapshot):
-        """Continue from a Snapshot of these settings."""
+        """Continue from a checked Snapshot."""
         if (snapshot.scene, snapshot.faults) != (self.scene, self._faults) or self._handle is None:
             scene, faults = snapshot.scene, snapshot.faults
             self._enter(scene, self._nominal_in(scene), faults, self._guard(scene, faults))
@@ -596,7 +596,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._np_random_seed = snapshot.seed
 
     def _check_snapshot(self, snapshot):
-        """Refuse what is no Snapshot of an environment with these settings."""
+        """Raise InputError unless snapshot is a Snapshot of an environment with these settings."""
         if not isinstance(snapshot, Snapshot):
             raise InputError(f"state = {type(snapshot).__name__}: must be what get_state() returned")
         if snapshot.kind != self._kind:
@@ -606,13 +606,13 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
 
     def _nominal_in(self, scene):
-        """Return the nominal plant in the weather of another scene, where a controller is designed on it."""
+        """Return the nominal plant, in the weather of another scene if a controller is designed on it."""
         if self._nominal is None or (self._baseline is None and self._estimator is None):
             return self._nominal
         return self._nominal.with_weather(scene.wind, scene.sea, scene.seed)
 
     def _enter(self, scene, nominal, faults, guard):
-        """Run in the scene's weather from now on, with new data: their size follows the wave components."""
+        """Switch to the scene's weather; reallocate data, whose size depends on the wave components."""
         self.scene, self._nominal, self._faults = scene, nominal, faults
         config = self._config._replace(model=scene.model)
         interface, ahead = self._connect(scene, guard)
@@ -631,11 +631,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._handle = Handle(self._config, self._episode)
 
     def measurement(self, preview_times: Sequence[float] = ()) -> Measurement:
-        """Return the Measurement of all fields now (SI), as the sensors read them.
+        """Return the present Measurement of all fields (SI), as read by the sensors.
 
-        With individual pitch it has blades, a BladeMeasurement.
-        preview_times: increasing, s; with them it has wind_preview, the rotor-averaged wind that far ahead,
-        exact: a lidar is read by the channel wind_preview and by the baseline alone.
+        With individual pitch the field blades is a BladeMeasurement.
+        preview_times: increasing, s; adds the field wind_preview, the exact rotor-averaged wind at these
+        look-ahead times (only the channel wind_preview and the baseline read a lidar).
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
@@ -644,16 +644,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             return whole_view(reading) if self.individual else Measurement(*reading)
         if self._interface.preview not in (None, EXACT):
             raise InputError(
-                f"preview = {self._interface.preview!r}: measurement(preview_times) has the exact wind ahead"
-                " alone; the channel wind_preview and the baseline read the lidar"
+                f"preview = {self._interface.preview!r}: measurement(preview_times) returns the exact"
+                " wind only; the channel wind_preview and the baseline read the lidar"
             )
         time, values = exact_preview(self.scene, tuple(preview_times))[:2]
         return whole_view(reading, [float(np.interp(reading[0], time, row)) for row in values])
 
     def true_measurement(self) -> Measurement:
-        """Return the Measurement of all fields now (SI): true motions, without the sensors.
+        """Return the present Measurement of all fields (SI): true motions, without sensor effects.
 
-        With individual pitch it has blades, a BladeMeasurement.
+        With individual pitch the field blades is a BladeMeasurement.
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: nothing has been measured yet")
@@ -662,11 +662,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def design_scene(self) -> Scene:
-        """Return the scene that controllers may be designed on: the nominal plant, else the true one."""
+        """Return the scene for controller design: the nominal plant, or the true plant if there is none."""
         return self.scene if self._nominal is None else self._nominal
 
     def channels(self) -> dict[str, float]:
-        """{OpenFAST channel: value in its unit} of the present instant; leaves the run as it is."""
+        """Return {OpenFAST channel: value in its unit} at the present instant; the run is unchanged."""
         if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
         run, scene = self._episode, self.scene
@@ -680,10 +680,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return dict(zip((channel.name for channel in scene.channels), values, strict=True))
 
     def frame(self) -> pd.DataFrame:
-        """Return the episode so far as simulate returns a run, with the same rows and attrs.
+        """Return the episode so far as a DataFrame with the rows and attrs of simulate.
 
-        It needs the setting record. A row per control period holds the command of the period that begins
-        there; the row of the episode's end is there once the episode is truncated.
+        Needs record=True. Each row is the start of a control period with the command of this period; the
+        row at the end of the episode is included once the episode is truncated.
         """
         if not self._interface.record or self._handle is None:
             raise InputError("frame() needs record=True, and a reset")
@@ -696,11 +696,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def last_action(self) -> np.ndarray:
-        """Copy of the last accepted action (actions,)."""
+        """Return a copy of the last accepted action (actions,)."""
         return self._episode.action.copy()
 
     def view(self) -> "View":
-        """Return copies of the arrays of the present instant."""
+        """Return a View with copies of the arrays at the present instant."""
         run = self._episode
         link, estimate = run.link, run.estimate
         return View(
@@ -717,11 +717,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         )
 
     def render(self) -> np.ndarray | None:
-        """Return a picture of the present instant, (height, width, 3) uint8; mode "human" shows it: None.
+        """Return an image (height, width, 3) uint8 of this instant; mode "human": show it and return None.
 
-        It has the last action and reward of the episode; render_size sets width and height.
+        The image includes the last action and reward; render_size sets width and height.
 
-        Without a render mode it warns, as Gymnasium's own environments do, and returns None.
+        Without a render mode, warn as Gymnasium's built-in environments do and return None.
         """
         if self.render_mode is None:
             gymnasium.logger.warn(
@@ -747,7 +747,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return None
 
     def close(self) -> None:
-        """Close the window of render mode "human"; reset and step then raise ClosedEnvironmentError."""
+        """Close the environment and its window; reset and step then raise ClosedEnvironmentError."""
         self._running, self._closed = False, True
         if self._view is not None:
             self._view.close()
@@ -756,16 +756,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 class View(NamedTuple):
-    """Arrays of an environment at one instant; SI."""
+    """Holds copies of the arrays of an environment at one instant; SI."""
 
     state: np.ndarray  # (n_state,) fowt_env.plant.state.State
     in_force: np.ndarray  # (n_commands,) torque and blade-pitch command in force
     command: np.ndarray  # (n_commands,) of the last action, before faults and limits
-    measurement: np.ndarray  # true motions
-    reading: np.ndarray  # as sensors read them
+    measurement: np.ndarray  # of the true motions
+    reading: np.ndarray  # measurement as read by the sensors
     action: np.ndarray  # last accepted action
     ahead: np.ndarray  # (leads,) wind ahead in the observation, m/s
-    terms: np.ndarray  # of the last reward
+    terms: np.ndarray  # reward terms of the last step
     baseline_memory: np.ndarray  # of the baseline law or the set-point loop
     estimate: np.ndarray | None  # memory of the estimator
 

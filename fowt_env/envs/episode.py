@@ -1,8 +1,8 @@
-"""One control period of an environment as one compiled call: command, physics, measurement, reward.
+"""Advances an environment by one control period in one compiled call: command, physics, reading, reward.
 
-Everything that a period reads is an EpisodeConfig, everything it writes EpisodeData: arrays of one
-environment, so that many environments are rows of larger ones. Sensors, trips and faults, and their
-order, is that of simulate (fowt_env/loop/period.py).
+The inputs of a period are in EpisodeConfig, its outputs in EpisodeData: arrays of one environment, which may
+be rows of the arrays of a batch. Sensors, trips and faults act in the same order as in simulate
+(fowt_env/loop/period.py).
 """
 
 from typing import NamedTuple
@@ -33,7 +33,7 @@ from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import Data, LoadCache, Model
 from fowt_env.plant.state import Command, State
 
-BAD_ACTION = -1  # beside the statuses of rollout.py
+BAD_ACTION = -1  # in addition to the statuses of plant/advance.py
 STEP, SATURATED, LIMITED = 0, 1, 2  # entries of EpisodeData.counts
 N_COUNTS = 3
 SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in the infos
@@ -41,7 +41,7 @@ SHOWN_COUNTS = {"saturated_actions": SATURATED, "torque_limited": LIMITED}  # in
 
 @by_reference
 class EpisodeConfig(NamedTuple):
-    """What stays fixed during an episode."""
+    """Holds the parameters of an episode, which remain constant."""
 
     model: Model
     actions: ActionMap
@@ -53,31 +53,31 @@ class EpisodeConfig(NamedTuple):
     overspeed: float  # rad/s, above which the episode ends
     dt: float  # s
     per_control: int  # physics steps in a control period
-    interface: Interface  # between plant, observation and baseline
-    ahead: WindAhead | None  # wind ahead in the observation; None: the exact one at the hub
+    interface: Interface  # sensors, guard and preview between plant and controllers
+    ahead: WindAhead | None  # wind preview of the observation; None: exact wind at the hub
 
 
 @by_reference
 class EpisodeData(NamedTuple):
-    """What moves during an episode; the arrays down to reference are its whole state."""
+    """Holds the variables of an episode; the arrays up to reference are its complete state."""
 
     data: Data
     x: np.ndarray  # (n_state,)
     u: np.ndarray  # (n_commands,) generator torque and blade-pitch command in force
     memory: np.ndarray  # of the baseline law or the set-point loop
-    estimate: np.ndarray | None  # memory of the estimator; None: no channel asks for it
+    estimate: np.ndarray | None  # memory of the estimator; None: no channel needs an estimate
     action: np.ndarray  # (actions,) last accepted action
     link: InterfaceData  # measurement, readings, command
     ahead: np.ndarray  # (leads,) wind ahead in the observation, m/s
-    motion: np.ndarray | None  # memory of the lidar that measures it; None as EpisodeConfig.ahead
+    motion: np.ndarray | None  # memory of the lidar of the preview; None as EpisodeConfig.ahead
     observation: np.ndarray  # (n,) float32
-    # int64: physics steps done, control periods with a clipped action, those with a torque at its limits
+    # int64: physics steps done, control periods with a clipped action, control periods with limited torque
     counts: np.ndarray
     reference: np.ndarray  # rewards.Reference of the episode
     previous_measurement: np.ndarray  # (n_measurements,) scratch from here on: one control period ago
-    signals: np.ndarray  # what observations are made of
+    signals: np.ndarray  # inputs of the observation map
     terms: np.ndarray  # (N_TERMS,) of the last period
-    rows: np.ndarray | None  # (control periods + 1, n_channels) output rows so far, SI; None: none are kept
+    rows: np.ndarray | None  # (control periods + 1, n_channels) output rows so far, SI; None: not stored
 
 
 @kernel
@@ -89,9 +89,9 @@ def copy_into(target, source):
 
 @kernel
 def measure_and_begin(config, episode):
-    """Measure at the present instant and begin its control period.
+    """Measure at the present instant and begin the control period.
 
-    Returns RUNNING, TRIPPED where a trip ends the episode, or NON_FINITE with the last measurement kept.
+    Returns RUNNING, TRIPPED if a trip ends the episode, or NON_FINITE with the previous measurement.
     """
     model, link, interface = config.model, episode.link, config.interface
     t = episode.counts[STEP] * config.dt
@@ -107,7 +107,7 @@ def measure_and_begin(config, episode):
 
 @kernel
 def look_ahead(ahead, t, period, model, leads, episode):
-    """Fill the wind ahead of the observation: as simulate gives it, or the exact one at the hub."""
+    """Fill the wind preview of the observation: as in simulate, or the exact wind at the hub."""
     if ahead is None:
         for i in range(leads.shape[0]):
             wind = wind_of(t + leads[i], 0.0, 0.0, model.layout.hub[2], model.aero)
@@ -130,7 +130,7 @@ def write_observation(config, episode):
 
 @kernel
 def record_row(config, episode, rows):
-    """Fill the output row of the present control instant; rows None: nothing."""
+    """Fill the output row of the present control instant; rows None: do nothing."""
     if rows is None:
         return
     step = episode.counts[STEP]
@@ -160,27 +160,27 @@ def start_episode(handle):
 
 @entry
 def rewrite_observation(handle):
-    """Fill the observation anew, after an estimator was started."""
+    """Fill the observation again after the start of an estimator."""
     write_observation(model_of(handle), data_of(handle))
 
 
 @kernel
 def update_estimate(estimator_law, config, episode):
-    """Take the period that is over, its command and what is read now into the estimate."""
+    """Update the estimate with the command of the past period and the present reading."""
     if estimator_law is None:
         return
     u = episode.u
     first, total, blades = u[Command.BLADE_PITCH], 0.0, u.shape[0] - Command.BLADE_PITCH
     for blade in range(blades):
         total += u[Command.BLADE_PITCH + blade]
-    u[Command.BLADE_PITCH] = total / blades  # it knows one pitch
+    u[Command.BLADE_PITCH] = total / blades  # the estimator has one pitch input
     estimator_law(config.estimator, episode.estimate, episode.link.reading, u)
     u[Command.BLADE_PITCH] = first
 
 
 @kernel
 def apply_period(config, episode):
-    """Put link.command into force for a control period, and record its first instant."""
+    """Apply link.command for a control period and record the first instant of the period."""
     t = episode.counts[STEP] * config.dt
     apply_command(t, episode.x, episode.u, config.model, episode.data, config.interface, episode.link)
     episode.counts[LIMITED] += int(episode.data.cache[LoadCache.TORQUE_LIMITED])
@@ -189,7 +189,7 @@ def apply_period(config, episode):
 
 @kernel
 def advance_period(config, episode, estimator_law):
-    """Advance one control period under episode.u, measure, observe and reward. Returns (status, reward)."""
+    """Advance one control period under episode.u, measure, observe and compute (status, reward)."""
     model, data, link = config.model, episode.data, episode.link
     first = episode.counts[STEP]
     copy_into(episode.previous_measurement, link.measurement)
@@ -214,9 +214,9 @@ def advance_period(config, episode, estimator_law):
 def act(handle, baseline_law, estimator_law, action):
     """Advance one control period under an action (actions,) in [-1, 1]. Returns (status, reward).
 
-    baseline_law, estimator_law: Handles whose data is the control kernel, or None; Python takes ten times as
-    long to pass a kernel itself. BAD_ACTION leaves everything unchanged. While the guard stops the turbine,
-    the action is ignored.
+    baseline_law, estimator_law: Handles whose data is the control kernel, or None; passing the kernel
+    directly from Python takes ten times as long. With the status BAD_ACTION nothing is changed. While the
+    guard stops the turbine, the action is ignored.
     """
     config, episode = model_of(handle), data_of(handle)
     model, link, interface = config.model, episode.link, config.interface
@@ -238,9 +238,9 @@ def act(handle, baseline_law, estimator_law, action):
 
 @entry
 def act_physical(handle, estimator_law, command):
-    """Advance one control period under a command (n_commands,), as simulate applies it: (status, reward).
+    """Advance one control period under a command (n_commands,), as in simulate. Returns (status, reward).
 
-    estimator_law: as act takes it.
+    estimator_law: as in act.
     """
     config, episode = model_of(handle), data_of(handle)
     link, interface = episode.link, config.interface

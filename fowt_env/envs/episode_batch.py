@@ -1,4 +1,4 @@
-"""One control period of many environments as one compiled call, on one thread or several."""
+"""Advances many environments by one control period in one compiled call, on one or several threads."""
 
 from contextlib import contextmanager
 from math import isfinite
@@ -12,7 +12,7 @@ from fowt_env.plant.compile.decorators import entry, kernel, parallel_entry
 
 @kernel
 def first_unusable(actions, active):
-    """Index of the first active row of actions (n, actions) that is not finite, or -1."""
+    """Return the index of the first active row of actions (n, actions) that is not finite, or -1."""
     for i in range(actions.shape[0]):
         for k in range(actions.shape[1]):
             if active[i] and not isfinite(actions[i, k]):
@@ -22,7 +22,7 @@ def first_unusable(actions, active):
 
 @entry
 def act_some(handles, baseline_law, estimator_law, actions, active, statuses, rewards, first, last):
-    """One control period of the active environments first <= i < last, see act_all."""
+    """Advance the active environments first <= i < last by one control period, see act_all."""
     for i in range(first, last):
         if active[i]:
             statuses[i], rewards[i] = act(handles[i], baseline_law, estimator_law, actions[i])
@@ -30,10 +30,10 @@ def act_some(handles, baseline_law, estimator_law, actions, active, statuses, re
 
 @entry
 def act_all(handles, baseline_law, estimator_law, actions, active, statuses, rewards):
-    """One control period of each active environment under its row of actions, on this thread.
+    """Advance each active environment by one control period under its row of actions, on this thread.
 
     handles: list of n Handles of one type. Fills statuses (n,) and rewards (n,). Returns -1, or the index of
-    the first active environment whose action is not finite; then nothing was moved.
+    the first active environment whose action is not finite; no environment is then advanced.
     """
     bad = first_unusable(actions, active)
     if bad < 0:
@@ -43,7 +43,7 @@ def act_all(handles, baseline_law, estimator_law, actions, active, statuses, rew
 
 @parallel_entry
 def act_all_parallel(handles, baseline_law, estimator_law, actions, active, statuses, rewards, parts):
-    """As act_all, in as many parts, side by side, as there are threads to run them."""
+    """Advance as act_all, with the environments split into `parts` that run in parallel threads."""
     bad = first_unusable(actions, active)
     if bad < 0:
         n = len(handles)
@@ -65,7 +65,7 @@ def act_all_parallel(handles, baseline_law, estimator_law, actions, active, stat
 
 @contextmanager
 def thread_limit(threads):
-    """Within the block, compiled loops use this many threads; afterwards as many as before."""
+    """Set the number of threads of compiled loops within the block and restore it afterwards."""
     previous = numba.get_num_threads()
     if threads == previous:  # set_num_threads takes microseconds
         yield

@@ -1,7 +1,7 @@
-"""Observation channels by name: where each comes from, its unit, centre, scale and bounds.
+"""Defines the observation channels: source, unit, centre, scale and bounds of each.
 
-An entry of the observation is (value - centre)/scale, clipped to the bounds, float32. The bounds lie
-far outside what happens before an episode fails; they are there so that the space is finite.
+An entry of the observation is (value - centre)/scale, clipped to the bounds, float32. The bounds keep the
+observation space finite; they lie far outside the values reached before an episode fails.
 """
 
 from collections.abc import Iterable
@@ -23,23 +23,23 @@ from fowt_env.plant.measurement import (
 )
 from fowt_env.plant.state import MOTIONS, N_COMMANDS, N_INDIVIDUAL_COMMANDS
 
-SIN_AZIMUTH = N_MEASUREMENTS  # signals that follow the measurements
+SIN_AZIMUTH = N_MEASUREMENTS  # indices of the signals after the measurements
 COS_AZIMUTH = N_MEASUREMENTS + 1
 FIRST_ACTION = N_MEASUREMENTS + 2
 ESTIMATES = FIRST_ACTION + N_INDIVIDUAL_COMMANDS
-ESTIMATED = (  # what an estimator's memory begins with, see controllers/lqr/law.py
+ESTIMATED = (  # first entries of an estimator's memory, see controllers/lqr/law.py
     "surge", "platform_pitch", "surge_rate", "platform_pitch_rate", "rotor_speed", "blade_pitch",
     "wind_tendency", "wind", "wave", "wave_quadrature", "moment", "mean_wind",
 )  # fmt: skip
 OF_BLADES = ESTIMATES + len(ESTIMATED)  # BladeMeasurement
 SINCE_SHUTDOWN = OF_BLADES + N_BLADE_MEASUREMENTS
 PREVIEW = SINCE_SHUTDOWN + 1
-N_ACTIONS = N_COMMANDS  # of every mode but "individual"
+N_ACTIONS = N_COMMANDS  # in every mode except "individual"
 DEFAULT = "default"  # in a list of channels: the task's channels
 
 
 class Entry(NamedTuple):
-    """One number of the observation, SI before scaling."""
+    """Defines one number of the observation, SI before scaling."""
 
     name: str
     unit: str
@@ -52,17 +52,17 @@ class Entry(NamedTuple):
 
 
 def _meaning(name):
-    """Return what a measured field is, and which way it counts."""
+    """Return the meaning of a measured field with its positive direction."""
     field = (MEASURED | BLADES_MEASURED)[name]
     return f"{field.meaning} ({field.positive})"
 
 
 def _symmetric(name, unit, scale, bound, meaning, signal):
-    """Return the Entry about zero."""
+    """Return an Entry with centre 0 and symmetric bounds."""
     return Entry(name, unit, int(signal), 0.0, scale, -bound, bound, meaning)
 
 
-FIXED = tuple(  # channels that look the same for every turbine
+FIXED = tuple(  # channels with the same scaling for every turbine
     _symmetric(name, field.unit, field.scale, field.bound, _meaning(name), Measure[name.upper()])
     for name, field in MEASURED.items()
     if field.scale is not None
@@ -76,15 +76,15 @@ def _wind(name, signal, meaning):
 
 
 def _estimated(name):
-    """Return the signal of something estimated."""
+    """Return the signal index of an estimated quantity."""
     return ESTIMATES + ESTIMATED.index(name)
 
 
-ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measures
+ESTIMATE_CHANNELS = {  # computed by the estimator of lqr from measurements of a turbine
     "estimated_wind": (
         _wind("estimated_wind", _estimated("wind"), "rotor-averaged wind, estimated"),
-        _wind("estimated_wind_tendency", _estimated("wind_tendency"), "what the estimated wind follows"),
-        _wind("estimated_mean_wind", _estimated("mean_wind"), "estimated wind, low pass of some 80 s"),
+        _wind("estimated_wind_tendency", _estimated("wind_tendency"), "slow component of the estimated wind"),
+        _wind("estimated_mean_wind", _estimated("mean_wind"), "estimated wind, low pass of about 80 s"),
     ),
     "estimated_platform": (
         _symmetric("estimated_surge", "m", 20.0, 200.0, "surge, estimated", _estimated("surge")),
@@ -96,17 +96,17 @@ ESTIMATE_CHANNELS = {  # made by the estimator of lqr from what a turbine measur
     "estimated_waves": (
         _symmetric("estimated_wave", "m", 3.0, 50.0, "wave elevation, estimated", _estimated("wave")),
         _symmetric(
-            "estimated_wave_quadrature", "m", 3.0, 50.0, "the same a quarter of the peak period later",
+            "estimated_wave_quadrature", "m", 3.0, 50.0, "estimated_wave a quarter of the peak period later",
             _estimated("wave_quadrature"),
         ),
     ),
 }  # fmt: skip
 
 
-STOP_CHANNELS = {  # of tasks in which the turbine is to be stopped
+STOP_CHANNELS = {  # of tasks with a shutdown
     "time_since_shutdown": (
         Entry(
-            "time_since_shutdown", "s", SINCE_SHUTDOWN, 0.0, 60.0, 0.0, 1e5, "time since a stop was signalled"
+            "time_since_shutdown", "s", SINCE_SHUTDOWN, 0.0, 60.0, 0.0, 1e5, "time since the stop signal"
         ),
     ),
 }  # fmt: skip
@@ -115,7 +115,7 @@ BLADE_CHANNELS = BladeMeasurement._fields[BladeMeasure.BLADE_PITCH_1 :]  # of in
 
 
 def _blade_channels(turbine):
-    """Return {channel: (Entry,)} of BLADE_CHANNELS; moments over the rated torque on the rotor's shaft."""
+    """Return {channel: (Entry,)} of BLADE_CHANNELS; moments are scaled by rated torque at the rotor shaft."""
     drive, table = turbine.pitch_drive, {}
     moment = turbine.drivetrain.gear_ratio * turbine.torque_law.rated_torque
     for name in BLADE_CHANNELS:
@@ -133,7 +133,7 @@ def _blade_channels(turbine):
 def observation_channels(turbine, preview=(), actions=N_ACTIONS):
     """Return {channel: tuple of its Entries} for a descriptions.turbine.Turbine.
 
-    preview: look-ahead times (s); actions: their number.
+    preview: look-ahead times (s); actions: number of actions.
     """
     rated, law, drive = turbine.rated_rotor_speed, turbine.torque_law, turbine.pitch_drive
     table = {entry.name: (entry,) for entry in FIXED}
@@ -175,9 +175,9 @@ def observation_channels(turbine, preview=(), actions=N_ACTIONS):
 
 
 def check_channels(where, names, default=None):
-    """Return the tuple of channel names, DEFAULT replaced by the default ones, each once.
+    """Return the tuple of unique channel names, with DEFAULT replaced by the names in default.
 
-    Raises: InputError for unknown names, an empty list, or a string where a list is meant.
+    Raises: InputError for unknown names, an empty list, or a string in place of a list.
     """
     if isinstance(names, str):
         raise InputError(f"{where} = {names!r}: must be a list of channel names, such as ({names!r},)")
@@ -210,22 +210,21 @@ KNOWN = (  # channels of every scene with wind
 def entries(names, turbine, preview, actions=N_ACTIONS, individual=False):
     """Return the entries of an observation in order; individual: whether each blade is pitched individually.
 
-    Raises: InputError for a preview without times, and for channels of single blades where there are none.
+    Raises: InputError for a preview without times, and for blade channels without individual pitch.
     """
     for name in names:
         if name in BLADE_CHANNELS and not individual:
             raise InputError(
-                f"observation: {name!r}: is measured with individual pitch: needs"
-                " pitch = 'individual'"
+                f"observation: {name!r}: is measured only with individual pitch: needs pitch = 'individual'"
             )
     if "wind_preview" in names and not len(preview):
-        raise InputError("wind_preview: give the look-ahead times, for example wind_preview=(2.0, 4.0, 6.0)")
+        raise InputError("wind_preview: needs look-ahead times, for example wind_preview=(2.0, 4.0, 6.0)")
     table = observation_channels(turbine, preview, actions)
     return tuple(entry for name in names for entry in table[name])
 
 
 class ObservationMap(NamedTuple):
-    """Entries as arrays (n,), and the look-ahead times of the preview (s)."""
+    """Holds the Entries as arrays (n,), and the look-ahead times of the preview (s)."""
 
     signal: np.ndarray  # int64
     centre: np.ndarray
@@ -253,10 +252,10 @@ def build_observation_map(observed, preview):
 
 @kernel
 def fill_signals(reading, azimuth, action, estimate, since_shutdown, ahead, signals):
-    """Fill signals (n,): readings, azimuth (rad), last action, estimates, and the wind ahead (leads,).
+    """Fill signals (n,) from readings, azimuth (rad), last action, estimates and wind preview (leads,).
 
-    reading: of a Measurement, and of a BladeMeasurement where there is one.
-    estimate: memory of an estimator, or None; since_shutdown: s, since the signal to stop.
+    reading: values of a Measurement, followed by those of a BladeMeasurement with individual pitch.
+    estimate: memory of an estimator, or None; since_shutdown: time since the stop signal, s.
     """
     for i in range(N_MEASUREMENTS):
         signals[i] = reading[i]
@@ -276,7 +275,7 @@ def fill_signals(reading, azimuth, action, estimate, since_shutdown, ahead, sign
 
 @kernel
 def fill_observation(signals, observation_map, observation):
-    """Fill observation (n,) float32 from the signals; an entry that is not finite keeps its last value."""
+    """Fill observation (n,) float32 from the signals; entries that are not finite keep the last value."""
     for i in range(observation.shape[0]):
         entry, centre = observation_map.signal[i], observation_map.centre[i]
         value = (signals[entry] - centre) / observation_map.scale[i]

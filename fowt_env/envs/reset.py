@@ -1,4 +1,4 @@
-"""The start of an episode: what is drawn, what the options of reset replace, and where it begins."""
+"""Prepares the start of an episode: drawn values, options of reset, and initial state."""
 
 from collections.abc import Mapping
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ from fowt_env.scene.scene import Scene
 
 
 class Start(NamedTuple):
-    """A new episode with all of it done that may be refused, so that it can be begun without fail."""
+    """Holds a validated new episode, which can begin without further errors."""
 
     episode: Episode
     scene: Scene
@@ -35,7 +35,7 @@ class Start(NamedTuple):
 
 @contextmanager
 def kept_if_refused(envs):
-    """Return a context that restores the environments' random generators where its block raises."""
+    """Restore the environments' random generators if the block of this context raises."""
     before = [
         (env._np_random, env._np_random_seed, env._np_random and env._np_random.bit_generator.state)
         for env in envs
@@ -51,9 +51,9 @@ def kept_if_refused(envs):
 
 
 def moved_state(scene, state, command, offsets):
-    """Return (state, command) moved by {channel: offset in its unit}, the pitch within its drive's range.
+    """Return (state, command) plus {channel: offset in its unit}, with the pitch limited to its range.
 
-    BldPitch1 stands for all blades, whose pitches are the same at an operating point.
+    An offset of BldPitch1 applies to all blades, whose pitches are equal at an operating point.
     """
     x, u, drive = state.copy(), command.copy(), scene.turbine.pitch_drive
     for name, value in offsets.items():
@@ -62,7 +62,7 @@ def moved_state(scene, state, command, offsets):
     if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
         raise InputError(
             f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"
-            f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must stay inside (-90, 90) deg"
+            f" {x[State.PLATFORM_PITCH] * DEG_PER_RAD:g} deg, must be inside (-90, 90) deg"
         )
     x[list(scene.pitch_states)] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
     u[Command.BLADE_PITCH :] = x[State.BLADE_PITCH]
@@ -71,7 +71,7 @@ def moved_state(scene, state, command, offsets):
 
 
 def with_options(drawn, options, rng):
-    """Return the drawn Episode with the options of reset in place of its values, ranges drawn with rng."""
+    """Return the drawn Episode with values replaced by the options of reset; ranges are drawn with rng."""
     if not isinstance(options, Mapping | None):
         raise InputError(f"options = {short(options)}: must be a mapping of reset's options, or None")
     changes = {}
@@ -79,7 +79,7 @@ def with_options(drawn, options, rng):
         if key not in Episode._fields:
             raise unknown("option of reset", key, Episode._fields)
         if key == "faults":
-            continue  # drawn after everything else
+            continue  # drawn later, in FowtEnv._plan
         if key == "offsets":
             value = draw_offsets(value, rng)
         if key == "wind":

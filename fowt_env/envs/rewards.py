@@ -1,6 +1,6 @@
-"""Named reward terms: each a function of what is measured, bounded, weighted by the task.
+"""Defines the reward terms: bounded functions of measurements, weighted by the task.
 
-To add one: a kernel, a line in REWARD_TERMS and one in fill_terms. reward = sum of weight * term.
+reward = sum of weight * term. A new term needs a kernel, an entry in REWARD_TERMS and a line in fill_terms.
 """
 
 import inspect
@@ -19,33 +19,33 @@ from fowt_env.plant.state import BLADES
 
 AT_MARGIN = 0.1  # value of tolerance() one margin outside its bounds
 STEEPNESS = -log(AT_MARGIN)
-POWER_MARGIN = 0.2  # fraction of rated power above rated at which the power term has fallen to a tenth
-SPEED_MARGIN = 0.2  # fraction of rated rotor speed outside the band at which its term has fallen to a tenth
-TILT_MARGIN = 5.0 * pi / 180.0  # rad, amplitude of platform pitch at which its term has fallen to a tenth
+POWER_MARGIN = 0.2  # excess over rated power, fraction of rated, at which the power term is 0.1
+SPEED_MARGIN = 0.2  # distance from the band, fraction of rated rotor speed, at which the speed term is 0.1
+TILT_MARGIN = 5.0 * pi / 180.0  # rad, amplitude of platform pitch at which the motion term is 0.1
 TOP_ACCELERATION = 3.3  # m/s2 of the tower top, the limit of the ATLAS Offshore contest (ARPA-E 2019)
-TILT_PERIOD = 30.0  # s, about that of platform pitch: turns its rate into an amplitude
+TILT_PERIOD = 30.0  # s, about the platform-pitch period: converts pitch rate to amplitude
 
 
 class Scales(NamedTuple):
-    """Values of the turbine that make terms dimensionless."""
+    """Holds the turbine values that make reward terms dimensionless."""
 
     rated_power: float  # mechanical, at the generator, W
     rated_speed: float  # rotor, rad/s
     gear_ratio: float
-    max_pitch_increment: float  # most that the blade pitch can travel in one control period, rad
-    max_torque_increment: float  # most that the torque may change in one control period, N m
+    max_pitch_increment: float  # largest change of blade pitch in one control period, rad
+    max_torque_increment: float  # largest change of torque in one control period, N m
 
 
 class Reference(NamedTuple):
-    """Operating point of the episode's mean wind, in the order of the kernels' array."""
+    """Holds the operating point of the episode's mean wind, in the order of the kernels' array."""
 
     platform_pitch: float  # rad
     rotor_speed: float  # rad/s
-    shutdown: float = inf  # s, from which the turbine is to be stopped
+    shutdown: float = inf  # s, time of the stop signal
 
 
 class RewardTerm(NamedTuple):
-    """Range and meaning of a reward term, for tests and documents."""
+    """Holds range and meaning of a reward term, for tests and documentation."""
 
     low: float
     high: float
@@ -54,35 +54,35 @@ class RewardTerm(NamedTuple):
 
 REWARD_TERMS = {
     "power": RewardTerm(
-        0.0, 1.0, "generator power over rated; above rated it falls again, to a tenth at 20 % too much"
+        0.0, 1.0, "generator power over rated; falls above rated power, to 0.1 at 120 % of rated"
     ),
     "rotor_speed": RewardTerm(
         0.0,
         1.0,
         "1 between the rotor speed of the episode's operating point and rated (above rated wind: at rated),"
-        " a tenth at 20 % of rated outside",
+        " 0.1 at 20 % of rated outside this band",
     ),
     "platform_motion": RewardTerm(
         0.0,
         1.0,
-        "1 with the platform pitch at rest at the operating point, a tenth at an oscillation of 5 deg"
-        " amplitude (angle and rate over 2 pi/30 s taken together)",
+        "1 with the platform pitch at rest at the operating point, 0.1 at an oscillation of 5 deg"
+        " amplitude (from the angle and the rate over 2 pi/30 s)",
     ),
     "pitch_travel": RewardTerm(
         -1.0,
         0.0,
-        "blade-pitch travel over the most that the rate limit allows; of blades with individual pitch the"
-        " mean",
+        "minus the blade-pitch travel over the largest that the rate limit allows; with individual pitch the"
+        " mean over the blades",
     ),
-    "torque_travel": RewardTerm(-1.0, 0.0, "change of generator torque over the most its rate limit allows"),
-    "failure": RewardTerm(-1.0, 0.0, "-1 in the step that ends in failure, else 0"),
-    "power_shortfall": RewardTerm(-1.0, 0.0, "minus the missing fraction of rated power; more adds nothing"),
-    "standstill": RewardTerm(-1.0, 0.0, "minus the rotor speed, either way, over rated"),
+    "torque_travel": RewardTerm(-1.0, 0.0, "minus the torque change over the largest within the rate limit"),
+    "failure": RewardTerm(-1.0, 0.0, "-1 in the step that ends in failure, otherwise 0"),
+    "power_shortfall": RewardTerm(-1.0, 0.0, "minus the missing fraction of rated power; 0 above rated"),
+    "standstill": RewardTerm(-1.0, 0.0, "minus the absolute rotor speed over rated"),
     "platform_rate": RewardTerm(
         0.0,
         1.0,
-        "1 with the platform pitch at rest wherever it is, a tenth at the rate of an oscillation of 5 deg"
-        " amplitude in 30 s",
+        "1 with the platform pitch at rest at any angle, 0.1 at the rate of an oscillation with 5 deg"
+        " amplitude and 30 s period",
     ),
     "tower_top": RewardTerm(
         -1.0, 0.0, "minus the square of the tower top's fore-aft acceleration over 3.3 m/s2"
@@ -94,7 +94,7 @@ N_TERMS = len(REWARD_TERMS)
 
 @kernel
 def tolerance(x, bounds, margin):
-    """1 inside bounds = (low, high), falling outside as a Gaussian to 0.1 one margin away; in [0, 1].
+    """Return 1 inside bounds = (low, high); outside, a Gaussian that falls to 0.1 one margin away.
 
     margin 0: 0 outside. NaN gives 0. Bounds may be infinite.
     """
@@ -109,58 +109,58 @@ def tolerance(x, bounds, margin):
 
 @kernel
 def unit_fraction(value):
-    """The value within [0, 1]; NaN gives 1, which clamp would let through."""
+    """Return the value clipped to [0, 1]; NaN gives 1 (clamp would return NaN)."""
     return max(0.0, min(1.0, value))
 
 
 @kernel
 def power_term(speed, torque, scales):
-    """Share of rated power, and how well the rest stays below it."""
+    """Return the fraction of rated power, reduced above rated power."""
     power = scales.gear_ratio * speed * torque / scales.rated_power
     return unit_fraction(power) * tolerance(power, (0.0, 1.0), POWER_MARGIN)
 
 
 @kernel
 def power_shortfall_term(speed, torque, scales):
-    """Minus the missing fraction of rated power."""
+    """Return minus the missing fraction of rated power."""
     return unit_fraction(scales.gear_ratio * speed * torque / scales.rated_power) - 1.0
 
 
 @kernel
 def rotor_speed_term(speed, steady_speed, scales):
-    """How near the rotor speed (rad/s) is to the band from its steady speed to rated."""
+    """Return the tolerance of the rotor speed (rad/s) about the band from steady speed to rated."""
     low = min(steady_speed, scales.rated_speed) / scales.rated_speed
     return tolerance(speed / scales.rated_speed, (low, 1.0), SPEED_MARGIN)
 
 
 @kernel
 def platform_motion_term(platform_pitch, rate, steady_pitch):
-    """How small the amplitude of the platform's pitch motion about its steady angle is."""
+    """Return the tolerance of the amplitude of platform pitch about its steady angle."""
     amplitude = hypot(platform_pitch - steady_pitch, rate * TILT_PERIOD / (2.0 * pi))
     return tolerance(amplitude, (0.0, 0.0), TILT_MARGIN)
 
 
 @kernel
 def standstill_term(speed, scales):
-    """Minus the share of rated rotor speed."""
+    """Return minus the absolute rotor speed over rated speed."""
     return 0.0 - unit_fraction(abs(speed) / scales.rated_speed)
 
 
 @kernel
 def tower_top_term(acceleration):
-    """Minus the square of the acceleration (m/s2) over its limit."""
+    """Return minus the square of the tower-top acceleration (m/s2) over its limit."""
     return 0.0 - unit_fraction((acceleration / TOP_ACCELERATION) ** 2)
 
 
 @kernel
 def travel_term(previous, after, max_increment):
-    """Minus the fraction of the possible travel that was used in one control period."""
+    """Return minus the travel in one control period as a fraction of the largest possible travel."""
     return 0.0 - unit_fraction(abs(after - previous) / max_increment)
 
 
 @kernel
 def pitch_travel_term(previous, m, scales):
-    """travel_term of the blade pitch; the mean over the blades with individual pitch."""
+    """Return the travel_term of the blade pitch; with individual pitch the mean over the blades."""
     if m.shape[0] == N_MEASUREMENTS:
         return travel_term(previous[Measure.BLADE_PITCH], m[Measure.BLADE_PITCH], scales.max_pitch_increment)
     total = 0.0
@@ -193,7 +193,7 @@ def fill_terms(m, previous, reference, failed, scales, terms):
 
 @kernel
 def weighted_sum(weights, terms):
-    """sum of weight * term in the order of REWARD_TERMS."""
+    """Return the sum of weight * term in the order of REWARD_TERMS."""
     total = 0.0
     for i in range(terms.shape[0]):
         total += weights[i] * terms[i]
@@ -201,7 +201,7 @@ def weighted_sum(weights, terms):
 
 
 def build_scales(turbine, control_dt):
-    """Scales of a descriptions.turbine.Turbine at a control period (s)."""
+    """Return the Scales of a descriptions.turbine.Turbine at a control period (s)."""
     law = turbine.torque_law
     return Scales(
         rated_power=float(law.rated_power),
@@ -213,7 +213,7 @@ def build_scales(turbine, control_dt):
 
 
 def check_weights(where, weights):
-    """{term: float} of a mapping of weights. Raises: InputError for unknown terms and bad numbers."""
+    """Return {term: float} of a mapping of weights. Raises: InputError for unknown terms, invalid numbers."""
     if not isinstance(weights, Mapping):
         raise InputError(f"{where} = {weights!r}: must be a dict of reward terms and their weights")
     checked = {}
@@ -228,7 +228,7 @@ def check_weights(where, weights):
 
 
 class OfInfo(NamedTuple):
-    """A user's reward that takes the info of a step alone."""
+    """Adapts a user-defined reward function (info) to (info, measurement)."""
 
     function: Callable
 
@@ -237,26 +237,26 @@ class OfInfo(NamedTuple):
 
 
 def check_own_reward(where, function):
-    """A user's reward as a function of (info, measurement), of which it may take the first alone.
+    """Return a user-defined reward, a function (info) or (info, measurement), as (info, measurement).
 
-    Raises: InputError where it takes neither one nor both.
+    Raises: InputError for other signatures.
     """
     try:
         signature = inspect.signature(function)
     except ValueError:  # a builtin without a signature
         return function
-    for taken, result in (({}, None), function), (({},), OfInfo(function)):
+    for arguments, result in (({}, None), function), (({},), OfInfo(function)):
         try:
-            signature.bind(*taken)
+            signature.bind(*arguments)
         except TypeError as error:
             reason = error
         else:
             return result
-    raise InputError(f"{where} = {function!r}: must take (info) or (info, measurement): {reason}")
+    raise InputError(f"{where} = {function!r}: must accept (info) or (info, measurement): {reason}")
 
 
 def paid(function, info, measurement):
-    """The number that a user's function of info and Measurement returns. Raises: InputError for others."""
+    """Return the finite number returned by a user-defined reward function. Raises: InputError otherwise."""
     value = function(info, measurement)
     try:
         number = float(value)

@@ -1,4 +1,4 @@
-"""Safe learning: costs of passing limits, and a guard that takes over from an agent."""
+"""Provides wrappers for safe learning: costs of exceeded limits, and a takeover by a baseline controller."""
 
 from math import isfinite, pi
 from typing import Any
@@ -11,18 +11,18 @@ from fowt_env.envs.assembly import named_baseline
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.measurement import Measure, Measurement
 
-AHEAD = 1.0  # s: the rotor speed is checked where it will be, since feathering takes its time
+AHEAD = 1.0  # s, extrapolation of rotor speed for the overspeed check, because feathering takes time
 
 
 class SafetyCosts(gymnasium.Wrapper):
-    """FowtEnv with costs of exceeded limits in its info, in the convention of Safety-Gymnasium.
+    """Adds costs of exceeded limits to the info of a FowtEnv, in the convention of Safety-Gymnasium.
 
     env       a FowtEnv, wrapped or not
-    limits    {field of Measurement: the largest absolute value that costs nothing, SI}, as rotor_speed=1.4
+    limits    {field of Measurement: largest absolute value with zero cost, SI}, such as rotor_speed=1.4
               (rad/s), platform_pitch=0.1 (rad), nacelle_acceleration=2.0 (m/s2)
 
-    info of each step has "cost_<field>" of each limit, 1.0 where the true motion at the end of the step
-    exceeds it and else 0.0, and "cost", their sum. The reward is unchanged.
+    info of each step has "cost_<field>" of each limit (1.0 if the true motion at the end of the step exceeds
+    the limit, otherwise 0.0) and "cost", the sum of these costs. The reward is unchanged.
 
     Raises: InputError for unknown fields and limits that are not positive numbers.
     """
@@ -30,7 +30,7 @@ class SafetyCosts(gymnasium.Wrapper):
     def __init__(self, env: gymnasium.Env, **limits: float) -> None:
         super().__init__(env)
         if not limits:
-            raise InputError("SafetyCosts: give a limit, such as rotor_speed=1.4 (rad/s)")
+            raise InputError("SafetyCosts: needs a limit, such as rotor_speed=1.4 (rad/s)")
         known = [name for name in Measurement._fields if name != "time"]
         for name, limit in limits.items():
             if name not in known:
@@ -40,7 +40,7 @@ class SafetyCosts(gymnasium.Wrapper):
         self.limits = {name: float(limit) for name, limit in limits.items()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """As the environment's, with the costs in info."""
+        """Advance the environment by one step; return its result with the costs in info."""
         result = self.env.step(action)
         plant: Any = self.env.unwrapped
         reached = plant.true_measurement()
@@ -53,20 +53,20 @@ class SafetyCosts(gymnasium.Wrapper):
 
 
 class SafetyLayer(gymnasium.Wrapper):
-    """FowtEnv in which a baseline controller takes over for a while when a limit is passed.
+    """Lets a baseline controller take over from the agent for a time when a limit is exceeded.
 
     env             a FowtEnv, wrapped or not
-    overspeed       rotor speed over rated, AHEAD of now as it accelerates, that hands over; while it lasts,
-                    the blades are feathered as fast as their drive can
-    platform_rate   platform-pitch rate (deg/s), either way, that hands over
-    calm            s that both must stay within `release` of their limits (rotor speed: of the way from
-                    rated to the limit) before the agent has the turbine back
+    overspeed       rotor speed over rated, extrapolated by AHEAD, above which the baseline takes over; while
+                    above, the blades are feathered at the rate limit
+    platform_rate   absolute platform-pitch rate (deg/s) above which the baseline takes over
+    calm            s for which both must stay within `release` times their limits (rotor speed: this
+                    fraction of the range from rated to the limit) before the agent regains control
     baseline        name of the compiled controller that takes over
 
-    The agent's actions are ignored meanwhile; observations and rewards continue. info of each step has
-    "guarded" (bool, whether this period was the guard's) and "guarded_periods" (of the episode so far).
+    During a takeover the agent's actions are ignored; observations and rewards continue. info of each step
+    has "guarded" (bool, whether the baseline had control) and "guarded_periods" (count in the episode).
 
-    Raises: InputError for limits that cannot be used.
+    Raises: InputError for invalid limits.
     """
 
     def __init__(self, env, overspeed=1.2, platform_rate=1.2, calm=10.0, release=0.5, baseline="gspi_oc3"):
@@ -88,15 +88,15 @@ class SafetyLayer(gymnasium.Wrapper):
         self._baseline = named_baseline(baseline, plant.design_scene.turbine, plant.control_dt)
         check_pitches(self._baseline, plant.scene.model.pitches is not None)
         drive = plant.scene.turbine.pitch_drive
-        # a command this far ahead of the blades keeps a first-order drive at its limit until the next one
+        # this command lead keeps a first-order pitch drive at its rate limit until the next command
         self._feather = drive.rate_limit * (drive.lag + plant.control_dt)
         self._highest = drive.maximum
         self._last_speed = None
-        self._left = 0  # control periods until the agent has the turbine back; 0: it has
+        self._left = 0  # control periods until the agent regains control; 0: the agent has control
         self.guarded_periods = 0
 
     def reset(self, **options):
-        """As the environment's; the agent has the turbine."""
+        """Reset the environment and return its result; the agent has control."""
         observation, info = self.env.reset(**options)
         self._baseline.prepare(known_scene(self.env.unwrapped.design_scene, self._baseline))
         self._left = 0
@@ -105,7 +105,7 @@ class SafetyLayer(gymnasium.Wrapper):
         return observation, info
 
     def step(self, action):
-        """One control period under the action, or under the guard's command."""
+        """Advance one control period under the action, or under the baseline's command."""
         plant = self.env.unwrapped
         measured = plant.measurement(self._baseline.preview_times)
         speed, rate = self._projected(measured.rotor_speed), abs(measured.platform_pitch_rate)
@@ -134,7 +134,7 @@ class SafetyLayer(gymnasium.Wrapper):
         return result
 
     def _projected(self, speed):
-        """Rotor speed (rad/s) AHEAD of now; a falling one counts as it is."""
+        """Return the rotor speed (rad/s) extrapolated by AHEAD; a falling speed is returned unchanged."""
         last = speed if self._last_speed is None else self._last_speed
         self._last_speed = speed
         return speed + AHEAD * max(0.0, speed - last) / self.env.unwrapped.control_dt

@@ -1,8 +1,7 @@
-"""Sensors of an environment: the setting, and the values and noise in one episode.
+"""Checks the sensor settings of an environment and draws the sensors of an episode.
 
-One reading is made per control period, and observation, baseline, set-point loop and estimator read that
-same one. Rewards, failures and outputs are of the true motions. The readings are made as those of simulate
-are, by fowt_env/plant/sensing.py.
+Observation, baseline, set-point loop and estimator use the same reading in a control period. Rewards,
+failures and outputs use true motions. Readings are computed as in simulate, by fowt_env/loop/sensing.py.
 """
 
 from collections.abc import Mapping
@@ -28,11 +27,10 @@ LONGEST_DELAY = 1000  # control periods
 
 
 def reading_scales(turbine, individual=False):
-    """Return what noise of 1 is on each field of a Measurement, (N_MEASUREMENTS,), SI; 0 for the time.
+    """Return the unit of noise of each field of a Measurement (N_MEASUREMENTS,), SI; 0 for time and azimuth.
 
-    It is the scale of the observation channel of that name; of a field without one, that of the first channel
-    in its unit, or 1 where there is none.
-    individual: with the fields of a BladeMeasurement behind them; 0 for the azimuth, which is exact.
+    The unit of noise is the scale of the observation channel of the same name, else of the first channel with
+    the same physical unit, else 1. individual: append the fields of a BladeMeasurement.
     """
     table = {name: entries[0] for name, entries in observation_channels(turbine).items() if entries}
     in_unit = {entry.unit: entry.scale for entry in reversed(table.values())}
@@ -45,7 +43,7 @@ def reading_scales(turbine, individual=False):
 
 
 def check_sensors(setting, turbine=None):
-    """Return the setting sensors of an environment: {"noise", "delay"}, or a SensorChain; "exact" is None.
+    """Return the checked setting `sensors`: {"noise", "delay"}, a SensorChain, or None for "exact".
 
     Raises: InputError.
     """
@@ -64,9 +62,9 @@ def check_sensors(setting, turbine=None):
 
 
 def draw_sensors(settings, scales, control_dt, seed, readings):
-    """Return the sensors of an episode from what check_sensors returned, by the seed of its weather.
+    """Return the Sensors of an episode for settings from check_sensors, drawn with the weather seed.
 
-    A noise is a fraction of the scales (reading_scales). What a SensorChain does not have reads as NaN.
+    Noise is a fraction of the scales (reading_scales). Fields without a sensor in a SensorChain read NaN.
     """
     if isinstance(settings, SensorChain):
         sensors = draw_chain(settings, control_dt, seed, readings, scales.size > N_MEASUREMENTS)

@@ -1,10 +1,10 @@
-"""The whole state of an environment at one instant, for what-if, tree search and predictive control."""
+"""Defines the state of an environment at one instant, for what-if studies, tree search and MPC."""
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-# arrays that outlive a control period: of episode.EpisodeData, of its InterfaceData, and of plant.model.Data
-# (stages: its first row has the wake's rates as long as the cached loads are valid)
+# arrays kept between control periods: in episode.EpisodeData, its InterfaceData, and plant.model.Data
+# (stages: the first row has the wake rates while the cached loads are valid)
 CARRIED = {
     "": (
         "x", "u", "memory", "estimate", "action", "ahead", "motion", "observation", "counts", "reference",
@@ -19,20 +19,20 @@ CARRIED = {
 
 
 class Snapshot(NamedTuple):
-    """What FowtEnv.get_state returns; read only."""
+    """Holds the result of FowtEnv.get_state; read only."""
 
-    kind: tuple  # settings that an environment must share to continue from here
+    kind: tuple  # settings that must be equal in an environment that continues from this state
     scene: Any  # scene.Scene with the weather of the episode
     faults: tuple  # of the episode
-    arrays: tuple  # copies, in the order of CARRIED; None for what the run lacks
+    arrays: tuple  # copies, in the order of CARRIED; None for arrays that the run lacks
     running: bool
     generator: Mapping[str, Any] | None  # state of the random generator; None before the first draw
-    seed: int | None  # that the generator was made from
+    seed: int | None  # seed of the generator
     end: str = ""  # why and when the episode ended
 
 
 def carried(episode):
-    """Return the arrays of EpisodeData in the order of CARRIED, None for those that the run lacks."""
+    """Return the arrays of EpisodeData in the order of CARRIED; None for arrays that the run lacks."""
     parts = {"": episode, "link": episode.link, "data": episode.data}
     return [getattr(parts[part], name) for part, names in CARRIED.items() for name in names]
 

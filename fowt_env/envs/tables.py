@@ -1,4 +1,4 @@
-"""Markdown tables of what an environment takes, shows and pays, made from its task."""
+"""Writes Markdown tables of the actions, observation and reward of a task."""
 
 from math import isinf
 
@@ -9,12 +9,12 @@ from fowt_env.envs.rewards import REWARD_TERMS
 from fowt_env.files.markdown import markdown_table
 
 
-def _figure(value):
+def _formatted(value):
     return str(value) if isinf(value) else f"{value:.4g}"
 
 
 def action_table(task, turbine):
-    """Meaning of the actions in each mode."""
+    """Return a table with the meaning of the actions in each mode."""
     law = turbine.torque_law
     rpm = 30.0 / 3.141592653589793
     low, high = (fraction * turbine.rated_rotor_speed * rpm for fraction in task.setpoint)
@@ -22,7 +22,7 @@ def action_table(task, turbine):
     rows = [
         ("direct", 0, f"generator torque, 0 to {law.max_torque * 1e-3:.2f} kN m (high-speed shaft)"),
         ("direct", 1, pitch),
-        ("setpoint", 0, f"rotor-speed set-point, {low:.2f} to {high:.2f} rpm, followed through the torque"),
+        ("setpoint", 0, f"rotor-speed set-point, {low:.2f} to {high:.2f} rpm, tracked by generator torque"),
         ("setpoint", 1, pitch),
         (
             "residual",
@@ -37,16 +37,16 @@ def action_table(task, turbine):
 
 
 def observation_table(task, turbine):
-    """Index, channel, unit, scaling and bounds of each observation entry."""
+    """Return a table with index, channel, unit, scaling and bounds of each observation entry."""
     rows = [
         (
             index,
             entry.name,
             entry.unit,
-            _figure(entry.centre),
-            _figure(entry.scale),
-            _figure((entry.low - entry.centre) / entry.scale),
-            _figure((entry.high - entry.centre) / entry.scale),
+            _formatted(entry.centre),
+            _formatted(entry.scale),
+            _formatted((entry.low - entry.centre) / entry.scale),
+            _formatted((entry.high - entry.centre) / entry.scale),
             entry.meaning,
         )
         for index, entry in enumerate(entries(task.observation, turbine, task.wind_preview))
@@ -56,7 +56,7 @@ def observation_table(task, turbine):
 
 
 def reward_table(task):
-    """Weight, range and meaning of each reward term."""
+    """Return a table with weight, range and meaning of each reward term."""
     rows = [
         (name, f"{task.weights.get(name, 0.0):g}", f"{term.low:g} to {term.high:g}", term.meaning)
         for name, term in REWARD_TERMS.items()
@@ -65,7 +65,7 @@ def reward_table(task):
 
 
 def task_tables(task, turbine=None):
-    """Action, observation and reward tables of a task for a turbine (the NREL 5 MW), as markdown."""
+    """Return the action, observation and reward tables of a task in Markdown; turbine: default NREL 5 MW."""
     if turbine is None:
         turbine = read_turbine(read_platform("oc3_hywind").turbine)
     return (

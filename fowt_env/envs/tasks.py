@@ -1,4 +1,4 @@
-"""Tasks: what an episode is drawn from, what is observed and rewarded, and how long it lasts."""
+"""Defines tasks: the ranges that episodes are drawn from, observation, reward and duration."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,36 +25,35 @@ from fowt_env.weather.wind import nominal_speed
 from fowt_env.weather.wind_field import is_field
 
 SITE = "gulf_of_maine_normal"
-LARGEST_SEED = 2**31  # of an episode's weather
+LARGEST_SEED = 2**31  # exclusive upper limit of weather seeds
 RANGED, FAR = ("time", "delay", "rate", "offset", "value"), 1e9  # keys of a fault that may be ranges
-SAMPLED = ("series", "steps", "components")  # kinds whose lists are data, never ranges
+SAMPLED = ("series", "steps", "components")  # kinds with lists of data, never ranges
 OFFSETS = tuple(name for name, (index, _) in INITIAL.items() if not State.VX <= index <= State.WZ)
 
 
 class Episode(NamedTuple):
-    """One draw: everything that sets an episode apart from others of its task."""
+    """Holds the drawn values of one episode of a task."""
 
     wind: Any  # as build_scene takes it
     sea: Any
     weather_seed: int
-    offsets: dict  # {channel: what is added to the operating point, in the channel's unit}
-    exact_start: bool  # operating point of this very wind, or interpolated between others
-    shutdown: float | None = None  # s of operation by the baseline before the agent has to stop the turbine
+    offsets: dict  # {channel: offset from the operating point, in the channel's unit}
+    exact_start: bool  # operating point solved for this wind, or interpolated between neighbouring winds
+    shutdown: float | None = None  # s of operation by the baseline before the agent must stop the turbine
     faults: tuple = ()  # descriptions.faults.Faults of the episode
 
 
 @dataclass(frozen=True)
 class Task:
-    """What an agent has to do.
+    """Defines weather, observation, reward and duration of the episodes of an agent.
 
-    wind, sea: as build_scene takes them, where a tuple (low, high) instead of a number is a range
-    from which each episode draws uniformly. sea may also be {"kind": "joint", "table": name}: the
-    JONSWAP state that belongs to the mean wind at a site (constant outside its rows);
-    None is still water.
+    wind, sea: as in build_scene, where a tuple (low, high) in place of a number is a range from which
+    each episode draws uniformly. sea may also be {"kind": "joint", "table": name}: the JONSWAP state
+    that belongs to the mean wind at a site (constant outside the rows of the table); None: still water.
 
-    A mixture of weathers is a list of (share, wind, sea) instead of the wind: each episode draws one of
-    them, with a probability in proportion to its share, and then from its ranges. sea itself is then None.
-    Raises: InputError naming the task, the key, the value and what is allowed.
+    A mixture of weathers is a list of (share, wind, sea) in place of wind: each episode draws one entry
+    with probability proportional to its share, then draws from the ranges of the entry. sea must be None.
+    Raises: InputError naming the task, the key, the value and the allowed range.
     """
 
     name: str
@@ -70,14 +69,14 @@ class Task:
     residual_torque: float = 0.1  # largest addition to the baseline's torque, fraction of rated torque
     residual_pitch: float = 2.0  # deg, largest addition to the baseline's blade pitch
     wind_preview: tuple = ()  # s, look-ahead times of the channel wind_preview
-    # s, range of what the baseline operates the turbine before a stop is signalled and the agent takes over;
-    # None: nothing is to be stopped, and the agent has it from the start
+    # s, range of the time for which the baseline operates the turbine before the stop signal, when the agent
+    # takes over; None: no stop, the agent operates the turbine from the start
     shutdown: tuple | None = None
     weather_seeds: tuple = (0, LARGEST_SEED)  # range (low, below) from which an episode's weather is drawn
-    summary: str = field(default="", compare=False)  # what is to be done, for lists
+    summary: str = field(default="", compare=False)  # objective in a few words, for lists
 
     def _repr_html_(self):
-        """What a notebook shows: weather, observation, and the weights of the reward."""
+        """Return an HTML table of weather, observation and reward weights for notebooks."""
         rows = [
             *(
                 (
@@ -122,11 +121,11 @@ class Task:
 
     @property
     def weathers(self):
-        """Tuple of (share, wind, sea) that an episode draws from; one alone where wind is no mixture."""
+        """Return the tuple of (share, wind, sea) of the mixture; a single entry without a mixture."""
         return self.wind if is_mixture(self.wind) else ((1.0, self.wind, self.sea),)
 
     def draw(self, rng):
-        """Episode drawn with a numpy Generator; the same generator state gives the same episode."""
+        """Draw an Episode with a numpy Generator; the same generator state gives the same episode."""
         wind, sea = _drawn(self.weathers, rng)
         seed = int(rng.integers(*self.weather_seeds))
         offsets = {name: float(rng.uniform(*bounds)) for name, bounds in self.offsets.items()}
@@ -135,12 +134,12 @@ class Task:
 
     @property
     def has_sea(self):
-        """Whether an episode may have waves; the kernels then sum waves in all of them."""
+        """Return whether an episode may have waves; kernels then compute waves in every episode."""
         return any(_has_waves(wind, sea) for _, wind, sea in self.weathers)
 
     @property
     def fixed_wind(self):
-        """Whether every episode has the same mean wind (a box of wind always has its mean)."""
+        """Return whether every episode has the same mean wind (always true for a full-field wind box)."""
         if is_field(self.wind):
             return True
         ends = [_weather(wind, None, pick)[0] for _, wind, _ in self.weathers for pick in (_lowest, _highest)]
@@ -148,7 +147,7 @@ class Task:
 
 
 def _drawn(weathers, rng):
-    """(wind, sea) of one of some (share, wind, sea), numbers drawn from its ranges."""
+    """Draw one (share, wind, sea) and return its (wind, sea) with numbers drawn from its ranges."""
     i = 0
     if len(weathers) > 1:
         shares = np.array([share for share, _, _ in weathers])
@@ -157,16 +156,16 @@ def _drawn(weathers, rng):
 
 
 def varies(spec):
-    """Whether a wind or sea leaves something to be drawn: a range, a mixture, the sea of a joint table."""
+    """Return whether a wind or sea contains values to draw: a range, a mixture or a joint table."""
     if isinstance(spec, dict):
         if spec.get("kind") in SAMPLED:
             return False
         return spec.get("kind") == "joint" or any(isinstance(value, tuple) for value in spec.values())
-    return type(spec) is tuple or (type(spec) is list and is_mixture(spec))  # a WindSeries is a tuple too
+    return type(spec) is tuple or (type(spec) is list and is_mixture(spec))  # excludes WindSeries, a subclass
 
 
 def draw_weather(where, wind, sea, rng):
-    """(wind, sea) of an episode, drawn from ranges or a mixture with a Generator. Raises: InputError."""
+    """Draw (wind, sea) of an episode from ranges or a mixture with a Generator. Raises: InputError."""
     weathers = _check_mixture(where, wind, sea) if is_mixture(wind) else ((1.0, wind, sea),)
     for _, air, water in weathers:
         _check_weather(where, air, water)
@@ -174,7 +173,7 @@ def draw_weather(where, wind, sea, rng):
 
 
 def draw_offsets(offsets, rng):
-    """{channel: offset} of {channel: offset or (low, high)}, in the channels' units. Raises: InputError."""
+    """Draw {channel: offset} from {channel: offset or (low, high)}, channel units. Raises: InputError."""
     drawn = {}
     for name, value in {channel_name(name): value for name, value in offsets.items()}.items():
         if isinstance(value, tuple | list):
@@ -186,7 +185,7 @@ def draw_offsets(offsets, rng):
 
 
 def draw_faults(faults, rng):
-    """Return the tuple of Faults of an episode, drawn from Faults or mappings with ranges (low, high).
+    """Draw the tuple of Faults of an episode from Faults or mappings with ranges (low, high).
 
     Raises: InputError.
     """
@@ -216,13 +215,13 @@ def _highest(low, high):
 
 
 def _weather(wind, sea, pick):
-    """(wind, sea) with each range replaced by pick(low, high), a joint sea by its state at that wind."""
+    """Replace each range in (wind, sea) by pick(low, high), and a joint sea by its state at that wind."""
     wind = _picked("wind", wind, pick)
     if isinstance(sea, dict) and sea.get("kind") == "joint":
         rest = {key: value for key, value in sea.items() if key not in ("kind", "table")}
         rest = _picked("sea", rest, pick)
         if is_field(wind):
-            raise InputError("sea: a joint sea state needs a wind of known mean speed, not a box; give a sea")
+            raise InputError("sea: a joint sea state needs a mean wind speed, not a wind box; specify a sea")
         sea = _joint(sea.get("table", SITE), nominal_speed(wind)) | rest
     else:
         sea = _picked("sea", sea, pick)
@@ -230,18 +229,18 @@ def _weather(wind, sea, pick):
 
 
 def is_mixture(wind):
-    """Whether a wind is a list of weathers: (low, high) holds numbers, a mixture triples."""
+    """Return whether wind is a list of weathers: a range (low, high) has numbers, a mixture has triples."""
     return isinstance(wind, tuple | list) and any(isinstance(entry, tuple | list) for entry in wind)
 
 
 def _check_mixture(where, mixture, sea):
-    """Tuple of (share, wind, sea). Raises: InputError."""
+    """Return the checked mixture as a tuple of (share, wind, sea). Raises: InputError."""
     if sea is not None:
-        raise InputError(f"{where}: sea = {sea!r}: must be None with a mixture, which has seas")
+        raise InputError(f"{where}: sea = {sea!r}: must be None with a mixture, which specifies the seas")
     checked = []
     for i, entry in enumerate(mixture):
         if not isinstance(entry, tuple | list) or len(entry) != 3:
-            raise InputError(f"{where}: wind[{i}] = {entry!r}: must be (share, wind, sea), as the others")
+            raise InputError(f"{where}: wind[{i}] = {entry!r}: must be (share, wind, sea)")
         if is_field(entry[1]):
             raise InputError(f"{where}: wind[{i}]: a box of full-field wind cannot be part of a mixture")
         share = check_number(f"{where}: share of wind[{i}]", entry[0], 0.0, 1e6, low_open=True)
@@ -256,7 +255,7 @@ def _check_weather(where, wind, sea):
     for pick in (_lowest, _highest):
         air, water = _weather(wind, sea, pick)
         try:
-            if not isinstance(air, WindSeries) and not is_field(air):  # those need no reading
+            if not isinstance(air, WindSeries) and not is_field(air):  # these two are parsed already
                 read_wind(air)
             sea_state_of(water)
         except InputError as error:
@@ -264,14 +263,14 @@ def _check_weather(where, wind, sea):
 
 
 def _has_waves(wind, sea):
-    """Whether a weather may have waves."""
+    """Return whether a weather may have waves."""
     if isinstance(sea, dict) and sea.get("kind") == "joint":
         return True
     return sea_state_of(_weather(wind, sea, _highest)[1]).height > 0.0
 
 
 def _picked(where, spec, pick):
-    """The spec with each range replaced by pick(low, high)."""
+    """Return the spec with each range replaced by pick(low, high)."""
     if isinstance(spec, tuple):
         return pick(*check_pair(where, spec, -1e9, 1e9))
     if not isinstance(spec, dict) or spec.get("kind") in SAMPLED:
@@ -292,7 +291,7 @@ def _joint(table, speed):
 
 
 def check_offset(name, value):
-    """The offset (in the channel's unit) of one episode. Raises: InputError."""
+    """Return the checked offset (in the channel's unit) of one episode. Raises: InputError."""
     name = channel_name(name)
     if name not in OFFSETS:
         raise unknown("channel of offsets", name, OFFSETS)
@@ -324,9 +323,9 @@ def _check_seeds(where, seeds):
         )
 
 
-# These rank controllers as their metrics do (environment.md): with less on travel, loops that drive the
-# blades hard, and the platform with them, are paid best. Power counts little: its term falls faster above
-# rated than below, so that it draws the mean down.
+# These weights rank controllers as the metrics do (environment.md): a lower weight on travel favours
+# aggressive pitch action, which excites the platform. The weight of power is low: its term falls faster
+# above rated than below, which lowers the mean power.
 WEIGHTS: dict[str, float] = {
     "power": 0.2,
     "rotor_speed": 3.0,
@@ -336,7 +335,7 @@ WEIGHTS: dict[str, float] = {
     "failure": 100.0,
     "power_shortfall": 0.0,
 }
-START: dict[str, tuple[float, float]] = {  # of the order of one standard deviation in operation
+START: dict[str, tuple[float, float]] = {  # about one standard deviation in operation
     "PtfmSurge": (-2.0, 2.0),
     "PtfmSway": (-0.5, 0.5),
     "PtfmHeave": (-0.3, 0.3),
@@ -346,7 +345,7 @@ START: dict[str, tuple[float, float]] = {  # of the order of one standard deviat
     "RotSpeed": (-0.5, 0.5),
     "Azimuth": (0.0, 360.0),
 }
-# A rotor that stands soon, on a platform and tower that move little. Feathering as fast as it goes is rough.
+# Favours a quick stop with little motion of platform and tower; feathering at full rate excites both.
 STOP_WEIGHTS: dict[str, float] = {
     "standstill": 4.0,
     "platform_rate": 6.0,
@@ -360,7 +359,7 @@ GUST_START = (60.0, 300.0)  # s
 
 
 def _mixture(low, high):
-    """What a controller meets at mean winds from low to high (m/s), in shares that agents can learn from."""
+    """Return the weather mixture for mean winds from low to high (m/s), with shares suited to training."""
     speed = (low, high)
     return (
         (0.65, {"kind": "ntm", "speed": speed, "class": "B", "sigma": "drawn"}, JOINT),
@@ -424,11 +423,11 @@ def task_of(task: str | Task, turbine: Turbine | None = None) -> Task:
 
 
 def scaled_task(task: Task, turbine: Turbine) -> Task:
-    """A task of the NREL 5 MW turbine for another: itself where winds, speed and pitch drive are the same.
+    """Scale a task of the NREL 5 MW turbine to another turbine; unchanged for equal winds, speed and drive.
 
-    Winds above rated are as far from rated, others the same share of the way from cut-in to rated, none
-    above cut-out; the offset of the rotor speed goes with the rated one. The weight of pitch travel makes a
-    degree per turn of the rotor as dear, whatever the drive can do. Seas are those of the site at the wind.
+    Winds above rated keep their difference from rated, others their fraction of the range from cut-in to
+    rated, limited to cut-out; the rotor-speed offset scales with rated speed. The weight of pitch travel
+    counts a degree of travel per rotor revolution equally for every turbine. Seas follow the scaled wind.
     """
     winds = (turbine.cut_in_wind_speed, turbine.rated_wind_speed, turbine.cut_out_wind_speed)
     drive = turbine.pitch_drive
@@ -453,7 +452,7 @@ def scaled_task(task: Task, turbine: Turbine) -> Task:
 
 
 def _scaled_wind(wind, winds):
-    """A wind of TASKS with its speeds among the cut-in, rated and cut-out winds of another turbine."""
+    """Return a wind of TASKS with its speeds mapped to the cut-in, rated and cut-out winds of a turbine."""
     cut_in, rated, cut_out = winds
 
     def moved(speed):

@@ -1,4 +1,4 @@
-"""Many environments stepped by one compiled call: Gymnasium's vector interface without a Python loop."""
+"""Steps many environments in one compiled call: Gymnasium's vector interface without a Python loop."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -23,45 +23,45 @@ from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.handle import Handle
 
-INFO_KEYS = (*REWARD_KEYS, "time")  # those of every step that are float64
+INFO_KEYS = (*REWARD_KEYS, "time")  # float64 entries of every step's infos
 INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
-# attributes that a copy makes anew: compiled ones, and rows that it fills from those of its environments
+# attributes that a copy rebuilds: compiled ones, and arrays filled from those of the single environments
 COMPILED = (
     "_baseline_law", "_estimator_law", "_observations", "_counts", "_terms", "_handles", "_listed",
 )  # fmt: skip
 
 
 class FowtVectorEnv(gymnasium.vector.VectorEnv):
-    """num_envs environments, each with its own weather, random generator and, optionally, settings.
+    """Steps num_envs environments, each with separate weather, random generator and optional settings.
 
-    num_envs         how many
+    num_envs         number of environments
     autoreset_mode   a gymnasium.vector.AutoresetMode, its value or its name ("next_step"): "NextStep" (as
-                     Gymnasium's own vector environments: the step after the last one resets, its action is
-                     ignored and its reward 0), "SameStep" (the step that ends an episode returns the first
-                     observation of the next; the last one is in infos["final_obs"], its info in
-                     infos["final_info"]) or "Disabled" (reset(options={"reset_mask": mask}) is up to the
-                     caller)
-    threads          of the compiled call; None: as many as numba uses, at most num_envs
-    per_env          settings of single environments: num_envs dicts that are put over the common settings.
-                     All environments must have the same spaces and the same loads (one compiled kind):
-                     wind, sea, platform, turbine, task and reward may differ, rotor and options seldom.
+                     Gymnasium's vector environments: the step after the end of an episode resets, ignores the
+                     action and returns reward 0), "SameStep" (the step that ends an episode returns the
+                     first observation of the next; infos["final_obs"] and infos["final_info"] hold the last
+                     observation and info) or "Disabled" (the caller resets ended episodes with
+                     reset(options={"reset_mask": mask}))
+    threads          number of threads of the compiled call; None: as many as numba uses, at most num_envs
+    per_env          settings of single environments: num_envs dicts that override the common settings. All
+                     environments must have the same spaces and the same loads (one compiled type): wind,
+                     sea, platform, turbine, task and reward may differ, rotor and options rarely.
                      Domain randomisation, with fowt_env.training.rl.randomisation.randomised:
                      gymnasium.make_vec(name, n, per_env=randomised({"plants": 8}, n, seed))
-    settings         of all environments, see FowtEnv
+    settings         common settings of all environments, see FowtEnv
 
     One environment of the batch gives the same bits as a FowtEnv with its seed and its actions, whatever
     the number of threads. reset(seed=s) seeds the environments s, s + 1, ...; a list seeds each. Options of
-    reset go to every environment that is reset, those of a list of num_envs dicts to one each.
+    reset apply to every environment that is reset; a list of num_envs dicts has one entry for each.
 
-    infos are those of Gymnasium's SyncVectorEnv, but infos["sampled"][i] is a dict, which replays the
-    episode as options of a reset.
+    infos follow Gymnasium's SyncVectorEnv, except that infos["sampled"][i] is a dict: passed as options of
+    reset, this dict replays the episode.
 
-    envs are the single environments; step one of them alone through call() only.
+    envs holds the single environments; use call() to step one of them separately.
 
-    A reward that is a function is called in Python for one environment after the other, some 5 microseconds
-    each beside its own time. copy.deepcopy and pickle give an independent batch that continues from here.
+    A reward function is called in Python for one environment after the other, with an overhead of about
+    5 microseconds per call. copy.deepcopy and pickle give an independent batch in the present state.
 
-    An action that is not finite is refused for all before any environment moves.
+    An action that is not finite raises InputError before any environment is advanced.
     """
 
     metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}
@@ -78,9 +78,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = self.metadata | {"autoreset_mode": self.autoreset_mode}
         if settings.get("render_mode") is not None:
-            raise InputError(
-                f"render_mode = {settings['render_mode']!r}: a vector environment has no pictures"
-            )
+            raise InputError(f"render_mode = {settings['render_mode']!r}: a vector environment cannot render")
         _shorten_spinning()
         most = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined] # set when numba starts
         self.threads = min(numba.get_num_threads(), num_envs) if threads is None else threads
@@ -100,16 +98,16 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self._dt = np.array([env.dt for env in self.envs])
         self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
         self._protected = first.is_protected
-        self._own_rewards = [i for i, env in enumerate(self.envs) if env._own_reward is not None]
+        self._custom_rewards = [i for i, env in enumerate(self.envs) if env._custom_reward is not None]
         self._handles = None
         self._listed = [None] * num_envs  # handles in the compiled list, for comparison
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy is made from: the attributes less what is compiled and the rows."""
+        """Return the state of a copy: all attributes except compiled ones and shared arrays."""
         return {name: value for name, value in self.__dict__.items() if name not in COMPILED}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """Become a copy."""
+        """Restore the batch from the state of a copy."""
         self.__dict__.update(state)
         first = self.envs[0]
         self._baseline_law, self._estimator_law = first._baseline_law, first._estimator_law
@@ -125,7 +123,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                     self._renew(i)
 
     def _share_rows(self):
-        """Make the arrays that the outside reads rows of common ones."""
+        """Replace observation, counts and terms of each environment by rows of common arrays."""
         n = self.num_envs
         self._observations = np.zeros((n, *self.single_observation_space.shape), dtype=np.float32)
         self._counts = np.zeros((n, N_COUNTS), dtype=np.int64)
@@ -141,9 +139,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | list[dict[str, Any]] | None = None,
     ) -> tuple[np.ndarray, dict[str, Any]]:
-        """(observations, infos) at the start of new episodes, of all or of options["reset_mask"] (n,) bool.
+        """Start new episodes in all environments or those in options["reset_mask"] (n,) bool.
 
-        Raises: InputError, also for what FowtEnv.reset refuses; all are then as they were before.
+        Returns (observations, infos). Raises: InputError as FowtEnv.reset, with all environments unchanged;
         ClosedEnvironmentError after close().
         """
         if self.closed:
@@ -174,24 +172,24 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return self._observations.copy(), infos
 
     def _plan(self, i, seed, options):
-        """Start of a new episode of one environment. Raises: InputError, which names the environment."""
+        """Draw the Start of a new episode of one environment. Raises: InputError naming the environment."""
         try:
             return self.envs[i]._plan(seed, options)
         except InputError as error:
             raise InputError(f"environment {i}: {error}") from None
 
     def _mask(self, mask):
-        """The reset mask, checked."""
+        """Return the checked reset mask. Raises: InputError, ResetNeeded."""
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise InputError(f"options['reset_mask']: must be a bool array of shape ({self.num_envs},)")
         if not mask.any():
-            raise InputError("options['reset_mask']: must name at least one environment")
+            raise InputError("options['reset_mask']: must select at least one environment")
         if self._handles is None and not mask.all():
             raise ResetNeeded("call reset() of all environments first")
         return mask
 
     def _begin(self, i, start, infos):
-        """Begin a planned episode of one environment; returns the infos with its info added."""
+        """Begin the planned episode of one environment; return the infos with the info of its reset added."""
         _, info = self.envs[i]._begin(start)
         self._ended[i] = False
         self._renew(i)
@@ -203,7 +201,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return infos
 
     def _renew(self, i):
-        """Put the environment's present handle, if it has changed, into the compiled list."""
+        """Update the environment's handle in the compiled list if the handle has changed."""
         handle = self.envs[i]._handle
         if handle is self._listed[i]:
             return
@@ -218,7 +216,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     def step(
         self, actions: npt.ArrayLike
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
-        """(observations, rewards, terminations, truncations, infos) after one control period of each."""
+        """Advance all by one period; return (observations, rewards, terminations, truncations, infos)."""
         if self._handles is None:
             if self.closed:
                 raise ClosedEnvironmentError(CLOSED)
@@ -242,9 +240,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         ended = terminations | truncations
         infos = {}
         over = ended.any()
-        for i in self._own_rewards:
+        for i in self._custom_rewards:
             if active[i]:
-                rewards[i] = self.envs[i]._own(self.last_info(i))
+                rewards[i] = self.envs[i]._reward_of(self.last_info(i))
         if over:
             for i in np.flatnonzero(ended):
                 self.envs[i]._finish(statuses[i])
@@ -263,10 +261,10 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return self._observations.copy(), rewards, terminations, truncations, infos
 
     def _act(self, actions, active):
-        """One control period of the active environments under checked actions."""
+        """Advance the active environments by one control period under checked actions."""
         shape = self.action_space.shape
         try:
-            requested = np.array(actions, dtype=np.float64)  # a copy of one type
+            requested = np.array(actions, dtype=np.float64)  # a float64 copy for the kernel
         except (TypeError, ValueError):
             raise InputError(f"actions = {actions!r}: must be {shape} numbers") from None
         if requested.shape != shape:
@@ -284,7 +282,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             raise InputError(f"action of environment {bad} = {requested[bad].tolist()}: must be finite")
 
     def _infos(self, infos, shown, terminations):
-        """Infos of a step with those of the shown environments added, as _add_info would."""
+        """Add the step infos of the shown environments to infos, in the format of _add_info."""
         if not shown.any():
             return infos
         columns = np.empty((len(INFO_KEYS), self.num_envs))
@@ -296,7 +294,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             for values in counts.values():
                 values[~shown] = 0
         masks = np.empty((len(INFO_KEYS), self.num_envs), dtype=bool)
-        masks[:] = shown  # a row each: a reset adds itself to some of them
+        masks[:] = shown  # separate rows, because a reset changes some of them
         infos.update(zip(INFO_KEYS, columns, strict=True))
         infos.update(zip(INFO_MASKS, masks, strict=True))
         if self._protected:
@@ -310,7 +308,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return infos
 
     def _finals(self, ended):
-        """Infos with the last observation and the last info of the ended environments."""
+        """Return infos with the last observation and info of the ended environments."""
         infos = {}
         for i in np.flatnonzero(ended):
             final = {"final_obs": self._observations[i].copy(), "final_info": self.last_info(i)}
@@ -331,13 +329,13 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         return info
 
     def get_state(self) -> tuple[Snapshot, ...]:
-        """Tuple of the environments' Snapshots."""
+        """Return a tuple with the Snapshot of each environment."""
         return tuple(env.get_state() for env in self.envs)
 
     def set_state(self, snapshots: Snapshot | Sequence[Snapshot]) -> None:
-        """Go on from one Snapshot per environment, or all from the same one.
+        """Continue from one Snapshot per environment, or from a common Snapshot.
 
-        An environment that had ended then waits for its reset as it did. Raises: InputError.
+        An environment whose episode had ended at the Snapshot waits for a reset. Raises: InputError.
         """
         if isinstance(snapshots, Snapshot):
             snapshots = [snapshots] * self.num_envs
@@ -359,31 +357,31 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
     def call(
         self, name: str, *args: Any, indices: Sequence[int] | None = None, **kwargs: Any
     ) -> tuple[Any, ...]:
-        """Tuple of what an attribute is, or returns when called, in each (or each chosen) environment."""
+        """Return a tuple with an attribute, or its result when called, of all or selected environments."""
         results = []
         for i in range(self.num_envs) if indices is None else indices:
-            found = self.envs[i].get_wrapper_attr(name)
-            results.append(found(*args, **kwargs) if callable(found) else found)
+            attribute = self.envs[i].get_wrapper_attr(name)
+            results.append(attribute(*args, **kwargs) if callable(attribute) else attribute)
             self._renew(i)
         return tuple(results)
 
     def get_attr(self, name: str) -> tuple[Any, ...]:
-        """Tuple of an attribute of each environment."""
+        """Return a tuple with an attribute of each environment."""
         return tuple(env.get_wrapper_attr(name) for env in self.envs)
 
     @property  # type: ignore[misc]
     def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override] # as SyncVectorEnv
-        """Tuple of the environments' random generators."""
+        """Return a tuple with the random generator of each environment."""
         return self.get_attr("np_random")
 
     @property
     def np_random_seed(self) -> tuple[int | None, ...]:  # type: ignore[override]
-        """Tuple of the seeds that they were made from."""
+        """Return a tuple with the seed of each environment's random generator."""
         return self.get_attr("np_random_seed")
 
 
 def of_one(infos: dict[str, Any], i: int, but: Sequence[str] = ()) -> dict[str, Any]:
-    """Return the info of environment i, as FowtEnv.step returns it, from those of a vector environment."""
+    """Return the info of environment i in the format of FowtEnv.step, from infos of a vector environment."""
     info = {}
     for key, values in infos.items():
         if key in but or f"_{key}" not in infos or not infos[f"_{key}"][i]:
@@ -406,16 +404,16 @@ def _autoreset_mode(mode_or_name):
 
 
 def _count(name, value, most):
-    """A whole number in [1, most]. Raises: InputError."""
+    """Return value as an int in [1, most]. Raises: InputError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= most:
         raise InputError(f"{name} = {value!r}: must be a whole number from 1 to {most}")
     return int(value)
 
 
 def _environments(num_envs, per_env, settings):
-    """List of environments; those of equal settings share what is never written.
+    """Return the list of environments; those with equal settings share constant parts.
 
-    Raises: InputError unless all have the same spaces and compiled kind.
+    Raises: InputError unless all have the same spaces and compiled type.
     """
     if per_env is None:
         per_env = [{}] * num_envs
@@ -436,7 +434,7 @@ def _environments(num_envs, per_env, settings):
 
 
 def _equal(one, other):
-    """Whether two dicts of settings are surely the same; arrays in them count as different."""
+    """Return whether two dicts of settings are equal; False if they contain arrays."""
     try:
         return bool(one == other)
     except ValueError:
@@ -447,7 +445,7 @@ def _check_alike(i, env, first):
     """Raise InputError unless one compiled loop can step both environments."""
     if env.observation_space != first.observation_space:
         raise InputError(
-            f"per_env[{i}]: its observation differs from that of the first; all must be the same"
+            f"per_env[{i}]: the observation space differs from that of per_env[0]; all must be equal"
         )
     if env.action_mode != first.action_mode:
         raise InputError(f"per_env[{i}]: action_mode = {env.action_mode!r}: must be {first.action_mode!r}")
@@ -459,16 +457,16 @@ def _check_alike(i, env, first):
     models = [e.scene.model._asdict() | e._config.interface._asdict() for e in (first, env)]
     parts = [n for n in models[0] if numba.typeof(models[0][n]) != numba.typeof(models[1][n])]
     raise InputError(
-        f"per_env[{i}]: another compiled kind than the first, in {', '.join(parts)}; use the same"
+        f"per_env[{i}]: differs from per_env[0] in the compiled types of {', '.join(parts)}; must be equal"
     )
 
 
 def _shorten_spinning():
-    """Have idle threads sleep soon, unless the user has decided on that; read when numba starts its threads.
+    """Limit the spinning of idle threads unless OMP_WAIT_POLICY is set; call before numba starts threads.
 
-    GNU's OpenMP, which runs them on Linux, lets an idle thread spin for milliseconds: best between steps on a
-    quiet machine, ruinous beside other programs (performance.md). This many turns are some 50
-    microseconds, longer than what lies between two steps.
+    GNU OpenMP, which runs the threads on Linux, lets an idle thread spin for milliseconds: fastest on an
+    idle machine, very slow alongside other programs (performance.md). 3000 iterations take about 50
+    microseconds, longer than the time between two steps.
     """
     if "OMP_WAIT_POLICY" not in os.environ:
         os.environ.setdefault("GOMP_SPINCOUNT", "3000")

@@ -1,4 +1,4 @@
-"""Plots, pictures and animations. The plots of runs can be imported from here, each when it is first used."""
+"""Provides plots, images and animations. Plot functions of runs are imported from here on first use."""
 
 from importlib import import_module
 from typing import Any

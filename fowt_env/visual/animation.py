@@ -29,12 +29,12 @@ from fowt_env.visual.style import short_names
 SUFFIXES = (".gif", ".mp4")
 MOST_RUNS = 4
 DRAWN = ("Time", *MOTIONS, "Azimuth", "RotSpeed")
-GIF_COLOURS = 64  # a palette that keeps files small; the sky has few shades
-CLEAR = GIF_COLOURS - 1  # palette entry of pixels that do not change
-UNSEEN = 6  # of 255: smaller changes of a pixel are drawn once they have accumulated
+GIF_COLOURS = 64  # size of the palette; a small palette keeps files small
+CLEAR = GIF_COLOURS - 1  # palette entry of unchanged pixels
+UNSEEN = 6  # of 255: smaller changes of a pixel accumulate before the pixel is redrawn
 MOST_STILL = 2.0  # windows: shorter animations have a fixed time axis
-# small or rare colours that the palette must contain: SWATCH rows of its sample show them
-SHADE = (178, 141, 30)  # of yellow, away from the light
+# colours of small areas that the palette must contain, added to the palette's sample in SWATCH rows
+SHADE = (178, 141, 30)  # shaded yellow
 KEY_COLOURS = (*RGB_COLOURS, YELLOW, SHADE, LOOSE, AT_REST, TIGHT)
 SWATCH = 160
 
@@ -43,9 +43,9 @@ def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0,
     """Write an animation of runs {label: frame of simulate} of one scene; return its path.
 
     speed     seconds of the run per second of the animation
-    fps       pictures per second; a GIF uses the nearest hundredth of a second
-    size      pixels, both even
-    start     time of the first picture, s
+    fps       images per second; a GIF rounds the interval to hundredths of a second
+    size      image size (width, height), pixels, both even
+    start     time of the first image, s
     progress  called as progress(done, total)
     Raises: InputError for invalid settings, or if a library is missing.
     """
@@ -83,7 +83,7 @@ def animate(scene, runs, path, *, speed=4.0, fps=20, size=(960, 540), start=0.0,
 
 
 def animation_path(path):
-    """Return `path` as a Path. Raises: InputError for an ending not in SUFFIXES."""
+    """Return `path` as a Path. Raises: InputError for a file name extension not in SUFFIXES."""
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"animation {str(path)!r}: must end with {' or '.join(SUFFIXES)}")
@@ -91,15 +91,15 @@ def animation_path(path):
 
 
 class _Track:
-    """Interpolates the drawn channels of one run; after its end they stay constant."""
+    """Interpolates the drawn channels of one run; values stay constant after the end of the run."""
 
     def __init__(self, label, frame):
-        wanted = dict.fromkeys((*DRAWN, *(trace.channel for trace in TRACES)))
+        channels = dict.fromkeys((*DRAWN, *(trace.channel for trace in TRACES)))
         columns = {name.partition("_[")[0]: name for name in frame.columns}
-        missing = [name for name in wanted if name not in columns]
+        missing = [name for name in channels if name not in columns]
         if missing or len(frame) < 2:
-            raise InputError(f"run {label!r}: needs at least two rows and the channels {', '.join(wanted)}")
-        self.values = {name: frame[columns[name]].to_numpy(dtype=float) for name in wanted}
+            raise InputError(f"run {label!r}: needs at least two rows and the channels {', '.join(channels)}")
+        self.values = {name: frame[columns[name]].to_numpy(dtype=float) for name in channels}
         self.values["Azimuth"] = np.unwrap(self.values["Azimuth"], period=360.0)
         self.time = self.values["Time"]
 
@@ -110,9 +110,9 @@ class _Track:
 
 
 def _write_gif(pictures, path, pause):
-    """Write pictures as a looping GIF of one palette: that of the first picture and KEY_COLOURS.
+    """Write images as a looping GIF with one palette, from the first image and KEY_COLOURS.
 
-    A frame contains the changed pixels; the others are transparent and compress well.
+    Each frame contains the changed pixels; unchanged pixels are transparent and compress well.
     """
     try:
         from PIL import GifImagePlugin, Image
@@ -128,10 +128,10 @@ def _write_gif(pictures, path, pause):
     def reduced(picture):
         return np.array(Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE))
 
-    def image(places):
-        found = Image.frombytes("P", places.shape[::-1], places.tobytes())
-        found.putpalette(entries)
-        return found
+    def image(indices):
+        result = Image.frombytes("P", indices.shape[::-1], indices.tobytes())
+        result.putpalette(entries)
+        return result
 
     before = reduced(shown)
     whole = image(before)
@@ -141,22 +141,22 @@ def _write_gif(pictures, path, pause):
         file.writelines(GifImagePlugin.getdata(whole, **settings))
         shown = shown.astype(np.int16)
         for picture in pictures:
-            places = reduced(picture)
+            indices = reduced(picture)
             gap = np.abs(picture - shown).max(axis=2)
-            changed = (places != before) & (gap > UNSEEN)
-            before, shown = np.where(changed, places, before), np.where(changed[..., None], picture, shown)
+            changed = (indices != before) & (gap > UNSEEN)
+            before, shown = np.where(changed, indices, before), np.where(changed[..., None], picture, shown)
             rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
-            if not rows.size:  # a picture has at least one pixel
+            if not rows.size:  # a frame needs at least one pixel
                 rows = columns = np.zeros(1, dtype=int)
             box = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-            part = image(np.where(changed, places, CLEAR).astype(np.uint8)[box])
+            part = image(np.where(changed, indices, CLEAR).astype(np.uint8)[box])
             look = settings | {"transparency": CLEAR, "disposal": 1}
             file.writelines(GifImagePlugin.getdata(part, (int(columns[0]), int(rows[0])), **look))
         file.write(b";")
 
 
 def _write_mp4(pictures, path, pause):
-    """Write pictures as H.264 video."""
+    """Write images as H.264 video."""
     try:
         import imageio_ffmpeg
     except ImportError as error:
@@ -177,7 +177,7 @@ def _write_mp4(pictures, path, pause):
                 break
     finally:
         writer.close()
-    with suppress(RuntimeError):  # no video
+    with suppress(RuntimeError):  # the file is not a valid video
         written, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
-    if written < sent:  # ffmpeg does not say why; a full disk most of all
-        raise OSError(errno.EIO, f"ffmpeg wrote {written} of {sent} pictures", str(path))
+    if written < sent:  # ffmpeg reports no reason; usually a full disk
+        raise OSError(errno.EIO, f"ffmpeg wrote {written} of {sent} images", str(path))

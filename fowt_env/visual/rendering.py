@@ -1,4 +1,4 @@
-"""Draws a floating turbine: side view and mooring to scale, and strips of live time series.
+"""Draws a floating wind turbine: side view and mooring to scale, and strips of live time series.
 
 The input is a row of channels {OpenFAST name: value} and the scene, so the same code shows a running
 environment and a finished run. Needs pygame: pip install "fowt-env[render]".
@@ -22,13 +22,13 @@ SIZE = (960, 640)  # pixels of a view
 FPS = 30
 WINDOW = 60.0  # s of a trace
 SIDES = (160, 4000)  # pixels: smallest and largest side of a view
-SAMPLING = 3  # enlargement of the side view before it is averaged down
-LETTERS = 4  # enlargement of text: hinting of the font would misplace small letters
+SAMPLING = 3  # enlargement of the side view before averaging
+LETTERS = 4  # enlargement of text before averaging: font hinting would misplace small letters
 DEPTH_SHIFT = 0.28  # cabinet projection: shift per metre across the wind, so that the rotor is visible
 LINE_POINTS = 81
-MOST_TENSIONS = 4  # written in full; of more lines only the smallest and the largest
+MOST_TENSIONS = 4  # tensions listed in full; for more lines only minimum and maximum
 LEAST_SEA = 0.55  # rotor radii of water shown below a flat hull
-SPLASH = 0.1  # of the draft: the hull is yellow above this depth
+SPLASH = 0.1  # of the draft: depth above which the hull is yellow
 WAVE_STEP = 9  # pixels of the enlarged picture between points of the sea surface
 LEAST_BLADE = 0.0055, 0.0022  # of the picture's height: smallest half width of a drawn blade at root and tip
 FIRST_WINDOWS = (15.0, 30.0, WINDOW)  # s shown at the start of a run
@@ -97,9 +97,9 @@ def load_pygame():
 
 
 class Writer:
-    """Renders text of any size, evenly spaced: enlarged, then averaged down. Keeps rendered texts."""
+    """Renders evenly spaced text of any size by enlarging and averaging. Caches rendered texts."""
 
-    MOST = 600  # texts kept
+    MOST = 600  # cached texts
 
     def __init__(self, pygame, zoom=1.0):
         self.pygame, self.zoom = pygame, zoom
@@ -119,12 +119,12 @@ class Writer:
             self._kept[key] = self.pygame.transform.smoothscale(large, shape)
         return self._kept[key]
 
-    def put(self, picture, text, place, height, colour, *, right=False):
+    def put(self, picture, text, position, height, colour, *, right=False):
         """Draw a text at the (x, y) of its left or right upper corner; return the x of the other corner."""
         words = self.render(text, height, colour)
         width = words.get_width()
-        picture.blit(words, (place[0] - width if right else place[0], place[1]))
-        return place[0] - width if right else place[0] + width
+        picture.blit(words, (position[0] - width if right else position[0], position[1]))
+        return position[0] - width if right else position[0] + width
 
 
 class PlatformPose:
@@ -171,22 +171,22 @@ class Surface:
         if self.waves is None:
             return np.zeros(len(self.x))
         turned = self.waves.omega * time
-        # einsum: a threaded matrix product of this size loses milliseconds where the machine is busy
+        # einsum: a threaded matrix product of this size is milliseconds slower on a busy machine
         level = np.einsum("xj,j->x", self.even, np.cos(turned))
         level += np.einsum("xj,j->x", self.odd, np.sin(turned))
         return level * ramp_factor(time, self.waves.ramp)
 
 
 def tension_colour(tension, at_rest):
-    """Return the colour of a line: blue if loose, yellow at its tension at rest, red at 1.5 times that."""
+    """Return the colour of a line: blue if slack, yellow at the tension at rest, red at 1.5 times that."""
     fraction = 2.0 * (tension / at_rest - 1.0) if at_rest > 0.0 else 0.0
     other, fraction = (TIGHT, min(fraction, 1.0)) if fraction > 0.0 else (LOOSE, min(-fraction, 1.0))
     return _mixed(AT_REST, other, fraction)
 
 
-def _mixed(colour, other, share):
-    """Return the colour at a share of the way to another one."""
-    return tuple(round(a + share * (b - a)) for a, b in zip(colour, other, strict=True))
+def _mixed(colour, other, fraction):
+    """Return the colour interpolated towards another by a fraction."""
+    return tuple(round(a + fraction * (b - a)) for a, b in zip(colour, other, strict=True))
 
 
 class _SideView:
@@ -203,14 +203,14 @@ class _SideView:
 
 
 def _dark(colour):
-    """Return a colour in shade."""
+    """Return a darker shade of a colour."""
     return [round(0.85 * c) for c in colour]
 
 
 def _solids(platform):
     """Yield (ends (2, 3), two diameters or (width, height), whether round) of a hull, the farthest first.
 
-    The spar, else shapes of the platform file, else members, else a box of the hull's volume and draft.
+    The spar, else shapes of the platform file, else members, else a box with the hull's volume and draft.
     """
     hull, draft = platform.hull, platform.draft
     solids = platform.shapes or platform.members
@@ -229,7 +229,7 @@ def _solids(platform):
 
 
 class TurbinePanel(_SideView):
-    """Draws one turbine to scale; its pixels are those of the picture before averaging."""
+    """Draws one turbine to scale, in pixels of the enlarged image before averaging."""
 
     def __init__(self, pygame, scene, size):
         self.pygame = pygame
@@ -253,7 +253,7 @@ class TurbinePanel(_SideView):
         self.enter(scene)
 
     def enter(self, scene):
-        """Change the scene: the same turbine in other weather."""
+        """Change the scene to the same turbine in other weather."""
         self.scene = scene
         waves = None if scene.model.hydro is None else scene.model.hydro.waves
         self.surface = Surface(waves, self._pixels / self.scale + self.left)
@@ -264,12 +264,12 @@ class TurbinePanel(_SideView):
         """Return a Surface with a colour gradient between two heights."""
         picture = self.pygame.Surface(self.inner, self.pygame.SRCALPHA)
         for y in range(self.inner[1]):
-            share = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
-            self.pygame.draw.line(picture, _mixed(*colours, share), (0, y), (self.inner[0], y))
+            fraction = min(max((y - begin) / max(1, end - begin), 0.0), 1.0)
+            self.pygame.draw.line(picture, _mixed(*colours, fraction), (0, y), (self.inner[0], y))
         return picture
 
     def draw(self, row, label=None, colour=None, speed=None):
-        """Return the picture of a row of channels with `label`, its `colour` and `speed`."""
+        """Return the image of a row of channels with `label`, its `colour` and `speed`."""
         pygame, canvas = self.pygame, self._canvas
         pose = PlatformPose(row)
         canvas.blit(self._sky, (0, 0))
@@ -279,9 +279,9 @@ class TurbinePanel(_SideView):
             tint = tension_colour(tension, self.tension_at_rest[number])
             pygame.draw.lines(canvas, tint, False, self.pixels(points), 2 * SAMPLING)
         self._rotor(canvas, pose, row)
-        place = self._wind(canvas, row["Wind1VelX"])
+        position = self._wind(canvas, row["Wind1VelX"])
         picture = pygame.transform.smoothscale(canvas, self.size)
-        self._writer.put(picture, f"{row['Wind1VelX']:.1f} m/s", place, self._small, RGB_COLOURS[0])
+        self._writer.put(picture, f"{row['Wind1VelX']:.1f} m/s", position, self._small, RGB_COLOURS[0])
         self._words(picture, row, label, colour, speed)
         return picture
 
@@ -312,8 +312,8 @@ class TurbinePanel(_SideView):
         heights = ends[:, 2]
         self._cylinder(canvas, pose, ends, diameters, STEEL if heights.min() < limit else YELLOW)
         if heights.min() < limit < heights.max():
-            share = (limit - heights[0]) / (heights[1] - heights[0])
-            cut, wide = (pair[0] + share * (pair[1] - pair[0]) for pair in (ends, diameters))
+            fraction = (limit - heights[0]) / (heights[1] - heights[0])
+            cut, wide = (pair[0] + fraction * (pair[1] - pair[0]) for pair in (ends, diameters))
             top = int(np.argmax(heights))
             self._cylinder(canvas, pose, np.array([cut, ends[top]]), (wide, diameters[top]), YELLOW)
 
@@ -322,8 +322,8 @@ class TurbinePanel(_SideView):
         along, half = ends[1] - ends[0], 0.5 * section[1]
         near = np.array([-along[1], along[0], 0.0]) * 0.5 * section[0] / np.hypot(*along[:2])
         near = near if near[1] < 0.0 else -near
-        share = np.clip((limit - ends[:, 2].mean()) / half, -1.0, 1.0)
-        for low, high, colour in ((-1.0, share, STEEL), (share, 1.0, YELLOW)):
+        level = np.clip((limit - ends[:, 2].mean()) / half, -1.0, 1.0)
+        for low, high, colour in ((-1.0, level, STEEL), (level, 1.0, YELLOW)):
             if low < high:
                 face = near + np.vstack([ends + (0, 0, low * half), ends[::-1] + (0, 0, high * half)])
                 seen = self.pixels(pose.inertial(np.vstack([face, face - 2.0 * near])))
@@ -340,7 +340,7 @@ class TurbinePanel(_SideView):
         self._cylinder(canvas, pose, ends, (tower.base_diameter, tower.top_diameter), WHITE)
 
     def _sea_over(self, canvas, time):
-        """Draw the sea over the parts below the surface."""
+        """Draw the semi-transparent sea over submerged parts."""
         pygame = self.pygame
         level = (self.top - self.surface.at(time)) * self.scale
         curve = np.column_stack([self._pixels, level])
@@ -364,7 +364,7 @@ class TurbinePanel(_SideView):
         half = 0.032 * radius
         corners = [(-0.06, -1), (-0.075, 0.3), (-0.05, 1), (0.16, 1), (0.17, -0.4), (0.15, -1)]
         nacelle = [(x * radius, 0.0, rotor.hub_height + z * half) for x, z in corners]
-        # the nacelle first: all blades are upwind of it
+        # draw the nacelle first, because all blades are upwind of the nacelle
         self._polygon(canvas, (226, 230, 235), pose, nacelle)
         pygame.draw.polygon(canvas, (140, 150, 162), self.pixels(pose.inertial(nacelle)), SAMPLING)
         turn, pitch = radians(row["Azimuth"]), radians(row["BldPitch1"])
@@ -381,7 +381,7 @@ class TurbinePanel(_SideView):
         """Return the outline (n, 3) of a blade about the hub in body axes."""
         blade = self.scene.turbine.blade
         e_r = np.array([0.0, -sin(azimuth), cos(azimuth)])
-        e_t = np.array([0.0, -cos(azimuth), -sin(azimuth)])  # the way the blade moves
+        e_t = np.array([0.0, -cos(azimuth), -sin(azimuth)])  # direction of rotation
         angle = pitch + blade.twist
         chord = np.outer(np.cos(angle), e_t) - np.outer(np.sin(angle), [1.0, 0.0, 0.0])  # to the leading edge
         axis = np.outer(blade.radius, e_r)
@@ -393,7 +393,7 @@ class TurbinePanel(_SideView):
     def _thick(outline, least):
         """Return a blade's outline in pixels, widened to at least twice `least` (2,) at root and tip.
 
-        An edge-on blade to scale would be invisible in a small picture.
+        An edge-on blade to scale would be invisible in a small image.
         """
         count = len(outline) // 2
         one, tip, other = outline[:count], outline[count], outline[:count:-1]
@@ -404,12 +404,12 @@ class TurbinePanel(_SideView):
             return outline
         across = np.array([-along[1], along[0]]) / length
         reach = half @ across
-        side = -1.0 if reach.sum() < 0.0 else 1.0  # one for all: a twisted blade would cross itself
+        side = -1.0 if reach.sum() < 0.0 else 1.0  # common sign: a twisted outline would cross itself
         wide = (side * np.maximum(side * reach, np.linspace(*least, count)))[:, None] * across
         return np.vstack([middle + wide, tip, (middle - wide)[::-1]])
 
     def _wind(self, canvas, speed):
-        """Draw an arrow at hub height with the length of the wind speed; return the place of its text."""
+        """Draw an arrow at hub height, its length proportional to wind speed; return the text position."""
         x, y = 0.035 * self.inner[0], (self.top - self.scene.turbine.rotor.hub_height) * self.scale
         tip, head = x + 0.011 * self.inner[0] * speed, 0.014 * self.inner[1]
         if abs(speed) > 0.05:
@@ -420,13 +420,13 @@ class TurbinePanel(_SideView):
         return x / SAMPLING, (y + 1.2 * head) / SAMPLING + 2
 
     def _words(self, picture, row, label, colour, speed):
-        """Write time, speed and label onto the picture after averaging, which would blur text."""
+        """Write time, speed and label onto the averaged image, because averaging would blur text."""
         put, margin = self._writer.put, round(0.02 * self.size[1])
         right = self.size[0] - margin
         put(picture, f"{row['Time']:.1f} s", (right, margin), self._large, INK, right=True)
         if speed is not None:
-            place = right, margin + 1.2 * self._large
-            put(picture, f"{speed:.3g} x real time", place, self._small, SOFT, right=True)
+            position = right, margin + 1.2 * self._large
+            put(picture, f"{speed:.3g} x real time", position, self._small, SOFT, right=True)
         if label:
             left = margin
             if colour is not None:
@@ -453,7 +453,7 @@ class MooringPanel(_SideView):
         self.left, self.top = 0.5 * (low + high - size[0] / self.scale), self.level / self.scale
 
     def draw(self, row, scene, at_rest):
-        """Return the picture of a row of channels."""
+        """Return the image of a row of channels."""
         pygame = self.pygame
         picture = pygame.Surface(self.size)
         picture.fill(CARD)
@@ -479,14 +479,14 @@ class MooringPanel(_SideView):
         return picture
 
 
-def tension_key(pygame, picture, writer, place, width):
-    """Draw the colour scale of mooring lines: tension over that at rest, from 0.5 to 1.5."""
-    x, y = place
+def tension_key(pygame, picture, writer, position, width):
+    """Draw the colour scale of mooring lines: tension over tension at rest, from 0.5 to 1.5."""
+    x, y = position
     end = x + min(width, 300) - writer.render("1.5", 15, SOFT).get_width() - 6
-    begin = writer.put(picture, "tension / at rest: 0.5", place, 15, SOFT) + 6
+    begin = writer.put(picture, "tension / at rest: 0.5", position, 15, SOFT) + 6
     for column in range(begin, end):
-        share = 0.5 + (column - begin) / max(1, end - begin - 1)
-        pygame.draw.line(picture, tension_colour(share, 1.0), (column, y + 2), (column, y + 8))
+        relative = 0.5 + (column - begin) / max(1, end - begin - 1)
+        pygame.draw.line(picture, tension_colour(relative, 1.0), (column, y + 2), (column, y + 8))
     pygame.draw.rect(picture, SOFT, (begin - 1, y + 1, end - begin + 2, 9), 1)
     writer.put(picture, "1.5", (end + 6, y), 15, SOFT)
 
@@ -503,7 +503,7 @@ class TracePanel:
     """Draws strips of the last WINDOW seconds of some channels of one or several runs, with scales.
 
     levels: {rating: value} of horizontal lines. span: (begin, end) s of a fixed time axis; None: the last
-    WINDOW s. limits: {channel: (low, high)} of all values to come, which keep the scales constant.
+    WINDOW s. limits: {channel: (low, high)} of the complete run, which keep the scales constant.
     """
 
     def __init__(self, pygame, size, runs=1, levels=None, span=None, limits=None):
@@ -513,7 +513,7 @@ class TracePanel:
         self.histories = [deque() for _ in range(runs)]
 
     def add(self, rows):
-        """Append one row of channels per run, in place of those of the same or a later time."""
+        """Append one row of channels per run, replacing rows of the same or a later time."""
         for history, row in zip(self.histories, rows, strict=True):
             while history and row["Time"] <= history[-1][0]:
                 history.pop()
@@ -534,7 +534,7 @@ class TracePanel:
         return nice_range(low - spare, high + spare)
 
     def draw(self):
-        """Return the picture of all strips."""
+        """Return the image of all strips."""
         picture, zoom = self.pygame.Surface(self.size), self._writer.zoom
         picture.fill(CARD)
         foot, head, gutter = round(16 * zoom), round(20 * zoom), round(42 * zoom)
@@ -570,9 +570,9 @@ class TracePanel:
             draw.line(picture, FAINT, (box.left, y), (box.right, y))
             text = f"{tick:.6g}"
             tall = self._writer.render(text, 14, SOFT).get_height()
-            place = box.left - 4, min(max(y - tall // 2, box.top), box.bottom - tall)
+            position = box.left - 4, min(max(y - tall // 2, box.top), box.bottom - tall)
             if len(ticks) <= 4 or tick in (ticks[0], ticks[-1]):
-                self._writer.put(picture, text, place, 14, SOFT, right=True)
+                self._writer.put(picture, text, position, 14, SOFT, right=True)
         for _, level in self._levels(trace):
             y = round(height(level))
             for x in range(box.left, box.right, 8):
@@ -598,7 +598,7 @@ class TracePanel:
 
 
 def agent_picture(pygame, writer, width, agent):
-    """Return the picture of an Agent: each entry of the action as a bar about zero, and the reward."""
+    """Return the image of an Agent: each entry of the action as a bar about zero, and the reward."""
     draw, put = pygame.draw, writer.put
     names = ACTION_NAMES.get(len(agent.action), [f"action {n + 1}" for n in range(len(agent.action))])
     picture = pygame.Surface((width, 18 * (len(names) + 1) + 10), pygame.SRCALPHA)
@@ -621,10 +621,10 @@ def agent_picture(pygame, writer, width, agent):
 
 
 class View:
-    """Draws the picture of a render mode: side views of one or several runs, traces and mooring.
+    """Draws the image of a render mode: side views of one or several runs, traces and mooring.
 
-    scenes: one per run; labels: their names, or None. speed: factor over real time, written into the
-    picture unless None. span, limits: as for TracePanel.
+    scenes: one per run; labels: names of the runs, or None. speed: factor over real time, written into the
+    image unless None. span, limits: as for TracePanel.
     """
 
     def __init__(self, scenes, labels=None, size=SIZE, *, speed=None, span=None, limits=None):
@@ -671,12 +671,12 @@ class View:
         return self.canvas
 
     def array(self):
-        """Return a (height, width, 3) uint8 copy of the last picture."""
+        """Return a (height, width, 3) uint8 copy of the last image."""
         data = self.pygame.image.tobytes(self.canvas, "RGB")
         return np.frombuffer(data, dtype=np.uint8).reshape(self.size[1], self.size[0], 3).copy()
 
     def show(self, fps):
-        """Show the last picture in a window, at most fps pictures per second.
+        """Show the last image in a window, with at most fps images per second.
 
         Raises: InputError without a display.
         """

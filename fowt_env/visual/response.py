@@ -1,6 +1,6 @@
 """Plots box plots of runs, the steady schedule and response amplitude operators (RAOs).
 
-As in time_series.py every function returns a matplotlib Figure and writes it to `path` unless that is None.
+As in time_series.py every function returns a matplotlib Figure and writes the figure to `path` unless None.
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 
@@ -26,8 +26,8 @@ WAVE = "Wave1Elev_[m]"
 WIND = "Wind_[m/s]"  # column of `fowt trim --out`
 WHISKERS = (1.0, 99.0)  # percentiles
 HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of colours
-ENERGETIC = 0.02  # of the peak of the wave spectrum: least wave energy for an estimate of an RAO
-COHERENT = 0.5  # above it an RAO is drawn solid
+ENERGETIC = 0.02  # of the peak of the wave spectrum: minimum wave energy for the estimate of an RAO
+COHERENT = 0.5  # coherence above which an RAO is drawn solid
 RAO_RANGE = (0.015, 0.3)  # Hz: from below the resonances of spars and semi-submersibles to the end of waves
 BOXES = tuple(
     panel for panel in PANELS if panel[1] not in ("Wind1VelX_[m/s]", "Wave1Elev_[m]", "GenTq_[kN-m]")
@@ -49,19 +49,19 @@ MOTION_CHANNELS = (
 
 
 def _grid(panels, columns, width, height):
-    """Return (figure, panels in reading order) of a grid; unused places stay empty."""
+    """Return (figure, panels in reading order) of a grid; unused grid cells stay empty."""
     rows = -(-len(panels) // columns)
     figure = new_figure(width * columns, 0.7 + height * rows)
-    places = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for axes in places[len(panels) :]:
+    cells = list(figure.subplots(rows, columns, squeeze=False).flat)
+    for axes in cells[len(panels) :]:
         axes.set_visible(False)
-    for axes in places[: len(panels)]:
+    for axes in cells[: len(panels)]:
         style_axes(axes)
-    return figure, places[: len(panels)]
+    return figure, cells[: len(panels)]
 
 
 def _shown(panels, frames, what):
-    """Return the panels with a channel in some frame. Raises: InputError if there is none."""
+    """Return the panels whose channel is in at least one frame. Raises: InputError if there are none."""
     shown = [panel for panel in panels if any(panel[1] in frame.columns for frame in frames)]
     if not shown:
         raise InputError(f"nothing to plot: no {what} has {', '.join(channel for _, channel in panels)}")
@@ -74,13 +74,13 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
     Boxes span the quartiles, whiskers WHISKERS percentiles. The first `skip` seconds are omitted.
     """
     if not cases:
-        raise InputError("nothing to plot: no cases were given")
+        raise InputError("nothing to plot: there are no cases")
     kept = {case: named_runs(runs, skip) for case, runs in cases.items()}
     labels = list(dict.fromkeys(label for runs in kept.values() for label in runs))
     panels = _shown(BOXES, [frame for runs in kept.values() for frame in runs.values()], "run")
-    figure, places = _grid(panels, min(3, len(panels)), 4.2, 2.4)
+    figure, cells = _grid(panels, min(3, len(panels)), 4.2, 2.4)
     width = 0.8 / len(labels)
-    for axes, (name, channel) in zip(places, panels, strict=True):
+    for axes, (name, channel) in zip(cells, panels, strict=True):
         for number, label in enumerate(labels):
             frames = [runs.get(label, ()) for runs in kept.values()]
             having = [i for i, frame in enumerate(frames) if channel in frame]
@@ -104,7 +104,7 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
         axes.grid(False, axis="x")
         axes.ticklabel_format(axis="y", useOffset=False)
         axes.set_xlim(-0.6, len(kept) - 0.4)
-    head_of(figure, places, labels, title)
+    head_of(figure, cells, labels, title)
     return save_figure(figure, path)
 
 
@@ -118,8 +118,8 @@ def plot_schedule(points, path=None, title=None, *, rated_wind=None):
         if WIND not in table.columns or len(table) < 2:
             raise InputError(f"schedule {label!r}: needs a column {WIND!r} and at least two rows")
     panels = _shown(SCHEDULE, list(tables.values()), "table")
-    figure, places = _grid(panels, min(3, len(panels)), 3.6, 2.2)
-    for axes, (name, channel) in zip(places, panels, strict=True):
+    figure, cells = _grid(panels, min(3, len(panels)), 3.6, 2.2)
+    for axes, (name, channel) in zip(cells, panels, strict=True):
         for number, (label, table) in enumerate(tables.items()):
             if channel in table.columns:
                 order = np.argsort(table[WIND].to_numpy())
@@ -131,9 +131,9 @@ def plot_schedule(points, path=None, title=None, *, rated_wind=None):
         axes.set_xlabel("wind (m/s)", fontsize=8, color=INK)
         axes.ticklabel_format(axis="y", useOffset=False)
     if rated_wind is not None:
-        for axes in places[: min(3, len(places))]:
+        for axes in cells[: min(3, len(cells))]:
             note(axes, f"rated {rated_wind:g} m/s", (rated_wind, 1.0), (3, -8))
-    head_of(figure, places, list(tables), title)
+    head_of(figure, cells, list(tables), title)
     return save_figure(figure, path)
 
 
@@ -142,7 +142,7 @@ def response_operator(frame, channel, skip=0.0, segment=None):
 
     The estimate is |S_wc| / S_ww from Welch's cross-spectrum (H1), the linear response to waves. Wind lowers
     the coherence, which is 1 for a linear system without noise; at low coherence the amplitude is uncertain
-    and rather too large. segment: seconds per window; None: an eighth of the record.
+    and tends to be too large. segment: seconds per window; None: an eighth of the record.
     Raises: InputError for a missing channel, a record without waves, or uneven times.
     """
     frequency, amplitude, _, coherence, energetic = _estimate(frame, channel, skip, segment)
@@ -160,7 +160,7 @@ def _estimate(frame, channel, skip, segment):
     kept = frame[frame[TIME] >= frame[TIME].iloc[0] + skip]
     time = kept[TIME].to_numpy()
     if len(time) < 64:
-        raise InputError(f"response operator: {len(time)} rows are left; must be at least 64")
+        raise InputError(f"response operator: {len(time)} rows remain; must be at least 64")
     step = even_step("response operator", time)
     wave, motion = kept[WAVE].to_numpy(), kept[channel].to_numpy()
     if np.ptp(wave) < 1e-9:
@@ -174,12 +174,12 @@ def _estimate(frame, channel, skip, segment):
     with np.errstate(invalid="ignore", divide="ignore"):
         coherence = np.abs(cross) ** 2 / (power * answer)
         amplitude = np.abs(cross) / power
-    found = frequency, amplitude, np.degrees(np.angle(cross)), coherence, power > ENERGETIC * power.max()
-    return tuple(values[1:] for values in found)
+    result = frequency, amplitude, np.degrees(np.angle(cross)), coherence, power > ENERGETIC * power.max()
+    return tuple(values[1:] for values in result)
 
 
 def broken_at_wraps(x, degrees):
-    """Return (x, angles in [-180, 180) deg) of a line, interrupted where the angle passes +-180 deg."""
+    """Return (x, angles in [-180, 180) deg) of a line, interrupted where the angle crosses +-180 deg."""
     x, angle = np.asarray(x, dtype=float), (np.asarray(degrees) + 180.0) % 360.0 - 180.0
     jumps = np.flatnonzero(np.abs(np.diff(angle)) > 180.0) + 1
     return np.insert(x, jumps, np.nan), np.insert(angle, jumps, np.nan)
@@ -230,8 +230,8 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitc
         axes.set_ylabel(text, fontsize=8.5, color=INK)
     grid[0, 0].set_xlim(*RAO_RANGE)
     if platform_pitch_period is not None:
-        place = (1.0 / platform_pitch_period, 0.02)
-        note(grid[0, 0], "platform-pitch resonance", place, (3, 0), rotation=90)
+        position = (1.0 / platform_pitch_period, 0.02)
+        note(grid[0, 0], "platform-pitch resonance", position, (3, 0), rotation=90)
     figure.align_ylabels(grid[:, 0])
     title = title or "Response per metre of wave amplitude (grey: waves without energy)"
     head_of(figure, grid[0], list(runs), title)

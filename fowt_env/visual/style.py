@@ -7,17 +7,17 @@ from fowt_env.caches import cached
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 
-# Okabe and Ito's palette: told apart with any colour vision
+# palette of Okabe and Ito, distinguishable with any colour vision
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", ":", "-.")  # for each further round of colours
 INK, SOFT, FAINT = "#333333", "#777777", "#D9D9D9"
 UNSCORED = "#EFEFEF"
 LONGEST_NAME = 28  # characters of a controller's name in a plot
-SCREEN, SHARP = 96, 2  # dots per inch of a notebook's page, and pixels to each
+SCREEN, SHARP = 96, 2  # dots per inch of a notebook page, and pixels per dot
 
 
 def new_figure(width, height):
-    """Return an empty Figure in the house style, displayed as a picture in notebooks.
+    """Return an empty Figure in the common style, displayed as an image in notebooks.
 
     Raises: InputError that names the extra to install.
     """
@@ -30,7 +30,7 @@ def new_figure(width, height):
 
 @cached(1)
 def _shown(figure_class):
-    """Return a subclass of Figure with its own picture: without pyplot IPython cannot make one."""
+    """Return a Figure subclass with a PNG representation, which IPython lacks without pyplot."""
 
     class NotebookFigure(figure_class):
         def _repr_png_(self):
@@ -44,7 +44,7 @@ def _shown(figure_class):
 
 
 def style_axes(axes, xlabel=None, ylabel=None, title=None):
-    """Set a light grid, no box, grey ticks, and the texts that are given."""
+    """Set a light grid, no box, grey ticks, and the labels and title unless None."""
     axes.grid(True, color=FAINT, linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
@@ -56,7 +56,7 @@ def style_axes(axes, xlabel=None, ylabel=None, title=None):
 
 
 def line_style(number):
-    """Return colour and line style of the number-th run; the first 28 combinations differ."""
+    """Return colour and line style of run `number`; the first 28 combinations differ."""
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": LINES[number // len(COLOURS) % len(LINES)],
@@ -64,7 +64,7 @@ def line_style(number):
 
 
 def short_names(names):
-    """Return {name: text} for plots: without `policy:`, modules and folders, at most LONGEST_NAME long.
+    """Return {name: text} for plots, without `policy:`, modules and folders, at most LONGEST_NAME long.
 
     Names with the same text keep their full form.
     """
@@ -84,7 +84,7 @@ def _short(name):
 
 
 def head_of(figure, panels, names, title=None):
-    """Put the title and one legend of all panels above them; a run named "" has no entry."""
+    """Put the title and a common legend above all panels; a run named "" has no entry."""
     texts, handles = short_names(names), {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -94,7 +94,7 @@ def head_of(figure, panels, names, title=None):
 
 
 def head(figure, title=None, handles=(), names=()):
-    """Put the title and a legend of handles, those with a name, above the panels."""
+    """Put the title and a legend of the named handles above the panels."""
     named = [(handle, name) for handle, name in zip(handles, names, strict=True) if name]
     if not named:
         if title:
@@ -106,19 +106,19 @@ def head(figure, title=None, handles=(), names=()):
         *zip(*named, strict=True),
         loc="outside upper center", ncols=max(1, min(len(named), int(width // entry))), fontsize=8.5,
         labelcolor=INK, frameon=False, handlelength=1.8,
-        title=title, title_fontproperties={"size": 11},  # of the legend: a suptitle would overlap it
+        title=title, title_fontproperties={"size": 11},  # title of the legend: a suptitle would overlap
     )  # fmt: skip
 
 
-def note(axes, text, place, offset, scale="data", **look):
-    """Write a small text into a panel, at (data or axes, axes or data) and an offset in points."""
+def note(axes, text, position, offset, scale="data", **look):
+    """Write a small text into a panel at a position (see scale) plus an offset in points."""
     coordinates = ("data", "axes fraction") if scale == "data" else ("axes fraction", "data")
     look = {"fontsize": 7, "color": SOFT, "textcoords": "offset points"} | look
-    axes.annotate(text, place, xycoords=coordinates, xytext=offset, **look)
+    axes.annotate(text, position, xycoords=coordinates, xytext=offset, **look)
 
 
 def save_figure(figure, path):
-    """Write the figure to `path` (format by its ending, default PNG) unless that is None; return it."""
+    """Write the figure to `path` (format by extension, default PNG) unless None; return the figure."""
     if path is not None:
         path = Path(path)
         if not path.name:
@@ -128,7 +128,7 @@ def save_figure(figure, path):
         supported = figure.canvas.get_supported_filetypes()
         if path.suffix[1:].lower() not in supported:
             allowed = ", ".join(sorted(supported))
-            raise InputError(f"plot file {str(path)!r}: unknown ending; allowed: {allowed}")
+            raise InputError(f"plot file {str(path)!r}: unknown extension; allowed: {allowed}")
         with replacing(path) as temporary:
             figure.savefig(temporary, dpi=150)
     return figure

@@ -1,7 +1,7 @@
 """Plots time series and spectra of runs. Needs matplotlib: pip install "fowt-env[plot]".
 
-Every function returns a matplotlib Figure and writes it to `path` unless that is None. Figures are made
-without pyplot: no global state, no display.
+Every function returns a matplotlib Figure and writes the figure to `path` unless `path` is None. Figures are
+created without pyplot: no global state, no display.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ from fowt_env.visual.style import (
 
 TIME = "Time_[s]"
 
-# one panel each: axis label, channel; a run without the channel has no such panel
+# axis label and channel of each panel; a run without the channel has no such panel
 PANELS = (
     ("wind\n(m/s)", "Wind1VelX_[m/s]"),
     ("wave\n(m)", "Wave1Elev_[m]"),
@@ -37,11 +37,11 @@ PANELS = (
     ("surge\n(m)", "PtfmSurge_[m]"),
     ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
 )
-MARKED = {  # channel: lines across its panel, as (text, rating)
+MARKED = {  # channel: horizontal lines (text, rating) in the panel
     "RotSpeed_[rpm]": (("rated", RATED_SPEED), ("trip", OVERSPEED)),
     "GenPwr_[kW]": (("rated", RATED_POWER),),
 }
-STEADY = 1e-6  # of the mean: a signal with a smaller range is shown as constant
+STEADY = 1e-6  # of the mean: signals with a smaller range are treated as constant
 SPECTRA = (
     ("wind", "Wind1VelX_[m/s]", "(m/s)"),
     ("wave elevation", "Wave1Elev_[m]", "m"),
@@ -54,10 +54,10 @@ SPECTRA = (
 def named_runs(runs, skip=0.0):
     """Return runs {label: frame}, without their first `skip` seconds.
 
-    Raises: InputError without a run, and for a run without time column or with less than two rows.
+    Raises: InputError without runs, and for a run without time column or with fewer than two rows.
     """
     if not runs:
-        raise InputError("nothing to plot: no runs were given")
+        raise InputError("nothing to plot: there are no runs")
     for label, frame in runs.items():
         if TIME not in frame.columns or len(frame) < 2:
             raise InputError(f"run {label!r}: needs a column {TIME!r} and at least two rows")
@@ -67,7 +67,7 @@ def named_runs(runs, skip=0.0):
 
 
 def _lines(runs, channel):
-    """Return [(label, style, frame)] of a channel; one entry without label if all runs agree (weather)."""
+    """Return [(label, style, frame)] of a channel; a single unlabelled entry if all runs agree (weather)."""
     lines = [(label, line_style(i), f) for i, (label, f) in enumerate(runs.items()) if channel in f.columns]
     if len(lines) > 1:
         first = lines[0][2]
@@ -99,14 +99,14 @@ def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None, panels=PAN
     skip      s from the start, shaded as not scored
     ratings   {name: value} of descriptions.ratings.ratings, drawn as lines in rotor speed and power;
               None: attrs["ratings"] of the first frame, which simulate sets
-    panels    (label, channel) of each panel; those without a run that has the channel are left out
+    panels    (label, channel) of each panel; panels whose channel is in no run are omitted
     """
     runs = named_runs(runs)
     check_number("skip", skip, 0.0)
-    wanted = ", ".join(channel for _, channel in panels)
+    channels = ", ".join(channel for _, channel in panels)
     panels = [panel for panel in panels if any(panel[1] in frame.columns for frame in runs.values())]
     if not panels:
-        raise InputError(f"nothing to plot: none of {wanted} is in the run")
+        raise InputError(f"nothing to plot: none of {channels} is in the run")
     first = next(iter(runs.values()))
     ratings = first.attrs.get("ratings", {}) if ratings is None else ratings
     start = first[TIME].iloc[0]
@@ -189,7 +189,7 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
         axes.grid(True, which="minor", axis="x", color=FAINT, linewidth=0.3)
     near = ""
     for name, at in sorted(marks, key=lambda mark: mark[1]):
-        near = "" if near else "\n"  # neighbours at two heights
+        near = "" if near else "\n"  # adjacent labels alternate between two heights
         look = {"fontsize": 7.5, "color": INK, "ha": "center", "annotation_clip": False}
         note(rows[0], f"{name} {at:.3g} Hz{near}", (at, 1.0), (0, 3), **look)
     rows[-1].set_xscale("log")

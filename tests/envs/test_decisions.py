@@ -103,7 +103,7 @@ def test_the_estimated_wind_is_found_among_what_is_observed():
     assert wind_entry(settings, ActionMode.RESIDUAL, observed) == (1, 15.0, 0.0)
     assert wind_entry(DecisionSettings(), ActionMode.DIRECT, observed) is None
     assert wind_entry(DecisionSettings(washout=9.0), ActionMode.RESIDUAL, observed) is None
-    with pytest.raises(InputError, match="needs the channel 'estimated_wind' among the observed"):
+    with pytest.raises(InputError, match="needs the channel 'estimated_wind' in the observation"):
         wind_entry(settings, ActionMode.RESIDUAL, observed[:1])
     with pytest.raises(InputError, match="decisions.authority = .*needs the action mode 'residual'"):
         wind_entry(settings, ActionMode.SETPOINT, observed)

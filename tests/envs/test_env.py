@@ -376,7 +376,7 @@ def test_bad_settings_are_refused_with_the_key_and_what_is_allowed(settings, mes
         ({"weather_seed": -1}, "seed = -1"),
         ({"offsets": {"PtfmTVxi": 1.0}}, "unknown channel"),
         ({"offsets": {"PtfmSurge": float("nan")}}, "nan"),
-        ({"wind": 18.0, "offsets": {"PtfmPitch": 100.0}}, "must stay inside"),
+        ({"wind": 18.0, "offsets": {"PtfmPitch": 100.0}}, "must be inside"),
         ([], r"options = \[\]: must be a mapping"),
         (0, "options = 0: must be a mapping"),
     ],

@@ -150,7 +150,7 @@ def test_a_reward_may_take_the_info_alone():
 
 def test_reward_functions_that_cannot_be_used_are_refused():
     for function in (lambda: 1.0, lambda info, measurement, action: 1.0):
-        with pytest.raises(InputError, match=r"must take \(info\) or \(info, measurement\)"):
+        with pytest.raises(InputError, match=r"must accept \(info\) or \(info, measurement\)"):
             FowtEnv(**QUICK, reward=function)
     for value in (None, "much", float("nan"), [1.0, 2.0], 10**400, -(10**5000)):
         env = FowtEnv(**QUICK, reward=lambda info, measurement, value=value: value)
@@ -164,7 +164,7 @@ def test_costs_are_those_of_the_limits_passed():
     env.reset(seed=1)
     info = env.step(np.zeros(2, dtype=np.float32))[4]
     assert (info["cost"], info["cost_rotor_speed"], info["cost_platform_pitch"]) == (1.0, 1.0, 0.0)
-    cases = (({}, "give a limit"), ({"speed": 1.0}, "unknown limit"), ({"surge": -1.0}, "surge"))
+    cases = (({}, "needs a limit"), ({"speed": 1.0}, "unknown limit"), ({"surge": -1.0}, "surge"))
     for limits, message in cases:
         with pytest.raises(InputError, match=message):
             SafetyCosts(env, **limits)

@@ -1,6 +1,5 @@
 """Degraded sensors and a plant that controllers do not know: one reading for all, and nothing else."""
 
-
 import numpy as np
 import pytest
 from episodes import DEGRADED
@@ -216,7 +215,7 @@ def test_a_preview_baseline_is_given_the_wind_ahead_as_in_a_run():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (BY_NAME | {"observation": ("surge",)}, "'surge': the sensor chain 'standard' does not have it"),
+        (BY_NAME | {"observation": ("surge",)}, "'surge': is not measured by the sensor chain 'standard'"),
         ({"sensors": "standart"}, "unknown sensor chain"),
         ({"sensors": 0.02}, "must be a dict with noise and delay"),
         ({"sensors": {"nosie": 0.02}}, "Did you mean 'noise'"),
@@ -225,8 +224,8 @@ def test_a_preview_baseline_is_given_the_wind_ahead_as_in_a_run():
         ({"sensors": {"delay": 1.5}}, r"sensors.delay = 1.5"),
         ({"sensors": {"delay": True}}, r"sensors.delay = True"),
         ({"designed_on": {"platform": "oc3_hywind"}}, "'designed_on' of FowtEnv: is called nominal_plant"),
-        ({"nominal_plant": "oc3_hywind"}, "must be a dict with a platform"),
-        ({"nominal_plant": {"turbine": None}}, "must be a dict with a platform"),
+        ({"nominal_plant": "oc3_hywind"}, "must be a dict with platform"),
+        ({"nominal_plant": {"turbine": None}}, "must be a dict with platform"),
         ({"nominal_plant": {"platform": "oc3_hywind", "sea": 1}}, "unknown key of nominal_plant 'sea'"),
     ],
 )

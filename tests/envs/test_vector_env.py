@@ -146,9 +146,9 @@ def test_disabled_autoreset_leaves_the_resets_to_the_caller():
     ("settings", "message"),
     [
         ({"per_env": [{}]}, "must be a list of 2 dicts"),
-        ({"per_env": [{}, {"observation": ("surge",)}]}, "per_env\\[1\\]: its observation"),
+        ({"per_env": [{}, {"observation": ("surge",)}]}, "per_env\\[1\\]: the observation"),
         ({"per_env": [{}, {"action_mode": "residual"}]}, "per_env\\[1\\]: action_mode"),
-        ({"per_env": [{}, {"mooring": False}]}, "another compiled kind than the first, in mooring"),
+        ({"per_env": [{}, {"mooring": False}]}, "in the compiled types of mooring"),
         ({"autoreset_mode": "SameStap"}, "Did you mean 'SameStep'"),
         ({"threads": 0}, "threads = 0"),
         ({"num_envs": 0}, "num_envs = 0"),

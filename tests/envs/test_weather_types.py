@@ -79,7 +79,7 @@ REFUSED = [
     ({"sea": CROSSING}, "several headings cannot be summed fast"),
     ({"sea": {"kind": "regular", "H": 400.0, "T": 12.0}}, "water depth"),
     ({"wind": {"kind": "series", "time": [0.0, 60.0], "speed": [12.0, 12.0]}}, "ends at 60 s"),
-    ({"wind": 18.0, "offsets": {"PtfmPitch": 100.0}}, "must stay inside"),
+    ({"wind": 18.0, "offsets": {"PtfmPitch": 100.0}}, "must be inside"),
     ({"wind": NTM | {"speed": (13.0, 11.0)}}, "the low end must not exceed the high end"),
     ({"wind": NTM, "sea": JONSWAP | {"Hs": (2.0, -1.0)}}, "sea.Hs"),
     ({"offsets": {"PtfmPitch": (3.0, 2.0)}}, "offsets"),

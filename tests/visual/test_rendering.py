@@ -214,7 +214,7 @@ def test_a_missing_pygame_and_a_vector_environment_are_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(InputError, match=r"fowt-env\[render\]"):
         FowtEnv(render_mode="rgb_array", **QUICK)
-    with pytest.raises(InputError, match="vector environment has no pictures"):
+    with pytest.raises(InputError, match="vector environment cannot render"):
         FowtVectorEnv(2, render_mode="rgb_array", **QUICK)
 
 

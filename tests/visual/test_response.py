@@ -106,7 +106,7 @@ def test_every_plot_is_written_where_it_is_asked_for(tmp_path):
         (lambda: plot_raos(run().assign(**{"Wave1Elev_[m]": 0.0})), "no waves"),
         (lambda: plot_raos(run().drop(columns="Wave1Elev_[m]")), "no column 'Wave1Elev"),
         (lambda: plot_raos(run().drop(index=5)), "evenly"),
-        (lambda: plot_raos(run(), skip=2399.0), "rows are left"),
+        (lambda: plot_raos(run(), skip=2399.0), "rows remain"),
     ],
 )
 def test_what_cannot_be_plotted_is_named(call, message):

@@ -122,7 +122,7 @@ def test_spectra_mark_platform_pitch_wave_and_1p(tmp_path):
 
 
 def test_wrong_input_is_named_and_leaves_no_file(tmp_path):
-    with pytest.raises(InputError, match="unknown ending"):
+    with pytest.raises(InputError, match="unknown extension"):
         time_series.plot_run(run(), tmp_path / "run.docx")
     with pytest.raises(InputError, match="no runs"):
         time_series.plot_runs({})

@@ -107,5 +107,5 @@ def test_the_nonlinear_run_shows_the_damping_of_the_linear_platform_mode(above_r
 def test_a_loop_that_rests_on_its_limit_is_refused():
     scene = build_scene("oc3_hywind", wind=8.0, fidelity="reference")
     model = linearize(scene, trim(scene))
-    with pytest.raises(InputError, match="rests on a limit"):
+    with pytest.raises(InputError, match="is at a limit"):
         closed_loop_matrix(model, PISettings.published(scene.turbine))

@@ -86,8 +86,8 @@ def test_evaluate_scores_a_design_by_its_file_and_notices_its_edit(pi_file):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"version": 1}, "version = 1: this program reads 2"),
-        ({"format": "other"}, "no design of a controller"),
+        ({"version": 1}, "version = 1: must be 2"),
+        ({"format": "other"}, "is not a controller design"),
         ({"kind": "pid"}, "unknown kind 'pid'. Did you mean 'pi'"),
         ({"turbine": "iea15mw"}, "turbine = 'iea15mw': cannot control 'nrel5mw'"),
         ({"settings": GOOD | {"KP": "x"}}, "settings.KP = x: must be a finite number"),
@@ -112,7 +112,7 @@ def test_a_wrong_entry_is_named_with_file_key_and_value(pi_file, turbine, change
         (lambda s: s["models"][1].update(wind=15.0), "models[1].wind = 15: must be 1 m/s above"),
         (lambda s: s["models"][0]["A"].pop(), "models[0].A: must be 11 x 11 finite numbers"),
         (lambda s: s["models"][0].update(trim=None), "models[0].trim: must be 6 finite numbers"),
-        (lambda s: s.update(models=[]), "must list models of two winds or more"),
+        (lambda s: s.update(models=[]), "must list models of at least two winds"),
     ],
 )
 def test_a_wrong_entry_of_an_lqr_is_named(lqr_file, tmp_path, edit, message):
@@ -187,5 +187,5 @@ def test_bad_wishes_are_named(models, turbine):
         design_pi(models, turbine, 0.2, float("nan"))
     with pytest.raises(InputError, match="Did you mean 'published'"):
         design_pi(models, turbine, 0.2, 0.7, "publised")
-    with pytest.raises(InputError, match="winds: at least two"):
+    with pytest.raises(InputError, match="winds: must include at least two"):
         design_pi({11.0: models[11.0]}, turbine, 0.2, 0.7)

@@ -76,7 +76,7 @@ def test_trim_plots_the_schedule_and_plot_does_so_from_its_table(tmp_path):
         (("series", "run.txt"), "file 'run.txt': must end with .csv, .parquet or .outb"),
         (("series", "run.csv", "run.csv"), "each must be named once"),
         (("schedule", "run.csv"), "needs a column"),
-        (("series", "run.csv", "--out", "run.what"), "unknown ending"),
+        (("series", "run.csv", "--out", "run.what"), "unknown extension"),
         (("spectra", "run.csv", "--platform", "raft"), "raft"),
     ],
 )
