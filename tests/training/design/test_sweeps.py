@@ -108,7 +108,7 @@ def test_plots_show_every_mode_and_leave_out_a_pitch_that_rests(models):
 
 
 def test_a_sweep_refuses_scoring_seeds_and_unknown_settings():
-    with pytest.raises(InputError, match=r"seeds = \[1001, 7\]: tune on seeds of 1000"):
+    with pytest.raises(InputError, match=r"seeds = \[1001, 7\]: must be 1000 or more"):
         sweep([{}], "ntm_18", [1001, 7])
     with pytest.raises(InputError, match="Did you mean 'torque_rate'"):
         sweep([{"torque_rat": 1.0}], "ntm_18", [1001])
