@@ -1,7 +1,7 @@
 """Measures run time against error of the whole model for every cheaper choice of parts.
 
-Reference of a seed: the exact parts (BEM rotor, exact waves, Runge-Kutta 4) at the finest step; a run at twice
-the step shows convergence. Error of a variant: the largest rms difference of CHANNELS over the standard
+Reference of a seed: the exact parts (BEM rotor, exact waves, Runge-Kutta 4) at the finest step; runs at twice
+the step show convergence. Error of a variant: the largest rms difference of CHANNELS over the standard
 deviation of the reference, in the same wind and sea, controller at 10 Hz. Cost: the CPU time of simulate and
 of the compiled loop alone, as real-time factors.
 """

@@ -134,5 +134,5 @@ def test_the_table_of_zeros_is_that_of_the_models(models):
     assert table["zero_real_[rad/s]"][20.0] == 0.0 and np.isnan(table["zero_period_[s]"][20.0])
     # the published gains leave the platform damped (theory.md, section 4)
     assert (table["pi_pitch_damping_[-]"] > 0.0).all()
-    with pytest.raises(InputError, match="8: the blade pitch rests"):
+    with pytest.raises(InputError, match="8: the blade pitch is at its limit"):
         zeros_over(scene, (8.0,))
