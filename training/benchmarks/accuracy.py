@@ -1,7 +1,7 @@
-"""Run time against error of the whole model: what every cheaper choice costs, and what it saves.
+"""Measures run time against error of the whole model for every cheaper choice of parts.
 
-Reference of a seed: the exact parts (BEM rotor, exact waves, Runge-Kutta 4) at the finest step; half as fine
-a step shows that it has converged. Error of a variant: the worst rms difference of CHANNELS over the standard
+Reference of a seed: the exact parts (BEM rotor, exact waves, Runge-Kutta 4) at the finest step; runs at twice
+the step show convergence. Error of a variant: the largest rms difference of CHANNELS over the standard
 deviation of the reference, in the same wind and sea, controller at 10 Hz. Cost: the CPU time of simulate and
 of the compiled loop alone, as real-time factors.
 """
@@ -38,9 +38,9 @@ COLUMNS = (
     "seed", "variant", "axis", "integrator", "dt_s", "rotor", "wave_loads", "components", "seconds",
     "finest_s", "worst", "worst_of", *CHANNELS, "real_time_factor", "kernel_factor", "calibration_ms",
 )  # fmt: skip
-# OpenFAST on the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor
-# (CPU), largest |difference| in 40 s to its own reference: surge m, platform pitch deg, rotor speed rpm),
-# and the standard deviations of the same case over 500 s that turn them into fractions
+# OpenFAST with the rigid model, 18 m/s uniform turbulence, Hs 7.5 m: (step and strips, real-time factor
+# (CPU), largest |difference| in 40 s to this reference: surge m, platform pitch deg, rotor speed rpm),
+# and the standard deviations of the same case over 500 s for normalisation
 OPENFAST = (
     ("0.0125 s, 1 m: its reference", 1.9, (0.0, 0.0, 0.0)),
     ("0.0125 s, 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
@@ -53,31 +53,31 @@ OPENFAST_STD = (2.005, 1.308, 1.617)
 
 @dataclass(frozen=True)
 class Variant:
-    """One choice of parts and step, with the axis that it is a point of; the defaults are exact."""
+    """Defines a choice of parts and step, with its axis in the sweep; the defaults are exact."""
 
     axis: str
     integrator: str = "rk4"
     dt: float = 0.025
     rotor: str = "bem"
     wave_loads: str = "exact"
-    # further options of build_scene, as (name, value); "strongest": that many of the sea's components
+    # further options of build_scene, as (name, value); "strongest": number of strongest sea components kept
     options: tuple = ()
 
     @property
     def fidelity(self):
-        """Level that has these waves, for what a variant leaves open: the memory of a potential-flow body."""
+        """Return the fidelity with these waves; it sets the radiation memory of a potential-flow body."""
         return "reference" if self.wave_loads == "exact" else "standard"
 
     @property
     def name(self):
-        """Name in tables, which tells step and parts."""
+        """Return the variant's name in tables: step and parts."""
         parts = [f"{self.integrator} {self.dt:g} s", self.rotor, f"{self.wave_loads} waves"]
         for name, value in self.options:
             parts.append(f"{value:g} {UNITS[name]}" if name in UNITS else f"{name} by {value}")
         return ", ".join(parts)
 
     def scene(self, platform, wind, sea, seed, duration):
-        """Return the scene of the variant in a wind and a sea."""
+        """Return the scene of the variant for a wind and a sea state."""
         options = dict(self.options)
         strongest = options.pop("strongest", None)
 
@@ -93,37 +93,37 @@ class Variant:
 REFERENCE = "reference"  # axis of the runs at twice the finest step
 LARGER_STEPS = {"rk4": 0.1}  # s, largest of the sweep where it is not the default step
 TABLED = (("mooring", "table"),)
-BENDING = (("tower", "modes"),)  # another plant, with a reference of its own
+BENDING = (("tower", "modes"),)  # another plant, with a separate reference
 
 
 def step_sizes(integrator):
-    """Return three steps of an integrator, s, each twice the one before."""
+    """Return three time steps of an integrator, s, each twice the previous one."""
     largest = LARGER_STEPS.get(integrator, INTEGRATORS[integrator].dt)
     return (0.25 * largest, 0.5 * largest, largest)
 
 
 def variants():
-    """Return every variant of the sweep: one part changed at a time, then all together, cheapest parts last.
+    """Return all variants of the sweep: one part changed at a time, then all together, cheapest parts last.
 
     ab4 evaluates the loads once per step, so that its rows with the BEM rotor show the BEM solved once per
     step against at every stage (rk4 of the same step).
     """
     axes = {1: "BEM once per step"}
-    found = [
+    sweep = [
         Variant(axes.get(kind.evaluations, "integrator and step"), name, dt)
         for name, kind in INTEGRATORS.items() for dt in step_sizes(name)
     ]  # fmt: skip
-    found += [Variant("rotor", rotor=rotor) for rotor in ("lookup", "table")]
-    found += [Variant("waves", wave_loads="fast"), Variant("mooring", options=TABLED)]
+    sweep += [Variant("rotor", rotor=rotor) for rotor in ("lookup", "table")]
+    sweep += [Variant("waves", wave_loads="fast"), Variant("mooring", options=TABLED)]
     for axis, option, waves, values in (
         ("wave components", "strongest", "fast", (200, 100, 50)),
         ("stations per blade", "blade_stations", "exact", (13, 9, 6)),
         ("strips", "strip_length", "exact", (1.5, 6.0, 12.0)),
     ):
-        found += [Variant(axis, wave_loads=waves, options=((option, value),)) for value in values]
+        sweep += [Variant(axis, wave_loads=waves, options=((option, value),)) for value in values]
     for n in (1, 2, 3, 4):
-        found.append(Variant("rotor loads per step", "ab4", 0.1, "lookup", "fast", (("rotor_samples", n),)))
-    return found + [
+        sweep.append(Variant("rotor loads per step", "ab4", 0.1, "lookup", "fast", (("rotor_samples", n),)))
+    return sweep + [
         Variant("all together", name, dt, rotor, "fast", options)
         for rotor, options in (("lookup", ()), ("table", TABLED))
         for name in INTEGRATORS
@@ -132,7 +132,7 @@ def variants():
 
 
 def variants_apart():
-    """Return variants outside the sweep: levels at several steps, parts of one, and a tower that bends."""
+    """Return variants outside the sweep: levels at several steps, parts of one level, a flexible tower."""
     axis, alone, bending = "steps of the levels", "parts of standard alone", "bending tower"
     steps, multistep = (0.0125, 0.025, 0.05, 0.1), (0.025, 0.05, 0.1)
     return [
@@ -147,7 +147,7 @@ def variants_apart():
     ]
 
 
-# which variants are the levels of build_scene
+# variants that are fidelity levels of build_scene
 LEVELS = {
     "ab4 0.1 s, lookup, fast waves": "standard",
     "ab4 0.1 s, table, fast waves, mooring by table": "fast",
@@ -156,10 +156,10 @@ LEVELS = {
 
 
 def select(names):
-    """Return the variants of the axes named. Raises: InputError for an unknown axis.
+    """Return the variants of the named axes. Raises: InputError for an unknown axis.
 
-    "levels" selects the variants that are levels of build_scene; those of variants_apart are in no sweep of
-    all; "reference" adds none to those of every study.
+    "levels" selects the variants that are levels of build_scene; those of variants_apart must be named;
+    "reference" adds no variant: the reference is in every study.
     """
     sweep, apart = variants(), variants_apart()
     known = [REFERENCE, "levels", *dict.fromkeys(v.axis for v in (*sweep, *apart))]
@@ -171,7 +171,7 @@ def select(names):
 
 
 def _thinned(waves, count):
-    """Return the sea (dict) of the strongest components of Waves, phases kept."""
+    """Return the sea (dict) of the strongest components of Waves, with their phases."""
     kept = np.sort(np.argsort(waves.amplitude)[-count:])
     heading = np.degrees(np.arctan2(waves.sin_heading, waves.cos_heading))
     return {
@@ -184,17 +184,17 @@ def accuracy(
     seeds=(1, 2, 3), duration=600.0, finest=0.00625, chosen=None, out=None, wind=None, sea=None, repeats=5,
     progress=silent, platform=PLATFORM,
 ):  # fmt: skip
-    """Return a DataFrame with a row per seed and variant, beginning with the reference at twice its step.
+    """Return a DataFrame of errors and speeds per seed and variant, first the reference at twice its step.
 
-    finest: step of the reference, s; repeats: of the timing of runs shorter than TIMED, the median counts;
-    chosen: variants (default: variants()), () leaves the reference at twice its step; out: CSV that grows by
-    a row as each run ends, a CSV for each platform, rows already there are kept and not run again;
+    finest: step of the reference, s; repeats: timings of runs shorter than TIMED (median);
+    chosen: variants (default: variants()), (): only the reference at twice its step; out: CSV per platform,
+    appended by a row after each run; existing rows are kept and not run again;
     progress: called with (text, done, total).
     """
     wind, sea = wind or TURBULENCE, SEA if sea is None else sea
     plan = [Variant(REFERENCE, dt=2.0 * finest), *(variants() if chosen is None else chosen)]
     if not is_field(wind):
-        plan = [v for v in plan if ("rotor_samples", 1) not in v.options]  # what it is anyway
+        plan = [v for v in plan if ("rotor_samples", 1) not in v.options]  # the default
     rows = _finished(out)
     known = {(row["seed"], row["axis"], row["variant"], row["seconds"], row["finest_s"]) for row in rows}
     total, done = len(seeds) * len(plan), 0
@@ -223,7 +223,7 @@ def accuracy(
 
 
 def _row(variant, scene, run, duration, reference, repeats):
-    """Return the errors and speeds (dict) of a variant: the CPU time is a median of those in TIMED s."""
+    """Return the errors and speeds (dict) of a variant, with the median CPU time of the runs in TIMED s."""
     simulate(scene, "pi", duration=1.0, dt=variant.dt)  # compiles
     times = []
     while len(times) < repeats and sum(times) < TIMED:
@@ -245,7 +245,7 @@ def _row(variant, scene, run, duration, reference, repeats):
 
 
 def _finished(out):
-    """Return the rows (list of dict) of an earlier, perhaps interrupted study."""
+    """Return the rows (list of dict) of an earlier, possibly interrupted study."""
     if out is None:
         return []
     out = Path(out)
@@ -255,19 +255,19 @@ def _finished(out):
         return []
     table = pd.read_csv(out, comment="#")
     if tuple(table.columns) != COLUMNS:
-        raise InputError(f"accuracy table {str(out)!r}: holds other columns; move it away")
+        raise InputError(f"accuracy table {str(out)!r}: has other columns; move the file away")
     return table.to_dict("records")
 
 
 def read_accuracy(path):
-    """Return a CSV of accuracy() as a DataFrame. Raises: InputError for none, and for another file."""
+    """Return a CSV of accuracy() as a DataFrame. Raises: InputError for a missing or another file."""
     if not Path(path).is_file():
         raise InputError(f"accuracy table {str(path)!r} does not exist")
     return pd.DataFrame(_finished(path), columns=COLUMNS)
 
 
 def _append(out, row):
-    """Add a row to the CSV, which begins with where it was made."""
+    """Append a row to the CSV, after a header with machine and versions in a new file."""
     if out is None:
         return
     out = Path(out)
@@ -280,7 +280,7 @@ def _append(out, row):
 
 
 def accuracy_summary(table):
-    """Return a DataFrame by variant: means of error and real-time factor over seeds; whether on the front."""
+    """Return a DataFrame per variant: mean error and real-time factor over seeds; whether on the front."""
     if table.empty:
         raise InputError("nothing to summarise: the table has no rows")
     groups = table.groupby(["variant", "axis"], sort=False)
@@ -291,7 +291,7 @@ def accuracy_summary(table):
 
 
 def pareto(error, speed):
-    """Return (n,) bool: no other point is as fast and more accurate, or as accurate and faster. NaN: no."""
+    """Return whether each of n points is Pareto-optimal in error and speed, (n,) bool; NaN: False."""
     error, speed = np.asarray(error, dtype=float), np.asarray(speed, dtype=float)
     front = np.isfinite(error) & np.isfinite(speed)
     for i in np.flatnonzero(front):
@@ -301,9 +301,9 @@ def pareto(error, speed):
 
 
 def plot_accuracy(table, path=None, openfast=True, beside=None):
-    """Return a Figure of error over real-time factor, logarithmic, with Pareto front and OpenFAST's points.
+    """Return a Figure of error over real-time factor, logarithmic, with Pareto front and OpenFAST points.
 
-    openfast: whether those, which are of OC3-Hywind, are drawn; beside: (name, table) of another platform.
+    openfast: whether OpenFAST points (OC3-Hywind) are drawn; beside: (name, table) of another platform.
     """
     points = accuracy_summary(table)
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
@@ -328,7 +328,7 @@ def plot_accuracy(table, path=None, openfast=True, beside=None):
         other = other[other["variant"].isin(set(points["variant"])) & other["axis"].isin(set(points["axis"]))]
         label = f"{name}, the same variants"
         axes.plot(other["real_time_factor"], other["worst"], "s", color=INK, label=label, **hollow)
-    names = []  # numbers at the points of the front, those of levels with their names; all names beside it
+    names = []  # points of the front are numbered, levels also named; all names are listed next to the plot
     for number, row in enumerate(front.to_dict("records"), 1):
         level = LEVELS.get(row["variant"])
         names.append(f"{number}  " + row["variant"].replace(", mooring", ",\n    mooring"))
@@ -344,16 +344,16 @@ def plot_accuracy(table, path=None, openfast=True, beside=None):
 
 
 def _draw_openfast(axes, style):
-    """Draw OpenFAST's points; its reference, whose difference is zero, on the lower edge."""
+    """Draw the OpenFAST points; the OpenFAST reference, with zero difference, is on the lower edge."""
     label = "OpenFAST, step and strips\n(largest difference in 40 s of\nsurge, pitch, rotor speed over std)"
     note, edge = {"fontsize": 6, "color": INK, "textcoords": "offset points"}, axes.get_xaxis_transform()
     for name, factor, largest in OPENFAST:
-        # over the standard deviations: upper bounds of the rms measure used here, over fewer quantities
+        # normalised maxima: upper bounds of the rms measure used here, over fewer quantities
         error = max(d / s for d, s in zip(largest, OPENFAST_STD, strict=True))
         if error > 0.0:
             axes.plot([factor], [error], marker="^", label=label, **style)
             axes.annotate(name, (factor, error), xytext=(6, -2), **note)
-            label = None  # once
+            label = None  # label only the first point
         else:
             axes.plot([factor], [0.015], marker="v", transform=edge, clip_on=False, **style)
             axes.annotate(name, (factor, 0.015), xycoords=edge, xytext=(-5, 8), **note)

@@ -1,6 +1,6 @@
-"""How long a session's scenes take to compile: six kinds one after the other, with an empty cache of kernels.
+"""Measures the compile time of a session: six kinds of scene in sequence, with an empty kernel cache.
 
-The session uses public names alone, so that `python compile_time.py` times another version of this project.
+The session uses only public names, so that `python compile_time.py` can time other versions of this project.
 """
 
 import os
@@ -54,10 +54,10 @@ NAMES = (
 
 
 def session(code=SESSION, folder=None, progress=None):
-    """Return a DataFrame (scene, seconds, processor_seconds) of what code reports in a new process.
+    """Return a DataFrame (scene, seconds, processor_seconds) reported by code run in a new process.
 
-    folder: cache of kernels; None: an empty one. progress: called with (text, done, total).
-    Raises: InputError with what a failed process printed.
+    folder: kernel cache; None: an empty cache. progress: called with (text, done, total).
+    Raises: InputError with the output of the process if it fails.
     """
     if folder is None:
         with tempfile.TemporaryDirectory() as empty:

@@ -1,4 +1,4 @@
-"""Speed of the environments: single, native batch, and Gymnasium's batches of single ones, in one run."""
+"""Measures the speed of environments: single, native batch, and Gymnasium batches, in one run."""
 
 import time
 from collections import Counter
@@ -17,12 +17,12 @@ from fowt_env.training.benchmarks.speed import header, multiply_adds
 
 SIZES = (1, 16, 256, 4096)
 THREADS = (1, 2)
-HOLD = np.zeros(2)  # residual mode: the baseline alone, so that no episode fails
+HOLD = np.zeros(2)  # residual mode: baseline alone, so that no episode fails
 ROUND = 1e-3  # s
 
 
 def timed(action, seconds):
-    """Return the time of a call (s), fastest of short rounds, which fall between turns of others."""
+    """Return the time of a call, s: the minimum over rounds too short for most interruptions."""
     action()
     begin = time.perf_counter()
     action()
@@ -39,13 +39,13 @@ def timed(action, seconds):
 
 @parallel_entry
 def multiply_adds_side_by_side(parts, n, results):
-    """Fill results (parts,), each with the calibration of n multiply-adds, on as many threads as allowed."""
+    """Fill results (parts,) with calibrations of n multiply-adds each, on all allowed threads."""
     for part in numba.prange(parts):
         results[part] = multiply_adds(n, 0.999, 0.1)
 
 
 def ceiling(threads, seconds):
-    """Return the work of so many threads over that of one in the same time, where nothing is shared."""
+    """Return the ideal speed-up of a number of threads over one thread, measured without shared data."""
     results, times = np.zeros(threads), []
     for number in (1, threads):
         with thread_limit(number):
@@ -63,17 +63,17 @@ def arrays_of(part):
 
 
 def own_bytes(envs):
-    """Return the mean size, bytes, of the arrays that each environment shares with no other."""
-    held = [{id(a): a.nbytes for a in (*arrays_of(env._config), *arrays_of(env._episode))} for env in envs]
-    holders = Counter(key for own in held for key in own)
-    return sum(n for own in held for key, n in own.items() if holders[key] == 1) / len(envs)
+    """Return the mean size of the arrays that an environment does not share with others, bytes."""
+    arrays = [{id(a): a.nbytes for a in (*arrays_of(env._config), *arrays_of(env._episode))} for env in envs]
+    holders = Counter(key for of_env in arrays for key in of_env)
+    return sum(n for of_env in arrays for key, n in of_env.items() if holders[key] == 1) / len(envs)
 
 
 def single_costs(env, seconds):
     """Return {step_us, physics_us, overhead_us, get_state_us, set_state_us, reset_ms} of one environment.
 
     physics: the compiled call for a batch of 16, over 16; overhead: the rest of a step; resets draw new
-    weather and offsets, with all trims known.
+    weather and offsets, with all trims cached.
     """
     few = 16
     batch = FowtVectorEnv(few, threads=1, **env)
@@ -88,13 +88,13 @@ def single_costs(env, seconds):
     state = single.get_state()
     get, put = timed(single.get_state, seconds), timed(lambda: single.set_state(state), seconds)
 
-    def replay():  # from the same state each time: the episode never ends
+    def replay():  # always from the same state: the episode never ends
         single.set_state(state)
         for _ in range(100):
             single.step(HOLD)
 
     step = timed(replay, seconds) / 100
-    for seed in range(60):  # the trims of the winds that are drawn, once per process
+    for seed in range(60):  # compute the trims of the drawn winds, once per process
         single.reset(seed=seed)
     seeds = cycle(range(60))
     reset = timed(lambda: single.reset(seed=next(seeds)), seconds)
@@ -105,7 +105,7 @@ def single_costs(env, seconds):
 
 
 def row_of(kind, n, threads, per_step, memory=np.nan, reset=np.nan, one=np.nan, most=np.nan):
-    """Return one row from the time of a step of all n environments (s); one: on one thread, most: ceiling."""
+    """Return a row from the time of a step of all n environments, s; one: on one thread, most: ceiling."""
     return {
         "kind": kind, "envs": n, "threads": threads, "env_steps_per_s": n / per_step,
         "us_per_env_step": per_step / n * 1e6, "times_one_thread": one / per_step, "ceiling": most,
@@ -114,7 +114,7 @@ def row_of(kind, n, threads, per_step, memory=np.nan, reset=np.nan, one=np.nan, 
 
 
 def native_rows(settings, sizes, threads, seconds):
-    """Return rows of FowtVectorEnv, each size on each number of threads."""
+    """Return rows of FowtVectorEnv for each size and number of threads."""
     rows = []
     for n in sizes:
         batch = FowtVectorEnv(n, threads=1, **settings)
@@ -133,10 +133,10 @@ def native_rows(settings, sizes, threads, seconds):
 
 
 def gymnasium_rows(settings, n, seconds):
-    """Return rows of Gymnasium's vector environments of n single ones."""
+    """Return rows of Gymnasium's vector environments of n single environments."""
     model, rows = FowtEnv(**settings), []
     model.reset(seed=0)
-    model.step(HOLD)  # compiled before processes fork
+    model.step(HOLD)  # compile before processes fork
     for kind, threads in ((AsyncVectorEnv, "processes"), (SyncVectorEnv, 1)):
         envs = kind([model.twin] * n)
         envs.reset(seed=0)
@@ -149,13 +149,13 @@ def gymnasium_rows(settings, n, seconds):
 def benchmark_envs(
     fidelity="standard", sizes=SIZES, threads=THREADS, seconds=1.0, gymnasium_envs=16, **settings
 ):
-    """Return (table, single): a pandas table of env steps per second, and the costs of a single environment.
+    """Return (table, single): DataFrame of env steps per second, and costs of a single environment.
 
     An env step is one control period (0.1 s) of the task above_rated in residual mode without residual.
-    seconds: per measurement. The first reset of a size includes trims that are not known yet.
+    seconds: per measurement. The first reset of a size includes trims that are not cached yet.
     """
     settings = {"fidelity": fidelity, "action_mode": "residual"} | settings
-    rows = gymnasium_rows(settings, gymnasium_envs, seconds)  # first: they fork, before threads are started
+    rows = gymnasium_rows(settings, gymnasium_envs, seconds)  # first: fork before threads are started
     single = single_costs(settings, seconds)
     rows = [row_of("FowtEnv", 1, 1, single["step_us"] * 1e-6, reset=single["reset_ms"] * 1e-3), *rows]
     rows += native_rows(settings, sizes, threads, seconds)

@@ -1,4 +1,4 @@
-"""Cost of an evaluation: processor time of a ten-minute case, stage by stage, and of handing it to Ray."""
+"""Measures the cost of an evaluation: processor time of a ten-minute case per stage, and of a Ray task."""
 
 import tempfile
 import time
@@ -17,9 +17,9 @@ STAGES = ("whole run", "without its file", "reading its row")
 
 
 def evaluation_cost(count=21, suite="above_rated", controller="pi"):
-    """Return a DataFrame (stage, ms per run, core seconds per 1,000 runs, MB per run) of one process.
+    """Return a DataFrame of the stages in one process: ms per run, core seconds per 1,000 runs, MB per run.
 
-    count: runs that are timed, after one per case that compiles. Raises: InputError for count < 1.
+    count: timed runs, after one run per case for compilation. Raises: InputError for count < 1.
     """
     check_whole_number("count", count, 1)
     chosen = read_suite(suite)
@@ -57,7 +57,7 @@ def ray_cost(count=200, controller="pi", suite="above_rated"):
         times = [time.perf_counter()]
         for _ in outcomes(bytes, [size] * count, jobs=1, engine="ray"):
             times.append(time.perf_counter())
-        # the first results wait for the cluster to start
+        # the first results include the start of the cluster
         settled = times[len(times) // 4 :]
         rows.append({"what": what, "ms per task": 1e3 * (settled[-1] - settled[0]) / (len(settled) - 1)})
     return pd.DataFrame(rows)

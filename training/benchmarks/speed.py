@@ -1,7 +1,7 @@
-"""How fast a scene of each kind is stepped: end to end, by the kernel alone, and load by load.
+"""Measures the speed of each kind of scene: end to end, kernel alone, and per load.
 
-Times are CPU times of one thread, medians of several repeats, beside that of a fixed calibration kernel
-measured in the same minute: figures of two machines compare through it.
+Times are CPU times of one thread, medians of several repeats, reported with the time of a fixed calibration
+kernel measured in the same minute to compare machines.
 """
 
 import os
@@ -63,7 +63,7 @@ LOADS = (
 
 @dataclass(frozen=True)
 class TimedScene:
-    """A kind of scene: arguments of build_scene, and what is fixed."""
+    """Defines a kind of scene: arguments of build_scene and fixed bodies."""
 
     wind: object = field(default_factory=lambda: TURBULENCE)
     sea: object = field(default_factory=lambda: SEA)
@@ -71,14 +71,14 @@ class TimedScene:
     options: dict = field(default_factory=dict)
     platform_fixed: bool = False
     parked: bool = False  # rotor at rest, blades feathered
-    absent: str = ""  # what this kind leaves out of the compiled code
+    absent: str = ""  # parts that are absent from the compiled code
 
     @property
     def controlled(self):
         return self.wind is not None and not self.parked
 
     def scene(self, platform=PLATFORM):
-        """Return the scene of this kind, with its platform fixed where the kind says so."""
+        """Return the scene of this kind, with the platform fixed if platform_fixed."""
         wind = self.wind(platform) if callable(self.wind) else self.wind
         options = {"fidelity": self.fidelity, "seed": 1, "duration": 700.0} | self.options
         scene = build_scene(platform, wind=wind, sea=self.sea, **options)
@@ -86,7 +86,7 @@ class TimedScene:
 
 
 def _box(platform):
-    """Return the wind of a box that the rotor fits into: OC3's stored one, else a sum of plane waves."""
+    """Return the wind of a box larger than the rotor: OC3's stored box, else a sum of plane waves."""
     if platform == PLATFORM:
         from fowt_env.training.validation.openfast_cases import box_wind
 
@@ -95,7 +95,7 @@ def _box(platform):
 
 
 def made_box(rotor, speed=18.0, seconds=620.0, dt=0.25, cell=8.0, waves=24, seed=1):
-    """Return a box of wind for a Rotor, for timing alone: a sum of plane waves carried by the wind."""
+    """Return a wind box for a Rotor, for timing only: a sum of plane waves convected by the wind."""
     draw, reach = np.random.default_rng(seed), 1.15 * rotor.tip_radius
     y = np.arange(-reach, reach + cell, cell)
     z = np.arange(5.0, rotor.hub_height + reach + cell, cell)
@@ -142,7 +142,7 @@ TIMED_SCENES = {
 
 @kernel
 def multiply_adds(n, a, b):
-    """Return n dependent multiply-adds: the calibration of a machine's clock."""
+    """Return the result of n dependent multiply-adds, the calibration of a machine."""
     x = 1.0
     for _ in range(n):
         x = x * a + b
@@ -156,7 +156,7 @@ def calibration(repeats=3):
 
 
 def median_time(call, repeats=REPEATS):
-    """Return the median CPU time of this thread in a call, s; the first call is not counted."""
+    """Return the median CPU time of this thread in a call, s, without the first call."""
     call()
     times = []
     for _ in range(repeats):
@@ -167,7 +167,7 @@ def median_time(call, repeats=REPEATS):
 
 
 def paired_times(calls, rounds):
-    """Return CPU times (rounds, n) of this process, s, of n calls that alternate; a first round compiles."""
+    """Return CPU times (rounds, n) of this process, s, of n alternating calls, after a first round."""
     times = np.empty((rounds + 1, len(calls)))
     for i in range(rounds + 1):
         for j, call in enumerate(calls):
@@ -179,11 +179,11 @@ def paired_times(calls, rounds):
 
 @entry
 def _repeat(handle, part, x, u, dx, m, row, n, dt):
-    """Call one of LOADS n times at changing times and places; return a sum, so that no call is left out."""
+    """Call one of LOADS n times at changing times and positions; return a sum of the results."""
     model, data, total = model_of(handle), data_of(handle), 0.0
     for i in range(n):
         t = i * dt
-        x[State.SURGE] += 1e-7  # nothing is the same as before: no call can be left out
+        x[State.SURGE] += 1e-7  # inputs change: no call can be optimised out
         if part == 7:
             respond(x, u, model, data, dx)
             total += dx[State.VX]
@@ -210,7 +210,7 @@ def _repeat(handle, part, x, u, dx, m, row, n, dt):
 
 @kernel
 def _of_wind(part, t, pose, x, aero, pitches, data, dx):
-    """Return a component of one of the loads of the wind, if part is one."""
+    """Return a component of an aerodynamic load, if part is one."""
     if aero is None:
         return 0.0
     now = wind_now(t, aero.wind) if part == 1 else wind_now(0.0, aero.wind)
@@ -224,7 +224,7 @@ def _of_wind(part, t, pose, x, aero, pitches, data, dx):
 
 @kernel
 def _of_water(part, t, pose, hydro, data):
-    """Return a component of one of the loads of the water, if part is one."""
+    """Return a component of a hydrodynamic load, if part is one."""
     if hydro is None:
         return 0.0
     if part == 4:
@@ -235,7 +235,7 @@ def _of_water(part, t, pose, hydro, data):
 
 
 def load_times(scene, x, u, calls=CHUNK, repeats=REPEATS):
-    """Return {load: microseconds of one call} near a state, without those of the loop and the pose."""
+    """Return {load: microseconds of one call} near a state, without the time of loop and pose."""
     scene = scene.with_step(0.1)
     handle, dx, m = scene.handle(), np.zeros_like(x), np.zeros(scene.n_measurements)
     row = np.zeros(len(scene.channels))
@@ -265,7 +265,7 @@ def loop_time(scene, controlled, x, u, dt, seconds, repeats=REPEATS):
     scene = scene.with_step(dt)
     controller = make("pi", scene.turbine, 0.1) if controlled else HeldCommand()
     handle, last = scene.handle(), round(seconds / dt)
-    rows = np.zeros((2, len(scene.channels)))  # of the first and the last instant
+    rows = np.zeros((2, len(scene.channels)))  # first and last instant
     schedule = Schedule(float(dt), round(0.1 / dt), last + 1, last)
     interface = build_interface(scene, controller, build_guard(), None, EXACT, 0.1, round(10.0 * seconds))
     link = interface_data(interface, len(x), len(u), scene.n_measurements)
@@ -286,41 +286,41 @@ def loop_time(scene, controlled, x, u, dt, seconds, repeats=REPEATS):
 def measure_kind(name, seconds, repeats, calls, platform):
     """Return the row (dict) of a kind of scene: times per step, real-time factors, microseconds per load."""
     kind = TIMED_SCENES[name]
-    held = scene = kind.scene(platform)
-    if hasattr(scene.wind, "usable"):  # a handle of wind has an end
+    timed = scene = kind.scene(platform)
+    if hasattr(scene.wind, "usable"):  # a wind box has a limited duration
         seconds = min(seconds, 10.0 * int(scene.wind.usable // 10.0))
-    # without lines no floating steady state withstands the wind
+    # without mooring lines there is no floating steady state in wind
     begin, dt = "zero" if kind.options.get("mooring", True) is False else "trim", scene.dt
     x, u = initial_state(scene, begin)
     if kind.parked:
         x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
         x[State.BLADE_PITCH] = u[Command.BLADE_PITCH] = scene.turbine.pitch_drive.maximum
     if not kind.controlled:
-        held = scene.with_model({"rigid_body.rotor_fixed": True})
+        timed = scene.with_model({"rigid_body.rotor_fixed": True})
     waves = None if scene.model.hydro is None else scene.model.hydro.waves
     row = {
         "kind": name, "integrator": scene.options["integrator"], "dt_s": dt,
         "wave_components": 0 if waves is None else waves.omega.shape[0], "absent": kind.absent,
-        "calibration_ms": calibration(), "step_us": step_time(held, x, u, dt, calls, repeats),
+        "calibration_ms": calibration(), "step_us": step_time(timed, x, u, dt, calls, repeats),
     }  # fmt: skip
     row["step_x"] = 1e6 * dt / row["step_us"]
-    row["loop_x"] = seconds / loop_time(held, kind.controlled, x, u, dt, seconds, repeats)
+    row["loop_x"] = seconds / loop_time(timed, kind.controlled, x, u, dt, seconds, repeats)
     row["simulate_x"] = float("nan")
-    if not kind.parked:  # simulate starts from the running rotor
+    if not kind.parked:  # simulate starts with the rotor turning
         law = "pi" if kind.controlled else None
         run = partial(simulate, scene, law, duration=seconds, initial=begin)
         row["simulate_x"] = seconds / median_time(run, repeats)
-    return row | {f"{load} (us)": value for load, value in load_times(held, x, u, calls, repeats).items()}
+    return row | {f"{load} (us)": value for load, value in load_times(timed, x, u, calls, repeats).items()}
 
 
 def silent(text, done, total):
-    """Report no progress."""
+    """Ignore progress reports."""
 
 
 def speed(kinds=None, seconds=600.0, repeats=REPEATS, calls=CHUNK, progress=silent, platform=PLATFORM):
-    """Return a DataFrame with a row per kind of scene (all by default) of a platform.
+    """Return a DataFrame of speeds with a row per kind of scene (all by default) of a platform.
 
-    seconds: simulated by the closed loop and by simulate; progress: called with (text, done, total).
+    seconds: duration of the closed loop and of simulate; progress: called with (text, done, total).
     Raises: InputError for an unknown kind.
     """
     names, rows = list(kinds or TIMED_SCENES), []
@@ -343,7 +343,7 @@ report("scene and run")
 
 
 def start_times(fidelity="standard"):
-    """Return {what: seconds}: a first run, its cache of kernels empty, and a later one, in new processes."""
+    """Return {name: seconds} of a first run with empty kernel cache and of a later run, in new processes."""
     times = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in ("first", "later"):
@@ -355,7 +355,7 @@ def start_times(fidelity="standard"):
 
 
 def header():
-    """Return lines (list of str) on machine, versions, commit and date of a measurement."""
+    """Return lines (list of str) with machine, versions, commit and date of a measurement."""
     root, cpus = Path(fowt_env.__file__).resolve().parents[1], Path("/proc/cpuinfo")
 
     def git(*words):
@@ -379,7 +379,7 @@ def header():
 
 
 def write_csv(table, path, remarks=()):
-    """Write a table with the header and remarks as comment lines before it; return the path."""
+    """Write a table after header and remarks as comment lines; return the path."""
     path = Path(path)
     with replacing(path) as temporary, Path(temporary).open("w", encoding="utf-8", newline="") as file:
         for line in (*header(), *remarks):

@@ -1,4 +1,4 @@
-"""Speed of PPO on the native vector environment and others: time fractions of physics, torch and Python."""
+"""Measures the speed of PPO on vector environments: time fractions of physics, torch and Python."""
 
 import time
 
@@ -14,7 +14,7 @@ EPISODE = 600.0  # s
 
 
 def watch(spent, owner, name, label):
-    """Replace owner.name by itself, its seconds added to spent[label] less those of watched calls in it."""
+    """Wrap owner.name to add its time, s, to spent[label], without that of nested wrapped calls."""
     call = getattr(owner, name)
 
     def timed(*args, **kwargs):
@@ -28,7 +28,7 @@ def watch(spent, owner, name, label):
 
 
 def nothing_env(env):
-    """Return a VecEnv of env's spaces that costs nothing: it returns the same numbers, and PPO remains."""
+    """Return a VecEnv with env's spaces that returns constant arrays at no cost, to time PPO alone."""
     from stable_baselines3.common.vec_env import VecEnvWrapper
 
     rng = np.random.default_rng(0)
@@ -50,7 +50,7 @@ def nothing_env(env):
 
 
 def sync_env(n, settings):
-    """Return a FowtSB3VecEnv whose batch is Gymnasium's SyncVectorEnv of n single environments."""
+    """Return a FowtSB3VecEnv on Gymnasium's SyncVectorEnv of n single environments."""
     from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     class SyncSB3VecEnv(FowtSB3VecEnv):
@@ -64,7 +64,7 @@ def sync_env(n, settings):
 
 
 def subject(kind, n, settings, decisions):
-    """Return (VecEnv, control periods per step, its FowtVectorEnv or None) of a named kind."""
+    """Return (VecEnv, control periods per step, FowtVectorEnv inside or None) of a named kind."""
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
     from fowt_env.training.rl.decision_env import DecisionVecEnv
@@ -73,7 +73,7 @@ def subject(kind, n, settings, decisions):
     if kind == "SubprocVecEnv":
         first = FowtEnv(**settings)
         first.reset(seed=0)
-        first.step(np.zeros(2))  # compiled before processes start
+        first.step(np.zeros(2))  # compile before processes start
         return SubprocVecEnv([first.twin] * n, start_method="fork"), 1, None
     if kind == "SyncVectorEnv":
         return sync_env(n, settings), 1, None
@@ -90,13 +90,13 @@ VECTOR_ENVS = (
 
 
 def measured(kind, n, steps, settings, decisions, algorithm):
-    """Return a row of the table: PPO on one kind of vector environment."""
+    """Return the row of the table for PPO on one kind of vector environment."""
     from stable_baselines3 import PPO
 
     env, hold, native = subject(kind, n, settings, decisions)
     model = PPO("MlpPolicy", env, seed=0, device="cpu", **algorithm)
     rollout = algorithm["n_steps"] * n
-    model.learn(rollout)  # compiled, allocated
+    model.learn(rollout)  # compile and allocate
     spent, rounds = {}, max(1, round(steps / rollout))
     if native is not None:
         watch(spent, native, "_act", "physics")
@@ -116,11 +116,11 @@ def measured(kind, n, steps, settings, decisions, algorithm):
 
 
 def benchmark_training(n=64, steps=50_000, kinds=VECTOR_ENVS, progress=None):
-    """Return a DataFrame with a row per kind of vector environment, PPO as shipped on one torch thread.
+    """Return a DataFrame of PPO speeds per kind of vector environment, shipped settings, one torch thread.
 
-    An env step is one control period of the task above_rated in residual mode, a step what PPO learns from:
-    the same, or a decision. physics: the compiled call; torch: PPO's update and its forward pass during the
-    rollout; Python: the rest. The slow kinds do a tenth of the steps.
+    An env step is one control period of the task above_rated in residual mode; a step is a transition seen by
+    PPO: a control period or a decision. physics: the compiled call; torch: PPO's update and forward passes of
+    the rollout; Python: the rest. The slow kinds run a tenth of the steps.
     """
     import torch
 

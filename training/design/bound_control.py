@@ -1,15 +1,15 @@
-"""The best linear control of a bound_plant.BoundPlant for what it knows: gains, deviations, Pareto fronts.
+"""Computes the optimal linear control of a BoundPlant for given information: gains, deviations, fronts.
 
-Controls are the rates of torque and pitch command. With a quadratic cost the best of all linear feedback is
-state feedback on what is known or estimated, with a term for the wind that is to come. With P and K the
-solution of the Riccati equation of plant and controls and its gain, F = A - B K, and the wind v known for the
+Controls are the rates of torque and pitch command. For a quadratic cost the optimal linear feedback is
+state feedback on measured or estimated states, plus a term for the previewed wind. With P and K the
+solution of the Riccati equation of plant and controls and the gain, F = A - B K, and the wind v known for the
 time T ahead, that term is -R^-1 B^T g,
 
     g = int_0^T exp(F^T s) P e v(t + s) ds + exp(F^T T) X w(t + T),   F^T X + X a + P e c = 0,
 
-with e what the wind does to the plant, and w, a, c the states, matrix and output of the wind's filter
+with e the input vector of the wind, and w, a, c the states, matrix and output of the wind filter
 (Tomizuka, 1975, Optimal continuous finite preview problem, IEEE Trans. Automatic Control 20, 362-365). For
-T = 0 it is state feedback on plant and wind. Gains are optimal for the fitted weather. Deviations are
+T = 0 this is state feedback on plant and wind. Gains are optimal for the fitted weather. Deviations are
 integrals over the spectra of the fitted or the true weather.
 """
 
@@ -25,16 +25,16 @@ from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
 from fowt_env.training.design.bound_plant import BLADE, LEAN, OMEGA, SPEED, N
 
-SAMPLE_TIME = 0.1  # s, at which the noise of a sensor holds per sample
-TORQUE_RATE = 1e-3  # cost of (torque rate / 5 % of rated a second)^2: keeps the problem well posed
+SAMPLE_TIME = 0.1  # s, sample time of sensor noise
+TORQUE_RATE = 1e-3  # cost of (torque rate / 5 % of rated per second)^2: keeps the problem well posed
 COMMAND_RATE = 1e-4  # cost of (rate of the pitch command / 0.2 deg/s)^2: the same
-# on the plant's states per root second, so that no state is known for certain: far below the weather's effect
+# process noise of the plant's states per root second, far below the weather: no state is known exactly
 LEAST_NOISE = np.diag([1e-4, 1e-4, 1e-6, 1e-4, 1e-4, 1e-6, 1e-5, 1e-6]) ** 2
-TOLERANCE = 2e-3  # of the limits, relative
+TOLERANCE = 2e-3  # relative tolerance of the limits
 ROUNDS = 80
-STEP = 2.0  # of the multipliers' logarithms per relative excess
-LEAST_RATIO = 1e-6  # of a deviation to its limit, of which the logarithm is taken
-LOWEST, HIGHEST = np.log(1e-6), np.log(1e6)  # of a multiplier
+STEP = 2.0  # change of the logarithm of a multiplier per relative excess
+LEAST_RATIO = 1e-6  # lower bound of the ratio of a deviation to its limit, for the logarithm
+LOWEST, HIGHEST = np.log(1e-6), np.log(1e6)  # bounds of the logarithm of a multiplier
 GAUSSIAN_MEAN = sqrt(2.0 / pi)  # mean |x| of a Gaussian over its standard deviation
 QUANTITIES = ("rotor_speed", "platform_pitch", "travel", "power", "torque")  # fields of Deviations
 LIMITED = ("travel", "power", "torque")
@@ -43,7 +43,7 @@ TORQUE, COMMAND = N, N + 1  # states of the controls, after those of the plant
 
 @dataclass(frozen=True)
 class Deviations:
-    """Standard deviations of a closed loop: rad/s, rad, mean |rad/s|, fractions of rated power and torque."""
+    """Holds standard deviations of a closed loop: rad/s, rad, mean |rad/s|, of rated power and torque."""
 
     rotor_speed: float
     platform_pitch: float
@@ -54,11 +54,11 @@ class Deviations:
 
 @dataclass(frozen=True)
 class Information:
-    """What a linear controller knows and moves.
+    """Defines the information and actuators of a linear controller.
 
-    sensors: names of lqr/design.py's SENSORS, or None: all states of plant and weather. preview: s for which
-    the rotor-averaged wind is known ahead, exactly; None: not even now, unless all is known. torque: whether
-    it moves the generator torque. text: for plots.
+    sensors: names of lqr/design.py's SENSORS, or None: all states of plant and weather. preview: time for
+    which the rotor-averaged wind is known ahead exactly, s; None: unknown (known now if sensors is None).
+    torque: whether the generator torque is controlled. text: label in plots.
     """
 
     text: str
@@ -68,7 +68,7 @@ class Information:
 
 
 class Problem:
-    """A BoundPlant with what a controller knows: the best gains for a cost, and the deviations under them.
+    """Computes the optimal gains and the deviations of a BoundPlant for given Information.
 
     noise: {sensor: standard deviation of a sample every SAMPLE_TIME, SI}; None: noise_of().
     Raises: InputError for sensors without a positive noise.
@@ -95,33 +95,33 @@ class Problem:
         self.r = np.diag(rates[self.controls])
         self.wind = np.r_[plant.wind, np.zeros(len(self.controls))]
         self.waves = np.vstack([plant.E, np.zeros((len(self.controls), 3))])
-        self.wind_drive = np.outer(self.wind, plant.wind_filter.output)  # from the filters' states
+        self.wind_drive = np.outer(self.wind, plant.wind_filter.output)  # input from the filter states
         self.wave_drive = self.waves @ plant.force
         self.knows_wind = information.sensors is None or information.preview is not None
-        # one unit of each is one of wind, of elevation and of each sensor's noise
+        # unit inputs: white noise of wind, of elevation and of each sensor
         self.noise = self._noise(noise)
         self.estimates = {}
 
     def _noise(self, noise):
-        """Return (k,) intensity of the noise of the sensors in use, per rad/s and both sides."""
+        """Return the two-sided noise intensity (k,) of the sensors in use, per rad/s."""
         if self.information.sensors is None:
             return np.zeros(0)
         noise = noise_of(turbine=self.plant.turbine) if noise is None else dict(noise)
         for name in self.information.sensors:
             if not noise.get(name, 0.0) > 0.0:
-                raise InputError(f"noise: {name} = {noise.get(name)}: must be a standard deviation above 0")
+                raise InputError(f"noise: {name} = {noise.get(name)}: must be a positive standard deviation")
         return np.array([noise[name] ** 2 * SAMPLE_TIME for name in self.information.sensors])
 
     def cost(self, fraction, *multipliers):
-        """Return Q with a fraction of platform pitch and multipliers on travel, power and torque."""
+        """Return cost matrix Q for a weight of platform pitch and multipliers of travel, power, torque."""
         weights = np.array([1.0 - fraction, fraction, *multipliers])
         return (self.rows * weights[:, None]).T @ self.rows
 
     def parts(self, deviations):
-        """Return (5,) Deviations in the units of the cost's rows."""
-        found = np.array([getattr(deviations, name) / self.scale[name] for name in QUANTITIES])
-        found[QUANTITIES.index("travel")] /= GAUSSIAN_MEAN
-        return found
+        """Return Deviations as an array (5,) in the units of the cost rows."""
+        values = np.array([getattr(deviations, name) / self.scale[name] for name in QUANTITIES])
+        values[QUANTITIES.index("travel")] /= GAUSSIAN_MEAN
+        return values
 
     def gains(self, q):
         """Return (P, K): solution of the Riccati equation and gain on plant and controls."""
@@ -129,16 +129,16 @@ class Problem:
         return p, np.linalg.solve(self.r, self.b.T @ p)
 
     def deviations(self, q, weather):
-        """Return Deviations under the best control for the cost q, in a bound_plant.Weather."""
+        """Return Deviations under the optimal control for the cost q in a bound_plant.Weather."""
         p, k = self.gains(q)
         closed, n = self.a - self.b @ k, len(self.states)
-        if id(weather) not in self.estimates:  # the same for all gains
+        if id(weather) not in self.estimates:  # independent of the gains
             self.estimates[id(weather)] = weather, self._estimate(weather)
         errors, filters = self.estimates[id(weather)][1]
         inputs = 2 + self.noise.size
         drive = np.zeros((OMEGA.size, n, inputs), complex)
         drive[:, :, 0], drive[:, :, 1] = self.wind, weather.force @ self.waves.T
-        # the feedback acts on the estimate, the state less its error
+        # feedback acts on the estimate: state minus estimation error
         drive += self.b @ (k[:, :N] @ errors)
         gain = np.linalg.solve(self.r, self.b.T)
         ahead = np.zeros((OMEGA.size, n, inputs), complex)
@@ -160,38 +160,38 @@ class Problem:
         return Deviations(*(float(value) for value in found))
 
     def _ahead(self, closed, p, wind):
-        """Return (n, states) g of the wind per wind speed, with that known for the preview's time ahead."""
+        """Return the preview term g (n, states) per wind speed, with the wind known over the preview time."""
         time = self.information.preview or 0.0
         at = self.plant.wind_filter
         states = at.states(OMEGA)
         states = states / (states @ at.output)[:, None]
         shift, later = expm(closed.T * time), np.exp(1j * OMEGA * time)[:, None]
-        found = later * (states @ (shift @ wind).T)
+        term = later * (states @ (shift @ wind).T)
         if time > 0.0:
             n = len(self.states)
             pe = p @ self.wind
             change = later * (shift @ pe) - pe
             within = closed.T + 1j * OMEGA[:, None, None] * np.eye(n)
-            found = found + np.linalg.solve(within, change[:, :, None])[:, :, 0]
-        return found
+            term = term + np.linalg.solve(within, change[:, :, None])[:, :, 0]
+        return term
 
     def _estimate(self, weather):
-        """Return (plant's state less its estimate, estimates of the filters' states), both (n, 8, k).
+        """Return (estimation error of the plant states, estimates of the filter states), both (n, 8, k).
 
-        Responses over OMEGA to each of k inputs in a weather; the gains do not matter.
+        These are responses over OMEGA to each of k inputs in a weather, independent of the gains.
         """
         plant, k = self.plant, 2 + self.noise.size
         waves, order = plant.wave_filter, plant.wind_filter.b.size
         size = N + order + waves.b.size
         if self.information.sensors is None:
-            found = np.zeros((OMEGA.size, size, k), complex)
+            response = np.zeros((OMEGA.size, size, k), complex)
             states = waves.states(OMEGA)
             elevation = (states @ waves.output)[:, None]
-            np.divide(states, elevation, out=found[:, N + order :, 1], where=elevation != 0.0)
-            return found[:, :N], found[:, N:]
+            np.divide(states, elevation, out=response[:, N + order :, 1], where=elevation != 0.0)
+            return response[:, :N], response[:, N:]
         gain, c = self.estimator()
         used = [SENSORS.index(name) for name in self.information.sensors]
-        # state of the plant less its estimate, and estimates of the weather
+        # estimation error of the plant, and estimates of the weather
         sign = np.r_[np.ones(N), -np.ones(size - N)]
         loop = (self._with_filters()[0] - gain @ c) * sign[:, None] * sign
         drive = np.zeros((OMEGA.size, size, k), complex)
@@ -205,17 +205,17 @@ class Problem:
         return moved[:, :N], moved[:, N:]
 
     def _with_filters(self):
-        """Return (A, Q) of the plant with the filters' states, and the intensity of the noise on them."""
+        """Return (A, Q): system matrix of plant and filter states, and intensity of the process noise."""
         plant, wind, waves = self.plant, self.plant.wind_filter, self.plant.wave_filter
         a = block_diag(plant.A, wind.a, waves.a)
         a[:N, N:] = np.hstack([np.outer(plant.wind, wind.output), plant.E @ plant.force])
         return a, block_diag(LEAST_NOISE, np.outer(wind.b, wind.b), np.outer(waves.b, waves.b))
 
     def estimator(self):
-        """Return (gain, C): Kalman gain on plant and filters' states, and what the sensors read of these.
+        """Return (gain, C): Kalman gain and output matrix of the sensors for plant and filter states.
 
-        Torque and pitch command are known. A wind that is known acts through them alike: its filter's states
-        are not estimated, and have no gain.
+        Torque and pitch command are known inputs, and so is a known wind: the states of the wind filter are
+        then not estimated and have no gain.
         """
         plant, wind = self.plant, self.plant.wind_filter
         used = [SENSORS.index(name) for name in self.information.sensors]
@@ -231,56 +231,56 @@ class Problem:
 
 
 def noise_of(chain="standard", turbine=None):
-    """Return {sensor: standard deviation of a reading} of SENSORS through a chain, a name or SensorChain.
+    """Return {sensor: standard deviation of a reading} of SENSORS for a sensor chain, a name or SensorChain.
 
-    Noise and quantisation together; low pass and delay, small beside the plant's times, are left out.
-    Raises: InputError for an unknown name, and for a chain without one of SENSORS or that is exact.
+    Includes noise and quantisation; neglects low pass and delay, which are fast compared with the plant.
+    Raises: InputError for an unknown name, and for a chain that is exact or lacks one of SENSORS.
     """
-    found = sensor_chain(chain) if turbine is None else sensors_of(chain, turbine)
+    chosen = sensor_chain(chain) if turbine is None else sensors_of(chain, turbine)
     for name in SENSORS:
-        if found is None or name not in found.sensors:
+        if chosen is None or name not in chosen.sensors:
             raise InputError(
                 f"sensors = {chain!r}: must be a chain with noise on each of {', '.join(SENSORS)}"
             )
-    used = {name: found.sensors[name] for name in SENSORS}
+    used = {name: chosen.sensors[name] for name in SENSORS}
     return {name: sqrt(sensor.noise**2 + sensor.step**2 / 12.0) for name, sensor in used.items()}
 
 
 def front(problem, limits, fractions):
-    """Return [(fraction, Deviations, cost)] best for each fraction of platform pitch; limits: Deviations.
+    """Return [(fraction, Deviations, cost)] optimal for each weight of platform pitch; limits: Deviations.
 
-    In the plant's true weather. Each multiplier grows while its limit is exceeded and shrinks while it is
-    kept. Fractions at which ROUNDS rounds of that end outside the limits are left out.
-    Raises: InputError where that is all of them.
+    Deviations are in the plant's true weather. Each multiplier grows while its limit is exceeded and shrinks
+    while the limit is met. Fractions without convergence in ROUNDS iterations are omitted.
+    Raises: InputError if no fraction converges.
     """
-    found, multipliers = [], np.log([1.0, 0.3, 0.1])
-    wanted = np.array([getattr(limits, name) for name in LIMITED])
+    points, multipliers = [], np.log([1.0, 0.3, 0.1])
+    bounds = np.array([getattr(limits, name) for name in LIMITED])
     for fraction in fractions:
         step, last = np.full(len(LIMITED), STEP), np.zeros(len(LIMITED))
         for _ in range(ROUNDS):
             q = problem.cost(fraction, *np.exp(multipliers))
             reached = problem.deviations(q, problem.plant.true)
             values = np.array([getattr(reached, name) for name in LIMITED])
-            excess = np.log(np.maximum(values / wanted, LEAST_RATIO))
-            # a limit that is kept, and whose cost counts for nothing, does not hold anything
+            excess = np.log(np.maximum(values / bounds, LEAST_RATIO))
+            # a limit that is met at negligible cost is inactive
             parts = problem.parts(reached) ** 2
-            share = np.exp(multipliers) * parts[2:] / (parts[:2] @ [1.0 - fraction, fraction])
-            slack = (excess < 0.0) & (share < TOLERANCE)
+            cost_fraction = np.exp(multipliers) * parts[2:] / (parts[:2] @ [1.0 - fraction, fraction])
+            slack = (excess < 0.0) & (cost_fraction < TOLERANCE)
             if np.all((np.abs(excess) < TOLERANCE) | slack):
                 break
-            # smaller steps where the last one went too far
+            # smaller steps after an overshoot
             step = np.where(excess * last < 0.0, 0.5 * step, np.minimum(1.2 * step, STEP))
             last = excess
             multipliers = np.clip(multipliers + step * excess, LOWEST, HIGHEST)
         if excess.max() < 2.0 * TOLERANCE:
-            found.append((float(fraction), reached, q))
-    if not found:
+            points.append((float(fraction), reached, q))
+    if not points:
         raise InputError(f"{problem.information.text}: no gains meet the limits")
-    return found
+    return points
 
 
 def baseline_deviations(plant, weather):
-    """Return Deviations under gspi_oc3 in a bound_plant.Weather; constant torque: power goes with speed."""
+    """Return Deviations under gspi_oc3 in a bound_plant.Weather; at constant torque power follows speed."""
     responses = plant.baseline_response(weather)
 
     def deviation(row, weight=1.0):

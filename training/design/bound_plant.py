@@ -1,10 +1,10 @@
-"""The plant and the weather of the performance limit: planar states with linear drag, and fitted filters.
+"""Defines plant and weather of the performance limit: planar states with linear drag, and fitted filters.
 
-Per wind speed: surge, heave and platform pitch, rotor and pitch actuator, with the hull's drag linearised
-in the sea and in the motion that the plant has under gspi_oc3. The rotor-averaged Kaimal wind is white
-noise through a filter of order 3 with one zero, the elevation that through two resonators one after the
-other, and the wave force on the hull a combination of their states. FittedWeather has these spectra and
-TrueWeather those that runs are drawn from, with the hull's own force at each frequency.
+Per wind speed: surge, heave and platform pitch, rotor and pitch actuator, with hull drag linearised for the
+sea and for the motion under gspi_oc3. The rotor-averaged Kaimal wind is white noise through a filter of order
+3 with one zero, the elevation white noise through two resonators in series, and the wave force on the hull a
+combination of the resonator states. BoundPlant.fitted has these spectra; BoundPlant.true has the spectra from
+which runs are drawn and the exact hull force at each frequency.
 """
 
 from dataclasses import dataclass
@@ -27,33 +27,33 @@ from fowt_env.errors import InputError
 from fowt_env.weather.turbulence import amplitudes, fft_length
 
 PLANAR = ("surge", "heave", "platform_pitch", "vx", "vz", "wy", "rotor_speed", "blade_pitch")
-IN_PLANE = (0, 2, 4)  # of forces and velocities of the hull: surge, heave, platform pitch
+IN_PLANE = (0, 2, 4)  # indices of surge, heave and platform pitch in forces and velocities of the hull
 N = len(PLANAR)
 LEAN, VX, VZ, WY, SPEED, BLADE = (
     PLANAR.index(name) for name in ("platform_pitch", "vx", "vz", "wy", "rotor_speed", "blade_pitch")
 )
-RECORD = 800.0  # s, over which the wind of the named suites is drawn: it has nothing slower
-SMALLEST_ROTOR = 200.0  # m2 of swept area, above which the wind of IEC 61400-1 holds
-ORDER, ZEROS = 3, 1  # of the wind's filter, beside the one that stops what is slower than a record
+RECORD = 800.0  # s, length of the wind records of the named suites: no slower components
+SMALLEST_ROTOR = 200.0  # m2 of swept area, above which the wind models of IEC 61400-1 apply
+ORDER, ZEROS = 3, 1  # of the wind filter, without the high-pass at the length of a record
 SLOWEST = pi / RECORD  # rad/s, half the lowest frequency of a record
-WIND_BAND = (1.0 / RECORD, 0.25)  # Hz, of its fit
-WAVE_BAND = (0.5, 3.0)  # peak frequencies, of the fit of the elevation
-LOWEST_FORCE = 0.1  # rad/s, from which on the fit of the force weighs it by 1 over frequency
-# rad/s: dense where platform and waves have their resonances, wide enough for the noise of sensors
+WIND_BAND = (1.0 / RECORD, 0.25)  # Hz, band of the wind fit
+WAVE_BAND = (0.5, 3.0)  # peak frequencies, band of the elevation fit
+LOWEST_FORCE = 0.1  # rad/s, above which the force fit is weighted by 1/frequency
+# rad/s: dense at the resonances of platform and waves, wide enough for sensor noise
 OMEGA = np.r_[
     np.geomspace(1e-4, 0.999 * SLOWEST, 16), SLOWEST * np.arange(1, 510),
     np.geomspace(510 * SLOWEST, 6.0, 50, endpoint=False), np.geomspace(6.0, 100.0, 60),
 ]  # fmt: skip
-ROUNDS, SETTLED = 40, 1e-4  # of the drag and the motion under gspi_oc3
-START = np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # m2/s2: in surge, from which that begins
+ROUNDS, SETTLED = 40, 1e-4  # iterations and tolerance for drag and motion under gspi_oc3
+START = np.diag([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])  # m2/s2, initial guess of the motion: surge
 
 
 @dataclass(frozen=True)
 class Filter:
-    """White noise of unit intensity through dx = a x + b noise: its states, and what they stand for.
+    """Models a signal as unit white noise through the filter dx = a x + b noise.
 
     output (m,) gives wind speed (m/s) or elevation (m). error: integral of the absolute difference from the
-    spectrum that it was fitted to, over the variance, at the frequencies that this has.
+    fitted spectrum over the variance, at frequencies where that spectrum is not zero.
     """
 
     a: np.ndarray
@@ -62,18 +62,18 @@ class Filter:
     error: float
 
     def states(self, omega):
-        """Return (n, m) complex response of the states to the noise."""
+        """Return the complex response (n, m) of the states to the noise."""
         eye = np.eye(self.b.size)
         return np.linalg.solve(1j * omega[:, None, None] * eye - self.a, self.b[:, None])[:, :, 0]
 
     def density(self, omega):
-        """Return (n,) one-sided spectrum of the output, per rad/s."""
+        """Return the one-sided spectrum (n,) of the output, per rad/s."""
         return np.abs(self.states(omega) @ self.output) ** 2 / pi
 
 
 @dataclass(frozen=True)
 class Weather:
-    """Spectra of wind and elevation (n,) over OMEGA, per rad/s; force (n, 3) in the plane per elevation."""
+    """Holds spectra (n,) of wind and elevation over OMEGA, per rad/s; in-plane force (n, 3) per elevation."""
 
     wind: np.ndarray
     elevation: np.ndarray
@@ -81,13 +81,13 @@ class Weather:
 
 
 class BoundPlant:
-    """One wind speed's plant with its weather, linear (SI, less the trim).
+    """Holds the linear plant and weather of one wind speed (SI, deviations from trim).
 
-    A (8, 8) of PLANAR, B (8, 2) of torque (in rated torques) and pitch command, wind (8,), E (8, 3) of forces
-    in the plane; C, D, Dwind, F the same of SENSORS. wind_filter and wave_filter are Filters, force (3, 4)
-    gives the wave force from the states of the latter; fitted and true are Weathers. drag is the LinearDrag.
-    Raises: InputError where the blade pitch rests on its limit, for a rotor too small for the wind of
-    IEC 61400-1, and where gspi_oc3 does not hold the plant.
+    A (8, 8) of PLANAR, B (8, 2) of torque (in rated torques) and pitch command, wind (8,), E (8, 3) of
+    in-plane forces; C, D, Dwind, F the same of SENSORS. wind_filter and wave_filter are Filters, force (3, 4)
+    maps the states of the latter to wave force; fitted and true are Weathers. drag is the LinearDrag.
+    Raises: InputError if the blade pitch is at its limit, for a rotor too small for the wind models of
+    IEC 61400-1, and if gspi_oc3 does not stabilise the plant.
     """
 
     def __init__(self, scene, wind, sea=None):
@@ -95,8 +95,8 @@ class BoundPlant:
         area = pi * scene.turbine.rotor.tip_radius**2
         if area <= SMALLEST_ROTOR:
             raise InputError(
-                f"the turbine sweeps {area:.3g} m2: the performance limit takes the turbulence of"
-                f" IEC 61400-1, which holds above {SMALLEST_ROTOR:g} m2"
+                f"swept area = {area:.3g} m2: the performance limit uses the turbulence of"
+                f" IEC 61400-1, which applies above {SMALLEST_ROTOR:g} m2"
             )
         if sea is None:
             sea = joint_sea_state(SITE, min(self.wind_speed, LAST_SEA_WIND))
@@ -104,7 +104,7 @@ class BoundPlant:
         model = with_pitch_lag(residualised(linearize(scene_at(scene, wind))))
         if model.pitch_rests:
             raise InputError(
-                f"wind = {wind:g}: the blade pitch rests on its limit there, and no controller moves it"
+                f"wind = {wind:g}: the blade pitch is at its limit, so no controller can move it"
             )
         self.torque, self.pitch = (float(value) for value in model.point.command)
         elevation = elevation_spectrum(self.sea, OMEGA)
@@ -123,7 +123,7 @@ class BoundPlant:
         self.fitted = Weather(self.wind_filter.density(OMEGA), self.wave_filter.density(OMEGA), force)
 
     def _settle_drag(self, scene, model):
-        """Linearise the drag in the sea and in the motion under gspi_oc3, which depends on it."""
+        """Linearise the drag for the sea and the motion under gspi_oc3, which depends on the drag."""
         strips, motion, damping = self.true, HullMotion(0.0, START), np.inf
         for _ in range(ROUNDS):
             drag = linear_drag(scene, model.point.state, OMEGA, self.sea, motion)
@@ -132,26 +132,26 @@ class BoundPlant:
             scale = np.abs(drag.damping).max()
             if np.abs(drag.damping - damping).max() <= SETTLED * scale:
                 break
-            damping, found = drag.damping, self._motion()
-            # half way: more drag is less motion, so that whole steps would swing about what is sought
-            motion = HullMotion(0.5 * (motion.waves + found.waves), 0.5 * (motion.other + found.other))
+            damping, updated = drag.damping, self._motion()
+            # half steps: more drag gives less motion, so that full steps would oscillate
+            motion = HullMotion(0.5 * (motion.waves + updated.waves), 0.5 * (motion.other + updated.other))
         self.drag = drag
 
     def _take(self, model):
         """Set the matrices from a LinearModel."""
         rows = [model.index(name) for name in PLANAR]
         sensors = [model.output_index(name) for name in SENSORS]
-        units = np.array([self.torque, 1.0])  # torque is counted in rated torques
+        units = np.array([self.torque, 1.0])  # torque in units of rated torque
         self.A, self.B, self.wind = model.A[np.ix_(rows, rows)], model.B[rows, :2] * units, model.B[rows, 2]
         self.C = model.C[np.ix_(sensors, rows)]
         self.D, self.Dwind = model.D[sensors, :2] * units, model.D[sensors, 2]
         self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
 
     def baseline(self):
-        """Return (10, 10) closed loop of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
+        """Return the closed loop (10, 10) of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
 
         The law in continuous time, with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
-        Raises: InputError where it is unstable.
+        Raises: InputError if the closed loop is unstable.
         """
         settings = PISettings.published(self.turbine)
         gain = schedule_gain(self.pitch, settings.gain_schedule_pitch)
@@ -173,8 +173,8 @@ class BoundPlant:
         drive = np.zeros((OMEGA.size, N + 2, 2), complex)
         drive[:, :N, 0] = self.wind
         drive[:, :N, 1] = weather.force @ self.E.T
-        found = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(N + 2) - self.baseline(), drive)
-        return found[:, :N, 0], found[:, :N, 1]
+        response = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(N + 2) - self.baseline(), drive)
+        return response[:, :N, 0], response[:, :N, 1]
 
     def _motion(self):
         """Return the HullMotion under gspi_oc3 on the true spectra."""
@@ -197,16 +197,16 @@ def _wind_spectrum(speed, rotor):
     spacing = 2.0 * pi / (samples * step)
     at = spacing * np.arange(amplitude.size)
     density = np.log(0.5 * amplitude[1:-1] ** 2 / spacing)
-    found = np.exp(np.interp(OMEGA, at[1:-1], density))
-    found[(OMEGA < 0.9995 * SLOWEST) | (OMEGA > at[-1])] = 0.0
-    return found * 0.5 * np.sum(amplitude**2) / np.trapezoid(found, OMEGA)
+    spectrum = np.exp(np.interp(OMEGA, at[1:-1], density))
+    spectrum[(OMEGA < 0.9995 * SLOWEST) | (OMEGA > at[-1])] = 0.0
+    return spectrum * 0.5 * np.sum(amplitude**2) / np.trapezoid(spectrum, OMEGA)
 
 
 def fit_wind(spectrum):
-    """Return a Filter of order 3 with a zero, behind one that stops frequencies below a record's.
+    """Return a Filter of order 3 with a zero, in series with a high-pass at the length of a record.
 
-    Fitted to the log of a wind's spectrum over OMEGA; the variances agree. Without the second the best
-    control would spend its torque on slow changes that no run has.
+    Fitted to the log of a wind spectrum over OMEGA; the variances agree. Without the high-pass the optimal
+    control would spend torque on slow changes that no run contains.
     """
     used = (OMEGA > 2.0 * pi * WIND_BAND[0]) & (OMEGA < 2.0 * pi * WIND_BAND[1])
     omega, target = OMEGA[used], spectrum[used]
@@ -233,8 +233,8 @@ def fit_wind(spectrum):
 def fit_waves(weather, sea):
     """Return (Filter of the elevation, force (3, 4) of its states, relative rms errors (3,) of the force).
 
-    The filter is s^2 through two resonators; its variance is the sea's. The errors are those of the force at
-    the sea's frequencies; zero where there is no force.
+    The filter is s^2 through two resonators, with the variance of the sea. The errors are those at
+    the frequencies of the sea; zero without a force.
     """
     peak = 2.0 * pi / sea.Tp if sea.height else 1.0
     used = (OMEGA > WAVE_BAND[0] * peak) & (OMEGA < WAVE_BAND[1] * peak)
@@ -255,25 +255,25 @@ def fit_waves(weather, sea):
             best = fit
     w1, z1, w2, z2 = np.exp(best.x[:4])
     below = np.polymul([1.0, 2.0 * z1 * w1, w1**2], [1.0, 2.0 * z2 * w2, w2**2])
-    a, b, c = _companion(below, np.array([1.0, 0.0, 0.0]))  # in time of 1/peak: the states are of one size
+    a, b, c = _companion(below, np.array([1.0, 0.0, 0.0]))  # time in 1/peak: states of equal magnitude
     a, b = a * peak, b * sqrt(peak)
     filtered = _scaled(a, b, c, weather.elevation)
     states = filtered.states(OMEGA)
     elevation = states @ filtered.output
-    # per frequency, as that is how a mass moves; also where there is no sea, so that the force is small there
+    # weighted by 1/frequency, as the response of a mass; outside the sea's band the force is kept small
     weight = np.sqrt(np.gradient(OMEGA)) / np.maximum(OMEGA, LOWEST_FORCE)
-    wanted = weather.force * elevation[:, None]
-    left, right = states * weight[:, None], wanted * weight[:, None]
+    true_force = weather.force * elevation[:, None]
+    left, right = states * weight[:, None], true_force * weight[:, None]
     stacked = (np.r_[left.real, left.imag], np.r_[right.real, right.imag])
     force = np.linalg.lstsq(*stacked, rcond=None)[0].T
     density = (np.gradient(OMEGA) * (weather.elevation > 0.0))[:, None]
-    size = np.sum(density * np.abs(wanted) ** 2, axis=0)
-    miss = np.sum(density * np.abs(states @ force.T - wanted) ** 2, axis=0)
+    size = np.sum(density * np.abs(true_force) ** 2, axis=0)
+    miss = np.sum(density * np.abs(states @ force.T - true_force) ** 2, axis=0)
     return filtered, force, np.sqrt(np.divide(miss, size, out=np.zeros(3), where=size > 0.0))
 
 
 def _companion(below, above):
-    """Return (a, b, c) of the filter above/below, polynomials in s with the first coefficient of below 1."""
+    """Return (a, b, c) of the filter above/below, polynomials in s; the leading coefficient of below is 1."""
     n = below.size - 1
     a = np.zeros((n, n))
     a[:-1, 1:] = np.eye(n - 1)
@@ -285,7 +285,7 @@ def _companion(below, above):
 
 
 def _scaled(a, b, c, spectrum):
-    """Return a Filter with the variance of a spectrum over OMEGA, both where the spectrum is not zero."""
+    """Return a Filter with the variance of a spectrum over OMEGA where the spectrum is not zero."""
     variance, here = np.trapezoid(spectrum, OMEGA), spectrum > 0.0
     density = np.where(here, np.abs(Filter(a, b, c, 0.0).states(OMEGA) @ c) ** 2 / pi, 0.0)
     ratio = variance / np.trapezoid(density, OMEGA) if variance > 0.0 else 0.0

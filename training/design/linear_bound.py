@@ -1,12 +1,12 @@
-"""The performance limit of linear control: Pareto fronts of rotor-speed and platform-pitch deviation.
+"""Computes the performance limit of linear control: fronts of rotor-speed and platform-pitch deviation.
 
     fowt design bound --wind 12,14,16,18,20,22,24
 
-Per wind speed, on the linear plant of bound_plant.py: the least weighted sum of both variances at no more
-blade-pitch travel and no more power deviation than gspi_oc3 has on the same model, and a torque deviation
-that the drivetrain can give. The limits are met by multipliers in the quadratic cost, so that each point is
-optimal among all linear controllers of the same information, for weather of the fitted spectra; deviations
-are those in the whole spectra. The model limits no torque, pitch or rate, and nothing is sampled.
+Per wind speed, on the linear plant of bound_plant.py: the minimum weighted sum of both variances at no more
+blade-pitch travel and power deviation than those of gspi_oc3 on the same model, and a torque deviation
+within the drivetrain's range. The limits are met by multipliers in the quadratic cost, so that each point is
+optimal among all linear controllers with the same information, for weather of the fitted spectra; deviations
+are computed with the exact spectra. The model has no saturation of torque, pitch or rates and no sampling.
 """
 
 from dataclasses import replace
@@ -24,11 +24,11 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.training.design.bound_control import Information, Problem, baseline_deviations, front
 from fowt_env.training.design.bound_plant import BoundPlant
 
-BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # what fowt design bound wrote
-FRACTIONS = (0.05, 0.2, 0.4, 0.55, 0.68, 0.8, 0.88, 0.94, 0.98)  # of platform pitch
-TORQUE_STD = 0.05  # of rated torque: twice this is the way to the torque's maximum
+BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # output of fowt design bound
+FRACTIONS = (0.05, 0.2, 0.4, 0.55, 0.68, 0.8, 0.88, 0.94, 0.98)  # weights of platform pitch
+TORQUE_STD = 0.05  # fraction of rated torque: half the margin to maximum torque
 PREVIEWS = (3.0, 11.0)  # s
-KNOWN = {  # what the feedback knows: name, words, sensors
+KNOWN = {  # information of the feedback: name: (text, sensors)
     "full": ("plant, wind and waves", None),
     "measured": ("five sensors", SENSORS),
     "speed": ("rotor speed and blade pitch", SENSORS[:2]),
@@ -45,31 +45,31 @@ RATIOS = {  # column of ratio_table: metric
 
 
 def information_sets(previews=PREVIEWS):
-    """Return {name: Information} of KNOWN, each without and with previews of the wind, and without torque."""
-    found = {}
+    """Return {name: Information} of KNOWN, each without and with wind preview, with and without torque."""
+    sets = {}
     for torque, time in product((True, False), (None, *previews)):
         suffix, ahead = ("", "") if time is None else (f"_preview_{time:g}", f", wind {time:g} s ahead")
         suffix, ahead = (suffix, ahead) if torque else (suffix + PITCH_ONLY, f"{ahead}; no torque")
         for name, (text, sensors) in KNOWN.items():
-            found[name + suffix] = Information(text + ahead, sensors, time, torque)
-    return found
+            sets[name + suffix] = Information(text + ahead, sensors, time, torque)
+    return sets
 
 
 def usual(previews=PREVIEWS):
-    """Return {name: text} of the information_sets of a table by default.
+    """Return {name: text} of the default information_sets of a table.
 
-    Where the wind is known exactly, now and ahead, sensors or all states make less than 1 % of difference:
-    of those, all states.
+    With exact preview of the wind, limits with sensors and with all states differ by less than 1 %: only
+    those with all states are included.
     """
-    found = information_sets(previews).items()
-    return {name: known.text for name, known in found if known.preview is None or known.sensors is None}
+    sets = information_sets(previews).items()
+    return {name: known.text for name, known in sets if known.preview is None or known.sensors is None}
 
 
-INFORMATION = usual()  # name: what plots call it
+INFORMATION = usual()  # name: label in plots
 
 
 def winds_of(turbine):
-    """Return the winds above rated at which the limit is found by default: even ones up to cut-out, m/s."""
+    """Return the default winds of the limit, m/s: even values above rated up to cut-out."""
     first = 2 * ceil(0.5 * (turbine.rated_wind_speed + 0.1))
     return tuple(float(wind) for wind in range(first, int(turbine.cut_out_wind_speed) + 1, 2))
 
@@ -78,21 +78,21 @@ def bound_table(
     scene, winds=None, information=None, *, travel=1.0, power=1.0, torque_std=TORQUE_STD, previews=PREVIEWS,
     noise=None, sea=None, fractions=FRACTIONS, progress=None,
 ):  # fmt: skip
-    """Return a DataFrame: the Pareto front per wind and information, absolute and over gspi_oc3's.
+    """Return a DataFrame of the Pareto front per wind and information, absolute and relative to gspi_oc3.
 
     winds        m/s; None: winds_of the scene's turbine
-    information  names of information_sets(previews); None: the usual ones
-    travel       limit of the blade-pitch travel over that of gspi_oc3; power: the same of the power deviation
-    torque_std   limit of the torque deviation, as a fraction of rated torque; inf for none, as for the others
-    previews     s for which the wind is known ahead
+    information  names of information_sets(previews); None: those of usual(previews)
+    travel       limit of blade-pitch travel over that of gspi_oc3; power: the same for the power deviation
+    torque_std   limit of the torque deviation, fraction of rated torque; inf: no limit, as for the others
+    previews     preview times of the wind, s
     noise        {sensor: standard deviation of a sample every 0.1 s, SI}; None: noise_of() the standard chain
-    sea          of every wind; None: the joint sea states of the named suites
-    fractions    of platform pitch in the sum that is made least
+    sea          sea state of every wind; None: the joint sea states of the named suites
+    fractions    weights of platform pitch in the minimised sum
 
-    fit_difference_[%]: how far a deviation of rotor speed, platform pitch or travel in the fitted weather is
-    from that in the whole spectra, at most. attrs["fits"]: DataFrame of the errors of the fits, and the drag.
+    fit_difference_[%]: largest difference of a deviation (rotor speed, platform pitch, travel) between fitted
+    and exact spectra. attrs["fits"]: DataFrame of the errors of the fits, and the drag.
     Raises: InputError for winds that are not above rated, limits that are not positive, unknown information,
-    and for a scene without the plant that this takes (BoundPlant).
+    and for a scene that BoundPlant does not support.
     """
     known = information_sets(previews)
     chosen = tuple(usual(previews) if information is None else information)
@@ -118,33 +118,33 @@ def bound_table(
         fits[-1]["pitch_drag_[MN-m-s/rad]"] = 1e-6 * float(plant.drag.damping[4, 4])
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base, fitted))
         limits = replace(base, travel=travel * base.travel, power=power * base.power, torque=torque_std)
-        for place, name in enumerate(chosen, 1):
+        for index, name in enumerate(chosen, 1):
             problem = Problem(plant, known[name], noise)
-            for fraction, found, q in front(problem, limits, fractions):
-                rows.append(_row(wind, name, fraction, found, base, problem.deviations(q, plant.fitted)))
+            for fraction, reached, q in front(problem, limits, fractions):
+                rows.append(_row(wind, name, fraction, reached, base, problem.deviations(q, plant.fitted)))
             if progress is not None:
-                progress(number * len(chosen) + place, total)
+                progress(number * len(chosen) + index, total)
     table = pd.DataFrame(rows)
     table.attrs["fits"] = pd.DataFrame(fits)
     return table
 
 
-def _row(wind, information, fraction, found, base, fitted):
-    """Return one row of bound_table."""
+def _row(wind, information, fraction, best, base, fitted):
+    """Return one row of bound_table as a dict."""
     names = ("rotor_speed", "platform_pitch", "travel")
-    difference = max(abs(getattr(fitted, name) / getattr(found, name) - 1.0) for name in names)
+    difference = max(abs(getattr(fitted, name) / getattr(best, name) - 1.0) for name in names)
     return {
         "wind_[m/s]": float(wind), "information": information, "share_[-]": fraction,
-        "RotSpeed_std_[rpm]": found.rotor_speed / RPM, "PtfmPitch_std_[deg]": found.platform_pitch / DEGREE,
-        "blade_pitch_travel_[deg/s]": found.travel / DEGREE, "power_std_[%]": 100.0 * found.power,
-        "torque_std_[%]": 100.0 * found.torque, "speed_ratio_[-]": found.rotor_speed / base.rotor_speed,
-        "pitch_ratio_[-]": found.platform_pitch / base.platform_pitch,
+        "RotSpeed_std_[rpm]": best.rotor_speed / RPM, "PtfmPitch_std_[deg]": best.platform_pitch / DEGREE,
+        "blade_pitch_travel_[deg/s]": best.travel / DEGREE, "power_std_[%]": 100.0 * best.power,
+        "torque_std_[%]": 100.0 * best.torque, "speed_ratio_[-]": best.rotor_speed / base.rotor_speed,
+        "pitch_ratio_[-]": best.platform_pitch / base.platform_pitch,
         "fit_difference_[%]": 100.0 * difference,
     }  # fmt: skip
 
 
 def rounded(table):
-    """Return a bound_table with five significant digits, as it is stored."""
+    """Return a bound_table rounded to five significant digits, as stored."""
     numbers = table.columns.drop("information")
     short = table.copy()
     short[numbers] = table[numbers].map(lambda value: float(f"{value:.5g}"))
@@ -152,10 +152,10 @@ def rounded(table):
 
 
 def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full"):
-    """Return the position of a controller between gspi_oc3 (0) and the Pareto front (1), on a line.
+    """Return the position of a controller between gspi_oc3 (0) and the Pareto front (1) on a straight line.
 
-    speed_ratio, pitch_ratio: its deviations over those of gspi_oc3. 1: on the Pareto front; 0: no better than
-    gspi_oc3; NaN where the line meets no front (or the controller betters neither).
+    speed_ratio, pitch_ratio: deviations over those of gspi_oc3. 1: on the Pareto front; 0: no better than
+    gspi_oc3; NaN if the line does not meet the front (or the controller improves neither).
     """
     here = table[(table["wind_[m/s]"] == float(wind)) & (table["information"] == information)]
     line = efficient(here[["speed_ratio_[-]", "pitch_ratio_[-]"]])
@@ -166,25 +166,25 @@ def fraction_of_bound(table, wind, speed_ratio, pitch_ratio, information="full")
     line = np.vstack([[line[0, 0], 10.0], line, [10.0, line[-1, 1]]])
     for start, end in pairwise(1.0 - line):
         try:
-            along, place = np.linalg.solve(np.column_stack([way, start - end]), start)
+            along, along_front = np.linalg.solve(np.column_stack([way, start - end]), start)
         except np.linalg.LinAlgError:
             continue
-        if along > 0.0 and 0.0 <= place <= 1.0:
+        if along > 0.0 and 0.0 <= along_front <= 1.0:
             return float(1.0 / along)
     return float("nan")
 
 
 def ratio_table(runs, bound=None):
-    """Return a DataFrame of a sweep's means over seeds (sweeps.sweep) over those of its gspi_oc3.
+    """Return a DataFrame of the means over seeds of a sweep (sweeps.sweep), relative to those of gspi_oc3.
 
     Columns: wind, variant, ratios of speed, platform pitch, power and travel; with a bound_table also the
-    fractions of the limit, and of that for measured channels. Cases are named kind_WIND.
+    fractions of the limit with all states and with measured channels. Cases are named kind_WIND.
     Raises: InputError for a table without the columns, without gspi_oc3, or with other cases.
     """
     needed = ("case", "variant", "seed", *RATIOS.values())
     missing = [name for name in needed if name not in runs]
     if missing:
-        raise InputError(f"runs: column {missing[0]!r} is missing; fowt design lqr-sweep --out makes it")
+        raise InputError(f"runs: column {missing[0]!r} is missing; fowt design lqr-sweep --out writes it")
     means = runs.groupby(["case", "variant"], sort=False)[list(RATIOS.values())].mean()
     rows = []
     for (case, variant), mean in means.iterrows():
@@ -205,7 +205,7 @@ def ratio_table(runs, bound=None):
 
 
 def efficient(points):
-    """Return the rows of (n, 2) points that no other betters in both columns, by rising first column."""
+    """Return the non-dominated rows of (n, 2) points (smaller is better), sorted by the first column."""
     points = np.asarray(points, dtype=float).reshape(-1, 2)
     points = points[np.lexsort((points[:, 1], points[:, 0]))]
     lowest = np.minimum.accumulate(points[:, 1])

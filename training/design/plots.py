@@ -1,6 +1,6 @@
-"""Plots of linear design: poles and damping over the wind, Bode plots, and Pareto fronts of linear control.
+"""Plots linear design: poles and damping over the wind, Bode plots, and Pareto fronts of linear control.
 
-As in visual/time_series.py every function returns a matplotlib Figure and, if given a path, writes it there.
+As in visual/time_series.py every function returns a matplotlib Figure and writes it to `path` if not None.
 Needs matplotlib: pip install "fowt-env[plot]".
 """
 
@@ -19,22 +19,22 @@ MODE_NAMES = (
 )  # fmt: skip
 MODE_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", "*")
 OF_REAL_POLES = ("rotor_speed", "blade_pitch", "surge", "sway", "heave", "roll", "platform_pitch", "yaw")
-REAL = 1e-6  # rad/s: a pole of less imaginary part is real
-FASTEST = 2.0  # 1/s: poles that decay faster are of actuators
-SLOW = 0.4  # rad/s: below it surge, platform pitch and heave, above it yaw
+REAL = 1e-6  # rad/s: a pole with a smaller imaginary part is real
+FASTEST = 2.0  # 1/s: poles that decay faster belong to actuators
+SLOW = 0.4  # rad/s: surge, platform pitch and heave are slower, yaw is faster
 FREQUENCIES = np.geomspace(0.01, 4.0, 400)  # rad/s
 BODE = (  # input, output, title, factor to the unit shown, unit
     ("blade_pitch_command", "rotor_speed", "blade pitch to rotor speed", DEGREE / RPM, "rpm/deg"),
     ("generator_torque", "rotor_speed", "torque to rotor speed", 1e3 / RPM, "rpm/(kN m)"),
     ("wind_speed", "platform_pitch", "wind to platform pitch", 1.0 / DEGREE, "deg/(m/s)"),
 )
-DECADES = 3.0  # of gain in every Bode plot, so that slopes compare
+DECADES = 3.0  # range of gain in every Bode plot, for comparable slopes
 WIND = "wind_[m/s]"
-TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel's ratio: white at 1
+TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel ratio: white at 1
 
 
 def _wind_colours(winds):
-    """Return {wind: colour} from dark (low) to light, and the scale for a colour bar.
+    """Return {wind: colour} from dark (low wind) to light, and the scale of the colour bar.
 
     Raises: InputError without winds.
     """
@@ -49,26 +49,26 @@ def _wind_colours(winds):
 
 
 def plot_poles(models, path=None, title=None):
-    """Return a Figure of the poles over the wind of {wind: LinearModel}, whole and near the origin.
+    """Return a Figure of the poles of {wind: LinearModel} over the wind, all and near the origin.
 
-    Poles of oscillations have the mark of their mode; real ones, of the rotor speed and of actuators, lie on
-    the real axis. Poles that decay faster than FASTEST lie outside and are named with their value.
+    Oscillatory poles have the mark of their mode; real poles, of rotor speed and actuators, lie on
+    the real axis. Poles that decay faster than FASTEST lie outside and are listed with their value.
     """
     colours, scale = _wind_colours(list(models))
-    found = [(wind, *pole) for wind, model in models.items() for pole in _poles(model)]
+    poles = [(wind, *pole) for wind, model in models.items() for pole in _poles(model)]
     figure = new_figure(11.5, 5.2)
     panels = figure.subplots(1, 2)
-    beyond = [(name, pole) for _, name, pole in found if pole.real < -FASTEST]
+    beyond = [(name, pole) for _, name, pole in poles if pole.real < -FASTEST]
     for axes, slow in zip(panels, (False, True), strict=True):
         style_axes(axes)
-        shown = [entry for entry in found if entry[2].real >= -FASTEST and (not slow or abs(entry[2]) < SLOW)]
+        shown = [each for each in poles if each[2].real >= -FASTEST and (not slow or abs(each[2]) < SLOW)]
         for wind, name, pole in shown:
             style = {"color": colours[wind], "edgecolor": INK, "linewidth": 0.4, "s": 34}
             axes.scatter(pole.real, pole.imag, marker=MODE_MARKERS[MODE_NAMES.index(name)], zorder=3, **style)
         turning = [pole for _, _, pole in shown if pole.imag > 0.0 or not slow]
         _damping_lines(axes, min(p.real for p in turning), max(p.imag for p in turning))
         axes.set_xlabel("real part (1/s)", fontsize=9, color=INK)
-    names = {name for _, name, _ in found} - {name for name, _ in beyond}
+    names = {name for _, name, _ in poles} - {name for name, _ in beyond}
     for name, mark in zip(MODE_NAMES, MODE_MARKERS, strict=True):
         if name in names:
             panels[0].scatter([], [], marker=mark, color=SOFT, label=name.replace("_", " "))
@@ -90,7 +90,7 @@ def plot_poles(models, path=None, title=None):
 
 
 def _poles(model):
-    """Return [(name, pole rad/s)] of all poles of a LinearModel with an imaginary part of at least 0.
+    """Return [(name, pole rad/s)] of the poles of a LinearModel with non-negative imaginary part.
 
     Oscillations have the names of model.modes(); a real pole that of the state of OF_REAL_POLES that
     participates most in it.
@@ -104,14 +104,14 @@ def _poles(model):
             nearest = min(modes, key=lambda pole: abs(pole - value))
             entries.append((modes[nearest], complex(value)))
         elif abs(value.imag) <= REAL:
-            share = np.abs(vectors[:, number] * left[number])
-            places = [(share[i], name) for i, name in enumerate(model.states) if name in OF_REAL_POLES]
-            entries.append((max(places)[1], complex(value.real)))
+            weight = np.abs(vectors[:, number] * left[number])
+            states = [(weight[i], name) for i, name in enumerate(model.states) if name in OF_REAL_POLES]
+            entries.append((max(states)[1], complex(value.real)))
     return entries
 
 
 def _colour_bar(figure, scale, axes, label):
-    """Draw a colour bar beside axes."""
+    """Draw a colour bar next to axes."""
     bar = figure.colorbar(scale, ax=axes, pad=0.01)
     bar.set_label(label, fontsize=9, color=INK)
     bar.ax.tick_params(labelsize=8, colors=INK)
@@ -119,7 +119,7 @@ def _colour_bar(figure, scale, axes, label):
 
 
 def _damping_lines(axes, left, top):
-    """Set limits that reach the real part `left` and the imaginary part `top`; draw lines of damping."""
+    """Set axis limits from the real part `left` and imaginary part `top`; draw lines of constant damping."""
     low, high = min(1.1 * left, -1e-3), 1.1 * max(top, 1e-2)
     axes.set_xlim(low, -0.05 * low)
     axes.set_ylim(-0.03 * high, high)
@@ -130,12 +130,12 @@ def _damping_lines(axes, left, top):
         slope = np.sqrt(1.0 - damping**2) / damping
         axes.plot([0.0, low], [0.0, -slope * low], color="#BBBBBB", linewidth=0.9, zorder=1)
         over = -slope * low >= high
-        place = (-high / slope, high) if over else (low, -slope * low)
-        if over and place[0] - named < 0.045 * -low and named:
-            continue  # no room for its name
-        named = place[0] if over else named
+        position = (-high / slope, high) if over else (low, -slope * low)
+        if over and position[0] - named < 0.045 * -low and named:
+            continue  # no space for its label
+        named = position[0] if over else named
         axes.annotate(
-            f"{damping:g}", place, fontsize=7, color=SOFT, xytext=(0, 3) if over else (3, 3),
+            f"{damping:g}", position, fontsize=7, color=SOFT, xytext=(0, 3) if over else (3, 3),
             textcoords="offset points", ha="center" if over else "left", annotation_clip=False,
         )  # fmt: skip
 
@@ -148,9 +148,9 @@ def plot_damping(models, path=None, title=None):
     panels = figure.subplots(2, 1, sharex=True)
     modes = [(wind, mode) for wind, model in models.items() for mode in model.modes()]
     for colour, mark, name in zip(COLOURS * 2, MODE_MARKERS, MODE_NAMES, strict=False):
-        found = [(wind, mode.period, mode.damping_ratio) for wind, mode in modes if mode.name == name]
-        if found:
-            winds, periods, ratios = zip(*found, strict=True)
+        points = [(wind, mode.period, mode.damping_ratio) for wind, mode in modes if mode.name == name]
+        if points:
+            winds, periods, ratios = zip(*points, strict=True)
             style = {"color": colour, "marker": mark, "markersize": 4, "linewidth": 1.0}
             panels[0].plot(winds, periods, label=name.replace("_", " "), **style)
             panels[1].plot(winds, ratios, **style)
@@ -170,8 +170,8 @@ def plot_damping(models, path=None, title=None):
 def plot_bode(models, path=None, title=None):
     """Return a Figure of gain and phase of BODE for {wind: LinearModel}.
 
-    Phases are in [-180, 180) deg. Blade pitch is shown where it is free to move: not at winds where it
-    rests on its limit.
+    Phases are in [-180, 180) deg. Blade pitch is shown only at winds at which the blade pitch is not
+    at its limit.
     """
     colours, scale = _wind_colours(list(models))
     figure = new_figure(12.0, 5.8)
@@ -206,11 +206,11 @@ def plot_bode(models, path=None, title=None):
 
 
 def plot_bound(table, names, points=None, path=None, title=None):
-    """Return a Figure of the fronts of linear_bound.bound_table over gspi_oc3's, a panel per wind.
+    """Return a Figure of the fronts of linear_bound.bound_table relative to gspi_oc3, one panel per wind.
 
     names: {information: legend text}, in order. points: training.design.linear_bound.ratio_table of simulated
-    controllers, coloured by their blade-pitch travel over that of gspi_oc3. Winds without points are left
-    out where there are points at all.
+    controllers, coloured by blade-pitch travel relative to gspi_oc3. If points is not None, winds without
+    points are omitted.
     """
     winds = sorted(table[WIND].unique())
     if points is not None:
@@ -226,8 +226,8 @@ def plot_bound(table, names, points=None, path=None, title=None):
     columns = min(4, len(winds))
     rows = -(-(len(winds) + (len(winds) > 3)) // columns)
     figure = new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
-    places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
-    for axes, wind in zip(places, winds, strict=False):
+    panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+    for axes, wind in zip(panels, winds, strict=False):
         draw_fronts(axes, table, wind, looks, (1.25, 1.15))
         if points is not None:
             shown = points[points[WIND] == wind]
@@ -236,12 +236,12 @@ def plot_bound(table, names, points=None, path=None, title=None):
                 s=30, edgecolor=INK, linewidth=0.5, label="lqr, simulated", zorder=5,
             )  # fmt: skip
     if points is not None:
-        _colour_bar(figure, drawn, places, "mean blade-pitch rate over that of gspi_oc3")
-    return finish_bound(figure, places, len(winds), path, title)
+        _colour_bar(figure, drawn, panels, "mean blade-pitch rate relative to gspi_oc3")
+    return finish_bound(figure, panels, len(winds), path, title)
 
 
 def draw_fronts(axes, table, wind, looks, ends):
-    """Draw the fronts {information: look} of one wind of a bound_table, within the upper ends of the axes."""
+    """Draw the fronts {information: style} of a bound_table at one wind, within the upper axis limits."""
     style_axes(axes)
     here = table[table[WIND] == wind]
     for information, look in looks.items():
@@ -254,23 +254,23 @@ def draw_fronts(axes, table, wind, looks, ends):
     axes.set_title(f"{wind:g} m/s", fontsize=9, color=INK)
 
 
-def finish_bound(figure, places, used, path, title):
-    """Return a Figure of a grid of deviations over those of gspi_oc3, completed and written to path.
+def finish_bound(figure, panels, used, path, title):
+    """Complete a grid of deviations relative to gspi_oc3, write it to path and return the Figure.
 
-    Labels, title and a legend in the first spare place, or above the grid; other spare places are emptied.
+    Adds labels, title and a legend in the first unused panel, or above the grid; hides other unused panels.
     """
-    figure.supxlabel("rotor-speed deviation over that of gspi_oc3", fontsize=9, color=INK)
-    figure.supylabel("platform-pitch deviation over that of gspi_oc3", fontsize=9, color=INK)
+    figure.supxlabel("rotor-speed deviation relative to gspi_oc3", fontsize=9, color=INK)
+    figure.supylabel("platform-pitch deviation relative to gspi_oc3", fontsize=9, color=INK)
     if title:
         figure.suptitle(title, fontsize=10, color=INK)
-    for axes in places[used:]:
+    for axes in panels[used:]:
         axes.set_axis_off()
-    columns = places[0].get_subplotspec().get_gridspec().ncols
-    for axes in places[max(0, used - columns) : used]:  # above a spare place, too
+    columns = panels[0].get_subplotspec().get_gridspec().ncols
+    for axes in panels[max(0, used - columns) : used]:  # also above an unused panel
         axes.tick_params(labelbottom=True)
-    handles, labels = places[0].get_legend_handles_labels()
-    if len(places) > used:
-        places[used].legend(handles, labels, fontsize=8, frameon=False, loc="center")
+    handles, labels = panels[0].get_legend_handles_labels()
+    if len(panels) > used:
+        panels[used].legend(handles, labels, fontsize=8, frameon=False, loc="center")
     else:
         columns = 1 if used == 1 else 3
         figure.legend(handles, labels, loc="outside upper center", ncols=columns, fontsize=8, frameon=False)

@@ -1,6 +1,6 @@
-"""Linear models over the wind: modes, zeros of blade pitch to rotor speed; and sweeps of lqr.
+"""Computes linear models over the wind, their modes and zeros of blade pitch to rotor speed; sweeps lqr.
 
-Run as fowt linearize and fowt design; every function returns a table that can be written as it is.
+Used by fowt linearize and fowt design; every function returns a table that can be written unchanged.
 """
 
 import json
@@ -32,7 +32,7 @@ KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")
 
 
 def models_over(scene, winds, progress=None):
-    """Return {wind m/s: LinearModel} of a scene in steady winds; blades lag by LEAST_LAG at least."""
+    """Return {wind m/s: LinearModel} of a scene in steady winds; the pitch lag is at least LEAST_LAG."""
     models = {}
     for number, wind in enumerate(winds, 1):
         models[float(wind)] = with_pitch_lag(linearize(scene_at(scene, wind)))
@@ -42,7 +42,7 @@ def models_over(scene, winds, progress=None):
 
 
 def mode_table(models):
-    """Return a DataFrame: wind, mode, period (s), damping ratio of oscillations, pitch and torque held."""
+    """Return a DataFrame of the modes at constant pitch and torque: wind, mode, period (s), damping ratio."""
     rows = [
         (wind, mode.name, mode.period, mode.damping_ratio)
         for wind, model in models.items()
@@ -65,14 +65,14 @@ def transmission_zeros(model, source="blade_pitch_command", output="rotor_speed"
 
 
 def _right_half(model):
-    """Return the zeros of blade pitch to rotor speed in the right half plane, one of each pair."""
+    """Return the right-half-plane zeros of blade pitch to rotor speed, one of each pair."""
     return [z for z in transmission_zeros(model) if z.real > 1e-6 and z.imag >= 0.0]
 
 
 def zero_table(models):
-    """Return a DataFrame: wind, real and imaginary part (rad/s) of the right-half-plane zeros.
+    """Return a DataFrame of the right-half-plane zeros: wind, real and imaginary part (rad/s).
 
-    Winds at which the blade pitch rests on its minimum are left out: there is no pitch control.
+    Winds at which the blade pitch is at its minimum are omitted: there is no pitch control.
     """
     moving = {wind: model for wind, model in models.items() if not model.pitch_rests}
     rows = [(wind, z.real, z.imag) for wind, model in moving.items() for z in _right_half(model)]
@@ -80,25 +80,25 @@ def zero_table(models):
 
 
 def zeros_over(scene, winds=None, progress=None):
-    """Return a DataFrame: wind, right-half-plane zero of blade pitch to rotor speed, and modes of the loop.
+    """Return a DataFrame of the right-half-plane zero of blade pitch to rotor speed and loop modes per wind.
 
-    winds      m/s; None: whole ones above rated up to cut-out
+    winds      m/s; None: whole values above rated up to cut-out
     Columns: real and imaginary part of the zero (0 where there is none) and its period; period and damping of
     the platform's pitch with blades and torque held; under `pi` the least damping ratio of platform pitch and
     rotor speed, and that of surge: of the modes in the plane faster and slower than half the platform's
-    frequency. Drag, quadratic in the motion, is left out.
-    Raises: InputError for winds at which the blades rest.
+    frequency. Drag, quadratic in the motion, is neglected.
+    Raises: InputError for winds at which the blade pitch is at its limit.
     """
     turbine = with_gains(scene)
     winds = winds_above_rated(turbine) if winds is None else winds
     settings, rows = PISettings.published(turbine), []
     for wind, model in models_over(scene, winds, progress).items():
         if model.pitch_rests:
-            raise InputError(f"wind = {wind:g}: the blade pitch rests on its limit there")
+            raise InputError(f"wind = {wind:g}: the blade pitch is at its limit")
         zero = max(_right_half(model), key=lambda z: z.real, default=0.0j)
-        own, frequency = platform_mode(model), platform_frequency(model)
+        pitch_mode, frequency = platform_mode(model), platform_frequency(model)
         a, names = closed_loop_matrix(model, settings)
-        # modes of platform and rotor: sway, roll and yaw are not the loop's
+        # modes of platform and rotor: sway, roll and yaw are not in the loop
         moving = [
             mode for mode in modes(a, names, model.cm_height, model.arm)
             if mode.name in ("platform_pitch", "rotor_speed", "surge")
@@ -112,8 +112,8 @@ def zeros_over(scene, winds=None, progress=None):
             "zero_real_[rad/s]": float(zero.real),
             "zero_imag_[rad/s]": float(zero.imag),
             "zero_period_[s]": float(2.0 * np.pi / abs(zero)) if zero else np.nan,
-            "platform_period_[s]": np.nan if own is None else own.period,
-            "platform_damping_[-]": np.nan if own is None else own.damping_ratio,
+            "platform_period_[s]": np.nan if pitch_mode is None else pitch_mode.period,
+            "platform_damping_[-]": np.nan if pitch_mode is None else pitch_mode.damping_ratio,
             "pi_pitch_damping_[-]": float(fast),
             "pi_surge_damping_[-]": float(slow),
         })  # fmt: skip
@@ -125,7 +125,7 @@ def save_models(models, path):
 
     winds (n,), states, inputs, outputs, forces (names), A (n, m, m), B, C, D, E, F as in LinearModel, and
     the operating points: x (n, m) in the order of states, u (n, 2) torque and blade pitch.
-    Raises: InputError for another ending.
+    Raises: InputError for another suffix.
     """
     path = Path(path)
     if path.suffix.lower() not in MODEL_SUFFIXES:
@@ -162,15 +162,15 @@ def save_study(models, folder):
 
 
 def sweep(variants, cases, seeds, out=None, progress=None, duration=660.0, skip=60.0, platform="oc3_hywind"):
-    """Return a DataFrame of lqr with each variant of its settings and of gspi_oc3, seed by seed.
+    """Return a DataFrame of the runs of lqr with each variant of settings and of gspi_oc3, per seed.
 
-    variants: {setting: value} each; cases: names of cases and suites, scaled to the platform's turbine.
-    Metrics are those of KEPT, NaN where a run failed. seeds: seeds.VALIDATION.start and above, as the others
+    variants: list of {setting: value}; cases: names of cases and suites, scaled to the platform's turbine.
+    Metrics are those of KEPT, NaN for failed runs. seeds: seeds.VALIDATION.start and above, as the others
     are for scoring. out: CSV.
     Raises: InputError for other seeds or unknown settings.
     """
     if min(seeds) < VALIDATION.start:
-        raise InputError(f"seeds = {list(seeds)}: tune on seeds of {VALIDATION.start} and above")
+        raise InputError(f"seeds = {list(seeds)}: must be {VALIDATION.start} or more for tuning")
     laws = {"gspi_oc3": "gspi_oc3"}
     for variant in variants:
         settings = LQGSettings().changed(**variant)

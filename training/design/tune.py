@@ -1,12 +1,12 @@
-"""One search for all baselines: the same objective, seeds, sensors, limits and number of settings tried.
+"""Tunes all baselines by one search: same objective, seeds, sensors, limits and number of evaluations.
 
     fowt design tune rosco_float --budget 40 --out results/tune
 
-Every setting runs on the cases of a suite, on validation seeds (1000 and above, on which no suite is scored).
-Its cost is the mean of the lifetime deviations of rotor speed and platform pitch over those of gspi_oc3 on
-the same runs, plus PENALTY times the excess over the suite's limits and over LIMITS, in fractions of them,
-plus LOST times the fraction of lost runs. The present settings come first, then up to half of the budget
-spread evenly (Sobol), then Nelder and Mead's method from the best. OUT/tune_NAME.csv is written after each.
+Settings are evaluated on the cases of a suite with validation seeds (1000 and above, never used for scoring).
+The cost is the mean of the lifetime deviations of rotor speed and platform pitch over those of gspi_oc3 on
+the same runs, plus PENALTY times the relative excess over the suite's limits and over LIMITS,
+plus LOST times the fraction of lost runs. The current settings come first, then up to half of the budget
+in a Sobol sequence, then the Nelder-Mead method from the best. OUT/tune_NAME.csv is written after each.
 """
 
 from collections.abc import Callable, Mapping
@@ -50,34 +50,34 @@ FIGURES = {
     "travel_ratio": "blade_pitch_travel_[deg/s]", "shaft_ratio": "RotTorq_DEL_[kN-m]",
     "energy_ratio": "GenPwr_capped_mean_[kW]", "power_std_ratio": "GenPwr_std_[kW]",
 }  # fmt: skip
-# over the baseline's, stricter than the suite's: a search ends at a limit, and other seeds then exceed it
+# ratios to the baseline, stricter than the suite's: an optimum at a limit exceeds it on other seeds
 LIMITS = {"blade_pitch_travel_[deg/s]": 0.98, "RotTorq_DEL_[kN-m]": 1.05, "GenPwr_capped_mean_[kW]": 0.995}
-PENALTY = 10.0  # 1 % above a limit has to be worth 10 % of the deviations
+PENALTY = 10.0  # 1 % above a limit costs as much as 10 % of the deviations
 LOST = 5.0
-FIRST_STEP = 0.12  # of the simplex, in the unit cube
+FIRST_STEP = 0.12  # size of the initial simplex in the unit cube
 
 
 @dataclass(frozen=True)
 class Space:
-    """Settings of a controller that are searched: {setting: (low, high)}, by logarithm where low is positive.
+    """Defines the search space of a controller: {setting: (low, high)}, logarithmic if low is positive.
 
-    start: the present settings. make(settings, turbine, control_dt): the controller.
+    start: the current settings. make(settings, turbine, control_dt): returns the controller.
     """
 
     ranges: Mapping[str, tuple[float, float]]
     start: Mapping[str, float]
     make: Callable[..., Any]
 
-    def settings(self, place):
-        """Return {setting: value} of a place (n,) in the unit cube."""
-        x = dict(zip(self.ranges, np.clip(place, 0.0, 1.0), strict=True))
+    def settings(self, point):
+        """Return {setting: value} of a point (n,) in the unit cube."""
+        x = dict(zip(self.ranges, np.clip(point, 0.0, 1.0), strict=True))
         return {
             key: float(low * (high / low) ** x[key] if low > 0.0 else low + (high - low) * x[key])
             for key, (low, high) in self.ranges.items()
         }
 
     def place(self, settings):
-        """Return the place (n,) of settings in the unit cube, at its walls where they lie outside."""
+        """Return the point (n,) of settings in the unit cube, clipped to the cube."""
         low, high = np.array(list(self.ranges.values())).T
         value = np.clip([settings[key] for key in self.ranges], low, high)
         with np.errstate(all="ignore"):
@@ -116,7 +116,7 @@ _FACTORS = {"KP": (0.3, 4.0), "KI": (0.05, 3.0), "gain_schedule_pitch": (0.3, 4.
 
 
 def spaces():
-    """Return {name of a baseline: its Space}."""
+    """Return {name: Space} of the baselines."""
 
     def of(record, ranges):
         return ranges, {key: getattr(record, key) for key in ranges}
@@ -146,12 +146,12 @@ def spaces():
 
 
 class Objective:
-    """Cost of controllers on a suite's cases and some validation seeds."""
+    """Computes the cost of controllers on the cases of a suite with some validation seeds."""
 
     def __init__(self, suite=SUITE, seeds=SEEDS, platform=None, **engine):
         if any(seed < VALIDATION.start for seed in seeds):
             raise InputError(
-                f"seeds = {list(seeds)}: must be {VALIDATION.start} or more: no suite is scored on those"
+                f"seeds = {list(seeds)}: must be {VALIDATION.start} or more, which are not used for scoring"
             )
         self.suite, self.seeds, self.engine = read_suite(suite, platform), tuple(seeds), engine
         self.turbine = build_scene(self.suite.cases[0].platform).turbine
@@ -165,18 +165,18 @@ class Objective:
         table = with_lost_power(pd.concat([self.base, made], ignore_index=True))
         runs = table[table["controller"] == "candidate"]
         table = penalised(table, REFERENCE)
-        own, base = (self._means(table[table["controller"] == name]) for name in ("candidate", REFERENCE))
-        ratio = own / base
+        tuned, base = (self._means(table[table["controller"] == name]) for name in ("candidate", REFERENCE))
+        ratio = tuned / base
         lost = float((runs["status"] != OK).mean())
         limits = self.suite.limits
         beyond = [-better(k) * (ratio[k] / x - 1.0) for k, x in (limits.relative | LIMITS).items()]
-        beyond += [own[name] / limit - 1.0 for name, limit in limits.lifetime.items()]
+        beyond += [tuned[name] / limit - 1.0 for name, limit in limits.lifetime.items()]
         beyond += [runs[name].max() / limit - 1.0 for name, limit in limits.run.items()]
         excess = sum(max(0.0, each) for each in beyond)
         cost = float(np.mean([ratio[name] for name in AIMS])) + PENALTY * excess + LOST * lost
-        found = {"cost": cost if np.isfinite(cost) else 2.0 * LOST}
-        found |= {key: float(ratio[name]) for key, name in FIGURES.items()}
-        return found | {"lost": lost, "beyond": float(excess)}
+        result = {"cost": cost if np.isfinite(cost) else 2.0 * LOST}
+        result |= {key: float(ratio[name]) for key, name in FIGURES.items()}
+        return result | {"lost": lost, "beyond": float(excess)}
 
     def _means(self, runs):
         """Return a Series of the lifetime means of METRICS over the runs of one controller."""
@@ -190,11 +190,11 @@ class Objective:
 
 
 def tune(name, budget=BUDGET, out=None, report=None, **objective):
-    """Return (best settings, their figures, DataFrame of all that were tried, in order) of a baseline.
+    """Return (best settings, metrics of these, DataFrame of all evaluations in order) of a baseline.
 
-    budget     settings that are tried
-    out        folder of tune_NAME.csv; None: none is written
-    report     called as report(number, row) after each
+    budget     number of evaluations
+    out        folder of tune_NAME.csv; None: not written
+    report     called as report(number, row) after each evaluation
     objective  arguments of Objective
     Raises: InputError for an unknown name, seeds of the suites, or a budget below 4.
     """
@@ -204,11 +204,11 @@ def tune(name, budget=BUDGET, out=None, report=None, **objective):
     check_whole_number("budget", budget, 4)
     space, judge, rows = known[name], Objective(**objective), []
 
-    def cost(place):
-        settings = space.settings(place)
+    def cost(point):
+        settings = space.settings(point)
         row = settings | judge(space.make(settings, judge.turbine, CONTROL_DT))
-        # outside the walls of the search the nearest setting inside counts, and the distance to it
-        row["cost"] += float(np.sum(np.abs(place - np.clip(place, 0.0, 1.0))))
+        # outside the cube: cost of the nearest point inside plus the distance
+        row["cost"] += float(np.sum(np.abs(point - np.clip(point, 0.0, 1.0))))
         rows.append(row)
         if out is not None:
             write_table(pd.DataFrame(rows), Path(out) / f"tune_{name}.csv")
@@ -232,12 +232,12 @@ def tune(name, budget=BUDGET, out=None, report=None, **objective):
 
 
 def write_tuned(name, settings, figures, budget, objective, path=TUNED):
-    """Write settings into tuned.toml, in place of those of the same controller."""
+    """Write settings into tuned.toml, replacing those of the same controller."""
     import tomllib
 
-    held = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    stored = tomllib.loads(Path(path).read_text(encoding="utf-8"))
     seeds = list(objective.get("seeds", SEEDS))
-    held[name] = {
+    stored[name] = {
         "settings": {key: float(f"{value:.4g}") for key, value in settings.items()},
         "figures": {key: round(value, 4) for key, value in figures.items()},
         "search": {"suite": objective.get("suite", SUITE), "seeds": seeds, "budget": budget},
@@ -245,8 +245,8 @@ def write_tuned(name, settings, figures, budget, objective, path=TUNED):
     lines = [
         "# Settings found by `fowt design tune NAME`. Figures are over gspi_oc3 on the seeds of the search.",
     ]
-    for controller in sorted(held):
-        for section, values in held[controller].items():
+    for controller in sorted(stored):
+        for section, values in stored[controller].items():
             lines += ["", f"[{controller}.{section}]"]
             lines += [f"{key} = {value!r}".replace("'", '"') for key, value in values.items()]
     with replacing(path) as temporary:

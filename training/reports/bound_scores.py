@@ -1,4 +1,4 @@
-"""Fraction of the performance limit of linear control that a controller reaches, per wind speed.
+"""Computes the fraction of the performance limit of linear control that a controller reaches, per wind speed.
 
     fowt scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
 
@@ -29,32 +29,32 @@ from fowt_env.training.design.linear_bound import (
 from fowt_env.training.evaluation.results_table import KEY
 from fowt_env.training.reports.scores import frame_markdown, grouped
 
-BASELINE = "gspi_oc3"  # with the travel and power deviation of the limit
+BASELINE = "gspi_oc3"  # the limit holds at its pitch travel and power deviation
 WIND = "wind_[m/s]"
-MORE = 1.02  # ratios of travel and power deviation above this are more than those of gspi_oc3
+MORE = 1.02  # ratio of travel or power deviation to gspi_oc3 above which the limit does not apply
 TORQUE_TRAVEL = "torque_travel_[kN-m/s]"
 MOVED = 1.5  # ratio of torque travel to that of gspi_oc3 above which a controller uses the torque
-FREE = {"time", "generator_torque", "generator_speed", "plant_model"}  # inputs that every limit has
+FREE = {"time", "generator_torque", "generator_speed", "plant_model"}  # inputs available to every limit
 
 
 def read_bound(path=None):
-    """Return the bound_table of a file of fowt design bound; None: that of this package."""
+    """Return the table of performance limits written by fowt design bound; None: the packaged table."""
     file = BOUND if path is None else Path(path)
     if not file.is_file():
         raise InputError(
-            f"performance limit {str(file)!r}: there is no such file; make it with fowt design bound --out"
+            f"performance limit {str(file)!r}: no such file; create it with fowt design bound --out"
         )
     return pd.read_csv(file)
 
 
 def limit_for(information, moves_torque, bound, preview_times=()):
-    """Return the name of the limit in a bound_table that applies to a controller; None without one.
+    """Return the name of the limit in a bound_table that applies to a controller, or None.
 
     information    inputs of the controller: Measurement fields and PRIVILEGED_INPUTS (fowt_env.control)
     moves_torque   whether it uses the generator torque above rated wind
-    preview_times  of the wind, s; () with "wind_preview": the longest of the table
-    Preview counts as exact, and the next longer one of the table is taken: that of the same sensors, or else
-    of all states, which differs by less than 1 %.
+    preview_times  preview times of the wind, s; () with "wind_preview": the longest of the table
+    Preview is assumed exact. The next longer preview time of the table is used, with the same sensors or else
+    with all states measured (limits differ by less than 1 %).
     """
     used, limits = set(information) - FREE, list(bound["information"].unique())
     ahead = "wind_preview" in used
@@ -66,17 +66,17 @@ def limit_for(information, moves_torque, bound, preview_times=()):
         return name + end if name + end in limits else None
     times = {}
     for kind in ("full", name):
-        found = (re.fullmatch(rf"{kind}_preview_([\d.]+){end}", limit) for limit in limits)
-        times |= {float(match[1]): match[0] for match in found if match}
+        matches = (re.fullmatch(rf"{kind}_preview_([\d.]+){end}", limit) for limit in limits)
+        times |= {float(match[1]): match[0] for match in matches if match}
     horizon = max(preview_times, default=max(times, default=0.0))
     return next((times[time] for time in sorted(times) if time >= horizon), None)
 
 
 def bound_fractions(table, bound, groups=None, agents=None, information=None):
-    """Return a DataFrame: per agent or group, training seed and wind, the fraction of its limit reached.
+    """Return a DataFrame with the fraction of the limit reached per agent or group, training seed and wind.
 
     table: of an evaluation with gspi_oc3, cases named kind_WIND; groups, agents: as in scores.grouped.
-    information: {label: (inputs, preview_times)}; other controllers declare it, or count as having full
+    information: {label: (inputs, preview_times)}; other controllers declare them, or are assumed to have full
     information. Columns: agent, seed_of (label of the training seed; "" for the means over the seeds), ratios
     of linear_bound.RATIOS (mean over the weather seeds on which both succeeded), limit (name of limit_for),
     of_limit_[-] (NaN: no better than gspi_oc3, or not at a wind of the limit), within (no more travel and
@@ -91,7 +91,7 @@ def bound_fractions(table, bound, groups=None, agents=None, information=None):
         raise InputError("results: no run of gspi_oc3 at a wind of the limit succeeded (cases kind_WIND)")
     kinds = {case.rpartition("_")[0] for case in base["case"]}
     if len(kinds) > 1:
-        raise InputError(f"results: cases of several kinds ({', '.join(sorted(kinds))}): choose one's cases")
+        raise InputError(f"results: cases of several kinds ({', '.join(sorted(kinds))}): select one kind")
     rows = []
     for name, labels in chosen.items():
         used, times = (information or {}).get(labels[0]) or declared(labels[0])
@@ -105,16 +105,16 @@ def bound_fractions(table, bound, groups=None, agents=None, information=None):
             ratios = part[[WIND, "speed_ratio_[-]", "pitch_ratio_[-]"]].to_numpy()
             reached = [np.nan if limit is None else fraction_of_bound(bound, *each, limit) for each in ratios]
             rows.append(part.assign(agent=name, limit=limit or "none", **{"of_limit_[-]": reached}))
-    found = pd.concat(rows, ignore_index=True)
-    found["within"] = (found["travel_ratio_[-]"] <= MORE) & (found["power_ratio_[-]"] <= MORE)
-    return found[["agent", "seed_of", WIND, *RATIOS, "limit", "of_limit_[-]", "within"]]
+    result = pd.concat(rows, ignore_index=True)
+    result["within"] = (result["travel_ratio_[-]"] <= MORE) & (result["power_ratio_[-]"] <= MORE)
+    return result[["agent", "seed_of", WIND, *RATIOS, "limit", "of_limit_[-]", "within"]]
 
 
 def declared(label):
     """Return (inputs, preview_times) that a controller declares, by its label in a table.
 
-    The user's code is not run, and a label may name a file that no longer exists: such a controller counts as
-    having full information without preview.
+    The user's code is not run, and a label may name a file that no longer exists: such a controller is
+    assumed to have full information without preview.
     """
     if ":" not in label or label.startswith((POLICY, DESIGN)):
         with suppress(InputError):
@@ -125,8 +125,8 @@ def declared(label):
 
 def _moves_torque(good, base, labels):
     """Return whether the torque travel is more than MOVED times that of gspi_oc3 on the same runs."""
-    own = good[good["controller"].isin(labels)].merge(base[[*KEY[1:], TORQUE_TRAVEL]], on=KEY[1:])
-    travels = own[[f"{TORQUE_TRAVEL}_x", f"{TORQUE_TRAVEL}_y"]].mean()
+    runs = good[good["controller"].isin(labels)].merge(base[[*KEY[1:], TORQUE_TRAVEL]], on=KEY[1:])
+    travels = runs[[f"{TORQUE_TRAVEL}_x", f"{TORQUE_TRAVEL}_y"]].mean()
     return bool(travels.iloc[0] > MOVED * travels.iloc[1])
 
 
@@ -138,12 +138,12 @@ def _wind(case):
         return float("nan")
 
 
-def _ratios(own, base, label):
+def _ratios(runs, base, label):
     """Return the ratio_table of one label over gspi_oc3 on their common runs."""
-    shared = own.merge(base[KEY[1:]], on=KEY[1:])[KEY[1:]]
+    shared = runs.merge(base[KEY[1:]], on=KEY[1:])[KEY[1:]]
     if shared.empty:
         return pd.DataFrame()
-    pair = pd.concat([frame.merge(shared, on=KEY[1:]) for frame in (base, own)])
+    pair = pd.concat([frame.merge(shared, on=KEY[1:]) for frame in (base, runs)])
     ratios = ratio_table(pair.rename(columns={"controller": "variant"}))
     return ratios.drop(columns="variant").assign(seed_of=label)
 

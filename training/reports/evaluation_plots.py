@@ -1,4 +1,4 @@
-"""Plots of an evaluation: metrics over cases, the Pareto plot of a leaderboard, and runs of each case."""
+"""Plots an evaluation: metrics over cases, the Pareto plot of a leaderboard, and the runs of each case."""
 
 import json
 
@@ -29,15 +29,15 @@ from fowt_env.visual.style import (
 from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
 
 TITLES = {name: title for _, name, _, _, title in PRINTED_METRICS}
-UPRIGHT = 6  # characters of a case's name that fit below a group of marks without being turned
-# places of a name about its mark: to the right and up, and points of distance
+UPRIGHT = 6  # characters of a case's name that fit horizontally below a group of marks
+# candidate positions of a label around its mark: directions (right, up) and distances (points)
 SIDES = np.array([(1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0)])
 WAYS = np.array([0.0, 10.0, 22.0, 36.0, 52.0, 70.0])
-ROOM = 0.6  # of the distance between two cases that the marks of one may take
+ROOM = 0.6  # fraction of the spacing of cases that the marks of one case may occupy
 
 
 def metric_title(name):
-    """Return the title of a panel: that of TITLES, else the metric's name with its unit."""
+    """Return the title of a metric's panel, from TITLES or else its name and unit."""
     if name in TITLES:
         return TITLES[name]
     text, _, unit = name.rpartition("_[")
@@ -47,8 +47,8 @@ def metric_title(name):
 def plot_evaluation(table, metrics, path=None, title=None):
     """Plot one panel per metric: a group of marks for each case, one mark per controller.
 
-    table      the DataFrame of training.evaluation.evaluate.evaluate; lost runs are left out, and counted
-    metrics    column names; marks are the mean over the seeds, bars reach from least to greatest
+    table      the DataFrame of training.evaluation.evaluate.evaluate; lost runs are omitted and counted
+    metrics    column names; marks: mean over the seeds; bars: minimum to maximum
     """
     metrics = [name for name in metrics if name in table.columns]
     if not metrics or table.empty:
@@ -72,9 +72,9 @@ def plot_evaluation(table, metrics, path=None, title=None):
             offset = step * (index - 0.5 * (len(controllers) - 1))
             axes.errorbar(
                 np.arange(len(cases)) + offset, mean,
-                yerr=np.maximum([mean - low, high - mean], 0.0),  # a mean of equal figures is rounded
+                yerr=np.maximum([mean - low, high - mean], 0.0),  # the mean of equal values is rounded
                 color=COLOURS[index % len(COLOURS)], marker=MARKS[index % len(MARKS)], markersize=4,
-                linestyle="none", elinewidth=1.0, capsize=0, label=controller,  # cases have no order
+                linestyle="none", elinewidth=1.0, capsize=0, label=controller,  # cases have no order: no line
             )  # fmt: skip
         for edge in np.arange(0.5, len(cases) - 1):
             axes.axvline(edge, color=FAINT, linewidth=0.8, zorder=0)
@@ -97,7 +97,7 @@ def plot_evaluation(table, metrics, path=None, title=None):
 
 
 PARETO_METRICS = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "overspeed_[%]")
-LARGEST_MARK = 420.0  # points squared, of the controller that travels most
+LARGEST_MARK = 420.0  # points squared, of the controller with the most pitch travel
 SMALLEST_MARK = 16.0
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours: 56 pairs
 
@@ -105,29 +105,29 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X", "*")  # one more than colours: 56 pa
 def plot_pareto(board, path=None, title=None, order=()):
     """Plot rotor-speed std (x) against platform-pitch std (y) of each controller, as ratios to the baseline.
 
-    board: mapping of a leaderboard. Bars are the intervals of the paired ratios, from the runs that both
-    finished; with too few seeds there are none. The mark's area is the mean blade-pitch rate; hollow: the
-    controller has lost runs. The stepped line is the Pareto front of those without lost runs. Without a
-    baseline the axes are rpm and deg, and the bars the intervals of the means or, with too few seeds, lines
-    without ends over the range of the seeds. order: controllers in the order (and colours) of other plots.
+    board: mapping of a leaderboard. Bars: intervals of the paired ratios, over the runs that both controllers
+    finished; omitted with too few seeds. Area of a mark: mean blade-pitch rate; hollow: the controller has
+    lost runs. Stepped line: Pareto front of the controllers without lost runs. Without a baseline the axes
+    are in rpm and deg, and bars are the intervals of the means or, with too few seeds, the range over the
+    seeds, without caps. order: controllers in the order (and colours) of other plots.
     """
     order = list(dict.fromkeys([*order, *(entry["controller"] for entry in board["controllers"])]))
     kept = []
     for entry in board["controllers"]:
-        figures = [entry["metrics"][name] for name in PARETO_METRICS]
-        if all(np.isfinite([figure["mean"] for figure in figures])) and figures[0]["mean"] > 0.0:
-            kept.append((entry, figures))
+        metrics = [entry["metrics"][name] for name in PARETO_METRICS]
+        if all(np.isfinite([figure["mean"] for figure in metrics])) and metrics[0]["mean"] > 0.0:
+            kept.append((entry, metrics))
     if not kept:
         raise InputError("nothing to plot: no controller has finished a run")
-    base = next((figures for entry, figures in kept if entry["controller"] == board.get("baseline")), None)
-    places = [_place(entry, figures, base, board.get("baseline")) for entry, figures in kept]
+    base = next((metrics for entry, metrics in kept if entry["controller"] == board.get("baseline")), None)
+    positions = [_position(entry, metrics, base, board.get("baseline")) for entry, metrics in kept]
     figure = new_figure(9.0, 5.8)
     axes = figure.subplots()
     style_axes(axes)
-    points = np.array([point for point, _, _ in places])
-    rates = np.array([figures[2]["mean"] for _, figures in kept])
+    points = np.array([point for point, _, _ in positions])
+    rates = np.array([metrics[2]["mean"] for _, metrics in kept])
     areas = np.maximum(LARGEST_MARK * rates / max(rates.max(), 1e-9), SMALLEST_MARK)
-    whole = [not entry["lost"] for entry, _ in kept]  # one that lost runs dominates no other
+    whole = [not entry["lost"] for entry, _ in kept]  # a controller with lost runs is not on the front
     front = efficient(points[whole])
     if len(front) > 1:
         axes.step(*front.T, where="post", color=INK, linewidth=0.8, linestyle=":", zorder=1)
@@ -136,19 +136,19 @@ def plot_pareto(board, path=None, title=None, order=()):
             line(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
     names = short_names([entry["controller"] for entry, _ in kept])
     marks, drawn = [], set()
-    for place, ((entry, figures), (point, bars, kind)) in enumerate(zip(kept, places, strict=True)):
+    for index, ((entry, metrics), (point, bars, kind)) in enumerate(zip(kept, positions, strict=True)):
         number = order.index(entry["controller"])
         colour = COLOURS[number % len(COLOURS)]
-        square = number // len(COLOURS) % 2  # its area is the whole box of its size, a circle's pi/4 of it
+        square = number // len(COLOURS) % 2  # scatter's s is the bounding box: a circle fills pi/4
         if bars is not None:
             style = {"color": colour, "linewidth": 1.0, "capsize": 0 if kind == "seeds" else 2, "zorder": 2}
             axes.errorbar(*point, xerr=bars[0], yerr=bars[1], **style)
             drawn.add(kind)
-        text = f"{names[entry['controller']]}: {rates[place]:.3f} deg/s, {figures[3]['mean']:.0f} %"
+        text = f"{names[entry['controller']]}: {rates[index]:.3f} deg/s, {metrics[3]['mean']:.0f} %"
         marks.append(
             axes.scatter(
                 *point,
-                s=areas[place] * (np.pi / 4.0 if square else 1.0),
+                s=areas[index] * (np.pi / 4.0 if square else 1.0),
                 marker="s" if square else "o",
                 facecolor="none" if entry["lost"] else colour,
                 alpha=0.6,
@@ -170,7 +170,7 @@ def plot_pareto(board, path=None, title=None, order=()):
         loc="outside right upper",
         fontsize=8,
         frameon=False,
-        title="mean blade-pitch rate (area of a mark),\noverspeed; hollow: lost runs",
+        title="mean blade-pitch rate (mark area),\noverspeed; hollow: lost runs",
         title_fontsize=8,
         alignment="left",
     )
@@ -185,12 +185,12 @@ def plot_pareto(board, path=None, title=None, order=()):
         text += f"; {counted(len(board.get('seeds', ())), 'seed')}: no interval"
     figure.suptitle(f"{title}\n{text}" if title else text, fontsize=9, color=INK, x=0.01, ha="left")
     labels = [names[entry["controller"]] for entry, _ in kept]
-    _label_marks(figure, axes, labels, points, areas, places, base is not None)
+    _label_marks(figure, axes, labels, points, areas, positions, base is not None)
     return save_figure(figure, path)
 
 
 def _absolute_axes(axes, speed, pitch):
-    """Add the scales in rpm and deg, on the top and on the right."""
+    """Add secondary axes in rpm and deg at the top and on the right."""
     top = axes.secondary_xaxis("top", functions=(lambda x: x * speed, lambda x: x / speed))
     right = axes.secondary_yaxis("right", functions=(lambda y: y * pitch, lambda y: y / pitch))
     top.set_xlabel("rotor speed, std (rpm)", fontsize=8, color=SOFT)
@@ -201,41 +201,41 @@ def _absolute_axes(axes, speed, pitch):
             spine.set_visible(False)
 
 
-def _place(entry, figures, base, baseline):
-    """Return (point (2,), bars (2, 2, 1) or None, "ratio", "mean", "seeds" or "") of a controller."""
+def _position(entry, metrics, base, baseline):
+    """Return a controller's point (2,), bars (2, 2, 1) or None, and the kind of bars ("" without bars)."""
     if base is not None and entry["controller"] == baseline:
         return np.ones(2), None, ""
     if base is not None:
         gaps = [entry["difference"][name] for name in PARETO_METRICS[:2]]
-        shares = [0.01 * gap["percent"] for gap in gaps]
-        if np.isfinite(shares).all():
-            point = 1.0 + np.array(shares)
-            ends = [_ratio_ends(gap, share) for gap, share in zip(gaps, shares, strict=True)]
+        fractions = [0.01 * gap["percent"] for gap in gaps]
+        if np.isfinite(fractions).all():
+            point = 1.0 + np.array(fractions)
+            ends = [_ratio_ends(gap, fraction) for gap, fraction in zip(gaps, fractions, strict=True)]
             if not np.isfinite(ends).all():
                 return point, None, ""
             bars = [[[at - low], [high - at]] for at, (low, high) in zip(point, ends, strict=True)]
             return point, np.maximum(bars, 0.0), "ratio"  # rounding
-        return np.array([f["mean"] / b["mean"] for f, b in zip(figures[:2], base[:2], strict=True)]), None, ""
-    point = np.array([figure["mean"] for figure in figures[:2]])
+        return np.array([f["mean"] / b["mean"] for f, b in zip(metrics[:2], base[:2], strict=True)]), None, ""
+    point = np.array([figure["mean"] for figure in metrics[:2]])
     for low, high, kind in (("low", "high", "mean"), ("seed_low", "seed_high", "seeds")):
-        bars = np.array([[[f["mean"] - f[low]], [f[high] - f["mean"]]] for f in figures[:2]])
+        bars = np.array([[[f["mean"] - f[low]], [f[high] - f["mean"]]] for f in metrics[:2]])
         if np.isfinite(bars).all():
             return point, np.maximum(bars, 0.0), kind
     return point, None, ""
 
 
-def _ratio_ends(gap, share):
+def _ratio_ends(gap, fraction):
     """Return (low, high) of 1 + difference/baseline; a ratio of deviations is never negative."""
     if gap["low"] != gap["low"] or gap["mean"] == 0.0:
         return (np.nan, np.nan) if gap["low"] != gap["low"] else (1.0, 1.0)
-    return tuple(max(0.0, 1.0 + share * gap[end] / gap["mean"]) for end in ("low", "high"))
+    return tuple(max(0.0, 1.0 + fraction * gap[end] / gap["mean"]) for end in ("low", "high"))
 
 
-def _label_marks(figure, axes, names, points, areas, places, ratios):
-    """Write each name beside its mark, if possible without covering a mark, bar or other name."""
+def _label_marks(figure, axes, names, points, areas, positions, ratios):
+    """Write each name next to its mark, if possible without covering a mark, bar or other name."""
     from matplotlib.patheffects import withStroke
 
-    figure.draw_without_rendering()  # settles the layout, and with it where the marks are
+    figure.draw_without_rendering()  # fixes the layout and the positions of the marks
     size, per_point = 8.0, figure.dpi / 72.0
 
     def placed(where):
@@ -243,7 +243,7 @@ def _label_marks(figure, axes, names, points, areas, places, ratios):
 
     centres, radii = placed(points), 0.5 * np.sqrt(areas)
     taken = [(x - r, y - r, x + r, y + r) for (x, y), r in zip(centres, radii, strict=True)]  # in points
-    for point, (_, bars, _) in zip(points, places, strict=True):
+    for point, (_, bars, _) in zip(points, positions, strict=True):
         if bars is not None:
             low, high = placed([point - bars[:, 0, 0], point + bars[:, 1, 0]])
             x, y = placed([point])[0]
@@ -277,7 +277,7 @@ def _label_marks(figure, axes, names, points, areas, places, ratios):
 
 
 def evaluation_plots(table, board, folder):
-    """Plot a results folder with its table and leaderboard; return the paths.
+    """Plot the results of a folder from its table and leaderboard; return the paths.
 
     pareto.png: rotor-speed against platform-pitch deviation; metrics.png: the controllers over all cases;
     boxes.png, timeseries_CASE.png and spectra_CASE.png: quartiles, series and spectra of the first seed of
@@ -313,6 +313,6 @@ def evaluation_plots(table, board, folder):
 
 
 def platform_pitch_period(platform):
-    """Return the natural period (s) in platform pitch of a platform's file, or None."""
+    """Return the published natural period in platform pitch, s, or None."""
     description = platform if isinstance(platform, Platform) else read_platform(platform)
     return description.published.get("natural_periods", {}).get("pitch")

@@ -1,4 +1,4 @@
-"""A self-contained HTML page of an evaluation: table, plots, schedule, provenance.
+"""Writes a self-contained HTML page of an evaluation: table, plots, schedule, provenance.
 
     from fowt_env.training.reports.html_page import write_report
     write_report("results/above_rated")
@@ -51,17 +51,17 @@ SCHEDULE_WINDS = (4.0, 6.0, 8.0, 10.0, 11.0, 11.5, 12.0, 13.0, 14.0, 16.0, 18.0,
 def write_report(
     folder, out=None, cases=None, seeds=None, rate=None, platform=None, schedule=True, progress=None
 ):
-    """Write the HTML page of an evaluation's folder; return its path.
+    """Write the HTML page of an evaluation folder; return its path.
 
     folder     contains results.csv (or metrics.csv) and runs/<controller>/<case>_seed<n>.parquet, and
                optionally leaderboard.json and manifest.json
     out        the page; None: report.html in the folder
     cases      names of the cases with time series; None: all
-    seeds      seeds with time series; None: all. With neither, at most MAX_SERIES_RUNS runs have them: the
+    seeds      seeds with time series; None: all. Without cases and seeds, at most MAX_SERIES_RUNS runs: the
                first seed of each case (of evenly spaced cases, if these are too many), then further seeds
-    rate       samples per second of the series, means over their interval; None: DISPLAY_RATE, or what
-               MAX_POINTS allow
-    platform   of the steady schedule; None: that of the manifest's cases, else oc3_hywind; if its file
+    rate       samples per second of the series, means over the interval; None: DISPLAY_RATE, less for series
+               of more than MAX_POINTS samples
+    platform   platform of the steady schedule; None: the manifest's, else oc3_hywind; if the platform file
                cannot be read here, the page says so in place of the schedule
     schedule   whether the page has a steady schedule (some seconds)
     progress   called as progress(done, total, text)
@@ -79,7 +79,7 @@ def write_report(
     if rate is not None:
         check_number("rate", rate, 0.0, low_open=True, allowed="a positive number of samples per second")
     if not folder.is_dir():
-        raise InputError(f"results {str(folder)!r} is no folder: make one with fowt evaluate --out FOLDER")
+        raise InputError(f"results {str(folder)!r} is not a folder: create it with fowt evaluate --out")
     table = read_results(folder)
     manifest, path = _json_file(folder / "manifest.json"), folder / "leaderboard.json"
     board_file = check_leaderboard(_json_file(path), path) if path.is_file() else None
@@ -105,7 +105,7 @@ def write_report(
 
 
 def _json_file(path):
-    """Return the mapping of a JSON file, {} without one. Raises: InputError for any other content."""
+    """Return the mapping in a JSON file, {} if the file is missing. Raises: InputError for other content."""
     if not path.is_file():
         return {}
     try:
@@ -143,8 +143,8 @@ def _chosen_runs(table, cases, seeds):
 def _read_runs(folder, table, chosen, about, rate, say):
     """Return {"series": {case: {seed: {controller: run}}}, "pool", "quantiles", "rates" (Hz), "missing": n}.
 
-    Every run is read once: for the box plots, and for its time series if it is a chosen one.
-    about: {case: mapping} of the manifest. pool: codes of the series, each once; a series has its index.
+    Every run is read once, for the box plots and, if in `chosen`, for its time series.
+    about: {case: mapping} of the manifest. pool: distinct codes of the series, which refer to them by index.
     """
     drawn, pool = set(chosen.index), {}
     periods = {}
@@ -187,7 +187,7 @@ def _read_runs(folder, table, chosen, about, rate, say):
 
 
 def _skipped(row, frame, about):
-    """Return the seconds at the start of a run that are not scored, of the manifest or the table."""
+    """Return the unscored time at the start of a run, s, from the manifest or the table."""
     if is_number(about.get("skip")):
         return float(max(0.0, about["skip"]))
     scored = row.get("scored_[s]", float("nan"))
@@ -199,14 +199,14 @@ def _drawn_run(frame, skip, rate, pitch_period, pool):
     """Return ({"series", "spectra", "marks", "start", "skip"} of one run, samples per second)."""
     time = frame[TIME].to_numpy(dtype=float)
     step = (time[-1] - time[0]) / (len(time) - 1)
-    wanted = DISPLAY_RATE if rate is None else rate
-    block = max(1, round(1.0 / (wanted * step)))
+    target_rate = DISPLAY_RATE if rate is None else rate
+    block = max(1, round(1.0 / (target_rate * step)))
     if rate is None:
         block = max(block, -(-len(time) // MAX_POINTS))
     present = [channel for _, channel in PANELS if channel in frame.columns]
     series = {}
     for channel in present:
-        values = frame[channel].to_numpy(dtype=float)  # means of blocks; a shorter rest is left out
+        values = frame[channel].to_numpy(dtype=float)  # means of blocks; an incomplete last block is dropped
         values = values[: len(values) // block * block].reshape(-1, block).mean(axis=1)
         series[channel] = _packed(values, time[0] + 0.5 * (block - 1) * step, block * step, pool)
     scored = frame[time >= time[0] + skip - 1e-9]
@@ -219,8 +219,8 @@ def _drawn_run(frame, skip, rate, pitch_period, pool):
                 logs = np.full(inside.sum(), np.nan)
                 np.log10(density[inside], out=logs, where=density[inside] > 0.0)
                 spectra[channel] = _packed(logs, frequency[inside][0], frequency[1] - frequency[0], pool)
-    found = frequency_marks(scored, pitch_period) if spectra else ()
-    marks = [[f"{name} {at:.3g} Hz", float(at)] for name, at in found]
+    marked = frequency_marks(scored, pitch_period) if spectra else ()
+    marks = [[f"{name} {at:.3g} Hz", float(at)] for name, at in marked]
     run = {"series": series, "spectra": spectra, "marks": marks, "start": float(time[0]), "skip": skip}
     return run, float(f"{1.0 / (block * step):.4g}")
 
@@ -228,7 +228,7 @@ def _drawn_run(frame, skip, rate, pitch_period, pool):
 def _packed(values, start, step, pool):
     """Return evenly spaced values as 16-bit codes between their bounds, in base64; code 0 is missing.
 
-    pool: {codes: index}, to which they are added, so that equal series (the weather) are stored once.
+    pool: {codes: index}; new codes are added, so that equal series (the weather) are stored once.
     """
     finite = np.isfinite(values)
     low, high = (float(values[finite].min()), float(values[finite].max())) if finite.any() else (0.0, 0.0)
@@ -236,25 +236,25 @@ def _packed(values, start, step, pool):
     codes = np.zeros(len(values), dtype="<u2")
     codes[finite] = 1 + (np.rint((values[finite] - low) / span * 65534.0) if span > 0.0 else 0)
     text = base64.b64encode(codes.tobytes()).decode("ascii")
-    place = pool.setdefault(text, len(pool))
-    return {"codes": place, "low": low, "high": high, "start": float(start), "step": float(step)}
+    index = pool.setdefault(text, len(pool))
+    return {"codes": index, "low": low, "high": high, "start": float(start), "step": float(step)}
 
 
 def _rounded(values):
-    """Return floats with six digits, and None for NaN, which JSON lacks."""
+    """Return floats rounded to six digits, and None for NaN, which JSON lacks."""
     return [float(f"{v:.6g}") if v is not None and np.isfinite(v) else None for v in values]
 
 
 def _rounded_items(values):
-    """Return the mapping with its floats rounded, without None."""
+    """Return the mapping with floats rounded to six digits, without items that are None."""
     return {name: float(f"{value:.6g}") for name, value in values.items() if value is not None}
 
 
 def _schedule(chosen, about, say):
     """Return {"platform", "wind", "panels"} of the steady operating points over wind speed.
 
-    chosen: platform; None: the only one of the manifest's cases, else oc3_hywind, and {"platform",
-    "missing": why} if that has no file here.
+    chosen: platform; None: the only platform of the manifest's cases, else oc3_hywind; {"platform",
+    "missing": reason} if the file of that platform is missing.
     """
     import fowt_env
 
@@ -305,7 +305,7 @@ def _means(table, metrics, case):
         by_case = (group[metrics] ** exponents).groupby(group["case"]).mean().reindex(cases).to_numpy()
         shares = np.ones(1) if case != ALL_CASES else case_shares(group, cases)
         means = lifetime_means(by_case[:, None] ** (1.0 / exponents), np.ones((1, 1)), shares, exponents)[0]
-        whole = set(group.loc[group["status"] == OK, "case"]) == set(cases)  # else there is no lifetime mean
+        whole = set(group.loc[group["status"] == OK, "case"]) == set(cases)  # else no lifetime mean
         values = dict(zip(metrics, _rounded(means if whole else np.full_like(means, np.nan)), strict=True))
         counts = lost_counts(group["status"])
         lost = {"lost": sum(counts.values()), "lost_text": lost_text(counts)}
@@ -316,7 +316,7 @@ def _means(table, metrics, case):
 def _board_rows(board, case):
     """Return leaderboard rows of a LeaderboardFile: means and paired differences, with their intervals.
 
-    p: {metric: p-value} of the tested differences, corrected for their number; {}: none is tested.
+    p: {metric: p-value} of the tested differences, corrected for their number; {}: no tests.
     """
     rows = []
     for entry in board.controllers:
@@ -353,7 +353,7 @@ def _intervals(figures):
 
 
 def _remark(table, board_file, case):
-    """Return a line on runs, cases, seeds and tests of the leaderboard."""
+    """Return a remark on the runs, cases, seeds and tests of the leaderboard."""
     part = table if case == ALL_CASES else table[table["case"] == case]
     seeds = sorted(set(part["seed"]))
     text = f"{counted(len(part), 'run')}, {counted(part['case'].nunique(), 'case')}, {seeds_text(seeds)}."
@@ -371,7 +371,7 @@ def _remark(table, board_file, case):
 def _fine_print(board_file, interval):
     """Return HTML of the help text of the leaderboard."""
     lines = [
-        "Choose a heading to sort by it; it also explains the metric. Bold: the best of a column, among"
+        "Click a heading to sort by that column; its tooltip explains the metric. Bold: best of column among"
         " controllers that lost no run."
     ]
     names = ", ".join(short_name(name) for name in TESTED)
@@ -379,12 +379,12 @@ def _fine_print(board_file, interval):
         lines.append("Means over the lifetime, of the runs that ended well.")
     elif board_file.baseline is not None:
         lines += [
-            f"Differences are paired: each run against that of {html.escape(board_file.baseline)} in the same"
+            f"Differences are paired: each run minus that of {html.escape(board_file.baseline)} in the same"
             " wind and waves.",
-            "* significant: without a real difference, one as large would be found with a probability of at"
+            "* significant: if there were no difference, one as large would be seen with a probability of at"
             f" most {1.0 - interval.level:.2g} (p-value with Holm's correction over the {len(TESTED)} tested"
             f" metrics: {names})."
-            " Without a star a difference may be due to chance, which does not prove that there is none.",
+            " A difference without a star may be due to chance, which does not prove that it is zero.",
             '<span class="better">✓ better</span> and <span class="worse">✗ worse</span> than the baseline;'
             " grey: tested and not significant; regular weight: not tested.",
         ]
@@ -402,7 +402,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         case: _means(table, names, case) if board_file is None else _board_rows(board_file, case)
         for case in [ALL_CASES, *cases]
     }
-    about = "Score of the suite: weighted mean of metrics over the baseline's. Less is better."
+    about = "Score of the suite: weighted mean of the ratios of metrics to the baseline's. Less is better."
     score = {"name": "score", "label": "score", "unit": "", "headline": True, "better": -1, "about": about}
     if any(row["values"].get("score") is not None for row in board[ALL_CASES]):
         metrics = [score, *metrics]
@@ -452,7 +452,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
 
 
 def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
-    """Return {placeholder: HTML} of the page's texts; every name is escaped."""
+    """Return {placeholder: HTML} of the texts of the page; every name is escaped."""
     series = "The samples are means over 1/rate seconds; the files under runs/ contain every sample."
     shown = sum(len(each) for each in runs["series"].values())
     known = sum(map(len, data["seeds"].values()))
@@ -483,7 +483,7 @@ def _page_texts(folder, table, manifest, board_file, data, runs, schedule):
 
 
 def _schedule_section(schedule):
-    """Return HTML of the section of the steady schedule, or why it is missing; "" for none."""
+    """Return HTML of the steady schedule's section, or the reason why it is missing; "" for none."""
     if not schedule:
         return ""
     if "missing" in schedule:

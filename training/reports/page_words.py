@@ -1,4 +1,4 @@
-"""HTML texts of a report page, all escaped: title, conditions of the cases, lost runs, provenance, policy."""
+"""Builds the HTML texts of a report page, escaped: title, case conditions, lost runs, provenance, policy."""
 
 import base64
 import hashlib
@@ -13,7 +13,7 @@ from fowt_env.training.evaluation.conditions import sea_text, wind_text
 from fowt_env.training.evaluation.run_case import OK
 from fowt_env.training.reports.metric_words import counted, numbers_text, seeds_text
 
-NAMED_CASES = 3  # the most cases that a title names
+NAMED_CASES = 3  # maximum number of cases named in a title
 WIND_KINDS = {
     "ntm": "normal turbulence (NTM)",
     "etm": "extreme turbulence (ETM)",
@@ -27,14 +27,14 @@ WIND_KINDS = {
 
 
 def described_cases(manifest):
-    """Return {case: mapping} of a manifest; anything but a mapping is left out."""
+    """Return {case: mapping} of the cases of a manifest; entries that are not mappings are omitted."""
     cases = manifest.get("cases")
-    found = cases.items() if isinstance(cases, dict) else ()
-    return {name: case for name, case in found if isinstance(case, dict)}
+    items = cases.items() if isinstance(cases, dict) else ()
+    return {name: case for name, case in items if isinstance(case, dict)}
 
 
 def page_title(manifest, cases):
-    """Return the title: the platform, and the suite or the cases by name or number."""
+    """Return the title of the page: the platform, and the suite or the cases by name or number."""
     about = described_cases(manifest)
     platforms = {str(about[name].get("platform")) for name in cases if name in about} - {"None"}
     where = f"{len(platforms)} platforms" if len(platforms) > 1 else Path(min(platforms, default="")).stem
@@ -57,9 +57,9 @@ def page_lead(table, manifest):
 
 
 def case_conditions(table, manifest, shares=None):
-    """Return [{heading: text}] of the conditions of the cases of a table, in its order.
+    """Return [{heading: text}] of the conditions of the cases of a table, in the table's order.
 
-    shares: {case: share of the lifetime}, or None. A case that is not in the manifest has only its seeds.
+    shares: {case: fraction of the lifetime}, or None. A case missing in the manifest has only its seeds.
     """
     about, rows = described_cases(manifest), []
     for name, runs in table.groupby("case", sort=False):
@@ -71,7 +71,7 @@ def case_conditions(table, manifest, shares=None):
             row["sensors"] = str(case.get("sensors", ""))
         row["seeds"] = numbers_text(sorted(set(runs["seed"])))
         if shares is not None:
-            row["share of the lifetime"] = f"{100.0 * shares[name]:.1f} %"
+            row["fraction of lifetime"] = f"{100.0 * shares[name]:.1f} %"
         rows.append(row)
     return rows
 
@@ -86,7 +86,7 @@ def conditions_text(row):
 
 
 def conditions_table(rows):
-    """Return the rows of an HTML table of case_conditions, without empty columns and a common platform."""
+    """Return the HTML rows of case_conditions, without empty columns and a common platform."""
     headings = list(dict.fromkeys(heading for row in rows for heading in row))
     kept = [name for name in headings if any(row.get(name) for row in rows)]
     if len({row.get("platform") for row in rows}) == 1 and "platform" in kept:
@@ -125,7 +125,7 @@ def _sea(sea):
 
 
 def _events(case):
-    """Return the text of faults, shifts and starts of a manifest's case, "" for none."""
+    """Return the text of the faults, offsets and initial conditions of a manifest's case, "" for none."""
     parts = ["parked"] if case.get("parked") else []
     fault = case.get("fault")
     if isinstance(fault, dict):
@@ -142,7 +142,7 @@ def _number(value):
 
 
 def lost_runs(table):
-    """Return [(controller, case, seed, text)] of lost runs; text: status, time and reason, each once."""
+    """Return [(controller, case, seed, text)] of lost runs, with status, time and reason in the text."""
     lost = []
     for row in table[table["status"] != OK].to_dict("records"):
         at, status, reason = row.get("stopped_[s]"), row["status"], row["reason"]
@@ -164,7 +164,7 @@ def lost_list(lost, runs):
 
 
 def provenance(folder, table, manifest, board_file):
-    """Return the rows of the table of provenance, as HTML."""
+    """Return the HTML rows of the provenance table."""
     facts, suite = {"folder": folder.resolve().name}, manifest.get("suite")
     if manifest:
         facts["suite"], site = suite, None
@@ -173,8 +173,8 @@ def provenance(folder, table, manifest, board_file):
             site = suite.get("site")
         facts |= {"created": manifest.get("created"), "plant sources": manifest.get("plant")}
         trips = [case.get("trip") for case in described_cases(manifest).values()]
-        found = {f"{_number(trip)} times rated rotor speed": None for trip in trips if trip is not None}
-        facts["overspeed trip"] = " or ".join(found)
+        thresholds = {f"{_number(trip)} times rated rotor speed": None for trip in trips if trip is not None}
+        facts["overspeed trip"] = " or ".join(thresholds)
         if isinstance(site, dict):
             facts["site"] = f"Weibull A = {site.get('A')} m/s, k = {site.get('k')} ({site.get('source')})"
         for key in ("versions", "options", "controllers"):
@@ -196,7 +196,7 @@ def provenance(folder, table, manifest, board_file):
 
 
 def _brief(label, value):
-    """Return a manifest's value as a short text: a controller's name, if it differs, and its hash."""
+    """Return a value of the manifest as short text; a controller's name only if it differs from its label."""
     if not isinstance(value, dict):
         return str(value)
     words = [str(item) for key, item in value.items() if not (key == "name" and item == label)]
@@ -206,7 +206,7 @@ def _brief(label, value):
 def content_policy(scripts=(), styles=(), dynamic_styles=False):
     """Return the Content-Security-Policy: a script runs only if its hash is in it, and no network is used.
 
-    scripts, styles: contents of the page's elements, exactly as between their tags. dynamic_styles: whether
+    scripts, styles: exact contents of the script and style elements of the page. dynamic_styles: whether
     any style may be set, as plotting libraries do.
     """
     style = "'unsafe-inline'" if dynamic_styles else _hashes(styles)
@@ -215,7 +215,7 @@ def content_policy(scripts=(), styles=(), dynamic_styles=False):
 
 
 def _hashes(texts):
-    """Return the sources of inline texts, "'none'" for none; HTML parsers read line ends as line feeds."""
+    """Return the policy sources of inline texts, "'none'" for none; HTML parsers turn line ends into LF."""
     plain = (text.replace("\r\n", "\n").replace("\r", "\n").encode("utf-8") for text in texts)
     digests = (base64.b64encode(hashlib.sha256(text).digest()).decode("ascii") for text in plain)
     return " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"

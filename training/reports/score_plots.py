@@ -1,4 +1,4 @@
-"""Plots of agents with baselines and the performance limit, and of one gust under many controllers.
+"""Plots agents with baselines and the performance limit, and one gust under many controllers.
 
 As in visual/time_series.py, every function returns a matplotlib Figure and writes it to a path, if any.
 """
@@ -11,7 +11,7 @@ from fowt_env.visual.style import COLOURS, INK, new_figure
 from fowt_env.visual.time_series import PANELS, TIME, named_runs, plot_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
-FRONTS = {  # looks
+FRONTS = {  # line styles of the Pareto fronts
     name: {"color": INK, "linewidth": 1.2, "ls": line, "label": text}
     for name, line, text in (
         ("full", "-", "limit: plant, wind and waves"),
@@ -28,7 +28,7 @@ GUST = (  # panels of plot_gust
 
 
 def plot_fractions(fractions, bound, path=None, title=None):
-    """Plot rotor-speed against platform-pitch deviation over gspi_oc3's per wind, with Pareto fronts.
+    """Plot rotor-speed and platform-pitch deviation relative to gspi_oc3 per wind, with Pareto fronts.
 
     fractions: bound_scores.bound_fractions; bound: linear_bound.bound_table. Large marks: agents; small ones:
     their training seeds. Hollow: more travel or power deviation than gspi_oc3, so that the limit does not
@@ -40,25 +40,25 @@ def plot_fractions(fractions, bound, path=None, title=None):
     columns = min(4, len(winds) + 1)
     rows = -(-(len(winds) + 1) // columns)
     figure = new_figure(3.1 * columns + 0.6, 3.1 * rows + 0.3)
-    places = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+    panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
     names = list(dict.fromkeys(fractions["agent"]))
-    styles = list(zip(names, cycle(COLOURS), cycle(AGENT_MARKERS), strict=False))  # 84 differ
-    for axes, wind in zip(places, winds, strict=False):
+    styles = list(zip(names, cycle(COLOURS), cycle(AGENT_MARKERS), strict=False))  # 84 distinct styles
+    for axes, wind in zip(panels, winds, strict=False):
         draw_fronts(axes, bound, wind, FRONTS, (FRAME, FRAME))
         at = fractions[fractions[WIND] == wind]
         beyond = 0
         for name, colour, mark in styles:
             beyond += _marks(axes, at[at["agent"] == name], colour, mark, beyond)
             style = {"facecolor": colour, "edgecolor": INK, "linewidth": 0.5}
-            axes.scatter([], [], marker=mark, s=46, label=name, **style)  # of the legend
+            axes.scatter([], [], marker=mark, s=46, label=name, **style)  # legend entry
         axes.scatter([], [], marker="o", s=46, facecolor="none", edgecolor=INK, label=HOLLOW)
-    return finish_bound(figure, places, len(winds), path, title)
+    return finish_bound(figure, panels, len(winds), path, title)
 
 
 def _marks(axes, rows, colour, mark, beyond):
     """Draw one agent at one wind; return the number of agents (0 or 1) outside the frame.
 
-    Such an agent is written as text in the corner, below `beyond` others.
+    The ratios of such an agent are written in the corner, below those of `beyond` other agents.
     """
     outside = 0
     for row in rows.sort_values("seed_of").to_dict("records"):
@@ -66,15 +66,15 @@ def _marks(axes, rows, colour, mark, beyond):
         x, y = row["speed_ratio_[-]"], row["pitch_ratio_[-]"]
         if max(x, y) > FRAME:
             if whole:
-                place = 0.98 * FRAME, (0.96 - 0.06 * beyond) * FRAME
-                axes.annotate(f"{x:.2f}, {y:.2f}", place, fontsize=7, color=colour, ha="right", va="center")
-                axes.scatter(0.72 * FRAME, place[1], marker=mark, s=14, color=colour)
+                corner = 0.98 * FRAME, (0.96 - 0.06 * beyond) * FRAME
+                axes.annotate(f"{x:.2f}, {y:.2f}", corner, fontsize=7, color=colour, ha="right", va="center")
+                axes.scatter(0.72 * FRAME, corner[1], marker=mark, s=14, color=colour)
                 outside = 1
             continue
         style = {"facecolor": colour, "edgecolor": INK if whole else "white", "linewidth": 0.5}
         if not row["within"]:
             style = {"facecolor": "white" if whole else "none", "edgecolor": colour, "linewidth": 1.2}
-        size, level = (46, 6) if whole else (14, 7)  # the seeds lie upon their mean
+        size, level = (46, 6) if whole else (14, 7)  # seeds are drawn above their mean
         axes.scatter(x, y, marker=mark, s=size, zorder=level, **style)
     return outside
 

@@ -1,11 +1,11 @@
-"""Scores of agents against baselines on the same runs: ratios of lifetime means, with 95 % intervals.
+"""Scores agents against baselines on the same runs: ratios of lifetime means, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
     fowt scores baselines results/rl --against gspi_oc3,rosco_float
 
 Both means are over the lifetime, in the same wind and waves. Training seeds of one configuration form a
 group, whose interval resamples training and weather seeds (training.evaluation.bootstrap). A lost run of an
-agent counts PENALTY times the baseline's metrics of that case and seed; one of the baseline has no ratio.
+agent counts PENALTY times the baseline's metrics of that case and seed; lost baseline runs have no ratio.
 """
 
 import re
@@ -31,7 +31,7 @@ PAST_ANY = "past a constraint"
 
 
 class Figure(NamedTuple):
-    """A metric scored as ratio to a baseline's, with a first and a second target (None: no target).
+    """Defines a metric scored as ratio to a baseline's, with a first and a second target (None: no target).
 
     more: whether the ratio must be at least the target; else at most.
     """
@@ -55,11 +55,11 @@ class Figure(NamedTuple):
             return "failed"
         aims = [aim for aim in (self.first, self.then) if aim is not None]
         met = sum((ratio >= aim) if self.more else (ratio <= aim) for aim in aims)
-        found = "missed" if not met else "met" if len(aims) == 1 else "then" if met == 2 else "first"
+        text = "missed" if not met else "met" if len(aims) == 1 else "then" if met == 2 else "first"
         sure = (*sure, False, False)
         if not sure[0]:
-            return found
-        return "then, first*" if found == "then" and not sure[1] else f"{found}*"
+            return text
+        return "then, first*" if text == "then" and not sure[1] else f"{text}*"
 
 
 FIGURES = (
@@ -82,7 +82,7 @@ COUNTS = {  # constraint: metric that counts how often it was exceeded
 
 
 def figures_named(names):
-    """Return the Figures of names: those of FIGURES, and metrics as figures without a target.
+    """Return the Figures with these names: those of FIGURES, or metrics as Figures without a target.
 
     Raises: InputError for other names.
     """
@@ -95,7 +95,7 @@ def figures_named(names):
 
 
 def grouped(table, baselines, groups=None, agents=None):
-    """Return {name: labels of its training seeds} of groups, then single agents.
+    """Return {name: labels of the training seeds} of the groups and then of single agents.
 
     groups: {name: labels}. agents: labels; None: all that are neither baselines nor in a group.
     Raises: InputError for labels without runs, and for duplicate names.
@@ -118,7 +118,7 @@ def grouped(table, baselines, groups=None, agents=None):
 
 
 def agent_scores(table, baselines, groups=None, agents=None, figures=FIGURES):
-    """Return a DataFrame: per agent or group, baseline and figure the ratio, its interval and a verdict.
+    """Return a DataFrame with ratio, interval and verdict per agent or group, baseline and figure.
 
     table: of evaluate.evaluate; groups, agents: as in `grouped`. Columns: agent, baseline, figure, metric,
     ratio (of the lifetime means, its mean over the training seeds), low, high (NaN with too few seeds:
@@ -141,11 +141,11 @@ def _scores(table, baselines, chosen, figures):
         made = table[table["controller"].isin(labels)]
         counts = {"runs": len(made), **lost_counts(made["status"]), "training_seeds": len(labels)}
         for baseline, runs in over.items():
-            found = [_ratio_row(runs, labels, baseline, cases, seeds, shares, figure) for figure in figures]
-            if not any(row["pairs"] for row in found):
-                raise InputError(f"{name} and {baseline}: no run of both has a figure")
-            corrected = holm([p for row in found for p in (row["p_first"], row["p_then"])])
-            for figure, row, pair in zip(figures, found, corrected.reshape(-1, 2), strict=True):
+            ratios = [_ratio_row(runs, labels, baseline, cases, seeds, shares, figure) for figure in figures]
+            if not any(row["pairs"] for row in ratios):
+                raise InputError(f"{name} and {baseline}: no run of both has a value")
+            corrected = holm([p for row in ratios for p in (row["p_first"], row["p_then"])])
+            for figure, row, pair in zip(figures, ratios, corrected.reshape(-1, 2), strict=True):
                 sure = [p <= 1.0 - LEVEL for p in pair]
                 verdict = figure.verdict(row["ratio"], sure, sum(counts[kind] for kind in KINDS))
                 row |= {"holm_first": pair[0], "holm_then": pair[1], **counts, "verdict": verdict}
@@ -155,8 +155,8 @@ def _scores(table, baselines, chosen, figures):
 
 def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
     """Return {column: value} of one Figure: ratio, interval, p-values, pairs."""
-    places = pd.MultiIndex.from_product([[*labels, baseline], cases, seeds])
-    values = runs[figure.metric].reindex(places).to_numpy(dtype=float)  # NaN: failed, or no such run
+    index = pd.MultiIndex.from_product([[*labels, baseline], cases, seeds])
+    values = runs[figure.metric].reindex(index).to_numpy(dtype=float)  # NaN: failed or missing run
     values = values.reshape(-1, len(cases), len(seeds))
     exponent, positive = mean_exponent(figure.metric), never_negative(figure.metric)
     estimate = crossed_ratio(values[:-1], values[-1], shares, exponent, positive=positive)
@@ -167,7 +167,7 @@ def _ratio_row(runs, labels, baseline, cases, seeds, shares, figure):
 
 
 def agent_counts(table, baselines, groups=None, agents=None):
-    """Return a DataFrame: per agent, group and baseline its runs, lost runs and exceeded constraints.
+    """Return a DataFrame with runs, lost runs and exceeded constraints per agent, group and baseline.
 
     Columns: agent, inputs (of `inputs`), runs, failed, tripped, lost_power, the names of COUNTS (runs that
     exceed it at least once), PAST_ANY, largest overspeed (%), verdict ("met" if no run was lost and no
@@ -199,7 +199,7 @@ def inputs(label):
     "" for labels that name neither a controller of the package nor an existing agent or design.
     """
     if ":" in label and not label.startswith((POLICY, DESIGN)):
-        return ""  # a table must not run code of the user
+        return ""  # labels of a table must not execute user code
     try:
         used = information(label)
     except InputError:
@@ -216,7 +216,7 @@ def kind_of(case):
 def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=False):
     """Return (scores, counts) of agent_scores and agent_counts per kind of case, in a first column `kind`.
 
-    each: every case is a kind; else the winds of a kind (kind_of) are taken together. Ratios are NaN in a
+    each: every case is a separate kind; else all winds of a kind (kind_of) are pooled. Ratios are NaN in a
     kind in which an agent has no metric. p-values are corrected for the figures of one kind.
     """
     chosen = grouped(table, [baseline], groups, agents)
@@ -226,7 +226,7 @@ def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=Fal
         for name, labels in chosen.items():
             try:
                 scores.append(_scores(here, [baseline], {name: labels}, figures).assign(kind=kind))
-            except (InputError, KeyError):  # no run has a metric, as the counts show
+            except (InputError, KeyError):  # no run has a metric; the counts show it
                 blank = {"agent": name, "baseline": baseline, "kind": kind, "pairs": 0, "verdict": ""}
                 scores.append(pd.DataFrame([blank | {"figure": figure.name} for figure in figures]))
     whole = pd.concat(scores, ignore_index=True), pd.concat(counts, ignore_index=True)
@@ -234,7 +234,7 @@ def by_kind(table, baseline, groups=None, agents=None, figures=FIGURES, each=Fal
 
 
 def ratio_text(row):
-    """Return the text of a row of agent_scores: ratio [low, high]."""
+    """Return the ratio of a row of agent_scores as text: ratio [low, high]."""
     if not np.isfinite(row["ratio"]):
         return "-"
     ends = f" [{row['low']:.3f}, {row['high']:.3f}]" if np.isfinite(row["low"]) else ""
@@ -250,7 +250,7 @@ def frame_markdown(frame):
 def wide_markdown(frame, texts, title, index, column, rows=None):
     """Return the markdown table of texts of the rows of a frame: values of `index` by those of `column`.
 
-    rows: values of `index` that are shown; None: all. Order is that of the frame.
+    rows: values of `index` that are shown; None: all. Rows keep the order of the frame.
     """
     wide = frame.assign(text=texts).pivot(index=index, columns=column, values="text")
     wide = wide.loc[frame[index].unique() if rows is None else rows, frame[column].unique()]
@@ -259,14 +259,14 @@ def wide_markdown(frame, texts, title, index, column, rows=None):
 
 
 def _remark(scores):
-    """Return [line] on why ratios have no interval; [] if each has one."""
+    """Return [line] on why ratios have no interval; [] if every ratio has an interval."""
     bare = np.isfinite(scores["ratio"]) & ~np.isfinite(scores["low"])
     text = f"No interval: fewer than {LEAST_SEEDS} weather seeds, or two or three training seeds.\n"
     return [text] if bare.any() else []
 
 
 def scores_markdown(scores, counts):
-    """Return markdown of agent_scores and agent_counts: a table per baseline, one of failures."""
+    """Return agent_scores and agent_counts as markdown: one table per baseline and one of failures."""
     parts = []
     for baseline, rows in scores.groupby("baseline", sort=False):
         texts = [f"{ratio_text(row)} {row['verdict']}".rstrip() for row in rows.to_dict("records")]
@@ -278,7 +278,7 @@ def scores_markdown(scores, counts):
 
 
 def kinds_markdown(scores, counts, figures=None):
-    """Return markdown of by_kind: a table per figure (names; None: all), one of failures."""
+    """Return by_kind as markdown: one table per figure (names; None: all) and one of failures."""
     parts = []
     for name in figures or scores["figure"].unique():
         rows = scores[scores["figure"] == name]

@@ -1,4 +1,4 @@
-"""Tables of the faults that each controller survives, from an evaluation of the suite faults."""
+"""Tabulates the faults that each controller survives, from an evaluation of the suite faults."""
 
 import numpy as np
 import pandas as pd
@@ -18,12 +18,12 @@ NEVER = "-"  # a run did not come to rest
 
 
 def survival(table, limits=None):
-    """Return a DataFrame by kind of case and controller: runs, survived runs, trips, largest motions, loads.
+    """Return a DataFrame with runs, survived runs, trips, largest motions and loads per kind and controller.
 
-    table    of read_results
-    limits   {metric: greatest value} of a survived run; None: those of the suite faults
-    A run survived if it neither failed (capsize, numerical blow-up, a controller's error) nor exceeded a
-    limit; a trip is no failure. Platform pitch and moment: the larger of both directions. standstill: NaN
+    table    as of read_results
+    limits   {metric: maximum value} of a survived run; None: those of the suite faults
+    A run survives if it neither fails (capsize, numerical divergence, controller error) nor exceeds a
+    limit; a trip is not a failure. Platform pitch and moment: the larger of both directions. standstill: NaN
     if a stopped run does not come to rest.
     """
     limits = read_suite("faults").limits.run if limits is None else limits
@@ -53,7 +53,7 @@ def survival(table, limits=None):
 
 
 def _size(table, name):
-    """Return the larger magnitude of a channel's least and greatest value."""
+    """Return the larger magnitude of a channel's minimum and maximum."""
     return np.maximum(table[name.format("max")].abs(), table[name.format("min")].abs())
 
 
@@ -63,8 +63,8 @@ def survival_markdown(found):
     def part(title, texts, rows=None):
         return wide_markdown(found, texts, title, "kind", "controller", rows)
 
-    shares = [f"{kept} of {runs}" for kept, runs in zip(found["survived"], found["runs"], strict=True)]
-    parts = [part("survived", shares)]
+    counts = [f"{kept} of {runs}" for kept, runs in zip(found["survived"], found["runs"], strict=True)]
+    parts = [part("survived", counts)]
     for title, (column, digits) in FIGURES.items():
         texts = [NEVER if np.isnan(value) else f"{value:.{digits}f}" for value in found[column]]
         parts.append(part(title, texts, found["kind"][found[column].notna()].unique()))

@@ -1,43 +1,43 @@
-"""The printed tables of an evaluation."""
+"""Formats the printed tables of an evaluation."""
 
 from fowt_env.training.evaluation.bootstrap import holm
 from fowt_env.training.evaluation.failures import KINDS, lost_text
 from fowt_env.training.reports.metric_words import counted, seeds_text
 
-# printed columns: heading, metric, format, place among those that a narrow terminal lacks, title of its plot
+# printed columns: heading, metric, format, order of removal on a narrow terminal (None: kept), plot title
 PRINTED_METRICS = (
     ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f", 3, "rotor speed, mean (rpm)"),
     ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f", None, "rotor speed, std (rpm)"),
-    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", None, "greatest rotor speed above rated (%)"),
+    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", None, "rotor speed above rated, max (%)"),
     ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f", 8, "power up to rated, mean (kW)"),
     ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f", 6, "power, std (kW)"),
-    ("great-\nest\npower\nkW", "GenPwr_max_[kW]", ".0f", 7, "greatest power (kW)"),
+    ("power\n\nmax\nkW", "GenPwr_max_[kW]", ".0f", 7, "power, max (kW)"),
     ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f", 5, "platform pitch, mean (deg)"),
     ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f", None, "platform pitch, std (deg)"),
-    ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f", 4, "platform pitch, greatest (deg)"),
+    ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f", 4, "platform pitch, max (deg)"),
     ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", None, "pitch rate, mean (deg/s)"),
     ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f", None, "torque rate, mean (kN m/s)"),
     ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", 9, "shaft torque, fatigue load (kN m)"),
     ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f", 2, "nacelle acceleration, rms (m/s²)"),
-    ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f", 1, "mooring tension, greatest (kN)"),
+    ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f", 1, "mooring tension, max (kN)"),
 )
 
 
 def summary_rows(means, width):
-    """Return (headings, rows of texts, lost runs per row) of evaluate.summary, in `width` characters."""
+    """Return (headings, rows of texts, lost runs per row) of evaluate.summary for `width` characters."""
     lost = list(means[list(KINDS)].sum(axis=1))
     columns = {name: (name, list(means[name])) for name in ("controller", "case")}
     columns["runs"] = "runs", [f"{n - bad}/{n}" for n, bad in zip(means["runs"], lost, strict=True)]
     for heading, name, form, *_ in PRINTED_METRICS:
         columns[name] = heading, ["-" if value != value else format(value, form) for value in means[name]]
-    drops = {place: name for _, name, _, place, _ in PRINTED_METRICS if place}
-    return *_fitted(columns, [drops[place] for place in sorted(drops)], width), lost
+    drops = {rank: name for _, name, _, rank, _ in PRINTED_METRICS if rank}
+    return *_fitted(columns, [drops[rank] for rank in sorted(drops)], width), lost
 
 
 def _fitted(columns, drops, width):
-    """Return (headings, rows of texts) of {name: (heading, texts)}, with fewer columns if too wide.
+    """Return (headings, rows of texts) of {name: (heading, texts)}, dropping columns to fit the width.
 
-    drops: names of the columns that may be left out, the first one first.
+    drops: names of the columns that may be dropped, in this order.
     """
     for name in (None, *drops):
         columns.pop(name, None)
@@ -56,9 +56,9 @@ LEADERBOARD = (
     ("shaft DEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", False, True),
     ("tower DEL\nkN m", "TwrBsMyt_DEL_[kN-m]", ".0f", False, True),
     ("power up to rated\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
-    ("greatest power\nkW", "GenPwr_max_[kW]", ".0f", False, False),
+    ("maximum power\nkW", "GenPwr_max_[kW]", ".0f", False, False),
 )
-# left out one by one in a narrow terminal; pitch and torque travel stay beside the deviations
+# dropped one by one on a narrow terminal; pitch and torque travel are kept next to the deviations
 LEADERBOARD_DROPS = ("GenPwr_max_[kW]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_capped_mean_[kW]")
 
 
@@ -66,8 +66,8 @@ def leaderboard_rows(board, width=200):
     """Return (title, headings, rows of texts, remarks) of a leaderboard, in `width` characters if possible.
 
     A difference is in percent of the baseline, with "*" if significant: its p-value, corrected for all
-    metrics of the row (bootstrap.holm), is at most 1 less the level of the intervals. Remarks: lines on
-    what the table lacks or does not show, and why.
+    metrics of the row (bootstrap.holm), is at most 1 minus the level of the intervals. Remarks: lines on
+    missing intervals, lost runs, limits and the baseline.
     """
     baseline, entries = board["baseline"], board["controllers"]
     level = board["interval"]["level"]
@@ -112,7 +112,7 @@ def _remarks(board, intervals):
     if board["baseline"] is None and entries:
         lines.append("no paired differences: every controller has runs that failed or lost power")
     if board["baseline"] in lost:
-        lines.append(f"differences from {board['baseline']} are over the runs that it did not lose")
+        lines.append(f"differences from {board['baseline']} are over the runs that the baseline did not lose")
     lines += [f"{e['controller']} exceeds a limit: {'; '.join(e['beyond'])}" for e in entries if e["beyond"]]
     if board["unchecked"]:
         lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")
@@ -120,7 +120,7 @@ def _remarks(board, intervals):
 
 
 def _runs_text(entry):
-    """Return "6/6" of a controller's runs that ended well, with the numbers of lost ones."""
+    """Return the completed runs of a controller as "6/6", with the numbers of lost runs."""
     lost = f", {lost_text(entry)}" if entry["lost"] else ""
     return f"{entry['runs'] - entry['lost']}/{entry['runs']}{lost}"
 

@@ -1,4 +1,4 @@
-"""The outcome of an evaluation in sentences, from the paired statistics of its leaderboard.
+"""Writes the outcome of an evaluation as sentences, from the paired statistics of the leaderboard.
 
 A difference is called better or worse only if it is significant; with too few seeds for a test the sentences
 say so and list the observed differences.
@@ -14,18 +14,18 @@ from fowt_env.training.reports.terminal import LEADERBOARD
 
 TESTED = tuple(metric for _, metric, _, _, different in LEADERBOARD if different)
 OBSERVED = (*TESTED[:3], "GenPwr_capped_mean_[kW]")
-SHOWN = 5  # sentences that are not folded away
+SHOWN = 5  # sentences that are always visible
 
 
 def corrected_p(entry):
-    """Return {metric: p-value} of a LeaderboardEntry over TESTED, corrected by Holm's method; {}: no test."""
+    """Return {metric: p-value} of a LeaderboardEntry over TESTED, with Holm's correction; {}: no test."""
     gaps = {name: entry.difference.get(name) for name in TESTED}
     adjusted = holm([math.nan if gap is None or gap.p is None else gap.p for gap in gaps.values()])
     return {name: float(p) for name, p in zip(gaps, adjusted, strict=True) if math.isfinite(p)}
 
 
 def percent_text(percent):
-    """Return "+34 %", "+9.2 %", "+0.03 %": two digits below ten, with a minus sign and a no-break space."""
+    """Return a percentage as text: "+34 %", "+9.2 %", "+0.03 %", with minus sign and no-break space."""
     size = abs(percent)
     text = f"{size:.{0 if size >= 9.95 else 1 if size >= 0.095 else 2}f}"
     sign = "±" if float(text) == 0.0 else "+" if percent > 0.0 else "\N{MINUS SIGN}"
@@ -33,9 +33,9 @@ def percent_text(percent):
 
 
 def verdict(board, seeds, least_seeds):
-    """Return HTML of the verdict over a LeaderboardFile (or None); every name is escaped.
+    """Return HTML of the verdict on a LeaderboardFile (or None); every name is escaped.
 
-    seeds: number of seeds of the evaluation; least_seeds: the least number for a test.
+    seeds: number of seeds of the evaluation; least_seeds: minimum number for a test.
     """
     if board is None:
         return "<p>No verdict: without leaderboard.json there are no paired differences.</p>"
@@ -44,7 +44,7 @@ def verdict(board, seeds, least_seeds):
         return "<p>No verdict: no baseline, as every controller has runs that failed or lost power.</p>"
     if not others:
         return "<p>No verdict: a single controller was evaluated, without another to compare.</p>"
-    own = [entry for entry in board.controllers if entry.controller == board.baseline and entry.lost]
+    lost = [entry for entry in board.controllers if entry.controller == board.baseline and entry.lost]
     tested = {entry.controller: corrected_p(entry) for entry in others}
     level = 1.0 - board.interval.level
     name = f"<b>{html.escape(board.baseline)}</b>"
@@ -53,7 +53,7 @@ def verdict(board, seeds, least_seeds):
     else:
         count = "A single seed" if seeds == 1 else f"{seeds} seeds"
         head = f"{count}: no difference is tested (that needs {least_seeds} seeds). Observed against {name}:"
-    for entry in own:
+    for entry in lost:
         head += f" The baseline itself lost runs ({_lost(entry)}); these have no differences."
     items = [f"<li>{_sentence(entry, tested[entry.controller], level)}</li>" for entry in others]
     text = f"<p>{head}</p><ul>{''.join(items[:SHOWN])}</ul>"
@@ -76,7 +76,7 @@ def _sentence(entry, tested, level):
     rest = [_gap(name, percent) for name, percent in gaps.items() if name not in sure]
     name = f"<b>{html.escape(entry.controller)}</b>"
     if not gaps:
-        text = f"{name}: no difference is known"
+        text = f"{name}: no difference is available"
     elif not tested:
         text = f"{name}: {', '.join(rest)} (not tested)"
     elif good or bad:
@@ -93,16 +93,16 @@ def _sentence(entry, tested, level):
 
 
 def _gap(name, percent, kind="", star=""):
-    """Return HTML of one difference."""
+    """Return HTML of the difference in one metric."""
     words = f"{html.escape(short_name(name))} {percent_text(percent)}{star}"
     return f'<span class="{kind}">{words}</span>' if kind else words
 
 
 def _joined(parts):
-    """Return "a, b and c"."""
+    """Return a list as text: "a, b and c"."""
     return " and ".join(filter(None, (", ".join(parts[:-1]), *parts[-1:])))
 
 
 def _lost(entry):
-    """Return "1 failed, 2 tripped of 12 runs"."""
+    """Return the lost runs of a controller as text: "1 failed, 2 tripped of 12 runs"."""
     return f"{entry.lost_text} of {entry.runs} runs"

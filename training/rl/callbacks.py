@@ -1,4 +1,4 @@
-"""While an agent learns: validation, the best policy kept, checkpoints, progress, an orderly stop."""
+"""Defines the training callbacks: validation, export of the best policy, checkpoints, progress, stop."""
 
 import time
 
@@ -14,11 +14,11 @@ REPORT_EVERY = 1.0  # s
 
 
 class Stopped(Exception):
-    """The run has been stopped, and its checkpoint is written."""
+    """Signals that the run was stopped after writing a checkpoint."""
 
 
 class Validation(EvalCallback):
-    """Validations of a train.Training: ratios to the reference, a row of the table, the best policy."""
+    """Validates a train.Training: ratios to the reference, a row of the table, the best policy."""
 
     def __init__(self, training, env):
         every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
@@ -27,7 +27,7 @@ class Validation(EvalCallback):
         self.best = float("inf")
 
     def now(self):
-        """Validate the present policy; the interval of the validations stays as it is."""
+        """Validate the current policy, leaving the interval of validations unchanged."""
         calls, self.n_calls = self.n_calls, 0
         try:
             self._on_step()
@@ -39,10 +39,10 @@ class Validation(EvalCallback):
         going = super()._on_step()
         if not due:
             return going
-        figures = decision_env(self.eval_env).base.figures()
+        metrics = decision_env(self.eval_env).base.figures()
         row = {"decisions": self.num_timesteps, "seconds": training.checkpointing.seconds()}
         row |= {"reward": self.last_mean_reward}
-        row |= validation_score(figures, training.reference, training.kinds)
+        row |= validation_score(metrics, training.reference, training.kinds)
         training.rows.append(row)
         for name, value in row.items():
             self.logger.record(f"validation/{name}", value)
@@ -54,19 +54,19 @@ class Validation(EvalCallback):
 
 
 class CheckpointCallback(BaseCallback):
-    """Checkpoints between an update and the next rollout, progress, and the stop of a run."""
+    """Writes checkpoints between an update and the next rollout, reports progress and stops a run."""
 
     def __init__(self, training, report):
         super().__init__()
         self.training = training
         self.report = report
-        self.before = 0.0  # s, of the sessions before this one
-        self.torch_state = None  # of the first rollout of a resumed run
+        self.before = 0.0  # s, wall time of earlier sessions
+        self.torch_state = None  # random state at the first rollout of a resumed run
         self._begin = self._saved = self._reported = time.monotonic()
         self._first = None
 
     def seconds(self):
-        """Return the wall time of the run so far, s, over all its sessions."""
+        """Return the wall time of the run so far over all sessions, s."""
         return self.before + time.monotonic() - self._begin
 
     def _on_training_start(self):
@@ -75,7 +75,7 @@ class CheckpointCallback(BaseCallback):
 
     def _on_rollout_start(self):
         if self.torch_state is not None:
-            # lasting noise was drawn once more before this point than in the run that was stopped
+            # exploration noise was drawn once more up to here than in the run that was stopped
             torch.set_rng_state(self.torch_state)
             self.torch_state = None
         now = time.monotonic()

@@ -1,9 +1,8 @@
-"""Whose checkpoint it is: loading one executes code from it, so one's own are recognised.
+"""Signs checkpoints: loading a checkpoint executes code from it, so the user's checkpoints are recognised.
 
-A checkpoint that a run of this user wrote carries a seal, a keyed hash (HMAC-SHA256) of all its files. The
-key is in the user's configuration folder (FOWT_CONFIG_DIR, else XDG_CONFIG_HOME/fowt_env or
-~/.config/fowt_env), readable for this user alone. A checkpoint without a right seal is loaded only where
-the user says so.
+A run signs every checkpoint with a keyed hash (HMAC-SHA256) of all files in it. The key is in the user's
+configuration folder (FOWT_CONFIG_DIR, else XDG_CONFIG_HOME/fowt_env or ~/.config/fowt_env), readable by this
+user only. A checkpoint without a valid signature is loaded only if the user trusts it explicitly.
 """
 
 import hashlib
@@ -20,12 +19,12 @@ KEY_BYTES = 32
 
 
 def config_folder():
-    """Return the folder of the user's configuration; None for a user without a home."""
+    """Return the user's configuration folder; None for a user without a home directory."""
     return user_folder("FOWT_CONFIG_DIR", "XDG_CONFIG_HOME", ".config")
 
 
 def _key():
-    """Return the user's key, made if missing; None where that fails, or others may know the key."""
+    """Return the user's key, created if missing; None if that fails or others can read the key."""
     folder = config_folder()
     if folder is None:
         return None
@@ -38,7 +37,7 @@ def _key():
             with os.fdopen(handle, "wb") as file:
                 file.write(secrets.token_bytes(KEY_BYTES))
             try:
-                os.link(temporary, path)  # whole, and of several processes only the first's
+                os.link(temporary, path)  # atomic: of several processes only the first creates the key
             except FileExistsError:
                 pass
             finally:
@@ -63,17 +62,17 @@ def _hash(folder, key):
 
 
 def seal(folder):
-    """Put the seal to a checkpoint's folder; without a key, as in a home that is read-only, there is none."""
+    """Sign a checkpoint folder; it stays unsigned if no key can be stored, as in a read-only home."""
     key = _key()
     if key is not None:
         (folder / SEAL).write_text(_hash(folder, key) + "\n", encoding="ascii")
 
 
 def is_own(folder):
-    """Return whether a checkpoint is as a run of this user wrote it."""
+    """Return whether a checkpoint is signed by this user and unchanged since."""
     key = _key()
     try:
-        given = (folder / SEAL).read_text(encoding="ascii").strip()
-        return key is not None and hmac.compare_digest(given, _hash(folder, key))
+        signature = (folder / SEAL).read_text(encoding="ascii").strip()
+        return key is not None and hmac.compare_digest(signature, _hash(folder, key))
     except (OSError, ValueError, TypeError):
         return False

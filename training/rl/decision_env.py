@@ -1,4 +1,4 @@
-"""stable-baselines3 environment whose steps are an agent's decisions, and that of its validation."""
+"""Defines the stable-baselines3 environments for training and validation; one step is one decision."""
 
 import numpy as np
 from gymnasium.spaces import Box
@@ -14,18 +14,17 @@ from fowt_env.plant.measurement import Measure
 from fowt_env.training.evaluation.metrics import STATISTICS, TOWER_EXPONENT, damage_equivalent_load, travel
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
-SETTLED_AFTER = 300.0  # s, from which on an episode of steady wind must be at rest
-SWING_AFTER = 500.0  # s, and its blade pitch: by then surge has died down
-KEPT = ("observations", "action", "memory")  # of Decisions, in a state
+SETTLED_AFTER = 300.0  # s, after which an episode of steady wind must be at rest
+SWING_AFTER = 500.0  # s, after which its blade pitch must be at rest: surge has decayed
+KEPT = ("observations", "action", "memory")  # attributes of Decisions that are part of a state
 RECORDED_FIELDS = (Measure.ROTOR_SPEED, Measure.PLATFORM_PITCH, Measure.BLADE_PITCH, Measure.GENERATOR_TORQUE)
 
 
 class DecisionVecEnv(VecEnvWrapper):
-    """FowtSB3VecEnv in which one step is one decision of DecisionSettings: several control periods.
+    """Wraps a FowtSB3VecEnv so that one step is one decision of DecisionSettings: several control periods.
 
-    The reward is the mean over the control periods of the decision. An episode that ends before its
-    decision does is followed by the next one under the action that asks for what is there already, until
-    the others are through.
+    The reward is the mean over the control periods of the decision. If an episode ends within a decision, the
+    next episode starts at once, with the action in force held until the end of the decision.
     """
 
     def __init__(self, venv, settings):
@@ -35,10 +34,10 @@ class DecisionVecEnv(VecEnvWrapper):
         first = venv.env.envs[0]
         of_blades = [entry.name for entry in first.observed if entry.name in BLADE_CHANNELS]
         if venv.action_space.shape != (N_ACTIONS,) or of_blades:
-            seen = ", ".join(of_blades) or "no single blades"
+            seen = ", ".join(of_blades) or "no individual blades"
             raise InputError(
                 f"environment: action_mode = {first.action_mode!r}, observation of {seen}: agents are trained"
-                " here with one pitch for all blades; use FowtEnv itself"
+                " only with collective pitch; use FowtEnv directly"
             )
         wind = wind_entry(settings, ACTION_MODES[first.action_mode], first.observed)
         self.decisions = Decisions(venv.num_envs, self.channels, settings, first.control_dt, wind)
@@ -61,7 +60,7 @@ class DecisionVecEnv(VecEnvWrapper):
         return self.decisions.features()
 
     def step_async(self, actions):
-        """Keep the decisions for step_wait."""
+        """Store the decisions for step_wait."""
         self._decision = np.array(actions, dtype=np.float64)
 
     def step_wait(self):
@@ -90,11 +89,11 @@ class DecisionVecEnv(VecEnvWrapper):
         return decisions.features(), (total / self.settings.hold).astype(np.float32), ended, infos
 
     def get_state(self):
-        """Return the state of the episodes, to be pickled: plants, histories, actions."""
+        """Return the picklable state of the episodes: plants, histories, actions."""
         return self.base.env.get_state(), *(getattr(self.decisions, name).copy() for name in KEPT)
 
     def set_state(self, state):
-        """Continue from a state of get_state; return its features."""
+        """Restore a state of get_state; return the features at that state."""
         plants, *kept = state
         self.base.env.set_state(list(plants))
         for name, values in zip(KEPT, kept, strict=True):
@@ -103,11 +102,11 @@ class DecisionVecEnv(VecEnvWrapper):
 
 
 class ValidationVecEnv(FowtSB3VecEnv):
-    """One environment per fixed episode, which every reset starts again; records what is validated.
+    """Runs one environment per fixed validation episode, restarted by every reset, and records it.
 
-    episodes: options of FowtEnv.reset, one dict each. After all episodes have ended once, figures() has the
-    metrics of each, without its first `skip` seconds.
-    Raises: InputError where nothing of an episode is left.
+    episodes: options of FowtEnv.reset, one dict each. After all episodes have ended once, figures() returns
+    the metrics of each episode without its first `skip` seconds.
+    Raises: InputError if skip is not less than the duration of an episode.
     """
 
     def __init__(self, episodes, skip=60.0, **settings):
@@ -124,7 +123,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
         self._failed = np.zeros(len(episodes), dtype=bool)
 
     def reset(self):
-        """Return observations at the start of the fixed episodes, whose randomness is the same each time."""
+        """Return observations at the start of the fixed episodes, with equal random seeds at every reset."""
         self._seeds = list(range(self.num_envs))
         self._options = [dict(episode) for episode in self.episodes]
         self._record[:], self._clock = np.nan, 0
@@ -132,7 +131,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
         return super().reset()
 
     def step_wait(self):
-        """Step as FowtSB3VecEnv and record the measurements of each environment's first episode."""
+        """Step as FowtSB3VecEnv does and record the measurements of each environment's first episode."""
         result = super().step_wait()
         _, _, dones, infos = result
         for i in np.flatnonzero(dones & ~self._over):
@@ -145,11 +144,11 @@ class ValidationVecEnv(FowtSB3VecEnv):
         return result
 
     def figures(self):
-        """Return {metric: (n,)} of the recorded episodes by evaluation.metrics; NaN for failed ones.
+        """Return {metric: (n,)} of the recorded episodes by evaluation.metrics; NaN for failed episodes.
 
-        They are of what the sensors could measure, control period by control period, and so of the shaft's
-        power, which is the generator's before its losses. Offset of the mean rotor speed from rated is of the
-        time after SETTLED_AFTER, the swing of the blade pitch, peak to peak, of that after SWING_AFTER.
+        Metrics are computed from measurable quantities at the control periods; power is shaft power, before
+        generator losses. The offset of the mean rotor speed from rated is over the time after SETTLED_AFTER,
+        the peak-to-peak swing of the blade pitch over the time after SWING_AFTER.
         """
         record = np.where(self._failed[:, None], np.nan, self._record[self.skip : self._clock - 1])
         speed, platform_pitch, blade_pitch, torque = np.moveaxis(record, 2, 0)
@@ -158,7 +157,7 @@ class ValidationVecEnv(FowtSB3VecEnv):
         turbine = first.scene.turbine
         gear, rated = turbine.drivetrain.gear_ratio, turbine.torque_law.rated_power
         power = speed * torque * gear * 1e-3
-        # of the low-speed shaft: what the generator takes and what turns its inertia
+        # low-speed shaft torque: generator torque plus acceleration of the generator inertia
         acceleration = np.gradient(speed, first.control_dt, axis=0) if len(speed) > 1 else 0.0 * speed
         shaft = gear * (torque + gear * turbine.drivetrain.generator_inertia * acceleration) * 1e-3
         settled, still = (self._after(record, start) for start in (SETTLED_AFTER, SWING_AFTER))
@@ -180,6 +179,6 @@ class ValidationVecEnv(FowtSB3VecEnv):
         }
 
     def _after(self, record, start):
-        """Return the rows of the record from a time (s) of the episode on; one of NaN if there are none."""
+        """Return the rows of the record from a time of the episode on, s; one row of NaN without any."""
         rows = record[max(0, round(start / self.env.envs[0].control_dt) - self.skip) :]
         return rows if len(rows) else np.full((1, *record.shape[1:]), np.nan)

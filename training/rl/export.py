@@ -1,4 +1,4 @@
-"""Trained policies as plain array files, which controllers/policy/controller.py reads with numpy alone."""
+"""Exports trained policies as plain array files, which controllers/policy/controller.py reads with numpy."""
 
 import json
 import pickle
@@ -16,7 +16,7 @@ ACTIVATION_NAMES = {"Tanh": "tanh", "ReLU": "relu"}
 def layers_of(model):
     """Return (torch Linear layers, activation name, squash name) of a model's deterministic policy.
 
-    Raises: InputError for policies that are not multilayer perceptrons with one known activation.
+    Raises: InputError for policies that are not multilayer perceptrons with one supported activation.
     """
     if hasattr(model.policy, "mlp_extractor"):
         modules, squash = [*model.policy.mlp_extractor.policy_net, model.policy.action_net], "clip"
@@ -34,8 +34,8 @@ def layers_of(model):
 def export_policy(model, normalisation, single, decisions, path, about):
     """Write the deterministic policy of a model as a .npz without pickled objects; return the path.
 
-    normalisation: the VecNormalize it was trained through; single: one of its FowtEnvs; decisions: its
-    DecisionSettings; about: dict of text and numbers on where it comes from.
+    normalisation, single, decisions: VecNormalize, a FowtEnv and DecisionSettings of the training; about:
+    dict of text and numbers on the origin of the model.
     """
     linear, activation, squash = layers_of(model)
     task = single.task
@@ -58,9 +58,9 @@ def export_policy(model, normalisation, single, decisions, path, about):
 
 
 def export_run(folder, path):
-    """Write the policy of a run's newest checkpoint, whose loading executes code; return the path.
+    """Write the policy of a run's newest checkpoint; return the path. Loading executes its code.
 
-    Raises: InputError where the folder holds no checkpoint.
+    Raises: InputError if the folder contains no checkpoint.
     """
     from fowt_env.envs import FowtEnv
     from fowt_env.envs.decisions import DecisionSettings
@@ -69,7 +69,7 @@ def export_run(folder, path):
     run = Training(None, folder, resume=True, trusted=True)
     settings, checkpoint = run.settings, run.newest()
     if checkpoint is None:
-        raise InputError(f"{folder}: holds no checkpoint of a run yet")
+        raise InputError(f"{folder}: contains no checkpoint of a run yet")
     model = make_algorithm(settings["algo"]).load(checkpoint / "model.zip", device="cpu")
     with (checkpoint / "normalisation.pkl").open("rb") as file:
         normalisation = pickle.load(file)

@@ -1,4 +1,4 @@
-"""The learning curve of a run as a picture."""
+"""Plots the learning curve of a training run."""
 
 from fowt_env.visual.style import COLOURS, new_figure, save_figure, style_axes
 
@@ -13,7 +13,7 @@ PANELS = (
 def plot_learning_curve(label, rows, path):
     """Plot the validation rows of a run over decisions, one panel per ratio; return the path.
 
-    Raises: InputError where matplotlib is missing.
+    Raises: InputError if matplotlib is missing.
     """
     figure = new_figure(8.0, 9.0)
     axes = figure.subplots(len(PANELS), 1, sharex=True)

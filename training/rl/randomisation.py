@@ -1,9 +1,9 @@
-"""Domain randomisation: plants and sensors drawn from named distributions.
+"""Implements domain randomisation: plants and sensors drawn from named distributions.
 
-Building a plant and its operating points takes seconds, so a batch draws a pool of plants once, by seed, and
-its environments share them in turn: environment i has plant i modulo the pool's size. Wind, sea and start are
-drawn anew in every episode as ever; how much noise its sensors have, and how late they are, is drawn with the
-plant. Controllers in the environments (the baseline, the estimator) are designed on the plant of the files.
+Building a plant and its operating points takes seconds, so a pool of plants is drawn once, by seed, and
+environment i uses plant i modulo the size of the pool. Sensor noise and delay are drawn with the plant; wind,
+sea and initial state are drawn in every episode, as without randomisation. Controllers in the environments
+(the baseline, the estimator) are designed on the nominal plant.
 """
 
 import numpy as np
@@ -13,9 +13,9 @@ from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.plant_perturbation import PLANT, PLATFORM, plant_settings
 
-SENSORS = {  # words, distribution by default
+SENSORS = {  # description, default distribution
     "noise": (
-        "white noise of every reading, standard deviation over the channel's observation scale",
+        "white noise of every reading: standard deviation over the channel's observation scale",
         ("uniform", 0.0, 0.02),
     ),
     "delay": ("whole control periods from measurement to reading", ("uniform", 0.0, 3.0)),
@@ -23,13 +23,13 @@ SENSORS = {  # words, distribution by default
 DISTRIBUTIONS = {
     "uniform": lambda rng, low, high: rng.uniform(low, high),
     "loguniform": lambda rng, low, high: float(np.exp(rng.uniform(np.log(low), np.log(high)))),
-    # within two standard deviations: a tail must not make a plant that cannot float
+    # truncated at two standard deviations: an outlier could give a plant that does not float
     "normal": lambda rng, mean, std: mean + std * float(np.clip(rng.normal(), -2.0, 2.0)),
 }
 
 
 def check_distribution(where, spec):
-    """Return (kind, a, b) of a distribution. Raises: InputError naming what is wrong with it."""
+    """Return (kind, a, b) of a distribution. Raises: InputError for invalid kind or parameters."""
     if not isinstance(spec, list | tuple) or len(spec) != 3:
         raise InputError(f"{where} = {spec!r}: must be [kind, a, b], kind one of {', '.join(DISTRIBUTIONS)}")
     kind, a, b = spec
@@ -42,27 +42,27 @@ def check_distribution(where, spec):
 
 
 def distributions(spec):
-    """Return {name: (kind, a, b)} of all randomised quantities: defaults, and the changes of spec.
+    """Return {name: (kind, a, b)} of all randomised quantities: defaults updated by spec.
 
-    spec: {name: [kind, a, b] or None (not randomised)}; "plants" is left out. Raises: InputError.
+    spec: {name: [kind, a, b] or None (not randomised)}; "plants" is ignored. Raises: InputError.
     """
     chosen = {name: default for name, (_, default) in (PLANT | SENSORS).items()}
     for name in spec:
         if name not in chosen and name != "plants":
             raise unknown("randomised quantity", name, chosen)
     chosen = {name: spec.get(name, default) for name, default in chosen.items()}
-    kept = {name: given for name, given in chosen.items() if given is not None}
-    return {name: check_distribution(f"randomise.{name}", given) for name, given in kept.items()}
+    kept = {name: entry for name, entry in chosen.items() if entry is not None}
+    return {name: check_distribution(f"randomise.{name}", entry) for name, entry in kept.items()}
 
 
 def draw(chosen, rng):
-    """Return {name: value} of one draw of distributions, in a fixed order."""
+    """Return {name: value} of one draw from the distributions, in a fixed order."""
     order = [name for name in (*PLANT, *SENSORS) if name in chosen]
     return {name: float(DISTRIBUTIONS[chosen[name][0]](rng, *chosen[name][1:])) for name in order}
 
 
 def randomised(spec, n, seed):
-    """Return n dicts of FowtEnv settings drawn with a seed: plant, sensors, and the nominal plant.
+    """Return n dicts of FowtEnv settings drawn with a seed: plant, sensors and nominal plant.
 
     spec: {"plants": size of the pool, name: distribution or None, ...}. Raises: InputError.
     """

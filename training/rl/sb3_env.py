@@ -1,4 +1,4 @@
-"""Many environments for stable-baselines3, stepped by one compiled call.
+"""Defines the vector environment for stable-baselines3, stepped by one compiled call.
 
 from stable_baselines3 import PPO
 from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
@@ -13,18 +13,18 @@ from fowt_env.envs.vector_env import of_one
 try:
     from stable_baselines3.common.vec_env import VecEnv
 except ImportError as error:
-    raise ImportError("training with stable-baselines3 needs it: pip install 'fowt-env[train]'") from error
+    raise ImportError("stable-baselines3 is not installed: pip install 'fowt-env[train]'") from error
 
 
 class FowtSB3VecEnv(VecEnv):
-    """FowtVectorEnv as stable-baselines3's VecEnv: an ended environment starts its next episode at once.
+    """Adapts FowtVectorEnv to stable-baselines3's VecEnv; ended environments restart at once.
 
-    num_envs, settings: see FowtVectorEnv, whose autoreset_mode is "SameStep" here. step_info: whether each
-    step's info holds what FowtEnv gives (reward terms, time, saturated actions), or only that of an
-    episode's last step does, which is faster.
+    num_envs, settings: see FowtVectorEnv, whose autoreset_mode is "SameStep" here. step_info: whether every
+    step has the info of FowtEnv (reward terms, time, saturated actions); False: only the last step of an
+    episode, which is faster.
 
-    In the last step of an episode infos[i]["terminal_observation"] is its last observation and
-    infos[i]["TimeLimit.truncated"] says whether time ended it and not failure.
+    In the last step of an episode infos[i]["terminal_observation"] is the last observation and
+    infos[i]["TimeLimit.truncated"] is True if the episode ended by its time limit and not by failure.
     """
 
     def __init__(self, num_envs=1, step_info=False, **settings):
@@ -42,7 +42,7 @@ class FowtSB3VecEnv(VecEnv):
         return observations
 
     def step_async(self, actions):
-        """Keep the actions for step_wait."""
+        """Store the actions for step_wait."""
         self._actions = actions
 
     def step_wait(self):
@@ -63,11 +63,11 @@ class FowtSB3VecEnv(VecEnv):
         return observations, rewards.astype(np.float32), dones, infos
 
     def close(self):
-        """Close the batch."""
+        """Close all environments."""
         self.env.close()
 
     def get_attr(self, attr_name, indices=None):
-        """Return a list of an attribute of the chosen environments."""
+        """Return the attribute's value in each of the chosen environments."""
         return [self.env.envs[i].get_wrapper_attr(attr_name) for i in self._get_indices(indices)]
 
     def set_attr(self, attr_name, value, indices=None):
@@ -76,10 +76,10 @@ class FowtSB3VecEnv(VecEnv):
             setattr(self.env.envs[i], attr_name, value)
 
     def env_method(self, method_name, *method_args, indices=None, **method_kwargs):
-        """Return a list of what a method of the chosen environments returns."""
+        """Call a method of each of the chosen environments; return the list of results."""
         chosen = self._get_indices(indices)
         return list(self.env.call(method_name, *method_args, indices=chosen, **method_kwargs))
 
     def env_is_wrapped(self, wrapper_class, indices=None):
-        """Return that no environment of the batch is wrapped."""
+        """Return False for each of the chosen environments: they are never wrapped."""
         return [False for _ in self._get_indices(indices)]

@@ -1,4 +1,4 @@
-"""What the settings of a training run may be: files and changes are checked before anything is built."""
+"""Checks the settings of a training run, from files and changes, before anything is built."""
 
 import inspect
 from dataclasses import fields
@@ -28,26 +28,26 @@ PositiveInteger = Annotated[int, Field(ge=1, strict=True)]
 Whole = Annotated[int, Field(ge=0, strict=True)]
 Switch = Annotated[bool, Field(strict=True)]
 TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")
-OF_TRAINING = ("num_envs", "randomise", *TASK_FIELDS)  # keys of environment beside those of FowtEnv
-FORMS = (  # of what the environment takes apart: key, types, in words
+OF_TRAINING = ("num_envs", "randomise", *TASK_FIELDS)  # keys of environment in addition to those of FowtEnv
+FORMS = (  # compound settings of the environment: key, types, description
     ("reward", dict, "a table of weights"),
     ("randomise", dict, "a table"),
     ("observation", (str, list), "the name of an observation set, or a list of channels"),
 )
-SIMPLE = (  # of what it takes apart, too: key, default, check, what that allows
+SIMPLE = (  # further settings of the environment: key, default, check, allowed values
     ("num_envs", 1, check_whole_number, 1),
-    ("baseline", "pi", check_one_of, CONTROLLERS),  # an import path would run code of whoever wrote the file
+    ("baseline", "pi", check_one_of, CONTROLLERS),  # no import path: it would run code named in the file
 )
-SCHEDULES = ("learning_rate", "clip_range")  # of an algorithm: numbers that may fall over a run
-GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms
+SCHEDULES = ("learning_rate", "clip_range")  # settings of an algorithm that may fall linearly over a run
+GIVEN_BY_TRAINING = (  # arguments of stable-baselines3's algorithms that Training sets
     "self", "policy", "env", "seed", "device", "tensorboard_log", "verbose", "_init_setup_model",
 )  # fmt: skip
-OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # arguments that are objects
-NOT_SET_THERE = ("task", "render_mode")  # of FowtEnv: what training gives, or lacks
+OBJECTS = ("action_noise", "rollout_buffer_class", "replay_buffer_class")  # not settable from a file
+NOT_SET_THERE = ("task", "render_mode")  # arguments of FowtEnv that Training sets or does not use
 
 
 class Normalise(Record):
-    """Arguments of stable-baselines3's VecNormalize; missing ones have their defaults."""
+    """Holds the arguments of stable-baselines3's VecNormalize, with defaults."""
 
     norm_obs: Switch = True
     norm_reward: Switch = True
@@ -57,33 +57,33 @@ class Normalise(Record):
     epsilon: Positive = 1e-8
 
 
-REFERENCE = "lqr"  # controller that validation compares with, where its settings name none
+REFERENCE = "lqr"  # default reference controller of the validation
 
 
 class Validation(Record):
-    """Episodes on which an agent is validated as it learns."""
+    """Defines the episodes on which an agent is validated during training."""
 
     winds: Annotated[list[Positive], Field(min_length=1)]  # m/s
     first: Whole
     seeds: PositiveInteger
     every: PositiveInteger  # decisions
     skip: NonNegative = 60.0  # s
-    reference: Literal[tuple(CONTROLLERS)] = REFERENCE  # that figures are ratios to
-    sigma: Literal[NTM_SIGMAS] = "90%"  # of the turbulence, as of the ntm wind
-    steady: list[Positive] = []  # m/s, winds in which an agent must come to rest in still water
-    gusts: list[Positive] = []  # m/s, mean winds of a gust (EOG) and a change of direction (EDC) each
-    # of FowtEnv, in turn over the seeds of each wind; none: exact readings, as always in steady wind
+    reference: Literal[tuple(CONTROLLERS)] = REFERENCE  # metrics are ratios to this controller's
+    sigma: Literal[NTM_SIGMAS] = "90%"  # turbulence level, as for the ntm wind
+    steady: list[Positive] = []  # m/s, steady winds in which the turbine must come to rest in still water
+    gusts: list[Positive] = []  # m/s, mean winds of one gust (EOG) and one direction change (EDC) each
+    # sensors of FowtEnv, alternating over the seeds of each wind; none, or steady wind: exact readings
     sensors: list[dict[str, Any] | str] = []
 
 
 class TrainingSettings(Record):
-    """Settings of a run. The environment's, the decisions' and the algorithm's are checked by these."""
+    """Holds the settings of a run; environment, decisions and algorithm are checked separately."""
 
     algo: Literal["ppo", "sac", "tqc"]
-    name: str  # of the settings in training/rl/ALGO.yml
+    name: str  # key of the settings in training/rl/ALGO.yml
     seed: Whole
     steps: PositiveInteger
-    task: str  # of the environment
+    task: str  # task of the environment
     environment: dict[str, Any]
     decisions: dict[str, Any]
     normalise: Normalise
@@ -93,7 +93,7 @@ class TrainingSettings(Record):
 
 
 def check_settings(settings, where="settings"):
-    """Return the settings of a run after checking them. Raises: InputError naming each wrong key."""
+    """Check and return the settings of a run. Raises: InputError naming each invalid key."""
     if not isinstance(settings, dict):
         raise InputError(f"{where}: must be a table of settings")
     raise_problems(where, validate(TrainingSettings, settings)[1])
@@ -106,13 +106,13 @@ def check_settings(settings, where="settings"):
         unknown_key(f"{section}.{key}", key, keys)
         for section, keys in known.items() for key in settings[section] if key not in keys
     ]  # fmt: skip
-    given = settings["environment"]
+    environment = settings["environment"]
     for key, kinds, words in FORMS:
-        if given.get(key) is not None and not isinstance(given[key], kinds):
-            problems.append(str(refusal(f"environment.{key}", given[key], words)))
+        if environment.get(key) is not None and not isinstance(environment[key], kinds):
+            problems.append(str(refusal(f"environment.{key}", environment[key], words)))
     for key, default, check, allowed in SIMPLE:
         try:
-            check(f"environment.{key}", given.get(key, default), allowed)
+            check(f"environment.{key}", environment.get(key, default), allowed)
         except InputError as error:
             problems.append(str(error))
     raise_problems(where, problems)
@@ -120,40 +120,40 @@ def check_settings(settings, where="settings"):
     return settings
 
 
-def check_algorithm(kind, name, given):
-    """Raise InputError for settings that an algorithm's class lacks, or declares with another type."""
+def check_algorithm(kind, name, settings):
+    """Raise InputError for settings that an algorithm's class does not have or declares with another type."""
     arguments = inspect.signature(kind.__init__).parameters
     left_out = (*GIVEN_BY_TRAINING, *OBJECTS)
     known = {key: argument.annotation for key, argument in arguments.items() if key not in left_out}
     problems = []
-    for key, value in given.items():
+    for key, value in settings.items():
         if key not in known:
             problems.append(unknown_key(f"algorithm.{key}", key, known))
             continue
-        found = {key: (value, _not_allowed(key, value, known[key]))}
+        checked = {key: (value, _not_allowed(key, value, known[key]))}
         if key == "policy_kwargs" and isinstance(value, dict):
-            found = {f"{key}.{name}": (each, _not_of_policy(name, each)) for name, each in value.items()}
-        for place, (each, wanted) in found.items():
-            if wanted is not None:
-                problems.append(str(refusal(f"algorithm.{place}", each, wanted)))
+            checked = {f"{key}.{name}": (each, _not_of_policy(name, each)) for name, each in value.items()}
+        for full_name, (each, allowed) in checked.items():
+            if allowed is not None:
+                problems.append(str(refusal(f"algorithm.{full_name}", each, allowed)))
     raise_problems(name, problems)
 
 
 def _not_of_policy(key, value):
-    """Return, for a wrong value of policy_kwargs, what it must be in words; else None."""
+    """Return the allowed values of an item of policy_kwargs as text if its value is invalid; else None."""
     if key == "activation":
         return None if value in tuple(ACTIVATIONS) else f"one of {', '.join(ACTIVATIONS)}"
     return "numbers, or lists or tables of them" if _holds_text(value) else None
 
 
 def _holds_text(value):
-    """Return whether a value is a text, or has one within it."""
+    """Return whether a value is or contains a string."""
     items = value.values() if isinstance(value, dict) else value if isinstance(value, list) else ()
     return isinstance(value, str) or any(map(_holds_text, items))
 
 
 def _not_allowed(key, value, declared):
-    """Return, for a wrong value of an algorithm's setting, what it must be in words; else None."""
+    """Return the allowed values of an algorithm's setting as text if its value is invalid; else None."""
     number = is_number(value)
     if key == "policy_kwargs":
         return None if isinstance(value, dict) else "a table"

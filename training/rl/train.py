@@ -1,15 +1,15 @@
-"""Training of agents: settings from one YAML per algorithm, resumable checkpoints, validation.
+"""Trains agents: settings from one YAML file per algorithm, resumable checkpoints, validation.
 
     from fowt_env.training.rl.train import Training, resolve
     Training(resolve("ppo", "above_rated", seed=0, steps=2_000_000), "runs/ppo_0").run()
 
-A run folder holds settings.yml and versions.json; checkpoints/step_N (model, normalisation, environments,
-replay buffer, random states); validation.csv with a row per validation; best.npz, the policy that scored
-best there, and last.npz; learning_curve.png; and TensorBoard's files.
+A run folder contains settings.yml and versions.json; checkpoints/step_N (model, normalisation, environments,
+replay buffer, random states); validation.csv with a row per validation; best.npz, the policy with the best
+validation score, and last.npz; learning_curve.png; and TensorBoard files.
 
-A resumed run has the bits of one that was never stopped, on the same machine with the same number of torch
-threads: checkpoints hold parameters, optimiser, environments in mid-episode, normalisation, replay buffer and
-the states of every random generator.
+A resumed run is bit-identical to an uninterrupted run on the same machine with the same number of torch
+threads: checkpoints contain parameters, optimiser, environments in mid-episode, normalisation, replay buffer
+and the states of all random generators.
 """
 
 import errno
@@ -48,17 +48,17 @@ from fowt_env.training.rl.settings import (
     read_settings,
 )
 
-SETTINGS_FOLDER = Path(__file__).parent  # of the YAML file of each algorithm
+SETTINGS_FOLDER = Path(__file__).parent  # contains the YAML file of each algorithm
 ALGORITHMS = ("ppo", "sac", "tqc")
-# what a turbine of today measures: drive train, blade pitch, motion of nacelle and hull
+# standard sensors of a turbine: drivetrain, blade pitch, motion of nacelle and platform
 MEASURED = (
     "rotor_speed", "blade_pitch", "generator_torque", "platform_pitch", "platform_pitch_rate",
     "nacelle_acceleration", "previous_action",
 )  # fmt: skip
-# what the estimator of lqr makes of that: wind, surge and waves
+# estimates of lqr's observer from these sensors: wind, surge and waves
 ESTIMATED = ("estimated_wind", "estimated_platform", "estimated_waves")
 AHEAD = ("wind_speed", "wind_preview")
-OBSERVATIONS = {  # information sets that agents are compared with
+OBSERVATIONS = {  # information sets for comparing agents
     "measured": MEASURED,
     "state": ("default", "nacelle_acceleration", "previous_action"),  # all motions and rates of the platform
     "preview": (*MEASURED, *AHEAD),
@@ -68,31 +68,31 @@ OBSERVATIONS = {  # information sets that agents are compared with
 }
 SECTIONS = ("environment", "decisions", "algorithm", "normalise", "validation", "checkpoint_minutes", "task")
 VERSIONS = ("fowt-env", "stable-baselines3", "sb3-contrib", "torch", "numpy", "numba", "gymnasium")
-MONITORED = ("episode_returns", "episode_lengths", "episode_count")  # of VecMonitor
+MONITORED = ("episode_returns", "episode_lengths", "episode_count")  # attributes of VecMonitor
 MOTIONS = ("rotor_speed_std_[rpm]", "platform_pitch_std_[deg]")
 RATIOS = (
     *MOTIONS, "blade_pitch_travel_[deg/s]", "torque_travel_[kN-m/s]", "shaft_torque_DEL_[kN-m]",
     "capped_power_mean_[kW]", "shaft_power_std_[kW]",
 )  # fmt: skip
-# what the validation score adds to the mean ratio of the motions
-FAILURE_COST = 10.0  # per fraction of episodes that failed
+# costs that the validation score adds to the mean ratio of the motions
+FAILURE_COST = 10.0  # times the fraction of failed episodes
 TRAVEL_COST = 2.0  # per unit of blade-pitch travel above the reference's
 TORQUE_COST = 1.0  # per unit of torque travel, and of shaft-torque DEL, above the reference's
-POWER_COST = 20.0  # per unit of mean power, counted up to rated, short of LEAST_POWER
-LEAST_POWER = 0.999  # of the reference's
-UNREST_COST = 0.5  # per fraction of episodes of steady wind that did not come to rest
-GUST_COST = 2.0  # per unit by which the worse motion in gusts passes the reference's
-LARGEST_OFFSET = 0.5  # % of rated rotor speed: at rest in steady wind
-LARGEST_SWING = 0.05  # deg of blade pitch, peak to peak
-STEADY_KICK = {"PtfmPitch": 0.5}  # deg, as in the suite settling: from which an agent must come to rest
+POWER_COST = 20.0  # per unit of mean power up to rated below LEAST_POWER
+LEAST_POWER = 0.999  # fraction of the reference's mean power
+UNREST_COST = 0.5  # times the fraction of episodes of steady wind that did not come to rest
+GUST_COST = 2.0  # per unit by which the worse motion ratio in gusts exceeds 1
+LARGEST_OFFSET = 0.5  # % of rated rotor speed: limit for rest in steady wind
+LARGEST_SWING = 0.05  # deg of blade pitch, peak to peak: limit for rest
+STEADY_KICK = {"PtfmPitch": 0.5}  # deg, initial offset in steady wind, as in the suite settling
 GUST_START = 120.0  # s
 
 
 def resolve(algo, task, seed, steps, changes=None):
-    """Return all settings of a run (dict): those of training/rl/ALGO.yml for the task, changed.
+    """Return all settings of a run (dict): those of training/rl/ALGO.yml for the task, with changes.
 
     changes: {dotted key: value}, such as {"environment.action_mode": "direct"}.
-    Raises: InputError for unknown names, keys, and numbers outside their range.
+    Raises: InputError for unknown names and keys, and numbers out of range.
     """
     import yaml
 
@@ -110,32 +110,32 @@ def resolve(algo, task, seed, steps, changes=None):
         *sections, last = key.split(".")
         if (sections or [last])[0] not in SECTIONS:
             raise unknown("setting", key, (f"{section}.*" for section in SECTIONS))
-        place = settings
+        section_settings = settings
         for section in sections:
-            place = place.setdefault(section, {})
-            if not isinstance(place, dict):
-                raise InputError(f"setting {key!r}: {section!r} holds no further settings")
-        place[last] = value
+            section_settings = section_settings.setdefault(section, {})
+            if not isinstance(section_settings, dict):
+                raise InputError(f"setting {key!r}: {section!r} has no further settings")
+        section_settings[last] = value
     return check_settings({"algo": algo, "name": task, "seed": seed, "steps": steps} | settings)
 
 
 def environment_settings(settings):
-    """Return the settings of FowtEnv for training: task with its reach and weather seeds, information set."""
-    given = {k: v for k, v in settings["environment"].items() if k not in ("num_envs", "randomise")}
-    task = task_of(settings["task"], turbine_of(given["platform"]) if "platform" in given else None)
-    reach = {name: given.pop(name) for name in TASK_FIELDS if name in given}
+    """Return the FowtEnv settings of a run: task with action ranges and weather seeds, information set."""
+    section = {k: v for k, v in settings["environment"].items() if k not in ("num_envs", "randomise")}
+    task = task_of(settings["task"], turbine_of(section["platform"]) if "platform" in section else None)
+    reach = {name: section.pop(name) for name in TASK_FIELDS if name in section}
     reach = {name: tuple(value) if isinstance(value, list) else value for name, value in reach.items()}
     task = replace(task, weather_seeds=(TRAINING.start, TRAINING.stop), **reach)
-    chosen = given.pop("observation", "measured")
+    chosen = section.pop("observation", "measured")
     if isinstance(chosen, str):
         if chosen not in OBSERVATIONS:
             raise unknown("observation set", chosen, OBSERVATIONS)
         chosen = OBSERVATIONS[chosen]
-    return {"task": task, "observation": chosen} | given
+    return {"task": task, "observation": chosen} | section
 
 
 def make_algorithm(name):
-    """Return the class of an algorithm. Raises: InputError where its library is missing."""
+    """Return the class of an algorithm. Raises: InputError if the library is missing."""
     try:
         if name == "tqc":
             from sb3_contrib import TQC
@@ -149,18 +149,18 @@ def make_algorithm(name):
 
 
 def versions():
-    """Return {package: version} of the packages that shape a result, and the number of processors."""
-    found = {"python": sys.version.split()[0], "processors": os.cpu_count()}
+    """Return {package: version} of the packages that affect results, and the number of processors."""
+    installed = {"python": sys.version.split()[0], "processors": os.cpu_count()}
     for name in VERSIONS:
         try:
-            found[name] = version(name)
+            installed[name] = version(name)
         except PackageNotFoundError:
-            found[name] = None
-    return found
+            installed[name] = None
+    return installed
 
 
 def validation_episodes(settings):
-    """Return (reset options, kinds) of the episodes that resolved settings validate on, two lists.
+    """Return (reset options, kinds) of the validation episodes of resolved settings, two lists.
 
     turbulent: each wind with each of its validation seeds; steady: still water, from STEADY_KICK; gust: one
     EOG and one EDC for each wind.
@@ -188,7 +188,7 @@ def validation_episodes(settings):
 
 
 def make_envs(settings):
-    """Return (training VecNormalize, validation VecNormalize); plants are drawn for training alone."""
+    """Return (training VecNormalize, validation VecNormalize); plants are randomised for training only."""
     from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
     from fowt_env.training.rl.decision_env import DecisionVecEnv
@@ -211,26 +211,26 @@ def make_envs(settings):
 
 
 def validation_env(settings, chosen):
-    """Return the ValidationVecEnv of resolved settings: FowtEnvs with the settings `chosen`, nominal plant.
+    """Return the ValidationVecEnv of resolved settings: FowtEnvs with settings `chosen` and nominal plant.
 
-    The sensors of the settings' validation alternate over the episodes of each wind.
+    The validation sensors of the settings alternate over the episodes of each wind.
     """
     from fowt_env.training.rl.decision_env import ValidationVecEnv
 
-    given = settings["validation"]
+    validation = settings["validation"]
     episodes, kinds = validation_episodes(settings)
-    sensors, per_env = given.get("sensors"), None
+    sensors, per_env = validation.get("sensors"), None
     if sensors:
         exact = {"noise": 0.0, "delay": 0}
         per_env = [
-            {"sensors": exact if kind == "steady" else sensors[i % given["seeds"] % len(sensors)]}
+            {"sensors": exact if kind == "steady" else sensors[i % validation["seeds"] % len(sensors)]}
             for i, kind in enumerate(kinds)
         ]
-    return ValidationVecEnv(episodes, given.get("skip", 60.0), threads=1, per_env=per_env, **chosen)
+    return ValidationVecEnv(episodes, validation.get("skip", 60.0), threads=1, per_env=per_env, **chosen)
 
 
 def decision_env(env):
-    """Return the DecisionVecEnv inside wrappers."""
+    """Return the DecisionVecEnv inside the wrappers of env."""
     while type(env).__name__ != "DecisionVecEnv":
         env = env.venv
     return env
@@ -239,8 +239,8 @@ def decision_env(env):
 def baseline_figures(settings, reference=None):
     """Return {metric: (n,)} of a compiled controller on the validation episodes of resolved settings.
 
-    reference: its name; None: that of the settings. It runs in the agent's environment and not by
-    evaluation.evaluate, so that a ratio is of the same weather, start, sensors and control periods.
+    reference: name of the controller; None: that of the settings. The controller runs in the agent's
+    environment, not in evaluation.evaluate, to have the same weather, start, sensors and control periods.
     """
     reference = reference or settings["validation"].get("reference", REFERENCE)
     chosen = environment_settings(settings) | {"action_mode": "residual", "baseline": reference}
@@ -253,13 +253,13 @@ def baseline_figures(settings, reference=None):
 
 
 def validation_score(figures, reference, kinds=None):
-    """Return {ratio, check or score: number} of figures over those of the reference; lower is better.
+    """Return {ratio, check or score: number} of metrics relative to the reference's; lower is better.
 
-    kinds: of the episodes, as validation_episodes has them; None: all turbulent. Ratios are means over the
-    turbulent ones, that of torque travel one of sums, since a reference may keep its torque in some. score:
-    mean of the ratios of rotor-speed and platform-pitch standard deviation, plus costs of more travel, torque
-    travel and shaft load or less power than the reference's, of failures, of unrest in steady wind and of
-    larger motions in gusts.
+    kinds: of the episodes, as from validation_episodes; None: all turbulent. Ratios are means over turbulent
+    episodes; for torque travel the ratio of the means, as a reference may hold its torque in some. score:
+    mean ratio of rotor-speed and platform-pitch standard deviation, plus costs of more travel, torque travel
+    and shaft load or less power than the reference's, of failures, of unrest in steady wind and of larger
+    motions in gusts.
     """
     kinds = np.array(["turbulent"] * len(figures["failed"]) if kinds is None else kinds)
     turbulent, steady, gust = (kinds == kind for kind in ("turbulent", "steady", "gust"))
@@ -282,18 +282,18 @@ def validation_score(figures, reference, kinds=None):
 
 
 def _mean(values):
-    """Return the mean of the values of episodes that did not fail, which are not NaN; NaN of none."""
+    """Return the mean of the finite values (failed episodes are NaN); NaN without any."""
     values = np.asarray(values, dtype=np.float64)
     kept = values[np.isfinite(values)]
     return float(kept.mean()) if len(kept) else float("nan")
 
 
 class Training:
-    """One run in one folder. resume: continue from its newest checkpoint, or anew where it has none.
+    """Runs one training in one folder. resume: continue from the newest checkpoint, if any.
 
-    Loading a checkpoint executes code from it: one that no run of this user wrote is refused unless trusted.
-    Raises: InputError where the folder holds another run, none to resume, or a stranger's; on run(), where
-    another training is in the folder.
+    Loading a checkpoint executes code from it: one that this user's runs did not write is refused unless
+    trusted. Raises: InputError if the folder contains another run, no run to resume or an untrusted
+    checkpoint; on run(), if another training is writing to the folder.
     """
 
     def __init__(self, settings, folder, resume=False, trusted=False):
@@ -308,44 +308,44 @@ class Training:
         self.stop, self.rows = False, []
 
     def _check_folder(self):
-        """Raise InputError unless the run can begin in its folder, or continue there."""
+        """Raise InputError unless the run can start or continue in the folder."""
         if self.resume != self.settings_path.exists():
             raise InputError(
-                f"--resume: {self.folder} holds no run"
+                f"--resume: {self.folder} contains no run"
                 if self.resume
-                else f"{self.folder} holds a run already: use --resume to go on with it, or another --out"
+                else f"{self.folder} already contains a run: use --resume to continue it, or another --out"
             )
         newest = self.newest() if self.resume else None
         if newest is not None and not self.trusted and not is_own(newest):
             raise InputError(
-                f"--resume: loading {newest} executes code from it, and no run of yours wrote it so;"
-                " if you trust whoever did, add --trust-zip"
+                f"--resume: loading {newest} executes code from it, and it is not signed by this user;"
+                " add --trust-zip if you trust its origin"
             )
 
     def newest(self):
-        """Return the folder of the newest checkpoint, or None."""
-        found = [p for p in self.checkpoints.glob("step_*") if p.name.removeprefix("step_").isdigit()]
-        return max(found, key=lambda p: int(p.name.removeprefix("step_")), default=None)
+        """Return the folder of the newest checkpoint of the run, or None."""
+        folders = [p for p in self.checkpoints.glob("step_*") if p.name.removeprefix("step_").isdigit()]
+        return max(folders, key=lambda p: int(p.name.removeprefix("step_")), default=None)
 
     def run(self, report=None):
-        """Train to the end, or to an interrupt; return whether the end was reached.
+        """Train until the end or an interrupt; return whether the end was reached.
 
         report(done, total, text): called about once a second.
-        Raises: InputError where another training is in the folder, or its settings cannot be used.
+        Raises: InputError if another training is writing to the folder, or the settings cannot be used.
         """
         name, busy = f"run folder {str(self.folder)!r}", "another training is writing to it"
         with locked(self.folder, name, busy):  # before anything is built, which may take minutes
-            self._check_folder()  # again, now that no other changes it
+            self._check_folder()  # again, now that the folder is locked
             if not self.resume:
-                self._write_settings()  # which say that the folder holds a run
+                self._write_settings()  # mark the folder as a run's
             try:
                 validation, state = self._build()
             except BaseException:
-                if not self.resume:  # it never began: the folder is free for settings that work
+                if not self.resume:  # the run never started: leave the folder free for other settings
                     self.settings_path.unlink(missing_ok=True)
                 raise
             if self.resume:
-                self._write_settings()  # they may have more steps now
+                self._write_settings()  # the number of steps may have changed
             with replacing(self.folder / "versions.json") as path:
                 path.write_text(json.dumps(versions(), indent=1), encoding="utf-8")
             return self._learn(validation, state, report)
@@ -405,7 +405,7 @@ class Training:
 
     @contextmanager
     def _signals(self):
-        """Let the first interrupt or termination within the block set stop: a checkpoint, then the end."""
+        """Set self.stop on the first interrupt or termination signal in the block: checkpoint, then end."""
 
         def ask(number, frame):
             if self.stop:
@@ -420,7 +420,7 @@ class Training:
                 signal.signal(number, handler)
 
     def _remove_leftovers(self):
-        """Remove files that killed processes left half written."""
+        """Remove partly written files of killed processes."""
         remove_leftovers(self.folder)
         for path in self.checkpoints.glob(".writing_*"):
             number = path.name.removeprefix(".writing_")
@@ -434,9 +434,9 @@ class Training:
             path.write_text(yaml.safe_dump(self.settings, sort_keys=False), encoding="utf-8")
 
     def save(self):
-        """Write a checkpoint of the present instant, whole or not at all, in place of the one before.
+        """Write a checkpoint atomically, replacing the previous checkpoint.
 
-        Raises: OSError naming it where there is no space; then the one before remains.
+        Raises: OSError naming the checkpoint if it cannot be written; the previous checkpoint remains.
         """
         target = self.checkpoints / f"step_{self.model.num_timesteps}"
         if target.exists():
@@ -446,7 +446,7 @@ class Training:
         try:
             temporary.mkdir(parents=True)
             self._fill(temporary)
-        except (OSError, RuntimeError) as error:  # RuntimeError: what torch makes of a full disk
+        except (OSError, RuntimeError) as error:  # RuntimeError: torch raises it for a full disk
             shutil.rmtree(temporary, ignore_errors=True)
             number = getattr(error, "errno", None) or errno.EIO
             raise OSError(number, f"the checkpoint cannot be written: {error}", str(target)) from error
@@ -456,7 +456,7 @@ class Training:
                 shutil.rmtree(old, ignore_errors=True)
 
     def _fill(self, folder):
-        """Write the files of a checkpoint of the present instant."""
+        """Write the files of a checkpoint into the folder and sign them."""
         import torch
 
         model, env = self.model, self.env
@@ -485,7 +485,7 @@ class Training:
         seal(folder)
 
     def _load(self, kind, env):
-        """Return (model, state) of the newest checkpoint, with environments and generators as they were."""
+        """Return (model, state) of the newest checkpoint, with environments and generators restored."""
         from stable_baselines3.common.vec_env import VecNormalize
 
         folder = self.newest()
@@ -515,11 +515,11 @@ class Training:
         return model, state
 
     def best(self):
-        """Return the row of the validation with the least score; None before the first one."""
+        """Return the row of the validation with the lowest score; None before the first validation."""
         return min(self.rows, key=lambda row: row["score"], default=None)
 
     def export(self, name):
-        """Write the present policy as a plain array file in the run folder; return its path."""
+        """Write the current policy as a plain array file in the run folder; return the path."""
         from fowt_env.training.rl.export import export_policy
 
         about = {key: self.settings[key] for key in ("algo", "name", "seed")}
@@ -538,23 +538,23 @@ class Training:
 
 
 def _schedules(settings):
-    """Return those of SCHEDULES that fall linearly over a run, as stable-baselines3 takes them."""
+    """Return {setting: LinearSchedule} of the settings in SCHEDULES that fall linearly over a run."""
     from stable_baselines3.common.utils import LinearSchedule
 
-    given = {key: settings["algorithm"].get(key) for key in SCHEDULES}
-    pairs = {key: map(float, pair) for key, pair in given.items() if isinstance(pair, list)}
+    values = {key: settings["algorithm"].get(key) for key in SCHEDULES}
+    pairs = {key: map(float, pair) for key, pair in values.items() if isinstance(pair, list)}
     return {key: LinearSchedule(*pair, 1.0) for key, pair in pairs.items()}
 
 
 def _new_model(kind, settings, env):
-    """Return an untrained model. Raises: InputError for a keyword that the algorithm lacks."""
+    """Return an untrained model. Raises: InputError for settings that the algorithm does not accept."""
     import torch
 
-    given = dict(settings["algorithm"]) | _schedules(settings)
-    policy = dict(given.pop("policy_kwargs", {}))
+    arguments = dict(settings["algorithm"]) | _schedules(settings)
+    policy = dict(arguments.pop("policy_kwargs", {}))
     if "activation" in policy:
         policy["activation_fn"] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[policy.pop("activation")]
     try:
-        return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **given)
+        return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **arguments)
     except (AssertionError, TypeError, ValueError) as error:
-        raise InputError(f"algorithm: {settings['algo']} does not take these settings: {error}") from error
+        raise InputError(f"algorithm: {settings['algo']} does not accept these settings: {error}") from error

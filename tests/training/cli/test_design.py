@@ -79,7 +79,7 @@ def test_bound_writes_and_front_reads_its_fronts(tmp_path):
 
 def test_a_sweep_of_settings_refuses_seeds_for_scoring_and_settings_that_there_are_not():
     _, stderr = fowt("design", "lqr-sweep", "--seeds", "1,2", code=2)
-    assert "seeds = [1, 2]: tune on seeds of 1000 and above" in " ".join(stderr.split())
+    assert "seeds = [1, 2]: must be 1000 or more for tuning" in " ".join(stderr.split())
     _, stderr = fowt("design", "lqr-sweep", "--vary", "torque_rat=1,2", code=2)
     assert "unknown setting of lqr 'torque_rat'. Did you mean 'torque_rate'" in " ".join(stderr.split())
 

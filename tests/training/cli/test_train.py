@@ -36,7 +36,7 @@ def test_a_run_ends_goes_on_and_its_checkpoint_becomes_a_policy_on_request_only(
     folder = tmp_path / "run"
     assert train(folder, 32).exit_code == 0
     again = train(folder, 32)
-    assert again.exit_code == EXIT_INPUT and "holds a run already" in again.output
+    assert again.exit_code == EXIT_INPUT and "already contains a run" in again.output
     assert call("train", "--resume", "--out", folder, "--steps", 64).exit_code == 0
     assert [p.name for p in (folder / "checkpoints").iterdir()] == ["step_64"]
     refused = call("export-policy", folder, "--out", tmp_path / "p.npz")
@@ -107,7 +107,7 @@ def test_benchmark_training_writes_a_row_per_kind_of_environment(tmp_path):
         (("train", "--steps", "0"), "steps = 0"),
         (("train", "--set", "reward=1"), "unknown setting 'reward'"),
         (("train", "--resume", "--set", "task=x", "--out", "nowhere"), "keeps its settings"),
-        (("train", "--resume", "--out", "nowhere"), "holds no run"),
+        (("train", "--resume", "--out", "nowhere"), "contains no run"),
         (("export-policy", "nowhere", "--out", "p.zip"), "must end with .npz"),
     ],
 )

@@ -185,7 +185,7 @@ def test_more_noise_costs_more_and_none_is_full_knowledge(plant):
     ]
     assert np.all(np.diff(costs) > 0.0)
     assert costs[0] == pytest.approx(total(plant, FULL, q), rel=0.05)
-    with pytest.raises(InputError, match="noise: blade_pitch = 0.0: must be a standard deviation above 0"):
+    with pytest.raises(InputError, match="noise: blade_pitch = 0.0: must be a positive standard deviation"):
         Problem(plant, MEASURED, dict.fromkeys(SENSORS, 0.0) | {"rotor_speed": 1.0})
 
 

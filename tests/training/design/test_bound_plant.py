@@ -99,10 +99,10 @@ def test_a_pitch_drive_without_lag_counts_as_a_quick_one(plant):
 
 
 def test_what_has_no_limit_is_named(windy, plant):
-    with pytest.raises(InputError, match="the turbine sweeps .* IEC 61400-1, which holds above 200 m2"):
+    with pytest.raises(InputError, match="swept area = .* IEC 61400-1, which applies above 200 m2"):
         small = build_scene("liu_1_50", wind=2.0, fidelity="reference")
         BoundPlant(small, 2.0)
-    with pytest.raises(InputError, match="the blade pitch rests on its limit there"):
+    with pytest.raises(InputError, match="the blade pitch is at its limit"):
         BoundPlant(windy, 10.0)
     with pytest.raises(InputError, match="unstable under gspi_oc3"):
         loose = copy(plant)

@@ -212,7 +212,7 @@ def test_settings_that_cannot_be_used_are_named(folder, arguments, message):
 def test_a_folder_without_results_is_refused(tmp_path):
     result = CliRunner().invoke(cli.app, ["report", str(tmp_path)])
     assert result.exit_code == EXIT_INPUT and "contains no results.csv" in result.stderr
-    with pytest.raises(InputError, match="is no folder"):
+    with pytest.raises(InputError, match="is not a folder"):
         write_report(tmp_path / "none")
 
 

@@ -58,7 +58,7 @@ def test_conditions_are_wind_sea_events_length_sensors_and_seeds():
     assert row["sea"] == "JONSWAP Hs 1.86 m, Tp 7.94 s, gamma 1"
     assert row["events"] == "grid loss at 260 s, shift mooring stiffness 0.8"
     assert (row["duration (s)"], row["scored from (s)"], row["seeds"]) == ("650", "50", "1, 2, 4")
-    assert row["share of the lifetime"] == "25.0 %"
+    assert row["fraction of lifetime"] == "25.0 %"
     assert conditions_text(row).endswith("650 s, scored from 50 s; standard sensors; seeds 1, 2, 4")
 
 

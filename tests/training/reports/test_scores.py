@@ -127,7 +127,7 @@ def test_failed_runs_are_counted_and_cost_a_multiple_of_the_baselines_figures():
     for name in ("agent", "base"):
         for seed in range(3):
             fail(runs, name, seed)
-    with pytest.raises(InputError, match="no run of both has a figure"):
+    with pytest.raises(InputError, match="no run of both has a value"):
         agent_scores(runs, ["base"])
 
 

@@ -83,17 +83,17 @@ def test_a_row_has_means_with_intervals_and_differences_to_the_baseline():
 
 
 def test_one_name_has_one_figure_and_one_unit_in_all_tables():
-    """The greatest power is the mean of the runs' greatest, in the metric's own unit."""
+    """The maximum power is the mean of the maxima of the runs, in the metric's own unit."""
     both = board([1, 2, 9], x="ok", factor=1e3)
     _, headings, (_, x), _ = leaderboard_rows(both)
     place = {heading.replace("\n", " "): number for number, heading in enumerate(headings)}
     assert (
-        x[place["greatest power kW"]] == "1400" == f"{both['controllers'][1]['metrics'][POWER]['mean']:.0f}"
+        x[place["maximum power kW"]] == "1400" == f"{both['controllers'][1]['metrics'][POWER]['mean']:.0f}"
     )
     for heading, metric, *_ in (*LEADERBOARD, *PRINTED_METRICS):
         unit = metric.rpartition("_[")[2][:-1].replace("m/s^2", "m/s²")
         assert heading.split("\n")[-1].replace(" ", "") == unit.replace("-", "")
-    assert SHORT[POWER] == "greatest power"
+    assert SHORT[POWER] == "maximum power"
 
 
 def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
@@ -119,7 +119,7 @@ def test_a_controller_that_failed_in_bad_weather_is_not_said_to_be_better_and_it
 
 def test_a_baseline_that_failed_is_said_to_have():
     _, _, _, remarks = leaderboard_rows(board([1, 2, 3, 4, 5], x="ok", lost=5, baseline="x"))
-    assert remarks[-1] == "differences from x are over the runs that it did not lose"
+    assert remarks[-1] == "differences from x are over the runs that the baseline did not lose"
     title, _, _, remarks = leaderboard_rows(board([1, 2], pi="failed"))
     assert "difference" not in title
     assert remarks[-1] == "no paired differences: every controller has runs that failed or lost power"

@@ -87,7 +87,7 @@ def test_without_something_to_compare_the_verdict_says_why():
     assert "a single controller" in verdict(board(), 6, 4)
     lost = verdict(board(("a", {}, 1), baseline=None), 6, 4)
     assert "every controller has runs that failed or lost power" in lost
-    assert "a: no difference is known" in words(verdict(board(("a", {}, 0)), 6, 4))
+    assert "a: no difference is available" in words(verdict(board(("a", {}, 0)), 6, 4))
 
 
 @pytest.mark.parametrize(

@@ -110,7 +110,7 @@ def test_a_second_training_in_a_folder_is_refused_before_anything_is_built(tmp_p
         for other in (second, third):
             with pytest.raises(InputError, match=f"run folder '{folder}': another training is writing to it"):
                 other.run()
-        with pytest.raises(InputError, match="holds a run already"):
+        with pytest.raises(InputError, match="already contains a run"):
             Training(small("ppo"), folder)
         raise KeyboardInterrupt
 
@@ -124,7 +124,7 @@ def test_a_run_that_came_into_the_folder_meanwhile_is_not_written_over(tmp_path)
     late = Training(small("ppo", steps=32), tmp_path / "run")
     first = Training(small("ppo", steps=64), late.folder)
     first._write_settings()
-    with pytest.raises(InputError, match="holds a run already"):
+    with pytest.raises(InputError, match="already contains a run"):
         late.run()
     assert Training(None, late.folder, resume=True).settings == first.settings
 
@@ -286,7 +286,7 @@ def test_what_no_file_of_settings_has_is_named(words, changes, message):
 
 
 def test_a_folder_without_usable_settings_is_not_resumed(tmp_path):
-    with pytest.raises(InputError, match="holds no run"):
+    with pytest.raises(InputError, match="contains no run"):
         Training(None, tmp_path, resume=True)
     (tmp_path / "settings.yml").write_text("algo: [ppo\n")
     with pytest.raises(InputError, match="settings.yml.*not valid YAML"):
@@ -336,8 +336,8 @@ def test_a_setting_that_no_run_can_have_is_named_before_anything_is_built(change
         ({"algorithm.policy_kwargs.net_arch": {"pi": ["x"]}}, "policy_kwargs.net_arch = .*: must be numbers"),
         ({"algorithm.rollout_buffer_class": "os:abort"}, "algorithm.rollout_buffer_class: unknown key"),
         ({"algorithm.target_kl": "os:abort"}, "algorithm.target_kl = 'os:abort': must be a number"),
-        ({"algorithm.policy_kwargs.net": 3}, "ppo does not take these settings.*'net'"),
-        ({"algorithm.n_steps": -1}, "ppo does not take these settings.*n_steps=-1"),
+        ({"algorithm.policy_kwargs.net": 3}, "ppo does not accept these settings.*'net'"),
+        ({"algorithm.n_steps": -1}, "ppo does not accept these settings.*n_steps=-1"),
         (
             {"environment.observation": "mesured"},
             "set 'mesured'. Did you mean 'measured'",

@@ -7,7 +7,7 @@ const ALL = "";
 const dark = () => document.documentElement.dataset.theme === "dark";
 const colour = (i) => (dark() ? DARK : LIGHT)[i % LIGHT.length];
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-// plotly reads some tags in its texts: names are shown as they are
+// plotly interprets some tags in texts: names are escaped
 const plain = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
 function decode(packed) {
@@ -47,7 +47,7 @@ function element(tag, text, kind) {
   return made;
 }
 function explain(target, text) {
-  // what stands under a pointer, a finger or the keyboard's focus is explained by its data-tip
+  // the tooltip shows the data-tip of the element under the pointer or with the keyboard focus
   target.dataset.tip = text;
   if (!target.matches("button, a, select, [tabindex]")) target.tabIndex = 0;
   return target;
@@ -84,7 +84,7 @@ for (const [kind, show] of [["pointerover", true], ["focusin", true], ["click", 
 }
 $("tip").addEventListener("pointerleave", hideTip);
 document.addEventListener("keydown", (event) => { if (event.key === "Escape") hideTip(); });
-// what is explained moves, and its explanation with it
+// the tooltip follows its element on scroll
 document.addEventListener("scroll", () => { if (explained) showTip(explained); }, { passive: true, capture: true });
 
 // ---- tables that scroll ------------------------------------------------------------------------
@@ -119,7 +119,7 @@ function percentage(percent) {
 }
 
 function gapOf(row, metric) {
-  // {text, kind, tip} of a difference; better and worse are told by a mark beside the colour
+  // {text, kind, tip} of a difference; better and worse are shown by a mark in addition to the colour
   const percent = row.percent && row.percent[metric.name];
   if (percent === null || percent === undefined) return null;
   const p = row.p[metric.name];
@@ -145,9 +145,9 @@ function sortedRows() {
   const own = { controller: (row) => row.controller, lost: (row) => row.lost, rank: (row) => row.rank };
   const value = own[order.key] || ((row) => (shown === "percent" && row.controller === DATA.baseline ? 0 : row[shown][order.key]));
   rows.sort((a, b) => {
-    if (!own[order.key] && !a.lost !== !b.lost) return a.lost ? 1 : -1; // figures of other runs than the others' come last
+    if (!own[order.key] && !a.lost !== !b.lost) return a.lost ? 1 : -1; // controllers with lost runs last: their means are over other runs
     const [x, y] = [value(a), value(b)];
-    if (x === null || x === undefined) return 1; // missing figures last, whichever the direction
+    if (x === null || x === undefined) return 1; // missing values last, in either direction
     if (y === null || y === undefined) return -1;
     const sign = typeof x === "string" ? x.localeCompare(y) : x - y;
     return order.down ? -sign : sign;
@@ -207,8 +207,8 @@ function drawTable() {
   const columns = shownColumns();
   const rows = sortedRows();
   const head = element("tr");
-  head.append(headerCell("controller", "controller", "", "Choose to sort by name."), headerCell("lost", "lost", "runs", "Runs that failed, tripped or lost power (less than half of the reference's energy), of all runs. They have no figures here; a score counts them as far worse than the reference."));
-  if (DATA.ranked) head.append(headerCell("rank", "rank", "", "First those whose runs all ended well within the limits, then those beyond a limit, then those that lost runs; within each by score, else as evaluated."));
+  head.append(headerCell("controller", "controller", "", "Click to sort by name."), headerCell("lost", "lost", "runs", "Runs that failed, tripped or lost power (less than half of the reference's energy), of all runs. Lost runs are not in these means; a score counts them as far worse than the reference."));
+  if (DATA.ranked) head.append(headerCell("rank", "rank", "", "First controllers within all limits and without lost runs, then those that exceed a limit, then those with lost runs; within each group by score, else in order of evaluation."));
   for (const metric of columns) head.append(headerCell(metric.name, metric.label, metric.unit, metric.about));
   hideTip();
   $("table").classList.toggle("every", $("all-columns").checked);
@@ -276,7 +276,7 @@ function drawWinds() {
 const PLACES = ["top center", "bottom center", "middle right", "middle left", "top right", "bottom right", "top left", "bottom left"];
 
 function placeLabels(marks, width, height) {
-  // for each mark {x, y, r, text} in pixels the place of its name that covers least of what is there
+  // for each mark {x, y, r, text}, in pixels: the label position with the least overlap
   const taken = marks.map(({ x, y, r }) => [x - r, y - r, x + r, y + r]);
   const overlap = (a, b) => Math.max(0, Math.min(a[2], b[2]) - Math.max(a[0], b[0])) * Math.max(0, Math.min(a[3], b[3]) - Math.max(a[1], b[1]));
   return marks.map(({ x, y, r, text }) => {
@@ -299,7 +299,7 @@ function drawPareto() {
   const [across, up, size] = DATA.pareto;
   const known = (value) => value !== null && value !== undefined;
   const every = DATA.board[$("table-case").value].filter((row) => known(row.values[across]) && known(row.values[up]));
-  const whole = every.filter((row) => !row.lost); // a controller that lost runs betters nobody, and sets no scale
+  const whole = every.filter((row) => !row.lost); // controllers with lost runs are excluded from front and scale
   const range = (key) => {
     const values = (whole.length ? whole : every).map((row) => row.values[key]);
     const [low, high] = [Math.min(...values), Math.max(...values)];
@@ -344,7 +344,7 @@ function drawPareto() {
   const found = front.length > 1 ? ` No controller lies below and to the left of the dotted line (${names}).`
     : rows.length > 1 && front.length ? ` ${names} is least in both.` : "";
   $("pareto-remark").textContent = rows.length
-    ? `Less is better on both axes: ${where}, for the case chosen in the leaderboard. The area of a mark is the pitch travel${rows.length > whole.length ? "; hollow: of the runs that were not lost" : ""}.${off.length ? ` ${off.length} off scale: ${off.join(", ")}.` : ""}${found} Intervals are shown on hover; whether a difference is significant is said above.`
+    ? `Less is better on both axes: ${where}, for the case chosen in the leaderboard. The area of a mark is the pitch travel${rows.length > whole.length ? "; hollow: controllers with lost runs, over the others" : ""}.${off.length ? ` ${off.length} off scale: ${off.join(", ")}.` : ""}${found} Intervals are shown on hover; the leaderboard shows which differences are significant.`
     : "No controller has both standard deviations here.";
   draw("pareto-plot", traces, {
     height: 430, xaxis: { title: { text: "rotor speed, standard deviation (rpm)" }, range: xs },
@@ -395,7 +395,7 @@ function panels(entries, field, axes) {
     const top = 1 - number * (height + gap);
     const held = DATA.controllers.map((controller, i) => [controller, i, entries[controller]]).filter(([, , run]) => run && run[field][axis.channel]);
     const same = held.length > 1 && held.every(([, , run]) => ["codes", "low", "high"].every((key) => run[field][axis.channel][key] === held[0][2][field][axis.channel][key]));
-    const sound = held.filter(([controller]) => !lost[controller]); // lost runs set no scale
+    const sound = held.filter(([controller]) => !lost[controller]); // lost runs are excluded from the scale
     const ends = (sound.length ? sound : held).map(([, , run]) => run[field][axis.channel]);
     const [least, most] = [Math.min(...ends.map((packed) => packed.low)), Math.max(...ends.map((packed) => packed.high))];
     const pad = 0.06 * (most - least) || 1;
@@ -455,8 +455,8 @@ function drawSpectra() {
   const marks = [...((Object.values(entries).find((run) => run.marks.length) || {}).marks || [])].sort((a, b) => a[1] - b[1]);
   const height = 140 + 190 * Math.max(1, axes.length);
   $("spectra-about").textContent = axes.length
-    ? `Power spectral density of ${$("series-case").value}, seed ${$("series-seed").value}, as chosen above.${marks.length ? " Vertical lines: the frequencies named at the top." : ""}`
-    : "No run that is shown has enough scored samples for a spectrum.";
+    ? `Power spectral density of ${$("series-case").value}, seed ${$("series-seed").value}, as selected above.${marks.length ? " Vertical lines: the frequencies named at the top." : ""}`
+    : "No run shown has enough scored samples for a spectrum.";
   draw("spectra-plot", traces, {
     ...shape, height, hovermode: "x", margin: { l: 64, r: 16, t: narrow() ? 54 : 38, b: 48 },
     xaxis: { type: "log", title: { text: "frequency (Hz)", standoff: 8 }, range: [Math.log10(0.005), Math.log10(0.5)], tickvals: [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1], anchor: axes.length > 1 ? `y${axes.length}` : "y" },
@@ -487,7 +487,7 @@ function drawSchedule() {
 
 // ---- the page ----------------------------------------------------------------------------------
 function chooseSeeds() {
-  // every seed of the case; those whose series are not in the file cannot be chosen
+  // all seeds of the case; seeds without series in the file are disabled
   const there = DATA.series[$("series-case").value] || {};
   const before = $("series-seed").value;
   const seeds = DATA.seeds[$("series-case").value];
