@@ -1,4 +1,4 @@
-"""The `fowt` command with all its commands. Each is thin: it parses, calls, prints."""
+"""Assembles the `fowt` command; each subcommand parses its options, calls the library and prints."""
 
 from importlib import import_module
 
@@ -9,5 +9,5 @@ for module in MODULES:
 
 
 def main():
-    """Entry point of the console script."""
+    """Run the console script `fowt`."""
     app()

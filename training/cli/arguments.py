@@ -1,4 +1,4 @@
-"""What users type on the command line, turned into what the library takes."""
+"""Parses texts from the command line into arguments of the library."""
 
 import json
 
@@ -8,7 +8,7 @@ from fowt_env.errors import InputError
 
 
 def parse_names(text, separator=","):
-    """Return the list of the names in a text with separators; None for None."""
+    """Return the names in a text as a list; None: None."""
     return None if text is None else [name.strip() for name in text.split(separator) if name.strip()]
 
 
@@ -30,7 +30,7 @@ def parse_protection(text):
 
 
 def parse_pairs(pairs, what):
-    """Return {key: value} of "key=value" texts (None: none); a value that is no JSON stays a text."""
+    """Return {key: value} of "key=value" texts (None: {}); a value that is not JSON stays a text."""
     result = {}
     for pair in pairs or ():
         key, sign, value = pair.partition("=")

@@ -1,4 +1,4 @@
-"""fowt benchmark: speed, compile times, accuracy, evaluation and stability."""
+"""Implements fowt benchmark: speed, compile times, accuracy, evaluation and stability."""
 
 from pathlib import Path
 from typing import Annotated
@@ -20,10 +20,10 @@ ScenesOption = Annotated[str, Option(help="Platform of the scenes.")]
 
 @command(benchmarks)
 def compile_command(out_path: CsvOption = "results/benchmark/compile.csv"):
-    """Time the first run of six kinds of scene: compiling.
+    """Time the first run, with compilation, of six kinds of scene.
 
     Examples:
-    fowt benchmark compile  # a minute or two; kernels of other runs are kept
+    fowt benchmark compile  # a minute or two; the kernel cache stays unchanged
     """
     from fowt_env.training.benchmarks import compile_time
     from fowt_env.training.benchmarks import speed as bench
@@ -38,10 +38,10 @@ def compile_command(out_path: CsvOption = "results/benchmark/compile.csv"):
 @command(benchmarks)
 def speed(
     kinds: Annotated[str | None, Option(help="Kinds of scene, semicolon-separated; default: all.")] = None,
-    seconds: Annotated[float, Option(help="Simulated seconds of a run.")] = 600.0,
-    repeats: Annotated[int, Option(help="Repeats; the median counts.")] = 5,
+    seconds: Annotated[float, Option(help="Simulated time of a run, s.")] = 600.0,
+    repeats: Annotated[int, Option(help="Repeats; reported: the median.")] = 5,
     platform: ScenesOption = "oc3_hywind",
-    starts: Annotated[bool, Option("--starts", help="Also time the first and a later start.")] = False,
+    starts: Annotated[bool, Option("--starts", help="Also time a first and a later start.")] = False,
     out_path: CsvOption = "results/benchmark/speed.csv",
 ):
     """Time simulate on each kind of scene, load by load.
@@ -50,7 +50,7 @@ def speed(
     fowt benchmark speed  # every kind of scene, load by load (some minutes: each kind is compiled)
     fowt benchmark speed --kinds "full, standard;full, fast" --starts  # two kinds, and start times
 
-    [bold]File written[/bold]: speed.csv, with machine, versions, commit and calibration in its head.
+    [bold]File written[/bold]: speed.csv, with machine, versions, commit and calibration in its header.
     """
     from fowt_env.training.benchmarks import speed as bench
 
@@ -68,16 +68,16 @@ def speed(
 
 @command(benchmarks)
 def accuracy(
-    seeds: Annotated[str, Option(help=f"{WHOLE}.")] = "1,2,3",
+    seeds: Annotated[str, Option(help=f"Seeds: {WHOLE}.")] = "1,2,3",
     duration: Annotated[float, Option(help="Length of each run, s.")] = 600.0,
     finest: Annotated[float, Option(help="Step of the reference, s.")] = 0.00625,
     axes: Annotated[str | None, Option(help="Axes of the sweep, comma-separated; default: all.")] = None,
-    repeats: Annotated[int, Option(min=1, help="Timed repeats of short runs; the median counts.")] = 5,
+    repeats: Annotated[int, Option(min=1, help="Timed repeats of short runs; reported: the median.")] = 5,
     platform: ScenesOption = "oc3_hywind",
-    box: Annotated[bool, Option("--box", help="Wind of the stored full-field TurbSim box instead.")] = False,
+    box: Annotated[bool, Option("--box", help="Use the wind of the stored full-field TurbSim box.")] = False,
     out_folder: FolderOption = "results/benchmark",
     plot: PlotsOption = True,
-    beside: Annotated[str | None, Option(help="CSV of another platform, to plot in the same figure.")] = None,
+    beside: Annotated[str | None, Option(help="CSV of another platform, added to the figure.")] = None,
 ):
     """Measure error against run time.
 
@@ -86,9 +86,9 @@ def accuracy(
     Examples:
     fowt benchmark accuracy  # every variant, three seeds of 600 s: an hour
     fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"  # a first look
-    fowt benchmark accuracy --platform iea15_volturnus_s --axes levels  # another platform's levels
+    fowt benchmark accuracy --platform iea15_volturnus_s --axes levels  # fidelity levels of another platform
 
-    [bold]Files written[/bold]: accuracy.csv (a row as each run ends; a rerun resumes), accuracy.png.
+    [bold]Files written[/bold]: accuracy.csv (a row after each run; a rerun resumes), accuracy.png.
     """
     from fowt_env.training.benchmarks import accuracy as study
     from fowt_env.training.validation.openfast_cases import box_wind
@@ -98,7 +98,7 @@ def accuracy(
     name = "accuracy" if platform == study.PLATFORM else f"accuracy_{platform}"
     if box and platform != study.PLATFORM:
         raise InputError(
-            f"--box: the stored box is {study.PLATFORM}'s; leave it out for platform {platform!r}"
+            f"--box: the stored box is for {study.PLATFORM}; omit --box for platform {platform!r}"
         )
     numbers = parse_whole_numbers(seeds, "seeds")
     with text_progress("accuracy") as progress:
@@ -120,8 +120,8 @@ def accuracy(
         )
         for row in study.accuracy_summary(table).to_dict("records")
     ]
-    headings = ("variant", "worst", "of", "x real time", "kernel alone", "Pareto front")
-    title = "rms difference over standard deviation, and speed of simulate"
+    headings = ("variant", "largest", "channel", "x real time", "kernel only", "Pareto front")
+    title = "rms difference relative to standard deviation, and speed of simulate"
     print_table(headings, rows, title, left=(0, 2))
     files = [folder / f"{name}.csv"]
     if plot:
@@ -136,7 +136,7 @@ def accuracy(
 
 @command(benchmarks)
 def evaluation(
-    count: Annotated[int, Option(help="Runs that are timed.")] = 21,
+    count: Annotated[int, Option(help="Number of timed runs.")] = 21,
     suite: SuiteOption = "above_rated",
     controller: Annotated[str, Option(help="Controller.")] = "pi",
     with_ray: Annotated[bool, Option("--ray", help="Also time a local Ray worker.")] = False,
@@ -144,7 +144,7 @@ def evaluation(
 ):
     """Time the runs of an evaluation on one core.
 
-    --ray adds the overhead of distributing them.
+    --ray adds the overhead of distributing the runs.
 
     Examples:
     fowt benchmark evaluation  # 21 runs of the suite above_rated with pi
@@ -165,23 +165,23 @@ def evaluation(
 @command(benchmarks)
 def stability(
     parts: Annotated[str | None, Option(help="Parts, comma-separated; default: all.")] = None,
-    cases: Annotated[int, Option(min=1, help="Random scenes and states.")] = 2000,
-    steps: Annotated[int, Option(min=1000, help="Steps of the long runs.")] = 200_000,
+    cases: Annotated[int, Option(min=1, help="Number of random scenes and states.")] = 2000,
+    steps: Annotated[int, Option(min=1000, help="Number of steps of the long runs.")] = 200_000,
     hostile: Annotated[int, Option(min=1, help="Control periods of each adversarial policy.")] = 600,
-    seed: Annotated[int, Option(min=0, help="Seed of everything random.")] = 0,
+    seed: Annotated[int, Option(min=0, help="Random seed.")] = 0,
     out_folder: FolderOption = "results/stability",
-    report: Annotated[str | None, Option(help="Report; default: robustness.md in --out.")] = None,
-    replay: Annotated[str | None, Option(help="Run a stored case again, nothing else.")] = None,
+    report: Annotated[str | None, Option(help="Report file; default: robustness.md in --out.")] = None,
+    replay: Annotated[str | None, Option(help="Only rerun a stored case.")] = None,
 ):
     """Stress-test the simulator (from a clone).
 
-    Steps, random scenes, adversarial actions, extremes, long runs.
+    Covers time steps, random scenes, adversarial actions, extreme conditions and long runs.
 
     Examples:
-    fowt benchmark stability  # every part on small counts: some minutes
+    fowt benchmark stability  # every part with small counts: some minutes
     fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000  # as documented: an hour
-    fowt benchmark stability --parts map,extremes  # two parts; the report joins those of the folder
-    fowt benchmark stability --replay results/stability/failures/case_0000.json  # a failure again
+    fowt benchmark stability --parts map,extremes  # two parts; the report also has those in the folder
+    fowt benchmark stability --replay results/stability/failures/case_0000.json  # rerun a failure
 
     [bold]Files written[/bold]: PART.json, failures/case_NNNN.json, robustness.md, robustness/PART.csv.
     """
@@ -196,7 +196,7 @@ def stability(
     sizes = stress.Sizes(cases=cases, steps=steps, hostile_steps=hostile, seed=seed)
     with text_progress("stability") as progress:
         results = stress.study(out_folder, parse_names(parts), sizes, progress=progress)
-    claims = [claim for found in results.values() for claim in found.claims]
+    claims = [claim for part in results.values() for claim in part.claims]
     for claim in claims:
         verdict = "[green]holds[/green] " if claim.holds else "[red]MISSED[/red]"
         out.print(f"{verdict} {escape(f'{claim.what} ({claim.count}): {claim.found}')}")

@@ -1,4 +1,4 @@
-"""fowt cache: what is kept on disk to save time, and its removal."""
+"""Implements fowt cache: shows and clears compiled kernels and other cached files on disk."""
 
 from typing import Annotated
 
@@ -10,20 +10,20 @@ from fowt_env.errors import InputError
 from fowt_env.training.cli.console import add_group, command, note, out, reported
 from fowt_env.training.cli.tables import print_table
 
-cache = add_group("cache", "Show or clear what is kept on disk.", invoke_without_command=True)
+cache = add_group("cache", "Show or clear the cache on disk.", invoke_without_command=True)
 
 
 @cache.callback()
 @reported
 def show(context: typer.Context):
-    """Show the folder of compiled kernels and full-field wind, and how large they are."""
+    """Show the folder and the size of compiled kernels and full-field wind."""
     if context.invoked_subcommand is not None:
         return
     from fowt_env.training.cli import health
 
     parts = health.cache_parts()
     if not parts:
-        raise InputError("no cache: neither FOWT_CACHE_DIR nor a home folder says where")
+        raise InputError("no cache: neither FOWT_CACHE_DIR nor a home folder is set")
     out.print(escape(str(health.cache_root())))
     rows = [(what, len(paths), f"{health.megabytes(paths):.1f}") for what, paths in parts.items()]
     print_table(("", "folders or files", "MB"), rows)
@@ -31,22 +31,22 @@ def show(context: typer.Context):
 
 @command(cache)
 def clear(
-    every: Annotated[bool, Option("--all", help="Kernels of this version too.")] = False,
-    wind_boxes: Annotated[bool, Option("--wind-boxes", help="Full-field wind too.")] = False,
-    yes: Annotated[bool, Option("--yes", "-y", help="Do not ask.")] = False,
+    every: Annotated[bool, Option("--all", help="Also remove kernels of this version.")] = False,
+    wind_boxes: Annotated[bool, Option("--wind-boxes", help="Also remove full-field wind.")] = False,
+    yes: Annotated[bool, Option("--yes", "-y", help="Do not ask for confirmation.")] = False,
 ):
-    """Remove compiled kernels of other versions and of submissions; what this package did not make stays.
+    """Remove compiled kernels of other versions and of submissions; files not created by this package stay.
 
     Examples:
     fowt cache clear  # compiled kernels of other versions, and those of a leaderboard's submissions
-    fowt cache clear --all  # this version's too: the next run compiles them again
-    fowt cache clear --wind-boxes --yes  # full-field wind besides, without a question
+    fowt cache clear --all  # also those of this version: the next run compiles them again
+    fowt cache clear --wind-boxes --yes  # also full-field wind, without confirmation
     """
     from fowt_env.training.cli import health
 
-    wanted = {"other versions", "submissions"} | ({"this version", "hashes of sources"} if every else set())
-    wanted |= {"wind boxes"} if wind_boxes else set()
-    parts = {what: paths for what, paths in health.cache_parts().items() if what in wanted and paths}
+    selected = {"other versions", "submissions"} | ({"this version", "hashes of sources"} if every else set())
+    selected |= {"wind boxes"} if wind_boxes else set()
+    parts = {what: paths for what, paths in health.cache_parts().items() if what in selected and paths}
     if not parts:
         note("nothing to remove")
         return

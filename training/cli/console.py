@@ -1,4 +1,4 @@
-"""Shared parts of the commands of fowt: the application, messages on stderr, exit codes, progress."""
+"""Defines what the fowt commands share: the application, messages on stderr, exit codes, progress bars."""
 
 import functools
 import inspect
@@ -21,19 +21,19 @@ from fowt_env.training.cli.tables import out
 
 EXIT_STOPPED, EXIT_INPUT, EXIT_INTERRUPTED = 1, 2, 130
 STUDIES = "fowt_env.training.studies"  # not in the wheel
-LINE_EVERY = 30.0  # s between two lines of progress where there is no terminal for a bar
-OUTPUTS = {  # parameters of commands that name what is written -> how they are checked ahead
+LINE_EVERY = 30.0  # s between lines of progress without a terminal
+OUTPUTS = {  # output parameters of commands -> arguments of output(), which checks them before the run
     "out_path": {},
     "out_folder": {"folder": True},
     "plot": {"option": "--plot"},
     "report": {"option": "--report"},
 }
 err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
-MODULES = (  # that add their commands to the app
+MODULES = (  # modules that add commands to the app
     "simulate", "listing", "check", "evaluate", "validate", "doctor", "warmup", "cache", "benchmark",
     "design", "plot", "report", "scores", "leaderboard", "import_deck", "hydro", "train",
 )  # fmt: skip
-GROUPS = {  # of fowt --help: heading -> its commands, in the order in which they are shown
+GROUPS = {  # headings of fowt --help -> their commands, in the order shown
     "Run": ("simulate", "trim", "plot", "animate", "check", "import", "hydro"),
     "Design": ("linearize", "design"),
     "Evaluate": ("evaluate", "report", "scores", "leaderboard"),
@@ -42,18 +42,18 @@ GROUPS = {  # of fowt --help: heading -> its commands, in the order in which the
     "Develop": ("validate", "paper", "benchmark"),
 }
 START = (  # first examples in fowt --help
-    ("fowt simulate --wind 18 --plot run.png", "one run: statistics and a picture"),
-    ("fowt list", "names: platforms, seas, controllers"),
+    ("fowt simulate --wind 18 --plot run.png", "one run: statistics and a plot"),
+    ("fowt list", "platforms, seas, controllers, ..."),
     ("fowt evaluate --controllers pi,lqr", "compare controllers"),
-    ("fowt COMMAND --help", "options, and examples to copy"),
+    ("fowt COMMAND --help", "options and examples"),
 )
 
 
 class Overview(TyperGroup):
-    """The commands in their groups, a line each, so that all of them fit on one screen."""
+    """Shows the commands in groups, one line each, so that the help fits on one screen."""
 
     def format_help(self, ctx, formatter):
-        """Print the help of the whole command."""
+        """Print the help of fowt."""
         out.print(f"[bold]fowt[/bold]  {self.help}  [dim](--version)[/dim]\n")
         width = max(len(command) for command, _ in START)
         for command, text in START:
@@ -72,7 +72,7 @@ class Overview(TyperGroup):
         return {group: [name for name in names if name in self.commands] for group, names in GROUPS.items()}
 
 
-new_folders: list[Path] = []  # that the running command may make
+new_folders: list[Path] = []  # that the running command may create
 app = typer.Typer(
     name="fowt",
     cls=Overview,
@@ -88,7 +88,7 @@ app = typer.Typer(
 def version_option(
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ):
-    """Options of the command as a whole."""
+    """Handle the options of fowt itself."""
     if version:
         from fowt_env import __version__
 
@@ -97,17 +97,17 @@ def version_option(
 
 
 def add_group(name, text, **options):
-    """Return a new group of commands of the app, with its help text."""
-    made = typer.Typer(rich_markup_mode="rich", help=text, **(options or {"no_args_is_help": True}))
-    app.add_typer(made, name=name)
-    return made
+    """Add a group of commands to the app and return the group; text: help of the group."""
+    group = typer.Typer(rich_markup_mode="rich", help=text, **(options or {"no_args_is_help": True}))
+    app.add_typer(group, name=name)
+    return group
 
 
 def command(group=app):
     """Return a decorator that adds a function to a group of commands, with its errors `reported`.
 
-    The command has the name of the function, without an ending "_command". The docstring is the help, and
-    below its line "Examples:" the epilog, in which lines that begin with "fowt" are examples.
+    The command is named after the function, without the suffix "_command". The docstring is the help and,
+    below its line "Examples:", the epilog; lines that begin with "fowt" are examples.
     """
 
     def coloured(line):
@@ -156,70 +156,70 @@ def reported(function):
 
 
 def announce_folders():
-    """Print which of the missing folders have been made, once."""
+    """Print which of new_folders have been created, then clear the list."""
     for folder in new_folders:
         if folder.is_dir():
-            note(f"made the folder {folder}")
+            note(f"created the folder {folder}")
     new_folders.clear()
 
 
 @contextmanager
 def from_a_clone(command):
-    """Wrap imports of the studies. Raises: InputError that names the command if they are not installed."""
+    """Wrap imports of the studies. Raises: InputError with the command if the studies are not installed."""
     try:
         yield
     except ModuleNotFoundError as error:
         if not (error.name or "").startswith(STUDIES):
             raise
         raise InputError(
-            f"fowt {command}: needs a clone of the repository, whose folder training/studies is not installed"
-            " with the package: pip install -e . in the clone"
+            f"fowt {command}: needs a clone of the repository (pip install -e . in the clone):"
+            " training/studies is not part of the installed package"
         ) from None
 
 
 def fail(message, code):
-    """Print the message in red on stderr, as its last line, and end with the exit code."""
+    """Print the message in red as the last line of stderr and exit with the code."""
     announce_folders()
     err.print(f"[red][bold]Error:[/bold] {escape(str(message))}[/red]")
     raise typer.Exit(code)
 
 
 def note(message):
-    """Print a remark on stderr, so that stdout has only results."""
+    """Print a remark on stderr, so that stdout contains only results."""
     err.print(f"[dim]{escape(message)}[/dim]")
 
 
 def wrote(*paths):
-    """Print on stderr which files have been written, but for those that are None."""
+    """Print the paths of written files on stderr; None is skipped."""
     if any(paths):
         note(f"wrote {', '.join(str(path) for path in paths if path is not None)}")
 
 
 def output(path, option="--out", folder=False, endings=()):
-    """Return the path of an option (None: None), once its folder exists or may be made.
+    """Return the path of an output option whose folder exists or may be created; None: None.
 
-    endings: those that the file may have; (): any. A missing folder may be made in the working folder alone,
-    and so may the last part of an option that names a folder; `reported` says at the end what has been made.
-    Raises: InputError that names the option, the path and the missing folder.
+    endings: allowed suffixes; (): any. Missing folders are created in the working folder only; if the option
+    names a folder, its last part may be new anywhere. `reported` prints the created folders.
+    Raises: InputError with the option, the path and the missing folder.
     """
     if path is None:
         return None
     if endings:
         table_path(path, endings, option)
-    place = Path(path) if folder else Path(path).parent
-    if place.is_dir():
+    dest = Path(path) if folder else Path(path).parent
+    if dest.is_dir():
         return path
-    if place.exists():
-        raise InputError(f"{option} {str(path)!r}: cannot be written: {str(place)!r} is a file, not a folder")
-    inside = place.resolve().is_relative_to(Path.cwd())
-    if not inside and not (folder and place.parent.is_dir()):
-        missing = place.parent if folder else place
+    if dest.exists():
+        raise InputError(f"{option} {str(path)!r}: cannot be written: {str(dest)!r} is a file, not a folder")
+    inside = dest.resolve().is_relative_to(Path.cwd())
+    if not inside and not (folder and dest.parent.is_dir()):
+        missing = dest.parent if folder else dest
         raise InputError(
-            f"{option} {str(path)!r}: cannot be written: there is no folder {str(missing)!r}; make it"
-            " first: folders are made in the working folder alone"
+            f"{option} {str(path)!r}: cannot be written: there is no folder {str(missing)!r}; create it"
+            " first: new folders are created in the working folder only"
         )
-    if place not in new_folders:
-        new_folders.append(place)
+    if dest not in new_folders:
+        new_folders.append(dest)
     return path
 
 
@@ -227,7 +227,7 @@ def output(path, option="--out", folder=False, endings=()):
 def progress_bar(description, total=None, every=LINE_EVERY):
     """Show a bar on stderr that disappears when done; yield update(done, total=None, text=None).
 
-    Without a terminal (a file, a pipe, a batch job) it is a line each `every` seconds.
+    Without a terminal (a file, a pipe, a batch job), print a line every `every` seconds instead.
     """
     columns = (
         *(bars.SpinnerColumn(), bars.TextColumn("{task.description}"), bars.BarColumn()),
@@ -244,8 +244,8 @@ def progress_bar(description, total=None, every=LINE_EVERY):
         now, whole = time.monotonic(), bar.tasks[0].total
         if hidden and now - printed >= every:
             printed = now
-            share = f", {100.0 * done / whole:.0f} %" if whole else ""
-            note(f"{now - began:.0f} s{share}: {text or description}")
+            percent = f", {100.0 * done / whole:.0f} %" if whole else ""
+            note(f"{now - began:.0f} s{percent}: {text or description}")
 
     with bar:
         yield update
@@ -253,12 +253,12 @@ def progress_bar(description, total=None, every=LINE_EVERY):
 
 @contextmanager
 def text_progress(description, label=""):
-    """Show a progress bar; yield progress(text, done, total), as some studies call it."""
+    """Show a progress bar; yield progress(text, done, total), the callback of some studies."""
     with progress_bar(description) as update:
         yield lambda text, done, total: update(done, total, f"{label}{text}")
 
 
 def save_table(frame, path):
-    """Write a table to the path of an option and say so; None: nothing."""
+    """Write a table to the path of an option and print the path; None: do nothing."""
     if path is not None:
         wrote(write_table(frame, path))

@@ -1,4 +1,4 @@
-"""The commands of linear design: fowt linearize and fowt design."""
+"""Implements fowt linearize and fowt design: linear models, control design and performance limits."""
 
 import shlex
 from pathlib import Path
@@ -14,35 +14,35 @@ from fowt_env.training.cli.arguments import parse_names, parse_pairs
 from fowt_env.training.cli.console import add_group, command, note, output, progress_bar, save_table, wrote
 from fowt_env.training.cli.tables import out, print_table, show
 
-design = add_group("design", "Design and tune controllers, and find their limits.")
+design = add_group("design", "Design and tune controllers; compute their limits.")
 WindsOption = Annotated[
-    str | None, Option(help=f"Winds, m/s: {shared.RANGE}; default: every whole one above rated.")
+    str | None, Option(help=f"Winds, m/s: {shared.RANGE}; default: all whole m/s above rated.")
 ]
 SettingOption = Annotated[
-    list[str] | None, Option(metavar="SETTING=VALUE", help="A setting of fowt design lqr; repeats.")
+    list[str] | None, Option(metavar="SETTING=VALUE", help="Setting of fowt design lqr; repeatable.")
 ]
-SWEPT = f"Winds, m/s: {shared.RANGE}; default: every whole one from cut-in to cut-out."
-VARIED = "Setting and its values; repeats."
-INFORMED = "Information of the feedback, comma-separated; default: the usual (below)."
-LINEARIZED = "Modes: .csv, .parquet; models: .json, .npz, .mat (one wind); everything: a folder."
-SETTINGS = {  # of LQGSettings, in words
-    "share": "weight of platform pitch in the cost; the rest: rotor speed",
-    "share_growth": "growth of the share, per m/s",
-    "travel": "limit of blade-pitch travel, over that of gspi_oc3",
-    "travel_cap": "limit of the same, deg/s",
-    "travel_near_rated": "limit of the same at the lowest design wind, deg/s",
-    "power": "limit of the power's deviation, over that of gspi_oc3",
-    "torque": "limit of the generator torque's deviation, of rated",
-    "shaft": "limit of the shaft torque's deviation, over that of gspi_oc3",
-    "shaft_near_rated": "limit of the same at the lowest design wind, of rated torque",
-    "speed_integral": "cost of the integral of the rotor speed",
-    "torque_rate": "cost of the torque's rate",
-    "schedule_time": "s, over which the operating wind follows the estimate",
+SWEPT = f"Winds, m/s: {shared.RANGE}; default: all whole m/s from cut-in to cut-out."
+VARIED = "Setting and its values; repeatable."
+INFORMED = "Information available to the feedback (below), comma-separated; default: the usual sets."
+LINEARIZED = "Modes (.csv, .parquet), models (.json, .npz; one wind: .mat) or everything (a folder)."
+SETTINGS = {  # field of LQGSettings -> its meaning
+    "share": "weight of platform pitch in the cost; the remainder: rotor speed",
+    "share_growth": "increase of share per m/s of wind",
+    "travel": "limit of blade-pitch travel, relative to gspi_oc3",
+    "travel_cap": "limit of blade-pitch travel, deg/s",
+    "travel_near_rated": "limit of blade-pitch travel at the lowest design wind, deg/s",
+    "power": "limit of the deviation of power, relative to gspi_oc3",
+    "torque": "limit of the deviation of generator torque, over rated torque",
+    "shaft": "limit of the deviation of shaft torque, relative to gspi_oc3",
+    "shaft_near_rated": "limit of the deviation of shaft torque at the lowest design wind, over rated torque",
+    "speed_integral": "cost of the integral of rotor speed",
+    "torque_rate": "cost of the torque rate",
+    "schedule_time": "time constant of the operating wind following the estimate, s",
 }
 
 
 def _scene_and_winds(platform, winds, default, **options):
-    """Return (scene, winds in m/s, their text); default(turbine): the winds if no text is passed."""
+    """Return (scene, winds in m/s, winds as text); default(turbine): the winds without a text."""
     import fowt_env
 
     speeds = None if winds is None else parse_numbers(winds, "winds")
@@ -68,7 +68,9 @@ def linearize(
     winds: Annotated[str | None, Option(help=SWEPT)] = None,
     target: Annotated[str | None, Option("--out", help=LINEARIZED)] = None,
 ):
-    """Linear models over the wind: modes, zeros, matrices.
+    """Linearize the plant: modes, zeros, matrices.
+
+    Each model is at the steady operating point of its wind.
 
     Examples:
     fowt linearize --winds 18  # modes with periods and damping at one wind
@@ -90,7 +92,7 @@ def linearize(
     output(target, folder=not suffix)
     scene, speeds, _ = _scene_and_winds(platform, winds, design_winds)
     if suffix == ".mat" and len(speeds) > 1:
-        raise InputError(f"--out {target}: a .mat holds the model of one wind, as --winds 18")
+        raise InputError(f"--out {target}: a .mat contains the model of one wind, e.g. --winds 18")
     with progress_bar("linearising", len(speeds)) as update:
         models = sweeps.models_over(scene, speeds, update)
     modes, zeros = sweeps.mode_table(models), sweeps.zero_table(models)
@@ -101,7 +103,7 @@ def linearize(
     if resting:
         out.print(
             f"up to {max(resting):g} m/s the blade pitch is at its minimum and pitch control is off:"
-            " these winds are left out of zeros and Bode plots"
+            " these winds are excluded from zeros and Bode plots"
         )
     if target is None:
         return
@@ -117,18 +119,18 @@ def linearize(
 @command(design)
 def pi(
     omega: Annotated[float, Option(help="Frequency of the rotor loop, rad/s.")] = 0.2,
-    zeta: Annotated[float, Option(help="Its damping ratio.")] = 0.7,
-    schedule: Annotated[str, Option(help="loop (the same at every wind) or published (Jonkman's).")] = "loop",
+    zeta: Annotated[float, Option(help="Damping ratio of the rotor loop.")] = 0.7,
+    schedule: Annotated[str, Option(help="loop (same loop at all winds) or published (Jonkman's).")] = "loop",
     winds: WindsOption = None,
     platform: shared.PlatformOption = "oc3_hywind",
     out_path: shared.DesignOption = None,
 ):
-    """Design a scheduled PI from frequency and damping of the rotor loop.
+    """Design a gain-scheduled PI controller from frequency and damping of the rotor loop.
 
     Also prints the damping of platform pitch under these gains.
 
     Examples:
-    fowt design pi --omega 0.2 --zeta 0.7 --out my.json  # the published aim, on this rotor
+    fowt design pi --omega 0.2 --zeta 0.7 --out my.json  # the published values, for this rotor
     fowt evaluate --controllers gspi_oc3,design:my.json --cases ntm_18  # score it
 
     slope: rotor acceleration per blade pitch; KP, KI, omega, zeta: of the rotor loop at that wind;
@@ -144,35 +146,35 @@ def pi(
     scene, speeds, winds = _scene_and_winds(platform, winds, winds_above_rated)
     with progress_bar("linearising", len(speeds)) as update:
         models = models_over(scene, speeds, update)
-    found = design_pi(models, scene.turbine, omega, zeta, schedule)
-    show(pd.DataFrame(found.table), f"{platform}: rotor loop {omega:g} rad/s, damping {zeta:g}")
-    unstable = [row["wind_[m/s]"] for row in found.table if row["platform_zeta_[-]"] < 0.0]
+    result = design_pi(models, scene.turbine, omega, zeta, schedule)
+    show(pd.DataFrame(result.table), f"{platform}: rotor loop {omega:g} rad/s, damping {zeta:g}")
+    unstable = [row["wind_[m/s]"] for row in result.table if row["platform_zeta_[-]"] < 0.0]
     if unstable:
-        out.print(f"the platform is unstable at {', '.join(f'{w:g}' for w in unstable)} m/s: lower omega")
-    gain = found.gain_schedule_pitch
-    out.print(f"KP = {found.KP:.6g} s, KI = {found.KI:.6g}, gain_schedule_pitch = {gain:.6g} rad")
+        out.print(f"the platform is unstable at {', '.join(f'{w:g}' for w in unstable)} m/s: reduce omega")
+    gain = result.gain_schedule_pitch
+    out.print(f"KP = {result.KP:.6g} s, KI = {result.KI:.6g}, gain_schedule_pitch = {gain:.6g} rad")
     if out_path is not None:
-        settings = {key: getattr(found, key) for key in ("KP", "KI", "gain_schedule_pitch")}
+        settings = {key: getattr(result, key) for key in ("KP", "KI", "gain_schedule_pitch")}
         words = (
             f"fowt design pi --omega {omega:g} --zeta {zeta:g} --schedule {schedule}"
             f" --winds {winds} --platform {platform}"
         )
-        wrote(save_design(out_path, "pi", scene, settings, words, table=found.table))
+        wrote(save_design(out_path, "pi", scene, settings, words, table=result.table))
 
 
 @command(design)
 def bound(
     wind: Annotated[
-        str | None, Option(help=f"Winds above rated, m/s: {shared.RANGE}; default: even ones.")
+        str | None, Option(help=f"Winds above rated, m/s: {shared.RANGE}; default: even m/s.")
     ] = None,
     information: Annotated[str | None, Option(help=INFORMED)] = None,
-    travel: Annotated[float, Option(help="Limit of blade-pitch travel over gspi_oc3's; or inf.")] = 1.0,
-    power: Annotated[float, Option(help="Limit of power deviation over gspi_oc3's; or inf.")] = 1.0,
-    torque_std: Annotated[float, Option(help="Limit of the torque's deviation, %; or inf.")] = 5.0,
+    travel: Annotated[float, Option(help="Limit of blade-pitch travel relative to gspi_oc3, or inf.")] = 1.0,
+    power: Annotated[float, Option(help="Limit of power deviation relative to gspi_oc3, or inf.")] = 1.0,
+    torque_std: Annotated[float, Option(help="Limit of torque deviation, %, or inf.")] = 5.0,
     previews: Annotated[str, Option(help="Preview times of the wind, s.")] = "3,11",
-    sensors: Annotated[str, Option(help="Sensor chain, whose noise the feedback has.")] = "standard",
+    sensors: Annotated[str, Option(help="Sensor chain whose noise acts on the feedback.")] = "standard",
     sea: Annotated[
-        str | None, Option(help=f"Sea of every wind. {shared.AS_SIMULATE} Default: the suites'.")
+        str | None, Option(help=f"Sea at all winds. {shared.AS_SIMULATE} Default: as in the suites.")
     ] = None,
     platform: shared.PlatformOption = "oc3_hywind",
     out_path: shared.TableOption = None,
@@ -180,17 +182,17 @@ def bound(
 ):
     """Compute the performance limit of linear feedback.
 
-    The smallest deviations of rotor speed and platform pitch that any linear feedback can reach.
+    The limit is the smallest deviations of rotor speed and platform pitch that linear feedback can reach.
 
     Examples:
     fowt design bound --wind 18  # the performance limit of linear control, at 18 m/s
     fowt design bound --out bound.csv --plot bound.png  # all winds above rated
-    fowt design bound --wind 18 --information measured,measured_pitch_only  # what torque is worth
-    fowt design bound --wind 18 --previews 5 --information full,full_preview_5  # 5 s of wind ahead
+    fowt design bound --wind 18 --information measured,measured_pitch_only  # with and without torque control
+    fowt design bound --wind 18 --previews 5 --information full,full_preview_5  # 5 s of wind preview
 
-    Deviations are ratios to those of gspi_oc3 on the same model, at no more pitch travel and power deviation.
+    Deviations are ratios to gspi_oc3 on the same model, with no more pitch travel or power deviation.
     Information: full (plant, wind and waves), measured (five sensors with noise) or speed (rotor speed and
-    blade pitch); _preview_T adds the wind T s ahead, _pitch_only leaves the torque out.
+    blade pitch); _preview_T adds the wind T s ahead, _pitch_only excludes torque.
     """
     import fowt_env
     from fowt_env.descriptions.sea_state import sea_of, sea_state_of
@@ -216,7 +218,7 @@ def bound(
     single = speeds is not None and len(speeds) == 1
     show(table if single else _balanced(table), f"{platform}: smallest deviations")
     if "fits" in table.attrs:
-        show(table.attrs["fits"], "weather as filters of noise: errors of the fits; linear drag of the hull")
+        show(table.attrs["fits"], "weather as filtered noise: errors of the fits; linear drag of the hull")
     save_table(rounded(table), out_path)
     if plot is not None:
         from fowt_env.training.design.plots import plot_bound
@@ -235,20 +237,20 @@ def zeros(
 ):
     """Find right-half-plane zeros that limit control by blade pitch.
 
-    From blade pitch to rotor speed, with the damping under pi.
+    Lists zeros from blade pitch to rotor speed, with damping ratios under pi.
 
     Examples:
-    fowt design zeros  # OC3-Hywind, whole winds above rated
+    fowt design zeros  # OC3-Hywind, whole m/s above rated
     fowt design zeros --platform nrel5mw_oc4_semi --out zeros.csv  # another platform, as a table
 
     No feedback of rotor speed alone can be faster than such a zero. pi: damping ratios of platform pitch (or
-    of the rotor, if lower) and of surge under pi; drag is left out.
+    of the rotor, if lower) and of surge under pi, without drag.
     """
     from fowt_env.controllers.lqr.design import winds_above_rated
     from fowt_env.training.design.sweeps import zeros_over
 
     output(out_path, endings=TABLE_SUFFIXES)
-    # the linear model of "reference" within 1e-3, at a tenth of the time
+    # equals the linear model of "reference" within 1e-3, in a tenth of the time
     scene, speeds, _ = _scene_and_winds(platform, winds, winds_above_rated, fidelity="standard")
     with progress_bar("linearising") as update:
         table = zeros_over(scene, speeds, update)
@@ -258,22 +260,22 @@ def zeros(
 
 @command(design)
 def front(
-    runs: Annotated[str, Option(help="Table of fowt design lqr-sweep --out.")],
-    bound_path: Annotated[str, Option("--bound", help="Table of fowt design bound --out.")],
+    runs: Annotated[str, Option(help="Output table of fowt design lqr-sweep.")],
+    bound_path: Annotated[str, Option("--bound", help="Output table of fowt design bound.")],
     out_path: shared.TableOption = None,
     plot: shared.PlotOption = None,
 ):
     """Compare simulated designs with the performance limit.
 
     Examples:
-    fowt design front --runs sweep.csv --bound bound.csv --plot front.png  # lqr beside the limit
+    fowt design front --runs sweep.csv --bound bound.csv --plot front.png  # lqr and the limit
     """
     from fowt_env.files.tables import read_table
     from fowt_env.training.design.linear_bound import INFORMATION, PLOTTED, ratio_table
 
     fronts = read_table(bound_path)
     table = ratio_table(read_table(runs), fronts)
-    show(table, "over gspi_oc3; of_bound: 1 on the limit")
+    show(table, "relative to gspi_oc3; of_bound: 1 at the limit")
     save_table(table, out_path)
     if plot is not None:
         from fowt_env.training.design.plots import plot_bound
@@ -295,7 +297,7 @@ def lqr(
     fowt design lqr --setting travel=0.8 --out my.json  # a design with less blade-pitch travel
     fowt simulate --controller design:my.json --wind ntm:18:B  # run it
 
-    Many values at once: fowt design lqr-sweep.
+    For sweeps over settings see fowt design lqr-sweep.
     """
     import fowt_env
     from fowt_env.controllers.design.saved_files import lqr_settings, save_design
@@ -309,7 +311,7 @@ def lqr(
         (name, f"{getattr(chosen, name):g}", f"{getattr(default, name):g}", text)
         for name, text in SETTINGS.items()
     ]
-    headings = ("setting", "value", "default", "what it is")
+    headings = ("setting", "value", "default", "meaning")
     print_table(headings, rows, "settings of lqr", left=(0, 3), prose=(3,))
     if out_path is None:
         return
@@ -326,12 +328,12 @@ def lqr(
 def lqr_sweep(
     vary: Annotated[list[str] | None, Option(metavar="SETTING=A,B,C", help=VARIED)] = None,
     setting: SettingOption = None,
-    cases: Annotated[str, Option(help="Cases or suites.")] = "ntm_14,ntm_18,ntm_22",
+    cases: Annotated[str, Option(help="Cases or suites, comma-separated.")] = "ntm_14,ntm_18,ntm_22",
     seeds: shared.ValidationSeeds = "1001,1002",
     platform: shared.PlatformOption = "oc3_hywind",
-    out_path: Annotated[str | None, Option("--out", help="All runs, .csv.")] = None,
+    out_path: Annotated[str | None, Option("--out", help="Output table of all runs: .csv.")] = None,
 ):
-    """Run designs of lqr over values of its settings, beside gspi_oc3.
+    """Simulate lqr designs over values of their settings, and gspi_oc3.
 
     Examples:
     fowt design lqr-sweep  # the shipped settings against gspi_oc3 on validation seeds
@@ -355,19 +357,19 @@ def lqr_sweep(
 
 @command(design)
 def tune_command(
-    name: Annotated[str, Argument(help="pi_tuned, floating_feedback, rosco_float, lqr, mpc, ...")],
-    budget: Annotated[int, Option(help="Settings that are tried.")] = 40,
+    name: Annotated[str, Argument(help="Controller: pi_tuned, rosco_float, lqr, mpc, ...")],
+    budget: Annotated[int, Option(help="Number of settings tried.")] = 40,
     suite: shared.SuiteOption = "above_rated",
     platform: shared.PlatformOption = "oc3_hywind",
     seeds: shared.ValidationSeeds = "1001,1002",
-    preview: Annotated[str, Option(help="Wind ahead: exact, or a lidar by its name.")] = "exact",
+    preview: Annotated[str, Option(help="Wind preview: exact, or the name of a lidar.")] = "exact",
     jobs: shared.JobsOption = 1,
     engine: shared.EngineOption = "processes",
     address: shared.AddressOption = None,
     keep: Annotated[bool, Option("--keep", help="Write the result to controllers/tuned.toml.")] = False,
     out_folder: shared.FolderOption = "results/tune",
 ):
-    """Search the settings of a built-in controller.
+    """Optimise the settings of a built-in controller.
 
     Objective, seeds and limits are the same for all controllers.
 
@@ -383,18 +385,18 @@ def tune_command(
 
     numbers = tuple(parse_whole_numbers(seeds, "seeds"))
     if keep and platform != "oc3_hywind":
-        raise InputError(f"--keep: controllers/tuned.toml is OC3-Hywind's; {platform!r} is tuned for a table")
-    asked = {"suite": suite, "seeds": numbers, "jobs": jobs, "engine": engine, "address": address}
-    asked |= {} if platform == "oc3_hywind" else {"platform": platform}
-    asked |= {} if preview == "exact" else {"preview": preview}
+        raise InputError(f"--keep: controllers/tuned.toml is for OC3-Hywind; omit --keep for {platform!r}")
+    settings = {"suite": suite, "seeds": numbers, "jobs": jobs, "engine": engine, "address": address}
+    settings |= {} if platform == "oc3_hywind" else {"platform": platform}
+    settings |= {} if preview == "exact" else {"preview": preview}
     with progress_bar(f"tuning {name}", budget) as update, session(engine, jobs, address):
 
         def report(number, row):
             update(number, budget, f"tuning {name}, cost {row['cost']:.3f}")
 
-        settings, figures, table = tune(name, budget, out_folder, report, **asked)
+        tuned, metrics, table = tune(name, budget, out_folder, report, **settings)
     show(table.nsmallest(10, "cost"), f"{name}: the best of {len(table)}")
     if keep:
-        write_tuned(name, settings, figures, budget, asked)
+        write_tuned(name, tuned, metrics, budget, settings)
         wrote("controllers/tuned.toml")
     wrote(f"{out_folder}/tune_{name}.csv")

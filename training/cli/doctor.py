@@ -1,4 +1,4 @@
-"""`fowt doctor`: a check of the installation, of missing parts and of the results of a short run."""
+"""Implements fowt doctor: checks versions, optional packages, the kernel cache and a short run."""
 
 from typing import Annotated
 
@@ -14,19 +14,19 @@ from fowt_env.training.cli.console import command, out
 def doctor(test: Annotated[bool, typer.Option("--test/--no-test", help="Run the self-test.")] = True):
     """Check this installation.
 
-    Versions, optional parts, the cache of compiled kernels, and a short run with known results.
+    Reports versions, optional parts and the kernel cache, and compares a short run with known results.
 
     Examples:
-    fowt doctor  # all of it; the self-test compiles kernels if it must, up to a minute
-    fowt doctor --no-test  # versions, optional parts and the cache alone
+    fowt doctor  # everything; the self-test may compile kernels, up to a minute
+    fowt doctor --no-test  # versions, optional parts and the cache only
 
-    [bold]Exit code[/bold]: 0 if versions and the self-test (unless left out) are right, 1 if not.
+    [bold]Exit code[/bold]: 0 if the versions fit and the self-test, unless skipped, passes; 1 if not.
     """
     packages = requirements.versions()
     _heading("versions")
     for package in packages:
-        found = package.version or "missing"
-        state = found if package.fits else f"[red]{found}[/red], needed: {escape(package.needed)}"
+        version = package.version or "missing"
+        state = version if package.fits else f"[red]{version}[/red], required: {escape(package.needed)}"
         out.print(f"  {package.name:14} {state}")
     _heading("optional parts")
     try:
@@ -38,13 +38,11 @@ def doctor(test: Annotated[bool, typer.Option("--test/--no-test", help="Run the 
         try:
             from fowt_env.training.cli import (
                 health,
-            )  # and numba, without which other commands' help is faster
+            )  # imports numba, which other commands' help does not need
         except ImportError as error:  # raised by numba, e.g. for a NumPy that is too new
             faults = [str(error)]
     if requirements.installed("ipykernel") and not requirements.installed("ipywidgets"):
-        _advise(
-            'Jupyter is here without ipywidgets, which progress bars need: pip install "fowt-env[notebook]"'
-        )
+        _advise('Jupyter has no ipywidgets, which progress bars need: pip install "fowt-env[notebook]"')
     if faults:
         for fault in faults:
             out.print(f"[red]{escape(fault)}[/red]")
@@ -69,35 +67,35 @@ def _advise(text):
 
 
 def _print_extras(extras):
-    """Print each extra with its packages, and how to install what is missing."""
+    """Print each extra with its packages, and how to install missing ones."""
     for extra, packages in extras.items():
         if any(package.version is None for package in packages):
             state = "[yellow]missing[/yellow]"
         elif all(package.fits for package in packages):
-            state = "[green]found[/green]"
+            state = "[green]installed[/green]"
         else:
-            state = "[yellow]another version[/yellow]"
+            state = "[yellow]wrong version[/yellow]"
         names = ", ".join(map(_named, packages))
         advice = "" if "green" in state else f': pip install "{requirements.DISTRIBUTION}[{extra}]"'
         out.print(f"  {extra:14} {state}  {escape(names + advice)}")
-    usual = [found for name, found in extras.items() if name not in "docs hydro".split()]  # as `all` has them
-    if any(package.version is None for found in usual for package in found):
+    usual = [parts for name, parts in extras.items() if name not in "docs hydro".split()]  # as `all` has them
+    if any(package.version is None for parts in usual for package in parts):
         out.print(escape(f'  all but docs and hydro: pip install "{requirements.DISTRIBUTION}[all]"'))
 
 
 def _named(package):
-    """Return name and version, with the needed one if it differs."""
+    """Return name and version, with the required version if it differs."""
     if package.version is None or package.fits:
         return f"{package.name} {package.version or 'missing'}"
-    return f"{package.name} {package.version} (needed: {package.needed})"
+    return f"{package.name} {package.version} (required: {package.needed})"
 
 
 def _self_test(health):
     """Run and print the self-test; exit with 1 if it fails."""
     _heading("self-test")
-    found, worst, seconds = health.self_test()
+    values, worst, seconds = health.self_test()
     for name, expected in health.EXPECTED.items():
-        text = f"{name.replace('_', ' '):16} {found[name]:12.5f}   expected {expected:12.5f}"
+        text = f"{name.replace('_', ' '):16} {values[name]:12.5f}   expected {expected:12.5f}"
         out.print(f"  {escape(text)}")
     passed = worst <= health.TOLERANCE
     out.print(

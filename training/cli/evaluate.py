@@ -1,4 +1,4 @@
-"""fowt evaluate: controllers on the cases of a suite."""
+"""Implements fowt evaluate: compares controllers on the cases of a suite."""
 
 import json
 from pathlib import Path
@@ -23,14 +23,14 @@ from fowt_env.training.cli.console import (
 )
 from fowt_env.training.cli.tables import out, print_table, table_width
 
-MOST_CASES = 12  # more cases are not printed with their conditions
+MOST_CASES = 12  # largest number of cases whose conditions are printed
 CONTROLLERS = "Names, policy:NAME, design:FILE or module:Name, comma-separated."
-CASES = "Cases or suites, comma-separated; with --suite: some of its cases. Default: above_rated."
-PLATFORM = "Platform: a name or a path; winds and limits are scaled. Default: the suite's."
+CASES = "Cases or suites, comma-separated; with --suite: a selection of its cases. Default: above_rated."
+PLATFORM = "Platform (name or path), to which winds and limits are scaled. Default: the suite's."
 SEEDS = f"{shared.WHOLE}, the same for each controller. Default: the suite's, else 1."
-DRAWN = "Hash, e.g. of the commit that fixes the entries, to draw the suite's seeds from."
-PREVIEW = "Wind ahead: exact, or measured by the lidar four_beam_pulsed or circular_cw."
-SENSORS = "exact, or the name of a sensor chain. Default: that of each case."
+DRAWN = "Hash from which the suite's seeds are drawn, e.g. of the commit that freezes the entries."
+PREVIEW = "Wind preview: exact, or measured by the lidar four_beam_pulsed or circular_cw."
+SENSORS = "Sensors: exact, or the name of a sensor chain. Default: that of each case."
 BASELINE = "Controller of the paired differences. Default: gspi_oc3, else pi."
 TEXT = str | None
 
@@ -46,15 +46,17 @@ def evaluate_command(
     duration: Annotated[
         float | None, Option(help="Length of a run, s. Default: the suite's, or 660.")
     ] = None,
-    skip: Annotated[float | None, Option(help="Start not scored, s. Default: the suite's, or 60.")] = None,
+    skip: Annotated[
+        float | None, Option(help="Initial time not scored, s. Default: the suite's, or 60.")
+    ] = None,
     preview: Annotated[str, Option(help=PREVIEW)] = "exact",
     sensors: Annotated[TEXT, Option(help=SENSORS)] = None,
     baseline: Annotated[TEXT, Option(help=BASELINE)] = None,
     jobs: shared.JobsOption = 1,
     engine: shared.EngineOption = "processes",
     address: shared.AddressOption = None,
-    time_limit: Annotated[float, Option(help="Clock time, s, after which a run fails; 0: never.")] = 3600.0,
-    retry_failed: Annotated[bool, Option("--retry-failed", help="Repeat failed runs of the folder.")] = False,
+    time_limit: Annotated[float, Option(help="Wall-clock limit of a run, s; 0: none.")] = 3600.0,
+    retry_failed: Annotated[bool, Option("--retry-failed", help="Repeat failed runs in the folder.")] = False,
     out_folder: shared.FolderOption = "results/evaluation",
     plot: shared.PlotsOption = True,
 ):
@@ -63,12 +65,12 @@ def evaluate_command(
     Also writes intervals, metrics by case, the time series of all runs, and plots.
 
     Examples:
-    fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2  # the headline comparison
+    fowt evaluate --suite above_rated --controllers pi,pi_land --jobs 2  # the main comparison
     fowt evaluate --controllers pi,pi_land --cases ntm_18,paper_18 --seeds 1,2,3 --jobs 2
     fowt evaluate --suite mysuite.toml --controllers pi,mymodule:Mine --baseline pi  # your own cases
     fowt evaluate --suite above_rated --platform nrel5mw_oc4_semi --out results/oc4
     fowt evaluate --suite above_rated --sensors exact --out results/exact  # without noise and delay
-    fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed  # failed runs again
+    fowt evaluate --controllers pi,mymodule:Mine --out results/mine --retry-failed  # repeat failed runs
     fowt evaluate --suite above_rated --draw-seeds $COMMIT --out results/drawn  # seeds from a commit
 
     [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run),
@@ -139,7 +141,7 @@ def evaluate_command(
 
 
 def _print_conditions(folder, suite):
-    """Print wind, sea, event and length of each case of a results folder, or how to list many cases."""
+    """Print wind, sea, event and duration of each case; of many cases, the command that lists them."""
     from fowt_env.training.evaluation.conditions import described_texts
 
     cases = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))["cases"]
@@ -152,7 +154,7 @@ def _print_conditions(folder, suite):
 
 
 def _print_evaluation(table, means, board):
-    """Print metrics by case and the leaderboard; on stderr lost runs and why a score is invalid."""
+    """Print metrics by case and the leaderboard; on stderr, lost runs and reasons for invalid scores."""
     from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
     headings, rows, failures = summary_rows(means, table_width())

@@ -1,4 +1,4 @@
-"""Checks of `fowt doctor` besides versions: the kernel cache, and a short run with known results."""
+"""Checks the kernel cache and a short run with known results, for fowt doctor and fowt cache."""
 
 import os
 import platform
@@ -14,24 +14,24 @@ import numba
 from fowt_env.folders import cache_root, distrust
 from fowt_env.plant.compile.decorators import CACHE_FOLDER, kernels_compiled, own_folders
 
-BOX_NAME = re.compile(r"[0-9a-f]{24}\.npz")  # of a box of wind (training/evaluation/wind_boxes.py)
-# of a submission's kernels (training/board/isolated.py), complete or unfinished
+BOX_NAME = re.compile(r"[0-9a-f]{24}\.npz")  # file of a box of wind (training/evaluation/wind_boxes.py)
+# folder of a submission's kernels (training/board/isolated.py), complete or unfinished
 SUBMISSION_NAME = re.compile(r"[0-9a-f]{24}(-\w+)?")
 TEST_DURATION = 60.0  # s
-# Last row of reference_run(). It checks the installation, not the physics (the tests do): a wrongly compiled
-# part or a changed data file shifts it far outside the tolerance.
+# Last row of reference_run(), which checks the installation, not the physics (the tests do): wrongly compiled
+# kernels or changed data files shift the values far outside the tolerance.
 EXPECTED = {
     "PtfmSurge_[m]": 19.2783,
     "PtfmPitch_[deg]": 2.6417,
     "RotSpeed_[rpm]": 12.6687,
     "FAIRTEN1_[kN]": 607.274,
 }
-TOLERANCE = 1e-3  # relative; half the step changes the values by 1.4e-4
+TOLERANCE = 1e-3  # relative; halving the step changes the values by 1.4e-4
 
 
 def machine():
-    """Return a line on the machine and the compiler's settings."""
-    jit = "switched off (NUMBA_DISABLE_JIT)" if numba.config.DISABLE_JIT else "on"
+    """Return a line that describes the machine and the compiler's settings."""
+    jit = "disabled (NUMBA_DISABLE_JIT)" if numba.config.DISABLE_JIT else "on"
     return (
         f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors,"
         f" {numba.config.NUMBA_NUM_THREADS} threads, compiler {jit}, {sys.executable}"
@@ -39,7 +39,7 @@ def machine():
 
 
 def cache_state():
-    """Return (line on the cache of compiled kernels, advice on a problem of it or "")."""
+    """Return (line that describes the kernel cache, advice on a problem with the cache or "")."""
     root, size, others = cache_root(), 0.0, 0
     folder = CACHE_FOLDER or (root / "kernels" if root else "no home folder, and no FOWT_CACHE_DIR")
     with suppress(OSError):  # removed meanwhile, or not readable
@@ -51,13 +51,13 @@ def cache_state():
     )
     text += f", {others} folders of other versions" if others else ""
     if CACHE_FOLDER is None:
-        return text, "kernels are compiled at each start: set FOWT_CACHE_DIR to a folder that can be written"
+        return text, "kernels are compiled at each start: set FOWT_CACHE_DIR to a writable folder"
     written = os.access(CACHE_FOLDER, os.W_OK | os.X_OK)
     return text, "" if written else "read only: missing kernels are compiled at each start"
 
 
 def cache_parts() -> dict[str, list[Path]]:
-    """Return {part of the cache: its folders or files} that this package made; {} without a cache folder."""
+    """Return {part of the cache: its folders or files} created by this package; {} without a cache folder."""
     root = cache_root()
     if root is None:
         return {}
@@ -96,7 +96,7 @@ def _ours(folder):
 
 
 def megabytes(paths: list[Path]) -> float:
-    """Return the size of files and of all files in folders, without those removed meanwhile."""
+    """Return the total size (MB) of files and of files in folders, without files removed meanwhile."""
     total = 0
     for file in (file for path in paths for file in (path, *path.rglob("*"))):
         with suppress(OSError):
@@ -105,7 +105,7 @@ def megabytes(paths: list[Path]) -> float:
 
 
 def reference_run():
-    """Return the DataFrame of the self-test: 60 s from rest in steady 18 m/s and a regular wave with pi."""
+    """Return the DataFrame of the self-test: 60 s of pi from rest in steady 18 m/s and a regular wave."""
     from fowt_env import build_scene, simulate
 
     sea = {"kind": "regular", "H": 4.0, "T": 10.0}
@@ -114,11 +114,11 @@ def reference_run():
 
 
 def self_test():
-    """Return ({channel: last value}, largest relative difference from EXPECTED, s without compiling)."""
+    """Return ({channel: last value}, largest relative error, run time without compilation in s)."""
     reference_run()
     start = perf_counter()
     last = reference_run().iloc[-1]
     seconds = perf_counter() - start
-    found = {name: float(last[name]) for name in EXPECTED}
-    worst = max(abs(found[name] / value - 1.0) for name, value in EXPECTED.items())
-    return found, worst, seconds
+    values = {name: float(last[name]) for name in EXPECTED}
+    worst = max(abs(values[name] / value - 1.0) for name, value in EXPECTED.items())
+    return values, worst, seconds

@@ -1,4 +1,4 @@
-"""The command fowt hydro: potential-flow coefficients of a hull from its panel mesh."""
+"""Implements fowt hydro: computes potential-flow coefficients of a hull from its panel mesh."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,26 +14,26 @@ from fowt_env.training.cli.tables import print_table
 
 @command()
 def hydro(
-    mesh: Annotated[Path, Argument(help="Panel mesh in metres, z up from still water, normals out.")],
+    mesh: Annotated[Path, Argument(help="Panel mesh in metres, z up from still water, normals outward.")],
     depth: Annotated[float, Option(help="Water depth, m.")],
-    out_file: Annotated[Path, Option("--out", help="Coefficients to write (.npz).")] = Path("hydro.npz"),
+    out_file: Annotated[Path, Option("--out", help="Output coefficients (.npz).")] = Path("hydro.npz"),
     omega: Annotated[str, Option(help=f"Frequencies, rad/s: {RANGE}.")] = "0.05:3:0.05",
     heading: Annotated[str, Option(help=f"Wave directions (of travel), deg: {RANGE}.")] = "-180:180:30",
-    density: Annotated[float, Option(help="Density of the water, kg/m3.")] = 1025.0,
-    gravity: Annotated[float, Option(help="Gravity, m/s2.")] = 9.80665,
-    lid: Annotated[bool, Option("--lid/--no-lid", help="Close the inner water plane.")] = True,
+    density: Annotated[float, Option(help="Water density, kg/m3.")] = 1025.0,
+    gravity: Annotated[float, Option(help="Gravitational acceleration, m/s2.")] = 9.80665,
+    lid: Annotated[bool, Option("--lid/--no-lid", help="Close the interior water plane with a lid.")] = True,
 ):
-    """Wave loads of a hull from its panel mesh (Capytaine).
+    """Compute wave loads of a hull from its panel mesh.
 
-    Computes added mass, damping, wave excitation and hydrostatics.
+    Capytaine computes added mass, damping, wave excitation and hydrostatics.
 
     Examples:
     fowt hydro semi.gdf --depth 200 --out hydro.npz  # 0.05 to 3 rad/s, waves from -180 to 180 deg
-    fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0  # fewer of both
+    fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0  # fewer frequencies and headings
 
     In the platform file: \\[potential_flow] coefficients = "hydro.npz" and displaced_volume, which is
-    printed. A problem takes a second with 3000 panels; there are six and one per heading at each frequency.
-    A lid on the inner water plane removes irregular frequencies.
+    printed. A boundary-value problem with 3000 panels takes a second; each frequency has six and one per
+    heading. A lid on the interior water plane removes irregular frequencies.
     """
     from fowt_env.analysis.panel_method import solve_mesh
     from fowt_env.descriptions.potential_flow import coefficient_arrays

@@ -1,4 +1,4 @@
-"""The command that brings in a floating turbine from a deck of OpenFAST: fowt import."""
+"""Implements fowt import: converts an OpenFAST deck to a platform file."""
 
 from typing import Annotated
 
@@ -11,15 +11,15 @@ from fowt_env.training.cli.check import print_faults
 from fowt_env.training.cli.console import EXIT_STOPPED, command, note, out
 from fowt_env.training.cli.tables import print_table
 
-Part = Annotated[str | None, Option(help="This part file, in place of the one that the .fst names.")]
+Part = Annotated[str | None, Option(help="Part file used instead of the one named in the .fst.")]
 PARTS = ("elastodyn", "aerodyn", "servodyn", "hydrodyn", "seastate", "mooring", "inflow")
 
 
 @command()
 def import_command(
     deck: Annotated[str | None, Argument(help="The .fst file; optional with part files.")] = None,
-    out_folder: Annotated[str, Option("--out", help="Folder for the files, made if missing.")] = "imported",
-    name: Annotated[str | None, Option(help="Name of platform and turbine; default: the folder's.")] = None,
+    out_folder: Annotated[str, Option("--out", help="Output folder, created if missing.")] = "imported",
+    name: Annotated[str | None, Option(help="Name of platform and turbine; default: of the folder.")] = None,
     elastodyn: Part = None,
     aerodyn: Part = None,
     servodyn: Part = None,
@@ -27,7 +27,7 @@ def import_command(
     seastate: Part = None,
     mooring: Part = None,
     inflow: Part = None,
-    discon: Annotated[str | None, Option(help="A DISCON.IN of ROSCO, in place of the deck's.")] = None,
+    discon: Annotated[str | None, Option(help="ROSCO DISCON.IN, used instead of the deck's.")] = None,
     search: Annotated[list[str] | None, Option(help="Further folder to search; repeatable.")] = None,
     overwrite: Annotated[bool, Option(help="Replace the files of an earlier import.")] = False,
     check: Annotated[bool, Option(help="Check the imported platform at rest, as fowt check does.")] = True,
@@ -36,20 +36,20 @@ def import_command(
 
     Examples:
     fowt import deck/5MW_OC4Semi.fst --out my_semi  # platform.toml, turbine, coefficients and report.md
-    fowt import deck.fst --out mine --discon tuned_DISCON.IN  # another controller than the deck's
+    fowt import deck.fst --out mine --discon tuned_DISCON.IN  # with other controller settings
     fowt import --elastodyn ED.dat --aerodyn AD.dat --hydrodyn HD.dat --mooring MAP.dat --out mine  # no .fst
-    fowt simulate --platform my_semi/platform.toml --wind 14  # what comes next
+    fowt simulate --platform my_semi/platform.toml --wind 14  # simulate the imported platform
 
-    docs/guides/import.md says what is read, what is approximated and what is refused.
+    docs/guides/import.md lists what is read, approximated and refused.
 
-    [bold]Exit code[/bold]: 0 if everything fits, 1 if the files are written but something in them does not
-    fit (as fowt check), 2 if the deck cannot be imported.
+    [bold]Exit code[/bold]: 0 if the imported platform is consistent, 1 if it is written but has
+    contradictions (see fowt check), 2 if the deck cannot be imported.
     """
     from fowt_env.analysis.check import check_platform
     from fowt_env.files.openfast_deck.importer import import_deck
 
-    given = (elastodyn, aerodyn, servodyn, hydrodyn, seastate, mooring, inflow)
-    parts = dict(zip(PARTS, given, strict=True))
+    files = (elastodyn, aerodyn, servodyn, hydrodyn, seastate, mooring, inflow)
+    parts = dict(zip(PARTS, files, strict=True))
     if deck is None and not any(parts.values()):
         raise InputError(
             "fowt import: needs an .fst file, or part files such as --elastodyn, --aerodyn, --hydrodyn"
@@ -57,7 +57,7 @@ def import_command(
     report = import_deck(
         deck, out_folder, parts=parts, search=search or (), discon=discon, name=name, replace_files=overwrite
     )
-    print_table(("figure", "value"), report.figures, report.title, left=(0, 1))
+    print_table(("quantity", "value"), report.figures, report.title, left=(0, 1))
     out.print()
     for columns, rows, title in (
         (("in the deck", "here"), report.differences, "Differences from the deck"),
@@ -74,9 +74,9 @@ def import_command(
         try:
             faults = check_platform(platform).faults
         except InputError as error:
-            faults = (f"It cannot be checked: {error}",)
+            faults = (f"The platform cannot be checked: {error}",)
         print_faults(faults)
         if faults:
-            note(f"the files are kept; fowt check {platform} says more")
+            note(f"the files are kept; for details: fowt check {platform}")
             raise typer.Exit(EXIT_STOPPED)
     note(f"next: fowt simulate --platform {platform} --wind 14")

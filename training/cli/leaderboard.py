@@ -1,4 +1,4 @@
-"""fowt leaderboard: a public ranking of submitted controllers, which its organiser re-runs."""
+"""Implements fowt leaderboard: a public ranking of submitted controllers, re-run by its organiser."""
 
 import shlex
 from pathlib import Path
@@ -12,26 +12,26 @@ from fowt_env.training.cli.tables import print_table
 
 board_app = add_group("leaderboard", "Keep a public ranking of submitted controllers.")
 
-PLATFORM = "Platform of a new board: a name or a path, to which its suites are scaled."
-DRAWN = "Hash from which the public seeds are drawn, in place of the board's."
-WITHIN = "Command that starts each Python file, e.g. a container; {folder}: its folder."
+PLATFORM = "Platform (name or path) of a new board, to which its suites are scaled."
+DRAWN = "Hash from which the public seeds are drawn, instead of the board's seeds."
+WITHIN = "Command that starts each Python file, e.g. in a container; {folder}: folder of the file."
 BoardOption = Annotated[Path, Option("--board", help="Folder of the board.")]
 
 
 @command(board_app)
 def add_command(
-    submissions: Annotated[list[Path], Argument(help="Folders, each with a card.toml.")],
+    submissions: Annotated[list[Path], Argument(help="Submission folders, each with a card.toml.")],
     board: BoardOption = Path("board"),
     platform: Annotated[str | None, Option(help=PLATFORM)] = None,
 ):
     """Check submissions and copy them into the board.
 
-    Their code is not run.
+    The submitted code is not run.
 
     Examples:
-    fowt leaderboard add my_controller  # into ./board; a new one begins with the package's controllers
+    fowt leaderboard add my_controller  # into ./board; a new board starts with the package's controllers
 
-    A submission is a folder with card.toml and the controller that it names:
+    A submission is a folder with card.toml and the controller named in the card:
 
         name = "my_controller"
         author = "A. Researcher"
@@ -46,9 +46,9 @@ def add_command(
     kinds = [read_submission(folder).kind for folder in submissions]
     if not (board / SETTINGS).exists():
         output(board, "--board", folder=True)
-        made = new_board(board, platform=platform)
-        first = ", ".join(each.name for each in made.submissions())
-        note(f"made the board {board} with the controllers of the package: {first}")
+        created = new_board(board, platform=platform)
+        first = ", ".join(each.name for each in created.submissions())
+        note(f"created the board {board} with the controllers of the package: {first}")
     for kind, folder in zip(kinds, submissions, strict=True):
         name = Board(board).add(folder)
         trusted = " --trust-code (once you have read its Python file)" if kind == PYTHON_FILE else ""
@@ -57,13 +57,13 @@ def add_command(
 
 @command(board_app)
 def seeds_command(
-    path: Annotated[Path, Argument(help="New file, which only you can read.")],
+    path: Annotated[Path, Argument(help="New file, readable only by you.")],
     count: Annotated[int, Option(help="Number of seeds.")] = 6,
 ):
-    """Draw an organiser's secret seeds, too large to be guessed, with a salt.
+    """Draw an organiser's secret seeds, too large to guess, with a salt.
 
     Examples:
-    fowt leaderboard seeds seeds.txt  # publish the SHA-256 that it prints, and keep the file
+    fowt leaderboard seeds seeds.txt  # publish the printed SHA-256, and keep the file
     """
     from fowt_env.training.board.folder import write_secret_seeds
 
@@ -82,16 +82,16 @@ def run_command(
     trust_code: Annotated[bool, Option("--trust-code", help="Run submitted Python files.")] = False,
     within: Annotated[str | None, Option(help=WITHIN)] = None,
 ):
-    """Run every submission on the board's frozen suites and write its page.
+    """Run every submission on the board's frozen suites and write the page of the board.
 
     Examples:
     fowt leaderboard run --jobs 2  # all submissions on the board's seeds
     fowt leaderboard run --draw-seeds $COMMIT  # seeds from a commit
-    fowt leaderboard run --secret seeds.txt --private private --trust-code  # secret seeds too
+    fowt leaderboard run --secret seeds.txt --private private --trust-code  # also on secret seeds
 
-    Python files run only with [bold]--trust-code[/bold], each in a separate process, with your user's rights:
-    read them first, or run them in a container with [bold]--within[/bold] (docs/guides/leaderboard.md). The
-    same command resumes an interrupted judging.
+    Python files run only with [bold]--trust-code[/bold], each in a separate process, with your user's
+    permissions: read them first, or run them in a container with [bold]--within[/bold]
+    (docs/guides/leaderboard.md). The same command resumes an interrupted run.
     """
     from fowt_env.training.board.folder import Board
     from fowt_env.training.board.judge import judge
@@ -113,7 +113,7 @@ def show_command(
     board: BoardOption = Path("board"),
     regime: Annotated[str | None, Option(help="Regime; default: the first of the board.")] = None,
 ):
-    """Print the last judged board.
+    """Print the board as last judged.
 
     Examples:
     fowt leaderboard show  # the board in ./board, its first regime

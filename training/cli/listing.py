@@ -1,4 +1,4 @@
-"""fowt list: what the other commands take by name, as tables with what each means and where it is from."""
+"""Implements fowt list: tables of the names that the other commands accept, with meanings and sources."""
 
 import json
 from collections.abc import Callable
@@ -12,19 +12,19 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli.console import command, out
 from fowt_env.training.cli.tables import figure, print_table
 
-LAST = ("DEMONSTRATION", "comparison only")  # in the summaries of controllers that nobody should choose
+LAST = ("DEMONSTRATION", "comparison only")  # marks of controllers not for use, which are listed last
 
 
 class Kind(NamedTuple):
-    """One kind of names: where it is used, what it is, its headings, and what makes its rows."""
+    """Describes a kind of names: the option that takes them, their use, headings and source of rows."""
 
     option: str
     use: str
     headings: tuple[str, ...]
     rows: Callable[[], list]
     remark: str = ""
-    extra: tuple[str, ...] = ()  # further keys of the JSON, whose texts stand at the end of the rows
-    notes: int | None = None  # column whose texts stand below the table, once each
+    extra: tuple[str, ...] = ()  # further keys of the JSON, for the last texts of each row
+    notes: int | None = None  # column whose texts are printed below the table, once each
 
 
 def _platforms():
@@ -40,7 +40,7 @@ def _platforms():
 
 
 def _one_line(text):
-    """Return the text of a source in one line."""
+    """Return the text of a source on one line."""
     return " ".join((text or "not stated").split())
 
 
@@ -76,7 +76,7 @@ def _seas():
 
 
 def _natural(name):
-    """Return the key that sorts names with the numbers at their end by size."""
+    """Return a sort key that compares the numbers in a name by value."""
     parts = name.split("_")
     return [(0, float(part), "") if part.isdigit() else (1, 0.0, part) for part in parts]
 
@@ -89,7 +89,7 @@ def _controllers():
         summary, needs = factory.__doc__.splitlines()[0], information(name)
         ahead, blades = "wind_preview" in needs, "azimuth" in needs
         motion = not {"nacelle_velocity", "nacelle_acceleration"}.isdisjoint(needs)
-        extra = "wind ahead" if ahead else "blade loads" if blades else "motion" if motion else ""
+        extra = "wind preview" if ahead else "blade loads" if blades else "motion" if motion else ""
         last = any(mark in summary for mark in LAST) or name == "constant"
         rows.append((last, ahead, blades, (name, summary, extra, ", ".join(needs))))
     return [row[-1] for row in sorted(rows, key=lambda row: row[:-1])]
@@ -182,14 +182,14 @@ def _faults():
 def _sensors():
     from fowt_env.descriptions.sensors import built_in_chains
 
-    exact = ("exact", "every reading is the plant's own value")
+    exact = ("exact", "every reading is the exact value of the plant")
     return [exact, *((name, chain.description) for name, chain in built_in_chains().items())]
 
 
 def _lidars():
     from fowt_env.descriptions.lidar import lidars
 
-    exact = ("exact", "the wind itself, averaged over the rotor")
+    exact = ("exact", "the exact wind, averaged over the rotor")
     return [exact, *((name, _one_line(lidar.source)) for name, lidar in lidars().items())]
 
 
@@ -198,35 +198,35 @@ KINDS = {
         "--platform", "floating platforms with turbine, water depth, source",
         ("name", "hull", "turbine", "depth\nm", "source"), _platforms,
         "hull: wave loads by strips (Morison) or from panels (potential flow)."
-        " A file of your own: --platform mine.toml",
+        " Your own file: --platform mine.toml",
     ),
     "turbines": Kind(
-        "--option turbine=", "turbines, of which every platform has one",
+        "--option turbine=", "turbines; every platform has one",
         ("name", "power\nkW", "rated\nwind m/s", "rated\nrpm", "source"), _turbines,
     ),
     "winds": Kind(
-        "--wind", "kinds of wind, and how each is written", ("kind", "--wind", "what it is"), _winds,
-        "Any of them as JSON, with further keys. Speeds in m/s at hub height.",
+        "--wind", "kinds of wind and their syntax", ("kind", "--wind", "what it is"), _winds,
+        "All kinds also as JSON, with further keys. Speeds in m/s at hub height.",
     ),
     "seas": Kind(
         "--sea", "sea states with Hs, Tp, source",
         ("name", "kind", "Hs or H\nm", "Tp or T\ns", "wind\nm/s", "source"), _seas, notes=5,
-        remark="Also jonswap:HS:TP[:GAMMA], regular:H:T (m, s), JSON, or none. wind: that belongs to it.",
+        remark="Also jonswap:HS:TP[:GAMMA], regular:H:T (m, s), JSON, or none. wind: associated wind speed.",
     ),
     "controllers": Kind(
         "--controller", "built-in control laws", ("name", "what it is", "also uses"), _controllers,
         "Also policy:NAME (fowt list agents), design:FILE (fowt design) and module:Name (your own).\n"
-        "All use generator speed, torque and blade pitch; motion: nacelle and platform. All of it: --json.",
+        "All use generator speed, torque and blade pitch; motion: nacelle and platform. Full list: --json.",
         extra=("measurements and models",),
     ),
     "agents": Kind(
-        "--controller", "trained agents that come with the package",
+        "--controller", "trained agents shipped with the package",
         ("name", "how it acts", "what it sees", "training"), _agents,
-        "An agent of your own: policy:PATH/best.npz",
+        "Your own agent: policy:PATH/best.npz",
     ),
     "suites": Kind(
         "--suite", "sets of load cases with seeds and rules",
-        ("name", "cases", "seeds", "what it is"), _suites, "The cases of one:  fowt list cases above_rated",
+        ("name", "cases", "seeds", "what it is"), _suites, "Cases of a suite:  fowt list cases above_rated",
     ),
     "cases": Kind(
         "--cases", "load cases: wind, sea, duration", ("name", "suite", "wind", "sea", "s"), _cases
@@ -236,68 +236,70 @@ KINDS = {
         ("name", "what is to be done", "wind", "sea", "s"), _tasks,
     ),
     "metrics": Kind(
-        "results.csv", "what runs are judged by", ("name", "unit", "meaning", "better"), _metrics,
+        "results.csv", "metrics by which runs are judged", ("name", "unit", "meaning", "better"), _metrics,
         'A column is NAME_[UNIT]: "RotSpeed_std_[rpm]".',
     ),
     "channels": Kind(
-        "--initial", "outputs of a run, by OpenFAST's names", ("name", "unit", "meaning"), _channels,
-        'A column is NAME_[UNIT]: "RotSpeed_[rpm]". FAIRTEN2, ...: further lines.',
+        "--initial", "outputs of a run, with OpenFAST names", ("name", "unit", "meaning"), _channels,
+        'A column is NAME_[UNIT]: "RotSpeed_[rpm]". FAIRTEN2, ...: further mooring lines.',
     ),
     "options": Kind(
-        "--option", "parts of the model, as of build_scene",
+        "--option", "parts of the model, as in build_scene",
         ("option", "what it is", "values, default first"), _options,
-        "None: that of the fidelity, the platform or the turbine. What is no text is JSON: null.",
+        "None: set by the fidelity, platform or turbine. Values other than texts are JSON: null.",
     ),
     "faults": Kind(
-        "--fault", "what goes wrong in a run", ("kind", "--fault", "what happens"), _faults,
+        "--fault", "faults during a run", ("kind", "--fault", "what happens"), _faults,
         'As JSON: {"kind": "pitch_offset", "time": 100, "offset": 2}',
     ),
     "sensors": Kind(
-        "--sensors", "what stands between plant and controller", ("name", "what it is"), _sensors
+        "--sensors", "sensors between plant and controller", ("name", "what it is"), _sensors
     ),
-    "lidars": Kind("--preview", "what sees the wind ahead", ("name", "what it is, and its source"), _lidars),
+    "lidars": Kind(
+        "--preview", "lidars that measure wind ahead", ("name", "what it is, and its source"), _lidars
+    ),
 }  # fmt: skip
 
 
 @command()
 def list_command(
-    kind: Annotated[str | None, Argument(help=f"{', '.join(KINDS)}; or all.")] = None,
-    part: Annotated[str | None, Argument(help="Show the rows with this text in them.")] = None,
+    kind: Annotated[str | None, Argument(help=f"Kind: {', '.join(KINDS)}; or all.")] = None,
+    part: Annotated[str | None, Argument(help="Show only rows that contain this text.")] = None,
     as_json: Annotated[bool, Option("--json", help="Print JSON.")] = False,
 ):
-    """Names that the other commands take, with what each is.
+    """List the names that the other commands accept.
 
     Examples:
-    fowt list  # the kinds of names, how many there are of each, and where they are used
+    fowt list  # kinds of names, their number and where they are used
     fowt list seas  # sea states with Hs, Tp and source
     fowt list cases above_rated  # wind, sea and duration of the cases of a suite
-    fowt list channels tower  # rows with "tower" in them
-    fowt list metrics --json  # for a program
+    fowt list channels tower  # rows that contain "tower"
+    fowt list metrics --json  # as JSON, for a program
     """
     if kind is not None and kind != "all" and kind not in KINDS:
         raise unknown("kind of name", kind, ("all", *KINDS))
     if kind is None:
         headings = ("kind", "names", "used in", "what")
-        found = [(name, str(len(each.rows())), each.option, each.use) for name, each in KINDS.items()]
+        rows = [(name, str(len(each.rows())), each.option, each.use) for name, each in KINDS.items()]
         if as_json:
-            out.print_json(json.dumps(_as_mappings(headings, found)))
+            out.print_json(json.dumps(_as_mappings(headings, rows)))
             return
-        print_table(headings, found, left=(0, 2, 3), prose=(3,))
-        out.print("\nfowt list KIND  shows one kind,  fowt list KIND TEXT  its rows with that text")
+        print_table(headings, rows, left=(0, 2, 3), prose=(3,))
+        out.print("\nfowt list KIND  shows one kind,  fowt list KIND TEXT  its rows that contain TEXT")
         return
-    wanted = (part or "").lower()
+    pattern = (part or "").lower()
     tables = {
-        name: [row for row in KINDS[name].rows() if any(wanted in cell.lower() for cell in row)]
+        name: [row for row in KINDS[name].rows() if any(pattern in cell.lower() for cell in row)]
         for name in (KINDS if kind == "all" else [kind])
     }
     if part is not None and not any(tables.values()):
-        raise InputError(f"no {kind} with {part!r} in them: fowt list {kind} shows them all")
+        raise InputError(f"no {kind} with {part!r}: fowt list {kind} shows all")
     if as_json:
-        found = {
+        mappings = {
             name: _as_mappings((*KINDS[name].headings, *KINDS[name].extra), rows)
             for name, rows in tables.items()
         }
-        out.print_json(json.dumps(found if kind == "all" else found[kind]))
+        out.print_json(json.dumps(mappings if kind == "all" else mappings[kind]))
         return
     for number, (name, rows) in enumerate(item for item in tables.items() if item[1]):
         if number:
@@ -312,7 +314,7 @@ def _as_mappings(headings, rows):
 
 
 def _print_kind(name, kind, rows):
-    """Print rows of a Kind: columns of numbers to the right, those of texts with blanks as prose."""
+    """Print rows of a Kind: numbers aligned right, texts with spaces wrapped as prose."""
     columns = [[row[i] for row in rows] for i in range(len(kind.headings))]
     numbered = {}
     if kind.notes is not None:

@@ -1,4 +1,4 @@
-"""fowt plot: pictures of saved runs and tables."""
+"""Implements fowt plot: plots of saved runs and tables."""
 
 from pathlib import Path
 from typing import Annotated
@@ -13,26 +13,26 @@ PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 
 @command()
 def plot(
-    kind: Annotated[str, Argument(help="series, spectra, boxes, raos or schedule.")],
-    files: Annotated[list[str], Argument(help="Runs, .csv, .parquet or .outb; one line or box for each.")],
-    out_path: Annotated[str | None, Option("--out", help="Picture; default: KIND.png.")] = None,
-    skip: Annotated[float, Option(min=0.0, help="Seconds at the start left out; not of series.")] = 0.0,
-    title: Annotated[str | None, Option(help="Heading.")] = None,
-    platform: Annotated[str, Option(help="Platform of rated values and periods; or none.")] = "oc3_hywind",
+    kind: Annotated[str, Argument(help="Kind of plot: series, spectra, boxes, raos or schedule.")],
+    files: Annotated[list[str], Argument(help="Runs: .csv, .parquet or .outb; one line or box each.")],
+    out_path: Annotated[str | None, Option("--out", help="Output plot; default: KIND.png.")] = None,
+    skip: Annotated[float, Option(min=0.0, help="Initial time left out, s; in series it is shaded.")] = 0.0,
+    title: Annotated[str | None, Option(help="Title of the plot.")] = None,
+    platform: Annotated[str, Option(help="Platform of rated values and periods, or none.")] = "oc3_hywind",
 ):
     """Plot saved runs: time series, spectra, box plots.
 
-    Also the response to waves, and the steady schedule of a table of fowt trim.
+    Also plots RAOs, and the steady schedule in a table of fowt trim.
 
     Examples:
-    fowt plot series run.csv  # stacked time series, into series.png
-    fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png  # two runs over each other
-    fowt plot series openfast.outb run.csv  # a run of OpenFAST beside one of fowt simulate
+    fowt plot series run.csv  # stacked time series, in series.png
+    fowt plot spectra pi.csv lqr.csv --skip 100 --out spectra.png  # two runs overlaid
+    fowt plot series openfast.outb run.csv  # a run of OpenFAST and one of fowt simulate
     fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png  # a box for each run
-    fowt plot raos waves.parquet --skip 100  # motion per metre of wave, of a run in irregular waves
-    fowt plot schedule steady.csv  # operating points that fowt trim --out wrote
+    fowt plot raos waves.parquet --skip 100  # motion per metre of wave, from a run in irregular waves
+    fowt plot schedule steady.csv  # operating points saved by fowt trim --out
 
-    Runs are files of fowt simulate --out, of an evaluation's runs folder, and .outb of OpenFAST.
+    Runs are files of fowt simulate --out or of an evaluation's runs folder, or .outb files of OpenFAST.
     """
     from fowt_env.descriptions.platform import read_platform, turbine_of
     from fowt_env.descriptions.ratings import ratings
@@ -62,7 +62,7 @@ def plot(
 
 
 def _names(files):
-    """Return {the part of the path that differs from the others: path}."""
+    """Return {label: path}, the label being the part of the path that differs between the files."""
     if len(set(files)) < len(files):
         raise InputError(f"files {', '.join(files)}: each must be named once")
     parts = [[*Path(file).parts[:-1], Path(file).stem] for file in files]

@@ -1,4 +1,4 @@
-"""The commands that make things to look at: report, animate."""
+"""Implements fowt report and fowt animate."""
 
 from functools import partial
 from pathlib import Path
@@ -14,24 +14,24 @@ from fowt_env.training.cli.options import FidelityOption, OptionOption, SeaOptio
 
 @command()
 def report(
-    folder: Annotated[str, Argument(help="Folder that fowt evaluate wrote.")],
-    out_path: Annotated[str | None, Option("--out", help="Default: report.html in the folder.")] = None,
+    folder: Annotated[str, Argument(help="Output folder of fowt evaluate.")],
+    out_path: Annotated[str | None, Option("--out", help="Page; default: report.html in the folder.")] = None,
     cases: Annotated[str | None, Option(help="Cases with time series; default: all, up to 120 runs.")] = None,
     seeds: Annotated[str | None, Option(help="Seeds with time series: 1,2 or 1:6:1; default: all.")] = None,
-    rate: Annotated[float | None, Option(help="Samples per second of the series; default: up to 2.")] = None,
-    platform: Annotated[str | None, Option(help="Of the steady schedule; default: the evaluation's.")] = None,
+    rate: Annotated[float | None, Option(help="Samples per second of time series; default: up to 2.")] = None,
+    platform: Annotated[str | None, Option(help="Platform of the schedule; default: as evaluated.")] = None,
     schedule: Annotated[bool, Option("--schedule/--no-schedule", help="Show the steady schedule.")] = True,
 ):
-    """Write an HTML page of an evaluation for offline use.
+    """Write an offline HTML report of an evaluation.
 
-    It has leaderboard, Pareto and box plots, time series and spectra.
+    Contains the leaderboard, Pareto and box plots, time series and spectra.
 
     Examples:
     fowt report results/demo  # results/demo/report.html
     fowt report results/suite --cases ntm_12,ntm_24 --seeds 1,2 --rate 5 --out page.html
     fowt report results/suite --platform mine.toml  # the steady schedule of another platform
 
-    The page contains plotly.js and all data: 5 MB and 25 kB for each run of 10 minutes that it shows.
+    The page contains plotly.js and all data: 5 MB, and 25 kB per 10-minute run shown.
     """
     from fowt_env.training.reports.html_page import write_report
 
@@ -45,23 +45,23 @@ def report(
 
 @command()
 def animate(
-    out_file: Annotated[str, Argument(help="The animation: .gif or .mp4.")],
-    controllers: Annotated[str, Option(help="One to four, with commas.")] = "pi,pi_land",
-    platform: Annotated[str, Option(help="Platform: a name or a path.")] = "oc3_hywind",
+    out_file: Annotated[str, Argument(help="Output animation: .gif or .mp4.")],
+    controllers: Annotated[str, Option(help="One to four controllers, comma-separated.")] = "pi,pi_land",
+    platform: Annotated[str, Option(help="Platform: a name or the path of a TOML file.")] = "oc3_hywind",
     wind: WindOption = '{"kind": "eog", "speed": 18, "start": 20}',
     sea: SeaOption = "jonswap:4:10",
     duration: Annotated[float, Option(help="Length of the runs, s.")] = 80.0,
     seed: Annotated[int, Option(help="Seed of wind and waves.")] = 0,
-    speed: Annotated[float, Option(help="Playback speed over real time.")] = 5.0,
+    speed: Annotated[float, Option(help="Playback speed relative to real time.")] = 5.0,
     fps: Annotated[float, Option(help="Frames per second.")] = 15.0,
-    width: Annotated[int, Option(help="Pixels.")] = 960,
-    height: Annotated[int, Option(help="Pixels.")] = 540,
+    width: Annotated[int, Option(help="Width, pixels.")] = 960,
+    height: Annotated[int, Option(help="Height, pixels.")] = 540,
     fidelity: FidelityOption = "standard",
     option: OptionOption = None,
 ):
     """Animate controllers side by side, as .gif or .mp4.
 
-    All controllers meet the same wind and waves.
+    All controllers are simulated in the same wind and waves.
 
     Examples:
     fowt animate gust.gif  # OC3 and land gains in an extreme operating gust at 18 m/s

@@ -1,4 +1,4 @@
-"""The commands that score agents over baselines and against the performance limit: scores."""
+"""Implements fowt scores: agents relative to baselines and to the performance limit, gusts and faults."""
 
 from typing import Annotated
 
@@ -11,30 +11,31 @@ from fowt_env.training.cli.console import add_group, command, out, output, progr
 
 scores = add_group("scores", "Compare agents with baselines, from saved evaluations.")
 FoldersArgument = Annotated[
-    list[str], Argument(metavar="RESULTS...", help="Folders or results.csv of fowt evaluate.")
+    list[str], Argument(metavar="RESULTS...", help="Output folders or results.csv files of fowt evaluate.")
 ]
 GroupOption = Annotated[
-    list[str] | None, Option(metavar="NAME=LABEL,LABEL", help="Training seeds of one agent; repeatable.")
+    list[str] | None,
+    Option(metavar="NAME=LABEL,LABEL", help="Training seeds of one agent; repeatable."),
 ]
 AgentsOption = Annotated[str | None, Option(help="Controllers to score; default: all but the baselines.")]
 CasesOption = Annotated[str | None, Option(help="Cases to score, comma-separated; default: all.")]
 OutOption = Annotated[str | None, Option("--out", metavar="STEM", help="Write STEM.md and tables STEM*.csv.")]
-LIMIT = "Limit: CSV of fowt design bound; default: the package's."
+LIMIT = "Performance limit: CSV of fowt design bound; default: the package's."
 FIGURES = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL"
 GUST = '{"kind": "eog", "speed": 18, "class": "B", "start": 200}'
 
 
 def _groups(texts):
-    """Return {name: labels} of the texts of --group. Raises: InputError."""
-    found = {}
+    """Return {name: labels} from the texts of --group. Raises: InputError."""
+    groups = {}
     for text in texts or ():
         name, equals, labels = text.partition("=")
         if not (name.strip() and equals and parse_names(labels)):
             raise InputError(f"--group {text!r}: must be NAME=LABEL,LABEL")
-        if name.strip() in found:
+        if name.strip() in groups:
             raise InputError(f"--group {text!r}: the name is used twice")
-        found[name.strip()] = parse_names(labels)
-    return found
+        groups[name.strip()] = parse_names(labels)
+    return groups
 
 
 def _runs(results, cases):
@@ -45,13 +46,13 @@ def _runs(results, cases):
     return read_results(results, METRICS, parse_names(cases), parked=False)
 
 
-def _shown(text, out_path, found, counts=None):
-    """Print the markdown text; with a path, write it and its tables."""
+def _shown(text, out_path, ratios, counts=None):
+    """Print the markdown text; with a path, also write the text and the tables."""
     from fowt_env.training.reports.scores import write_scores
 
     out.print(text, markup=False)
     if out_path is not None:
-        tables = {"": found} if counts is None else {"": found, "counts": counts}
+        tables = {"": ratios} if counts is None else {"": ratios, "counts": counts}
         wrote(*write_scores(tables, text, out_path))
 
 
@@ -79,24 +80,24 @@ def baselines_command(
 
     table = _runs(results, cases)
     chosen = parse_names(against), _groups(group), parse_names(agents)
-    found, counts = agent_scores(table, *chosen), agent_counts(table, *chosen)
-    _shown(scores_markdown(found, counts), out_path, found, counts)
+    ratios, counts = agent_scores(table, *chosen), agent_counts(table, *chosen)
+    _shown(scores_markdown(ratios, counts), out_path, ratios, counts)
 
 
 @command(scores)
 def cases_command(
     results: FoldersArgument,
-    against: Annotated[str, Option(help="The baseline.")] = "gspi_oc3",
+    against: Annotated[str, Option(help="Baseline.")] = "gspi_oc3",
     group: GroupOption = None,
     agents: AgentsOption = None,
     cases: CasesOption = None,
-    figures: Annotated[str, Option(help="Short names or metrics that get a table, with commas.")] = FIGURES,
-    each: Annotated[bool, Option("--each", help="A row per case, not one per kind of wind.")] = False,
+    figures: Annotated[str, Option(help="Metrics (short or full names), comma-separated.")] = FIGURES,
+    each: Annotated[bool, Option("--each", help="Write a row per case instead of per kind of wind.")] = False,
     out_path: OutOption = None,
 ):
     """Score agents against one baseline on each kind of case.
 
-    The winds of a kind are taken together; failed runs are counted.
+    All winds of a kind are pooled; failed runs are counted.
 
     Examples:
     fowt evaluate --suite shifted --controllers policy:ppo_lqr,gspi_oc3 --out results/shifted
@@ -106,8 +107,8 @@ def cases_command(
     from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown
 
     table, chosen = _runs(results, cases), figures_named(parse_names(figures))
-    found, counts = by_kind(table, against, _groups(group), parse_names(agents), chosen, each)
-    _shown(kinds_markdown(found, counts), out_path, found, counts)
+    ratios, counts = by_kind(table, against, _groups(group), parse_names(agents), chosen, each)
+    _shown(kinds_markdown(ratios, counts), out_path, ratios, counts)
 
 
 @command(scores)
@@ -125,16 +126,16 @@ def bound(
     Examples:
     fowt scores bound results/rl --plot results/rl/bound.png --out results/rl/bound
 
-    In brackets: more blade-pitch travel or power deviation than gspi_oc3, which the limit excludes.
+    Values in brackets: more blade-pitch travel or power deviation than gspi_oc3, which the limit excludes.
     """
     from fowt_env.training.reports.bound_scores import bound_fractions, bound_markdown, read_bound
     from fowt_env.training.reports.score_plots import plot_fractions
 
     fronts = read_bound(table_path)
-    found = bound_fractions(_runs(results, cases), fronts, _groups(group), parse_names(agents))
-    _shown(bound_markdown(found), out_path, found)
+    fractions = bound_fractions(_runs(results, cases), fronts, _groups(group), parse_names(agents))
+    _shown(bound_markdown(fractions), out_path, fractions)
     if plot is not None:
-        plot_fractions(found, fronts, plot)
+        plot_fractions(fractions, fronts, plot)
     wrote(plot)
 
 
@@ -142,24 +143,24 @@ def bound(
 def faults(results: FoldersArgument, cases: CasesOption = None, out_path: OutOption = None):
     """Show which controllers survive which faults.
 
-    Also shows the largest motions and loads, and the trips.
+    Also shows the largest motions and loads, and trips.
 
     Examples:
     fowt evaluate --suite faults --controllers pi,gspi_oc3,rosco_float,lqr --out results/faults
     fowt scores faults results/faults
 
-    Survived: no capsize, blow-up or error, and within the suite's limits. A trip is no failure here.
+    Survived: no capsize, blow-up or error, and within the suite's limits. A trip is not a failure here.
     """
     from fowt_env.training.reports.survival import survival, survival_markdown
 
-    found = survival(_runs(results, cases))
-    _shown(survival_markdown(found), out_path, found)
+    rates = survival(_runs(results, cases))
+    _shown(survival_markdown(rates), out_path, rates)
 
 
 @command(scores)
 def gust(
-    image: Annotated[str, Argument(help="Image file.")],
-    controllers: Annotated[str, Option(help="Names, with commas.")] = "gspi_oc3,rosco_float,lqr",
+    image: Annotated[str, Argument(help="Output image.")],
+    controllers: Annotated[str, Option(help="Controllers, comma-separated.")] = "gspi_oc3,rosco_float,lqr",
     wind: shared.WindOption = GUST,
     sea: shared.SeaOption = "jonswap:4:10",
     seed: Annotated[int, Option(help="Seed of the waves.")] = 1,

@@ -1,4 +1,4 @@
-"""fowt simulate and trim: one run, and operating points."""
+"""Implements fowt simulate and fowt trim: single runs and steady operating points."""
 
 from typing import Annotated
 
@@ -14,23 +14,23 @@ from fowt_env.training.cli.arguments import parse_fault, parse_names, parse_pair
 from fowt_env.training.cli.console import command, note, output, progress_bar, save_table, wrote
 from fowt_env.training.cli.tables import print_table
 
-ROUNDING = 1e-9  # fraction of the mean below which a standard deviation is rounding
-OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # of scenes that have them
-LEAST_WAVES = 700.0  # s, of the waves of a shorter run
+ROUNDING = 1e-9  # fraction of the mean below which a standard deviation is rounding error
+OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # only with individual pitch
+LEAST_WAVES = 700.0  # s, weather duration of shorter runs
 WIND = (
-    "m/s; KIND:SPEED[:CLASS] as ntm:18:B, eog:18 or (full-field) mann:18:B; a file: .csv of time and speed,"
-    " .bts, .wnd, .hh; JSON, e.g. kind box; or none. See fowt list winds."
+    "Wind speed, m/s; KIND:SPEED[:CLASS], e.g. ntm:18:B, eog:18 or mann:18:B (full field); a file: .csv (time"
+    " and speed), .bts, .wnd, .hh; JSON, e.g. of kind box; or none. See fowt list winds."
 )
-SEA = "Name of fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
+SEA = "Name from fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
 CONTROLLER = (
-    "Name of fowt list controllers, policy:NAME of fowt list agents, policy:FILE.npz, design:FILE.json, or"
+    "Name from fowt list controllers, policy:NAME from fowt list agents, policy:FILE.npz, design:FILE.json or"
     " your module:Name. none: constant rotor speed and blade pitch (at rest without wind); constant: constant"
-    " torque and blade pitch, the rotor turns freely."
+    " torque and blade pitch, variable rotor speed."
 )
-FIDELITY = "reference, standard (1000 times faster, within 0.1 %), or fast (rotor as a table)."
-INITIAL = "Start value, OpenFAST units; repeats."
-FAULT = "Fault, e.g. grid_loss:100; repeats."
-PROTECTION = "Trips: none, turbine (those of its file), or JSON of single ones."
+FIDELITY = "reference, standard (1000 times faster, within 0.1 %), or fast (tabulated rotor)."
+INITIAL = "Initial value in OpenFAST units; repeatable."
+FAULT = "Fault, e.g. grid_loss:100; repeatable."
+PROTECTION = "Trips: none, turbine (as in the turbine file), or JSON of single trips."
 REPEATED = list[str] | None
 
 
@@ -41,18 +41,22 @@ def simulate(
     sea: Annotated[str, Option(help=SEA)] = "none",
     controller: Annotated[str, Option(help=CONTROLLER)] = "pi",
     duration: Annotated[float, Option(help="Length of the run, s.")] = 600.0,
-    dt: Annotated[float | None, Option(help="Physics step, s; default: that of the fidelity.")] = None,
+    dt: Annotated[float | None, Option(help="Physics time step, s; default: set by the fidelity.")] = None,
     control_dt: Annotated[float, Option(help="Control period, s; a multiple of dt.")] = 0.1,
     output_dt: Annotated[float, Option(help="Output period, s; a multiple of dt.")] = 0.1,
     seed: Annotated[int, Option(help="Seed of wind and waves.")] = 0,
     fidelity: Annotated[str, Option(help=FIDELITY)] = "standard",
     rotor: shared.RotorOption = None,
-    start: Annotated[str, Option(help="trim (steady state of the mean wind) or zero.")] = "trim",
+    start: Annotated[
+        str, Option(help="Initial state: trim (steady state at the mean wind) or zero.")
+    ] = "trim",
     initial: Annotated[REPEATED, Option(metavar="CHANNEL=VALUE", help=INITIAL)] = None,
     fault: Annotated[REPEATED, Option(metavar="KIND:TIME or JSON", help=FAULT)] = None,
     protection: Annotated[str, Option(help=PROTECTION)] = "none",
     option: shared.OptionOption = None,
-    out_path: Annotated[str | None, Option("--out", help="Series: .csv, .parquet or .outb.")] = None,
+    out_path: Annotated[
+        str | None, Option("--out", help="Output time series: .csv, .parquet or .outb.")
+    ] = None,
     plot: shared.PlotOption = None,
 ):
     """Simulate one run: statistics, time series and a plot.
@@ -62,10 +66,10 @@ def simulate(
     fowt simulate --wind ntm:18:B --seed 3 --controller gspi_oc3 --out run.csv  # turbulence
     fowt simulate --wind none --sea regular:3:5 --controller none --start zero  # waves alone
     fowt simulate --wind none --start zero --controller none --initial PtfmSurge=10  # free decay
-    fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'  # any wind, as JSON
+    fowt simulate --wind '{"kind": "etm", "speed": 18, "class": "A"}'  # a wind as JSON
     fowt simulate --controller policy:ppo_lqr --wind ntm:16:B  # a trained agent
-    fowt simulate --controller ipc --option pitch=individual  # a pitch for each blade
-    fowt simulate --wind 18 --fault grid_loss:100 --protection turbine  # a fault, and trips
+    fowt simulate --controller ipc --option pitch=individual  # individual blade pitch
+    fowt simulate --wind 18 --fault grid_loss:100 --protection turbine  # a fault, with trips
     """
     import fowt_env
 
@@ -107,20 +111,20 @@ def _save_run(frame, path):
 
 
 def _note_limits(frame, turbine):
-    """Print notes on torque at its limits, on rotor speeds above the overspeed, and on a trip."""
+    """Print notes on torque at its limits, rotor speed above the overspeed limit, and a trip."""
     from fowt_env.descriptions.units import RPM
 
     limited = frame["GenTqLim_[-]"].mean()
     if limited > 0.0:
         note(
             f"generator torque at its range or rate limit for {100.0 * limited:.1f} % of the run: the"
-            " commands are more than the generator can follow"
+            " generator cannot follow the commands"
         )
     fastest, limit = frame["RotSpeed_[rpm]"].max(), turbine.overspeed / RPM
     if fastest > limit:
         note(
-            f"rotor speed of up to {fastest:.2f} rpm is above the turbine's overspeed of {limit:g} rpm,"
-            " at which an environment ends and an evaluation counts the run as failed"
+            f"rotor speed reaches {fastest:.2f} rpm, above the turbine's overspeed of {limit:g} rpm, where an"
+            " environment terminates and an evaluation counts the run as failed"
         )
     if frame.attrs.get("trip") is not None:
         trip = frame.attrs["trip"].replace("_", " ")
@@ -141,7 +145,7 @@ def _print_channels(frame, title):
 
 
 def compared_runs(controllers, duration, progress, platform="oc3_hywind", wind=None, sea=None, **options):
-    """Return (scene, {controller: run}) of controllers with commas, all in the same wind and waves."""
+    """Return (scene, {controller: run}) of comma-separated controllers in the same wind and waves."""
     import fowt_env
 
     options = {"duration": max(LEAST_WAVES, duration)} | options
@@ -169,12 +173,12 @@ def trim(
     out_path: shared.TableOption = None,
     plot: shared.PlotOption = None,
 ):
-    """Compute steady operating points over the wind speed.
+    """Compute steady operating points over wind speed.
 
     Examples:
     fowt trim  # the floating turbine from cut-in to cut-out
-    fowt trim --winds 8,11.4,18 --fixed --out steady.csv  # fixed platform, into a file
-    fowt trim --plot schedule.png  # the steady schedule as a picture
+    fowt trim --winds 8,11.4,18 --fixed --out steady.csv  # fixed platform, saved to a file
+    fowt trim --plot schedule.png  # plot of the steady schedule
     """
     import pandas as pd
 

@@ -1,7 +1,7 @@
-"""Tables of the command line: without a frame, and with all digits in a terminal of any width.
+"""Prints the tables of the command line, without a frame and with all digits at any terminal width.
 
-If a table is wider than the terminal, its headings and then its prose are wrapped; if it still is, it is
-printed in blocks of columns, each beginning with the first ones. A file or a pipe gets full lines, unless
+If a table is wider than the terminal, its headings and then its prose are wrapped; if this is not enough, the
+table is printed in blocks of columns that repeat the first columns. A file or a pipe gets full lines, unless
 COLUMNS is set.
 """
 
@@ -15,14 +15,16 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-out = Console(emoji=False, highlight=False, soft_wrap=True)  # no emoji for a controller module:Name:
+out = Console(
+    emoji=False, highlight=False, soft_wrap=True
+)  # no emoji codes: a controller may be module:Name:
 GAP = 2
-LONG_WORD = 16  # characters to which a column of prose may be narrowed though a word of it is longer
+LONG_WORD = 16  # characters; least width of a column of prose with longer words
 RULED = Box("    \n    \n ── \n    \n    \n    \n    \n    \n")
 
 
 def table_width():
-    """Return the characters in a line of the terminal; infinite for a file or a pipe."""
+    """Return the width of the terminal in characters; infinite for a file or a pipe."""
     return out.width if out.is_terminal or os.environ.get("COLUMNS", "").isdigit() else float("inf")
 
 
@@ -32,11 +34,11 @@ def figure(value):
 
 
 def print_table(headings, rows, title=None, keys=1, left=(0,), prose=(), red=()):
-    """Print rows (sequences of texts and numbers) below headings, numbers to the right.
+    """Print rows (sequences of texts and numbers) below headings, with numbers aligned right.
 
     keys   number of first columns that every block repeats
-    left   numbers of left-aligned columns; prose: of those whose texts may take several lines
-    red    numbers of red rows
+    left   indices of left-aligned columns; prose: of columns whose texts may be wrapped
+    red    indices of red rows
     """
     width, rows = table_width(), [list(map(figure, row)) for row in rows]
     columns = [[row[i] for row in rows] for i in range(len(headings))]
@@ -64,13 +66,13 @@ def print_table(headings, rows, title=None, keys=1, left=(0,), prose=(), red=())
             head = Text("\n" * (tall - heads[i].count("\n")) + heads[i], style="bold")
             side = "left" if i in left or i in prose else "right"
             table.add_column(head, justify=side, no_wrap=i not in prose, overflow="fold")
-        for place, row in enumerate(rows):
-            table.add_row(*(Text(row[i]) for i in block), style="red" if place in red else "")
+        for index, row in enumerate(rows):
+            table.add_row(*(Text(row[i]) for i in block), style="red" if index in red else "")
         out.print(table)
 
 
 def show(frame, title=None):
-    """Print a DataFrame with left-aligned columns of texts."""
+    """Print a DataFrame, with columns of texts aligned left."""
     texts = [i for i, name in enumerate(frame.columns) if frame[name].map(type).eq(str).any()]
     keys = max([i + 1 for i in texts if i < 2], default=1)
     print_table(list(frame.columns), frame.itertuples(index=False), title, keys, left=texts)
@@ -88,14 +90,14 @@ def _total(sizes):
 
 
 def _wrapped(head, column):
-    """Return a heading over several lines, as wide as its column or its longest word."""
+    """Return a heading wrapped to the width of its column or of its longest word."""
     words = head.replace("_", " ")
     size = max(_longest(column), _longest(words.split()))
     return head if "\n" in head or not words else textwrap.fill(words, size, break_on_hyphens=False)
 
 
 def _blocks(sizes, keys, width):
-    """Return [numbers of columns] of each block: the first `keys` and as many more as fit, at least one."""
+    """Return [column indices] of each block: the first `keys` and as many more as fit, at least one."""
     blocks = [list(range(keys))]
     for i in range(keys, len(sizes)):
         if len(blocks[-1]) > keys and _total(sizes[j] for j in (*blocks[-1], i)) > width:

@@ -1,4 +1,4 @@
-"""The commands of learning: train, export-policy, benchmark training."""
+"""Implements fowt train, fowt export-policy and fowt benchmark training."""
 
 import shlex
 from pathlib import Path
@@ -14,7 +14,9 @@ from fowt_env.training.cli.console import EXIT_INTERRUPTED, command, err, note, 
 from fowt_env.training.cli.options import CsvOption
 from fowt_env.training.cli.tables import print_table, show
 
-TrustOption = Annotated[bool, Option("--trust-zip", help="Load the checkpoint, which executes code from it.")]
+TrustOption = Annotated[
+    bool, Option("--trust-zip", help="Load the checkpoint, although loading executes code from it.")
+]
 CHANGE = "Change a setting; repeatable."
 LINE_EVERY = 10.0  # s between lines of progress without a terminal
 WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
@@ -22,10 +24,14 @@ WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
 
 @command()
 def train(
-    algo: Annotated[str, Option(help="ppo, sac or tqc.")] = "ppo",
-    task: Annotated[str, Option(help="Settings of training/rl/ALGO.yml: above_rated, ...")] = "above_rated",
+    algo: Annotated[str, Option(help="Algorithm: ppo, sac or tqc.")] = "ppo",
+    task: Annotated[
+        str, Option(help="Task with settings in training/rl/ALGO.yml: above_rated, ...")
+    ] = "above_rated",
     seed: Annotated[int, Option(help="Random seed of networks and episodes.")] = 0,
-    steps: Annotated[int | None, Option(help="Decisions; default 2000000, or as before.")] = None,
+    steps: Annotated[
+        int | None, Option(help="Number of decisions; default: 2000000, or that of the resumed run.")
+    ] = None,
     out_folder: Annotated[str | None, Option("--out", help="Folder of the run.")] = None,
     resume: Annotated[bool, Option("--resume", help="Continue from the newest checkpoint.")] = False,
     trust_zip: TrustOption = False,
@@ -33,24 +39,24 @@ def train(
 ):
     """Train an agent with stable-baselines3 (PPO, SAC, TQC).
 
-    It is validated as it learns and at the end; best.npz is the policy that scored best.
+    The agent is validated during and after training; best.npz is the policy with the best score.
 
     Examples:
     fowt train --steps 20000 --out runs/first  # a first try
     fowt train --algo ppo --steps 4000000 --seed 0 --out runs/ppo_0
-    fowt train --out runs/ppo_0 --resume  # go on after Ctrl-C, kill or a crash
+    fowt train --out runs/ppo_0 --resume  # continue after Ctrl-C, kill or a crash
     fowt train --set environment.observation=preview --set environment.reward.pitch_travel=20
 
-    [bold]Steps[/bold] are decisions of the agent, each several control periods (decisions.hold). [bold]Files
-    written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png, settings.yml,
-    versions.json, checkpoints/, tensorboard/. A policy runs as the controller policy:runs/ppo_0/best.npz.
+    [bold]Steps[/bold] are decisions of the agent, each over several control periods (decisions.hold).
+    [bold]Files written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png,
+    settings.yml, versions.json, checkpoints/, tensorboard/. To use a policy: policy:runs/ppo_0/best.npz.
     """
     from fowt_env.training.rl.train import Training, resolve
 
     folder = Path(out_folder or f"runs/{task}_{algo}_{seed}")
     if resume:
         if change:
-            raise InputError("--set: a resumed run keeps its settings; only --steps may grow")
+            raise InputError("--set: a resumed run keeps its settings; only --steps may be increased")
         run = Training(None if steps is None else {"steps": steps}, folder, resume=True, trusted=trust_zip)
         if trust_zip:
             note(f"warning: executing code from the checkpoint in {folder}, as requested")
@@ -66,13 +72,13 @@ def train(
         finished = run.run(report)
     if run.rows:
         _print_validations(run)
-    place = shlex.quote(str(folder))
+    path = shlex.quote(str(folder))
     if not finished:
-        note(f"stopped with a checkpoint: {folder}; next: fowt train --resume --out {place}")
+        note(f"stopped with a checkpoint: {folder}; next: fowt train --resume --out {path}")
         raise typer.Exit(EXIT_INTERRUPTED)
     steps, done = run.settings["steps"], run.rows[-1]["decisions"]
     if done > steps:
-        note(f"{done:,} decisions for --steps {steps:,}: the algorithm takes whole rollouts")
+        note(f"{done:,} decisions for --steps {steps:,}: the algorithm runs complete rollouts")
     note(f"finished: {folder} ({', '.join(name for name in WRITTEN if (folder / name).exists())})")
     policy = folder / next(name for name in ("best.npz", "last.npz") if (folder / name).exists())
     platform = run.settings["environment"].get("platform")
@@ -83,7 +89,7 @@ def train(
 
 
 def _print_validations(run):
-    """Print the best and the last validation of a Training, and what the score means."""
+    """Print the best and the last validation of a Training, and the reference of the score."""
     best, last = run.best(), run.rows[-1]
     chosen = {"best": best} | ({} if last is best else {"last": last})
     ratios = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio", "failed")
@@ -92,30 +98,30 @@ def _print_validations(run):
         (name, f"{row['decisions']:,}", *(row[key] for key in ("score", *ratios)))
         for name, row in chosen.items()
     ]
-    print_table(headings, rows, f"over {run.reference_name}, whose score is 1; less is better")
+    print_table(headings, rows, f"relative to {run.reference_name} (score 1); less is better")
 
 
 @command()
 def export_policy(
-    folder: Annotated[str, Argument(help="Folder of a run of fowt train.")],
-    out_path: Annotated[str, Option("--out", help="The policy file, .npz.")],
+    folder: Annotated[str, Argument(help="Output folder of fowt train.")],
+    out_path: Annotated[str, Option("--out", help="Output policy file, .npz.")],
     trust_zip: TrustOption = False,
 ):
-    """Turn a training run's checkpoint into a policy file.
+    """Convert a training checkpoint to a policy file.
 
     Examples:
-    fowt export-policy runs/ppo_0 --out mine.npz --trust-zip  # of a run of your own
+    fowt export-policy runs/ppo_0 --out mine.npz --trust-zip  # from your own run
     fowt evaluate --controllers policy:mine.npz,pi  # compare it
 
-    Training writes best.npz and last.npz by itself: this is for an interrupted run.
+    Training already writes best.npz and last.npz: use this after an interrupted run.
     """
     from fowt_env.training.rl.export import export_run
 
     output(out_path, endings=(".npz",))
     if not trust_zip:
         raise InputError(
-            f"{folder}: loading a stable-baselines3 checkpoint executes code from it; if it is yours, or you"
-            " trust whoever made it, add --trust-zip"
+            f"{folder}: loading a stable-baselines3 checkpoint executes code from it; add --trust-zip if"
+            " you created it or trust its author"
         )
     note(f"warning: executing code from the checkpoint in {folder}, as requested")
     wrote(export_run(folder, out_path))
@@ -123,13 +129,13 @@ def export_policy(
 
 @command(benchmarks)
 def training(
-    envs: Annotated[int, Option(help="Environments in a batch.")] = 64,
-    steps: Annotated[int, Option(help="Steps of PPO that are timed.")] = 50_000,
+    envs: Annotated[int, Option(help="Number of environments in a batch.")] = 64,
+    steps: Annotated[int, Option(help="Number of timed PPO steps.")] = 50_000,
     out_path: CsvOption = "results/benchmark/training.csv",
 ):
     """Time PPO on each kind of vector environment.
 
-    With the times of physics, torch and Python apart.
+    Times of physics, torch and Python are listed separately.
 
     Examples:
     fowt benchmark training --envs 16 --steps 20000  # a first look

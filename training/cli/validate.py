@@ -1,4 +1,4 @@
-"""fowt validate and paper: comparison with OpenFAST, and the source paper's load cases."""
+"""Implements fowt validate and fowt paper: comparison with OpenFAST, load cases of the source paper."""
 
 from typing import Annotated
 
@@ -11,9 +11,9 @@ from fowt_env.training.cli.console import command, from_a_clone, out, text_progr
 from fowt_env.training.cli.options import FolderOption, PlotsOption
 from fowt_env.training.cli.tables import print_table
 
-PLATFORM = "oc3_hywind, iea15_volturnus_s, nrel5mw_iti_barge or nrel5mw_oc4_semi."
-CASE = "Groups of comparisons of docs/results/validation.md, with commas; or all. Default: all but costs."
-FOLDER = "Folder; default: results/validation, for others than OC3 its subfolder PLATFORM."
+PLATFORM = "Platform: oc3_hywind, iea15_volturnus_s, nrel5mw_iti_barge or nrel5mw_oc4_semi."
+CASE = "Groups of comparisons in docs/results/validation.md, comma-separated, or all. Default: all but costs."
+FOLDER = "Output folder; default: results/validation, or its subfolder PLATFORM if not OC3."
 
 
 @command()
@@ -21,19 +21,19 @@ def validate(
     platform: Annotated[str, Option(help=PLATFORM)] = "oc3_hywind",
     case: Annotated[str | None, Option(help=CASE)] = None,
     out_folder: Annotated[str | None, Option("--out", help=FOLDER)] = None,
-    reference: Annotated[str | None, Option(help="Folder of the OpenFAST series.")] = None,
+    reference: Annotated[str | None, Option(help="Folder of the OpenFAST time series.")] = None,
     bts: Annotated[str | None, Option(help="Full TurbSim box instead of the stored region.")] = None,
     plot: PlotsOption = True,
 ):
     """Compare the plant with OpenFAST (from a clone).
 
-    Runs the same cases in both, prints a verdict on every quantity, and makes plots.
+    Simulates the cases of stored OpenFAST runs, prints a verdict on every quantity and writes plots.
 
     Examples:
-    fowt validate --case decays,steady  # the quick ones
+    fowt validate --case decays,steady  # quick comparisons
     fowt validate  # every comparison with OpenFAST
     fowt validate --platform iea15_volturnus_s  # another platform
-    fowt validate --case all --bts turbsim_18mps.bts  # with the cheaper model options, from the full box
+    fowt validate --case all --bts turbsim_18mps.bts  # also the cheaper model options, and the full box
 
     [bold]Files written[/bold]: validation.csv and validation.md (every quantity with its verdict), and plots.
     """
@@ -52,7 +52,7 @@ def validate(
         counts = [int((rows["verdict"] == verdict).sum()) for verdict in ("met", "MISSED", "reported")]
         lines.append((name, len(rows), *counts))
     missed = [number for number, line in enumerate(lines) if line[3]]
-    print_table(("case", "figures", "met", "missed", "reported"), lines, platform, red=missed)
+    print_table(("case", "quantities", "met", "missed", "reported"), lines, platform, red=missed)
     for row in study.rows:
         if row.verdict == "MISSED":
             text = f"{row.case}: {row.quantity}: {row.error:.3g} %, allowed {row.allowed:g} %"
@@ -62,13 +62,15 @@ def validate(
 
 @command()
 def paper(
-    case: Annotated[str, Argument(help="LC1 to LC12, comma-separated; all; or full_scale.")] = "all",
+    case: Annotated[
+        str, Argument(help="Load cases: LC1 to LC12, comma-separated; all; or full_scale.")
+    ] = "all",
     out_folder: FolderOption = "results/paper",
     plot: PlotsOption = True,
 ):
     """Run the source paper's load cases (from a clone).
 
-    Also checks the claims of the paper.
+    Also checks the results against the claims of the paper.
 
     Examples:
     fowt paper LC5  # one load case of the 1:50 model

@@ -1,4 +1,4 @@
-"""fowt warmup: compile the usual kinds of scene ahead."""
+"""Implements fowt warmup: compiles the usual kinds of scene in advance."""
 
 from typing import Annotated
 
@@ -13,14 +13,14 @@ from fowt_env.training.cli.tables import print_table
 @command()
 def warmup(
     platform: PlatformOption = "oc3_hywind",
-    kinds: Annotated[str, Option(help="Kinds of scene, with commas, or all.")] = "standard,environment",
-    jobs: Annotated[int, Option(help="Processes; each needs about 1 GB.")] = 1,
+    kinds: Annotated[str, Option(help="Kinds of scene, comma-separated, or all.")] = "standard,environment",
+    jobs: Annotated[int, Option(help="Number of processes; each needs about 1 GB.")] = 1,
 ):
-    """Compile kernels of the usual scenes ahead.
+    """Compile kernels of the usual scenes in advance.
 
     Examples:
-    fowt warmup  # runs and the environment of OC3-Hywind, so that later ones start at once
-    fowt warmup --kinds standard,vector,linear --jobs 2  # other kinds, the later ones side by side
+    fowt warmup  # simulate and the environment, OC3-Hywind: later runs start at once
+    fowt warmup --kinds standard,vector,linear --jobs 2  # other kinds, after the first in parallel
     fowt warmup --kinds all  # standard, environment, vector, steady, linear, fast and reference
     """
     from fowt_env.warmup import KINDS
@@ -41,4 +41,4 @@ def warmup(
         show.done = 0
         table = compile_kinds(platform, names, jobs, show)
     rows = [(row.kind, KINDS[row.kind][0], row.kernels, f"{row.seconds:.1f}") for row in table.itertuples()]
-    print_table(("kind", "what it is for", "compiled", "s"), rows, platform, left=(0, 1))
+    print_table(("kind", "used for", "compiled", "s"), rows, platform, left=(0, 1))

@@ -346,17 +346,17 @@ def test_no_folder_is_made_outside_of_the_working_folder(words, tmp_path, monkey
     (tmp_path / "work").mkdir()
     monkeypatch.chdir(tmp_path / "work")
     _, stderr = fowt(*(word.format(tmp_path) for word in words), code=2)
-    assert f"there is no folder '{tmp_path}/new'; make it first" in stderr
+    assert f"there is no folder '{tmp_path}/new'; create it first" in stderr
     assert [path.name for path in tmp_path.iterdir()] == ["work"] and not list((tmp_path / "work").iterdir())
 
 
 def test_a_folder_made_in_the_working_folder_is_announced(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     _, stderr = fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")
-    assert "made the folder a/b" in stderr and len(pd.read_csv("a/b/run.csv")) == 11
-    assert "made the folder" not in fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")[1]
+    assert "created the folder a/b" in stderr and len(pd.read_csv("a/b/run.csv")) == 11
+    assert "created the folder" not in fowt("simulate", "--duration", "1", "--out", "a/b/run.csv")[1]
     _, stderr = fowt("evaluate", "--controllers", "pie", "--out", "c", code=2)
-    assert "made the folder" not in stderr
+    assert "created the folder" not in stderr
     assert output(str(tmp_path.parent / "results"), folder=True)  # the last part may be new anywhere
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"--out 'file/run.csv': cannot be written: 'file' is a file"):

@@ -30,7 +30,7 @@ def test_linearize_writes_the_model_of_one_wind_for_matlab(tmp_path):
     fowt("linearize", "--winds", "18", "--out", str(out))
     assert scipy.io.loadmat(out)["A"].shape == (14, 14)
     _, stderr = fowt("linearize", "--winds", "12,18", "--out", str(tmp_path / "n.mat"), code=2)
-    assert "a .mat holds the model of one wind" in stderr
+    assert "a .mat contains the model of one wind" in stderr
 
 
 def test_linearize_refuses_other_endings_before_it_starts(tmp_path):

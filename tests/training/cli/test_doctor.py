@@ -47,7 +47,7 @@ def test_a_missing_part_is_told_with_how_to_install_it(monkeypatch):
     (line,) = (line for line in stdout.splitlines() if "magic" in line)
     assert "missing" in line and 'pip install "fowt-env[magic]"' in line
     (line,) = (line for line in stdout.splitlines() if "matplotlib" in line)
-    assert "found" in line and "pip install" not in line
+    assert "installed" in line and "pip install" not in line
 
 
 def test_a_folder_that_was_never_installed_is_no_failure(monkeypatch):
@@ -77,7 +77,7 @@ def test_a_cache_that_cannot_be_used_or_written_is_told_with_what_to_do(monkeypa
     assert "read only" in doctor("--no-test")
     for module in (health, decorators):
         monkeypatch.setattr(module, "CACHE_FOLDER", None)
-    assert "FOWT_CACHE_DIR to a folder" in doctor("--no-test")
+    assert "FOWT_CACHE_DIR to a writable folder" in doctor("--no-test")
 
 
 @pytest.mark.parametrize(
@@ -109,7 +109,7 @@ def test_a_requirement_that_is_not_met_is_told_and_fails(monkeypatch):
     assert f"numpy {metadata.version('numpy')} is too old: pip install 'numpy<3,>=99.0'" in stdout
     assert "scipy " in stdout and "scipy is" not in stdout
     (line,) = (line for line in stdout.splitlines() if "matplotlib" in line)
-    assert "needed: <2" in line and 'pip install "fowt-env[plot]"' in line
+    assert "required: <2" in line and 'pip install "fowt-env[plot]"' in line
 
 
 def test_what_numba_itself_refuses_is_told_in_a_line(monkeypatch):

@@ -56,8 +56,8 @@ def test_a_run_is_validated_at_its_end_and_the_command_that_it_prints_works(tmp_
     assert list(table["decisions"]) == [64]
     said = " ".join(done.output.split())
     assert "scoring the reference lqr" in said and "decisions/s" in said and " left" in said
-    assert "return -" not in said and "made the folder run of mine" in said
-    assert f"{table['score'][0]:.4g}" in said and "over lqr, whose score is 1" in said
+    assert "return -" not in said and "created the folder run of mine" in said
+    assert f"{table['score'][0]:.4g}" in said and "relative to lqr (score 1)" in said
     (command,) = re.findall(r"next: (fowt evaluate .*)", done.stderr)
     assert "policy:run of mine/best.npz,lqr" in command and "--baseline lqr" in command
     short = ("--cases", "steady_16", "--duration", "15", "--skip", "5", "--no-plot")
