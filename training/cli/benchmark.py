@@ -39,7 +39,7 @@ def compile_command(out_path: CsvOption = "results/benchmark/compile.csv"):
 def speed(
     kinds: Annotated[str | None, Option(help="Kinds of scene, semicolon-separated; default: all.")] = None,
     seconds: Annotated[float, Option(help="Simulated time of a run, s.")] = 600.0,
-    repeats: Annotated[int, Option(help="Repeats; reported: the median.")] = 5,
+    repeats: Annotated[int, Option(help="Repeats; the median is reported.")] = 5,
     platform: ScenesOption = "oc3_hywind",
     starts: Annotated[bool, Option("--starts", help="Also time a first and a later start.")] = False,
     out_path: CsvOption = "results/benchmark/speed.csv",
@@ -72,7 +72,7 @@ def accuracy(
     duration: Annotated[float, Option(help="Length of each run, s.")] = 600.0,
     finest: Annotated[float, Option(help="Step of the reference, s.")] = 0.00625,
     axes: Annotated[str | None, Option(help="Axes of the sweep, comma-separated; default: all.")] = None,
-    repeats: Annotated[int, Option(min=1, help="Timed repeats of short runs; reported: the median.")] = 5,
+    repeats: Annotated[int, Option(min=1, help="Timed repeats of short runs; the median is taken.")] = 5,
     platform: ScenesOption = "oc3_hywind",
     box: Annotated[bool, Option("--box", help="Use the wind of the stored full-field TurbSim box.")] = False,
     out_folder: FolderOption = "results/benchmark",

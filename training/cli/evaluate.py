@@ -46,9 +46,7 @@ def evaluate_command(
     duration: Annotated[
         float | None, Option(help="Length of a run, s. Default: the suite's, or 660.")
     ] = None,
-    skip: Annotated[
-        float | None, Option(help="Initial time not scored, s. Default: the suite's, or 60.")
-    ] = None,
+    skip: Annotated[float | None, Option(help="Unscored start, s. Default: the suite's, or 60.")] = None,
     preview: Annotated[str, Option(help=PREVIEW)] = "exact",
     sensors: Annotated[TEXT, Option(help=SENSORS)] = None,
     baseline: Annotated[TEXT, Option(help=BASELINE)] = None,

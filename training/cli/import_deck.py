@@ -19,7 +19,7 @@ PARTS = ("elastodyn", "aerodyn", "servodyn", "hydrodyn", "seastate", "mooring", 
 def import_command(
     deck: Annotated[str | None, Argument(help="The .fst file; optional with part files.")] = None,
     out_folder: Annotated[str, Option("--out", help="Output folder, created if missing.")] = "imported",
-    name: Annotated[str | None, Option(help="Name of platform and turbine; default: of the folder.")] = None,
+    name: Annotated[str | None, Option(help="Name of platform and turbine; default: that of --out.")] = None,
     elastodyn: Part = None,
     aerodyn: Part = None,
     servodyn: Part = None,

@@ -255,9 +255,7 @@ KINDS = {
     "sensors": Kind(
         "--sensors", "sensors between plant and controller", ("name", "what it is"), _sensors
     ),
-    "lidars": Kind(
-        "--preview", "lidars that measure wind ahead", ("name", "what it is, and its source"), _lidars
-    ),
+    "lidars": Kind("--preview", "lidars for wind preview", ("name", "what it is, and its source"), _lidars),
 }  # fmt: skip
 
 

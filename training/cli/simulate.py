@@ -47,16 +47,12 @@ def simulate(
     seed: Annotated[int, Option(help="Seed of wind and waves.")] = 0,
     fidelity: Annotated[str, Option(help=FIDELITY)] = "standard",
     rotor: shared.RotorOption = None,
-    start: Annotated[
-        str, Option(help="Initial state: trim (steady state at the mean wind) or zero.")
-    ] = "trim",
+    start: Annotated[str, Option(help="trim (steady state at the mean wind) or zero.")] = "trim",
     initial: Annotated[REPEATED, Option(metavar="CHANNEL=VALUE", help=INITIAL)] = None,
     fault: Annotated[REPEATED, Option(metavar="KIND:TIME or JSON", help=FAULT)] = None,
     protection: Annotated[str, Option(help=PROTECTION)] = "none",
     option: shared.OptionOption = None,
-    out_path: Annotated[
-        str | None, Option("--out", help="Output time series: .csv, .parquet or .outb.")
-    ] = None,
+    out_path: Annotated[str | None, Option("--out", help="Time series: .csv, .parquet or .outb.")] = None,
     plot: shared.PlotOption = None,
 ):
     """Simulate one run: statistics, time series and a plot.

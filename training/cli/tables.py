@@ -15,9 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-out = Console(
-    emoji=False, highlight=False, soft_wrap=True
-)  # no emoji codes: a controller may be module:Name:
+out = Console(emoji=False, highlight=False, soft_wrap=True)  # no emoji for a controller module:Name:
 GAP = 2
 LONG_WORD = 16  # characters; least width of a column of prose with longer words
 RULED = Box("    \n    \n ── \n    \n    \n    \n    \n    \n")

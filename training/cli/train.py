@@ -14,9 +14,7 @@ from fowt_env.training.cli.console import EXIT_INTERRUPTED, command, err, note, 
 from fowt_env.training.cli.options import CsvOption
 from fowt_env.training.cli.tables import print_table, show
 
-TrustOption = Annotated[
-    bool, Option("--trust-zip", help="Load the checkpoint, although loading executes code from it.")
-]
+TrustOption = Annotated[bool, Option("--trust-zip", help="Load the checkpoint; this executes code from it.")]
 CHANGE = "Change a setting; repeatable."
 LINE_EVERY = 10.0  # s between lines of progress without a terminal
 WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
@@ -25,13 +23,9 @@ WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
 @command()
 def train(
     algo: Annotated[str, Option(help="Algorithm: ppo, sac or tqc.")] = "ppo",
-    task: Annotated[
-        str, Option(help="Task with settings in training/rl/ALGO.yml: above_rated, ...")
-    ] = "above_rated",
+    task: Annotated[str, Option(help="Task in training/rl/ALGO.yml: above_rated, ...")] = "above_rated",
     seed: Annotated[int, Option(help="Random seed of networks and episodes.")] = 0,
-    steps: Annotated[
-        int | None, Option(help="Number of decisions; default: 2000000, or that of the resumed run.")
-    ] = None,
+    steps: Annotated[int | None, Option(help="Decisions; default: 2000000, resumed: unchanged.")] = None,
     out_folder: Annotated[str | None, Option("--out", help="Folder of the run.")] = None,
     resume: Annotated[bool, Option("--resume", help="Continue from the newest checkpoint.")] = False,
     trust_zip: TrustOption = False,

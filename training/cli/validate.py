@@ -62,9 +62,7 @@ def validate(
 
 @command()
 def paper(
-    case: Annotated[
-        str, Argument(help="Load cases: LC1 to LC12, comma-separated; all; or full_scale.")
-    ] = "all",
+    case: Annotated[str, Argument(help="LC1 to LC12, comma-separated; all; or full_scale.")] = "all",
     out_folder: FolderOption = "results/paper",
     plot: PlotsOption = True,
 ):
