@@ -94,25 +94,25 @@ def built_in_chains() -> dict[str, SensorChain]:
 def _chain(name: str, entries: dict[str, Any]) -> SensorChain:
     known = [item.name for item in fields(Sensor)]
     sensors = {}
-    for quantity, figures in entries.items():
+    for quantity, values in entries.items():
         if quantity == "description":
             continue
-        for key in figures:
+        for key in values:
             if key not in known:
                 raise unknown(f"key of sensor {name}.{quantity}:", key, known)
-        sensors[quantity] = Sensor(**figures)
+        sensors[quantity] = Sensor(**values)
     return SensorChain(name, sensors, entries.get("description", ""))
 
 
-def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | None:
+def sensors_of(sensors: str | SensorChain | None, turbine: Any) -> SensorChain | None:
     """Return the SensorChain of a run with a Turbine description; None for exact readings.
 
-    A built-in chain, given by name, is scaled to the turbine: noise and quantisation of shaft speeds and
+    A built-in chain, selected by name, is scaled to the turbine: noise and quantisation of shaft speeds and
     torque with the rated values, those of bending moments with the rated torque on the rotor shaft. A
     SensorChain is returned unchanged. Raises: InputError as sensor_chain.
     """
-    chain = sensor_chain(given)
-    if chain is None or not isinstance(given, str):
+    chain = sensor_chain(sensors)
+    if chain is None or not isinstance(sensors, str):
         return chain
     factors = {
         "rotor_speed": turbine.rated_rotor_speed / ROTOR_SPEED,
@@ -123,25 +123,25 @@ def sensors_of(given: str | SensorChain | None, turbine: Any) -> SensorChain | N
     factors |= dict.fromkeys(MOMENTS, slow)
     if all(factor == 1.0 for factor in factors.values()):
         return chain
-    sensors = dict(chain.sensors)
+    scaled = dict(chain.sensors)
     for name, factor in factors.items():
-        if name in sensors:
-            own = sensors[name]
-            sensors[name] = replace(own, noise=factor * own.noise, step=factor * own.step)
-    return replace(chain, sensors=sensors)
+        if name in scaled:
+            sensor = scaled[name]
+            scaled[name] = replace(sensor, noise=factor * sensor.noise, step=factor * sensor.step)
+    return replace(chain, sensors=scaled)
 
 
-def sensor_chain(given: str | SensorChain | None) -> SensorChain | None:
+def sensor_chain(sensors: str | SensorChain | None) -> SensorChain | None:
     """Return the SensorChain of a run from a name or SensorChain; None for None and "exact".
 
     Raises: InputError for an unknown name and for anything else.
     """
-    if given is None or isinstance(given, SensorChain):
-        return given
-    if not isinstance(given, str):
-        raise InputError(f"sensors = {given!r}: must be the name of a sensor chain, a SensorChain or None")
-    if given == EXACT:
+    if sensors is None or isinstance(sensors, SensorChain):
+        return sensors
+    if not isinstance(sensors, str):
+        raise InputError(f"sensors = {sensors!r}: must be the name of a sensor chain, a SensorChain or None")
+    if sensors == EXACT:
         return None
-    if given not in built_in_chains():
-        raise unknown("sensor chain", given, (EXACT, *built_in_chains()))
-    return built_in_chains()[given]
+    if sensors not in built_in_chains():
+        raise unknown("sensor chain", sensors, (EXACT, *built_in_chains()))
+    return built_in_chains()[sensors]

@@ -56,7 +56,7 @@ def test_a_run_with_harmful_rare_events_says_so_in_one_line():
     arguments = ["simulate", "--wind", "10", "--controller", "none", "--fidelity", "fast", "--duration", "1"]
     result = fowt(*arguments, "--initial", "PtfmRVzi=10")
     (line,) = (line for line in result[1].splitlines() if line.startswith("Warning"))
-    assert line.startswith("Warning: oc3_hywind: ROTOR_TABLE_CLAMPED") and line.endswith("needs it")
+    assert line.startswith("Warning: oc3_hywind: ROTOR_TABLE_CLAMPED") and line.endswith("fast yaw")
 
 
 def test_initial_values_a_locked_rotor_and_a_wind_series_reach_the_run(tmp_path):

@@ -66,7 +66,7 @@ def test_gust_draws_its_picture_of_each_controller(tmp_path):
         (("baselines", "{}", "--group", "g=a", "--group", "g=b"), "used twice"),
         (("baselines", "nowhere"), "no such file"),
         (("cases", "{}", "--figures", "power"), "unknown figure 'power'"),
-        (("bound", "{}", "--bound", "nowhere.csv"), "there is no such file"),
+        (("bound", "{}", "--bound", "nowhere.csv"), "no such file"),
         (("gust", "x.png", "--start", "300"), "start = 300 s"),
     ],
 )
