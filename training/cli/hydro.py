@@ -25,7 +25,7 @@ def hydro(
 ):
     """Compute wave loads of a hull from its panel mesh.
 
-    Capytaine computes added mass, damping, wave excitation and hydrostatics.
+    Capytaine solves for added mass, damping, wave excitation and hydrostatics.
 
     Examples:
     fowt hydro semi.gdf --depth 200 --out hydro.npz  # 0.05 to 3 rad/s, waves from -180 to 180 deg

@@ -87,7 +87,7 @@ def baselines_command(
 @command(scores)
 def cases_command(
     results: FoldersArgument,
-    against: Annotated[str, Option(help="Baseline.")] = "gspi_oc3",
+    against: Annotated[str, Option(help="Baseline controller.")] = "gspi_oc3",
     group: GroupOption = None,
     agents: AgentsOption = None,
     cases: CasesOption = None,
