@@ -206,7 +206,7 @@ def write_turbine(factor):
     folder, full = DATA / "turbines" / TURBINE, read_turbine("nrel5mw")
     words = f"of nrel5mw, all coefficients times {factor:.8g} (froude_model/identify.py)."
     polars = polar_files(with_polars(full, full.blade.polars, factor), words, 6, 8)
-    words = "# Blade of nrel5mw at 1:50, lengths by Froude's law; twist and airfoils as they are."
+    words = "# Blade of nrel5mw at 1:50, lengths by Froude's law; twist and airfoils unchanged."
     files = {folder / "polars" / name: text for name, text in polars.items()}
     files[folder / "blade.csv"] = stations_text(full.blade, SCALE, words, 8)
     tables = model_turbine()

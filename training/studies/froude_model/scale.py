@@ -94,9 +94,9 @@ PUBLISHED = {  # published values that are scaled; others are not copied
     "waterplane_stiffness": 2.0,
 }  # fmt: skip
 LABEL = """\
-# FROUDE-SCALED FROM {origin}, NOT A REAL {what}: every figure is that of {origin} times a power of
+# FROUDE-SCALED FROM {origin}, NOT A REAL {what}: every value is that of {origin} times a power of
 # the scale {scale:.6g}, lengths by the first, times and speeds by its root, masses and forces by the third.
-# Nobody designed or built it; a turbine of this power would be lighter and reach its rated power at
+# It was neither designed nor built; a turbine of this power would be lighter and reach its rated power at
 # less wind. SI units (kg, m, s, N, rad). Written by training/studies/froude_model/scale.py."""
 
 
@@ -213,7 +213,7 @@ def write(scale, folder, name, platform=PLATFORM, turbine=TURBINE):
     folder = Path(folder)
     machine = read_turbine(turbine)
     home = folder / "turbines" / name
-    words = f"# Blade of {machine.name}, lengths times {scale:.6g}, twist as it is (froude_model/scale.py)."
+    words = f"# Blade of {machine.name}, lengths times {scale:.6g}, twist unchanged (froude_model/scale.py)."
     texts = {home / "blade.csv": stations_text(machine.blade, scale, words)}
     polars = "polars"
     if (DATA / "turbines" / str(turbine) / polars).is_dir():
