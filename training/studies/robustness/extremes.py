@@ -46,10 +46,10 @@ class Extreme:
 
 
 FAULTS = {  # name: command (torque, pitch) from controller command, maximum pitch and pitch at EVENT
-    "emergency stop": lambda command, feathered, held: (0.0, feathered),  # at the rate limit of the actuator
-    "grid loss": lambda command, feathered, held: (0.0, command[1]),
-    "grid loss, no pitch action": lambda command, feathered, held: (0.0, held),
-    "stuck pitch": lambda command, feathered, held: (command[0], held),
+    "emergency stop": lambda command, feathered, stuck: (0.0, feathered),  # at the rate limit of the actuator
+    "grid loss": lambda command, feathered, stuck: (0.0, command[1]),
+    "grid loss, no pitch action": lambda command, feathered, stuck: (0.0, stuck),
+    "stuck pitch": lambda command, feathered, stuck: (command[0], stuck),
 }
 
 
@@ -126,7 +126,7 @@ def without_line(scene, line):
 
 def course(case, scene, dt):
     """Run an Extreme with steps of dt (s); return (status, time reached, {PEAKS: largest}, final state)."""
-    (x, u), controller, held = initial_state(scene), None, None  # held: blade pitch at EVENT
+    (x, u), controller, stuck = initial_state(scene), None, None  # stuck: blade pitch at EVENT
     feathered = scene.turbine.pitch_drive.maximum
     if case.parked:
         x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
@@ -143,8 +143,8 @@ def course(case, scene, dt):
         controller.reset(Measurement(*row.tolist()))
     status, time = RUNNING, case.duration
     for step in range(0, round(case.duration / CONTROL_DT) * per_control, per_control):
-        if case.fault and held is None and step * dt >= EVENT - 1e-9:
-            held = float(x[State.BLADE_PITCH])
+        if case.fault and stuck is None and step * dt >= EVENT - 1e-9:
+            stuck = float(x[State.BLADE_PITCH])
             if case.fault == "line loss":
                 scene = without_line(scene, case.line)
                 data = scene.data()
@@ -158,8 +158,8 @@ def course(case, scene, dt):
         np.fmax(peaks, now, out=peaks)
         if controller is not None:
             u[:] = controller.act(Measurement(*row.tolist()))
-        if held is not None and case.fault in FAULTS:
-            u[:] = FAULTS[case.fault](u, feathered, held)
+        if stuck is not None and case.fault in FAULTS:
+            u[:] = FAULTS[case.fault](u, feathered, stuck)
         status = advance(handle, x, u, step, per_control, dt)
         if status != RUNNING:
             time = (step + per_control) * dt

@@ -105,7 +105,7 @@ def responses(source, folder):
     for point in range(20):
         models = [read(path) for path in sorted(Path(source).glob(f"lin_{point:02d}.*.lin"))]
         A, B, states, inputs = (np.mean(part, axis=0) for part in zip(*models, strict=True))
-        held, by = hold_tower(A, B)
+        fixed, by = hold_tower(A, B)
         other, by_other = hold_tower(A, B, direction_from_masses())
         row = {
             "wind_mps": inputs[0], "azimuths": len(models), "rotor_speed_rad_s": states[9],
@@ -113,7 +113,7 @@ def responses(source, folder):
             "surge_m": states[0], "heave_m": states[1], "pitch_rad": states[2],
         }  # fmt: skip
         flexible = np.delete(np.delete(A, 4, axis=0), 4, axis=1)
-        for name, value in named_poles(held, HELD).items():
+        for name, value in named_poles(fixed, HELD).items():
             row |= {f"{name}_real": value.real, f"{name}_imag": value.imag}
         for name, value in named_poles(other, HELD).items():
             row |= {f"{name}_real_other": value.real, f"{name}_imag_other": value.imag}
@@ -126,7 +126,7 @@ def responses(source, folder):
         for source_name, column in (("wind", WIND), ("blade_pitch", COLLECTIVE)):
             for target, state in (("rotor_speed", 6), ("pitch", 2)):
                 for w in RAD_PER_S:
-                    value = np.linalg.solve(1j * w * np.eye(len(held)) - held, by[:, column])[state]
+                    value = np.linalg.solve(1j * w * np.eye(len(fixed)) - fixed, by[:, column])[state]
                     gains.append({
                         "wind_mps": inputs[0], "input": source_name, "output": target, "omega_rad_s": w,
                         "real": value.real, "imag": value.imag,
