@@ -56,7 +56,7 @@ def of_figures(row, rows):
     elif row.quantity.endswith("of the thrust"):
         scale = there["aerodynamic thrust"]
     elif row.quantity.endswith("over the azimuth, of the mean"):
-        root = "RootMyc1, mean over a turn"
+        root = "RootMyc1, mean over a revolution"
         (scale,) = [other.openfast for other in rows if (other.case, other.quantity) == (row.case, root)]
     return 0.0 if row.here == row.openfast == 0.0 else 100.0 * (row.here - row.openfast) / scale
 

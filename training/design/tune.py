@@ -243,7 +243,7 @@ def write_tuned(name, settings, figures, budget, objective, path=TUNED):
         "search": {"suite": objective.get("suite", SUITE), "seeds": seeds, "budget": budget},
     }
     lines = [
-        "# Settings found by `fowt design tune NAME`. Figures are over gspi_oc3 on the seeds of the search.",
+        "# Settings optimised by `fowt design tune NAME`. Ratios are to gspi_oc3 on the seeds searched.",
     ]
     for controller in sorted(stored):
         for section, values in stored[controller].items():

@@ -1,10 +1,10 @@
-"""Effect of information, action mode and algorithm on agents: equal runs that differ in one thing each.
+"""Compares agents with different information, action mode and algorithm, changing one setting at a time.
 
     python -m fowt_env.training.studies.ablation --out runs/ablation [--only direct,estimate]
     python -m fowt_env.training.studies.ablation --out runs/ablation --report docs/figures/rl_ablation.png
 
-The same command continues a stopped run. The runs are far shorter than those of the shipped agents: they
-compare the variants of ablation.yml and do not show the best that each can reach.
+The same command continues a stopped run. Runs are much shorter than those of the shipped agents: they
+compare the variants of ablation.yml and do not show the best performance of each.
 """
 
 import argparse
@@ -29,20 +29,20 @@ FIGURES = {
     "blade_pitch_travel_ratio": "blade-pitch travel",
     "shaft_power_std_ratio": "power std",
 }
-COLUMNS = FIGURES | {"capped_power_mean_ratio": "power up to rated"}  # of the table; the picture has FIGURES
+COLUMNS = FIGURES | {"capped_power_mean_ratio": "power up to rated"}  # of the table; FIGURES are plotted
 
 
 def read_table(path=TABLE):
-    """Return {variant: {OWN_KEYS: value}} of a file, shared values included. Raises: InputError."""
+    """Read a file and return {variant: {OWN_KEYS: value}}, with common values. Raises: InputError."""
     table = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
     variants = table["variants"]
-    checks = {f"key of variant {name!r} of {path}": (own, OWN_KEYS) for name, own in variants.items()}
-    for what, (given, known) in {f"key of {path}": (table, KEYS), **checks}.items():
-        for key in given:
+    checks = {f"key of variant {name!r} of {path}": (keys, OWN_KEYS) for name, keys in variants.items()}
+    for what, (keys, known) in {f"key of {path}": (table, KEYS), **checks}.items():
+        for key in keys:
             if key not in known:
                 raise unknown(what, key, known)
     shared = {"algo": "ppo", "steps": table["steps"], "seeds": table["seeds"]}
-    return {n: shared | own | {"set": table["common"] | own.get("set", {})} for n, own in variants.items()}
+    return {n: shared | keys | {"set": table["common"] | keys.get("set", {})} for n, keys in variants.items()}
 
 
 def variant_of(table, name):
@@ -70,7 +70,7 @@ def decisions_done(folder):
 
 
 def run_variant(table, name, seed, out, steps=None, report=None):
-    """Train the rest of the run of a variant and seed; return whether it has reached its end."""
+    """Train or continue the run of a variant and seed; return whether the run is complete."""
     settings, folder = settings_of(table, name, seed, steps), folder_of(out, name, seed)
     if decisions_done(folder) >= settings["steps"]:
         return True
@@ -78,7 +78,7 @@ def run_variant(table, name, seed, out, steps=None, report=None):
 
 
 def ablation_rows(table, out):
-    """Return a DataFrame: a row per validated variant and seed, with the figures of its best policy."""
+    """Return a DataFrame with a row per validated variant and seed: metrics of the best policy."""
     rows = []
     for name, seed in ((name, seed) for name, variant in table.items() for seed in variant["seeds"]):
         path = folder_of(out, name, seed) / "validation.csv"
@@ -94,12 +94,12 @@ def ablation_rows(table, out):
 
 
 def plot_ablation(rows, path):
-    """Plot the figures of ablation_rows, a line per variant, a dot per seed; return the path."""
-    place, labels = pd.factorize(rows["label"])
+    """Plot ablation_rows, a line per variant and a dot per seed; return the path."""
+    position, labels = pd.factorize(rows["label"])
     figure = new_figure(10.0, 1.2 + 0.33 * len(labels))
     axes = figure.subplots(1, len(FIGURES), sharey=True)
     for axis, (name, title), colour in zip(axes, FIGURES.items(), COLOURS, strict=False):
-        axis.plot(rows[name], place, "o", color=colour)
+        axis.plot(rows[name], position, "o", color=colour)
         axis.axvline(1.0, color="0.6", linewidth=0.8)
         style_axes(axis, title=title)
     axes[0].set_yticks(range(len(labels)), labels, fontsize=8)
@@ -125,27 +125,27 @@ def markdown(rows):
 
 
 def main(arguments=None):
-    """Train the rest of the chosen variants, or report the validated ones."""
+    """Train or continue the selected variants, or report the validated ones."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", default="runs/ablation", help="folder of the runs")
     parser.add_argument("--table", default=str(TABLE), help="file of variants")
     parser.add_argument("--only", help="variants, comma-separated")
-    parser.add_argument("--steps", type=int, help="decisions of each run, in place of the file's")
-    parser.add_argument("--report", metavar="PICTURE", help="train nothing: plot and print what there is")
-    given = parser.parse_args(arguments)
-    table = read_table(given.table)
-    if given.report:
-        rows = ablation_rows(table, given.out)
-        print(plot_ablation(rows, given.report))
+    parser.add_argument("--steps", type=int, help="decisions of each run (default: from the file)")
+    parser.add_argument("--report", metavar="PICTURE", help="plot and print results without training")
+    args = parser.parse_args(arguments)
+    table = read_table(args.table)
+    if args.report:
+        rows = ablation_rows(table, args.out)
+        print(plot_ablation(rows, args.report))
         print(markdown(rows))
         return
-    for name in given.only.split(",") if given.only else table:
+    for name in args.only.split(",") if args.only else table:
         for seed in variant_of(table, name)["seeds"]:
 
             def report(done, total, text, name=name, seed=seed):
                 print(f"\r{name} {seed}: {done}/{total}: {text}  ", end="", file=sys.stderr)
 
-            if not run_variant(table, name, seed, given.out, given.steps, report):
+            if not run_variant(table, name, seed, args.out, args.steps, report):
                 sys.exit(f"stopped; the same command continues with {name}, seed {seed}")
 
 

@@ -1,7 +1,7 @@
-"""What dynamic inflow does to a run, and how near the look-up comes to blade-element momentum with it.
+"""Computes the effect of dynamic inflow, and the error of the look-up rotor against blade-element momentum.
 
-Class B turbulence, a sea of 7.5 m above rated and of 4 m below, 540 s after 60 s under `pi`, at fidelity
-standard: rms differences from rotor = "bem" with dynamic inflow, over the standard deviations of that run.
+Class B turbulence, Hs 7.5 m above rated wind and 4 m below, 540 s after 60 s with `pi`, fidelity standard.
+Errors are rms differences from rotor = "bem" with dynamic inflow, over the standard deviations of that run.
 """
 
 from typing import Annotated
@@ -41,7 +41,7 @@ def scene_of(platform, wind, **options):
 
 
 def errors():
-    """Return the rows of the table of errors: of runs from START on."""
+    """Return the rows of the table of errors, from runs after START."""
     rows, channels = [], list(CHANNELS.values())
     for platform, wind in CASES:
         kinds = {"": {"rotor": "bem", "dynamic_inflow": True}, **KINDS}
@@ -55,18 +55,18 @@ def errors():
 
 
 def speeds():
-    """Return the rows of the table of speeds: CPU time of runs that alternate, medians."""
+    """Return the rows of the table of speeds: medians of the CPU time of alternating runs."""
     scenes = [scene_of("oc3_hywind", 18.0, **options) for options in KINDS.values()]
     times = paired_times([lambda s=s: simulate(s, "pi", duration=END) for s in scenes], REPEATS)
-    ratio = np.median(times[:, -1:] / times, axis=0)  # of the quasi-steady one, the last
+    ratio = np.median(times[:, -1:] / times, axis=0)  # relative to the last, quasi-steady one
     factors = END / np.median(times, axis=0)
     return [[k, f"{x:.0f}", f"{r:.2f}"] for k, x, r in zip(KINDS, factors, ratio, strict=True)]
 
 
-def main(speed: Annotated[bool, typer.Option("--speed", help="Time of a run with and without it.")] = False):
+def main(speed: Annotated[bool, typer.Option("--speed", help="Measure run times with and without.")] = False):
     """Print the errors of the look-up rotor with and without dynamic inflow."""
     if speed:
-        print(markdown_table(["rotor", "times real time", "of the quasi-steady one's"], speeds()))
+        print(markdown_table(["rotor", "times real time", "relative to quasi-steady"], speeds()))
     else:
         print(markdown_table(["platform", "wind, m/s", "rotor", *CHANNELS], errors()))
 

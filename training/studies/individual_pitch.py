@@ -1,8 +1,8 @@
-"""Relief of the blades by individual pitch control, its cost in travel, and the motion of the platform.
+"""Computes load reduction and pitch travel of individual pitch control, and its effect on platform motion.
 
-Runs the suite `ipc` with the controllers of NAMES and with `ipc` behind the bounds of BOUNDS. Printed are
-figures over those of the same law with one pitch for all blades: means over winds and seeds, with the
-exponents of their S-N curves; and the shares of the relief and of the added travel of `ipc` at each bound.
+Runs the suite `ipc` with the controllers of NAMES and with `ipc` limited to BOUNDS. Prints metrics relative
+to the same law with collective pitch (means over winds and seeds, with the exponents of their S-N curves),
+and the fractions of load reduction and of added travel of `ipc` that remain at each bound.
 """
 
 import argparse
@@ -19,7 +19,7 @@ from fowt_env.training.evaluation.metrics import mean_exponent
 from fowt_env.training.evaluation.run_case import CONTROL_DT
 
 SUITE, PLATFORM = "ipc", "oc3_hywind"
-NAMES = {  # controller -> the one with the same law and one pitch for all blades
+NAMES = {  # controller -> same law with collective pitch
     "pi": "pi", "ipc": "pi", "ipc_constrained": "pi", "ipc_floating": "pi",
     "rosco": "rosco", "rosco_ipc": "rosco",
 }  # fmt: skip
@@ -36,14 +36,14 @@ SHOWN = {
 
 
 def means(table):
-    """Return a DataFrame of the means of SHOWN and the travel of each controller over its runs.
+    """Return a DataFrame of the means of SHOWN and TRAVEL over the runs of each controller.
 
-    Raises: ValueError where a run failed or tripped.
+    Raises: ValueError if a run failed or tripped.
     """
     bad = table[table["status"] != "ok"]
     if len(bad):
         bad = bad[["controller", "case", "seed", "reason"]]
-        raise ValueError(f"runs that did not go to their end:\n{bad}")
+        raise ValueError(f"runs that were not completed:\n{bad}")
     metrics = [*SHOWN.values(), TRAVEL]
     powers = pd.Series({metric: mean_exponent(metric) for metric in metrics})
     values = table.set_index("controller")[metrics] ** powers
@@ -51,35 +51,35 @@ def means(table):
 
 
 def ratios(figures):
-    """Return a DataFrame of SHOWN over the collective law's, with the travel itself (deg/s), of means."""
-    found = figures.loc[list(NAMES)] / figures.loc[list(NAMES.values())].to_numpy()
-    found = found.rename(columns={metric: name for name, metric in SHOWN.items()})[list(SHOWN)]
-    found.insert(0, "travel", figures[TRAVEL])
-    return found.rename_axis(None)
+    """Return a DataFrame of SHOWN relative to the collective law, and travel (deg/s); figures: of means."""
+    table = figures.loc[list(NAMES)] / figures.loc[list(NAMES.values())].to_numpy()
+    table = table.rename(columns={metric: name for name, metric in SHOWN.items()})[list(SHOWN)]
+    table.insert(0, "travel", figures[TRAVEL])
+    return table.rename_axis(None)
 
 
 def trade_off(figures):
-    """Return a DataFrame of the shares of ipc's relief and added travel that each bound leaves."""
+    """Return a DataFrame of the fractions of load reduction and added travel of ipc at each bound."""
     change = (figures[[ROOT, TRAVEL]] - figures.loc["pi", [ROOT, TRAVEL]]).filter(
         regex="^ipc$|^bound", axis=0
     )
-    shares = change / change.loc["ipc"]
-    return shares.set_axis(["share of relief", "share of travel"], axis=1).rename_axis(None)
+    fractions = change / change.loc["ipc"]
+    return fractions.set_axis(["fraction of relief", "fraction of travel"], axis=1).rename_axis(None)
 
 
 def main(arguments=None):
-    """Print the tables."""
+    """Run the suite and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--platform", default=PLATFORM)
     parser.add_argument("--seeds", type=int, nargs="+", help="weather seeds; those of the suite by default")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--out", help="results folder, which a later run continues")
-    given = parser.parse_args(arguments)
-    published = PISettings.published(read_turbine(read_platform(given.platform).turbine))
+    parser.add_argument("--out", help="results folder; a later run continues")
+    args = parser.parse_args(arguments)
+    published = PISettings.published(read_turbine(read_platform(args.platform).turbine))
     laws = {name: name for name in NAMES}
     laws |= {f"bound {b:g}": IPC(published, IPCSettings(bound=b), CONTROL_DT) for b in BOUNDS}
-    options = {"jobs": given.jobs, "folder": given.out} | ({"seeds": given.seeds} if given.seeds else {})
-    figures = means(evaluate(laws, read_suite(SUITE, given.platform), **options))
+    options = {"jobs": args.jobs, "folder": args.out} | ({"seeds": args.seeds} if args.seeds else {})
+    figures = means(evaluate(laws, read_suite(SUITE, args.platform), **options))
     print(ratios(figures).round(3).to_string())
     print(trade_off(figures).round(3).to_string())
 

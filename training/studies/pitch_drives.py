@@ -1,8 +1,8 @@
-"""What the pitch drive does to a run: none, one of first order, one of second order.
+"""Compares runs without pitch drive, with a first-order and with a second-order one.
 
-18 m/s, class B turbulence, the sea of that wind at the site of the suites, three seeds, 600 s after 100 s, at
-fidelity standard. The drive of second order is that of the turbine file, the one of first order lags as long,
-or by the lag of the file where it has one.
+Conditions: 18 m/s, class B turbulence, the sea for that wind at the site of the suites, three seeds, 600 s
+after 100 s, fidelity standard. The second-order drive is that of the turbine file; the first-order one has
+the lag of the file or, without one, that of the second-order drive.
 """
 
 from typing import Annotated
@@ -31,7 +31,7 @@ FIGURES = {
 
 
 def drives(platform):
-    """Return {name: Turbine} of a platform's turbine with each of the drives."""
+    """Return {name: Turbine}: the turbine of a platform with each pitch drive."""
     turbine = read_turbine(read_platform(platform).turbine)
     second = with_second_order_drive(turbine)
     drive, lag = second.pitch_drive, turbine.pitch_drive.lag or second.pitch_drive.lag
@@ -48,7 +48,7 @@ def drives(platform):
 
 
 def scene_of(platform, turbine, seed):
-    """Return the scene of the study."""
+    """Return the scene of a run: platform, turbine and seed."""
     return build_scene(
         platform, wind={"kind": "ntm", "speed": WIND, "class": "B"}, turbine=turbine, fidelity="standard",
         sea=joint_sea_state("gulf_of_maine_normal", WIND), seed=seed, duration=END,
@@ -56,7 +56,7 @@ def scene_of(platform, turbine, seed):
 
 
 def table():
-    """Return the rows of the study: platform, drive, controller and the means of FIGURES over the seeds."""
+    """Return the rows of the study: platform, drive, controller, and means of FIGURES over the seeds."""
     rows = []
     for platform in PLATFORMS:
         for drive, turbine in drives(platform).items():
@@ -82,12 +82,12 @@ def speed(rounds):
 
 
 def main(
-    timed: Annotated[bool, typer.Option("--speed", help="Time of a run instead.")] = False,
+    timed: Annotated[bool, typer.Option("--speed", help="Measure run time instead.")] = False,
     rounds: Annotated[int, typer.Option(help="Pairs of runs to time.")] = 15,
 ):
-    """Print the effect of the pitch drive on runs: none, of first order, of second order."""
+    """Print the effect of no, a first-order and a second-order pitch drive on runs."""
     if timed:
-        heading = ["platform", "x real time without a drive", "with that of second order", "speed ratio"]
+        heading = ["platform", "x real time without a drive", "with second-order drive", "speed ratio"]
         print(markdown_table(heading, speed(rounds)))
     else:
         print(markdown_table(["platform", "pitch drive", "controller", *FIGURES], table()))

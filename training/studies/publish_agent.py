@@ -1,4 +1,4 @@
-"""Ship the best policy of a training run: its .npz and its card, in controllers/policy/agents.
+"""Copies the best policy of a training run to controllers/policy/agents, as .npz and card.
 
 python -m fowt_env.training.studies.publish_agent runs/above_rated_ppo_1 ppo_lqr --machine "two cores"
 """
@@ -19,11 +19,11 @@ from fowt_env.files.atomic import replacing
 from fowt_env.training.rl.settings import REFERENCE
 from fowt_env.training.rl.train import resolve
 
-LARGEST_FILE = 200_000  # bytes of a policy that is kept in the repository
+LARGEST_FILE = 200_000  # bytes, limit of a policy in the repository
 
 
 def changes_of(here, there, prefix=""):
-    """Return {dotted key: value} of nested settings that differ from others or that these lack."""
+    """Return {dotted key: value} of nested settings in `here` that `there` lacks or has otherwise."""
     changes = {}
     for key, value in here.items():
         if isinstance(value, dict) and isinstance(there.get(key), dict):
@@ -34,7 +34,7 @@ def changes_of(here, there, prefix=""):
 
 
 def training_command(settings):
-    """Return the command line that makes the run again, with what differs from its algorithm's YAML now."""
+    """Return the command line that repeats a run, with changes from the current YAML of the algorithm."""
     now = resolve(settings["algo"], settings["name"], settings["seed"], settings["steps"])
     changes = changes_of(settings, now)
     return (
@@ -44,13 +44,13 @@ def training_command(settings):
 
 
 def publish(folder, name, machine):
-    """Write policy and card of the best validation of a run; return their paths. Raises: InputError."""
+    """Write policy and card of the best validation of a run and return their paths. Raises: InputError."""
     folder = Path(folder)
     policy, table = folder / "best.npz", folder / "validation.csv"
     if not policy.is_file() or not table.is_file():
-        raise InputError(f"{folder}: holds no best.npz and validation.csv of a run")
+        raise InputError(f"{folder}: has no best.npz and validation.csv of a run")
     if policy.stat().st_size > LARGEST_FILE:
-        raise InputError(f"{policy}: {policy.stat().st_size} bytes: at most {LARGEST_FILE} are kept")
+        raise InputError(f"{policy}: {policy.stat().st_size} bytes; at most {LARGEST_FILE} are allowed")
     settings = yaml.safe_load((folder / "settings.yml").read_text(encoding="utf-8"))
     rows = pd.read_csv(table)
     about = read_policy(policy)[0]["about"]
@@ -83,7 +83,7 @@ def publish(folder, name, machine):
 
 
 def main(folder: str, name: str, machine: Annotated[str, typer.Option(help="Kind of machine of the run.")]):
-    """Ship the best policy of a training run: its .npz and its card."""
+    """Copy the best policy of a training run, with its card, to the shipped agents."""
     for path in publish(folder, name, machine):
         print(path)
 

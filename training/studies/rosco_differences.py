@@ -1,8 +1,8 @@
-"""What makes ROSCO with the OC3 gains differ from the published law with the same gains, one thing at a time.
+"""Separates the differences between ROSCO with the OC3 gains and the published law with the same gains.
 
-From the published law towards ROSCO: its periods, the place of the gain schedule, the pitch that sets it.
-From ROSCO towards the published law: the set-point smoother, the torque law, and gains that undo the place of
-the schedule. Cases of normal turbulence at WINDS on validation seeds.
+Changes from the published law towards ROSCO: control period, position of the gain schedule, pitch used by
+the schedule. Changes from ROSCO towards the published law: set-point smoother, torque law, and gains that
+compensate the position of the schedule. Cases have normal turbulence at WINDS, with validation seeds.
 """
 
 from math import exp
@@ -43,7 +43,7 @@ SHOWN = {
 
 
 class InsideIntegral:
-    """The PI law with the gain schedule inside the integral, as ROSCO has it: I += GK KI e dt.
+    """Computes the PI law with the gain schedule inside the integral, as in ROSCO: I += GK KI e dt.
 
     filtered: the schedule follows the filtered measured blade pitch, as in ROSCO, not the last command.
     """
@@ -54,7 +54,7 @@ class InsideIntegral:
         self.decay = exp(-control_dt * settings.speed_filter_corner)
 
     def reset(self, measurement):
-        """Start as PI.reset; the integral is then a blade pitch, rad."""
+        """Reset as PI.reset; the integral is a blade pitch, rad."""
         self.law.reset(measurement)
         p, memory = self.law.parameters, self.law.memory
         self.pitch = memory[Memory.PITCH_COMMAND]
@@ -80,7 +80,7 @@ class InsideIntegral:
 
 
 def outside_factor(blade_pitch, schedule_pitch):
-    """Return the share of its gains that a law has for small changes if the schedule multiplies its integral.
+    """Return the effective fraction of the gains for small changes if the schedule multiplies the integral.
 
     beta = GK(beta) (KP e + KI I): a change of beta moves GK too, and with the steady GK KI I = beta,
     d beta (1 + beta/(beta_K + beta)) = GK (KP de + KI e dt): theory.md (A7) over GK.
@@ -91,8 +91,8 @@ def outside_factor(blade_pitch, schedule_pitch):
 def variants(turbine):
     """Return {change: controller}, from the published law to ROSCO."""
     published = PISettings.published(turbine)
-    kept = outside_factor(SCHEDULE, turbine.gains["oc3"].gain_schedule_pitch)
-    outside = dict(zip(("PC_GS_KP", "PC_GS_KI"), kept * np.array(pitch_gains(turbine)), strict=True))
+    fraction = outside_factor(SCHEDULE, turbine.gains["oc3"].gain_schedule_pitch)
+    outside = dict(zip(("PC_GS_KP", "PC_GS_KI"), fraction * np.array(pitch_gains(turbine)), strict=True))
     rosco = {
         "rosco": {}, "rosco, no set-point smoother": {"SS_Mode": 0},
         "rosco, no smoother, torque K w^2": {"SS_Mode": 0, "VS_ControlMode": 1},
@@ -110,7 +110,7 @@ def variants(turbine):
 
 
 def differences(winds=WINDS, seeds=SEEDS, duration=660.0, names=None, jobs=1):
-    """Return a DataFrame of the variants: SHOWN over those of gspi_oc3, means over the cases."""
+    """Return a DataFrame of SHOWN of the variants, relative to gspi_oc3, means over the cases."""
     laws = variants(read_turbine("nrel5mw"))
     if names is not None:
         laws = {name: laws[name] for name in (BASELINE, *names)}

@@ -1,6 +1,6 @@
-"""Agents with and without the safety layer on validation episodes, beside two careless ones.
+"""Runs agents with and without the safety layer on validation episodes, and two careless policies.
 
-Those command new random torque and blade pitch every 5 s, or no torque and flat blades.
+Careless policies command random torque and blade pitch every 5 s, or no torque and flat blades.
 """
 
 from dataclasses import replace
@@ -23,13 +23,13 @@ CARELESS = ("random direct", "no torque, flat blades")
 
 
 class Trained:
-    """An agent of a policy file, acting on observations of its environment."""
+    """Runs the agent of a policy file on observations of its environment."""
 
     def __init__(self, name):
         self.settings, self.network = read_policy(policy_path(name))
 
     def env(self):
-        """Return the environment of the agent's training."""
+        """Return the training environment of the agent."""
         s = self.settings
         reach = {name: tuple(s[name]) if isinstance(s[name], list) else s[name] for name in TASK_FIELDS}
         return FowtEnv(
@@ -57,13 +57,13 @@ class Trained:
 
 
 class Careless:
-    """Direct commands without looking: random ones, or no torque and flat blades."""
+    """Commands without observation: random values, or no torque and flat blades."""
 
     def __init__(self, kind):
         self.kind = kind
 
     def env(self):
-        """Return an environment of direct commands."""
+        """Return an environment with direct commands."""
         return FowtEnv("above_rated", action_mode="direct")
 
     def reset(self, env, observation):
@@ -79,7 +79,7 @@ class Careless:
 
 
 def episode_figures(agent, env, options):
-    """Return {figure: number} of one episode."""
+    """Run one episode and return its metrics {name: value}."""
     observation, _ = env.reset(seed=0, options=options | {"offsets": {}})
     agent.reset(env, observation)
     scene = env.unwrapped.scene
@@ -89,18 +89,18 @@ def episode_figures(agent, env, options):
         rows.append(env.unwrapped.channels())
         over = terminated or truncated
     frame = pd.DataFrame(rows).set_axis([channel.column for channel in scene.channels], axis=1)
-    found = turbine_metrics(frame, scene.turbine)
+    metrics = turbine_metrics(frame, scene.turbine)
     return {
         "failed": float("termination" in info),
-        "overspeed_[%]": found["overspeed_[%]"],
+        "overspeed_[%]": metrics["overspeed_[%]"],
         "guarded_[%]": 100.0 * info.get("guarded_periods", 0) / (len(rows) - 1),
-        "rotor_speed_std_[%]": 100.0 * found["RotSpeed_std_[rpm]"] * RPM / scene.turbine.rated_rotor_speed,
-        "platform_pitch_std_[deg]": found["PtfmPitch_std_[deg]"],
+        "rotor_speed_std_[%]": 100.0 * metrics["RotSpeed_std_[rpm]"] * RPM / scene.turbine.rated_rotor_speed,
+        "platform_pitch_std_[deg]": metrics["PtfmPitch_std_[deg]"],
     }
 
 
 def safety_study(agents):
-    """Return a DataFrame: a row per agent and layer; means over episodes, largest overspeed."""
+    """Return a DataFrame with a row per agent and layer: means over episodes, largest overspeed."""
     episodes, rows = validation_episodes(resolve("ppo", "above_rated", 0, 1))[0][::2], []
     judged = {name: Trained(name) for name in agents} | {kind: Careless(kind) for kind in CARELESS}
     for label, agent in judged.items():

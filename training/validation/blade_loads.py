@@ -1,7 +1,7 @@
-"""Moments of single blades, hub and tower of the IEA 15 MW against OpenFAST: the platform held, steady wind.
+"""Compares moments of blades, hub and tower of the IEA 15 MW with OpenFAST: fixed platform, steady wind.
 
-OpenFAST's runs have a skewed wake, which the look-up of the rotor does not have: both rotors are compared
-with them, and the look-up also with `bem` without it. Blades as masses are those of the turbine file.
+The OpenFAST runs have a skewed wake, which the `lookup` rotor lacks: `bem` and `lookup` are compared with
+OpenFAST, and `lookup` also with `bem` without skewed wake. Blade masses are those of the turbine file.
 """
 
 import numpy as np
@@ -18,13 +18,13 @@ REFERENCE = f"{PLATFORM}/blade_loads.csv.gz"
 AZIMUTHS = 36
 ROTORS = {"bem": {"skewed_wake": True}, "lookup": {}}
 ROOTS = ("RootMxc1", "RootMyc1", "RootMyc2", "RootMyc3")
-STANDING = ("YawBrMyp", "YawBrMzp", "TwrBsMyt", "TwrBsMxt")  # in axes that do not turn with the rotor
-MEAN, HARMONIC = 2.0, 5.0  # %, allowed
-OWN = 1.0  # %, of the look-up against what it tabulates
+STANDING = ("YawBrMyp", "YawBrMzp", "TwrBsMyt", "TwrBsMxt")  # in non-rotating axes
+MEAN, HARMONIC = 2.0, 5.0  # allowed errors, %
+OWN = 1.0  # allowed error of `lookup` against the tabulated `bem`, %
 
 
 def turn(rotor, wind, shear, rotor_speed, pitches, **options):
-    """Return {channel: (mean, first, third harmonic)} of a rotor at rad/s and three pitches (rad), kN m."""
+    """Return {channel: (mean, first, third harmonic)} over a revolution, kN m; speed rad/s, pitches rad."""
     scene = build_scene(
         PLATFORM, wind={"kind": "steady", "speed": wind}, rotor=rotor, shear_exponent=shear,
         pitch="individual", hydrodynamics=False, mooring=False, **{"fidelity": "reference"} | options,
@@ -45,7 +45,7 @@ def turn(rotor, wind, shear, rotor_speed, pitches, **options):
 
 
 def blades(study):
-    """Compare steady wind, platform held: means of the moments 2 %, first (tower: third) harmonics 5 %."""
+    """Compare moments on a fixed platform in steady wind: means 2 %, first (tower: third) harmonics 5 %."""
     for case, rows in table(REFERENCE, study.folder).groupby("case", sort=False):
         first = rows.iloc[0]
         pitches = first[[f"blade_pitch{k}_deg" for k in (1, 2, 3)]].to_numpy(float) * DEGREE
@@ -53,12 +53,12 @@ def blades(study):
         state = wind, shear, first["rotor_speed_rpm"] * RPM, pitches
         for rotor, options in ROTORS.items():
             study.say(f"blades, {case}, {rotor}")
-            found, words = turn(rotor, *state, **options), f"blades, {case}, {rotor}"
+            moments, words = turn(rotor, *state, **options), f"blades, {case}, {rotor}"
             for row in rows.to_dict("records"):
-                name, (mean, *harmonics) = row["channel"], found[row["channel"]]
+                name, (mean, *harmonics) = row["channel"], moments[row["channel"]]
                 study.add(words, f"{name}, mean", "kN-m", row["mean_kNm"], mean.real, allowed=MEAN)
-                # loads that a balanced rotor turns with have no first harmonic where nothing turns, and one
-                # with unlike pitches in even wind no third
+                # in non-rotating axes a balanced rotor gives no first harmonic, and a rotor with unequal
+                # pitches in uniform wind gives no third one
                 order = 1 if name in ROOTS or pitches[0] != pitches[2] else 3
                 there, here = complex(row[f"cos{order}_kNm"], -row[f"sin{order}_kNm"]), harmonics[order // 2]
                 quantity = f"{name}, {'first' if order == 1 else 'third'} harmonic over the azimuth"
@@ -67,5 +67,5 @@ def blades(study):
         study.say(f"blades, {case}, lookup against bem")
         plain, words = turn("bem", *state), f"blades, {case}, lookup (against bem, no skewed wake)"
         for name in ROOTS + STANDING:
-            both = plain[name][0].real, found[name][0].real
+            both = plain[name][0].real, moments[name][0].real
             study.add(words, f"{name}, mean", "kN-m", *both, allowed=OWN)

@@ -1,4 +1,4 @@
-"""A comparison of this plant with a reference: its rows, their verdicts, and the rows that cases share."""
+"""Compares simulations with reference runs: rows, verdicts, and the statistics common to all cases."""
 
 from dataclasses import dataclass, field
 
@@ -18,7 +18,7 @@ TIME = "Time_[s]"
 
 
 class Channel:
-    """Columns of the compared series, as simulate names them."""
+    """Names the compared channels as in the tables of simulate."""
 
     SURGE, HEAVE, PITCH = "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]"
     SPEED, BLADE = "RotSpeed_[rpm]", "BldPitch1_[deg]"
@@ -34,26 +34,26 @@ COMBINATIONS = (  # position, surface and stretching of wave kinematics; theory.
     ("fixed", "instantaneous", "wheeler"),
     ("instantaneous", "instantaneous", "wheeler"),
 )
-SETTLED = 100.0  # s left out of statistics
+SETTLED = 100.0  # s, start-up omitted from statistics
 STATISTICS = {"std": "standard deviation", "mean": "mean", "rms": "normalised rms error"}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One compared quantity: both values, the error, and the allowed error."""
+    """Holds one compared quantity: both values, the error and the allowed error."""
 
     case: str
     quantity: str
     unit: str
-    openfast: float  # or the reference that the case names; nan if there is none
+    openfast: float  # or the reference named by the case; nan without one
     here: float
-    error: float  # %, relative or normalised as the quantity says; nan if only reported
+    error: float  # %, relative, or normalised as stated in quantity; nan if not defined
     allowed: float = float("nan")  # %
     note: str = ""
 
     @property
     def verdict(self):
-        """ "met", "MISSED" or "reported"."""
+        """Return "met", "MISSED" or, without an allowed error, "reported"."""
         if not np.isfinite(self.allowed):
             return "reported"
         return "met" if abs(self.error) <= self.allowed else "MISSED"
@@ -61,11 +61,11 @@ class Row:
 
 @dataclass
 class Study:
-    """Inputs of a validation and the rows that it has found so far."""
+    """Holds the inputs of a validation and the rows computed so far."""
 
     folder: object = None  # of the reference series
     bts: object = None  # path of the full TurbSim box
-    report: object = None  # called with the name of the present run, the runs done and their number
+    report: object = None  # called with (name of the current run, runs done, total runs)
     total: int = 0  # runs
     done: int = 0
     platform: str = "oc3_hywind"  # a name of validate.PLATFORMS
@@ -74,13 +74,13 @@ class Study:
     runs: dict = field(default_factory=dict)  # case -> (this project's frame, OpenFAST's frame)
 
     def say(self, text):
-        """Report the name of the run that begins."""
+        """Report the name of the run that starts."""
         if self.report is not None:
             self.report(text, self.done, self.total)
         self.done += 1
 
     def add(self, case, quantity, unit, openfast, here, error=None, allowed=float("nan"), note=""):
-        """Add a row; without an error its error is the relative one in percent, 0 where both are zero."""
+        """Add a row; error None: the relative error in percent, 0 if both values are zero."""
         if error is None and openfast == 0.0:
             error = 0.0 if here == 0.0 else float("inf")
         elif error is None:
@@ -89,9 +89,9 @@ class Study:
         self.rows.append(row)
 
     def pair(self, case, start=None, end=np.inf):
-        """Return (this project's frame, OpenFAST's frame) of a case, from start to end (s) where given.
+        """Return (this project's frame, OpenFAST's frame) of a case, from start (None: all) to end, s.
 
-        Raises: InputError where the reference has other times than the run.
+        Raises: InputError if the times of the reference differ from those of the run.
         """
         if case not in self.runs:
             self.say(case)
@@ -99,7 +99,7 @@ class Study:
             theirs, ours = run.theirs(self.folder), run.frame(self.folder, self.bts)
             if len(ours) != len(theirs) or not np.allclose(ours[TIME], theirs[TIME], atol=1e-6):
                 raise InputError(
-                    f"reference run {case!r}: its times are not those of the run, every {run.output_dt:g} s"
+                    f"reference run {case!r}: times differ from those of the run, every {run.output_dt:g} s"
                 )
             self.runs[case] = (ours, theirs)
         pair = self.runs[case]
@@ -115,10 +115,10 @@ class Study:
         self, case, channels, kinds=tuple(STATISTICS), start=SETTLED, *, pair=None, words="", note="",
         std=float("nan"), rms=float("nan"),
     ):  # fmt: skip
-        """Add a row for each channel and kind of STATISTICS of a case from start (s) on.
+        """Add a row per channel and kind of STATISTICS of a case, computed after start (s).
 
-        pair: frames in place of the case's; words: end of each quantity's name; std, rms: allowed errors, %.
-        An rms error is shown beside both deviations.
+        pair: frames to compare instead of those of the case; words: suffix of the names of quantities;
+        std, rms: allowed errors, %. Rows of rms errors have both standard deviations as values.
         """
         ours, theirs = pair or self.pair(case, start)
         allowed = {"std": std, "rms": rms, "mean": float("nan")}
@@ -130,7 +130,7 @@ class Study:
                 self.add(case, f"{name}, {STATISTICS[kind]}{words}", unit, *both, error, allowed[kind], note)
 
     def add_decay(self, case, channel, duration, period, decrement, rms, cycles=4, counted=(1, 3)):
-        """Add periods and decrements of cycles of a free decay and its rms error; allowed errors, %."""
+        """Add period, decrements of the counted cycles and rms error of a free decay; allowed errors in %."""
         name, unit, time, *both = self.series(case, channel)
         centre = both[0][time > 0.5 * duration].mean()
         periods = [decay_period(time, value, centre, cycles) for value in both]
@@ -144,7 +144,7 @@ class Study:
         self.add(case, f"{name}, {STATISTICS['rms']}", unit, both[0].std(), both[1].std(), error, rms)
 
     def add_harmonics(self, case, channels, period, window, vector=False):
-        """Add first harmonics in a wave of a period (s), 1 %; vector: and reported errors with phase."""
+        """Add first harmonics at a wave period (s), 1 %; vector: also report complex errors."""
         for channel in channels:
             name, unit, time, *both = self.series(case, channel, *window)
             there, here = (harmonics(time, value, 2.0 * np.pi / period)[0] for value in both)
@@ -166,10 +166,10 @@ def name_and_unit(channel):
 
 
 def since(frames, start, end=np.inf):
-    """Return the frames cut to the times from start to end (s)."""
+    """Return the frames cut to the times start..end (s)."""
     return [frame[(frame[TIME] >= start - 1e-6) & (frame[TIME] <= end + 1e-6)] for frame in frames]
 
 
 def phase(here, there, digits=2):
-    """Return a note on the phase (deg) between two complex amplitudes."""
+    """Return a note with the phase (deg) between two complex amplitudes."""
     return f"phase {np.degrees(np.angle(here / there)):+.{digits}f} deg"

@@ -1,4 +1,4 @@
-"""Errors of cheaper modelling choices: the same run with the costlier and the cheaper one, compared."""
+"""Computes errors of cheaper modelling options: one run is repeated with the costlier and the cheaper one."""
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ from fowt_env.training.validation.openfast_cases import PLATFORM, RUNS, box_wind
 from fowt_env.weather.turbulence import turbulence
 from fowt_env.weather.wind_field import read_box, rotor_average
 
-STEP = 0.025  # s; half of it changes deviations by less than 0.1 % here
+STEP = 0.025  # s; halving the step changes standard deviations by less than 0.1 %
 GENERATOR_SEEDS = 8
 BANDS = (0.005, 0.02, 0.05, 0.1, 0.2, 0.5)  # Hz
 INSTANTANEOUS = {
@@ -20,17 +20,17 @@ INSTANTANEOUS = {
 }  # fmt: skip
 UNIFORM, BOX = "turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"
 NO_SKEW = {"skewed_wake": False}
-RUN_CHANGES = {  # name of a run: (case, changes)
+RUN_CHANGES = {  # name of a run: (case, changed options)
     "uniform wind": (UNIFORM, {}),
     "uniform wind, no skewed wake": (UNIFORM, NO_SKEW),
     "uniform wind, rotor table": (UNIFORM, {**NO_SKEW, "rotor": "table"}),
     "uniform wind, instantaneous wave kinematics": (UNIFORM, INSTANTANEOUS),
     "uniform wind, dynamic inflow": (UNIFORM, {"dynamic_inflow": True}),
     "full-field wind": (BOX, {}),
-    "rotor-averaged wind": (BOX, {}),  # with the wind of _disk
+    "rotor-averaged wind": (BOX, {}),  # wind of _disk
     "rotor-averaged wind, rotor table": (BOX, {"rotor": "table", **NO_SKEW}),
 }
-CHOICES = {  # cheaper choice: (run with the costlier one, run with the cheaper one)
+CHOICES = {  # cheaper option: (run with the costlier option, run with the cheaper one)
     "skewed wake off (against on)": ("uniform wind", "uniform wind, no skewed wake"),
     "tabulated rotor (against BEM, both without skewed wake)": (
         "uniform wind, no skewed wake", "uniform wind, rotor table",
@@ -48,7 +48,7 @@ CHOICES = {  # cheaper choice: (run with the costlier one, run with the cheaper 
 
 
 def cheaper_choices(study):
-    """Compare each cheaper choice with the costlier one on the same run; keep the runs for the plots."""
+    """Compare the cheaper with the costlier options on the same run; store the runs for the plots."""
     disk = _disk(study)
     for name, (case, changes) in RUN_CHANGES.items():
         if name not in study.runs:
@@ -64,7 +64,7 @@ def cheaper_choices(study):
 
 
 def _disk(study):
-    """Return the rotor averages of the box, and the wind specification that has them."""
+    """Return the rotor averages of the box and the wind specification made from them."""
     turbine = read_turbine(read_platform(PLATFORM).turbine)
     hub, diameter = turbine.rotor.hub_height, 2.0 * turbine.rotor.tip_radius
     blade = (np.asarray(turbine.blade.radius), np.asarray(turbine.blade.chord))
@@ -77,31 +77,31 @@ def _disk(study):
 
 
 def _densities(step, values):
-    """Return (frequency, mean density) of the columns of (n, m) values, mean removed, Hann window."""
+    """Return (frequency, power density averaged over columns) of values (n, m); Hann window, mean removed."""
     frequency, density = periodogram(values, 1.0 / step, np.hanning(len(values)), axis=0)
     return frequency, density.mean(axis=1)
 
 
 def _generator(study, disk):
-    """Compare the generator of normal turbulence with the rotor average of the box: deviation, spectrum.
+    """Compare the generator of normal turbulence with the rotor average of the box: deviation and spectrum.
 
-    Fractions of the point variance are compared: that of one box of one seed differs from sigma_1.
+    Values are divided by those at a point, as the standard deviation of one box (one seed) is not sigma_1.
     """
     hub, diameter, box, step = disk["hub"], disk["diameter"], disk["box"], disk["box"].dt
     y, z = np.meshgrid(box.y, box.z)
     points = box.velocity[:, np.hypot(y, z - hub) <= 0.5 * diameter, 0].astype(float)
     frequency, point = _densities(step, points)
     mean, chord = (_densities(step, disk[name][:, :1])[1] for name in ("value", "chord"))
-    sigma, made = ntm_sigma(18.0, "B"), {}
+    sigma, winds = ntm_sigma(18.0, "B"), {}
     for average in ("rotor", "point"):  # (seed, time, component)
         settings = {"height": hub, "diameter": diameter, "period": len(points) * step, "average": average}
         seeds = range(GENERATOR_SEEDS)
-        made[average] = np.array([turbulence(18.0, sigma, seed=s, **settings)[1][:-1] for s in seeds])
-    spectra = {average: _densities(step, values[:, :, 0].T) for average, values in made.items()}
-    own, (made_frequency, made_rotor), (_, made_point) = made["rotor"].std(axis=1), *spectra.values()
+        winds[average] = np.array([turbulence(18.0, sigma, seed=s, **settings)[1][:-1] for s in seeds])
+    spectra = {average: _densities(step, values[:, :, 0].T) for average, values in winds.items()}
+    rotor_std, (made_frequency, made_rotor), (_, made_point) = winds["rotor"].std(axis=1), *spectra.values()
     case = "generator of normal turbulence (against the rotor average of the TurbSim box)"
     deviation = np.sqrt(points.var(axis=0).mean())
-    ours = np.mean(own[:, 0] / made["point"].std(axis=1)[:, 0])
+    ours = np.mean(rotor_std[:, 0] / winds["point"].std(axis=1)[:, 0])
     theirs = disk["value"].std(axis=0) / deviation
     study.add(case, "u: std of the rotor average over that of a point", "-", theirs[0], ours)
     chorded = disk["chord"][:, 0].std() / deviation
@@ -109,7 +109,7 @@ def _generator(study, disk):
     study.add(case, "u at a point, std (the box: one seed; here sigma_1)", "m/s", deviation, sigma)
     for column, name in ((3, "vertical"), (4, "horizontal")):
         quantity = f"u: std of the {name} gradient per diameter over that of a point"
-        study.add(case, quantity, "-", theirs[column], own[:, column].mean() / sigma)
+        study.add(case, quantity, "-", theirs[column], rotor_std[:, column].mean() / sigma)
     for low, high in zip(BANDS[:-1], BANDS[1:], strict=True):
         band = (frequency >= low) & (frequency < high)
         inside = (made_frequency >= low) & (made_frequency < high)

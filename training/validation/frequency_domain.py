@@ -1,12 +1,12 @@
-"""Natural periods and responses of a floating body in the frequency domain, by numpy and scipy alone.
+"""Computes natural periods and responses of a floating body in the frequency domain, with numpy and scipy.
 
-Nothing of the plant is used: coefficients come from the package's array file by the reader below, masses
-from the figures of the public decks, lines from the catenary below. Linear about the place where the body
-rests; drag is left out. With X the excitation per metre and q = surge, sway, heave, roll, pitch, yaw:
+Independent of the simulator: coefficients are read from the array file of the package, masses are those of
+the public decks, line tensions those of the catenary below. Equations are linear about the equilibrium,
+without drag. With X the excitation per metre and q = surge, sway, heave, roll, pitch, yaw:
 
     [-w^2 (M + A(w)) + i w (B(w) + D) + C + K] q = X(w).
 
-C is the hydrostatic stiffness with that of the weight, K that of the lines, D a damping that may be added.
+C is the stiffness of hydrostatics and weight, K that of the lines, D optional damping.
 """
 
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ NAMES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
 def read_arrays(path):
-    """Return {name: array} of a coefficients file of the package. Raises: InputError if it does not exist."""
+    """Return {name: array} of a coefficients file of the package. Raises: InputError if unreadable."""
     try:
         with np.load(path, allow_pickle=False) as file:
             return dict(file)
@@ -30,7 +30,7 @@ def read_arrays(path):
 
 
 def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
-    """Return the 6x6 mass matrix about the origin of a body, inertia about its centre."""
+    """Return the 6x6 mass matrix about the origin of a body with inertia about its centre."""
     x, y, z = place
     cross = mass * np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     matrix = np.zeros((6, 6))
@@ -42,14 +42,14 @@ def point_mass(mass, place, inertia=(0.0, 0.0, 0.0)):
 
 
 def tower_mass(stations, densities, base, top, slices=400):
-    """Return the 6x6 mass matrix of a tower along z, densities (kg/m) at fractions of its height."""
+    """Return the 6x6 mass matrix of a tower along z; densities (kg/m) at stations (fractions of height)."""
     fraction, height = (np.arange(slices) + 0.5) / slices, top - base
     masses = np.interp(fraction, stations, densities) * height / slices
     return sum(point_mass(m, (0.0, 0.0, base + f * height)) for f, m in zip(fraction, masses, strict=True))
 
 
 def weight_stiffness(mass):
-    """Return the 6x6 stiffness of the weight of a mass matrix about the displaced origin, fixed axes."""
+    """Return the 6x6 gravity stiffness of a mass matrix about the displaced origin, fixed axes."""
     x, y, z = mass[1, 5], -mass[0, 5], mass[0, 4]  # moments of mass
     stiffness = np.zeros((6, 6))
     stiffness[3, 3] = stiffness[4, 4] = -GRAVITY * z
@@ -64,7 +64,7 @@ def weight(mass):
 
 @dataclass(frozen=True)
 class CatenaryLine:
-    """An elastic line on a flat seabed at its anchor's depth."""
+    """Holds the data of an elastic line above a flat seabed at the depth of its anchor."""
 
     anchor: tuple
     fairlead: tuple  # body axes, undisplaced
@@ -75,9 +75,9 @@ class CatenaryLine:
 
 
 def catenary(span, rise, line):
-    """Return (horizontal, vertical) tension (N) at the fairlead of a line with this span and rise (m).
+    """Return the (horizontal, vertical) tension (N) at the fairlead of a line with a span and rise (m).
 
-    The closed form of Jonkman (2007), with and without a part on the seabed, solved in the logarithms.
+    Closed form of Jonkman (2007), with or without seabed contact, solved for the logarithms.
     """
     w, length, ea, cb = line.weight, line.length, line.stiffness, line.friction
 
@@ -98,14 +98,14 @@ def catenary(span, rise, line):
     guess = np.sqrt(taut) if length > np.hypot(span, rise) else 0.2
     h = max(0.5 * w * span / guess, 1e-3 * w * length)
     v = 0.5 * w * (rise / np.tanh(guess) + length)
-    found = root(misses, np.log([h, v]), tol=1e-13)
-    if not np.abs(found.fun).max() < 1e-8 * length:
+    solution = root(misses, np.log([h, v]), tol=1e-13)
+    if not np.abs(solution.fun).max() < 1e-8 * length:
         raise InputError(f"catenary: no solution at span {span:g} m and rise {rise:g} m")
-    return np.exp(found.x)
+    return np.exp(solution.x)
 
 
 def rotation(roll, pitch, yaw):
-    """Return the rotation matrix of small angles to second order, for stiffness by central differences."""
+    """Return the rotation matrix of small angles to second order, as central differences need."""
     a = np.array([[0.0, -yaw, pitch], [yaw, 0.0, -roll], [-pitch, roll, 0.0]])
     return np.eye(3) + a + 0.5 * a @ a
 
@@ -133,20 +133,20 @@ def line_stiffness(lines, q):
 
 
 def interpolated(omega, grid, values, low=None, high=None):
-    """Return values at omega (rad/s), linear over the grid; low, high: at zero and infinite frequency."""
+    """Interpolate values linearly at omega (rad/s); low, high: values at zero and infinite frequency."""
     if omega < grid[0]:
         first = values[0] if low is None else low
         return first + (values[0] - first) * omega / grid[0]
     if omega > grid[-1] and high is not None:
         return high + (values[-1] - high) * grid[-1] / omega
     at = min(max(int(np.searchsorted(grid, omega)) - 1, 0), len(grid) - 2)
-    share = (omega - grid[at]) / (grid[at + 1] - grid[at])
-    return values[at] * (1.0 - share) + values[at + 1] * share
+    fraction = (omega - grid[at]) / (grid[at + 1] - grid[at])
+    return values[at] * (1.0 - fraction) + values[at + 1] * fraction
 
 
 @dataclass(frozen=True)
 class FloatingBody:
-    """A body as the frequency domain sees it: coefficients, mass, lines, volume below the origin."""
+    """Holds a floating body: coefficients, mass, lines and displaced volume; computes its linear motion."""
 
     coefficients: dict  # of read_arrays
     mass: np.ndarray  # (6, 6)
@@ -157,25 +157,25 @@ class FloatingBody:
 
     @property
     def stiffness(self):
-        """(6, 6) hydrostatic stiffness with that of the weight and what is added."""
+        """Return the (6, 6) stiffness of hydrostatics, weight and added_stiffness."""
         return self.coefficients["stiffness"] + weight_stiffness(self.mass) + self.added_stiffness
 
     @property
     def rest_stiffness(self):
-        """(6, 6) stiffness with that of the lines, where the body rests."""
+        """Return the (6, 6) stiffness at equilibrium, with that of the lines."""
         return self.stiffness + line_stiffness(self.lines, self.rest())
 
     def rest(self):
-        """Return the position of rest (6,), of lines, weight and buoyancy."""
+        """Return the equilibrium position (6,) under lines, weight and buoyancy."""
         lift, stiffness = DENSITY * GRAVITY * self.volume, self.stiffness
         fixed = weight(self.mass) + lift * np.eye(6)[2]
-        found = root(
+        solution = root(
             lambda q: fixed + line_forces(self.lines, q) - stiffness @ q, np.zeros(6), tol=1e-13,
             jac=lambda q: -stiffness - line_stiffness(self.lines, q),
         )  # fmt: skip
-        if not np.abs(found.fun).max() < 1e-6 * lift:
-            raise InputError("frequency domain: the body finds no place to rest")
-        return found.x
+        if not np.abs(solution.fun).max() < 1e-6 * lift:
+            raise InputError("frequency domain: no equilibrium position")
+        return solution.x
 
     def added_mass(self, omega):
         """Return the added mass (6, 6) at omega (rad/s)."""
@@ -184,12 +184,12 @@ class FloatingBody:
         return interpolated(omega, c["omega"], c["added_mass"], *limits)
 
     def damping(self, omega):
-        """Return the damping (6, 6) of radiation, and added_damping."""
+        """Return the damping (6, 6) of radiation plus added_damping, at omega (rad/s)."""
         c = self.coefficients
         return interpolated(omega, c["omega"], c["damping"], 0.0, 0.0) + self.added_damping
 
     def excitation(self, omega, heading=0.0):
-        """Return the excitation (6,) per metre at omega (rad/s) and a heading (rad) of the file."""
+        """Return the excitation (6,) per metre at omega (rad/s) and a tabulated heading (rad)."""
         c = self.coefficients
         turns = np.abs((c["heading"] - heading + np.pi) % (2.0 * np.pi) - np.pi)
         column = int(np.argmin(turns))
@@ -199,11 +199,11 @@ class FloatingBody:
 
     def responses(self, omega, heading=0.0):
         """Return (n, 6) complex motion per metre of amplitude at omega (n,) rad/s."""
-        stiffness, found = self.rest_stiffness, []
+        stiffness, motion = self.rest_stiffness, []
         for w in omega:
             matrix = -w * w * (self.mass + self.added_mass(w)) + 1j * w * self.damping(w) + stiffness
-            found.append(np.linalg.solve(matrix, self.excitation(w, heading)))
-        return np.array(found)
+            motion.append(np.linalg.solve(matrix, self.excitation(w, heading)))
+        return np.array(motion)
 
     def retardation(self, time, spacing=0.004):
         """Return (n, 6, 6) K(t) = 2/pi times the integral of B cos(omega t), by the trapezoid rule."""
@@ -217,8 +217,8 @@ class FloatingBody:
     def free_decay(self, offset, duration, step=0.05, memory=60.0):
         """Return (time (n,), motion (n, 6) from rest) of a free decay from an offset (6,) in still water.
 
-        Cummins' equation by the leapfrog rule: places at whole steps, velocities at halves, and the
-        convolution by the midpoint rule at those.
+        Cummins' equation by the leapfrog rule: positions at whole steps, velocities at half steps, at which
+        the convolution is summed by the midpoint rule.
         """
         inertia = np.linalg.inv(self.mass + self.coefficients["added_mass_infinite"])
         kernel = step * self.retardation((np.arange(round(memory / step)) + 0.5) * step)
@@ -235,7 +235,7 @@ class FloatingBody:
 
     def natural_modes(self):
         """Return {motion: (rad/s, damping ratio)} of six modes, each with coefficients at its frequency."""
-        stiffness, found = self.rest_stiffness, {}
+        stiffness, modes = self.rest_stiffness, {}
         scale = np.array([1.0] * 3 + [self.volume ** (1.0 / 3.0)] * 3)[:, None]
         for i, name in enumerate(NAMES):
             omega = np.sqrt(stiffness[i, i] / (self.mass + self.added_mass(0.2))[i, i])
@@ -244,16 +244,16 @@ class FloatingBody:
                 lower = [-inverse @ stiffness, -inverse @ self.damping(omega)]
                 values, vectors = np.linalg.eig(np.block([[np.zeros((6, 6)), np.eye(6)], lower]))
                 shapes = np.abs(vectors[:6]) * scale
-                share = shapes[i] / np.linalg.norm(shapes, axis=0)
-                value = values[np.argmax(np.where(values.imag > 0.0, share, -1.0))]
+                participation = shapes[i] / np.linalg.norm(shapes, axis=0)
+                value = values[np.argmax(np.where(values.imag > 0.0, participation, -1.0))]
                 done, omega = abs(value.imag - omega) < 1e-10, 0.5 * (omega + value.imag)
                 if done:
                     break
-            found[name] = (float(value.imag), float(-value.real / abs(value)))
-        return found
+            modes[name] = (float(value.imag), float(-value.real / abs(value)))
+        return modes
 
 
-# --------------------------------------------------------------------------- figures of the public decks
+# --------------------------------------------------------------------------- values of the public decks
 
 FLOATING_TOWER = (
     4667.0, 4345.28, 4034.76, 3735.44, 3447.32, 3170.40, 2904.69, 2650.18, 2406.88, 2174.77, 1953.87,
@@ -264,7 +264,7 @@ BARGE_TOWER = (
 
 
 def nrel5mw(tower, base):
-    """Return the 6x6 mass matrix of the NREL 5 MW on a tower from `base` to 87.6 m; the rotor as a disk."""
+    """Return the 6x6 mass matrix of the NREL 5 MW (rotor as a disk) on a tower from `base` to 87.6 m."""
     tilt, cone, hub_radius = np.radians(5.0), np.radians(2.5), 1.5
     apex = np.array([-5.0191 * np.cos(tilt), 0.0, 87.6 + 1.96256 + 5.0191 * np.sin(tilt)])
     shaft = np.array([np.cos(tilt), 0.0, -np.sin(tilt)])  # downwind
@@ -285,10 +285,10 @@ def nrel5mw(tower, base):
 
 
 def oc4_semi(coefficients):
-    """Return the FloatingBody of OC4's DeepCwind semi: steel, and ballast water on the columns' axes.
+    """Return the FloatingBody of the OC4 DeepCwind semi: steel, and ballast water on the column axes.
 
-    HydroDyn 2, for which the deck was written, lumps the water at the nodes of the members, so that it has no
-    inertia across a member. As a solid it would make the periods of pitch and yaw 0.8 and 1.4 % longer.
+    HydroDyn 2, for which the deck was written, lumps the water at member nodes, without inertia across the
+    member. Water rotating as a solid would lengthen the periods of pitch and yaw by 0.8 and 1.4 %.
     """
     mass = nrel5mw(FLOATING_TOWER, 10.0)
     mass = mass + point_mass(3.85218e6, (0.0, 0.0, -8.6588), (2.56193e9, 2.56193e9, 4.24265e9))
@@ -308,13 +308,13 @@ def oc4_semi(coefficients):
 
 
 def iti_barge(coefficients):
-    """Return a FloatingBody of the ITI Energy barge."""
+    """Return the FloatingBody of the ITI Energy barge."""
     mass = nrel5mw(BARGE_TOWER, 0.0)
     mass = mass + point_mass(5.452e6, (0.0, 0.0, -0.281768), (7.269e8, 7.269e8, 1.4539e9))
     weight_in_water = (130.403 - DENSITY * 0.25 * np.pi * 0.0809**2) * GRAVITY
-    lines, place = [], (20.0, 20.0, -4.0)
+    lines, end = [], (20.0, 20.0, -4.0)
     for x, y in ((386.92, 171.985), (171.985, 386.95)):
         for c, s in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
             turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-            lines.append(CatenaryLine(turn @ (x, y, -150.0), turn @ place, 473.312, weight_in_water, 5.89e8))
+            lines.append(CatenaryLine(turn @ (x, y, -150.0), turn @ end, 473.312, weight_in_water, 5.89e8))
     return FloatingBody(coefficients, mass, tuple(lines), 6000.0)

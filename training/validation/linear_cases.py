@@ -1,11 +1,11 @@
-"""Linear models of this plant against OpenFAST's of the same turbine, above rated wind.
+"""Compares linear models of fowt_env with those of OpenFAST for the same turbine, above rated wind.
 
-OpenFAST's come from ROSCO's repository and belong to an older deck of the IEA 15 MW on VolturnUS-S, which
-`old_deck` builds from its figures: a lighter tower, other nacelle and hub, blades whose radii are 0.97 m
-smaller, another generator, g = 9.80665. HydroDyn linearises by steps of 0.02 deg times the depth in
-translation and 2 deg in rotation (HydroDyn.f90, HD_Perturb_u), so that its quadratic drag leaves the damping
-of such a velocity; the same is added here. What differs still: their radiation is the deck's state-space fit,
-their blades turn in the potential flow around the tower, and sway, roll and yaw are held.
+The OpenFAST models are from the ROSCO repository and belong to an older deck of the IEA 15 MW on VolturnUS-S,
+which `old_deck` builds: lighter tower, other nacelle, hub and generator, blade radii 0.97 m smaller,
+g = 9.80665. HydroDyn linearises with steps of 0.02 deg times the depth in translation and 2 deg in rotation
+(HydroDyn.f90, HD_Perturb_u); the damping that its quadratic drag has at such a velocity is added here.
+Remaining differences in OpenFAST: radiation by the state-space fit of the deck, potential flow around the
+tower at the blades, and fixed sway, roll and yaw.
 """
 
 from dataclasses import replace
@@ -21,14 +21,14 @@ from fowt_env.training.validation.comparison import phase
 from fowt_env.training.validation.openfast_cases import table
 
 PLATFORM = "iea15_volturnus_s"
-WINDS = (13.0, 15.0, 18.0, 21.0, 24.0)  # m/s, constant generator torque in OpenFAST's models
+WINDS = (13.0, 15.0, 18.0, 21.0, 24.0)  # m/s, constant generator torque in the OpenFAST models
 SHEAR = 0.12
 OUTPUTS = {"rotor_speed": ("rotor_speed", "rad/s"), "pitch": ("platform_pitch", "rad")}
 SHOWN = (0.05, 0.1, 0.2, 0.3, 0.5)  # rad/s, of the responses
-# figures of the older deck, kg, m, kg m2
+# values of the older deck, kg, m, kg m2
 TOWER = {
     "mass": 1262976.4, "cm_height": 55.9245, "inertia": (1.3972144e9, 1.3972144e9, 0.0),
-    # TwrCd 1.0 on the diameters of AeroDyn's table, of which this taper has the same area
+    # TwrCd 1.0 on the diameters of AeroDyn; this taper has the same area
     "base_diameter": 10.0, "top_diameter": 6.5, "drag_coefficient": 0.9974,
 }  # fmt: skip
 TOWER_TOP = 144.495
@@ -43,11 +43,11 @@ PLATFORM_DEPTH = 14.94
 TORQUE = 1.962e7  # N m
 HEAVE_STIFFNESS = 445.0687 * 1025.0 * 9.80665  # N/m
 GRAVITY = 9.80665
-DRAG_STEPS = np.radians([0.02 * 200.0] * 3 + [2.0] * 3)  # m/s and rad/s, of HydroDyn's differences
+DRAG_STEPS = np.radians([0.02 * 200.0] * 3 + [2.0] * 3)  # m/s and rad/s, perturbations in HydroDyn
 
 
 def old_deck():
-    """Return Platform and Turbine with the figures of the older deck."""
+    """Return Platform and Turbine with the values of the older deck."""
     platform = read_platform(PLATFORM)
     turbine = read_turbine(platform.turbine)
     flow = platform.potential_flow
@@ -78,7 +78,7 @@ def _turbine(turbine):
     top = YAW_BEARING + NACELLE
     reduced = NACELLE * YAW_BEARING / top
     gap_x, gap_z = NACELLE_PLACE[0], NACELLE_PLACE[1] - TOWER_TOP
-    own = NACELLE_YAW_INERTIA - NACELLE * NACELLE_PLACE[0] ** 2
+    yawing = NACELLE_YAW_INERTIA - NACELLE * NACELLE_PLACE[0] ** 2
     law, ratio = turbine.torque_law, turbine.drivetrain.gear_ratio
     changes = {
         "rotor": {
@@ -95,13 +95,13 @@ def _turbine(turbine):
             "mass": top,
             "cm_downwind": NACELLE * NACELLE_PLACE[0] / top,
             "cm_height": (NACELLE * NACELLE_PLACE[1] + YAW_BEARING * TOWER_TOP) / top,
-            "inertia": (reduced * gap_z**2, reduced * (gap_x**2 + gap_z**2), own + reduced * gap_x**2),
+            "inertia": (reduced * gap_z**2, reduced * (gap_x**2 + gap_z**2), yawing + reduced * gap_x**2),
         },
         "torque_law": {
             "rated_torque": TORQUE,
             "rated_power": TORQUE * (turbine.rated_rotor_speed * ratio),
             "max_torque": max(TORQUE, law.max_torque),
-            # below rated nothing is compared: the curve only has to meet the other rated torque
+            # not compared below rated: the curve only has to end at the other rated torque
             "region2_constant": law.region2_constant * TORQUE / law.rated_torque,
         },
         "drivetrain": {"generator_inertia": GENERATOR_INERTIA / ratio**2},
@@ -114,19 +114,19 @@ def _turbine(turbine):
 def named_poles(matrix, states):
     """Return {motion: pole with positive imaginary part, rotor: real pole} by participation factors.
 
-    Those of a mode are its right times its left eigenvector; a motion's are those of place and velocity.
+    Factor of a state in a mode: product of right and left eigenvector; of a motion: sum over its states.
     """
     value, right = np.linalg.eig(matrix)
-    share = np.abs(right.T * np.linalg.inv(right))  # (mode, state)
-    found, used = {}, set()
+    participation = np.abs(right.T * np.linalg.inv(right))  # (mode, state)
+    poles, used = {}, set()
     pairs = {"surge": ("surge", "vx"), "heave": ("heave", "vz"), "pitch": ("platform_pitch", "wy")}
     for name, motion in {"rotor": ("rotor_speed",), **pairs}.items():
         fits = np.abs(value.imag) < 1e-9 if name == "rotor" else value.imag > 0.0
-        order = np.argsort(-share[:, [states.index(state) for state in motion]].sum(axis=1))
+        order = np.argsort(-participation[:, [states.index(state) for state in motion]].sum(axis=1))
         mode = next(m for m in order if fits[m] and m not in used)
-        found[name] = value[mode]
+        poles[name] = value[mode]
         used.add(mode)
-    return found
+    return poles
 
 
 def linear(study):
@@ -141,7 +141,7 @@ def linear(study):
             platform, wind={"kind": "steady", "speed": wind}, turbine=turbine, rotor="bem", skewed_wake=True,
             shear_exponent=SHEAR, radiation="state_space", fidelity="reference",
         )  # fmt: skip
-        drag = scene.model.hydro.matrices  # with the damping that HydroDyn's differences make of it
+        drag = scene.model.hydro.matrices  # add the damping that results from the perturbations in HydroDyn
         damping = drag.linear_damping + drag.quadratic_damping * DRAG_STEPS
         model = linearize(scene.with_model({"hydro.matrices.linear_damping": damping}))
         theirs = poles[np.isclose(poles["wind_mps"], wind)].iloc[0]
@@ -152,7 +152,7 @@ def linear(study):
         ):  # fmt: skip
             there = theirs[column] / (DEGREE if unit == "deg" else 1.0)
             study.add(case, f"operating point, {name}", unit, there, model.point[name])
-        # the blade pitch becomes an input, the azimuth has no part
+        # blade pitch becomes an input; the azimuth is dropped
         states = [name for name in model.states if name not in ("blade_pitch", "azimuth")]
         kept = [model.states.index(name) for name in states]
         matrix = model.A[np.ix_(kept, kept)]

@@ -1,8 +1,8 @@
-"""The OC4 semi-submersible against OpenFAST with members: decays and an irregular sea, rotor at rest.
+"""Compares the OC4 semi-submersible with OpenFAST with members: decays and an irregular sea, rotor at rest.
 
-Both sides have the deck's coefficients; the excitation, which the deck lacks, is that of the package. The
-water in the columns turns as a solid in HydroDyn v5. The published inertia, which the platform's file has,
-is of water on the columns' axes: 4 % less in pitch; the period with it is reported.
+Both models use the coefficients of the deck; the excitation, which the deck lacks, is that of the package.
+In HydroDyn v5 the water in the columns rotates as a solid. The published inertia (platform file) has that
+water on the column axes: 4 % less pitch inertia; the resulting period is reported.
 """
 
 from dataclasses import replace
@@ -20,17 +20,17 @@ DECAYS = {  # case: (channel, start value, seconds, cycles counted)
     "decay_heave": (Channel.HEAVE, 3.0, 100.0, 4),
     "decay_pitch": (Channel.PITCH, 6.0, 150.0, 4),
 }
-# water of each of three columns, of its upper part and of its base, by the deck's HydroDyn file
+# water in each of three columns: upper part and base, from the HydroDyn file of the deck
 WATER = ((1025.0, 5.94, 7.83), (1025.0, 11.94, 5.05))  # density kg/m3, radius inside m, height m
 
 
 def with_solid_water():
-    """Return the platform with the water in its columns turning as a solid."""
-    found = read_platform(PLATFORM)
+    """Return the platform with the water in the columns rotating as a solid."""
+    platform = read_platform(PLATFORM)
     square = sum(3.0 * density * pi * radius**4 * height for density, radius, height in WATER)
     added = (0.25 * square, 0.25 * square, 0.5 * square)
-    inertia = tuple(own + more for own, more in zip(found.ballast.inertia, added, strict=True))
-    return found.model_copy(update={"ballast": found.ballast.model_copy(update={"inertia": inertia})})
+    inertia = tuple(a + b for a, b in zip(platform.ballast.inertia, added, strict=True))
+    return platform.model_copy(update={"ballast": platform.ballast.model_copy(update={"inertia": inertia})})
 
 
 def _run(case, duration, **settings):
@@ -53,14 +53,14 @@ RUNS = {
 
 
 def decays(study):
-    """Compare free decays with members' drag: period 0.2 %, decrement 2 %, rms of the record 1 %.
+    """Compare free decays with drag on members: period 0.2 %, decrement 2 %, rms error 1 %.
 
-    HydroDyn's members keep their upright direction: 1 - cos(6 deg) is 0.5 %. Its strips of 2 to 6 m make
-    less than 1 % of the drag of a velocity that is linear along a column.
+    HydroDyn keeps members upright: 1 - cos(6 deg) is 0.5 %. Its strips of 2 to 6 m change the drag of a
+    velocity that is linear along a column by less than 1 %.
     """
     for case, (channel, _, seconds, cycles) in DECAYS.items():
         study.add_decay(case, channel, seconds, 0.2, 2.0, 1.0, cycles=cycles, counted=(1,))
-    study.say(f"{case}, published inertia")  # the last one, of pitch
+    study.say(f"{case}, published inertia")  # the last case: pitch
     _, _, time, theirs, _ = study.series(case, channel)
     ours = replace(RUNS[case], platform=PLATFORM).frame(study.folder)[channel].to_numpy()
     centre = theirs[time > 0.5 * seconds].mean()
@@ -69,9 +69,9 @@ def decays(study):
 
 
 def waves(study):
-    """Compare irregular waves Hs 7.5 m: deviations after 100 s 2 %, with difference frequencies 5 %.
+    """Compare motions in irregular waves, Hs 7.5 m: standard deviations after 100 s 2 %, with the QTF 5 %.
 
-    The run with MoorDyn, whose lines have drag and inertia, is reported alone.
+    The MoorDyn run (lines with drag and inertia) is reported without limits.
     """
     for case, allowed in (("", 2.0), ("_qtf", 5.0), ("_moordyn", float("nan"))):
         study.add_statistics(f"waves_Hs7.5{case}", Channel.PLANE, std=allowed)

@@ -1,4 +1,4 @@
-"""The OpenFAST reference runs: where they are, and how this plant is run on the same case."""
+"""Defines the OpenFAST reference runs: their files, and the settings of fowt_env for the same cases."""
 
 import lzma
 from dataclasses import dataclass, field
@@ -14,7 +14,7 @@ from fowt_env.scene.build import build_scene
 
 PLATFORM = "oc3_hywind_openfast"
 FOLDER = Path(__file__).parent / "reference"
-NAMED = {  # channel as simulate names it: column of a reference file, in the same unit
+NAMED = {  # channel of simulate: column of a reference file, in the same unit
     "Time_[s]": "time_s", "Wave1Elev_[m]": "wave_elev_m", "PtfmSurge_[m]": "surge_m",
     "PtfmSway_[m]": "sway_m", "PtfmHeave_[m]": "heave_m", "PtfmRoll_[deg]": "roll_deg",
     "PtfmPitch_[deg]": "pitch_deg", "PtfmYaw_[deg]": "yaw_deg", "RotSpeed_[rpm]": "rotor_speed_rpm",
@@ -25,7 +25,7 @@ NAMED = {  # channel as simulate names it: column of a reference file, in the sa
     "TTDspSS_[m]": "tower_top_ss_m", "TwrBsMyt_[kN-m]": "twr_base_My_kNm",
     "TwrBsMxt_[kN-m]": "twr_base_Mx_kNm", "NcIMUTAxs_[m/s^2]": "nacelle_acc_x_mps2",
 }  # fmt: skip
-COLUMNS = {column: channel for channel, column in NAMED.items()} | {  # those in kN and kN m become N and N m
+COLUMNS = {column: channel for channel, column in NAMED.items()} | {  # kN and kN m are converted to N and N m
     "aero_thrust_kN": "RtFldFxh_[N]", "aero_torque_kNm": "RtFldMxh_[N-m]", "hydro_Fx_kN": "HydroFxi_[N]",
     "hydro_Fz_kN": "HydroFzi_[N]", "hydro_My_kNm": "HydroMyi_[N-m]",
 }  # fmt: skip
@@ -44,19 +44,19 @@ def _path(folder, name):
     path = Path(folder or FOLDER) / name
     if not path.is_file():
         raise InputError(
-            f"reference file {str(path)!r} not found: the OpenFAST runs come with the source tree,"
-            " in training/validation/reference; point --reference at that folder"
+            f"reference file {str(path)!r} not found: the OpenFAST runs are part of the source tree"
+            " (training/validation/reference); set --reference to that folder"
         )
     return path
 
 
 def table(name, folder=None):
-    """Return a file of the references as a DataFrame. Raises: InputError if absent."""
+    """Return a file of the reference folder as a DataFrame. Raises: InputError if absent."""
     return pd.read_csv(_path(folder, name), comment="#")
 
 
 def reference(case, folder=None, place=""):
-    """Return a reference run of a folder as a DataFrame, columns as of simulate. Raises: InputError."""
+    """Return a reference run as a DataFrame with the columns of simulate. Raises: InputError if absent."""
     frame = table(f"{place}/{case}.csv.gz" if place else f"{case}.csv.gz", folder)
     thousands = [name for name in frame if "kN" in name and "[N" in COLUMNS[name]]
     frame[thousands] *= 1e3
@@ -64,7 +64,7 @@ def reference(case, folder=None, place=""):
 
 
 def steady_reference(folder=None):
-    """Return a DataFrame of the steady curve, one row per wind speed (columns as in the file)."""
+    """Return the steady operating points as a DataFrame, one row per wind speed (columns as in the file)."""
     return table("steady.csv.gz", folder)
 
 
@@ -75,7 +75,7 @@ def hub_wind(folder=None, bts=None):
 
 
 def wave_components(folder=None):
-    """Return the sea specification of the recorded wave components (there omega t + phase, here minus)."""
+    """Return the sea specification of the recorded wave components (file: omega t + phase; here: minus)."""
     frame = table("waves_hs7.5_tp10.csv.gz", folder)
     return {
         "kind": "components",
@@ -86,9 +86,9 @@ def wave_components(folder=None):
 
 
 def box_wind(folder=None, bts=None):
-    """Return the wind specification of the TurbSim box: the file bts, or without one the stored region.
+    """Return the wind specification of the TurbSim box: file bts, or the stored region if None.
 
-    It is rounded to 0.04 m/s (u) and 0.08 m/s (v, w), see training/validation/reference/make.py.
+    The stored region is rounded to 0.04 m/s (u) and 0.08 m/s (v, w): training/validation/reference/make.py.
     """
     if bts is not None:
         return {"kind": "bts", "path": str(bts)}
@@ -105,11 +105,11 @@ def box_wind(folder=None, bts=None):
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """One reference run as this project's plant repeats it."""
+    """Holds the settings with which fowt_env repeats a reference run."""
 
     case: str  # name of the reference file
     duration: float
-    dt: float  # of the deck: physics step and control period here too
+    dt: float  # s, of the deck; used as physics step and control period
     wind: object = None  # function of (folder, bts) -> wind specification, or the specification
     sea: object = None
     controlled: bool = False
@@ -118,18 +118,18 @@ class ReferenceRun:
     platform: object = PLATFORM  # name, or function that returns the description
     controller: object = "openfast_oc3"  # name, or function of (folder) -> controller
     output_dt: float = 0.1  # of the reference file
-    place: str = ""  # folder of the reference file in that of all of them
-    held: bool = False  # platform and rotor speed
-    before: float = 0.0  # s that this plant runs before the reference begins, its wake settling
+    place: str = ""  # subfolder of the reference file
+    held: bool = False  # whether platform and rotor speed are fixed
+    before: float = 0.0  # s simulated before the reference starts, for the wake to settle
 
     def theirs(self, folder=None):
-        """Return OpenFAST's run as a DataFrame. Raises: InputError if absent."""
+        """Return the OpenFAST run as a DataFrame. Raises: InputError if absent."""
         return reference(self.case, folder, self.place)
 
     def frame(self, folder=None, bts=None, dt=None, wind=None, rotor="bem", progress=False, **options):
-        """Return this plant's run at the reference's times as a DataFrame.
+        """Simulate the case and return a DataFrame at the times of the reference.
 
-        wind, dt None: the run's own; options: of build_scene, and controller.
+        wind, dt: None: those of the run; options: of build_scene, and controller.
         """
         if wind is None:
             wind = self.wind(folder, bts) if callable(self.wind) else self.wind
@@ -156,7 +156,7 @@ class ReferenceRun:
 
 
 def without_rosco():
-    """Return why ROSCO's library is not installed, or None where it is."""
+    """Return the error message of a missing ROSCO library, or None if the library is installed."""
     try:
         find_library()
     except InputError as error:
@@ -165,12 +165,12 @@ def without_rosco():
 
 
 def rotor_start(rotor_speed, blade_pitch):
-    """Return the initial conditions of a rotor speed (rpm) and blade pitch (deg)."""
+    """Return initial conditions with a rotor speed (rpm) and blade pitch (deg)."""
     return {"RotSpeed": rotor_speed, "BldPitch1": blade_pitch}
 
 
 def _run(case, duration, dt, start, **settings):
-    """Return a ReferenceRun under control that starts at (rotor speed rpm, blade pitch deg)."""
+    """Return a controlled ReferenceRun that starts at (rotor speed in rpm, blade pitch in deg)."""
     return ReferenceRun(case, duration, dt, controlled=True, initial=rotor_start(*start), **settings)
 
 

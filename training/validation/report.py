@@ -1,4 +1,4 @@
-"""Reports of a validation: the table (CSV and Markdown) and plots of the compared series."""
+"""Writes reports of a validation: tables (CSV and Markdown) and plots of the compared series."""
 
 from datetime import UTC, datetime
 from functools import partial
@@ -27,7 +27,7 @@ OPERATING, WAVE = (*TURNING, Channel.TENSIONS[0]), (*Channel.PLANE, Channel.TENS
 BENDING = (Channel.PITCH, Channel.SPEED, "TTDspFA_[m]", "TwrBsMyt_[kN-m]")
 WAKE = (Channel.THRUST, Channel.TORQUE)
 WHOLE, LONG, SHORT = (0.0, 600.0), (100.0, 400.0), (100.0, 200.0)  # s
-PLOTS = {  # platform: {case: (channels, seconds shown, whether their spectra are drawn)}
+PLOTS = {  # platform: {case: (channels, time range in s, whether spectra are plotted)}
     "oc3_hywind": {
         "float_steady_8mps": (OPERATING, WHOLE, False),
         "float_steady_18mps": (OPERATING, WHOLE, False),
@@ -72,9 +72,9 @@ COST_PLOTS = {  # file -> (title, {legend: run})
 
 
 def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=False):
-    """Return a figure of a panel for each (channel, {legend: frame}) below each other, written to a path.
+    """Plot stacked panels, one per (channel, {legend: frame}), save them to a path and return the figure.
 
-    draw(axes, frame, channel, **style): draws one line. squared: labels are those of power densities.
+    draw(axes, frame, channel, **style): draws one line. squared: label axes as power densities.
     """
     figure = new_figure(9.0, 0.8 + height * len(panels))
     shared = all(frames is panels[0][1] for _, frames in panels)
@@ -100,12 +100,12 @@ def _series(axes, frame, channel, window=(0.0, np.inf), **style):
 
 
 def _overlay(frames, channels, window, path, title):
-    """Draw stacked time series of {legend: frame} over each other."""
+    """Plot time series of {legend: frame}, one panel per channel."""
     return _stack([(c, frames) for c in channels], partial(_series, window=window), path, title)
 
 
 def _spectra(frames, channels, path, title, start=100.0):
-    """Draw power spectra of {legend: frame} over each other, on logarithmic axes."""
+    """Plot power spectra of {legend: frame} on logarithmic axes, one panel per channel."""
     tops = {}
 
     def draw(axes, frame, channel, **style):
@@ -120,7 +120,7 @@ def _spectra(frames, channels, path, title, start=100.0):
 
 
 def _decays(study, path):
-    """Draw the decays, each in its own motion."""
+    """Plot the free decays, each in the displaced motion."""
     panels = []
     for case, run in study.cases.items():
         if case in study.runs and case.startswith("decay_"):
@@ -130,12 +130,12 @@ def _decays(study, path):
 
 
 def _steady(study, path):
-    """Draw errors of the steady curve over wind speed."""
+    """Plot errors of the steady operating points over wind speed."""
     table = study.table()
     rows = table[table["case"].str.startswith("steady_")]
     figure = new_figure(9.0, 3.2)
     axes = figure.subplots()
-    style_axes(axes, "wind (m/s)", "difference to OpenFAST (%)")
+    style_axes(axes, "wind (m/s)", "difference from OpenFAST (%)")
     for number, (quantity, chosen) in enumerate(rows.groupby("quantity", sort=False)):
         wind = chosen["case"].str.extract(r"steady_(.*)mps")[0].astype(float)
         style = {"color": COLOURS[number % len(COLOURS)], "markersize": 4, "label": quantity}
@@ -145,7 +145,7 @@ def _steady(study, path):
 
 
 def _responses(study, path):
-    """Draw responses to small waves over frequency: this plant and the frequency domain."""
+    """Plot responses to small waves over frequency, simulated and from the frequency domain."""
     from matplotlib.ticker import NullFormatter
 
     ours, smooth = study.runs["responses"]
@@ -162,7 +162,7 @@ def _responses(study, path):
 
 
 def _poles(study, path):
-    """Draw frequencies and damping ratios of the linear models over wind speed."""
+    """Plot frequencies and damping ratios of the linear models over wind speed."""
     table = study.table()
     table = table[table["case"].str.contains("linear model")]
     wind = table["case"].str.extract(r" at (\S+) ")[0].astype(float)
@@ -181,9 +181,9 @@ def _poles(study, path):
 
 
 def _generator(study, path, per_decade=12):
-    """Draw spectra of the wind at a point and averaged over the rotor: box and generator.
+    """Plot wind spectra of box and generator, at a point and averaged over the rotor.
 
-    Means over bins of equal width in the logarithm of the frequency.
+    Spectra are averaged over bins of equal width in log frequency.
     """
     box, made = study.runs["spectra of the wind"]
     figure = new_figure(9.0, 3.6)
@@ -205,7 +205,7 @@ def _generator(study, path, per_decade=12):
 
 
 def write_plots(study, folder):
-    """Write the plots of the runs of the study; return their paths."""
+    """Write the plots of a study and return their paths."""
     folder, paths = Path(folder), []
 
     def path(name):
@@ -238,25 +238,25 @@ def write_plots(study, folder):
 
 
 def markdown(study, plots=()):
-    """Return Markdown of the tables, one per case, each with the plots of its name; other plots come first.
+    """Return Markdown with one table per case and the plots of that case; other plots come first.
 
-    plots: names of files beside the text
+    plots: file names, in the folder of the text
     """
     cases = list(dict.fromkeys(row.case for row in study.rows))
-    owned = {case: [f"{case}.png", f"{case}_spectra.png"] for case in cases}
-    others = [name for name in plots if not any(name in names for names in owned.values())]
+    plots_of = {case: [f"{case}.png", f"{case}_spectra.png"] for case in cases}
+    others = [name for name in plots if not any(name in names for names in plots_of.values())]
 
     def images(names):
-        found = [f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names]
-        return [*found, ""] if found else []
+        links = [f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names]
+        return [*links, ""] if links else []
 
     def shown(value, digits=5):
         return "" if not np.isfinite(value) else f"{value:.{digits}g}"
 
     lines = [
-        f"# Every figure of {study.platform}", "",
+        f"# All results of {study.platform}", "",
         f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}: `fowt validate --platform"
-        f" {study.platform}`. Without an allowed error a figure is reported, not judged.", "",
+        f" {study.platform}`. Quantities without an allowed error are reported only.", "",
         *images(others),
     ]  # fmt: skip
     for case in cases:
@@ -268,14 +268,14 @@ def markdown(study, plots=()):
             values = shown(row.openfast), shown(row.here), error, shown(row.allowed, 6)
             cells.append((quantity, row.unit, *values))
         against = "OpenFAST" if "against" not in case else "reference"
-        header = ("figure", "unit", against, "here", "error %", "allowed %")
+        header = ("quantity", "unit", against, "here", "error %", "allowed %")
         lines += [f"## {case}", "", markdown_table(header, cells), ""]
-        lines += images(name for name in owned[case] if name in plots)
+        lines += images(name for name in plots_of[case] if name in plots)
     return "\n".join(lines)
 
 
 def write_validation_report(study, folder, plots=True):
-    """Write validation.csv, validation.md and, with plots, one or two images per case; return the paths."""
+    """Write validation.csv, validation.md and (with plots) one or two images per case; return the paths."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     remove_leftovers(folder)

@@ -1,6 +1,6 @@
-"""Semi-submersible and barge against the frequency domain: natural periods, and responses to small waves.
+"""Compares semi-submersible and barge with the frequency domain: natural periods, responses to small waves.
 
-The plant runs in a sea of a few small components without quadratic drag; motions are fitted by frequency.
+Simulations have a sea of a few small components and no quadratic drag; motions are fitted by frequency.
 """
 
 import tomllib
@@ -24,27 +24,27 @@ BODIES = {
 }
 OMEGA = np.array([0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.15, 1.3, 1.5])  # rad/s
 AMPLITUDE = 0.02  # m, of each component
-RAMP, BEGIN, END = 100.0, 200.0, 900.0  # s, of the waves and of what is fitted
+RAMP, BEGIN, END = 100.0, 200.0, 900.0  # s, of the waves; of the fitted interval
 STEP = 0.05  # s
 CHANNELS = {Channel.SURGE: 0, Channel.HEAVE: 2, Channel.PITCH: 4}
-DECAYING = (  # motions that are coupled, and their channels
+DECAYING = (  # coupled motions: their channels
     {"surge": Channel.SURGE, "heave": Channel.HEAVE, "pitch": Channel.PITCH},
     {"sway": "PtfmSway_[m]", "roll": "PtfmRoll_[deg]", "yaw": "PtfmYaw_[deg]"},
 )
-OFFSET = 0.1  # m and deg from rest, at which all six motions begin
+OFFSET = 0.1  # m and deg from equilibrium, start of all six motions
 SETTLING, DECAY = 5.0, 400.0  # s
-SMALL = 0.02  # of the largest response: smaller ones are judged by their share of it
+SMALL = 0.02  # of the largest response: errors of smaller ones are relative to this fraction of it
 
 
 def body_of(name):
-    """Return the FloatingBody of a built-in platform from the arrays that its file names."""
+    """Return the FloatingBody of a built-in platform, with the coefficients named in the platform file."""
     path = DATA / "platforms" / f"{name}.toml"
     table = tomllib.loads(path.read_text())["potential_flow"]
     return BODIES[name](frequency_domain.read_arrays(path.parent / table["coefficients"]))
 
 
 def without_drag(scene):
-    """Return the scene without quadratic drag, neither that of the matrices nor that of members."""
+    """Return the scene without the quadratic drag of matrices and members."""
     hydro, parts = scene.model.hydro, {}
     if hydro.matrices is not None:
         zero = np.zeros_like(hydro.matrices.quadratic_damping)
@@ -55,7 +55,7 @@ def without_drag(scene):
 
 
 def _decaying(time, rates):
-    """Return a list of series: one, and cosine and sine of each decaying mode of a complex rate (1/s)."""
+    """Return a list of series: ones, then cosine and sine of the decaying modes of complex rates (1/s)."""
     columns = [np.ones_like(time)]
     for rate in rates:
         envelope = np.exp(-rate.real * (time - time[0]))
@@ -64,7 +64,7 @@ def _decaying(time, rates):
 
 
 def fitted(time, value, omega, slow):
-    """Return complex amplitudes (n,) of value ~ Re(sum c exp(i omega t)) beside modes of rates slow."""
+    """Return complex amplitudes (n,) of value ~ Re(sum c exp(i omega t)) plus modes of rates slow."""
     waves = [wave for w in omega for wave in (np.cos(w * time), -np.sin(w * time))]
     one, *modes = _decaying(time, slow)
     solution = np.linalg.lstsq(np.column_stack([one, *waves, *modes]), value, rcond=None)[0]
@@ -72,7 +72,7 @@ def fitted(time, value, omega, slow):
 
 
 def sea(omega):
-    """Return the sea specification of the small components, phases spread so that they do not add up."""
+    """Return the sea specification of the small components, with phases that spread their crests."""
     phase = 2.0 * np.pi * np.arange(len(omega)) ** 2 / (2.0 * len(omega))
     return {
         "kind": "components", "omega": omega, "amplitude": np.full(len(omega), AMPLITUDE), "phase": phase,
@@ -81,9 +81,9 @@ def sea(omega):
 
 
 def modal_rates(time, values, guess):
-    """Return complex rates (n,), 1/s and rad/s, of the decaying modes that (m, k) values consist of.
+    """Return complex rates (n,), 1/s and rad/s, of the decaying modes in values (m, k).
 
-    values ~ c + sum Re(a_j exp(s_j t)), the same s_j = -rate.real + i rate.imag in all columns.
+    values ~ c + sum Re(a_j exp(s_j t)) with common s_j = -rate.real + i rate.imag in all columns.
     """
     scale = values.std(axis=0)
 
@@ -93,12 +93,12 @@ def modal_rates(time, values, guess):
         return ((columns @ solution - values) / scale).ravel()
 
     start = np.array([[rate.real, rate.imag] for rate in guess]).ravel()
-    found = least_squares(misfit, start, x_scale=np.abs(np.repeat(start[1::2], 2))).x.reshape(-1, 2)
-    return found[:, 0] + 1j * found[:, 1]
+    rates = least_squares(misfit, start, x_scale=np.abs(np.repeat(start[1::2], 2))).x.reshape(-1, 2)
+    return rates[:, 0] + 1j * rates[:, 1]
 
 
 def periods(name, study):
-    """Compare damped natural periods of small free decays with those of Cummins' equation in numpy: 1 %."""
+    """Compare damped natural periods of small free decays with Cummins' equation in numpy: 1 %."""
     study.say("natural periods")
     scene = without_drag(build_scene(name, fidelity="reference"))
     point, channels = trim(scene), [channel for group in DECAYING for channel in group.values()]
@@ -124,11 +124,11 @@ def periods(name, study):
 
 
 def rao(name, study):
-    """Compare responses to small waves, 0.2 to 1.5 rad/s, with the frequency domain: amplitude 1 %."""
+    """Compare responses to small waves from 0.2 to 1.5 rad/s with the frequency domain: amplitude 1 %."""
     study.say("responses to small waves")
     body = body_of(name)
     known = body.coefficients["excitation_omega"]
-    omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # the plant has no force outside its table
+    omega = OMEGA[(OMEGA >= known[0]) & (known[-1] >= OMEGA)]  # excitation is zero outside the table
     waves = sea(omega)
     scene = without_drag(build_scene(name, sea=waves, duration=END, fidelity="reference"))
     frame = simulate(scene, None, duration=END, dt=STEP, output_dt=0.1)
@@ -143,21 +143,21 @@ def rao(name, study):
     for channel, motion in CHANNELS.items():
         label, unit = name_and_unit(channel)
         factor = 1.0 / DEGREE if unit == "deg" else 1.0
-        # the elevation is a cos(omega t - e) at the origin: the same phase is taken off
+        # elevation at the origin is a cos(omega t - e): subtract the phase e
         here = fitted(time, kept[channel].to_numpy(), omega, slow) / AMPLITUDE * np.exp(1j * waves["phase"])
         there = theirs[:, motion] * factor
         largest = np.abs(there).max()
-        for w, mine, wanted in zip(omega, here, there, strict=True):
-            error = 100.0 * (abs(mine) - abs(wanted)) / max(abs(wanted), SMALL * largest)
+        for w, mine, exact in zip(omega, here, there, strict=True):
+            error = 100.0 * (abs(mine) - abs(exact)) / max(abs(exact), SMALL * largest)
             quantity = f"{label} per metre of wave at {w:g} rad/s"
             study.add(
-                "responses to small waves (against the frequency domain)", quantity, f"{unit}/m", abs(wanted),
-                abs(mine), error, 1.0, phase(mine, wanted),
+                "responses to small waves (against the frequency domain)", quantity, f"{unit}/m", abs(exact),
+                abs(mine), error, 1.0, phase(mine, exact),
             )  # fmt: skip
         ours[label], smooth[label] = np.abs(here), factor * curves[:, motion]
     study.runs["responses"] = (pd.DataFrame(ours), pd.DataFrame(smooth))
 
 
 def groups(name):
-    """Return {group: (function, runs)} of a platform."""
+    """Return {group: (function, number of runs)} of a platform."""
     return {"periods": (partial(periods, name), 1), "responses": (partial(rao, name), 1)}

@@ -1,4 +1,4 @@
-"""Measures of how far one time series is from another: decays, harmonics, band energies, errors."""
+"""Computes decay parameters, harmonics, band energies and rms errors of time series."""
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -7,13 +7,13 @@ from fowt_env.errors import InputError
 
 
 def crossings(time, value):
-    """Return the times (n,) at which a series passes zero, linear between samples."""
+    """Return the times (n,) of the zero crossings of a series, by linear interpolation."""
     at = np.flatnonzero((value[:-1] > 0.0) != (value[1:] > 0.0))
     return time[at] - value[at] * (time[at + 1] - time[at]) / (value[at + 1] - value[at])
 
 
 def extrema(time, value):
-    """Return the extrema (n,) between successive zero crossings, by parabolas through the largest samples."""
+    """Return the extrema (n,) between successive zero crossings, by a parabola through each maximum."""
     edges = np.flatnonzero((value[:-1] > 0.0) != (value[1:] > 0.0)) + 1
     result = []
     for low, high in zip(np.concatenate(([0], edges[:-1])), edges, strict=True):
@@ -28,7 +28,7 @@ def extrema(time, value):
 
 
 def decay_period(time, value, centre, cycles=4):
-    """Return the mean period (s) of the first cycles of a decay, between zero crossings about a centre."""
+    """Return the mean period (s) of the first cycles of a decay, from its crossings of a centre value."""
     at = crossings(time, value - centre)
     if len(at) < 2 * cycles + 1:
         raise InputError(f"decay: {len(at)} zero crossings, {2 * cycles + 1} are needed for {cycles} cycles")
@@ -36,7 +36,7 @@ def decay_period(time, value, centre, cycles=4):
 
 
 def decay_decrement(time, value, centre, cycle=1):
-    """Return the logarithmic decrement of a cycle (1: the first) from peak-to-peak values a cycle apart."""
+    """Return the logarithmic decrement of a cycle (from 1), from peak-to-peak values one cycle apart."""
     peaks = extrema(time, value - centre)
     height = np.abs(np.diff(peaks))
     return float(np.log(height[2 * cycle - 2] / height[2 * cycle]))
@@ -45,7 +45,7 @@ def decay_decrement(time, value, centre, cycle=1):
 def ringing(time, value, low, high):
     """Return (Hz, damping ratio) of a damped oscillation between two frequencies (Hz), by least squares.
 
-    A polynomial of eighth order takes slower motion.
+    Slower motion is fitted by a polynomial of eighth order.
     """
     at = (time - time.mean()) / (0.5 * (time[-1] - time[0]))
     slow = np.polynomial.chebyshev.chebvander(at, 8)
@@ -55,21 +55,21 @@ def ringing(time, value, low, high):
     inside = (frequency >= low) & (frequency <= high)
     largest = np.argmax(np.abs(np.fft.rfft(rest * np.hanning(len(time)), size)) * inside)
 
-    def left(figures):
-        omega, ratio = figures
+    def residual(parameters):
+        omega, ratio = parameters
         waves = np.exp((1j - ratio) * omega * (time - time[0]))
         basis = np.column_stack([waves.real, waves.imag, slow])
         return value - basis @ np.linalg.lstsq(basis, value, rcond=None)[0]
 
-    found = least_squares(left, [2.0 * np.pi * frequency[largest], 0.005], x_scale=[1e-2, 1e-3]).x
-    return float(found[0] / (2.0 * np.pi)), float(found[1])
+    solution = least_squares(residual, [2.0 * np.pi * frequency[largest], 0.005], x_scale=[1e-2, 1e-3]).x
+    return float(solution[0] / (2.0 * np.pi)), float(solution[1])
 
 
 def recovery(time, value, step, settled):
-    """Return (level before, level after, overshoot, its time) of a series with a step at `step` s.
+    """Return (level before, level after, overshoot, decay time) of a series with a step at `step` s.
 
-    The level after is the mean from `settled` on, the overshoot how far the series passes it, with its sign,
-    its time (s) the integral of the deviation from there on over it: the time constant of an exponential.
+    Level after: mean from `settled` (s). Overshoot: largest signed excess over that level. Decay time (s):
+    integral of the excess from its peak, divided by the overshoot; the time constant of an exponential.
     """
     before, after = value[time < step].mean(), value[time >= settled].mean()
     first = np.flatnonzero(time >= step)[0]
@@ -80,7 +80,7 @@ def recovery(time, value, step, settled):
 
 
 def normalised_rms(value, reference):
-    """Return the rms of the difference over the standard deviation of the reference."""
+    """Return the rms difference divided by the standard deviation of the reference."""
     value, reference = np.asarray(value), np.asarray(reference)
     return float(np.sqrt(np.mean((value - reference) ** 2)) / np.std(reference))
 
@@ -88,8 +88,8 @@ def normalised_rms(value, reference):
 def harmonics(time, value, omega, count=2):
     """Return complex amplitudes (count,) of harmonics: value ~ Re(sum c_k exp(i k omega t)), omega rad/s.
 
-    Projections under a Hann window, whose sidelobes fall so fast that a slow transient in the record
-    (surge, 124 s) does not leak into the second harmonic. time: whole periods, evenly spaced.
+    Projection with a Hann window: its sidelobes keep a slow transient (surge, 124 s) out of the second
+    harmonic. time: whole periods, evenly spaced.
     """
     window = np.hanning(len(time) + 1)[:-1]
     fluctuation = value - np.average(value, weights=window)

@@ -1,6 +1,6 @@
-"""Towers that bend against OpenFAST: frequency, tower-base moment by bands, motions as of rigid ones.
+"""Compares flexible towers with OpenFAST: frequency, tower-base moment by bands, and motions.
 
-VolturnUS-S with the first tower modes alone, as here; OC3-Hywind with every degree of freedom of ElastoDyn.
+In OpenFAST, VolturnUS-S has the first tower modes only, as here; OC3-Hywind all modes of ElastoDyn.
 """
 
 import numpy as np
@@ -11,18 +11,18 @@ from fowt_env.training.validation.signal_errors import band_energy, ringing
 
 MOMENT, ROLLING = "TwrBsMyt_[kN-m]", "TwrBsMxt_[kN-m]"
 FORE_AFT, SIDE_SIDE, NACELLE = "TTDspFA_[m]", "TTDspSS_[m]", "NcIMUTAxs_[m/s^2]"
-# Hz: platform and wind, waves, bending of the tower with the turns of the blades
+# Hz: platform motion and wind; waves; tower bending and blade passing
 BANDS = {"slow": (0.0, 0.05), "waves": (0.05, 0.2), "tower": (0.2, 5.0)}
-RINGING = (0.2, 1.0)  # Hz, in which the tower rings
-RINGING_WINDOW = (2.0, 22.0)  # s of a free decay, after which it has lost half
+RINGING = (0.2, 1.0)  # Hz, range of the tower frequency
+RINGING_WINDOW = (2.0, 22.0)  # s of a free decay, in which the oscillation halves
 MOVING = (*Channel.PLANE, Channel.SPEED, Channel.BLADE, Channel.POWER, Channel.THRUST)
 
 
 def _turbulent(study, case, channels):
-    """Add the rows of a bending tower in turbulence.
+    """Add the rows of a flexible tower in turbulence.
 
-    Base moment over the wind by bands 5 %, deflection 5 %; motions, rotor and lines as of the rigid turbine,
-    deviations 3 %. The rest is reported.
+    Standard deviations: fore-aft base moment (also by bands) and deflection 5 %; motions, rotor and lines
+    3 %, as for the rigid turbine. The rest is reported.
     """
     name, unit, time, *both = study.series(case, MOMENT, SETTLED)
     for band, (low, high) in BANDS.items():
@@ -37,9 +37,9 @@ def _turbulent(study, case, channels):
 
 
 def volturnus(study):
-    """Compare VolturnUS-S: free decay, and 18 m/s turbulence with Hs 7.5 m where ROSCO is installed.
+    """Compare VolturnUS-S in a free decay and, if ROSCO is installed, 18 m/s turbulence with Hs 7.5 m.
 
-    The tower rings in the decay: frequency 1 %, damping ratio 5 %.
+    Tower oscillation in the decay: frequency 1 %, damping ratio 5 %.
     """
     case = "decay_pitch_tower"
     _, _, time, *both = study.series(case, FORE_AFT, *RINGING_WINDOW)
@@ -54,5 +54,5 @@ def volturnus(study):
 
 
 def oc3(study):
-    """Compare OC3-Hywind with ElastoDyn with all its modes: 18 m/s turbulence with Hs 7.5 m."""
+    """Compare OC3-Hywind in 18 m/s turbulence with Hs 7.5 m with ElastoDyn with all modes."""
     _turbulent(study, "turb_18mps_Hs7.5_uniform_flex", (*MOVING, *Channel.TENSIONS))

@@ -1,7 +1,7 @@
-"""Validation of OC3-Hywind against OpenFAST, and the validations of all platforms.
+"""Compares OC3-Hywind with OpenFAST, and runs the validations of all platforms.
 
-Decays and floating steady winds count from the start, turbulence from 100 s on, regular waves over the last
-200 s. An error is normalised by the standard deviation of the reference. Nothing here is adjusted to fit.
+Decays and floating runs in steady wind are compared from the start, turbulent ones after 100 s, regular waves
+over the last 200 s. Errors are normalised by the reference standard deviation. Nothing is tuned to fit.
 """
 
 import numpy as np
@@ -27,13 +27,13 @@ BANDS = {"platform pitch": (0.025, 0.042), "wave": (0.08, 0.125), "rotor speed":
 
 
 def decays(study):
-    """Compare free decays in the six motions: period 0.2 %, decrement 3 %, normalised rms error 3 %."""
+    """Compare free decays in the six motions; allowed: period 0.2 %, decrement 3 %, rms error 3 %."""
     for case, (channel, _, duration) in DECAYS.items():
         study.add_decay(case, channel, duration, period=0.2, decrement=3.0, rms=3.0)
 
 
 def steady(study):
-    """Compare steady winds, platform locked: rotor speed and blade pitch 0.2 %, thrust and torque 0.3 %."""
+    """Compare rotors on a locked platform in steady wind; speed and pitch 0.2 %, thrust and torque 0.3 %."""
     for row in steady_reference(study.folder).to_dict("records"):
         case = f"steady_{row['wind_mps']:g}mps"
         study.say(case)
@@ -49,7 +49,7 @@ def steady(study):
 
 
 def floating(study):
-    """Compare steady winds, floating, from one start: surge, pitch, tensions, rotor speed within 3 % rms."""
+    """Compare floating runs in steady wind: surge, pitch, line tensions and rotor speed, 3 % rms error."""
     channels = (Channel.SURGE, Channel.PITCH, *Channel.TENSIONS, Channel.SPEED)
     for case in ("float_steady_8mps", "float_steady_18mps"):
         for start, words in ((0.0, ", whole record"), (SETTLED, f", t >= {SETTLED:g} s")):
@@ -57,7 +57,7 @@ def floating(study):
 
 
 def waves(study):
-    """Compare a regular wave H 3 m T 5 s: first harmonics 1 %; second ones reported for four kinematics."""
+    """Compare a regular wave, H 3 m, T 5 s: first harmonics 1 %; second ones of four kinematics reported."""
     cases = {"fixed": "regwave_H3T5", "instantaneous": "regwave_H3T5_displaced"}
     for case in cases.values():
         study.add_harmonics(case, (*Channel.PLANE, *Channel.TENSIONS), 5.0, WAVE_WINDOW, vector=True)
@@ -79,7 +79,7 @@ def waves(study):
 
 
 def steps(study):
-    """Compare wind steps 12 to 24 m/s: each step with its mean removed, normalised rms error 5 %."""
+    """Compare wind steps from 12 to 24 m/s: rms error of each step, mean removed, 5 %."""
     case = "float_windsteps_12_24"
     for channel in (Channel.SPEED, Channel.BLADE, Channel.PITCH):
         for number in range(13):
@@ -91,9 +91,9 @@ def steps(study):
 
 
 def turbulence(study):
-    """Compare 18 m/s turbulence with Hs 7.5 m, uniform and full field.
+    """Compare runs in 18 m/s turbulence, uniform and full-field, with waves of Hs 7.5 m.
 
-    Standard deviations 3 %, energies of frequency bands 5 %, rms errors 10 %.
+    Allowed errors: standard deviations 3 %, energies of frequency bands 5 %, rms errors 10 %.
     """
     operating = (Channel.SPEED, Channel.BLADE, Channel.POWER, Channel.THRUST)
     for case in ("turb_18mps_Hs7.5_uniform", "turb_18mps_Hs7.5_box"):
@@ -107,7 +107,7 @@ def turbulence(study):
         study.add_statistics(case, (Channel.PITCH, Channel.SPEED), ("rms",), rms=10.0)
 
 
-GROUPS = {  # name -> (function, runs that it takes)
+GROUPS = {  # name -> (function, number of runs)
     "decays": (decays, 6),
     "steady": (steady, 18),
     "floating": (floating, 2),
@@ -126,10 +126,10 @@ PLATFORMS = {  # name -> function that returns (groups, runs)
 
 
 def validate_cases(groups=None, folder=None, bts=None, report=None, platform="oc3_hywind"):
-    """Return a Study with every row of the groups (names of the platform's groups; None: all but costs).
+    """Run the comparisons of a platform's groups (names; None: all but costs) and return their Study.
 
-    folder: reference series (None: training/validation/reference); bts: the full TurbSim box instead of the
-    stored region; report: called with (text, runs done, runs in all) before each run.
+    folder: reference series (None: training/validation/reference); bts: path of the full TurbSim box, used
+    instead of the stored region; report: called before each run with (text, runs done, total runs).
     Raises: InputError for an unknown platform or group or a missing reference.
     """
     if platform not in PLATFORMS:

@@ -1,6 +1,6 @@
-"""The IEA 15 MW on VolturnUS-S against rigid OpenFAST v5 runs of the public deck, and ROSCO's linear models.
+"""Compares the IEA 15 MW on VolturnUS-S with OpenFAST v5 runs of the public deck and ROSCO's linear models.
 
-Settings of the runs are in the heads of the series. Nothing here is adjusted to fit.
+Settings of the runs are in the headers of the series. Nothing is tuned to fit.
 """
 
 from math import pi
@@ -29,8 +29,8 @@ from fowt_env.training.validation.tower_modes import volturnus as tower
 
 PLATFORM = "iea15_volturnus_s"
 YAW = "PtfmYaw_[deg]"
-DT = 0.025  # s, as OpenFAST's
-# as those runs had it: the wake skewed by the tilt of the shaft, loads of the undisturbed air
+DT = 0.025  # s, as in OpenFAST
+# as in the OpenFAST runs: wake skewed by the shaft tilt, uniform wind
 OPTIONS = {"skewed_wake": True, "shear_exponent": 0.0}
 BENDING = {**OPTIONS, "tower": "modes"}
 DECAYS = {  # case: (channel, start value, seconds, step of the reference)
@@ -41,8 +41,8 @@ DECAYS = {  # case: (channel, start value, seconds, step of the reference)
 }
 WAVE = {"kind": "regular", "H": 4.0, "T": 9.0}
 WAVE_WINDOW = (302.0, 499.9)  # s, twenty-two periods
-STEP, WAKE_SETTLED = 20.0, 100.0  # s, of wind or blade pitch with dynamic inflow, and before the record
-WAKES = {  # case: are its figures judged
+STEP, WAKE_SETTLED = 20.0, 100.0  # s: time of the step of wind or blade pitch; run before the record
+WAKES = {  # case: whether limits apply
     "wake_pitch_step": True,
     "wake_pitch_step_18mps": True,
     "wake_wind_step_18mps_mended": True,
@@ -58,12 +58,12 @@ def _run(case, duration, **settings):
 
 
 def rosco(folder):
-    """Return ROSCO's library as a controller with the deck's DISCON.IN and rotor table."""
+    """Return the ROSCO library as a controller with DISCON.IN and rotor table of the deck."""
     return make("rosco", read_turbine(read_platform(PLATFORM).turbine), DT)
 
 
 def _wake(case, wind, rotor_speed, pitches):
-    """Return a ReferenceRun of a held rotor: wind rises, or blade pitch changes at 2 deg/s."""
+    """Return a ReferenceRun at fixed rotor speed: wind rises, or blade pitch changes at 2 deg/s."""
     begin = WAKE_SETTLED + STEP
     if not isinstance(wind, float):
         times = [0.0, begin, begin + 1.0, begin + 200.0]
@@ -71,8 +71,8 @@ def _wake(case, wind, rotor_speed, pitches):
     first, last = np.radians(pitches)
 
     def pitch(measurement):
-        turned = np.radians(2.0) * max(measurement.time - begin, 0.0)
-        return 0.0, first + np.sign(last - first) * min(turned, abs(last - first))
+        travel = np.radians(2.0) * max(measurement.time - begin, 0.0)
+        return 0.0, first + np.sign(last - first) * min(travel, abs(last - first))
 
     return _run(
         case, 120.0, before=WAKE_SETTLED, held=True, wind=wind, controlled=True,
@@ -112,9 +112,9 @@ RUNS = {
 
 
 def rest(study):
-    """Compare where the platform settles in still water: surge and heave 0.02 m, platform pitch 0.02 deg.
+    """Compare the mean position in still water: surge and heave 0.02 m, platform pitch 0.02 deg.
 
-    Means of the last 540 s, four periods of surge, and of the last 50 s, in which it still moves.
+    Means of the last 540 s (four surge periods) and of the last 50 s, in which the platform still moves.
     """
     for start, words in ((60.0, "last 540 s"), (550.0, "last 50 s")):
         for channel in Channel.PLANE:
@@ -125,19 +125,19 @@ def rest(study):
 
 
 def decays(study):
-    """Compare free decays: period 0.5 %, logarithmic decrement 5 %, rms error of the whole record 4 %."""
+    """Compare free decays: period 0.5 %, logarithmic decrement 5 %, rms error 4 %."""
     for case, (channel, _, seconds, _) in DECAYS.items():
         study.add_decay(case, channel, seconds, period=0.5, decrement=5.0, rms=4.0)
 
 
-# of a straight blade as ElastoDyn has it (its summary): kg, m from the root, kg m2 about the root
+# straight blade of the ElastoDyn summary file: kg, m from the root, kg m2 about the root
 BLADE_MASS, BLADE_CENTRE, BLADE_SQUARE = 68507.6, 27.601, 101086645.0
 GRAVITY = 9.81
 AZIMUTHS = 24
 
 
 def _rotor_means(scene, rotor_speed, pitch):
-    """Return means over a turn: force, moment, root moment of blade 1 (mean, cos, sin part), N and N m."""
+    """Return means over a revolution: force, moment, root moment of blade 1 (mean, cos, sin), N and N m."""
     angles = 2.0 * pi * np.arange(AZIMUTHS) / AZIMUTHS
     loads = [rotor_loads(scene, rotor_speed, pitch, azimuth) for azimuth in angles]
     force, moment = (np.mean([getattr(load, name) for load in loads], axis=0) for name in ("force", "moment"))
@@ -147,10 +147,10 @@ def _rotor_means(scene, rotor_speed, pitch):
 
 
 def _structural_flap(rotor, rotor_speed):
-    """Return (mean, cos part) of the root moment by a straight blade's weight and rotation, N m."""
+    """Return (mean, cos part) of the root moment due to weight and rotation of a straight blade, N m."""
     tilt, cone = rotor.shaft_tilt, rotor.cone
     first = BLADE_MASS * BLADE_CENTRE
-    # weight: down-shaft part g sin(tilt), and g cos(tilt) cos(azimuth) along the blade's radius
+    # weight: g sin(tilt) along the shaft, g cos(tilt) cos(azimuth) along the radius
     mean = first * GRAVITY * np.sin(tilt) * np.cos(cone)
     cosine = -first * GRAVITY * np.cos(tilt) * np.sin(cone)
     turning = rotor_speed**2 * np.sin(cone) * np.cos(cone) * (BLADE_SQUARE + rotor.hub_radius * first)
@@ -158,7 +158,7 @@ def _structural_flap(rotor, rotor_speed):
 
 
 def rotor(study):
-    """Compare steady wind, platform held: rotor loads and root moments 0.5 %, in sheared wind 2 %."""
+    """Compare rotor loads and root moments on a fixed platform in steady wind: 0.5 %, in sheared wind 2 %."""
     for row in table(f"{PLATFORM}/steady.csv.gz", study.folder).to_dict("records"):
         study.say(f"rotor, {row['case']}")
         scene = build_scene(
@@ -175,12 +175,12 @@ def rotor(study):
         _hub_rows(study, case, allowed, row, force, moment)
         if not np.isfinite(row["root1_My_kNm"]):
             continue
-        # out-of-plane root moments: the air's, and a rigid blade's weight and rotation
+        # out-of-plane root moments: aerodynamic, plus weight and rotation of a rigid blade
         mean, cosine = _structural_flap(scene.turbine.rotor, speed)
         flaps = [means[pitch][2] for pitch in pitches]
         for number, flap in enumerate(flaps, 1):
             there, here = row[f"root{number}_My_kNm"], 1e-3 * (flap[0] + mean)
-            study.add(case, f"RootMyc{number}, mean over a turn", "kN-m", there, here, allowed=allowed)
+            study.add(case, f"RootMyc{number}, mean over a revolution", "kN-m", there, here, allowed=allowed)
         for part, here in (("cos", 1e-3 * (flaps[0][1] + cosine)), ("sin", 1e-3 * flaps[0][2])):
             there, words = row[f"root1_My_kNm_{part}"], f"RootMyc1, {part} over the azimuth, of the mean"
             error = 100.0 * (here - there) / row["root1_My_kNm"]
@@ -188,13 +188,13 @@ def rotor(study):
 
 
 def _hub_rows(study, case, allowed, row, force, moment):
-    """Add rows of thrust, torque, and of moments and forces at the hub, judged by a size that is not zero."""
+    """Add rows of thrust, torque, hub moments and forces; errors are relative to a value that is not zero."""
     thrust, torque = row["aero_thrust_N"], row["aero_torque_Nm"]
     size = np.hypot(row["aero_My_Nm"], row["aero_Mz_Nm"])
     for quantity, column, here, scale in (
         ("aerodynamic thrust", "aero_thrust_N", force[0], thrust),
         ("aerodynamic torque", "aero_torque_Nm", moment[0], torque),
-        # moments may pass zero: one percent of the torque is the other yardstick
+        # either moment may be zero; the note has the error relative to the torque
         ("tilting moment at the hub, of both moments", "aero_My_Nm", moment[1], size),
         ("yawing moment at the hub, of both moments", "aero_Mz_Nm", moment[2], size),
         ("side force at the hub, of the thrust", "aero_Fy_N", force[1], thrust),
@@ -207,19 +207,19 @@ def _hub_rows(study, case, allowed, row, force, moment):
 
 
 def regular(study):
-    """Compare a regular wave H 4 m T 9 s: first harmonics of surge, heave and platform pitch within 1 %."""
+    """Compare a regular wave, H 4 m, T 9 s: first harmonics of surge, heave and platform pitch 1 %."""
     study.add_harmonics("regwave_H4T9", Channel.PLANE, WAVE["T"], WAVE_WINDOW)
 
 
 def waves(study):
-    """Compare irregular waves Hs 7.5 m: deviations after 100 s 2 %, with difference-frequency forces 5 %."""
+    """Compare motions in irregular waves, Hs 7.5 m: standard deviations after 100 s 2 %, with the QTF 5 %."""
     for case, allowed in (("waves_Hs7.5", 2.0), ("waves_Hs7.5_qtf", 5.0)):
         study.add_statistics(case, Channel.PLANE, std=allowed)
 
 
 def floating(study):
-    """Compare floating with ROSCO, 12 and 18 m/s and turbulence with Hs 7.5 m: deviations 3 %."""
-    if without_rosco():  # an extra: the other groups need none of it
+    """Compare floating runs with ROSCO, 12 and 18 m/s and turbulence: standard deviations 3 %."""
+    if without_rosco():  # an optional dependency of this group
         study.say("without ROSCO: its library is not installed")
         return
     channels = (*Channel.PLANE, Channel.SPEED, Channel.BLADE, Channel.POWER, Channel.THRUST)
@@ -228,28 +228,28 @@ def floating(study):
 
 
 def wake(study):
-    """Compare dynamic inflow, steps of pitch and wind: loads at rest 0.5 %, overshoot 5 %, its time 10 %.
+    """Compare dynamic inflow at steps of pitch and wind: steady loads 0.5 %, overshoot 5 %, decay time 10 %.
 
-    AeroDyn's time constants are those of the mean induction of the disk, here each element has its own: at
-    0.3, 0.05 more is 11 % more of them. OpenFAST v5.0.0 updates the wake with one wind at both ends of a time
-    step, so that the filter's 0.6 tau_1 dW/dt sees no gust: that run is reported alone, and the judged one is
-    of a mended AeroDyn.
+    AeroDyn computes time constants from the mean induction of the disk, fowt_env per element: at 0.3, an
+    induction higher by 0.05 raises them by 11 %. OpenFAST v5.0.0 updates the wake with the same wind at both
+    ends of a time step, so that the term 0.6 tau_1 dW/dt of the filter misses a gust: this run is only
+    reported, and limits apply to a run of a corrected AeroDyn.
     """
     words = ("before the step", "long after it", "overshoot", "time of the overshoot")
     for case, judged in WAKES.items():
         limits = (0.5, 0.5, 5.0, 10.0) if judged else (np.nan,) * 4
         for channel in (Channel.THRUST, Channel.TORQUE):
             name, unit, time, *both = study.series(case, channel)
-            figures = zip(*(recovery(time, value, STEP, 100.0) for value in both), strict=True)
+            results = zip(*(recovery(time, value, STEP, 100.0) for value in both), strict=True)
             for what, its_unit, pair, allowed in zip(
-                words, (unit,) * 3 + ("s",), figures, limits, strict=True
+                words, (unit,) * 3 + ("s",), results, limits, strict=True
             ):
                 study.add(case, f"{name}, {what}", its_unit, *pair, allowed=allowed)
             study.add_statistics(case, (channel,), ("rms",), STEP, words=" after the step")
 
 
 def memory(study):
-    """Compare states of the radiation memory with convolution, decays and an irregular sea: 1 % rms."""
+    """Compare state-space radiation with convolution, in decays and an irregular sea: rms error 1 %."""
     words = "radiation memory as states (against convolution)"
     for case in ("decay_surge", "decay_heave", "decay_pitch", "waves_Hs7.5"):
         frames = []
@@ -258,12 +258,12 @@ def memory(study):
             frames.append(RUNS[case].frame(study.folder, radiation=kind))
         for channel in Channel.PLANE if case.startswith("waves") else (DECAYS[case][0],):
             name, unit = name_and_unit(channel)
-            dear, cheap = (frame[channel] for frame in frames)
-            quantity, error = f"{name}, rms error over the deviation, {case}", normalised_rms(cheap, dear)
-            study.add(words, quantity, unit, dear.std(), cheap.std(), 100.0 * error, 1.0)
+            reference, fast = (frame[channel] for frame in frames)
+            quantity, error = f"{name}, rms error over the deviation, {case}", normalised_rms(fast, reference)
+            study.add(words, quantity, unit, reference.std(), fast.std(), 100.0 * error, 1.0)
 
 
-GROUPS = {  # name -> (function, runs that it takes)
+GROUPS = {  # name -> (function, number of runs)
     "rest": (rest, 1),
     "decays": (decays, 4),
     "regular": (regular, 1),

@@ -1,10 +1,10 @@
-"""The paper's 1:50 model as description files: Froude-scaled OC3-Hywind with an identified mooring.
+"""Writes the 1:50 model of the paper as description files: Froude-scaled OC3-Hywind, identified mooring.
 
-The paper prints neither masses nor mooring. Identified, so that the six computed periods of Table 1 come out:
-stiffness EA, anchor radius and length of the taut lines (theory.md Eqs. (18)(19)), the floater's pitch
-inertia, and its mass, which keeps weight, lines and buoyancy in balance at the design draft. One factor on
-the polars gives the Froude-scaled rated thrust in the rated condition of the paper (LC2), whose wind is
-twice the Froude-scaled one: at the model's Reynolds number airfoils lift less.
+The paper gives neither masses nor mooring. Identified from the six computed periods of Table 1: stiffness EA,
+anchor radius and length of the taut lines (theory.md Eqs. (18)(19)), pitch inertia of the floater, and its
+mass, which balances weight, lines and buoyancy at the design draft. A factor on the polars gives the
+Froude-scaled rated thrust in the rated condition of the paper (LC2), whose wind is twice the Froude-scaled
+one: at the Reynolds number of the model, airfoils have less lift.
 """
 
 from math import cos, hypot, pi, sin
@@ -31,21 +31,21 @@ from fowt_env.training.studies.froude_model.scale import (
 NAME = "liu_1_50"
 TURBINE = NAME
 SCALE = 1.0 / 50.0
-WATER = 1000.0  # kg/m3: a fresh-water tank, a choice; the paper does not say
-DEPTH = 4.0  # m: 200 m at full scale, the depth of the tests by Koo et al. that the paper's mooring is from
+WATER = 1000.0  # kg/m3: fresh water assumed; not stated in the paper
+DEPTH = 4.0  # m: 200 m at full scale, depth of the tests by Koo et al., the source of the paper's mooring
 PERIODS = {  # s, Table 1, computed
     "surge": 10.24, "sway": 10.24, "heave": 3.66, "roll": 4.27, "platform_pitch": 4.27, "yaw": 3.15,
 }  # fmt: skip
 AZIMUTHS = (0.0, 120.0, 240.0)  # deg, of the anchors, as in OC3
-BRIDLE = 60.0  # deg to either side: the hull points of a delta, half-way to the next line's
-WET_WEIGHT = 0.02  # N/m, a thin wire: its sag (below 0.3 % of the span) does not matter, a choice
+BRIDLE = 60.0  # deg to either side: hull points of a delta, half-way to the next line
+WET_WEIGHT = 0.02  # N/m, a thin wire: its sag (below 0.3 % of the span) does not matter; assumed
 RATED_WIND = 3.36  # m/s, LC2
 RATED_SPEED = 85.6 * RPM  # rad/s, LC2
 RATED_THRUST = 703e3  # N at full scale: NREL 5 MW at 11.4 m/s, blade pitch 0
 START = (110.0, 3.4, 0.93, 13.5)  # EA N, anchor radius m, length over span, pitch inertia kg m2
 
 
-GEARED = {  # power of the gear ratio by which a quantity of the high-speed shaft becomes one of the rotor
+GEARED = {  # exponent of the gear ratio that converts a quantity from high-speed shaft to rotor
     "rated_torque": 1, "rated_speed": -1, "cut_in_speed": -1, "region2_start_speed": -1,
     "region2_constant": 3, "transition_speed": -1, "max_torque": 1, "max_torque_rate": 1, "KP": 1, "KI": 1,
 }  # fmt: skip
@@ -59,7 +59,7 @@ def model_scaled(record, name):
 
 
 def lines(EA, anchor_radius, stretch, fairlead_radius, fairlead_z):
-    """Return six Line records: each of three mooring lines is a pair to two points of the hull.
+    """Return six Line records: each of three mooring lines is a pair to two hull points.
 
     stretch: unstretched length over the straight distance at rest.
     """
@@ -85,7 +85,7 @@ def pull_at_rest(line):
 
 
 def model_turbine():
-    """Return {table: {key: value}} of the NREL 5 MW at model scale, driven directly, without a drivetrain."""
+    """Return {table: {key: value}} of the NREL 5 MW at model scale, with direct drive."""
     full = read_turbine("nrel5mw")
 
     def on_rotor(record, name):
@@ -125,7 +125,7 @@ def froude_platform(turbine):
 
 
 def candidate(base, above, unknowns):
-    """Return the Platform with unknowns as START put in, ballast balancing buoyancy and lines; above: kg."""
+    """Return the Platform for unknowns (as START); ballast balances buoyancy and lines. above: mass, kg."""
     EA, anchor_radius, stretch, inertia = unknowns
     full, hull, environment = read_platform("oc3_hywind").lines[0].fairlead, base.hull, base.environment
     moorings = lines(EA, anchor_radius, stretch, full[0] * SCALE, full[2] * SCALE)
@@ -138,30 +138,30 @@ def candidate(base, above, unknowns):
 
 
 def identify(turbine=TURBINE):
-    """Return the Platform with the four unknowns that give the periods of Table 1."""
+    """Identify the four unknowns from the periods of Table 1 and return the Platform."""
     base, machine = froude_platform(turbine), read_turbine(turbine)
     above = base.tower.mass + machine.nacelle.mass + machine.rotor.mass
 
     def misses(logarithms):
         platform = candidate(base, above, np.exp(logarithms))
         periods = natural_periods(build_scene(platform, fidelity="reference"))
-        wanted = ("surge", "heave", "yaw", "platform_pitch")
-        return [np.log(periods[name] / PERIODS[name]) for name in wanted]
+        motions = ("surge", "heave", "yaw", "platform_pitch")
+        return [np.log(periods[name] / PERIODS[name]) for name in motions]
 
-    solution, _, found, text = fsolve(misses, np.log(START), xtol=1e-9, full_output=True)
-    if found != 1:
-        raise RuntimeError(f"the periods of Table 1 are not reached: {text}")
+    solution, _, status, text = fsolve(misses, np.log(START), xtol=1e-9, full_output=True)
+    if status != 1:
+        raise RuntimeError(f"identification of the periods of Table 1 failed: {text}")
     return candidate(base, above, np.exp(solution))
 
 
 def with_polars(turbine, polars, factor=1.0):
-    """Return the turbine with these polars, their coefficients times a factor."""
+    """Return the turbine with polars whose coefficients are multiplied by a factor."""
     polars = {name: polar * np.array([1.0, *[factor] * 3]) for name, polar in polars.items()}
     return turbine.model_copy(update={"blade": turbine.blade.model_copy(update={"polars": polars})})
 
 
 def polar_factor(platform):
-    """Return the factor on the full-scale polars of the scaled rated thrust in LC2, platform fixed."""
+    """Return the factor on the full-scale polars for the scaled rated thrust in LC2, platform fixed."""
     turbine, full = read_turbine(TURBINE), read_turbine("nrel5mw")
     density = WATER / read_platform("oc3_hywind").environment.water_density
     target = RATED_THRUST * density * SCALE**3
@@ -202,11 +202,11 @@ MARKS = {
 
 
 def write_turbine(factor):
-    """Write the turbine's folder: the full-scale polars are multiplied by a factor."""
+    """Write the folder of the turbine, with full-scale polars multiplied by a factor."""
     folder, full = DATA / "turbines" / TURBINE, read_turbine("nrel5mw")
     words = f"of nrel5mw, all coefficients times {factor:.8g} (froude_model/identify.py)."
     polars = polar_files(with_polars(full, full.blade.polars, factor), words, 6, 8)
-    words = "# Blade of nrel5mw at 1:50, lengths by Froude's law; twist and airfoils as they are."
+    words = "# Blade of nrel5mw at 1:50, lengths by Froude's law; twist and airfoils unchanged."
     files = {folder / "polars" / name: text for name, text in polars.items()}
     files[folder / "blade.csv"] = stations_text(full.blade, SCALE, words, 8)
     tables = model_turbine()
@@ -219,7 +219,7 @@ def write_turbine(factor):
 
 
 def write():
-    """Identify everything and write turbine and platform; return the path of the platform file."""
+    """Identify the model, write turbine and platform, and return the path of the platform file."""
     write_turbine(1.0)
     platform = identify()
     factor = polar_factor(platform)

@@ -1,10 +1,10 @@
-"""A platform and turbine of another size by Froude's law, as description files.
+"""Writes description files of a platform and turbine scaled by Froude's law.
 
-Lengths by the scale L, speeds and times by sqrt(L), masses and forces by L^3 (water and air stay as they
-are), power by L^3.5: 10 MW from 5 MW is L = 2^(1/3.5) = 1.219. Blade twist, polars and all coefficients stay.
+Lengths scale with L, speeds and times with sqrt(L), masses and forces with L^3 (same water and air), power
+with L^3.5: 10 MW from 5 MW is L = 2^(1/3.5) = 1.219. Blade twist, polars and all coefficients are unchanged.
 
-The result is similar to its original, not a design: masses of real turbines grow less than L^3, rated wind
-speed does not grow with size, and it has not been built. Without settings (--help) the built-in
+The result is similar to the original, not a design: masses of real turbines grow less than L^3, rated wind
+speed does not grow with size, and no such turbine exists. Without settings (--help) the built-in
 oc3_froude_10mw is written.
 """
 
@@ -26,7 +26,7 @@ PLATFORM, TURBINE = "oc3_hywind", "nrel5mw"
 POWER_EXPONENT = 3.5
 SAME, TIME, SPEED, RATE = 0.0, 0.5, 0.5, -0.5  # exponents of the scale; RATE: per time
 LENGTH, MASS, FORCE, INERTIA, MOMENT = 1.0, 3.0, 3.0, 5.0, 4.0
-MASSIVE = 2.0  # least exponent of a quantity that is proportional to a mass
+MASSIVE = 2.0  # smallest exponent of a quantity proportional to mass
 SECOND_ORDER = {  # of a pitch drive
     "natural_frequency": RATE, "damping": SAME, "acceleration_limit": 2.0 * RATE, "deadband": SAME,
     "friction": SAME,
@@ -67,7 +67,7 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     "nacelle": {
         "mass": MASS, "cm_downwind": LENGTH, "cm_left": LENGTH, "cm_height": LENGTH, "inertia": INERTIA,
     },
-    "drivetrain": {  # the gear ratio stays: generator speed falls with the rotor's
+    "drivetrain": {  # same gear ratio: generator speed falls with rotor speed
         "gear_ratio": SAME, "generator_inertia": INERTIA, "mesh_loss": SAME, "bearing_loss": SAME,
         "generator_efficiency": SAME, "torque_time_constant": TIME,
     },
@@ -89,14 +89,14 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     },
     "gains": {"KP": TIME, "KI": SAME, "gain_schedule_pitch": SAME},
 }  # fmt: skip
-PUBLISHED = {  # figures of the original that the scaled one must show; others are not carried over
+PUBLISHED = {  # published values that are scaled; others are not copied
     "displaced_volume": 3.0, "total_mass": MASS, "weight": FORCE, "buoyancy": FORCE, "mooring_preload": FORCE,
     "waterplane_stiffness": 2.0,
 }  # fmt: skip
 LABEL = """\
-# FROUDE-SCALED FROM {origin}, NOT A REAL {what}: every figure is that of {origin} times a power of
+# FROUDE-SCALED FROM {origin}, NOT A REAL {what}: every value is that of {origin} times a power of
 # the scale {scale:.6g}, lengths by the first, times and speeds by its root, masses and forces by the third.
-# Nobody designed or built it; a turbine of this power would be lighter and reach its rated power at
+# It was neither designed nor built; a turbine of this power would be lighter and reach its rated power at
 # less wind. SI units (kg, m, s, N, rad). Written by training/studies/froude_model/scale.py."""
 
 
@@ -115,22 +115,22 @@ def entries(values):
 
 
 def toml_table(heading, values):
-    """Return the lines of a TOML table, after an empty one."""
+    """Return an empty line and the lines of a TOML table."""
     return ["", f"[{heading}]", *entries(values)]
 
 
 def write_files(texts):
-    """Write {path: text}, each file whole or not at all."""
+    """Write {path: text}, each file atomically."""
     for file, text in texts.items():
         with replacing(file) as temporary:
             temporary.write_text(text)
 
 
 def scaled(record, name, scale, density=1.0):
-    """Return {field: value} of the fields that a record sets, times their powers of the scale.
+    """Return {field: value} of the fields set in a record, multiplied by powers of the scale.
 
-    name: key of EXPONENTS; density: ratio of the densities of water, by which all that holds a mass changes
-    too: what grows with the power MASSIVE or more. A field with a table of its own is left out.
+    name: key of EXPONENTS; density: ratio of water densities, which multiplies quantities with an exponent of
+    MASSIVE or more (proportional to mass). Fields with a separate table are omitted.
     """
     result = {}
     for field, value in record.model_dump(exclude_unset=True, exclude_none=True).items():
@@ -147,7 +147,7 @@ def scaled(record, name, scale, density=1.0):
 
 
 def turbine_text(turbine, name, scale, polars="polars"):
-    """Return the text of the turbine file of a Turbine times the scale. polars: their folder."""
+    """Return the text of the turbine file of a scaled Turbine. polars: folder of the polars."""
     lines = [LABEL.format(origin=turbine.name, what="TURBINE", scale=scale), "", f'name = "{name}"']
     lines.append(f'source = "{turbine.name} by Froude\'s law, scale {scale:.6g}; not a real turbine"')
     lines += entries(scaled(turbine, "turbine", scale))
@@ -165,7 +165,7 @@ def turbine_text(turbine, name, scale, polars="polars"):
 
 
 def platform_text(platform, name, turbine_name, scale):
-    """Return the text of the platform file of a Platform times the scale."""
+    """Return the text of the platform file of a scaled Platform."""
     lines = [LABEL.format(origin=platform.name, what="PLATFORM", scale=scale), ""]
     lines += [f'name = "{name}"', f'turbine = "{turbine_name}"']
     lines.append(f'source = "{platform.name} by Froude\'s law, scale {scale:.6g}; not a real platform"')
@@ -173,10 +173,10 @@ def platform_text(platform, name, turbine_name, scale):
         lines += toml_table(part, scaled(getattr(platform, part), part, scale))
     for line in platform.lines:
         lines += ["", "[[lines]]", *entries(scaled(line, "lines", scale))]
-    own = platform.published
-    figures = {key: own[key] * scale**power for key, power in PUBLISHED.items() if key in own}
-    periods = {key: value * scale**TIME for key, value in own.get("natural_periods", {}).items()}
-    tables = {"options": platform.options, "published": figures, "published.natural_periods": periods}
+    published = platform.published
+    results = {key: published[key] * scale**power for key, power in PUBLISHED.items() if key in published}
+    periods = {key: value * scale**TIME for key, value in published.get("natural_periods", {}).items()}
+    tables = {"options": platform.options, "published": results, "published.natural_periods": periods}
     for heading, values in tables.items():
         if values:
             lines += toml_table(heading, values)
@@ -184,7 +184,7 @@ def platform_text(platform, name, turbine_name, scale):
 
 
 def stations_text(blade, scale, words, digits=10):
-    """Return the text of the file of a blade, lengths times the scale; words: its first line."""
+    """Return the text of a scaled blade file; words: first line."""
     rows = [words, "radius_m,chord_m,twist_deg,airfoil"]
     columns = (blade.radius * scale, blade.chord * scale, blade.twist / DEGREE, blade.airfoil)
     for *values, airfoil in zip(*columns, strict=True):
@@ -193,7 +193,7 @@ def stations_text(blade, scale, words, digits=10):
 
 
 def polar_files(turbine, words, angle_digits=10, digits=10):
-    """Return {file name: text} of a turbine's polars; words: behind each name in its first line."""
+    """Return {file name: text} of the polars of a turbine; words: follow the name in the first line."""
     files = {}
     for name, polar in turbine.blade.polars.items():
         rows = [f"# {name} {words}", "alpha_deg,cl,cd,cm"]
@@ -204,21 +204,20 @@ def polar_files(turbine, words, angle_digits=10, digits=10):
 
 
 def write(scale, folder, name, platform=PLATFORM, turbine=TURBINE):
-    """Write a platform and its turbine into folder/platforms and folder/turbines/<name>; return the path.
+    """Write folder/platforms/<name>.toml and folder/turbines/<name>; return the path of the platform file.
 
-    The path is that of the platform file. scale: of lengths, > 0.
-    platform, turbine: the originals, as read_platform and read_turbine take them.
-    Raises: InputError for a scale or descriptions that cannot be used.
+    scale: of lengths, > 0; platform, turbine: originals, as in read_platform and read_turbine.
+    Raises: InputError for an invalid scale or description.
     """
     check_number("scale", scale, 0.001, 100.0)
     folder = Path(folder)
     machine = read_turbine(turbine)
     home = folder / "turbines" / name
-    words = f"# Blade of {machine.name}, lengths times {scale:.6g}, twist as it is (froude_model/scale.py)."
+    words = f"# Blade of {machine.name}, lengths times {scale:.6g}, twist unchanged (froude_model/scale.py)."
     texts = {home / "blade.csv": stations_text(machine.blade, scale, words)}
     polars = "polars"
     if (DATA / "turbines" / str(turbine) / polars).is_dir():
-        polars = f"{turbine}/polars"  # those of a built-in turbine are found from anywhere
+        polars = f"{turbine}/polars"  # polars of a built-in turbine are accessible from any folder
     else:
         files = polar_files(machine, f"of {machine.name}, unchanged (froude_model/scale.py).")
         texts |= {home / polars / file: text for file, text in files.items()}
@@ -233,9 +232,9 @@ def write(scale, folder, name, platform=PLATFORM, turbine=TURBINE):
 def scale_of_power(power, turbine=TURBINE):
     """Return the scale of lengths at which the turbine's rated electrical power becomes `power` (W)."""
     machine = read_turbine(turbine)
-    own = machine.torque_law.rated_power * machine.drivetrain.generator_efficiency
+    original = machine.torque_law.rated_power * machine.drivetrain.generator_efficiency
     check_number("power", power, 0.0, low_open=True, allowed="a positive number of watts")
-    return float((power / own) ** (1.0 / POWER_EXPONENT))
+    return float((power / original) ** (1.0 / POWER_EXPONENT))
 
 
 def main(

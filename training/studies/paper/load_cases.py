@@ -1,8 +1,8 @@
-"""The paper's load cases: LC1 to LC12 on the 1:50 model, and the full-scale runs of its Figures 13 to 16.
+"""Runs the load cases of the paper: LC1 to LC12 on the 1:50 model, and full scale (Figures 13 to 16).
 
-Rotor speed and blade pitch are prescribed at model scale, theory.md Eq. (20). A run starts at its steady
-state in the mean wind; waves start at once, as a wave maker's do, so that a record holds the transient of
-its start. The wind has a turbulence intensity of 3 %, a choice: the paper says "low" and prints no value.
+Rotor speed and blade pitch are prescribed at model scale, theory.md Eq. (20). A run starts at the steady
+state in the mean wind; waves start at full height, as from a wave maker, so that records contain a start-up
+transient. Turbulence intensity is 3 %, an assumption: the paper states "low" without a value.
 """
 
 from functools import partial
@@ -27,15 +27,15 @@ from fowt_env.weather.turbulence import turbulence
 PLATFORM = "liu_1_50"
 SURGE, PITCH, MOTION_CHANNELS = Channel.SURGE, Channel.PITCH, Channel.MOTIONS
 DURATION = 500.0  # s at model scale, 59 min at full scale
-SKIP = 100.0  # s left out of statistics, ten surge periods
+SKIP = 100.0  # s omitted from statistics, ten surge periods
 SEGMENT = 125.0  # s of a spectrum's window: 12 surge periods
 STEP, OUTPUT = 0.01, 0.05  # s; 0.07 and 0.35 s at full scale
-INTENSITY = 0.03  # of the wind's turbulence, a choice
+INTENSITY = 0.03  # turbulence intensity, an assumption
 FULL_SCALE = "full_scale"
 
 
 class LoadCase(NamedTuple):
-    """One load case at model scale, as Table 2 of the paper has it; wind in m/s, None: no wind."""
+    """Defines a load case at model scale (Table 2 of the paper); wind in m/s, None: no wind."""
 
     wind: float | None
     rotor_rpm: float = 0.0
@@ -65,7 +65,7 @@ GROUPS = {"wind": (*CASES,)[:4], "waves": (*CASES,)[4:8], "wind and waves": (*CA
 
 
 def wanted_cases(text):
-    """Return the case names of "LC5", "LC1,LC2", "all" or "full_scale". Raises: InputError."""
+    """Return the case names selected by "LC5", "LC1,LC2", "all" or "full_scale". Raises: InputError."""
     names = [name.strip() for name in text.split(",") if name.strip()]
     if not names:
         raise InputError(f"case = {text!r}: must name at least one case, e.g. LC5, all or {FULL_SCALE}")
@@ -82,7 +82,7 @@ def wanted_cases(text):
 
 
 def run_load_case(name, **options):
-    """Return the DataFrame of a model-scale load case, started from its steady state; options of build_scene.
+    """Simulate a model-scale load case from its steady state; return a DataFrame. options: of build_scene.
 
     The wind is rotor-averaged Kaimal turbulence of low intensity.
     """
@@ -107,12 +107,12 @@ def run_load_case(name, **options):
 
 
 def settled(frame, skip=SKIP):
-    """Return the rows from skip seconds on."""
+    """Return the rows after skip seconds."""
     return frame[frame[TIME] >= skip - 1e-6]
 
 
 def statistics(runs):
-    """Return a DataFrame: mean, deviation, extremes and quartiles of the channels of {case: frame}."""
+    """Return a DataFrame of mean, standard deviation, extremes and quartiles of channels of {case: frame}."""
     rows = []
     for case, frame in runs.items():
         part = settled(frame)
@@ -127,15 +127,15 @@ def statistics(runs):
 
 
 def case_spectrum(frame, channel):
-    """Return (frequency Hz, density) of a channel."""
+    """Return (frequency in Hz, power density) of a channel."""
     return spectrum(frame[TIME], frame[channel], segment=SEGMENT)
 
 
 def prominence(frame, channel, frequency, width=0.1, reach=0.35):
     """Return the height of a spectral peak near a frequency (Hz) over its surroundings, above 1 for a peak.
 
-    The largest density within width (relative) of the frequency, over the larger of the medians of the
-    density on its two sides, up to reach away. 0 if the largest is at the edge, i.e. a slope and no peak.
+    Largest density within width (relative) of the frequency, divided by the larger of the median densities
+    on both sides, up to reach (relative). 0 if the largest is at the edge, i.e. a slope and no peak.
     """
     f, density = case_spectrum(frame, channel)
     near = np.flatnonzero(np.abs(f / frequency - 1.0) <= width)
@@ -147,12 +147,12 @@ def prominence(frame, channel, frequency, width=0.1, reach=0.35):
     return float(density[top] / max(np.median(left), np.median(right)))
 
 
-PEAK = 2.0  # a peak rises to at least this many times its surroundings ...
-VISIBLE = 1e-5  # ... and to this fraction of the highest one, five decades of a logarithmic axis
+PEAK = 2.0  # minimum height of a peak over its surroundings ...
+VISIBLE = 1e-5  # ... and over the highest one: five decades of a logarithmic axis
 
 
 class PaperClaim(NamedTuple):
-    """One qualitative claim of the paper, the result here, and whether it holds."""
+    """Holds a qualitative claim of the paper, the result here, and whether the claim holds."""
 
     figure: str
     text: str
@@ -161,7 +161,7 @@ class PaperClaim(NamedTuple):
 
 
 class PaperStudy(NamedTuple):
-    """Runs and claims of `fowt paper`."""
+    """Holds the runs and claims of `fowt paper`."""
 
     runs: dict  # model-scale case -> frame
     claims: list
@@ -169,28 +169,28 @@ class PaperStudy(NamedTuple):
 
 
 def natural_frequencies():
-    """Return {motion: Hz} of the 1:50 model."""
+    """Return the natural frequencies {motion: Hz} of the 1:50 model."""
     scene = fowt_env.build_scene(PLATFORM, fidelity="reference")
     return {motion: 1.0 / period for motion, period in fowt_env.natural_periods(scene).items()}
 
 
 def claims(runs, natural):
-    """Return [PaperClaim] of section 8 that the given model-scale runs can judge.
+    """Return [PaperClaim] of section 8 for the available model-scale runs.
 
     natural: natural_frequencies().
     """
-    having, found = set(runs), []
+    available, results = set(runs), []
     wind, waves, both = GROUPS.values()
     pitch = {name: settled(frame)[PITCH].to_numpy() for name, frame in runs.items()}
     mean, std = ({name: getattr(x, of)() for name, x in pitch.items()} for of in ("mean", "std"))
 
     def claim(figure, text, shown, holds):
-        found.append(PaperClaim(figure, text, shown, bool(holds)))
+        results.append(PaperClaim(figure, text, shown, bool(holds)))
 
-    def peaks(figure, case, channel, places):
-        """Claim that the spectrum of a channel peaks at each of {name of a frequency: Hz}."""
+    def peaks(figure, case, channel, frequencies):
+        """Add claims that the spectrum of a channel has peaks at {name of a frequency: Hz}."""
         words = {SURGE: "surge", PITCH: "pitch"}[channel]
-        for where, at in places.items() if case in having else ():
+        for where, at in frequencies.items() if case in available else ():
             height = prominence(runs[case], channel, at)
             f, density = case_spectrum(runs[case], channel)
             fraction = density[np.abs(f / at - 1.0) <= 0.1].max() / density.max()
@@ -198,28 +198,28 @@ def claims(runs, natural):
             holds = height >= PEAK and fraction >= VISIBLE
             claim(figure, f"{case}: {words} spectrum peaks at {where}", shown, holds)
 
-    if "LC1" in having:
+    if "LC1" in available:
         surge = settled(runs["LC1"])[SURGE]
         shown = f"mean {surge.mean():.4f} m, std {surge.std():.4f} m"
         claim("6", "LC1: surge is nearly steady", shown, surge.std() < 0.1 * surge.mean())
     of_pitch, wave = {"the pitch frequency": natural["platform_pitch"]}, 1.0 / SEAS[0]["T"]
     peaks("7", "LC2", SURGE, of_pitch)
-    if set(wind) <= having:
+    if set(wind) <= available:
         shown = ", ".join(f"{name} {mean[name]:.2f}" for name in wind) + " deg"
         claim("8", "mean pitch is largest at rated wind (LC2)", shown, max(wind, key=mean.get) == "LC2")
         falls = mean["LC2"] > mean["LC3"] > mean["LC4"]
         claim("8", "mean pitch falls above rated (LC2 > LC3 > LC4)", shown, falls)
     of_waves = {"the wave frequency": wave, "twice the wave frequency": 2.0 * wave}
     peaks("9", "LC5", SURGE, {"the surge frequency": natural["surge"], **of_pitch, **of_waves})
-    if set(waves) <= having:
+    if set(waves) <= available:
         spread = [std[name] for name in waves]
         shown = "std " + ", ".join(f"{name} {std[name]:.2f}" for name in waves) + " deg"
         claim("10", "LC5 to LC8: the range grows with the waves", shown, spread == sorted(spread))
         shift = max(abs(mean[name] - mean["LC5"]) for name in waves)
-        text, shown = "LC5 to LC8: waves leave the mean alone", f"means within {shift:.3f} deg"
+        text, shown = "LC5 to LC8: waves do not change the mean", f"means within {shift:.3f} deg"
         claim("10", text, shown, shift < 0.1 * std["LC8"])
     peaks("11", "LC11", PITCH, {**of_pitch, "the wave frequency": 1.0 / SEAS[2]["Tp"]})
-    if {*CASES} <= having:
+    if {*CASES} <= available:
         triples = list(zip(both, wind, waves, strict=True))
         shift = max(abs(mean[name] - mean[alone]) for name, alone, _ in triples)
         shown = f"within {shift:.2f} deg of the mean in wind alone"
@@ -228,13 +228,13 @@ def claims(runs, natural):
         shown = ", ".join(f"{name} {std[name] / std[sea]:.2f}" for name, _, sea in triples)
         nearer = all(abs(std[name] - std[sea]) < abs(std[name] - std[air]) for name, air, sea in triples[1:])
         claim("12", "LC10 to LC12: waves set the range", f"std over that in waves alone: {shown}", nearer)
-    return found
+    return results
 
 
 def static_pull(platform, direction, offsets):
-    """Return a DataFrame: restoring force and line tensions (N) at offsets (m) along a direction.
+    """Return a DataFrame of restoring force and line tensions (N) at offsets (m) in a direction.
 
-    direction: "surge" or "sway". The hull is moved without turning, as in the paper's Fig. 5.
+    direction: "surge" or "sway". The hull is moved without rotation, as in Fig. 5 of the paper.
     """
     way, rows = np.array({"surge": (1.0, 0.0, 0.0), "sway": (0.0, 1.0, 0.0)}[direction]), []
     for offset in offsets:
@@ -254,13 +254,13 @@ DECAYS = {"surge decay": ("PtfmSurge", 10.0, SURGE, 600.0), "pitch decay": ("Ptf
 
 
 def decay(channel, start, duration):
-    """Return the frame of a free decay of OC3-Hywind in still water."""
+    """Simulate a free decay of OC3-Hywind in still water and return its frame."""
     scene = fowt_env.build_scene("oc3_hywind", fidelity="reference")
     return fowt_env.simulate(scene, controller=None, duration=duration, dt=0.05, initial={channel: start})
 
 
 def regular_wave(position, surface, stretching):
-    """Return the frame of OC3-Hywind in the regular wave H 3 m, T 5 s of Fig. 15."""
+    """Simulate OC3-Hywind in the regular wave of Fig. 15 (H 3 m, T 5 s) and return the frame."""
     scene = fowt_env.build_scene(
         "oc3_hywind", sea={"kind": "regular", "H": 3.0, "T": 5.0, "ramp": 50.0}, fidelity="reference",
         kinematics_position=position, surface=surface, stretching=stretching,
@@ -271,16 +271,16 @@ def regular_wave(position, surface, stretching):
 def double_frequency(frame, start=260.0, period=5.0):
     """Return {channel: (first harmonic, second over first in %)} of surge and pitch in a regular wave."""
     part = frame[(frame[TIME] >= start) & (frame[TIME] < frame[TIME].iloc[-1] - 1e-6)]
-    found = {}
+    ratios = {}
     for channel in (SURGE, PITCH):
         series = part[TIME].to_numpy(), part[channel].to_numpy()
         first, second = np.abs(harmonics(*series, 2.0 * pi / period))
-        found[channel] = (float(first), float(100.0 * second / first))
-    return found
+        ratios[channel] = (float(first), float(100.0 * second / first))
+    return ratios
 
 
 def wind_and_waves():
-    """Return the frame of Fig. 16: 18 m/s (class B, a choice), JONSWAP Hs 7.5 m, Tp 10 s, under control."""
+    """Simulate Fig. 16: 18 m/s (class B assumed), JONSWAP Hs 7.5 m, Tp 10 s, PI control; return the frame."""
     wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
     scene = fowt_env.build_scene(
         "oc3_hywind", wind=wind, sea="paper_wind_wave", seed=1, fidelity="standard", duration=1000.0
@@ -289,7 +289,7 @@ def wind_and_waves():
 
 
 def run_paper(names, report=None):
-    """Return the PaperStudy of the named cases; report(text, done, total) is called before each run."""
+    """Run the named cases and return their PaperStudy; report(text, done, total): called before each run."""
     models = {name: partial(run_load_case, name) for name in names if name in CASES}
     full = {}
     if FULL_SCALE in names:

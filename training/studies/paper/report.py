@@ -1,4 +1,4 @@
-"""Files of `fowt paper`: time series, statistics, claims, and plots like the paper's."""
+"""Writes the files of `fowt paper`: time series, statistics, claims, and plots as in the paper."""
 
 from datetime import UTC, datetime
 from functools import partial
@@ -27,7 +27,7 @@ PULLS = {"model": (load_cases.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0
 
 
 def _axes(figure, rows, columns=1, xlabel=None, **options):
-    """Return styled axes (rows, columns) of a figure, the lowest with a label."""
+    """Return styled axes (rows, columns) of a figure; the lowest row has x labels."""
     axes = figure.subplots(rows, columns, squeeze=False, **options)
     for number, one in enumerate(axes.ravel()):
         style_axes(one, xlabel if number >= (rows - 1) * columns else None)
@@ -36,12 +36,12 @@ def _axes(figure, rows, columns=1, xlabel=None, **options):
 
 def _groups(runs):
     """Return {group: [case]} of the groups with at least one run."""
-    having = {name: [case for case in cases if case in runs] for name, cases in load_cases.GROUPS.items()}
-    return {name: cases for name, cases in having.items() if cases}
+    available = {name: [case for case in cases if case in runs] for name, cases in load_cases.GROUPS.items()}
+    return {name: cases for name, cases in available.items() if cases}
 
 
 def box_plots(runs, channel, path=None):
-    """Draw box plots of a channel per case, like Figs 8, 10 and 12: quartiles, median and extremes."""
+    """Draw box plots of a channel per case, as Figs 8, 10 and 12: quartiles, median and extremes."""
     groups = _groups(runs)
     figure = new_figure(9.0, 3.2)
     panels = _axes(figure, 1, len(groups), sharey=True)[0]
@@ -53,7 +53,7 @@ def box_plots(runs, channel, path=None):
 
 
 def time_series(runs, channel, path=None, window=(0.0, 200.0)):
-    """Draw a channel of every case over time, a panel per case."""
+    """Draw time series of a channel, a panel per case."""
     figure = new_figure(9.0, 0.6 + 0.9 * len(runs))
     rows = _axes(figure, len(runs), xlabel="time (s, model scale)", sharex=True)[:, 0]
     for axes, (case, frame) in zip(rows, runs.items(), strict=True):
@@ -86,7 +86,7 @@ def spectra(runs, channel, natural, path=None):
 
 
 def static_pulls(path=None):
-    """Draw pull and line tensions over offset, like Fig. 5, of the model and of OC3-Hywind."""
+    """Draw restoring force and line tensions over offset, as Fig. 5, of the model and OC3-Hywind."""
     figure = new_figure(9.0, 6.4)
     for row, (name, (platform, reach)) in zip(_axes(figure, 2, 2), PULLS.items(), strict=True):
         unit, factor = ("N", 1.0) if platform == load_cases.PLATFORM else ("kN", 1e-3)
@@ -120,7 +120,7 @@ def decays(full, path=None):
 
 
 def regular_waves(full, path=None):
-    """Draw Fig. 15: surge, pitch and tension in the regular wave, and spectra, for the four combinations."""
+    """Draw Fig. 15: surge, pitch and tension in the regular wave, with spectra, for four wave kinematics."""
     channels = (load_cases.SURGE, load_cases.PITCH, "FAIRTEN1_[kN]")
     figure = new_figure(9.0, 6.4)
     panels = _axes(figure, len(channels), 2)
@@ -143,13 +143,13 @@ def regular_waves(full, path=None):
 
 
 def double_frequency_table(full):
-    """Return a Markdown table of second over first harmonics for the four combinations."""
+    """Return a Markdown table of second over first harmonics for the four wave kinematics."""
     ratios = ("surge, 2nd/1st", "pitch, 2nd/1st")
     header = ("position", "surface", "surge (m)", "pitch (deg)", *ratios, "theory.md")
     rows = []
     for combination, expected in zip(load_cases.COMBINATIONS, load_cases.EXPECTED_DOUBLE, strict=True):
-        found = load_cases.double_frequency(full[combination])
-        (surge, surge2), (pitch, pitch2) = found[load_cases.SURGE], found[load_cases.PITCH]
+        harmonics = load_cases.double_frequency(full[combination])
+        (surge, surge2), (pitch, pitch2) = harmonics[load_cases.SURGE], harmonics[load_cases.PITCH]
         theory = f"{expected[0]:.2f} %, {expected[1]:.2f} %"
         sizes = f"{surge:.4f}", f"{pitch:.4f}", f"{surge2:.2f} %", f"{pitch2:.2f} %"
         rows.append((*combination[:2], *sizes, theory))
@@ -160,17 +160,17 @@ def statistics_table(runs):
     """Return a Markdown table of pitch and surge per case."""
     surge = ("surge mean", "std", "min", "max (m)")
     header = ("case", "pitch mean", "std", "min", "max (deg)", *surge, "thrust mean (N)")
-    cells, figures = [], ["mean", "std", "min", "max"]
+    cells, columns = [], ["mean", "std", "min", "max"]
     for case, rows in load_cases.statistics(runs).groupby("case", sort=False):
         rows = rows.set_index("channel")
-        pitch = (f"{value:.2f}" for value in rows.loc[load_cases.PITCH, figures])
-        surge = (f"{value:.3f}" for value in rows.loc[load_cases.SURGE, figures])
+        pitch = (f"{value:.2f}" for value in rows.loc[load_cases.PITCH, columns])
+        surge = (f"{value:.3f}" for value in rows.loc[load_cases.SURGE, columns])
         cells.append([case, *pitch, *surge, f"{rows.loc['RtFldFxh_[N]', 'mean']:.2f}"])
     return markdown_table(header, cells)
 
 
 def periods_table():
-    """Return a Markdown table of the natural periods of the 1:50 model against Table 1."""
+    """Return a Markdown table of the natural periods of the 1:50 model, compared with Table 1."""
     published = read_platform(load_cases.PLATFORM).published["natural_periods"]
     rows = []
     scene = fowt_env.build_scene(load_cases.PLATFORM, fidelity="reference")
@@ -182,17 +182,17 @@ def periods_table():
 
 
 def write_paper_report(study, folder, plot=True):
-    """Write everything of a study into a folder; return the paths."""
+    """Write all results of a study into a folder and return the paths."""
     folder = Path(folder)
     written = f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}"
-    paths, text = [], ["# Every claim of the paper", "", f"{written}: `fowt paper all,full_scale`.", ""]
+    paths, text = [], ["# All claims of the paper", "", f"{written}: `fowt paper all,full_scale`.", ""]
     if study.runs:
         for case, frame in study.runs.items():
             paths.append(Path(write_table(frame, folder / "runs" / f"{case}.parquet")))
         paths.append(Path(write_table(load_cases.statistics(study.runs), folder / "statistics.csv")))
         text += ["## Natural periods of the 1:50 model", "", periods_table(), "", "## Claims", ""]
         rows = [(c.figure, c.text, c.found, "holds" if c.holds else "FAILS") for c in study.claims]
-        text += [markdown_table(("figure", "claim of the paper", "found here", "verdict"), rows), ""]
+        text += [markdown_table(("figure", "claim of the paper", "result here", "verdict"), rows), ""]
         text += ["## Statistics, model scale", "", statistics_table(study.runs), ""]
     if study.full:
         text += ["## Double frequency, H 3 m, T 5 s, full scale", "", double_frequency_table(study.full), ""]
@@ -203,21 +203,21 @@ def write_paper_report(study, folder, plot=True):
 
 
 def _plots(study, folder):
-    """Write all plots; return their paths."""
-    made = {}
+    """Write all plots and return their paths."""
+    plots = {}
     if study.runs:
         natural = load_cases.natural_frequencies()
         for name, channel in (("pitch", load_cases.PITCH), ("surge", load_cases.SURGE)):
-            made[f"box_{name}"] = partial(box_plots, study.runs, channel)
-            made[f"spectra_{name}"] = partial(spectra, study.runs, channel, natural)
-            made[f"series_{name}"] = partial(time_series, study.runs, channel)
-        made["static_pull"] = static_pulls
+            plots[f"box_{name}"] = partial(box_plots, study.runs, channel)
+            plots[f"spectra_{name}"] = partial(spectra, study.runs, channel, natural)
+            plots[f"series_{name}"] = partial(time_series, study.runs, channel)
+        plots["static_pull"] = static_pulls
     if study.full:
-        made["full_decays"] = partial(decays, study.full)
-        made["full_regular_wave"] = partial(regular_waves, study.full)
-        made["full_wind_and_waves"] = partial(
+        plots["full_decays"] = partial(decays, study.full)
+        plots["full_regular_wave"] = partial(regular_waves, study.full)
+        plots["full_wind_and_waves"] = partial(
             plot_run, study.full["wind and waves"], title="18 m/s, Hs 7.5 m, Tp 10 s"
         )
-    for name, make in made.items():
+    for name, make in plots.items():
         make(path=folder / f"{name}.png")
-    return [folder / f"{name}.png" for name in made]
+    return [folder / f"{name}.png" for name in plots]

@@ -1,4 +1,4 @@
-"""Extreme events on the running or parked turbine, and hostile actions on the environment."""
+"""Runs extreme events on the operating or parked turbine, and hostile actions on the environment."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -23,7 +23,7 @@ from fowt_env.training.benchmarks.speed import silent
 from fowt_env.training.evaluation.run_case import CONTROL_DT
 from fowt_env.training.studies.robustness.random_cases import STEEPEST
 
-EVENT = 60.0  # s at which gusts start and faults happen
+EVENT = 60.0  # s, start of gusts and faults
 DURATION = 180.0  # s of a run: two minutes after the event
 GRAVITY = 9.80665
 NORMAL_SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 11.0}
@@ -34,22 +34,22 @@ HOSTILE_STEPS = 3000  # control periods of each hostile policy: five minutes
 
 @dataclass(frozen=True)
 class Extreme:
-    """One extreme run: its weather, and the fault (a name of FAULTS or "line loss") that happens at EVENT."""
+    """Describes an extreme run: weather, and the fault (a name of FAULTS or "line loss") at EVENT."""
 
     group: str
     wind: object
     sea: object = field(default_factory=lambda: dict(NORMAL_SEA))
     parked: bool = False  # rotor locked, blades feathered
     fault: str = ""
-    line: int = 0  # that is lost
+    line: int = 0  # index of the lost line
     duration: float = DURATION
 
 
-FAULTS = {  # name: command (torque, pitch) from the controller's, the drive's maximum and the pitch at EVENT
-    "emergency stop": lambda command, feathered, held: (0.0, feathered),  # as fast as the actuator goes
-    "grid loss": lambda command, feathered, held: (0.0, command[1]),
-    "grid loss, no pitch action": lambda command, feathered, held: (0.0, held),
-    "stuck pitch": lambda command, feathered, held: (command[0], held),
+FAULTS = {  # name: command (torque, pitch) from controller command, maximum pitch and pitch at EVENT
+    "emergency stop": lambda command, feathered, stuck: (0.0, feathered),  # at the rate limit of the actuator
+    "grid loss": lambda command, feathered, stuck: (0.0, command[1]),
+    "grid loss, no pitch action": lambda command, feathered, stuck: (0.0, stuck),
+    "stuck pitch": lambda command, feathered, stuck: (command[0], stuck),
 }
 
 
@@ -68,7 +68,7 @@ def _steep(period):
 
 SIGNS = (1, -1)
 EXTREMES = {
-    # gusts of every kind at the speeds where it hurts
+    # gusts of every kind at critical wind speeds
     **{f"EOG {u:g} m/s": Extreme("EOG", _gust("eog", u)) for u in (10.0, 11.4, 13.0, 25.0)},
     **{
         f"ECD {u:g} m/s, sign {sign:+d}": Extreme("ECD", _gust("ecd", u, sign=sign))
@@ -79,7 +79,7 @@ EXTREMES = {
         for way, sign, u in product(("vertical", "horizontal"), SIGNS, (12.0, 25.0))
     },
     **{f"ETM {u:g} m/s": Extreme("ETM", _etm(u)) for u in (12.0, 18.0, 25.0)},
-    # parked and idling in the storm from several sides, and in waves about to break
+    # parked and idling in the storm from several directions, and in waves at breaking steepness
     **{
         f"50-year storm, wind from {side:g} deg off, {rotor}": Extreme(
             "50-year storm", STORM_WIND | {"direction": side}, STORM_SEA, parked=rotor == "parked"
@@ -113,26 +113,26 @@ PEAKS = ("rotor_rpm", "tilt_deg", "yaw_deg", "offset_m", "heave_m", "tension_MN"
 
 
 def without_line(scene, line):
-    """Return the scene with one mooring line (0, 1, ..) gone, the others solved as catenaries.
+    """Return the scene without one mooring line (0, 1, ..), the others solved as catenaries.
 
     Raises: InputError if there is no such line.
     """
     check_whole_number("line", line, 0, scene.n_lines - 1)
-    # a table is about the rest position of all lines, which is not where the platform goes
+    # mooring tables are only valid near the rest position of all lines
     arrays = scene.model.mooring._replace(table=None)[:-1]
-    left = [np.ascontiguousarray(np.delete(array, line, axis=0)) for array in arrays]
-    return scene.with_model(mooring=Mooring(*left))
+    kept = [np.ascontiguousarray(np.delete(array, line, axis=0)) for array in arrays]
+    return scene.with_model(mooring=Mooring(*kept))
 
 
 def course(case, scene, dt):
-    """Run an Extreme with steps of dt (s); return (status, time reached, {PEAKS: largest}, last state)."""
-    (x, u), controller, held = initial_state(scene), None, None  # held: blade pitch at the fault
+    """Run an Extreme with steps of dt (s); return (status, time reached, {PEAKS: largest}, final state)."""
+    (x, u), controller, stuck = initial_state(scene), None, None  # stuck: blade pitch at EVENT
     feathered = scene.turbine.pitch_drive.maximum
     if case.parked:
         x[State.ROTOR_SPEED] = u[Command.GENERATOR_TORQUE] = 0.0
         x[State.BLADE_PITCH] = u[Command.BLADE_PITCH] = feathered
         scene = scene.with_model({"rigid_body.rotor_fixed": True})
-    elif x[State.ROTOR_SPEED] > 0.0:  # above cut-out the trim idles feathered without control
+    elif x[State.ROTOR_SPEED] > 0.0:  # above cut-out the trim is feathered and idling, without control
         controller = make("pi", scene.turbine, CONTROL_DT)
     dx, row, peaks = np.zeros_like(x), np.zeros(N_MEASUREMENTS), np.zeros(len(PEAKS))
     data, per_control = scene.data(), round(CONTROL_DT / dt)
@@ -143,8 +143,8 @@ def course(case, scene, dt):
         controller.reset(Measurement(*row.tolist()))
     status, time = RUNNING, case.duration
     for step in range(0, round(case.duration / CONTROL_DT) * per_control, per_control):
-        if case.fault and held is None and step * dt >= EVENT - 1e-9:
-            held = float(x[State.BLADE_PITCH])
+        if case.fault and stuck is None and step * dt >= EVENT - 1e-9:
+            stuck = float(x[State.BLADE_PITCH])
             if case.fault == "line loss":
                 scene = without_line(scene, case.line)
                 data = scene.data()
@@ -158,8 +158,8 @@ def course(case, scene, dt):
         np.fmax(peaks, now, out=peaks)
         if controller is not None:
             u[:] = controller.act(Measurement(*row.tolist()))
-        if held is not None and case.fault in FAULTS:
-            u[:] = FAULTS[case.fault](u, feathered, held)
+        if stuck is not None and case.fault in FAULTS:
+            u[:] = FAULTS[case.fault](u, feathered, stuck)
         status = advance(handle, x, u, step, per_control, dt)
         if status != RUNNING:
             time = (step + per_control) * dt
@@ -168,9 +168,9 @@ def course(case, scene, dt):
 
 
 def run_extreme(name, seed=1, finer=1, scene=None):
-    """Return the row (dict) of one of EXTREMES: its peaks and its verdict; steps are the finer-th of its own.
+    """Run one of EXTREMES with its step divided by finer; return the row (dict) of peaks and verdict.
 
-    The verdict names the reason of a stop, and an overspeed for which an environment would end the episode.
+    The verdict states the reason of a stop, or an overspeed that would terminate an episode.
     """
     case = EXTREMES[name]
     if scene is None:
@@ -186,7 +186,7 @@ def run_extreme(name, seed=1, finer=1, scene=None):
 
 
 def extremes(seed, progress):
-    """Return a DataFrame with a row per extreme; step_change: worst change of a peak by half the step."""
+    """Run all EXTREMES and return a DataFrame; step_change: largest change of a peak with half the step."""
     rows, base = [], None
     for done, (name, case) in enumerate(EXTREMES.items()):
         progress(f"extremes: {name}", done, len(EXTREMES))
@@ -201,7 +201,7 @@ def extremes(seed, progress):
     return pd.DataFrame(rows)
 
 
-def _bang(first, second):  # full swings every control period of the chosen channels, the others at rest
+def _bang(first, second):  # full swing of the selected channels every control period, zero in others
     swing = np.array([first, second], dtype=float)
     return lambda step, rng: swing * (1.0 if step % 2 == 0 else -1.0)
 
@@ -211,7 +211,7 @@ def _constant(first, second):
     return lambda step, rng: action
 
 
-POLICIES = {  # name: action (2,) from the step and a generator
+POLICIES = {  # name: function of (step, random generator) -> action (2,)
     "bang-bang at Nyquist, both": _bang(1, 1),
     "bang-bang at Nyquist, opposed": _bang(1, -1),
     "bang-bang at Nyquist, torque": _bang(1, 0),
@@ -226,7 +226,7 @@ REFUSED = ((np.nan, 0.0), (0.0, np.nan), (np.inf, 0.0), (0.0, -np.inf), (np.nan,
 
 
 def attack(env, policy, seed, steps=HOSTILE_STEPS):
-    """Return the row (dict) of a policy: periods, ends by reason, whether all was finite."""
+    """Run a policy and return its row (dict): periods, terminations by reason, whether all was finite."""
     rng, reasons, resets = np.random.default_rng(seed), Counter(), 0
     finite = np.isfinite(env.reset(seed=seed)[0]).all()
     for step in range(steps):
@@ -243,7 +243,7 @@ def attack(env, policy, seed, steps=HOSTILE_STEPS):
 
 
 def refused_alike(env, seed):
-    """Return how many of the unusable actions REFUSED were refused with the state left as it was."""
+    """Return how many of the invalid actions REFUSED raise InputError and leave the state unchanged."""
     env.reset(seed=seed)
     env.step(np.zeros(2))
     count = 0
@@ -261,14 +261,14 @@ def hostile(
     modes=("direct", "setpoint", "residual"), tasks=("above_rated", "full_range"), steps=HOSTILE_STEPS,
     progress=silent,
 ):  # fmt: skip
-    """Return a DataFrame: a row per task, action mode and policy, and one for actions that are no numbers."""
+    """Return a DataFrame with a row per task, action mode and policy, and one for NaN and infinity."""
     rows = []
     for done, (task, mode) in enumerate(product(tasks, modes)):
         progress(f"hostile actions: {task}, {mode}", done, len(modes) * len(tasks))
         env = FowtEnv(task=task, action_mode=mode)
-        found = [attack(env, policy, 1000 * number, steps) for number, policy in enumerate(POLICIES)]
+        results = [attack(env, policy, 1000 * number, steps) for number, policy in enumerate(POLICIES)]
         count, of = refused_alike(env, 7), len(REFUSED)
         ends = {"refused, state untouched": count}
-        found.append({"policy": "NaN and infinity", "steps": of, "ends": ends, "finite": count == of})
-        rows += [{"task": task, "mode": mode} | row for row in found]
+        results.append({"policy": "NaN and infinity", "steps": of, "ends": ends, "finite": count == of})
+        rows += [{"task": task, "mode": mode} | row for row in results]
     return pd.DataFrame(rows)

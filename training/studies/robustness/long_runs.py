@@ -1,4 +1,4 @@
-"""Long runs: invariants and memory over millions of steps, order of the integrators, quaternion attitude."""
+"""Measures invariants and memory over millions of steps, orders of integrators, and attitude errors."""
 
 import resource
 import sys
@@ -24,7 +24,7 @@ from fowt_env.training.studies.robustness.random_cases import (
     with_integrator,
 )
 
-CHUNK = 100_000  # steps between looks at the invariants
+CHUNK = 100_000  # steps between evaluations of the invariants
 WEATHER_SEA = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 
 
@@ -34,13 +34,13 @@ def _lossless(scene, **changes):
 
 
 def free_scene():
-    """Return the turbine in empty space without weight and without losses in the shaft."""
+    """Return the scene of the turbine in empty space, without gravity and shaft losses."""
     scene = build_scene(hydrodynamics=False, mooring=False, fidelity="reference")
     return _lossless(scene, **{"rigid_body.gravity": 0.0})
 
 
 def floating_scene():
-    """Return the turbine afloat on its lines in still water without drag, damping and fluid inertia."""
+    """Return the scene of the moored turbine in still water, without drag, damping and added mass."""
     scene = build_scene(fidelity="reference")
     hydro, inert = scene.model.hydro, ("added_mass_coefficient", "drag_coefficient", "heave_added_mass")
     damping = type(hydro.damping)(*(0.0,) * len(hydro.damping))
@@ -49,21 +49,21 @@ def floating_scene():
 
 
 def kinetic_energy(scene, x):
-    """Return the kinetic energy of platform and rotor, J."""
+    """Return the kinetic energy (J) of platform and rotor."""
     body, speed = scene.model.rigid_body, x[State.ROTOR_SPEED]
     spin = 0.5 * body.rotor_row * speed**2 + body.coupling * speed * x[State.WX]
     return platform_energy(x, body.mass_matrix) + spin
 
 
 def rotation(x):
-    """Return the rotation of the platform, body to inertial axes."""
+    """Return the Rotation of the platform from body to inertial axes."""
     return Rotation.from_euler("ZYX", [x[State.YAW], x[State.PLATFORM_PITCH], x[State.ROLL]])
 
 
 def momenta(scene, x, own=False):
     """Return (linear, angular) momentum of the turbine, inertial axes, (3,) each, angular about the origin.
 
-    own: about the centre of mass, which free flight leaves as it is.
+    own: angular momentum about the centre of mass, which is conserved in free flight.
     """
     body, turn = scene.model.rigid_body, rotation(x)
     body_momentum = body.mass_matrix @ x[7:13]
@@ -77,7 +77,7 @@ def momenta(scene, x, own=False):
 
 
 def free_start():
-    """Return the state (N_RIGID,) of a body that drifts and nutates, its pitch off the singular 90 deg."""
+    """Return the state (N_RIGID,) of a drifting, nutating body away from the singular pitch of 90 deg."""
     x = np.zeros(N_RIGID)
     x[3:6], x[7:10], x[10:13] = (0.2, -0.15, 0.4), (0.1, 0.05, -0.08), (0.01, 0.004, 0.006)
     x[State.ROTOR_SPEED] = 1.2671
@@ -100,9 +100,9 @@ def free_drift(integrator, steps, progress=silent):
 
 
 def floating_drift(integrator, steps, progress=silent):
-    """Return {energy: largest change over the motion's; status, steps} of the floating body."""
+    """Return {energy: largest change over the energy of motion; status, steps} of the floating body."""
     scene, x = floating_scene(), np.zeros(N_RIGID)
-    x[:6], x[State.ROTOR_SPEED] = (5.0, 2.0, 0.5, 0.02, 0.06, 0.03), 1.2671  # set free at an offset
+    x[:6], x[State.ROTOR_SPEED] = (5.0, 2.0, 0.5, 0.02, 0.06, 0.03), 1.2671  # released at an offset
     handle = with_integrator(scene, integrator).handle()
     start = kinetic_energy(scene, x) + potential_energy(handle, x)
     moving = potential_energy(handle, x) - potential_energy(handle, np.zeros(N_RIGID))
@@ -114,7 +114,7 @@ def floating_drift(integrator, steps, progress=silent):
 
 
 def _drift(changes, handle, x, integrator, steps, words, progress):
-    """Advance a body by so many steps; return {name: largest of changes(handle, x); status, steps}."""
+    """Advance a body by steps; return {name: largest of changes(handle, x); status, steps}."""
     u, largest, status, done = np.zeros(N_COMMANDS), {}, RUNNING, 0
     forget(handle)
     while done < steps and status == RUNNING:
@@ -127,7 +127,7 @@ def _drift(changes, handle, x, integrator, steps, words, progress):
 
 
 def resident():
-    """Return the resident memory of this process, MB, or its largest so far where that is all there is."""
+    """Return the resident memory of this process, MB; without /proc its peak so far."""
     statm = Path("/proc/self/statm")
     if statm.is_file():
         return int(statm.read_text().split()[1]) * resource.getpagesize() / 1e6
@@ -136,12 +136,12 @@ def resident():
 
 
 def plant_memory(steps, progress=silent):
-    """Return {growth_MB, status, steps}: memory of the full plant after all steps less after a tenth."""
+    """Return {growth_MB, status, steps}: memory growth of the plant after the first tenth of the steps."""
     wind = {"kind": "ntm", "speed": 18.0, "class": "B"}
     scene = build_scene(wind=wind, sea=WEATHER_SEA, fidelity="standard", seed=1)
     runner, x = Runner(scene, scene.dt), np.zeros(scene.n_state)
     x[State.ROTOR_SPEED], x[State.BLADE_PITCH] = 1.2671, 0.26
-    chunk = min(6000, max(1, steps // 10))  # a run of ten minutes under the PI, again and again
+    chunk = min(6000, max(1, steps // 10))  # repeated runs of ten minutes under PI control
     done, first, status = 0, None, RUNNING
     while done < steps and status == RUNNING:
         status = runner.run(x, [], chunk * scene.dt).status
@@ -153,7 +153,7 @@ def plant_memory(steps, progress=silent):
 
 
 def environment_memory(steps, progress=silent):
-    """Return {growth_MB, steps, resets} of an environment with episodes of 20 s, likewise."""
+    """Return {growth_MB, steps, resets}: the same for an environment with episodes of 20 s."""
     env, first, resets = FowtEnv(duration=20.0), None, 0
     env.reset(seed=0)
     for step in range(steps):
@@ -171,8 +171,8 @@ def environment_memory(steps, progress=silent):
 def measured_orders(duration=20.0, steps=(0.05, 0.025), finest=0.003125):
     """Return {integrator: order of convergence} in a regular wave, from the errors at two steps.
 
-    Without drag, whose |u| u is not smooth where the flow turns. The Adams methods get the derivatives of
-    their first three steps from the fine run: their own starting steps are of lower order.
+    Drag is omitted: |u| u is not smooth at flow reversal. The Adams methods take the derivatives of their
+    first three steps from the fine run, as their starting steps are of lower order.
     """
     base = build_scene(sea={"kind": "regular", "H": 6.0, "T": 8.0}, fidelity="reference")
     base = base.with_model({"hydro.strips.shape.drag_coefficient": 0.0})
@@ -207,10 +207,10 @@ def measured_orders(duration=20.0, steps=(0.05, 0.025), finest=0.003125):
 
 
 def quaternion_difference(duration=60.0):
-    """Return (largest difference of rotation matrices, rad turned): Euler angles against a quaternion.
+    """Return (largest difference of rotation matrices, largest angle in rad): Euler angles and quaternion.
 
-    A body tumbling in free space by Runge-Kutta 4, and its twin whose attitude is a quaternion integrated by
-    an eighth-order method; body rates come from the plant's equation of motion in both.
+    A body tumbling in free space is integrated by Runge-Kutta 4, and with a quaternion attitude by an
+    eighth-order method; body rates are those of the equation of motion in both.
     """
     scene, dt = with_integrator(free_scene(), "rk4"), INTEGRATORS["rk4"].dt
     x, dx = np.zeros(N_RIGID), np.zeros(N_RIGID)
@@ -231,12 +231,12 @@ def quaternion_difference(duration=60.0):
     times = np.linspace(0.0, duration, 61)
     y0 = np.r_[rotation(x).as_quat(), x[7:13], x[State.ROTOR_SPEED]]
     twin = solve_ivp(rate, (0.0, duration), y0, method="DOP853", rtol=1e-12, atol=1e-13, t_eval=times)
-    own = scene.handle()
-    forget(own)
+    euler = scene.handle()
+    forget(euler)
     worst, turned, step = 0.0, 0.0, 0
     for time, attitude in zip(times, twin.y[:4].T, strict=True):
         n = round(time / dt) - step
-        if advance(own, x, u, step, n, dt) != RUNNING:
+        if advance(euler, x, u, step, n, dt) != RUNNING:
             return float("inf"), turned
         step += n
         difference = rotation(x).as_matrix() - Rotation.from_quat(attitude).as_matrix()

@@ -1,6 +1,6 @@
-"""Random scenes and initial states over the whole valid range: does the plant stay finite and bounded?
+"""Runs random scenes and initial states over the valid range and checks that the state stays bounded.
 
-A case is a plain dict that holds everything to run it again (`fowt benchmark stability --replay FILE`).
+A case is a dict with everything needed to repeat it (`fowt benchmark stability --replay FILE`).
 """
 
 import json
@@ -32,23 +32,23 @@ DURATION = 30.0  # s of each case: three wave periods, one of platform pitch
 WEATHER = 60.0  # s of random wind and sea
 SEGMENT = 1.0  # s between changes of an open-loop command
 PER_WEATHER = 50  # initial states in each weather
-BENDS = " with a bending tower"  # ends the name of a plant whose tower has its first modes
+BENDS = " with a bending tower"  # suffix of a plant with flexible tower
 PLANTS = ("standard",) * 44 + ("reference",) + ("fast",) * 5  # fidelity of each weather, in turn
 KEYS = ("fidelity", "integrator", "dt", "duration", "wind", "sea", "seed", "state", "commands")
 
 STEEPEST = 0.142  # height over length of a regular wave in deep water before it breaks (Michell)
-FASTEST_TIP = 16.0  # tip-speed ratio that no freely turning rotor reaches
-WIND_LOAD = 1.3  # thrust coefficient over any angle and speed ratio that the wind's work is bounded with
-HUB_TRAVEL = 180.0  # m: hub from one side of the sea to the other, over which the wind may do work
-FACTOR = 2.0  # on the energy bound: waves and wind may act together with the initial motion
-FINER = 4  # ratio of steps of the run by which stops and the largest peaks are checked
+FASTEST_TIP = 16.0  # tip-speed ratio above that of any free-spinning rotor
+WIND_LOAD = 1.3  # upper bound of the thrust coefficient, for the work of the wind
+HUB_TRAVEL = 180.0  # m, largest travel of the hub, over which the wind does work
+FACTOR = 2.0  # safety factor of the energy bound: waves, wind and initial motion may combine
+FINER = 4  # step reduction of the run that checks stops and largest peaks
 QUADRATURE = np.polynomial.legendre.leggauss(40)  # of the energy of a line
-AGREE = 0.1  # relative difference of peak energies up to which they are the plant's and not the step's
+AGREE = 0.1  # allowed relative difference of peak energies with a finer step
 
 
 @kernel
 def platform_energy(x, mass_matrix):
-    """Return the kinetic energy of the platform's six motions (rotor turning with it), J."""
+    """Return the kinetic energy (J) of the six platform motions, without the spin of the rotor."""
     total = 0.0
     for i in range(6):
         for j in range(6):
@@ -60,11 +60,11 @@ def platform_energy(x, mass_matrix):
 def run_random_case(
     handle, x, u, act, parameters, memory, measurement, dx, commands, per_control, per_segment, last, dt, peak
 ):
-    """Advance x by last steps of dt; return (status, steps done).
+    """Advance x by `last` steps of dt; return (status, steps done).
 
-    Open loop where commands (k, 2) has rows, each held for per_segment steps; else the law act, called
-    every per_control steps. peak (4,) becomes the largest platform kinetic energy (J), roll or pitch (rad),
-    distance from the origin (m) and rotor speed (rad/s).
+    Open loop if commands (k, 2) has rows, each applied for per_segment steps; else the control law act is
+    called every per_control steps. peak (4,) gets the largest platform kinetic energy (J), roll or pitch
+    (rad), distance from the origin (m) and rotor speed (rad/s).
     """
     model, data = model_of(handle), data_of(handle)
     for step in range(last):
@@ -89,18 +89,18 @@ def run_random_case(
 
 @dataclass
 class Outcome:
-    """Result of a case."""
+    """Holds the result of a case."""
 
     status: int
     time: float  # s reached
-    peak: np.ndarray  # (4,) as run_random_case has it
+    peak: np.ndarray  # (4,) of run_random_case
     energy_bound: float  # J, of the platform's kinetic energy
     speed_bound: float  # rad/s, of the rotor
     unconverged: int  # mooring lines that missed their tolerance
 
     @property
     def failure(self):
-        """Reason for which the outcome is a failure, or an empty text. A finer run judges a capsize."""
+        """Return the reason of a failure, or an empty text; a capsize is checked by a finer run."""
         if self.status == NON_FINITE:
             return STOP_REASONS[NON_FINITE]
         energy, speed = self.peak[0], self.peak[3]
@@ -112,7 +112,7 @@ class Outcome:
 
     @property
     def text(self):
-        """The outcome in words."""
+        """Return a text that describes the outcome."""
         ended = STOP_REASONS[self.status] if self.status != RUNNING else "ran to its end"
         energy, tilt, speed = self.peak[0], np.degrees(self.peak[1]), self.peak[3]
         peaks = f"kinetic energy {energy:.3g} J, tilt {tilt:.1f} deg, rotor {speed:.3g} rad/s at most"
@@ -152,7 +152,7 @@ def _potential_energy(handle, x, node, quadrature):
 
 @kernel
 def buoyant_energy(pose, hydro, data):
-    """Return the work (J) that the still water has done on the hull, up to a constant."""
+    """Return the work (J) of the still water on the hull, up to a constant."""
     if hydro is None:
         return 0.0
     volume, qx, qy, qz = submerged(pose, hydro.hull, data.counters)
@@ -166,13 +166,13 @@ def potential_energy(handle, x):
 
 
 def weather_speeds(scene):
-    """Return (fastest wind at the rotor, fastest water at the surface) of a scene, m/s, generous."""
+    """Return (fastest wind at the rotor, fastest water at the surface) of a scene, m/s (upper bounds)."""
     wind = water = 0.0
     aero, hydro = scene.model.aero, scene.model.hydro
     if aero is not None:
         value = np.abs(aero.wind.value)
         level = np.sqrt((value[:, :3] ** 2).sum(axis=1)) + 0.5 * value[:, 3:].sum(axis=1)
-        wind = 1.1 * float(level.max()) + 10.0  # shear over the rotor's height; the hub's own motion
+        wind = 1.1 * float(level.max()) + 10.0  # margins for shear over the rotor and motion of the hub
     waves = None if hydro is None else hydro.waves
     if waves is not None:
         rms = sqrt(0.5 * float(np.sum((waves.amplitude * waves.omega) ** 2)))
@@ -182,7 +182,7 @@ def weather_speeds(scene):
 
 
 class Runner:
-    """Run cases in one scene, of which the shared parts are built once."""
+    """Runs cases in one scene, whose common parts are built once."""
 
     def __init__(self, scene, dt):
         self.scene, self.dt = scene, float(dt)
@@ -194,11 +194,11 @@ class Runner:
         self.dx, self.measurement = np.zeros(scene.n_state), np.zeros(N_MEASUREMENTS)
 
     def bounds(self, x):
-        """Return (J, rad/s) that the platform's kinetic energy and the rotor speed must stay below from x on.
+        """Return bounds (J, rad/s) of platform kinetic energy and rotor speed for a run that starts at x.
 
-        FACTOR times the sum of: the state's kinetic energy and its potential energy above that of the
-        upright platform; the platform with its added mass at the speed of the water; and the work of the
-        wind's thrust over HUB_TRAVEL. Rotor: its start, or FASTEST_TIP times the wind over the radius.
+        Energy: FACTOR times the sum of the kinetic energy at x, the potential energy above that of the
+        upright platform, the kinetic energy of platform and added mass at the speed of the water, and the
+        work of the thrust over HUB_TRAVEL. Rotor: its initial speed (plus 5 %) or FASTEST_TIP.
         """
         (wind, water), scene = self.speeds, self.scene
         body, radius = scene.model.rigid_body, scene.turbine.rotor.tip_radius
@@ -209,12 +209,12 @@ class Runner:
         return FACTOR * energy, max(1.05 * abs(x[State.ROTOR_SPEED]), FASTEST_TIP * wind / radius)
 
     def run(self, state, commands, duration):
-        """Return the Outcome of a state (n,) under commands (k, 2), or under the PI where there are none."""
+        """Run a state (n,) under commands (k, 2), or under PI control if empty, and return the Outcome."""
         dt, handle, data = self.dt, self.handle, self.data
         x, commands = np.array(state, dtype=float), np.array(commands, dtype=float).reshape(-1, 2)
         u, peak, bounds = np.array([0.0, x[State.BLADE_PITCH]]), np.zeros(4), self.bounds(x)
         for carried in (data.lines, data.counters, data.cache, data.history, data.elastic):
-            carried[:] = 0.0  # as in a scene of its own: a case runs alike alone and among others
+            carried[:] = 0.0  # as in a new scene: results do not depend on earlier cases
         law = hold.compiled, np.zeros(1), np.zeros(1)
         if len(commands) == 0:
             observe(handle, x, u, 0.0, self.dx, self.measurement)
@@ -239,7 +239,7 @@ def _one_of(*options):
 GUST = {"speed": _uniform(1.0, 50.0), "start": _uniform(0.0, 15.0)}
 SIGNED_GUST = GUST | {"sign": _one_of(1, -1)}
 TURBULENCE_CLASS = _one_of("A", "B", "C")
-WINDS = {  # kind: (probability, {key of its specification: draw}), in the order of the draws
+WINDS = {  # kind: (probability, {key of its specification: draw}), in drawing order
     "steady": (0.3, {"speed": _uniform(0.0, 70.0), "vertical": _uniform(-5.0, 5.0)}),
     "ntm": (0.2, {"speed": _uniform(1.0, 60.0), "class": TURBULENCE_CLASS}),
     "etm": (0.15, {"speed": _uniform(1.0, 50.0), "class": TURBULENCE_CLASS}),
@@ -253,19 +253,19 @@ WINDS = {  # kind: (probability, {key of its specification: draw}), in the order
 
 
 def draw_wind(rng):
-    """Return a wind specification from still air to 70 m/s, from any direction."""
+    """Draw a wind specification from still air to 70 m/s, from any direction."""
     kind = str(rng.choice(list(WINDS), p=[probability for probability, _ in WINDS.values()]))
     direction = float(rng.uniform(-180.0, 180.0))
     if kind == "still":
         return {"kind": "steady", "speed": 0.0}
     wind = {"kind": kind} | {key: draw(rng) for key, draw in WINDS[kind][1].items()}
-    if "start" not in wind:  # gusts come from ahead
+    if "start" not in wind:  # gusts come from upwind
         wind["direction"] = direction
     return wind | {"turbulent": True} if kind == "ewm" else wind
 
 
 def draw_sea(rng):
-    """Return a sea specification from flat water to Hs 17 m or a regular wave about to break, any heading."""
+    """Draw a sea specification: up to Hs 17 m or a regular wave below breaking steepness, any heading."""
     heading = float(rng.uniform(-180.0, 180.0))
     kind = str(rng.choice(["jonswap", "pierson_moskowitz", "regular"], p=[0.6, 0.15, 0.25]))
     if kind == "regular":
@@ -282,7 +282,7 @@ def draw_sea(rng):
 
 
 def draw_state(rng, turbine, tower=None):
-    """Return a state anywhere in the valid range, of a rigid or a bending tower (TowerModes)."""
+    """Draw a state in the valid range, with a rigid or a flexible tower (TowerModes)."""
     modes, drive = 0 if tower is None else len(tower.slope), turbine.pitch_drive
     x = np.zeros(N_RIGID + 2 * modes)
     offset, bearing = rng.uniform(0.0, 30.0), rng.uniform(0.0, 2.0 * pi)
@@ -300,7 +300,7 @@ def draw_state(rng, turbine, tower=None):
 
 
 def draw_commands(rng, turbine, duration):
-    """Return commands (k, 2): none (the PI), one constant, or a new one every SEGMENT."""
+    """Draw commands (k, 2): none (PI control), one constant, or a new one every SEGMENT."""
     drive = turbine.pitch_drive
     count = (0, 1, round(duration / SEGMENT))[rng.integers(3)]
     torque = rng.uniform(0.0, turbine.torque_law.max_torque, count)
@@ -308,7 +308,7 @@ def draw_commands(rng, turbine, duration):
 
 
 def _case(scene, wind, sea, seed, state, commands, duration):
-    """Return the dict by which a case can be run again."""
+    """Return the dict with which a case can be repeated."""
     return {key: scene.options[key] for key in ("fidelity", "tower", "integrator")} | {
         "dt": scene.dt, "duration": duration, "wind": wind, "sea": sea, "seed": seed,
         "state": np.asarray(state, dtype=float).tolist(), "commands": np.asarray(commands).tolist(),
@@ -316,7 +316,7 @@ def _case(scene, wind, sea, seed, state, commands, duration):
 
 
 def replay(case):
-    """Return the Outcome of a case dict or of its JSON file. Raises: InputError if keys are missing."""
+    """Run a case dict or its JSON file and return the Outcome. Raises: InputError if keys are missing."""
     if not isinstance(case, dict):
         path = Path(case)
         if not path.is_file():
@@ -337,20 +337,20 @@ def replay(case):
 
 
 def with_integrator(scene, name, rotor_samples=1):
-    """Return the scene with another integrator, ab4 with that many rotor loads per step."""
+    """Return the scene with another integrator; rotor_samples: rotor loads per step of ab4."""
     changed = scene.with_model(integrator=build_integrator(name, rotor_samples))
     return replace(changed, options=scene.options | {"integrator": name})
 
 
 def finer(scene, case):
-    """Return the Outcome of a case by Runge-Kutta 4 at a FINER-th of its step, in its own scene."""
+    """Run a case of a scene with Runge-Kutta 4 and its step divided by FINER; return the Outcome."""
     runner = Runner(with_integrator(scene, "rk4"), case["dt"] / FINER)
     return runner.run(case["state"], case["commands"], case["duration"])
 
 
 @dataclass
 class Tally:
-    """Result of a batch of random cases."""
+    """Holds the results of a batch of random cases."""
 
     cases: int = 0
     weathers: int = 0
@@ -365,10 +365,10 @@ class Tally:
 
 
 def random_cases(count, seed=0, per_weather=PER_WEATHER, duration=DURATION, plants=PLANTS, progress=silent):
-    """Return the Tally of count random cases, per_weather states in each weather, repeatable by the seed.
+    """Run count random cases, per_weather states in each weather, reproducible by seed; return the Tally.
 
-    Every capsize, and the most energetic case of each weather in twenty, runs again by Runge-Kutta 4 at
-    a quarter of the step: a capsize that the finer run does not have, or a peak energy that differs by
+    Every capsize, and the most energetic case of every twentieth weather, is repeated with Runge-Kutta 4 at
+    a quarter of the step. A capsize that the finer run does not have, or a peak energy that differs by
     more than AGREE, is a failure. progress: called with (text, done, total).
     """
     sequence, tally, bases = np.random.SeedSequence(seed), Tally(), {}
@@ -382,7 +382,7 @@ def random_cases(count, seed=0, per_weather=PER_WEATHER, duration=DURATION, plan
 
 
 def _one_weather(tally, bases, plant, rng, number, duration):
-    """Run number cases in one weather drawn from rng, into the tally."""
+    """Run a number of cases in one weather drawn from rng and add them to the tally."""
     wind, sea, seed = draw_wind(rng), draw_sea(rng), int(rng.integers(2**31))
     tally.per_plant[plant] = tally.per_plant.get(plant, 0) + number
     tally.cases += number
@@ -393,7 +393,7 @@ def _one_weather(tally, bases, plant, rng, number, duration):
             bases[plant] = build_scene(wind=wind, sea=sea, seed=seed, duration=WEATHER, **options)
         scene = bases[plant].with_weather(wind, sea, seed)
         runner = Runner(scene, scene.dt)
-    except Exception as error:  # any exception is what this looks for
+    except Exception as error:  # any exception is a failure of the case
         case = {"fidelity": plant, "wind": wind, "sea": sea, "seed": seed}
         tally.failures.append((case, f"exception: {error!r}"))
         return

@@ -1,7 +1,7 @@
-"""Largest stable step of each integrator and kind of scene: measured on the plant, and as theory has it.
+"""Computes the largest stable step of each integrator and kind of scene, by simulation and linear theory.
 
-Theory is the amplification matrix of the very scheme of fowt_env/plant/integrators.py on the linear model:
-blade pitch exact and, for the Adams methods, positions by Adams-Moulton from the new velocities.
+Theory uses the amplification matrix of the schemes of fowt_env/plant/integrators.py on the linear model:
+exact blade pitch and, for the Adams methods, positions by Adams-Moulton from the new velocities.
 """
 
 from dataclasses import dataclass, field
@@ -20,16 +20,16 @@ from fowt_env.scene.build import build_scene
 from fowt_env.training.benchmarks.speed import silent
 from fowt_env.training.studies.robustness.random_cases import with_integrator
 
-DURATION = 300.0  # s of each run: hundreds of steps even at the largest
-FINE_STEP = 0.0125  # s, of the run that others are judged by
-GROWTH = 2.0  # a run has blown up where a state's later peak is more than this times the fine run's
+DURATION = 300.0  # s of each run, a hundred of the largest steps
+FINE_STEP = 0.0125  # s, step of the reference run
+GROWTH = 2.0  # a run is unstable if a later peak exceeds that of the fine run by this factor
 LARGEST_STEP = 3.0  # s; the search ends here
-SCAN = 1.15  # ratio of one step to the next until the first blow-up
-RESOLUTION = 0.01  # relative, of the bisection after it
-MARGIN = 2.0  # that the default step must keep
-# moved from the operating point, so that every mode is excited; SI and radians, order of linear_model.STATES
+SCAN = 1.15  # ratio of successive steps of the scan
+RESOLUTION = 0.01  # relative, of the bisection
+MARGIN = 2.0  # required ratio of largest stable to default step
+# initial displacement that excites every mode; SI and radians, order of linear_model.STATES
 EXCITATION = np.array([1.0, 1.0, 0.3, 0.01, 0.01, 0.03, 0.05, 0.05, 0.05, 1e-3, 1e-3, 1e-3, 0.02, 2e-3])
-# what counts as motion at all beside the fine run's peak, in the same order
+# added to the peak of the fine run as the smallest relevant motion, in the same order
 FLOOR = np.array([0.1, 0.1, 0.1, 2e-3, 2e-3, 2e-3, 0.02, 0.02, 0.02, 5e-4, 5e-4, 5e-4, 5e-3, 5e-4])
 BASHFORTH = np.array([55.0, -59.0, 37.0, -9.0]) / 24.0  # of the derivatives, latest first
 MOULTON = np.array([9.0, 19.0, -5.0, 1.0]) / 24.0  # of the new derivative and the latest three
@@ -41,7 +41,7 @@ STORM = {"kind": "jonswap", "Hs": 15.0, "Tp": 16.0}
 
 @dataclass(frozen=True)
 class LimitScene:
-    """A kind of scene of the map: arguments of build_scene, and what is fixed."""
+    """Describes a kind of scene: arguments of build_scene, and whether platform and rotor are fixed."""
 
     wind: object = 18.0
     sea: object = field(default_factory=lambda: dict(SEA))
@@ -59,9 +59,9 @@ class LimitScene:
         return scene.with_model({f"rigid_body.{name}": value for name, value in fixed.items()})
 
     def point(self, scene):
-        """Return the OperatingPoint about which runs start and theory is linear.
+        """Return the OperatingPoint of the start of runs and of the linear model.
 
-        Without moorings nothing balances the thrust: then the upright platform, which drifts from there.
+        Without moorings nothing balances the thrust: the upright platform is used, which drifts.
         """
         if not self.platform_fixed and self.options.get("mooring", True):
             return trim(scene)
@@ -73,7 +73,7 @@ class LimitScene:
 
 LIMIT_SCENES = {
     "full, look-up rotor": LimitScene(),
-    "full, rotor sampled thrice a step": LimitScene(rotor_samples=3),  # as in a box of wind
+    "full, rotor sampled thrice a step": LimitScene(rotor_samples=3),  # as in a turbulence box
     "full, BEM rotor": LimitScene(fidelity="reference", options={"wave_components": 40}),
     "full, table rotor": LimitScene(fidelity="fast"),
     "full, rated wind": LimitScene(wind=11.4),
@@ -90,15 +90,15 @@ LIMIT_SCENES = {
 
 
 def amplification(a, h, integrator):
-    """Return the matrix of one step h of an integrator on x' = a x, a (N, N) of linear_model.STATES.
+    """Return the amplification matrix of a step h of an integrator for x' = a x; a (N, N), order of STATES.
 
     (N, N), or for the Adams methods (4 N, 4 N): x and the derivatives one, two and three steps ago.
     """
     one = np.eye(N)
 
-    def moved(by, share=1.0):  # blade pitch exact
+    def moved(by, fraction=1.0):  # blade pitch exact
         matrix = one + by
-        matrix[PITCH] = one[PITCH] * exp(a[PITCH, PITCH] * h * share)
+        matrix[PITCH] = one[PITCH] * exp(a[PITCH, PITCH] * h * fraction)
         return matrix
 
     if integrator == "heun":
@@ -122,16 +122,16 @@ def amplification(a, h, integrator):
 
 
 def stable(a, h, integrator, duration=DURATION):
-    """Return whether errors grow no more than GROWTH times as much as the plant itself over the duration."""
+    """Return whether errors grow at most GROWTH times as much as the linear model over the duration."""
     radius = np.abs(np.linalg.eigvals(amplification(a, h, integrator))).max()
-    own = max(0.0, np.linalg.eigvals(a).real.max())
-    return duration / h * log(radius) <= own * duration + log(GROWTH)
+    growth = max(0.0, np.linalg.eigvals(a).real.max())
+    return duration / h * log(radius) <= growth * duration + log(GROWTH)
 
 
 def first_unstable(holds, start):
-    """Return the largest step (s) below the first that does not hold: scan by SCAN, then bisection.
+    """Return the largest step (s) below the first for which holds(step) is false: scan, then bisection.
 
-    inf: all hold; 0.0: the start itself does not.
+    inf: true for all steps; 0.0: false at start.
     """
     low, high = 0.0, start
     while holds(high):
@@ -147,7 +147,7 @@ def first_unstable(holds, start):
 def excursions(scene, point, dt, duration=DURATION):
     """Return (peaks over the run, peaks over its second half): largest |state - operating point|, (N,).
 
-    The run starts off the operating point by EXCITATION and keeps its command. inf once it has stopped.
+    The run starts at the operating point plus EXCITATION with constant command. inf if the run stops.
     """
     x, u, rows, moved = point.state.copy(), point.command.copy(), np.array(STATE_INDEX), EXCITATION.copy()
     if scene.model.rigid_body.platform_fixed:
@@ -170,15 +170,15 @@ def excursions(scene, point, dt, duration=DURATION):
 
 
 def stays(scene, point, fine, dt, duration=DURATION):
-    """Return whether a run with steps dt does not blow up; fine: peaks of the fine run."""
+    """Return whether a run with step dt is stable; fine: peaks of the fine run."""
     return bool(np.all(excursions(scene, point, dt, duration)[1] <= GROWTH * (fine + FLOOR)))
 
 
 def stability_map(kinds=None, duration=DURATION, progress=silent):
     """Return a DataFrame with a row per kind of scene and integrator.
 
-    default_s, measured_s, theory_s: steps, inf above LARGEST_STEP; margin: measured over default; mode: state
-    that grows first; fastest_1_per_s: largest eigenvalue of the plant but for the blade-pitch actuator.
+    default_s, measured_s, theory_s: steps, inf above LARGEST_STEP; margin: measured over default; mode: first
+    unstable state; fastest_1_per_s: largest eigenvalue without the blade-pitch actuator.
     """
     names, rows = list(kinds or LIMIT_SCENES), []
     for done, name in enumerate(names):
@@ -193,15 +193,15 @@ def stability_map(kinds=None, duration=DURATION, progress=silent):
         for integrator in INTEGRATORS if kind.rotor_samples == 1 else ("ab4",):
             scene = with_integrator(base, integrator, kind.rotor_samples)
             default = INTEGRATORS[integrator].dt
-            found = first_unstable(partial(stays, scene, point, fine, duration=duration), default)
+            measured = first_unstable(partial(stays, scene, point, fine, duration=duration), default)
             scheme = "abm4" if integrator == "ab4" and feathering(point.state, base.model) else integrator
             theory = first_unstable(partial(stable, a, integrator=scheme, duration=duration), default)
             mode = ""
-            if theory < np.inf:  # what participates most, in EXCITATION, in the fastest-growing vector
+            if theory < np.inf:  # largest component, relative to EXCITATION, of the most unstable mode
                 values, vectors = np.linalg.eig(amplification(a, theory * SCAN, scheme))
                 mode = STATES[np.argmax(np.abs(vectors[:N, np.abs(values).argmax()]) / EXCITATION)]
             rows.append({
-                "kind": name, "integrator": integrator, "default_s": default, "measured_s": found,
-                "theory_s": theory, "margin": found / default, "mode": mode, "fastest_1_per_s": fastest,
+                "kind": name, "integrator": integrator, "default_s": default, "measured_s": measured,
+                "theory_s": theory, "margin": measured / default, "mode": mode, "fastest_1_per_s": fastest,
             })  # fmt: skip
     return pd.DataFrame(rows)

@@ -1,4 +1,4 @@
-"""Stability under stress: the parts of the study, each stored as JSON, the claims of each, and the report."""
+"""Runs the robustness study: parts stored as JSON, checks of each part, and the report."""
 
 import json
 import time
@@ -28,9 +28,9 @@ from fowt_env.training.studies.robustness import (
     without_compiler,
 )
 
-MEMORY_MB = 5.0  # growth that counts as none: less than a byte per step of the documented run
+MEMORY_MB = 5.0  # allowed memory growth: less than a byte per step of the documented run
 # relative changes of the free body over 10000000 default steps: kinetic energy, linear momentum, angular
-# momentum about the centre of mass, in inertial axes. The momenta turn with the error of the attitude, which
+# momentum about the centre of mass, in inertial axes. The momenta rotate with the attitude error, which
 # grows with time.
 DRIFT = {
     "rk4": {"energy": 1e-10, "linear": 1e-8, "angular": 1e-8},
@@ -38,18 +38,18 @@ DRIFT = {
     "abm4": {"energy": 1e-8, "linear": 1e-6, "angular": 1e-6},
     "ab4": {"energy": 1e-7, "linear": 1e-5, "angular": 1e-6},
 }
-FLOATING_DRIFT = {"rk4": 1e-5, "ab4": 1e-2}  # of the energy of motion, over as many
+FLOATING_DRIFT = {"rk4": 1e-5, "ab4": 1e-2}  # of the energy of motion, over as many steps
 SECULAR_STEPS = 10_000  # 600 s are 6000 to 12000 default steps
-ORDER_SLACK = 0.35  # that a measured order may lie below the method's
-TURNED = 1e-6  # entries of a rotation matrix
-PLAIN = 1e-9  # rounding of functions that Python and the compiler take from different libraries
-STEP_CHANGE = 0.05  # of an extreme's peak with half the step
+ORDER_SLACK = 0.35  # allowed shortfall of a measured order
+TURNED = 1e-6  # allowed difference of entries of a rotation matrix
+PLAIN = 1e-9  # rounding: Python and the compiler use different math libraries
+STEP_CHANGE = 0.05  # allowed relative change of a peak with half the step
 ROWS_SHOWN = 10  # of a table in the report
 
 
 @dataclass
 class RobustnessClaim:
-    """One row of the summary."""
+    """Holds one check of a part: one row of its summary."""
 
     what: str
     count: str
@@ -60,7 +60,7 @@ class RobustnessClaim:
 
 @dataclass
 class Found:
-    """Result of a part: claims, and tables as [title, columns, rows of texts]."""
+    """Collects the results of a part: claims, and tables as [title, columns, rows of texts]."""
 
     claims: list = field(default_factory=list)
     tables: list = field(default_factory=list)
@@ -70,13 +70,13 @@ class Found:
         self.claims.append(RobustnessClaim(what, str(count), found, target, bool(holds)))
 
     def none(self, what, count, number, words, target="none"):
-        """Add a claim that a number of misses, shown with these words behind it, is zero."""
+        """Add a claim that a number of misses is zero; words: text printed after the number."""
         self.claim(what, count, f"{number} {words}".rstrip(), target, number == 0)
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Sizes of the parts; the documented run has 100000 cases and 10000000 steps."""
+    """Holds the sizes of the parts; the documented run has 100000 cases and 10000000 steps."""
 
     cases: int = 2000
     steps: int = 200_000
@@ -85,7 +85,7 @@ class Sizes:
 
 
 def map_part(sizes, folder, progress):
-    """Return Found of the stability map."""
+    """Compute the stability map and return its Found."""
     table, found = step_limits.stability_map(progress=progress), Found()
     for integrator, rows in table.groupby("integrator", sort=False):
         least = rows.loc[rows["margin"].idxmin()]
@@ -97,7 +97,7 @@ def map_part(sizes, folder, progress):
     ratio = both["measured_s"] / both["theory_s"]
     count = f"{len(table)} limits, {len(both)} below {step_limits.LARGEST_STEP:g} s in both"
     text = f"{ratio.min():.2f} to {ratio.max():.2f}, median {ratio.median():.3f}"
-    found.claim("measured limit over linear theory's", count, text, "none below 0.8", ratio.min() > 0.8)
+    found.claim("measured over theoretical limit", count, text, "none below 0.8", ratio.min() > 0.8)
 
     def limit(value):
         return f"{value:.3f}" if np.isfinite(value) else f"> {step_limits.LARGEST_STEP:g}"
@@ -109,13 +109,13 @@ def map_part(sizes, folder, progress):
         for row in table.to_dict("records")
     ]  # fmt: skip
     columns = ["scene", "integrator", "default, s", "largest stable step, s", "theory, s", "margin",
-               "grows first", "fastest mode, 1/s"]  # fmt: skip
-    found.tables.append(["Largest step without blow-up", columns, rows])
+               "first unstable state", "fastest mode, 1/s"]  # fmt: skip
+    found.tables.append(["Largest stable step", columns, rows])
     return found
 
 
 def cases_part(sizes, folder, progress, fraction=1, plants=random_cases.PLANTS, failures="failures"):
-    """Return Found of the random scenes and states, one in fraction; failures are stored for replay."""
+    """Run cases / fraction random cases and return their Found; failures are stored for replay."""
     count = max(1, sizes.cases // fraction)
     tally = random_cases.random_cases(count, sizes.seed, plants=plants, progress=progress)
     paths = random_cases.store_case(tally.failures, Path(folder) / failures)
@@ -126,7 +126,7 @@ def cases_part(sizes, folder, progress, fraction=1, plants=random_cases.PLANTS, 
     what = f"{tally.cases} states in {tally.weathers} weathers ({spread})"
     found.none("NaN or exception", what, broken, "")
     words = f"above; largest ratio to the energy bound {tally.worst_ratio:.2f}"
-    target = "none, nor a stop that a finer step lacks"
+    target = "none, and no stop that a finer step does not have"
     found.none("kinetic energy and rotor speed bounded", tally.cases, len(reasons) - broken, words, target)
     what, most = "peak energy with a quarter of the step, every twentieth weather", random_cases.AGREE
     text, holds = f"largest change {tally.difference:.2%}", tally.difference <= most
@@ -140,7 +140,7 @@ def cases_part(sizes, folder, progress, fraction=1, plants=random_cases.PLANTS, 
         ["rotor speed", f"{peak[3] / RPM:.1f} rpm"],
         ["capsizes, each confirmed at a quarter of the step", f"{tally.capsizes}"],
     ]
-    found.tables.append(["Largest values of cases that ran to their end", ["", "largest"], rows])
+    found.tables.append(["Largest values of completed cases", ["", "largest"], rows])
     if paths:
         rows = [[path.name, reason] for path, reason in zip(paths, reasons, strict=True)]
         found.tables.append(["Failures, stored for --replay", ["file", "reason"], rows[:100]])
@@ -148,11 +148,11 @@ def cases_part(sizes, folder, progress, fraction=1, plants=random_cases.PLANTS, 
 
 
 def hostile_part(sizes, folder, progress):
-    """Return Found of hostile actions on the environment."""
+    """Apply hostile actions to environments and return Found."""
     table, found = extremes.hostile(steps=sizes.hostile_steps, progress=progress), Found()
     refused = table[table["policy"] == "NaN and infinity"]
     attacks = table.drop(refused.index)
-    what = "state, observation and reward finite, or an end with its reason"
+    what = "state, observation and reward finite, or termination with a reason"
     count = f"{attacks['steps'].sum()} control periods, {len(attacks)} policies, modes and tasks"
     found.none(what, count, (~attacks["finite"]).sum(), "not finite")
     what, count = "NaN or infinity refused, state untouched", refused["steps"].sum()
@@ -169,12 +169,12 @@ def hostile_part(sizes, folder, progress):
 
 
 def extremes_part(sizes, folder, progress):
-    """Return Found of the extreme events."""
+    """Run the extreme events and return Found."""
     table, found = extremes.extremes(seed=sizes.seed + 1, progress=progress), Found()
     sizes_of_groups = table.groupby("group", sort=False).size().items()
     groups = ", ".join(f"{count} {group}" for group, count in sizes_of_groups)
     stops = (~table["verdict"].str.startswith("finite")).sum()
-    words, broken = f"not finite, {stops} stopped with their reason", (~table["finite"]).sum()
+    words, broken = f"not finite, {stops} stopped with a reason", (~table["finite"]).sum()
     found.none("state finite to the end", f"{len(table)} runs: {groups}", broken, words, "all finite")
     changes = table["step_change"].dropna()
     text, holds = f"largest change {changes.max():.2%}", (changes <= STEP_CHANGE).all()
@@ -186,12 +186,12 @@ def extremes_part(sizes, folder, progress):
          "-" if np.isnan(row["step_change"]) else f"{row['step_change']:.2%}", row["verdict"]]
         for row in table.to_dict("records")
     ]  # fmt: skip
-    found.tables.append(["Extremes: largest values from the start of the run on", columns, rows])
+    found.tables.append(["Extremes: largest values of the whole run", columns, rows])
     return found
 
 
 def long_part(sizes, folder, progress):
-    """Return Found of the long runs, the orders and the quaternion."""
+    """Run long simulations, measure orders, compare with a quaternion attitude; return Found."""
     found = Found()
     runs = [(i, n, long_runs.free_drift, "free", DRIFT[i])
             for i in INTEGRATORS for n in (min(SECULAR_STEPS, sizes.steps), sizes.steps)]  # fmt: skip
@@ -224,7 +224,7 @@ def long_part(sizes, folder, progress):
 
 
 def plain_part(sizes, folder, progress):
-    """Return Found of the runs without the compiler."""
+    """Compare runs with and without the compiler and return Found."""
     progress("runs without the compiler", 0, 1)
     differences, found = without_compiler.differences(), Found()
     worst = max(differences, key=differences.get)
@@ -238,7 +238,7 @@ def plain_part(sizes, folder, progress):
 
 @dataclass(frozen=True)
 class Part:
-    """A part of the study: function, title and method in the report, (field of Sizes, its option) or None."""
+    """Describes a part: function, title and method in the report, (field of Sizes, CLI option) or None."""
 
     run: Callable
     title: str
@@ -250,23 +250,23 @@ PARTS = {
     "map": Part(
         map_part,
         "Stability map",
-        f"Each run starts off its operating point in every state, keeps its command and lasts"
-        f" {step_limits.DURATION:g} s. It has blown up where it stops, or where a peak of its second half is"
+        f"Each run starts with all states displaced from the operating point, has a constant command and"
+        f" lasts {step_limits.DURATION:g} s. It is unstable if it stops, or if a peak of its second half is"
         f" more than {step_limits.GROWTH:g} times that with steps of {step_limits.FINE_STEP:g} s. Theory is"
         " the amplification matrix of the integrator on the linear model, which has no drag: some limits"
-        " are therefore higher than its own. Yaw and rotor speed limit. Where the blades of an"
+        " therefore exceed the theoretical ones. Yaw and rotor speed limit the step. If the blades of an"
         " idling rotor damp its speed, ab4 corrects its step as abm4 does (`integrators.FEATHERING`).",
     ),
     "cases": Part(
         cases_part,
         "Random scenes and initial states",
         "Wind from still air to 70 m/s (steady, NTM, ETM, EWM, gusts; any direction), seas to Hs 17 m or a"
-        " regular wave to 30 m as steep as it may be; at the start offsets to 30 m, tilt and yaw to 30 deg,"
+        " regular wave to 30 m, up to breaking steepness; initial offsets to 30 m, tilt and yaw to 30 deg,"
         " speeds to 3 m/s and 0.1 rad/s, rotor to 150 %, any blade pitch. A third under the PI, a"
         f" third under a constant command, a third under a random one every second; {random_cases.DURATION:g}"
         " s each. The bound on the kinetic energy of the platform is"
-        f" {random_cases.FACTOR:g} times the sum of its energy at the start, its own at the speed of"
-        " the water, and the work that thrust can do; that on the rotor speed a tip-speed ratio of"
+        f" {random_cases.FACTOR:g} times the sum of its initial energy, its kinetic energy at the speed of"
+        " the water, and the largest work of the thrust; that on the rotor speed a tip-speed ratio of"
         f" {random_cases.FASTEST_TIP:g}.",
         ("cases", "--cases"),
     ),
@@ -274,14 +274,14 @@ PARTS = {
         partial(
             cases_part, fraction=20, plants=(f"standard{random_cases.BENDS}",), failures="tower_failures"
         ),
-        "The same with a tower that bends",
-        'A twentieth as many with `tower="modes"`, deflections to 1 m and rates to 2 m/s at the start.',
+        "Random scenes with a flexible tower",
+        'A twentieth as many with `tower="modes"`, initial deflections to 1 m and rates to 2 m/s.',
         ("cases", "--cases"),
     ),
     "hostile": Part(
         hostile_part,
         "Hostile actions",
-        "Environment at its defaults; episodes that end early restart. Policies: bang-bang at"
+        "Environment with default settings; episodes that end early are restarted. Policies: bang-bang at"
         " Nyquist, constant corners, random, platform-pitch resonance, far outside the range.",
         ("hostile_steps", "--hostile"),
     ),
@@ -289,13 +289,13 @@ PARTS = {
         extremes_part,
         "Extremes",
         f"Standard fidelity, {extremes.DURATION:g} s, the event at {extremes.EVENT:g} s,"
-        " PI control where the rotor runs. Lines have no breaking strength and the rotor no"
-        " aerodynamic brake: a finite state does not say that a turbine survives.",
+        " PI control if the rotor operates. Lines have no breaking strength and the rotor no"
+        " aerodynamic brake: a finite state does not show that a turbine survives.",
     ),
     "long": Part(
         long_part,
         "Long runs, order and attitude",
-        "The free body drifts and nutates in empty space with its rotor turning: relative drifts of its"
+        "The free body drifts and nutates in empty space with its rotor spinning: relative drifts of its"
         " energy, linear and angular momentum. The floating body has hull, weight and lines, but no drag,"
         " damping or added mass: drift of its energy over the energy of motion.",
         ("steps", "--steps"),
@@ -310,7 +310,7 @@ PARTS = {
 
 
 def study(folder, parts=None, sizes=None, progress=silent):
-    """Return {part: Found} of the chosen parts (default: all); each is written to folder/<part>.json.
+    """Run the chosen parts (default: all), write folder/<part>.json and return {part: Found}.
 
     progress: called with (text, done, total). Raises: InputError for an unknown part.
     """
@@ -329,9 +329,9 @@ def study(folder, parts=None, sizes=None, progress=silent):
 
 
 def write_robustness_report(folder, path):
-    """Write the Markdown report of every part that the folder holds; return the path.
+    """Write the Markdown report of all parts stored in a folder; return the path.
 
-    Tables of more than ROWS_SHOWN rows become CSV files in a folder beside the report, of its name.
+    Tables of more than ROWS_SHOWN rows are written as CSV to a folder next to the report, with its name.
     """
     path = Path(path)
     paths = {part: Path(folder) / f"{part}.json" for part in PARTS}
@@ -340,7 +340,7 @@ def write_robustness_report(folder, path):
     lines = [
         "# Numerical robustness", "",
         f"{len(verdicts)} checks, {verdicts.count(False)} of them missed. Version {fowt_env.__version__};"
-        " each part names the date and commit of its runs and the command that repeats them.",
+        " each part states the date and commit of its runs and the command to repeat them.",
     ]  # fmt: skip
     for name, stored in parts.items():
         part, sizes = PARTS[name], stored["sizes"]
@@ -356,7 +356,7 @@ def write_robustness_report(folder, path):
             [c["what"], c["count"], c["found"] if c["holds"] else f"**MISSED**: {c['found']}", c["target"]]
             for c in stored["claims"]
         ]
-        lines.append(markdown_table(["check", "count", "found", "target"], rows))
+        lines.append(markdown_table(["check", "count", "result", "target"], rows))
         for number, (title, columns, rows) in enumerate(stored["tables"]):
             if len(rows) <= ROWS_SHOWN:
                 lines += ["", f"**{title}**", "", markdown_table(columns, rows)]

@@ -1,6 +1,6 @@
-"""The same small runs with and without the compiler: numbers must agree to rounding.
+"""Compares short runs with and without the compiler, which must agree to rounding.
 
-As a program (arguments IN OUT, with NUMBA_DISABLE_JIT=1 in its environment) it runs the jobs of a pickle.
+Run as a program (arguments IN OUT, environment NUMBA_DISABLE_JIT=1), the module runs the jobs of a pickle.
 """
 
 import os
@@ -41,7 +41,7 @@ SCENES = {
 
 
 def start(scene):
-    """Return a state in rough motion."""
+    """Return a state with large motions."""
     x = np.zeros(scene.n_state)
     x[:6] = 4.0, -3.0, 0.5, 0.05, 0.08, -0.1
     x[7:13] = 0.5, -0.3, 0.2, 0.01, 0.02, -0.02
@@ -51,44 +51,44 @@ def start(scene):
 
 
 def jobs(scenes=SCENES, environments=True):
-    """Return {name: (None or environment and mode, scene or snapshot)} of pickled runs.
+    """Return jobs {name: (None or (environment, mode), scene or snapshot)}.
 
-    Scenes and snapshots are made here, with the compiler: trims and tables would take long without it.
+    Scenes and snapshots are made with the compiler: trims and tables would take long without it.
     """
-    found = {}
+    runs = {}
     for name, options in scenes.items():
         scene = build_scene(**{"fidelity": "reference"} | options)
         for integrator in INTEGRATORS:
             made = scene.with_model(integrator=build_integrator(integrator))
-            found[f"{name}, {integrator}"] = (None, made)
+            runs[f"{name}, {integrator}"] = (None, made)
     for mode in ("direct", "residual") if environments else ():
         for name in ("environment", "vector environment"):
             env = environment(name, mode)
             env.reset(seed=5)
-            found[f"{name}, {mode}"] = ((name, mode), env.get_state())
-    return found
+            runs[f"{name}, {mode}"] = ((name, mode), env.get_state())
+    return runs
 
 
 def environment(name, mode):
-    """Return an environment of an action mode, or a vector of two."""
+    """Return an environment, or a vector environment of two, with an action mode."""
     options = ENV | {"action_mode": mode}
     return FowtEnv(**options) if name == "environment" else FowtVectorEnv(2, threads=1, **options)
 
 
 def result(job):
-    """Return the numbers (n,) of a job."""
+    """Run a job and return its results as an array (n,)."""
     kind, begin = job
     if kind is None:
         x, handle, u = start(begin), begin.handle(), np.array([4.0e4, 0.25])
         status = advance(handle, x, u, 100, STEPS_PER_SCENE, 0.05)
         row = output_row(begin.handle(), x, u, 5.0 + STEPS_PER_SCENE * 0.05, len(begin.channels))
         return np.r_[status, x, row]
-    env, rng, found = environment(*kind), np.random.default_rng(3), []
+    env, rng, values = environment(*kind), np.random.default_rng(3), []
     env.set_state(begin)
     for _ in range(ENV_STEPS):
         action = rng.uniform(-1.0, 1.0, env.action_space.shape)
-        found += [np.ravel(part).astype(float) for part in env.step(action)[:3]]
-    return np.concatenate(found)
+        values += [np.ravel(part).astype(float) for part in env.step(action)[:3]]
+    return np.concatenate(values)
 
 
 def differences(given=None):
@@ -116,11 +116,11 @@ def differences(given=None):
 
 
 def main():
-    """Run the jobs of a pickle and store their numbers."""
+    """Run the jobs of a pickle and store their results."""
     if not numba.config.DISABLE_JIT:
-        raise SystemExit("NUMBA_DISABLE_JIT=1 must be in the environment")
-    given = pickle.loads(Path(sys.argv[1]).read_bytes())
-    np.savez(sys.argv[2], **{name: result(job) for name, job in given.items()})
+        raise SystemExit("the environment variable NUMBA_DISABLE_JIT=1 must be set")
+    todo = pickle.loads(Path(sys.argv[1]).read_bytes())
+    np.savez(sys.argv[2], **{name: result(job) for name, job in todo.items()})
 
 
 if __name__ == "__main__":

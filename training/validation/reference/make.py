@@ -1,7 +1,7 @@
-"""Makes the compact reference series of this folder from the full OpenFAST outputs: make.py SOURCE_FOLDER.
+"""Writes the compact reference series of this folder from full OpenFAST outputs: make.py SOURCE_FOLDER.
 
-Only the columns that are compared, every 0.1 s, with a header that says how the run was made and the SHA-256
-of the full output. The box of wind is cut to the region that rotor and tower meet, and rounded (see box()).
+Series have the compared columns every 0.1 s and a header with the settings of the run and the SHA-256 of the
+full output. The wind box is cut to the region of rotor and tower, and rounded (see box()).
 """
 
 import gzip
@@ -67,7 +67,7 @@ CASES = {  # case -> (columns, settings)
 
 
 def sha256(path):
-    """Return the SHA-256 of a file, or of the list of names and SHA-256 of a folder's files."""
+    """Return the SHA-256 of a file, or of the list of names and SHA-256 of the files of a folder."""
     path = Path(path)
     if path.is_dir():
         lines = [f"{sha256(part)} {part.name}\n" for part in sorted(path.iterdir())]
@@ -76,23 +76,23 @@ def sha256(path):
 
 
 def sources(*paths):
-    """Return the lines of a head: SHA-256 and name of each file that figures are from."""
+    """Return header lines with SHA-256 and name of each source file."""
     return [f"sha256 {sha256(path)} {Path(path).name}" for path in paths]
 
 
 def write(path, comment, frame):
-    """Write a gzipped CSV with comment lines, the same bytes whenever it is made."""
+    """Write a gzipped CSV with comment lines; the bytes are reproducible."""
     text = "".join(f"# {line}\n" for line in comment) + frame.to_csv(index=False)
     path.write_bytes(gzip.compress(text.encode(), compresslevel=9, mtime=0))
 
 
 def six_digits(rows):
-    """Return a DataFrame with six digits of each float."""
+    """Return a DataFrame of rows with floats rounded to six digits."""
     return pd.DataFrame(rows).map(lambda v: float(f"{v:.6g}") if isinstance(v, float) else v)
 
 
 def series(source, folder, cases, rounded):
-    """Write the time series of {case: (columns, step s, head lines)}, each column after rounded(column)."""
+    """Write time series of {case: (columns, step in s, header lines)}; rounded is applied to each column."""
     for case, (columns, step, *head) in cases.items():
         path, names = source / f"{case}.csv.gz", ["time_s", *columns]
         full = pd.read_csv(path, usecols=names)[names]
@@ -103,7 +103,7 @@ def series(source, folder, cases, rounded):
 
 
 def without_noise(values):
-    """Return a series, or 0 for a motion below 1e-7, which is rounding of the solver."""
+    """Return a series, or 0 if all values are below 1e-7 (rounding of the solver)."""
     return values if np.abs(values).max() >= 1e-7 else 0.0
 
 
@@ -122,16 +122,16 @@ def inputs(source):
         write(HERE / f"{name}.csv.gz", (*head, *sources(path)), kept(pd.read_csv(path)))
 
 
-# region of the box: columns within this of the axis, rows up to this height, seconds
+# region of the box: half width (m), height (m), duration (s)
 SIDE, TOP, LENGTH = 68.0, 162.0, 612.0
-REACH = 78.0  # m from the hub: farther out no blade station has a corner of its cell
+REACH = 78.0  # m from the hub: outside, no grid point is used by a blade station
 ROUNDING = np.array([0.04, 0.08, 0.08])  # m/s, rounding of u, v, w
 
 
 def box(source):
-    """Write the region of the TurbSim box that rotor and tower meet, rounded, differences in time, lzma.
+    """Write the region of the TurbSim box at rotor and tower: rounded, differences in time, lzma.
 
-    Points that neither meets are zero.
+    Points that are not used are zero.
     """
     from openfast_io.turbsim_file import TurbSimFile
 
@@ -145,7 +145,7 @@ def box(source):
     used = (np.hypot(y[None, :], z[:, None] - 90.0) < REACH) | (np.abs(y[None, :]) < 8.0)
     codes = np.round(velocity / ROUNDING).astype(np.int16) * used[None, :, :, None].astype(np.int16)
     steps = np.diff(codes, axis=0, prepend=np.zeros_like(codes[:1]))
-    # components and points first: each point's history is then one run of bytes
+    # components and points first: the time series of each point is then contiguous
     packed = np.ascontiguousarray(np.transpose(steps, (3, 1, 2, 0)))
     shape = (codes.shape[0], z.size, y.size)
     planes = packed.view(np.uint8).reshape(-1, 2)

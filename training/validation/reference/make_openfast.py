@@ -1,13 +1,13 @@
-"""Runs OpenFAST on the public decks and keeps the series: make_openfast.py DECKS OPENFAST RUNS [CASE ...].
+"""Runs OpenFAST on the public decks and writes the series: make_openfast.py DECKS OPENFAST RUNS [CASE ...].
 
 DECKS     folder with iea15_volturnus_s, nrel5mw_oc4_semi, nrel5mw_turbine (sources: openfast_decks.py)
-OPENFAST  the program: v5.0.0, Release, -O2, double precision, without OpenMP
-RUNS      folder of the full outputs, one subfolder a case; a case that is there is not run again
-CASE      names of CASES, or volturnus/NAME of VOLTURNUS; none: all of CASES but the mended ones
+OPENFAST  the executable: v5.0.0, Release, -O2, double precision, without OpenMP
+RUNS      folder of the full outputs, one subfolder per case; existing outputs are reused
+CASE      names of CASES, or volturnus/NAME of VOLTURNUS; default: all of CASES but the mended ones
 
-Series go beside this file, with settings and the SHA-256 of every file that figures are from. "mended" cases
-want a program with the correction that their heads name. Outputs of VOLTURNUS go to RUNS, for
-make_volturnus.py; those with a controller take ROSCO's library from the path ROSCO_LIB.
+Series are written next to this file, with settings and SHA-256 of every source file. "mended" cases need an
+executable with the correction named in their headers. Outputs of VOLTURNUS are written to RUNS, for
+make_volturnus.py; runs with a controller load the ROSCO library from the path ROSCO_LIB.
 """
 
 import os
@@ -130,7 +130,7 @@ VOLTURNUS = {  # full outputs that make_volturnus.py reduces
 
 
 def run(deck, case, folder, program):
-    """Return a DataFrame of OpenFAST's output of a case, run in a new folder. Raises: RuntimeError."""
+    """Run a case in a new folder (or reuse its output) and return a DataFrame. Raises: RuntimeError."""
     if not (folder / "model.out").exists():
         deck.write(
             folder, case, rosco=os.environ.get("ROSCO_LIB", "libdiscon.so"),
@@ -165,5 +165,5 @@ if __name__ == "__main__":
             case = name.removeprefix("volturnus/")
             full = run(Volturnus(decks), VOLTURNUS[case], runs / "volturnus" / case, program)
             frame = full[[name for name in full if name in COLUMNS]].rename(columns=COLUMNS)
-            write(runs / f"{case}.csv.gz", (), six_digits(frame))  # as make_volturnus.py reads it
+            write(runs / f"{case}.csv.gz", (), six_digits(frame))  # input of make_volturnus.py
         print(name, flush=True)

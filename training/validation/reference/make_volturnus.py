@@ -1,4 +1,4 @@
-"""Makes the compact reference series of iea15_volturnus_s/: make_volturnus.py SERIES_FOLDER [LINEAR_FOLDER].
+"""Writes the compact reference series of iea15_volturnus_s/: make_volturnus.py SERIES_FOLDER [LINEAR_FOLDER].
 
 SERIES_FOLDER has the OpenFAST outputs of the rigid IEA 15 MW on VolturnUS-S (make_openfast.py, VOLTURNUS),
 LINEAR_FOLDER the linearisation files (lin_NN.A.lin: operating point NN, azimuth A) of NREL/ROSCO fc11f43,
@@ -75,13 +75,13 @@ STEADY = {  # case -> (wind, rotor speed, blade pitches, shear exponent)
     "12mps_shear": (12.0, 7.56, (6.3,) * 3, 0.14),
     "12mps_pitches": (12.0, 7.56, (8.3, 5.3, 6.3), 0.0),
 }  # fmt: skip
-SETTLED = 15.0  # s of a steady case that are left out
+SETTLED = 15.0  # s, start-up omitted from a steady case
 TURNING = (("aero_Fy_N", "aero_Fz_N"), ("aero_My_Nm", "aero_Mz_Nm"))
 ROOTS = ("root1_Mx_kNm", "root1_My_kNm", "root2_My_kNm", "root3_My_kNm")
 
 
 def rounded(values, digits=5):
-    """Return a series rounded to a step that leaves `digits` digits of its largest value."""
+    """Return a series rounded to `digits` significant digits of its largest value."""
     largest = np.abs(values).max()
     if largest < 1e-7:
         return 0.0 * values
@@ -89,7 +89,7 @@ def rounded(values, digits=5):
 
 
 def wave_forces(source):
-    """Write the forces of a sea: first order, and difference frequencies of the full QTF, every 2 s."""
+    """Write wave forces every 2 s: first order, and difference frequencies of the full QTF."""
     path = source / "waves_Hs7.5_qtf.csv.gz"
     columns = ["time_s", "wave_elev_m", "excitation_Fx_N", "excitation_Fz_N", "excitation_My_Nm",
                "second_order_Fx_N", "second_order_My_Nm"]  # fmt: skip
@@ -103,10 +103,7 @@ def wave_forces(source):
 
 
 def held(source, case):
-    """Return (arrays of a steady case, azimuth of blade 1, row of the case's settings).
-
-    Samples after SETTLED that make up whole turns.
-    """
+    """Return (arrays of a steady case, azimuth of blade 1, row of settings), whole revolutions only."""
     wind, rpm, pitches, shear = STEADY[case]
     frame = pd.read_csv(source / f"steady_{case}_fixed.csv.gz")
     time, period = frame["time_s"].to_numpy(), 60.0 / rpm
@@ -125,7 +122,7 @@ def write_steady(name, settings, source, cases, rows):
 
 
 def steady(source):
-    """Write rotor loads in steady wind, platform held: means over whole turns, in axes that do not turn."""
+    """Write mean rotor loads in steady wind on a fixed platform: whole revolutions, non-rotating axes."""
     rows = []
     for case in STEADY:
         values, angle, row = held(source, case)
@@ -151,7 +148,7 @@ def steady(source):
 
 
 def sheared(source):
-    """Write rotor loads in sheared wind at azimuths of one turn."""
+    """Write rotor loads in sheared wind over one revolution."""
     path = source / "steady_12mps_shear_fixed.csv.gz"
     columns = ["time_s", "azimuth_deg", "aero_thrust_N", "aero_torque_Nm", "aero_My_Nm", "aero_Mz_Nm"]
     frame = pd.read_csv(path, usecols=columns)[columns]

@@ -1,7 +1,7 @@
-"""Inputs of OpenFAST v5.0.0 from the public decks of VolturnUS-S and of the OC4 semi-submersible.
+"""Writes OpenFAST v5.0.0 inputs from the public decks of VolturnUS-S and the OC4 semi-submersible.
 
-Decks are those of NOTICE: IEAWindSystems/IEA-15-240-RWT ac5248a (with the DISCON.IN of NREL/ROSCO fc11f43),
-old-NWTC/FAST 0badc8d with the turbine of NREL/ROSCO fc11f43. Figures are carried over by their keys.
+Decks are listed in NOTICE: IEAWindSystems/IEA-15-240-RWT ac5248a (with the DISCON.IN of NREL/ROSCO fc11f43),
+old-NWTC/FAST 0badc8d with the turbine of NREL/ROSCO fc11f43. Values are transferred by key.
 """
 
 import re
@@ -15,7 +15,7 @@ OPENFAST = "OpenFAST v5.0.0 (2895884d2be01862173c88d70f86b358d2f1a50a)"
 MOTIONS = ("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw")
 BLADES = (1, 2, 3)
 
-# keys of v5 in the order in which they are read, each with its default; what begins with "-" is a headline
+# keys of v5 in reading order, each with its default; entries starting with "-" are section headings
 GLUE = """
 - control; Echo False; AbortLevel "FATAL"; TMax 0; DT 0.025; ModCoupling 1; InterpOrder 2; NumCrctn 0;
 RhoInf 1.0; ConvTol 1e-6; MaxConvIter 20; DT_UJac 99999; UJacSclFact 1e6;
@@ -114,20 +114,20 @@ AERO_CHANNELS = ("RtFldFxh", "RtFldMxh", "RtFldFyh", "RtFldFzh", "RtFldMyh", "Rt
 
 
 def pattern(key):
-    """Return the pattern of a value before its key in a deck, brackets of the key optional."""
+    """Return the regular expression of a value and its key in a deck; brackets of the key are optional."""
     bare = re.escape(key).replace(r"\(", r"\(?").replace(r"\)", r"\)?")
     return rf"^[ \t]*(\"[^\"\n]*\"|[^\s\"]+)([ \t]+{bare}(?=\s|$))"
 
 
 def keys_of(settings):
-    """Return settings with BlPitch(1) for BlPitch__1."""
+    """Return settings with keys such as BlPitch__1 written as BlPitch(1)."""
     return {name.replace("__", "(") + (")" if "__" in name else ""): v for name, v in settings.items()}
 
 
 def filled(layout, deck="", **settings):
-    """Return the text of an input file: each key of the layout with its setting, default or deck's value.
+    """Return the text of an input file: keys of the layout with their setting, default or value in the deck.
 
-    Raises: KeyError for a setting that the layout lacks, and for a key without any value.
+    Raises: KeyError for a setting that is not in the layout, and for a key without a value.
     """
     lines, settings = [], keys_of(settings)
     for line in (part.strip() for part in layout.replace("\n", " ").split(";")):
@@ -135,46 +135,46 @@ def filled(layout, deck="", **settings):
         if key == "-" or line.startswith('"') or line == "END":
             lines.append(value if value[:1].isdigit() else line)
             continue
-        if not value and (found := re.search(pattern(key), deck, re.M)):
-            value = found[1]
+        if not value and (match := re.search(pattern(key), deck, re.M)):
+            value = match[1]
         value = settings.pop(key, value)
         if value == "" and key != "OutList":
             raise KeyError(key)
         lines.append(f"{value} {key}")
     if settings:
-        raise KeyError(f"no such key: {sorted(settings)}")
+        raise KeyError(f"unknown keys: {sorted(settings)}")
     return "\n".join(lines) + "\n"
 
 
 def put(text, **values):
-    """Return deck text with the value before each key replaced, where the key comes first."""
+    """Return deck text with the value of each key replaced at its first occurrence."""
     for key, value in keys_of(values).items():
         replaced = re.compile(pattern(key), re.M)
-        text, count = replaced.subn(lambda found, value=value: f"{value}{found[2]}", text, count=1)
+        text, count = replaced.subn(lambda match, value=value: f"{value}{match[2]}", text, count=1)
         if not count:
             raise KeyError(key)
     return text
 
 
 def with_channels(text, channels):
-    """Return deck text with its first list of channels replaced, and cut after it."""
+    """Return deck text with the first list of channels replaced, and the rest cut off."""
     head = text[: text.index("\n", text.index("OutList")) + 1]
     return head + "".join(f'"{name}"\n' for name in channels) + "END\n"
 
 
 def matrix(name, entries):
-    """Return six rows of a 6x6 matrix of HydroDyn; entries {(i, j) from 1: value}."""
+    """Return the text of a 6x6 matrix of HydroDyn; entries: {(i, j) from 1: value}."""
     rows = [" ".join(repr(float(entries.get((i, j), 0.0))) for j in range(1, 7)) for i in range(1, 7)]
     return "\n".join([f"{rows[0]} {name}", *rows[1:]]) + "\n"
 
 
 def table(key, rows):
-    """Return the text of a table of HydroDyn: the number of rows, two headlines, the rows."""
+    """Return the text of a table of HydroDyn: number of rows, two header lines, rows."""
     return f"- table\n{len(rows)} {key}\n-\n-\n" + "".join(f"{row}\n" for row in rows)
 
 
 def members_text(axial=("1 0 0 1 0 0 1",), joints=(), sections=(), coefficients=(), members=(), fills=()):
-    """Return the text of HydroDyn's strip theory, all tables of it in v5's order."""
+    """Return the text of the strip-theory section of HydroDyn v5, with all tables in order."""
     simple = [f"- simple{shape}\n-\n-\n{'0 ' * n}\n" for shape, n in (("", 14), (", rectangular", 18))]
     before = {"NAxCoef": axial, "NJoints": joints, "NPropSetsCyl": sections, "NPropSetsRec": ()}
     after = {
@@ -186,13 +186,13 @@ def members_text(axial=("1 0 0 1 0 0 1",), joints=(), sections=(), coefficients=
 
 
 def write_elastodyn(folder, deck, case, **files):
-    """Write ED.dat of a run: rigid but for what the case switches on; blade and tower files beside it."""
+    """Write ED.dat of a run, rigid except for the case's degrees of freedom; copy blade and tower files."""
     tower = case.get("tower", 0)
     pitches = case.get("pitches", (case.get("pitch", 0),) * 3)
-    held = {f"Ptfm{k}DOF": False for k in ("Sg", "Sw", "Hv", "R", "P", "Y")} if case.get("fixed") else {}
+    fixed = {f"Ptfm{k}DOF": False for k in ("Sg", "Sw", "Hv", "R", "P", "Y")} if case.get("fixed") else {}
     text = filled(
         ELASTODYN, deck, GenDOF=bool(case.get("control")), TwFADOF1=tower > 0, TwSSDOF1=tower > 0,
-        RotSpeed=case.get("rpm", 0), **{f"BlPitch__{k}": pitches[k - 1] for k in BLADES}, **held,
+        RotSpeed=case.get("rpm", 0), **{f"BlPitch__{k}": pitches[k - 1] for k in BLADES}, **fixed,
         **{name: case[name] for name in MOTIONS if name in case},
     )  # fmt: skip
     channels = "".join(f'"{name}"\n' for name in ELASTO_CHANNELS)
@@ -202,7 +202,7 @@ def write_elastodyn(folder, deck, case, **files):
 
 
 def write_sea(folder, case, components, **grid):
-    """Write SS.dat, and the file of wave components where the case has them."""
+    """Write SS.dat and, if the case has wave components, their file."""
     settings = {"WvHiCOffD": 0.737863, **grid}
     if kind := case.get("sea"):
         settings |= {"WaveMod": "1P0.0", "WaveHs": kind[0], "WaveTp": kind[1]}
@@ -226,16 +226,16 @@ def write_glue(folder, case, **settings):
 
 
 def end_nodes(text, inside=0.05):
-    """Return an AeroDyn blade with nodes just inside root and tip, where loads have no induction."""
+    """Return an AeroDyn blade with extra nodes just inside root and tip, whose loads have no induction."""
     lines = text.rstrip("\n").split("\n")
     first = next(k for k, line in enumerate(lines) if "NumBlNds" in line)
     count = int(lines[first].split()[0])
     rows = [[float(v) for v in line.split()] for line in lines[first + 3 : first + 3 + count]]
 
     def between(a, b, span):
-        share = (span - a[0]) / (b[0] - a[0])
-        row = [u + share * (v - u) for u, v in zip(a, b, strict=True)]
-        row[6] = (a if share < 0.5 else b)[6]  # the polar
+        fraction = (span - a[0]) / (b[0] - a[0])
+        row = [u + fraction * (v - u) for u, v in zip(a, b, strict=True)]
+        row[6] = (a if fraction < 0.5 else b)[6]  # the polar
         return row
 
     root = between(rows[0], rows[1], rows[0][0] + inside)
@@ -247,7 +247,7 @@ def end_nodes(text, inside=0.05):
 
 
 class Deck:
-    """A public deck: its own folder and name, tower and blade files, and the files of its floating body."""
+    """Represents a public deck: folder and name, tower and blade files, and files of the floating body."""
 
     ends = (".1", ".3", ".hst", ".12d")
 
@@ -256,7 +256,7 @@ class Deck:
         return (self.own / f"{self.name}_{part}.dat").read_text()
 
     def begin(self, folder, case):
-        """Make the folder of a run with the files of structure and floating body."""
+        """Create the folder of a run with the files of structure and floating body."""
         folder.mkdir(parents=True)
         tower = self.own / f"{self.name}_{self.tower}.dat"
         write_elastodyn(folder, self.read("ElastoDyn"), case, blade_ed=self.blade, tower=tower)
@@ -266,7 +266,7 @@ class Deck:
 
 
 class Volturnus(Deck):
-    """IEA 15 MW on VolturnUS-S: potential flow, a matrix of quadratic drag, MAP++, quasi-steady polars."""
+    """Writes runs of the IEA 15 MW on VolturnUS-S: potential flow, drag matrix, MAP++, static polars."""
 
     name = body = "IEA-15-240-RWT-UMaineSemi"
     tower = "ElastoDyn_tower"
@@ -279,7 +279,7 @@ class Volturnus(Deck):
         self.discon = tests / self.name / f"{self.name}_DISCON.IN"
 
     def inputs(self, case):
-        """Return the paths of the files of the deck that a run takes figures from."""
+        """Return the paths of the deck files that a run uses."""
         paths = [self.own / f"{self.name}_{part}.dat" for part in ("ElastoDyn", self.tower)] + [self.blade]
         if not case.get("fixed"):
             body = [self.own / "HydroData" / f"{self.body}{end}" for end in self.ends]
@@ -294,7 +294,7 @@ class Volturnus(Deck):
         return paths
 
     def write(self, folder, case, components=None, hub_wind=None, rosco="libdiscon.so"):
-        """Write all inputs of a run; rosco: path of its library."""
+        """Write all inputs of a run; rosco: path of the ROSCO library."""
         self.begin(folder, case)
         drag = {
             (1, 1): 9.23e5, (2, 2): 9.23e5, (3, 3): 2.30e6, (4, 4): 1.68e10, (5, 5): 1.68e10,
@@ -307,15 +307,15 @@ class Volturnus(Deck):
         (folder / "HD.dat").write_text(f"v5\n-\n{platform}{added}{strips}" + filled(HYDRO_OUTPUT))
         write_sea(folder, case, components)
         lines = re.sub(r"(850\.00\s+1\s+2)", r"\1 tension_fair", self.read("MAP"))
-        # MoorDyn's file of the deck has the anchors at 837.6 m
+        # anchors at 837.6 m, as in the MoorDyn file of the deck
         (folder / "mooring.dat").write_text(lines.replace("-837.800", "-837.600").replace("ˆ", "^"))
         self._write_wind(folder, case, hub_wind)
         self._write_servodyn(folder, case, rosco)
-        held = {"CompSeaSt": 0, "CompHydro": 0, "CompMooring": 0} if case.get("fixed") else {}
-        write_glue(folder, case, **held)
+        fixed = {"CompSeaSt": 0, "CompHydro": 0, "CompMooring": 0} if case.get("fixed") else {}
+        write_glue(folder, case, **fixed)
 
     def _write_wind(self, folder, case, hub_wind):
-        """Write AD.dat with its blade and airfoils, IW.dat and the uniform wind of a file."""
+        """Write AD.dat with blade and airfoils, IW.dat, and the uniform wind file if needed."""
         text = self.read("AeroDyn15").replace("../IEA-15-240-RWT/Airfoils", "Airfoils")
         text = text.replace("../IEA-15-240-RWT/IEA-15-240-RWT_AeroDyn15_blade.dat", "blade_ad.dat")
         text = put(text, TwrPotent=0, TwrShadow=0, DBEMT_Mod=case.get("dbemt", 0), UA_Mod=0, AoA34=False)
@@ -328,7 +328,7 @@ class Volturnus(Deck):
         blade = (self.rotor / "IEA-15-240-RWT_AeroDyn15_blade.dat").read_text()
         (folder / "blade_ad.dat").write_text(end_nodes(blade))
         (folder / "Airfoils").mkdir()
-        for polar in (self.rotor / "Airfoils").iterdir():  # coordinates are for acoustics and pictures alone
+        for polar in (self.rotor / "Airfoils").iterdir():  # coordinates are for acoustics and plots only
             text = re.sub(r"^\S+(\s+NumCoords)", r"0\1", polar.read_text(), flags=re.M)
             (folder / "Airfoils" / polar.name).write_text(text)
         wind, kind = case.get("wind") or 0.0, 1
@@ -342,7 +342,7 @@ class Volturnus(Deck):
         (folder / "IW.dat").write_text(f"v5\n-\n{text}")
 
     def _write_servodyn(self, folder, case, rosco):
-        """Write SV.dat: ROSCO's library, or a pitch manoeuvre of all blades ("pitch_to" degrees at 20 s)."""
+        """Write SV.dat: ROSCO library, or a pitch manoeuvre of all blades ("pitch_to" degrees at 20 s)."""
         control, target = 5 if case.get("control") else 0, case.get("pitch_to")
         text = put(self.read("ServoDyn"), PCMode=control, VSContrl=control, DLL_FileName=f'"{rosco}"',
                    DLL_InFile='"DISCON.IN"', DLL_DT="0.025" if control else '"default"')  # fmt: skip
@@ -350,9 +350,9 @@ class Volturnus(Deck):
             text = put(text, **{f"TPitManS__{k}": 20.0 for k in BLADES},
                        **{f"PitManRat__{k}": 2.0 for k in BLADES},
                        **{f"BlPitchF__{k}": target for k in BLADES})  # fmt: skip
-        neutral = {"PitNeut": case.get("pitch", 0), "PitSpr": 0, "PitDamp": 0}  # held without a controller
+        neutral = {"PitNeut": case.get("pitch", 0), "PitSpr": 0, "PitDamp": 0}  # fixed without a controller
         springs = "".join(f"{value} {name}({k})\n" for name, value in neutral.items() for k in BLADES)
-        text = re.sub(r"^(.*\sTPCOn\s.*\n)", lambda found: found[1] + springs, text, count=1, flags=re.M)
+        text = re.sub(r"^(.*\sTPCOn\s.*\n)", lambda match: match[1] + springs, text, count=1, flags=re.M)
         (folder / "SV.dat").write_text(with_channels(text, ("GenTq", "GenPwr")))
         if control:
             text = re.sub(r'^"[^"]*"(\s*! PerfFileName)', r'"Cp_Ct_Cq.txt"\1', self.discon.read_text(),
@@ -362,7 +362,7 @@ class Volturnus(Deck):
 
 
 def section(text, key):
-    """Return the rows (lists of words) of a table of HydroDyn's old format, below their number."""
+    """Return the rows (lists of words) of a table in the old HydroDyn format."""
     lines = text.split("\n")
     at = next(k for k, line in enumerate(lines) if re.match(rf"\s*\d+\s+{key}(\s|$)", line))
     count = int(lines[at].split()[0])
@@ -388,7 +388,7 @@ class Oc4(Deck):
         self.excitation = data / "nrel5mw_oc4_semi.npz"
 
     def inputs(self, case):
-        """Return the paths of the inputs of a run; the deck has no .3: excitation of the package."""
+        """Return the paths of the inputs of a run; the deck lacks a .3 file: excitation of the package."""
         parts = ["ElastoDyn", self.tower, "HydroDyn", "MoorDyn" if case.get("moordyn") else "MAP"]
         paths = [self.own / f"{self.name}_{part}.dat" for part in parts]
         ends = self.ends if case.get("qtf") else self.ends[:2]
@@ -400,7 +400,7 @@ class Oc4(Deck):
         self.begin(folder, case)
         (folder / "HydroData" / "body.3").write_text(self._excitation_text())
         (folder / "HD.dat").write_text(self._hydrodyn(case))
-        # 2 m along the waves, which no component is shorter than 9 m in; all members are within 29 m and 20 m
+        # 2 m along the waves (shortest component: 9 m); all members are within 29 m and 20 m
         grid = {"X_HalfWidth": 60, "NX": 31, "Y_HalfWidth": 40, "NY": 2, "Z_Depth": 24, "NZ": 15}
         write_sea(folder, case, components, WaveDT=0.1, **grid)
         text = self._moordyn() if case.get("moordyn") else self.read("MAP").replace("ˆ", "^")
@@ -408,9 +408,9 @@ class Oc4(Deck):
         write_glue(folder, case, Gravity=self.gravity, CompMooring=3 if case.get("moordyn") else 1)
 
     def _excitation_text(self):
-        """Return WAMIT's .3 of the package's arrays, about heading 0: at the periods of the .1, interpolated.
+        """Return a WAMIT .3 file near heading 0 from package arrays, interpolated at the periods of the .1.
 
-        Period, heading, mode, size, phase, real and imaginary part.
+        Columns: period, heading, mode, magnitude, phase, real and imaginary part.
         """
         with np.load(self.excitation) as arrays:
             known, heading, force = (arrays[k] for k in ("excitation_omega", "heading", "excitation"))
@@ -422,41 +422,41 @@ class Oc4(Deck):
             if float(text) <= 0.0:
                 continue
             omega = 2.0 * pi / float(text)
-            for b, beside in zip(np.degrees(heading[near]), force[:, near].swapaxes(0, 1), strict=True):
-                for mode, x in enumerate(beside.T / unit, 1):
+            for b, column in zip(np.degrees(heading[near]), force[:, near].swapaxes(0, 1), strict=True):
+                for mode, x in enumerate(column.T / unit, 1):
                     x = np.interp(omega, known, x.real) + 1j * np.interp(omega, known, x.imag)
                     size, phase = abs(x), np.degrees(np.angle(x))
                     rows.append(f"{text} {b:.6f} {mode} {size:.8e} {phase:.6f} {x.real:.8e} {x.imag:.8e}")
         return "\n".join(rows) + "\n"
 
     def ballast(self, text):
-        """Return [(mass, height of its centre)] of the water in members: kg, m."""
+        """Return [(mass, height of centre)] of the water in members: kg, m."""
         joints = {row[0]: float(row[3]) for row in section(text, "NJoints")}
         sizes = {row[0]: float(row[1]) - 2.0 * float(row[2]) for row in section(text, "NPropSets")}
         members = {row[0]: row for row in section(text, "NMembers")}
-        found = []
+        result = []
         for number, *rest in section(text, "NFillGroups"):
             names, level = rest[: int(number)], float(rest[int(number)])
             for name in names:
                 row = members[name]
                 bottom, top = sorted(joints[joint] for joint in row[1:3])
                 height = min(level, top) - bottom
-                found.append((self.density * 0.25 * pi * sizes[row[3]] ** 2 * height, bottom + 0.5 * height))
-        return found
+                result.append((self.density * 0.25 * pi * sizes[row[3]] ** 2 * height, bottom + 0.5 * height))
+        return result
 
     def _hydrodyn(self, case):
-        """Return the text of HD.dat: the deck's members with their drag, and the water in them."""
+        """Return the text of HD.dat: members of the deck with drag and internal water."""
         text = self.read("HydroDyn")
         wet = bool(case.get("sea") or case.get("waves"))
         platform = filled(FLOATING, text, DiffQTF=case.get("qtf", 0), ExctnMod=int(wet))
-        # the old HydroDyn had the water's weight not move; the deck makes up for it by a stiffness
+        # the old HydroDyn kept the weight of the water fixed, which the deck corrects by a stiffness
         restored = -sum(self.gravity * mass * height for mass, height in self.ballast(text))
         stiffness = float(re.search(r"^\s+0\s+0\s+0\s+([1-9]\d+)\s+0\s+0\s*$", text, re.M)[1]) - restored
         entries = {"AddCLin": {(4, 4): stiffness, (5, 5): stiffness}}
         added = "".join(matrix(name, entries.get(name, {})) for name in MATRICES)
         axial = [f"{name} {float(cd):g} {ca} {cp} 0 0 1" for name, cd, ca, cp in section(text, "NAxCoef")]
-        # members above the water are left out, and strips are as long as the waves allow: a solution of all
-        # node accelerations, their number squared, is what a run takes; a node is at the still water level
+        # members above the water are omitted and strips are as long as the waves allow: run time grows with
+        # the square of the number of nodes; one node is at the still water level
         joints = [row[:6] for row in section(text, "NJoints")]
         dry = {row[0] for row in joints if float(row[3]) >= 0.0}
         members = [row for row in section(text, "NMembers") if not dry.issuperset(row[1:3])]
@@ -466,7 +466,7 @@ class Oc4(Deck):
             " ".join([name, *(f"{float(v):g}" for v in row[:4]), *row[4:12], *"0000", *row[12:20], *"1111"])
             for name, *row in section(text, "NCoefMembers") if name in wetted
         ]  # fmt: skip
-        # cylinder, no turn, division, member table, no hydrostatics of its own
+        # cylinder, no rotation, division, member table, no separate hydrostatics
         rows = [" ".join([*r[:5], "1 0", self.division[r[3]], r[6], "1", r[7]]) for r in members]
         strips = members_text(
             axial, [" ".join(row) for row in joints if row[0] in met],
@@ -476,7 +476,7 @@ class Oc4(Deck):
         return f"v5\n-\n{platform}{added}" + filled(SIMPLE) + strips + filled(HYDRO_OUTPUT)
 
     def _moordyn(self):
-        """Return MoorDyn v2 text of the deck's MoorDyn file."""
+        """Return the MoorDyn file of the deck in v2 format."""
         text = self.read("MoorDyn")
 
         def rows(name, count):

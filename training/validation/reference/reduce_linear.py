@@ -1,12 +1,12 @@
-"""Poles and responses of OpenFAST's linear models of VolturnUS-S with the tower held: `responses`.
+"""Writes poles and responses of OpenFAST's linear models of VolturnUS-S with the tower fixed (`responses`).
 
 Each linearisation file has 106 states: surge, heave, platform pitch, the first fore-aft tower mode, the
 generator's azimuth, their rates, and HydroDyn's. The files of the twelve azimuths of an operating point are
-averaged. The tower is then held by the constraint force lambda e_t that makes its acceleration zero: with
+averaged. The tower is then fixed by the constraint force lambda e_t that makes its acceleration zero: with
 q'' = a the accelerations of the free model and m = M^-1 e_t, a - m a_t / m_t, q_t = q_t' = 0. The stiffness
 of the tower mode is a generalised force along e_t alone, so that the column of A for q_t is m up to gravity
-and aerodynamics (about 1 % of the column of pitch). `direction_from_masses` has m from the deck's masses
-instead; the poles by it are stored beside the others.
+and aerodynamics (about 1 % of the column of pitch). `direction_from_masses` computes m from the masses
+of the deck instead; the resulting poles are stored in further columns.
 """
 
 from itertools import takewhile
@@ -19,39 +19,39 @@ from fowt_env.training.validation.linear_cases import named_poles
 
 RAD_PER_S = np.array([0.05, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8])  # of the responses
 PLATFORM = ("surge", "heave", "pitch")
-TOWER = 3  # position of the tower
-HELD = (*"surge heave platform_pitch vx vz wy rotor_speed".split(),)  # first states then
+TOWER = 3  # index of the tower mode
+HELD = (*"surge heave platform_pitch vx vz wy rotor_speed".split(),)  # first states with the tower fixed
 
 
 def read(path):
     """Return (A, B, (states, inputs) operating points) of a linearisation file."""
-    lines, found = Path(path).read_text().split("\n"), {}
+    lines, parts = Path(path).read_text().split("\n"), {}
     for number, line in enumerate(lines):
         name = line.split()[-1].rstrip(":") if line.startswith("Order of ") else ""
         if line.startswith(("A:", "B:")):
             rows = int(line[2:].split("x")[0])
-            found[line[0]] = np.loadtxt(lines[number + 1 : number + 1 + rows], ndmin=2)
+            parts[line[0]] = np.loadtxt(lines[number + 1 : number + 1 + rows], ndmin=2)
         elif name in ("states", "inputs"):
             rows = takewhile(str.strip, lines[number + 3 :])
-            found[name] = np.array([float(row.split()[1].rstrip(",")) for row in rows])
-    return found["A"], found["B"], found["states"], found["inputs"]
+            parts[name] = np.array([float(row.split()[1].rstrip(",")) for row in rows])
+    return parts["A"], parts["B"], parts["states"], parts["inputs"]
 
 
 def hold_tower(A, B, direction=None):
-    """Return (A, B) with the tower held; states: surge, heave, pitch, their rates, rotor speed, HydroDyn's.
+    """Return (A, B) with the tower fixed; states: surge, heave, pitch, their rates, rotor speed, HydroDyn.
 
     direction (5,): M^-1 e_t up to a factor; None: the column of the tower's deflection.
     """
     m = A[5:10, TOWER] if direction is None else direction
-    share = m / m[TOWER]
+    ratio = m / m[TOWER]
     A, B = A.copy(), B.copy()
     for matrix in (A, B):
-        matrix[5:10] -= np.outer(share, matrix[5 + TOWER])
-    kept = [0, 1, 2, 5, 6, 7, 9, *range(10, len(A))]  # the rotor's azimuth has no part in what is averaged
+        matrix[5:10] -= np.outer(ratio, matrix[5 + TOWER])
+    kept = [0, 1, 2, 5, 6, 7, 9, *range(10, len(A))]  # models are averaged over the azimuth: drop it
     return A[np.ix_(kept, kept)], B[kept]
 
 
-# figures of that deck (ROSCO's test cases, aa8a5f62), kg and m: (mass, x, z) of bodies at the tower's top
+# values of that deck (ROSCO's test cases, aa8a5f62), kg and m: (mass, x, z) of bodies at the tower top
 TOWER_BASE, TOWER_TOP, TOWER_FACTOR = 15.0, 144.495, 1.012
 TOWER_DENSITY = (  # fraction of the height, kg/m
     (0.0, 20299.2), (0.1003226, 20225.5), (0.2006451, 20231.6), (0.3009678, 20149.7), (0.3009754, 7322.2),
@@ -71,7 +71,7 @@ ADDED_MASS = ((0, 0, 9.64e6), (1, 1, 2.48e7), (2, 2, 1.164e10), (0, 2, -1.01e8),
 
 
 def direction_from_masses():
-    """Return M^-1 e_t (5,) of the plane model from the figures above; the rotor does not couple."""
+    """Return M^-1 e_t (5,) of the planar model from the values above; the rotor is not coupled."""
     mass = np.zeros((4, 4))  # surge, heave, pitch, tower
 
     def add(m, x, z, bend, slope):
@@ -100,12 +100,12 @@ WIND, COLLECTIVE = 0, 8  # columns of B
 
 
 def responses(source, folder):
-    """Write linear_poles.csv.gz and linear_responses.csv.gz of the operating points 5 to 24 m/s."""
+    """Write linear_poles.csv.gz and linear_responses.csv.gz of the operating points from 5 to 24 m/s."""
     poles, gains = [], []
     for point in range(20):
         models = [read(path) for path in sorted(Path(source).glob(f"lin_{point:02d}.*.lin"))]
         A, B, states, inputs = (np.mean(part, axis=0) for part in zip(*models, strict=True))
-        held, by = hold_tower(A, B)
+        fixed, by = hold_tower(A, B)
         other, by_other = hold_tower(A, B, direction_from_masses())
         row = {
             "wind_mps": inputs[0], "azimuths": len(models), "rotor_speed_rad_s": states[9],
@@ -113,7 +113,7 @@ def responses(source, folder):
             "surge_m": states[0], "heave_m": states[1], "pitch_rad": states[2],
         }  # fmt: skip
         flexible = np.delete(np.delete(A, 4, axis=0), 4, axis=1)
-        for name, value in named_poles(held, HELD).items():
+        for name, value in named_poles(fixed, HELD).items():
             row |= {f"{name}_real": value.real, f"{name}_imag": value.imag}
         for name, value in named_poles(other, HELD).items():
             row |= {f"{name}_real_other": value.real, f"{name}_imag_other": value.imag}
@@ -126,7 +126,7 @@ def responses(source, folder):
         for source_name, column in (("wind", WIND), ("blade_pitch", COLLECTIVE)):
             for target, state in (("rotor_speed", 6), ("pitch", 2)):
                 for w in RAD_PER_S:
-                    value = np.linalg.solve(1j * w * np.eye(len(held)) - held, by[:, column])[state]
+                    value = np.linalg.solve(1j * w * np.eye(len(fixed)) - fixed, by[:, column])[state]
                     gains.append({
                         "wind_mps": inputs[0], "input": source_name, "output": target, "omega_rad_s": w,
                         "real": value.real, "imag": value.imag,
