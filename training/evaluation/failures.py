@@ -13,7 +13,7 @@ BASELINES = ("gspi_oc3", "pi")  # default baseline: the first of these that was 
 ENERGY = "energy_[kWh]"
 LEAST_ENERGY = 0.5  # fraction of the reference's energy below which a run has lost power
 # A score of lost runs only is PENALTY**2 = 100. The worst runs that still ended normally, with limit cycles
-# and oscillating commands, scored 10, with up to 10 times the reference's loads and 43 times its pitch travel.
+# and oscillating commands, scored 10, at up to 10 times the reference's loads and 43 times its pitch travel.
 PENALTY = 10.0
 KINDS = {"failed": FAILED, "tripped": TRIPPED, "lost_power": LOST_POWER}  # name of the count: status
 
