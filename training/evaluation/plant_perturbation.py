@@ -124,7 +124,7 @@ def perturbed_parts(perturbation, platform="oc3_hywind"):
 
 
 def perturbed_sensors(perturbation, turbine, control_dt):
-    """Return the SensorChain with a PlantPerturbation's noise and delay on every reading; None without both."""
+    """Return the SensorChain with a PlantPerturbation's noise and delay on every reading, or None."""
     if perturbation.noise == 0.0 and perturbation.delay == 0:
         return None
     scales = dict(zip(Measurement._fields, reading_scales(turbine).tolist(), strict=True))

@@ -144,7 +144,7 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
         assert "--out" in str(error.value) and str(tmp_path) in str(error.value)
     new = {"name": "pi", "code": "new"}
     for name, value, message in (
-        ("__version__", "9.9", "was made by fowt_env .* this is 9.9"),
+        ("__version__", "9.9", "was made by fowt_env .* not 9.9"),
         ("training.evaluation.provenance.plant_code", lambda: "other", "another state"),
         (
             "training.evaluation.evaluate.controller_code",
