@@ -278,7 +278,7 @@ def test_what_cannot_be_run_is_left_out_and_named(first, tmp_path):
     )
     judged = judge(Board(folder), trust_code=True)
     assert set(judged.left_out) == {"copied", "gspi-oc3", "renamed", "deaf, short"}
-    assert "no card.toml" in judged.left_out["copied"] and "nearly the name" in judged.left_out["gspi-oc3"]
+    assert "no card.toml" in judged.left_out["copied"] and "only in '_' and '-'" in judged.left_out["gspi-oc3"]
     assert "'other'" in judged.left_out["renamed"] and "wave_elevation" in judged.left_out["deaf, short"]
 
 

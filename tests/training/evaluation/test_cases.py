@@ -107,7 +107,7 @@ WIND = "wind = 16.0"
     ("text", "messages"),
     [
         ("", ["case is missing"]),
-        (f'[[case]]\nname = "a"\n{WIND}\n[[case]]\nname = "a"\n{WIND}', ["'a': named twice"]),
+        (f'[[case]]\nname = "a"\n{WIND}\n[[case]]\nname = "a"\n{WIND}', ["'a': defined twice"]),
         (f'[[case]]\nnam = "a"\n{WIND}', ["nam: unknown key. Did you mean 'name'?", "name is missing"]),
         ('[[case]]\nname = "a"\nwind = {kind = "ntn", speed = 12}', ["case.1 (a)", "'ntm'"]),
         ('[[case]]\nname = "a"\nwind = {kind = "ntm"}', ["wind.speed is missing"]),

@@ -239,7 +239,7 @@ def test_named_suites_hold_their_cases_once():
         ({"cases": "above_ratted"}, "above_rated"),
         ({"controllers": ["pie"]}, "'pi'"),
         ({"controllers": []}, "controllers"),
-        ({"cases": []}, "none were named|at least one"),
+        ({"cases": []}, "at least one"),
         ({"seeds": ()}, "seeds"),
         ({"seeds": (1, 1)}, "differ"),
         ({"cases": [CALM, CALM]}, "differ"),
