@@ -168,7 +168,7 @@ def _check_information(card, kind, problems):
     """Append problems of the declared inputs to `problems`."""
     if kind != PYTHON_FILE:
         if card.information is not None:
-            problems.append(f"information: is read from the {kind}; remove this key")
+            problems.append(f"information: must be omitted for a {kind} controller, which declares inputs")
         return
     if card.information is None:
         problems.append("information is missing: the inputs of the controller")

@@ -48,7 +48,7 @@ def test_a_sound_card_is_read_and_nothing_is_run(tmp_path):
         ({"controller": "mine.py:a b"}, "must be FILE.py:Name"),
         ({"controller": "gspi"}, "unknown controller 'gspi'. Did you mean"),
         ({"controller": "mine.npz"}, "no such file"),
-        ({"controller": "lqr"}, "information: is read from a built-in itself"),
+        ({"controller": "lqr"}, "information: must be omitted for a built-in"),
         ({"information": None}, "information is missing"),
         ({"information": ["wind"]}, "unknown input 'wind'"),
         ({"information": ["wind_preview"]}, "preview_times = ..: must be set if and only if"),
@@ -160,7 +160,7 @@ def test_a_file_of_secret_seeds_is_new_private_and_salted(tmp_path, monkeypatch)
     assert read_seeds(other)[0] == seeds and read_seeds(other)[1] != digest
     with pytest.raises(InputError, match="cannot be written: File exists"):
         write_secret_seeds(one, 6)
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="does not exist"):
         read_seeds(tmp_path / "none.txt")
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(one.read_bytes())))
     assert read_seeds("-") == (seeds, digest)
