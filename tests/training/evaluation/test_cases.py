@@ -119,7 +119,7 @@ WIND = "wind = 16.0"
         (f'[[case]]\nname = "a"\n{WIND}\nskip = 200.0', ["skip = 200", "below duration = 100"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_los", time = 50}}', ["'grid_loss'"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_loss", time = 500}}', ["fault.time = 500"]),
-        ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not fit"]),
+        ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not match"]),
         ('[[case]]\nname = "a"\nparked = true\nfault = {kind = "stuck_pitch", time = 5}', ["parked:"]),
         (f'[[case]]\nname = "a"\n{WIND}\nplatform = "oc3_hywnd"', ["oc3_hywind"]),
         (f'[[case]]\nname = "a"\n{WIND}\nsensors = "standart"', ["standart", "standard"]),
