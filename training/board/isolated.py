@@ -294,7 +294,7 @@ def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactor
         compiling = replace(factory, kernels=str(unfinished), keeps=True, log="", limits=limits)
         try:
             for scene in scenes():
-                with suppress(ControllerError, InputError):  # its judged runs will fail with the reason
+                with suppress(ControllerError, InputError):  # its runs on the board will fail with the reason
                     fowt_env.simulate(scene, compiling, duration=WARM_UP)
             unfinished.rename(target)
         finally:

@@ -201,11 +201,11 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     Means are lifetime means (METHOD), weighted by the column weight_[-]. Lost runs (failures.py) have no
     metrics, but count in the score.
     Keys: baseline (None: all have runs that failed or lost power), interval (level, method, resamples,
-    least_seeds), penalty (of a lost run, times the reference's metrics), unchecked (metrics whose relative
-    limits lack the runs of a reference), cases, shares {case: share}, seeds, controllers: a list of mappings
+    least_seeds), penalty (of a lost run, times the reference's metrics), unchecked (metrics with relative
+    limits, if reference runs are missing), cases, shares {case: share}, seeds, controllers: a list of mappings
     with rank (None without a score), controller, runs, lost, failed, tripped, lost_power, metrics {metric:
     mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent, pairs, p},
-    beyond (a text per exceeded limit), score (mean, low, high, valid, why; None without one), cases {case:
+    beyond (a text per exceeded limit), score (mean, low, high, valid, why; or None), cases {case:
     runs, ..., metrics, difference}. seed_low and seed_high: range of the lifetime mean over the seeds; worst:
     maximum over all runs; percent: mean difference relative to the baseline's mean of the same runs; p: its
     two-sided p-value (not per case, nor with lost runs).

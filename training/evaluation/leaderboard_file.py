@@ -1,4 +1,4 @@
-"""Writes leaderboard.json of a results folder, and checks the file before a page is made of it.
+"""Writes leaderboard.json of a results folder, and checks such a file before use in a page.
 
 The whole file is checked at once, since another version may have written it; unknown keys are ignored.
 """

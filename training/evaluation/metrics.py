@@ -45,7 +45,7 @@ class Metric(NamedTuple):
 
 STATISTICS = {
     "mean": Metric("mean", of=lambda x: np.mean(x, axis=0)),
-    # about the run's own mean, N in the denominator
+    # about the mean of the run, N in the denominator
     "std": Metric("standard deviation", -1, True, 2.0, lambda x: np.std(x, axis=0)),
     "min": Metric("minimum", of=lambda x: np.min(x, axis=0)),
     "max": Metric("maximum", -1, of=lambda x: np.max(x, axis=0)),

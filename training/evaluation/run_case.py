@@ -1,4 +1,4 @@
-"""Runs one controller on one case and returns its row. Imports of this module are what affects a result."""
+"""Runs one controller on one case and returns its row. All sources that affect a result are imported here."""
 
 import warnings
 from dataclasses import dataclass

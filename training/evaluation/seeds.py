@@ -67,7 +67,7 @@ def with_drawn_seeds(suite, source):
 
 
 def reseeded(suite, seeds):
-    """Return the Suite with other seeds; a case with individual seeds gets as many of them as it has."""
+    """Return the Suite with other seeds; the number of seeds of each case is unchanged."""
     cases = (replace(case, seeds=case.seeds and seeds[: len(case.seeds)]) for case in suite.cases)
     return replace(suite, seeds=seeds, cases=tuple(cases))
 
