@@ -202,7 +202,7 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     metrics, but count in the score.
     Keys: baseline (None: all have runs that failed or lost power), interval (level, method, resamples,
     least_seeds), penalty (of a lost run, times the reference's metrics), unchecked (metrics with relative
-    limits, if reference runs are missing), cases, shares {case: share}, seeds, controllers: a list of mappings
+    limits, without reference runs), cases, shares {case: share}, seeds, controllers: a list of mappings
     with rank (None without a score), controller, runs, lost, failed, tripped, lost_power, metrics {metric:
     mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent, pairs, p},
     beyond (a text per exceeded limit), score (mean, low, high, valid, why; or None), cases {case:
