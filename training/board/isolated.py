@@ -1,11 +1,11 @@
-"""A controller in a separate process, which receives its readings and nothing else.
+"""Runs a controller in a separate process, which receives only the controller's readings.
 
-The process has a copy of the submission's folder, an empty home folder, a copy of the kernels that it
-compiled beforehand, only the environment variables in KEPT, and limits of memory, files, processes and
-processor time. A supervisor (supervisor.py) ends what it leaves behind. Its answers are two numbers or the
-name of an exception, and are not unpickled, so that they cannot run code here. It is restarted for every run.
-It is no sandbox: it can read what this user can read, and open connections, unless it is started in a
-container (docs/guides/leaderboard.md).
+The process has a copy of the submission's folder, an empty home folder, a copy of its precompiled kernels,
+only the environment variables in KEPT, and limits of memory, files, processes and processor time. A
+supervisor (supervisor.py) ends remaining child processes. Answers are two numbers or the name of an
+exception and are not unpickled, so that they cannot execute code here. Every run starts a new process.
+The process is not a sandbox: unless started in a container (docs/guides/leaderboard.md), it has this user's
+access to files and network.
 """
 
 import builtins
@@ -31,18 +31,18 @@ from fowt_env.folders import cache_root, make_private
 from fowt_env.training.board import supervisor
 
 LARGEST_FOLDER = 50e6  # bytes of a submission
-COMPILED = "__pycache__"  # of its files: neither hashed nor copied
+COMPILED = "__pycache__"  # folder name: neither hashed nor copied
 KEPT = ("PATH", "LANG", "LC_ALL", "PYTHONPATH", "NUMBA_DISABLE_JIT")
 LENGTH = struct.Struct("<q")
 COMMAND = struct.Struct("<dd")
 OK, ERROR = b"k", b"e"
 LONGEST_ANSWER = 100  # bytes
 START, PREPARE, RESET, ACT = "start", "prepare", "reset", "act"
-FOLDER = "{folder}"  # in `within`: the process's folder
-LIMITS = {"FSIZE": 2 * 10**8, "NPROC": 256, "NOFILE": 256, "CORE": 0}  # bytes; on top of the user's; files
-PATIENCE = 10.0  # s for the supervisor to end
-WARM_UP = 1.0  # s of simulated time in which a submission compiles its kernels
-# reported names of exceptions: a name chosen by a submission could contain a message
+FOLDER = "{folder}"  # in `within`: replaced by the process's folder
+LIMITS = {"FSIZE": 2 * 10**8, "NPROC": 256, "NOFILE": 256, "CORE": 0}  # bytes; added to the user's; files
+PATIENCE = 10.0  # s allowed for the supervisor to end
+WARM_UP = 1.0  # s of simulated time, in which a submission compiles its kernels
+# names of exceptions that are reported: names defined by a submission could carry data
 KNOWN_ERRORS = {name for name, kind in vars(builtins).items() if isinstance(kind, type)} | {
     "ControllerError", "InputError", "LinAlgError",
 }  # fmt: skip
@@ -50,18 +50,18 @@ KNOWN_ERRORS = {name for name, kind in vars(builtins).items() if isinstance(kind
 
 def files_of(folder: Path | str) -> list[Path]:
     """Return the sorted files of a submission's folder. Raises: InputError for links and large folders."""
-    folder, found = Path(folder), []
+    folder, files = Path(folder), []
     for path in sorted(folder.rglob("*")):
         if path.is_symlink() or not (path.is_file() or path.is_dir()):
-            raise InputError(f"submission {str(folder)!r}: {str(path)!r} is a link or no plain file")
+            raise InputError(f"submission {str(folder)!r}: {str(path)!r} is a link or a special file")
         if path.is_file() and COMPILED not in path.relative_to(folder).parts:
-            found.append(path)
-    size = sum(path.stat().st_size for path in found)
+            files.append(path)
+    size = sum(path.stat().st_size for path in files)
     if size > LARGEST_FOLDER:
         raise InputError(
             f"submission {str(folder)!r}: {size / 1e6:.0f} MB: must be at most {LARGEST_FOLDER / 1e6:.0f} MB"
         )
-    return found
+    return files
 
 
 def digest_of(folder: Path | str) -> str:
@@ -75,15 +75,15 @@ def digest_of(folder: Path | str) -> str:
 
 
 def copy_files(folder: Path | str, place: Path | str) -> None:
-    """Copy a submission's folder to a new folder; links stay links."""
+    """Copy a submission's folder to a new folder, with links as links."""
     shutil.copytree(folder, place, symlinks=True, ignore=shutil.ignore_patterns(COMPILED))
 
 
 @dataclass(frozen=True)
 class ProcessLimits:
-    """Limits of a controller. A call that exceeds one fails the run."""
+    """Defines limits of a controller; the run fails if a call exceeds a limit."""
 
-    start: float = 120.0  # s, to import and make it; kernels may be compiled
+    start: float = 120.0  # s, to import and create the controller; kernels may be compiled
     prepare: float = 300.0  # s
     call: float = 0.1  # s, one call of act()
     memory: float = 4e9  # bytes of address space
@@ -92,7 +92,7 @@ class ProcessLimits:
 
 @dataclass(frozen=True)
 class IsolatedFactory:
-    """Makes controllers of a Python file, each in a separate process; can be sent to worker processes."""
+    """Creates controllers from a Python file, each in a separate process; can be pickled."""
 
     folder: str
     file: str
@@ -101,15 +101,15 @@ class IsolatedFactory:
     information: tuple[str, ...]
     preview_times: tuple[float, ...]
     limits: ProcessLimits = ProcessLimits()
-    digest: str = ""  # of the folder's files, checked when a run begins; "": not checked
-    within: tuple[str, ...] = ()  # command that starts the process, such as a container's
-    kernels: str = ""  # folder of compiled kernels, copied for each process; "": none
-    keeps: bool = False  # whether `kernels` is replaced by those of the process
-    log: str = ""  # file for the slowest call of each run; "": none
+    digest: str = ""  # of the folder's files, checked at the start of a run; "": not checked
+    within: tuple[str, ...] = ()  # command that starts the process, e.g. in a container
+    kernels: str = ""  # folder of compiled kernels, copied for each process; "": no copy
+    keeps: bool = False  # whether to replace `kernels` by the kernels of the process
+    log: str = ""  # file for the slowest call of each run; "": no log
 
     @property
     def content_key(self) -> str:
-        """Hash of all that affects its runs besides the sources of this package."""
+        """Return the hash of all that affects its runs except the sources of this package."""
         parts = (
             *(self.digest, self.file, self.attribute, self.name, self.information, self.preview_times),
             *(asdict(self.limits), self.within),
@@ -122,17 +122,17 @@ class IsolatedFactory:
 
 
 class IsolatedController:
-    """The simulator's side of a controller that runs in another process, started anew by each reset().
+    """Represents, in the simulator, a controller in another process; each reset() starts a new process.
 
     Raises: ControllerError if the process ends, fails, or exceeds its limits; InputError if the submission's
-    files do not match its digest.
+    files do not match the digest.
     """
 
     def __init__(self, factory: IsolatedFactory, turbine: Any, control_dt: float) -> None:
         self.factory, self.turbine, self.control_dt = factory, turbine, control_dt
         self.name, self.information = factory.name, factory.information
         self.preview_times = factory.preview_times
-        self.slowest = 0.0  # s, of the calls of act()
+        self.slowest = 0.0  # s, slowest call of act()
         self.known: Any = None
         self.folder: Path | None = None  # of the process
         self.process: Any = None
@@ -142,10 +142,10 @@ class IsolatedController:
         self.known = scene
 
     def reset(self, measurement: Any) -> None:
-        """Start a new process, and prepare and reset its controller."""
+        """Start a new process; prepare and reset its controller."""
         self.close()
         factory, limits = self.factory, self.factory.limits
-        supervisor.prctl(supervisor.DUMPABLE, 0)  # hide the weather in this process's memory from others
+        supervisor.prctl(supervisor.DUMPABLE, 0)  # other processes cannot read the weather in memory
         self.folder = Path(tempfile.mkdtemp(prefix="fowt-submission-"))
         try:
             self._start(self.folder)
@@ -162,14 +162,14 @@ class IsolatedController:
         answer = self._ask(ACT, measurement, self.factory.limits.call, moment)
         if len(answer) != COMMAND.size:
             self.close()
-            raise self._fault("its process sent no pair of numbers", moment)
+            raise self._fault("its process did not return two numbers", moment)
         return COMMAND.unpack(answer)
 
     def _start(self, folder):
         factory, work, kernels = self.factory, folder / "work", folder / "cache"
         copy_files(factory.folder, work)
         if factory.digest and digest_of(work) != factory.digest:
-            raise InputError(f"submission {factory.name!r}: its files have changed since it was read")
+            raise InputError(f"submission {factory.name!r}: its files have changed since they were read")
         if factory.kernels and os.path.isdir(factory.kernels):
             shutil.copytree(factory.kernels, kernels, symlinks=True)
         kernels.mkdir(mode=0o700, exist_ok=True)
@@ -192,7 +192,7 @@ class IsolatedController:
         os.set_blocking(self.process.stdin.fileno(), False)
 
     def _ask(self, what, content, limit, moment=0.0):
-        """Return the answer of the process, as bytes. Raises: ControllerError, once the process is ended."""
+        """Return the answer of the process, as bytes. Raises: ControllerError, after ending the process."""
         content, began = pickle.dumps((what, content)), time.perf_counter()
         try:
             kind, answer = self._exchange(LENGTH.pack(len(content)) + content, time.monotonic() + limit)
@@ -202,7 +202,7 @@ class IsolatedController:
             why = f"its process ended in {what}()"
         else:
             name = answer.decode("ascii", "replace")
-            why = f"{what}() raised {name if name in KNOWN_ERRORS else 'an exception of its own'}"
+            why = f"{what}() raised {name if name in KNOWN_ERRORS else 'a custom exception'}"
             why = None if kind == OK else why
         if what == ACT:
             self.slowest = max(self.slowest, time.perf_counter() - began)
@@ -221,14 +221,14 @@ class IsolatedController:
                 raise TimeoutError
 
         def read(count):
-            found = b""
-            while len(found) < count:
+            received = b""
+            while len(received) < count:
                 wait([back], [])
-                part = os.read(back, count - len(found))
+                part = os.read(back, count - len(received))
                 if not part:
                     raise EOFError
-                found += part
-            return found
+                received += part
+            return received
 
         content = memoryview(content)
         while content:
@@ -244,7 +244,7 @@ class IsolatedController:
         return ControllerError(f"controller {self.name!r}: {why}", self.name, moment, None)
 
     def close(self) -> None:
-        """End the process and its children, if there are any, keep its kernels, and log its slowest call."""
+        """End the process (if any) with its children, keep its kernels, and log its slowest call."""
         process, folder, factory = self.process, self.folder, self.factory
         self.process = self.folder = None
         if process is not None:
@@ -274,36 +274,36 @@ class IsolatedController:
 
 
 def warmed_up(factory: IsolatedFactory, scenes: Any, key: str) -> IsolatedFactory:
-    """Return the factory with kernels that it compiled in short runs of scenes without weather.
+    """Return the factory with kernels compiled in short runs of scenes without weather.
 
-    Runs of the board begin with copies of these, so that they cannot exchange data.
-    scenes: called for the scenes if needed; key: identifies these scenes and the plant.
+    Every run of the board starts with a copy of these kernels, so that runs cannot exchange data.
+    scenes: function that returns the scenes, called if needed; key: identifies the scenes and the plant.
     """
     root = cache_root()
     if root is None:
         return factory
     name = hashlib.sha256(f"{factory.content_key}/{key}".encode()).hexdigest()[:24]
-    place = root / "submissions" / name
-    if not place.is_dir():
+    target = root / "submissions" / name
+    if not target.is_dir():
         import fowt_env
 
-        make_private(place.parent)
-        # renamed once it is complete, so that an interrupted one is repeated
-        unfinished = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=place.parent))
-        limits = replace(factory.limits, call=factory.limits.start)  # the first act() compiles too
+        make_private(target.parent)
+        # renamed when complete, so that an interrupted compilation is repeated
+        unfinished = Path(tempfile.mkdtemp(prefix=f"{name}-", dir=target.parent))
+        limits = replace(factory.limits, call=factory.limits.start)  # the first act() also compiles
         compiling = replace(factory, kernels=str(unfinished), keeps=True, log="", limits=limits)
         try:
             for scene in scenes():
-                with suppress(ControllerError, InputError):  # its judged runs will fail with the reason
+                with suppress(ControllerError, InputError):  # its runs on the board will fail with the reason
                     fowt_env.simulate(scene, compiling, duration=WARM_UP)
-            unfinished.rename(place)
+            unfinished.rename(target)
         finally:
             shutil.rmtree(unfinished, ignore_errors=True)
-    return replace(factory, kernels=str(place))
+    return replace(factory, kernels=str(target))
 
 
 def serve() -> None:
-    """Answer requests from standard input until it is closed: the main loop of the other process.
+    """Answer requests from standard input until its end: the main loop of the other process.
 
     Standard input and output are redirected to the null device, since a controller may print.
     """
@@ -326,7 +326,7 @@ def serve() -> None:
 
 
 def _done(what, content, controller):
-    """Return (controller, answer) of one request."""
+    """Execute a request and return (controller, answer)."""
     if what == START:
         from fowt_env.control import make
 

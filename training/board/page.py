@@ -1,7 +1,7 @@
-"""The output of a judged board: an HTML page that loads nothing from a network, a CSV and a history.
+"""Writes the results of a board: an HTML page without network access, a CSV file and a history.
 
-Every text of a submission is escaped, including invisible characters and those that change the direction of
-writing; its address is a link only if it begins with http.
+Every text of a submission is escaped, including invisible characters and characters that change the writing
+direction; a URL becomes a link only if it begins with http.
 """
 
 import html
@@ -31,16 +31,16 @@ FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "tower DEL": "TwrBsMyt_DEL_[kN-m]",
 }
 VERSION = f"fowt_env {fowt_env.__version__}"
-LISTED = "listed"  # seeds of a judging without drawn ones
+LISTED = "listed"  # in the history: public seeds that were not drawn
 PER_WIND = ("rotor speed", "platform pitch", "travel")
 MODEL, PREVIEW = "plant_model", "wind_preview"
-FORMULA = ("=", "+", "-", "@", "\t", "\r")  # begin a formula in a spreadsheet
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet formula
 PLANT = {"rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "time"}
 CANNOT = (
-    "Whether a controller recognises seeds that are listed: compare its score on drawn or secret ones.",
-    "What was tuned on which seeds and with what budget: this is only declared by the author.",
-    "Whether code read files or the network of the organiser's machine, unless it ran in a container.",
-    "Submissions that differ in name alone.",
+    "Whether a controller recognises listed seeds: compare its scores on drawn or secret seeds.",
+    "On which seeds and with what budget a controller was tuned: this is declared by the author.",
+    "Whether code accessed files or the network of the organiser's machine, unless run in a container.",
+    "Submissions that differ only in name.",
 )
 STYLE = """
 :root{color-scheme:light dark;--page:#fff;--ink:#1b2430;--soft:#5b6773;--line:#d7dde4;--head:#f2f5f8;
@@ -69,23 +69,23 @@ background:var(--head);color:var(--ink)}
 
 
 def _visible(text):
-    """Return a text of a submission with Python escapes for characters that cannot be printed."""
+    """Return a text of a submission with Python escapes for unprintable characters."""
     return "".join(c if c.isprintable() else " " if c.isspace() else ascii(c)[1:-1] for c in str(text))
 
 
 def escaped(text):
-    """Return HTML of a text of a submission, escaped."""
+    """Return a text of a submission as escaped HTML."""
     return html.escape(_visible(text))
 
 
 def cell(text):
-    """Return a text of a submission for a CSV file, quoted so that no spreadsheet reads a formula."""
+    """Return a text of a submission for a CSV file, quoted so that spreadsheets do not read a formula."""
     text = _visible(text)
     return f"'{text}" if text.lstrip().startswith(FORMULA) else text
 
 
 def information_class(submission, turbine):
-    """Return the class of a submission by its inputs, such as "sensors + plant model"."""
+    """Return the information class of a submission, such as "sensors + plant model"."""
     used, preview = set(inputs_of(submission, turbine)), submission.card.preview
     words = ["rotor and blades" if used - set(PRIVILEGED_INPUTS) <= PLANT else "sensors"]
     words += ["exact weather"] if used & {"wind_speed", "wave_elevation"} else []
@@ -95,11 +95,11 @@ def information_class(submission, turbine):
 
 
 def board_frame(judged):
-    """Return a DataFrame of a Judged: a row for each suite and submission, in the order of the ranks.
+    """Return a DataFrame of a Judged with a row per suite and submission, sorted by rank.
 
     Columns: regime, suite, version, rank (NaN without a score), name, author, licence, information, runs,
-    failed (also lost power), tripped, for each of FIGURES its ratio to the baseline and p-value, score with
-    its interval, score_secret, beyond (exceeded limits), slowest_call_[s] (of a Python file; NaN for others).
+    failed (including lost power), tripped, ratio to the baseline and p-value for each of FIGURES, score with
+    interval, score_secret, beyond (exceeded limits), slowest_call_[s] (Python files; NaN for others).
     """
     rows = []
     board = judged.board
@@ -129,9 +129,9 @@ def board_frame(judged):
 
 
 def _compared(table, suite, board):
-    """Return {name: entry of the leaderboard} of a suite's table, in the order of the ranks."""
-    found = leaderboard(table, board.settings.baseline, suite.score, limits=suite.limits)
-    return {entry["controller"]: entry for entry in found["controllers"]}
+    """Return {name: entry of the leaderboard} of a suite's table, sorted by rank."""
+    result = leaderboard(table, board.settings.baseline, suite.score, limits=suite.limits)
+    return {entry["controller"]: entry for entry in result["controllers"]}
 
 
 def write_board(judged):
@@ -148,7 +148,7 @@ def write_board(judged):
 
 
 def _history(path, frame, judged):
-    """Return the history with the rows of this judging, which replace those of the same day and digest."""
+    """Return the history with the rows of this evaluation, which replace rows of the same day and digest."""
     digests = {each.name: each.digest for each in judged.shown}
     here = frame[["suite", "version", "name", "rank", "score", "failed", "tripped"]].assign(
         date=judged.when,
@@ -164,13 +164,13 @@ def _history(path, frame, judged):
 
 
 def board_rows(folder, regime=None):
-    """Return (title, headings, rows) of a judged board's CSV for one regime, for a terminal.
+    """Return (title, headings, rows) from board.csv for one regime, to print in a terminal.
 
-    Raises: InputError for a board that was not judged, or an unknown regime.
+    Raises: InputError for a board that was not evaluated, or an unknown regime.
     """
     path = Path(folder) / "board.csv"
     if not path.is_file():
-        raise InputError(f"board {str(folder)!r}: has not been judged: fowt leaderboard run --board {folder}")
+        raise InputError(f"board {str(folder)!r}: has no results: fowt leaderboard run --board {folder}")
     frame = read_table(path)
     names = list(dict.fromkeys(frame["regime"]))
     regime = regime or names[0]
@@ -186,11 +186,11 @@ def board_rows(folder, regime=None):
         ]
         for row in frame.to_dict("records")
     ]
-    return f"{regime}: ratios to the baseline, lifetime means", headings, rows
+    return f"{regime}: ratios of lifetime means to the baseline's", headings, rows
 
 
 def _rank_text(rank):
-    """Return the text of a rank; "-" for none, in a suite without a score."""
+    """Return a rank as text; "-" without a rank, in a suite without a score."""
     return "-" if pd.isna(rank) else f"{rank:.0f}"
 
 
@@ -199,40 +199,40 @@ def _number(value, digits=3):
 
 
 def _page(judged, frame, history):
-    """Return the HTML text of the page."""
+    """Return the page as HTML."""
     board, settings = judged.board, judged.board.settings
     title, baseline = html.escape(settings.title), html.escape(settings.baseline)
     count = len(settings.seeds)
-    public = f"{count} public seeds of each suite, drawn from <code>{judged.drawn}</code>"
+    public = f"{count} public seeds per suite, drawn from <code>{judged.drawn}</code>"
     if not judged.drawn:
         seeds = ", ".join(map(str, settings.seeds))
-        public = f"public seeds {seeds}, which are for development and which a controller may recognise"
+        public = f"public seeds {seeds}, which are for development (a controller may recognise these seeds)"
     secret = "No secret seeds were used."
     if judged.secret:
         count = next(iter(judged.secret.values()))["seed"].nunique()
-        secret = f"{count} secret seeds of a file with SHA-256 <code>{judged.seeds_hash}</code>."
+        secret = f"{count} secret seeds from a file with SHA-256 <code>{judged.seeds_hash}</code>."
     parts = [
         '<!doctype html><html lang="en"><head><meta charset="utf-8">',
         f'<meta http-equiv="Content-Security-Policy" content="{content_policy(styles=[STYLE])}">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{title}</title><style>{STYLE}</style></head><body><h1>{title}</h1>",
-        f"<p>Judged {judged.when} with {html.escape(VERSION)}; baseline"
+        f"<p>Evaluated {judged.when} with {html.escape(VERSION)}; baseline"
         f" <b>{baseline}</b>; {public}. {secret}</p>",
-        "<details open><summary>How to read it</summary><p class=small>Ratios are of lifetime means to the"
-        " baseline's in the same wind and waves; less is better except for energy (power up to rated). In"
+        "<details open><summary>How to read this page</summary><p class=small>Ratios: lifetime mean over"
+        " the baseline's in the same wind and waves; less is better except for energy (power up to rated). In"
         " brackets: 95 % interval of the score; * significant: the p-value, after Holm's correction over the"
         ' row, is at most 0.05, and the difference <span class="better">✓ better</span> or <span'
-        ' class="worse">✗ worse</span>. Ranks: first those within every limit, then those above one, then'
-        " those that lost runs (failed, tripped, or with less than half of the reference's energy); within"
-        " each by the score, in which a lost run counts ten times the reference's metrics. A heading explains"
-        " its metric. Wide tables scroll sideways.</p></details>",
+        ' class="worse">✗ worse</span>. Ranks: controllers within all limits, then those above a limit, then'
+        " those with lost runs (failed, tripped, or with less than half of the reference's energy); within"
+        " each group by score, in which a lost run counts as ten times the reference's metrics. Click a"
+        " heading for the definition of its metric. Wide tables scroll sideways.</p></details>",
     ]
     for number, (heading, metric) in enumerate(FIGURES.items()):  # popovers open without a script
         parts.append(
             f'<div popover id="metric-{number}"><b>{heading}</b>, ratio to the baseline.'
             f" {html.escape(about_metric(metric))}</div>"
         )
-    parts += _list("<p class=lost>Left out:</p>", judged.left_out.items())
+    parts += _list("<p class=lost>Excluded:</p>", judged.left_out.items())
     for regime in settings.regime:
         parts.append(f"<h2>{html.escape(regime.name)}</h2>")
         for name in regime.suites:
@@ -250,13 +250,13 @@ def _page(judged, frame, history):
 
 
 def _list(heading, pairs):
-    """Return [HTML of a list of (name, text) under a heading]; [] without a pair."""
+    """Return [HTML of a heading and a list of (name, text)]; [] for an empty list."""
     lines = "".join(f"<li><b>{escaped(name)}</b>: {escaped(text)}</li>" for name, text in pairs)
     return [f"{heading}<ul class=small>{lines}</ul>"] if lines else []
 
 
 def _table(headings, rows, texts=()):
-    """Return HTML of a table that scrolls; texts: numbers of the left-aligned columns."""
+    """Return HTML of a scrollable table; texts: indices of the left-aligned columns."""
     return f'<div class="scroll" tabindex="0"><table>{table_rows(headings, rows, texts)}</table></div>'
 
 
@@ -297,21 +297,21 @@ def _ranking(rows, judged):
 
 
 def _per_wind(entries):
-    """Return a table for each of PER_WIND: ratios case by case."""
+    """Return an HTML table of the ratios per case for each of PER_WIND."""
     cases = list(next(iter(entries.values()))["cases"])
     parts = []
     for heading in PER_WIND:
         rows = []
         for who, entry in entries.items():
-            found = (entry["cases"][case]["difference"][FIGURES[heading]]["percent"] for case in cases)
-            rows.append([html.escape(who), *(_number(1.0 + percent / 100.0, 2) for percent in found)])
+            percentages = (entry["cases"][case]["difference"][FIGURES[heading]]["percent"] for case in cases)
+            rows.append([html.escape(who), *(_number(1.0 + percent / 100.0, 2) for percent in percentages)])
         table = _table(["controller", *map(html.escape, cases)], rows, (0,))
-        parts.append(f"<details><summary>{heading}, case by case</summary>{table}</details>")
+        parts.append(f"<details><summary>{heading}, per case</summary>{table}</details>")
     return parts
 
 
 def _submissions(judged):
-    """Return the table of the cards."""
+    """Return an HTML table of the submissions' cards."""
     rows = []
     for each in judged.shown:
         card, name = each.card, escaped(each.card.name)
@@ -325,12 +325,12 @@ def _submissions(judged):
 
 
 def _history_table(history):
-    """Return the table of the scores of all judgings, newest first."""
+    """Return an HTML table of the scores of all evaluations, newest first."""
     rows = []
     for row in history.sort_values("date", ascending=False, kind="stable").to_dict("records"):
         words = [row[key] for key in ("date", "suite", "version", "seeds", "name", "package")]
         words += [_rank_text(row["rank"]), _number(row["score"]), int(row["failed"] + row["tripped"])]
         rows.append([html.escape(str(word)) for word in words])
-    headings = "date,suite,version,seeds,controller,judged with,rank,score,lost runs".split(",")
+    headings = "date,suite,version,seeds,controller,evaluated with,rank,score,lost runs".split(",")
     table = _table(headings, rows, (0, 1, 3, 4, 5))
-    return f"<h2>History</h2><details><summary>all judgings</summary>{table}</details>"
+    return f"<h2>History</h2><details><summary>all evaluations</summary>{table}</details>"

@@ -1,8 +1,8 @@
-"""A submission to a leaderboard: a folder with a card and the controller that it names.
+"""Reads a submission to a leaderboard: a folder with a card and a controller.
 
     my_controller/
         card.toml            author, licence, inputs
-        controller.py        or a policy file (.npz): the controller of card.toml
+        controller.py        or a policy file (.npz): the controller named in card.toml
 
 A policy file contains arrays and no code. `fowt leaderboard run` runs a Python file only with --trust-code,
 and then in a separate process (training.board.isolated).
@@ -29,27 +29,27 @@ from fowt_env.training.evaluation.run_case import PARKED
 CARD = "card.toml"
 BUILT_IN, POLICY_FILE, PYTHON_FILE = "built-in", "policy file", "Python file"
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,49}")
-RESERVED = (PARKED,)  # of turbines without a controller
-MOST_TIMES, FURTHEST = 100, 60.0  # number of preview_times, each with a series in memory, and s ahead
+RESERVED = (PARKED,)  # name of turbines without a controller
+MOST_TIMES, FURTHEST = 100, 60.0  # number of preview_times (one time series in memory each); s
 LONGEST_TEXT = 2000  # characters of each text of a card
 INPUTS = (*Measurement._fields, *PRIVILEGED_INPUTS)
 
 
 def _tuple(value):
-    """Return a tuple of a list; any other value unchanged, for the validation to refuse."""
+    """Return a list as a tuple; other values unchanged, to be rejected by the validation."""
     return tuple(value) if isinstance(value, list) else value
 
 
 class Card(Record):
-    """The text of card.toml.
+    """Defines the content of card.toml.
 
     controller     a name of fowt list controllers; "FILE.npz"; or "FILE.py:Name", where Name is a class or
                    factory called with (turbine, control_dt), or with nothing
-    information    inputs of the controller: fields of Measurement and PRIVILEGED_INPUTS; a built-in
-                   controller or a policy file declares them itself
-    preview_times  of the wind, s, increasing; with "wind_preview" in information
+    information    inputs of the controller: fields of Measurement and PRIVILEGED_INPUTS; only for Python
+                   files (built-in controllers and policy files declare their inputs)
+    preview_times  times ahead of the wind preview, s, increasing; with "wind_preview" in information
     preview        "exact", or the lidar preset (fowt list lidars) that measures the wind ahead
-    tuning         tuned settings or training, its seeds and budget
+    tuning         tuned settings or training, with seeds and budget
     """
 
     name: str
@@ -66,22 +66,22 @@ class Card(Record):
 
 @dataclass(frozen=True)
 class Submission:
-    """A checked submission. Raises (read_submission): InputError with a line per fault."""
+    """Holds a checked submission (see read_submission)."""
 
     card: Card
     folder: Path
     kind: str  # BUILT_IN, POLICY_FILE or PYTHON_FILE
-    digest: str  # SHA-256 of all its files
+    digest: str  # SHA-256 of all files
 
     @property
     def name(self) -> str:
-        """Name on the board."""
+        """Return the name on the board."""
         return self.card.name
 
     def controller(self, limits: Any, **options: Any) -> Any:
         """Return the controller for evaluate: a name, or a factory of isolated controllers.
 
-        limits: training.board.isolated.ProcessLimits of a Python file; options: further fields of its
+        limits: training.board.isolated.ProcessLimits of a Python file; options: further fields of the
         IsolatedFactory.
         """
         if self.kind == BUILT_IN:
@@ -98,26 +98,26 @@ class Submission:
 
 
 def alike(name: str) -> str:
-    """Return a name with "_" for "-"; no two names of a board are alike in it."""
+    """Return a name with "-" replaced by "_"; must be unique on a board."""
     return name.replace("-", "_")
 
 
 def read_submission(folder: Path | str) -> Submission:
-    """Return the submission in a folder; its code is not run.
+    """Return the submission in a folder without running its code.
 
-    Raises: InputError for a folder without a valid card, or whose controller cannot be used.
+    Raises: InputError, with a line per problem, for a folder without a valid card or a usable controller.
     """
     folder = Path(folder)
     if not folder.is_dir():
-        raise InputError(f"submission {str(folder)!r}: is no folder (one with {CARD} in it is needed)")
+        raise InputError(f"submission {str(folder)!r}: must be a folder with a {CARD}")
     where = f"submission {str(folder)!r}"
     if not (folder / CARD).is_file():
         raise InputError(f"{where}: has no {CARD}")
     card, problems = checked_record(Card, read_toml(folder / CARD, "card"), where), []
     if not NAME.fullmatch(card.name):
         problems.append(
-            f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', a letter or"
-            " digit first"
+            f"name = {card.name!r}: must be 1 to 50 lower-case letters, digits, '_' or '-', starting with"
+            " a letter or digit"
         )
     if card.name in RESERVED:
         problems.append(f"name = {card.name!r}: is reserved")
@@ -134,7 +134,7 @@ def read_submission(folder: Path | str) -> Submission:
 
 
 def _kind(card, folder, problems):
-    """Return BUILT_IN, POLICY_FILE or PYTHON_FILE; append problems of the controller."""
+    """Return BUILT_IN, POLICY_FILE or PYTHON_FILE; append problems of the controller to `problems`."""
     file, colon, attribute = card.controller.partition(":")
     if file.endswith(".py") and colon:
         if not attribute.isidentifier():
@@ -159,16 +159,16 @@ def _kind(card, folder, problems):
 
 
 def _inside(folder, name):
-    """Return whether a name is that of a file in the folder itself, and no link."""
+    """Return whether a name is a file directly in the folder, not a link."""
     path = folder / name
     return path.is_file() and not path.is_symlink() and path.resolve().parent == folder.resolve()
 
 
 def _check_information(card, kind, problems):
-    """Append problems of the declared inputs."""
+    """Append problems of the declared inputs to `problems`."""
     if kind != PYTHON_FILE:
         if card.information is not None:
-            problems.append(f"information: is read from a {kind} itself; leave it out")
+            problems.append(f"information: must be omitted for a {kind} controller, which declares inputs")
         return
     if card.information is None:
         problems.append("information is missing: the inputs of the controller")
@@ -179,6 +179,6 @@ def _check_information(card, kind, problems):
     if bool(card.preview_times) != ("wind_preview" in card.information):
         problems.append(f"{times}: must be set if and only if 'wind_preview' is in information")
     if list(card.preview_times) != sorted(set(card.preview_times)):
-        problems.append(f"{times}: must rise")
+        problems.append(f"{times}: must increase")
     if len(card.preview_times) > MOST_TIMES or max(card.preview_times, default=0.0) > FURTHEST:
         problems.append(f"preview_times: must be at most {MOST_TIMES} times of at most {FURTHEST:g} s")

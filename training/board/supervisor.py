@@ -1,9 +1,9 @@
-"""Runs a command under limits and ends all processes that it leaves behind.
+"""Runs a command under resource limits and ends all processes that the command leaves behind.
 
     python supervisor.py PARENT FOLDER LIMITS COMMAND...
 
-It uses the standard library only, so that it starts in some 20 ms and has no secrets in memory. Processes
-whose parent has ended become its children, so that none escapes by leaving its session. If PARENT, a process
+The supervisor uses only the standard library, so that it starts in about 20 ms and has no secrets in memory.
+Orphaned processes become its children, so that none escapes by starting a new session. If PARENT, a process
 id, has ended too, FOLDER is removed. LIMITS: {name of resource: value} as JSON.
 """
 
@@ -16,7 +16,7 @@ import signal
 import sys
 from contextlib import suppress
 
-PDEATHSIG, DUMPABLE, SUBREAPER = 1, 4, 36  # of prctl, which only Linux has
+PDEATHSIG, DUMPABLE, SUBREAPER = 1, 4, 36  # options of prctl (Linux only)
 # a separate signal: a parent with threads keeps its process id until the last of them has ended
 PARENT_ENDED = signal.SIGHUP
 
@@ -29,17 +29,17 @@ def prctl(option: int, value: int) -> None:
 
 def children() -> list[int]:
     """Return the process ids of the children of this process; [] without /proc."""
-    found, me = [], os.getpid()
+    ids, me = [], os.getpid()
     with suppress(OSError):
         for name in filter(str.isdigit, os.listdir("/proc")):
             with suppress(OSError, ValueError), open(f"/proc/{name}/stat", "rb") as file:
                 if int(file.read().rpartition(b")")[2].split()[1]) == me:
-                    found.append(int(name))
-    return found
+                    ids.append(int(name))
+    return ids
 
 
 def tasks() -> int:
-    """Return the number of this user's threads."""
+    """Return the number of running threads of this user."""
     count = 0
     with suppress(OSError):
         for name in filter(str.isdigit, os.listdir("/proc")):
@@ -50,7 +50,7 @@ def tasks() -> int:
 
 
 def limit(limits: dict[str, int]) -> None:
-    """Set {name of resource: value}; NPROC, which counts all threads of the user, on top of those running."""
+    """Set resource limits {name: value}; NPROC is increased by the running threads of the user."""
     for name, value in limits.items():
         number = getattr(resource, f"RLIMIT_{name}", None)
         if number is not None:
@@ -62,7 +62,7 @@ def limit(limits: dict[str, int]) -> None:
 
 
 def supervise(parent: int, folder: str, limits: dict[str, int], command: list[str]) -> None:
-    """Run the command until it or the parent ends, or this process is terminated; then end what is left."""
+    """Run the command until it or the parent ends, or this process is terminated; end all descendants."""
     prctl(SUBREAPER, 1)
     prctl(PDEATHSIG, PARENT_ENDED)
     first = 0
@@ -76,7 +76,7 @@ def supervise(parent: int, folder: str, limits: dict[str, int], command: list[st
                 with suppress(OSError):
                     os.kill(child, signal.SIGKILL)
             try:
-                os.wait()  # grandchildren become children of this process, and are ended in the next round
+                os.wait()  # grandchildren become children of this process; killed in the next iteration
             except ChildProcessError:
                 break
         if number == PARENT_ENDED or os.getppid() != parent:
@@ -95,7 +95,7 @@ def supervise(parent: int, folder: str, limits: dict[str, int], command: list[st
     signal.signal(signal.SIGTERM, end)
     signal.signal(PARENT_ENDED, end)
     nothing = os.open(os.devnull, os.O_RDWR)
-    os.dup2(nothing, 0)  # so that the other end notices when the command closes its pipes
+    os.dup2(nothing, 0)  # so that the parent detects when the command closes its pipes
     os.dup2(nothing, 1)
     if os.getppid() != parent:
         end()

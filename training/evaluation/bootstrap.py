@@ -1,14 +1,14 @@
-"""Bootstrap intervals over a few weather seeds, and over training seeds crossed with them.
+"""Computes bootstrap intervals over a few weather seeds, and over training seeds crossed with them.
 
-One seed draws the wind and waves of every case from the same random phases, so its cases are not independent.
-Seeds are therefore resampled with all their cases (cluster bootstrap), and so are the training seeds of an
-agent with all their runs.
+A seed generates the wind and waves of every case from the same random phases, so its cases are not
+independent. Seeds are therefore resampled with all their cases (cluster bootstrap), and the training seeds of
+an agent with all their runs.
 
-Fewer than LEAST_SEEDS seeds have no interval: with two seeds Student's t would widen it 6.5 times over the
-normal one, and their deviation is hardly known.
+Fewer than LEAST_SEEDS seeds have no interval: with two seeds Student's t would widen the normal interval 6.5
+times, and the estimated deviation is very uncertain.
 
-Means over the cases are lifetime means: cases are weighted by their share of the lifetime, and metrics that
-add up by a power (variances, damage) are averaged by that power.
+Means over the cases are lifetime means: cases are weighted by their fraction of the lifetime, and metrics
+that are additive as a power (variances, damage) are averaged as this power.
 """
 
 from dataclasses import dataclass
@@ -22,11 +22,11 @@ LEAST_SEEDS = 4
 RESAMPLES = 10_000
 RANDOM_SEED = 20191
 LEAST_P = 1e-6
-P_STEPS = 40  # halvings of the logarithm of a p-value: exact to 1e-10
+P_STEPS = 40  # bisections of the logarithm of a p-value: accurate to 1e-10
 
 
 def resample_weights(n, resamples=RESAMPLES, random_seed=RANDOM_SEED):
-    """Return counts (resamples, n) of how often each of n seeds is drawn, n draws with replacement."""
+    """Return how often (resamples, n) each of n seeds is drawn in n draws with replacement."""
     draws = np.random.default_rng(random_seed).integers(n, size=(resamples, n))
     return np.stack([(draws == seed).sum(axis=1) for seed in range(n)], axis=1).astype(np.float64)
 
@@ -36,20 +36,19 @@ def interval(estimate, resampled, n, positive=False):
 
     NaN below LEAST_SEEDS.
 
-    Percentiles are too narrow for small n: with 6 normal values they contain the truth in 84 % of trials.
-    Widening them by the ratio of Student's to the normal interval makes it 94 % and keeps their skewness.
-    Hesterberg, The American Statistician 69(4), 2015, section 5.3, does the same with the percentiles'
-    levels.
+    Percentile intervals are too narrow for small n: with 6 normal values their coverage is 84 %. Widening by
+    the ratio of Student's to the normal interval increases the coverage to 94 % and preserves skewness.
+    Hesterberg, The American Statistician 69(4), 2015, section 5.3, adjusts the percentiles' levels instead.
 
-    positive: whether the estimate (each of them, or all) cannot be below zero. The interval is then that of
-    the logarithm, above zero; if a resample is zero, as of a count, it ends at zero.
+    positive: whether the estimate (each metric, or all) cannot be below zero. The interval is then computed
+    for the logarithm, so above zero; if a resample is zero, e.g. of a count, the interval ends at zero.
     """
     if n < LEAST_SEEDS:
         return np.full_like(estimate, np.nan), np.full_like(estimate, np.nan)
     resampled = _known(resampled)
     least = np.fmin(estimate, np.nanmin(resampled, axis=0))
     log = positive & (least > 0.0)
-    with np.errstate(all="ignore"):  # unused logarithms, and overflows of the ends
+    with np.errstate(all="ignore"):  # unused logarithms, and overflow of the ends
         centre = np.where(log, np.log(estimate), estimate)
         spread = _spread(centre, np.where(log, np.log(resampled), resampled), n)
         low, high = (np.where(log, np.exp(centre + side), centre + side) for side in spread)
@@ -65,14 +64,14 @@ def _spread(estimate, resampled, n):
 
 
 def _known(values):
-    """Return the array with zeros in all-NaN columns, whose estimate, and so result, is NaN."""
+    """Return the array with zeros in all-NaN columns (their estimate, and thus the result, is NaN)."""
     return np.where(np.isnan(values).all(axis=0), 0.0, values)
 
 
 def case_means(values, weights):
-    """Return weighted means (resamples, metrics) over the seeds of values (seeds, metrics); NaN is no value.
+    """Return weighted means (resamples, metrics) over the seeds of values (seeds, metrics); NaN: no value.
 
-    A single value is the mean of every resample. A resample that has drawn no value is NaN.
+    A single value is the mean of every resample. A resample without a value is NaN.
     """
     there = np.isfinite(values)
     filled = np.where(there, values, 0.0)
@@ -86,15 +85,15 @@ def case_means(values, weights):
 def lifetime_means(values, weights, shares, exponents):
     """Return (sum over cases of share x mean over seeds of x^p)^(1/p) of x = values, (resamples, metrics).
 
-    values (cases, seeds, metrics), NaN is no value; weights (resamples, seeds) of the seeds; shares (cases,)
-    of the lifetime; exponents p (metrics,). Shares of cases without a value of a metric go to the others.
-    NaN if no case with a share has a value.
+    values (cases, seeds, metrics), NaN: no value; weights (resamples, seeds) of the seeds; shares (cases,):
+    fractions of the lifetime; exponents p (metrics,). Shares are normalised over the cases with a value of
+    the metric. NaN if no case with a nonzero share has a value.
     """
     share = np.where(np.isfinite(values).any(axis=1), np.asarray(shares)[:, None], 0.0)  # (cases, metrics)
     bent = exponents != 1.0
     total = np.zeros((len(weights), values.shape[-1]))
     with np.errstate(all="ignore"):
-        share = share / share.sum(axis=0)  # NaN where no case has one
+        share = share / share.sum(axis=0)  # NaN if no case has a value
         for part, each in zip(share, values**exponents, strict=True):
             means = case_means(each, weights)
             means *= part
@@ -105,18 +104,18 @@ def lifetime_means(values, weights, shares, exponents):
 
 
 def _widening(n, alpha):
-    """Return the widening of the 1 - alpha interval of n resampled values; alpha of any shape, in (0, 1]."""
+    """Return the widening factor of the 1 - alpha interval of n resampled values; array alpha in (0, 1]."""
     tail = np.minimum(0.5 * alpha, 0.5 - 1e-9)
     return np.sqrt(n / (n - 1.0)) * student.isf(tail, n - 1) / normal.isf(tail)
 
 
 def p_values(deviations, distance):
-    """Return two-sided p-values (metrics,): 1 less the level of the interval that ends at the tested value.
+    """Return two-sided p-values (metrics,): 1 minus the level of the interval that ends at the tested value.
 
-    deviations  [(resampled less estimate (resamples, metrics), n)] for each kind of seed; each side combines
-                by the root of its squares, as independent errors do
-    distance    (metrics,) from the estimate to the tested value, in the same terms (logarithms)
-    At least LEAST_P, below the resolution of resamples; NaN for a NaN distance, or without deviations.
+    deviations  [(resampled minus estimate (resamples, metrics), n)] for each kind of seed; each side is
+                combined by the root sum of squares, as for independent errors
+    distance    (metrics,) from the estimate to the tested value, in the same scale (logarithms)
+    Clipped at LEAST_P, below the resolution of resamples; NaN for a NaN distance, or without deviations.
     """
     distance = np.asarray(distance, dtype=np.float64)
     if not deviations:
@@ -138,57 +137,57 @@ def p_values(deviations, distance):
 
 
 def _quantile(ordered, q):
-    """Return the quantiles q (metrics,) of sorted columns, without NaN at their ends."""
+    """Return the quantiles q (metrics,) of sorted columns, ignoring NaN at the end of a column."""
     last = np.isfinite(ordered).sum(axis=0) - 1
-    place = np.maximum(last, 0) * q
-    below = np.floor(place).astype(int)
+    position = np.maximum(last, 0) * q
+    below = np.floor(position).astype(int)
     above = np.minimum(below + 1, np.maximum(last, 0))
     columns = np.arange(ordered.shape[1])
-    return ordered[below, columns] + (place - below) * (ordered[above, columns] - ordered[below, columns])
+    return ordered[below, columns] + (position - below) * (ordered[above, columns] - ordered[below, columns])
 
 
 def holm(p):
     """Return p-values (n,) adjusted for multiple tests (Holm, Scandinavian Journal of Statistics 6(2), 1979).
 
     The probability of any false rejection at level alpha is at most alpha. The k-th smallest of n p-values is
-    multiplied by n + 1 - k, with the results kept in order; NaN is no test.
+    multiplied by n + 1 - k, and the results are made monotonic; NaN: no test.
     """
     p = np.asarray(p, dtype=np.float64)
     adjusted = np.full(p.shape, np.nan)
-    order = [place for place in np.argsort(p) if np.isfinite(p[place])]
+    order = [index for index in np.argsort(p) if np.isfinite(p[index])]
     running = 0.0
-    for rank, place in enumerate(order):
-        running = max(running, min(1.0, (len(order) - rank) * p[place]))
-        adjusted[place] = running
+    for rank, index in enumerate(order):
+        running = max(running, min(1.0, (len(order) - rank) * p[index]))
+        adjusted[index] = running
     return adjusted
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """A ratio with its 95 % interval (NaN: none), and the deviations for its p-values."""
+    """Holds a ratio with its 95 % interval (NaN: no interval), and the deviations for its p-values."""
 
     value: float
     low: float = float("nan")
     high: float = float("nan")
-    deviations: tuple = ()  # as p_values takes them
-    log: bool = False  # whether they are of the logarithm
+    deviations: tuple = ()  # as in p_values
+    log: bool = False  # whether the deviations are those of the logarithm
 
     def p_value(self, tested):
         """Return the two-sided p-value of the ratio being `tested`; NaN without an interval."""
         if not np.isfinite(self.low):
             return float("nan")
-        own, other = np.log([self.value, tested]) if self.log else (self.value, tested)
-        return float(p_values(self.deviations, np.array([other - own]))[0])
+        value, reference = np.log([self.value, tested]) if self.log else (self.value, tested)
+        return float(p_values(self.deviations, np.array([reference - value]))[0])
 
 
 def crossed_ratio(own, base, shares, exponent=1.0, resamples=RESAMPLES, positive=False):
-    """Return the Estimate of the ratio of lifetime means to a baseline's, its mean over training seeds.
+    """Return the Estimate of the ratio of lifetime means to a baseline's, averaged over training seeds.
 
-    own (training seeds, cases, weather seeds), base (cases, weather seeds), NaN: none; shares and exponent:
-    as in lifetime_means; positive: as in `interval`. Each kind of seed is resampled by itself, its interval
-    is widened for few seeds, and the two combine as independent errors do, each side by the root of its
-    squares. A kind with a single seed adds nothing: the interval is for that seed. No interval if a kind has
-    two or more, but fewer than LEAST_SEEDS, or if neither has two.
+    own (training seeds, cases, weather seeds), base (cases, weather seeds), NaN: no value; shares and
+    exponent: as in lifetime_means; positive: as in `interval`. Each kind of seed is resampled separately, its
+    interval is widened for few seeds, and each side of the two intervals is combined by the root sum of
+    squares, as for independent errors. A kind with a single seed adds nothing: the interval holds for that
+    seed. No interval if a kind has two or more, but fewer than LEAST_SEEDS, or if neither has two.
     """
     own = np.asarray(own, dtype=np.float64)
     there = np.isfinite(own) & np.isfinite(base)

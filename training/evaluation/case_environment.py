@@ -1,4 +1,4 @@
-"""Environments whose episodes are the runs of a load case, to train on what evaluate scores."""
+"""Defines environments whose episodes are runs of a load case, to train on the conditions of evaluate."""
 
 from fowt_env.control import EXACT
 from fowt_env.descriptions.platform import turbine_of
@@ -15,7 +15,7 @@ def environment_settings(case, duration):
 
     An episode with reset(options={"weather_seed": seed}) of an environment with the residual action mode, the
     case's controller as baseline and actions of zero gives the rows of evaluate; frame() returns them.
-    Raises: InputError for a case with another plant than its nominal one, or with a displaced start.
+    Raises: InputError for a case with a perturbed plant, or with initial values other than the trim.
     """
     if case.shift is not None or case.displaced is not None or case.initial is not None:
         raise InputError(f"case {case.name!r}: an environment begins at the trim of the nominal plant")

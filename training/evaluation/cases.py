@@ -1,7 +1,7 @@
-"""Load cases, and suites of them read from TOML files of the folder suites or of the user.
+"""Defines load cases, and reads suites of load cases from TOML files (built-in or of the user).
 
-One `[[case]]` may define several: with `speed = [12, 14]` and `name = "ntm_{speed}"` it is one case per mean
-wind speed, which is filled into its wind and selects the row of its sea's table.
+A `[[case]]` may define several cases: `speed = [12, 14]` and `name = "ntm_{speed}"` define one case per mean
+wind speed, which is set as the speed of the wind and selects the row of the sea's table.
 """
 
 import json
@@ -40,16 +40,16 @@ DESCRIBED = (
 
 @dataclass(frozen=True)
 class Case:
-    """One load case: the arguments of build_scene except the seed, and the events of the run.
+    """Defines a load case: the arguments of build_scene except the seed, and the events of the run.
 
     parked: the turbine idles with feathered blades (at rest without wind), so no controller is compared.
     initial: absolute values of channels at the start, as in simulate.
-    seeds, duration, skip: of this case if they differ from the suite's. shift: difference of the plant from
-    the nominal one that controllers are prepared for (training.evaluation.plant_perturbation).
+    seeds, duration, skip: values of this case if they differ from the suite's. shift: perturbation of the
+    nominal plant for which controllers are prepared (training.evaluation.plant_perturbation).
     """
 
     name: str
-    wind: object = None  # as build_scene takes it
+    wind: object = None  # as in build_scene
     sea: object = None
     platform: str = "oc3_hywind"
     # further options of build_scene; "standard" is within 1e-3 of "reference" at a fraction of the time
@@ -61,15 +61,15 @@ class Case:
     duration: float | None = None  # s
     skip: float | None = None  # s
     shift: PlantPerturbation | None = None  # unknown to the controllers
-    trip: float | None = TRIP  # fraction of rated rotor speed; None: that of the protection, if it has one
-    sensors: str = EXACT  # sensor chain that controllers read through, by its name
+    trip: float | None = TRIP  # fraction of rated rotor speed; None: limit of the protection, if any
+    sensors: str = EXACT  # name of the sensor chain between plant and controllers
     displaced: dict | None = None  # {channel: offset from the trim at the start}
-    protection: object = None  # as simulate takes it: None, "turbine" or a mapping of trips
-    source: str = ""  # of the case, if it differs from the suite's
+    protection: object = None  # as in simulate: None, "turbine" or a mapping of trips
+    source: str = ""  # source of the case, if it differs from the suite's
 
 
 def mean_speed(case):
-    """Return the mean wind speed (m/s) of a Case; None for no wind, a series or a file."""
+    """Return the mean wind speed (m/s) of a Case; None without wind, or for a time series or file."""
     if is_number(case.wind):
         return float(case.wind)
     speed = case.wind.get("speed") if isinstance(case.wind, dict) else None
@@ -77,7 +77,7 @@ def mean_speed(case):
 
 
 def described(case):
-    """Return a Case as a mapping of plain values for JSON; arrays as lists, objects as their text."""
+    """Return a Case as a mapping of plain values for JSON; arrays as lists, other objects as text."""
     values = {key: getattr(case, key) for key in DESCRIBED}
     if isinstance(case.sea, SeaState):
         values["sea"] = case.sea.model_dump(exclude_none=True)
@@ -91,7 +91,7 @@ def described(case):
 
 
 def _plain(value):
-    """Return a value that JSON can hold of one that it cannot."""
+    """Return a JSON-compatible representation of a value."""
     number = plain_number(value)
     if isinstance(number, int | float):
         return number
@@ -99,12 +99,12 @@ def _plain(value):
 
 
 def _names(text):
-    """Return the list of names in a text with commas, or of a sequence of names."""
+    """Return the list of names in a comma-separated text or a sequence."""
     return [name.strip() for name in text.split(",") if name.strip()] if isinstance(text, str) else list(text)
 
 
 def _many(value):
-    """Return a list of one value or several."""
+    """Return one value or several as a list."""
     return list(value) if isinstance(value, list | tuple) else [value]
 
 
@@ -112,15 +112,15 @@ Seeds = Annotated[tuple[Annotated[int, Field(ge=0, strict=True)], ...], BeforeVa
 
 
 def _unless_false(value):
-    return None if value is False else value  # as a TOML file writes it
+    return None if value is False else value  # TOML has no null
 
 
-# of rated rotor speed; false: none
+# fraction of rated rotor speed; false: no trip
 Trip = Annotated[Annotated[float, Field(gt=1.0, le=3.0, strict=True)] | None, BeforeValidator(_unless_false)]
 
 
 def _checked_protection(value):
-    """Return the protection of a case, once it is read without an error; None for false."""
+    """Return the protection of a case after checking it; None for false."""
     if _unless_false(value) is not None:
         read_protection(value, Protection())
     return _unless_false(value)
@@ -130,7 +130,7 @@ Protected = Annotated[Any, BeforeValidator(_checked_protection)]
 
 
 class CaseEntry(Record):
-    """One [[case]] of a suite file, before it is spread over its wind speeds."""
+    """Defines a [[case]] of a suite file, before its expansion to one Case per wind speed."""
 
     name: str
     speed: Annotated[tuple[Positive, ...], BeforeValidator(_many)] | None = None  # m/s at hub height
@@ -149,45 +149,45 @@ class CaseEntry(Record):
     protection: Protected = None  # default: the suite's
     source: str = ""
     sensors: str | None = None
-    displaced: dict[str, float] | None = None  # from the trim, in place of initial on another platform
+    displaced: dict[str, float] | None = None  # offsets from the trim; replaces initial on another platform
 
 
 class Site(Record):
-    """Wind climate of a site: the Weibull distribution of ten-minute means at hub height."""
+    """Defines the wind climate of a site: Weibull distribution of ten-minute means at hub height."""
 
     A: Positive  # m/s, scale
     k: Positive  # shape
     source: str
 
     def below(self, speed):
-        """Return the share of the time with a mean wind below a speed, m/s."""
+        """Return the probability of a mean wind below a speed, m/s."""
         return 1.0 - exp(-((max(speed, 0.0) / self.A) ** self.k))
 
 
 class ScoreTerm(Record):
-    """One term of a score: the metric's weight in the sum, relative to the baseline's."""
+    """Defines a term of a score: a metric, relative to the baseline's value, and its weight."""
 
     metric: str
     weight: Positive
 
 
 class Score(Record):
-    """A number per controller: the weighted mean of metric/baseline, over relative power; less is better.
+    """Defines a score per controller: the weighted mean of metric/baseline, divided by relative power.
 
-    baseline: the controller whose runs without protection are the reference.
+    Less is better. baseline: the controller whose runs without protection are the reference.
     """
 
     baseline: str
     term: tuple[ScoreTerm, ...]
-    power: str | None = None  # metric of which more is better: the sum is divided by it over the baseline's
+    power: str | None = None  # metric of which more is better; its ratio to the baseline's divides the mean
 
 
 class Limits(Record):
-    """Limits of metrics; a controller that exceeds one ranks below those that exceed none.
+    """Defines limits of metrics; controllers that exceed a limit rank below those within all limits.
 
-    run: {metric: greatest value in any run}. lifetime: {metric: greatest mean over the lifetime}. relative:
-    {metric: greatest ratio of its mean over the lifetime to that of the reference on the same runs}.
-    baseline: the controller whose runs without protection are the reference, as the score's.
+    run: {metric: maximum in any run}. lifetime: {metric: maximum of the lifetime mean}. relative: {metric:
+    maximum ratio of the lifetime mean to that of the reference on the same runs}. baseline: the controller
+    whose runs without protection are the reference, as for the score.
     """
 
     run: dict[str, NonNegative] = {}
@@ -197,7 +197,7 @@ class Limits(Record):
 
 
 class SuiteFile(Record):
-    """The text of a suite file."""
+    """Defines the content of a suite file."""
 
     version: Annotated[int, Field(ge=1, strict=True)]
     description: str
@@ -207,7 +207,7 @@ class SuiteFile(Record):
     duration: Positive
     skip: NonNegative = 0.0
     platform: str = "oc3_hywind"
-    turbine: str | None = None  # of the file's winds and limits, which are scaled to other turbines
+    turbine: str | None = None  # for which winds and limits are set; they are scaled to other turbines
     options: dict[str, Any] = {"fidelity": "standard"}
     left_out: str = ""
     case: tuple[CaseEntry, ...]
@@ -221,7 +221,7 @@ class SuiteFile(Record):
 
 @dataclass(frozen=True)
 class Suite:
-    """Cases with the settings of their runs and comparison."""
+    """Holds cases with the settings of their runs and of the comparison."""
 
     name: str
     version: int
@@ -230,29 +230,29 @@ class Suite:
     wind: str  # of WIND_KINDS
     seeds: tuple
     duration: float  # s
-    skip: float  # s at the start that are not scored
+    skip: float  # s at the start of a run that are not scored
     cases: tuple
     left_out: str = ""
     score: Score | None = None
     site: Site | None = None
     limits: Limits = Limits()
-    weights: dict = field(default_factory=dict)  # {case: share of the lifetime}; {}: every case alike
-    drawn: dict | None = None  # hash and rule of drawn seeds (seeds.py); None: listed ones
+    weights: dict = field(default_factory=dict)  # {case: fraction of the lifetime}; {}: equal weights
+    drawn: dict | None = None  # hash and rule of drawn seeds (seeds.py); None: listed seeds
 
     @property
     def reference(self):
-        """Name of the controller of the reference runs of score and relative limits; None: none."""
+        """Return the name of the controller of the reference runs for score and relative limits, or None."""
         if self.score is not None:
             return self.score.baseline
         return self.limits.baseline if self.limits.relative else None
 
 
 def lifetime_weights(cases, site):
-    """Return {name: share of the lifetime} of Cases by their mean wind speeds; {} without a Site.
+    """Return {name: fraction of the lifetime} of Cases by their mean wind speeds; {} without a Site.
 
-    The winds of the cases are bins that meet half-way between them; the outer bins are symmetric. A bin's
-    share is its probability over that of all bins, and cases of one wind share it equally. A parked turbine
-    and a case without a mean wind speed have share 0.
+    The winds of the cases are bin centres with edges half-way between; the outer bins are symmetric. A bin's
+    weight is its probability divided by that of all bins, divided equally among cases with the same wind. A
+    parked turbine and a case without a mean wind speed have weight 0.
     Raises: InputError for fewer than two winds.
     """
     if site is None:
@@ -261,14 +261,14 @@ def lifetime_weights(cases, site):
     count = Counter(speed for speed in winds.values() if speed is not None)
     speeds = sorted(count)
     if len(speeds) < 2:
-        raise InputError(f"site: needs cases of two mean wind speeds or more, there are {len(speeds)}")
+        raise InputError(f"site: needs cases of two or more mean wind speeds, not {len(speeds)}")
     edges = [0.5 * (low + high) for low, high in zip(speeds, speeds[1:], strict=False)]
     edges = [2.0 * speeds[0] - edges[0], *edges, 2.0 * speeds[-1] - edges[-1]]
-    share = {speed: site.below(high) - site.below(low)
+    weight = {speed: site.below(high) - site.below(low)
              for speed, low, high in zip(speeds, edges, edges[1:], strict=False)}  # fmt: skip
-    total = sum(share.values())
+    total = sum(weight.values())
     return {
-        name: 0.0 if speed is None else share[speed] / count[speed] / total for name, speed in winds.items()
+        name: 0.0 if speed is None else weight[speed] / count[speed] / total for name, speed in winds.items()
     }
 
 
@@ -278,10 +278,10 @@ def suite_names():
 
 
 def read_suite(name_or_path, platform=None):
-    """Return the Suite of a built-in name or of a user's TOML file; a Suite as it is.
+    """Return the Suite of a built-in name or of a user's TOML file; a Suite unchanged.
 
-    platform: a name or a path that replaces the file's, with cases scaled to its turbine
-    (training/evaluation/scaling.py); None: that of the file.
+    platform: name or path that replaces the platform of the file, with cases scaled to its turbine
+    (training/evaluation/scaling.py); None: the platform of the file.
     Raises: InputError for an unknown name (with a suggestion), and with one line per wrong entry.
     """
     if isinstance(name_or_path, Suite):
@@ -295,7 +295,7 @@ def read_suite(name_or_path, platform=None):
 
 
 def _read(path, platform=None):
-    """Return the Suite of a file, scaled to a platform if one is named."""
+    """Return the Suite of a file, scaled to a platform unless None."""
     where = f"suite file {str(path)!r}"
     file = checked_record(SuiteFile, read_toml(path, "suite"), where)
     try:
@@ -305,11 +305,11 @@ def _read(path, platform=None):
     cases, problems, weights = [], [], {}
     for number, entry in enumerate(file.case, 1):
         try:
-            cases += _spread(entry, file, path.parent)
+            cases += _expanded(entry, file, path.parent)
         except InputError as error:
             problems.append(f"case.{number} ({entry.name}): {error}")
     count = Counter(case.name for case in cases)
-    problems += [f"case {name!r}: named twice" for name in sorted(count) if count[name] > 1]
+    problems += [f"case {name!r}: defined twice" for name in sorted(count) if count[name] > 1]
     if not file.case:
         problems.append("case is missing: at least one [[case]] is needed")
     score, limits = file.score, file.limits
@@ -319,7 +319,7 @@ def _read(path, platform=None):
         problems += [f"{key}: {unknown('metric', name, METRICS)}" for name in wrong]
     if score is not None and limits.relative and limits.baseline != score.baseline:
         names = limits.baseline, score.baseline
-        problems.append("limits.baseline = {!r}: must be that of the score, {!r}".format(*names))
+        problems.append("limits.baseline = {!r}: must be the baseline of the score, {!r}".format(*names))
     for case in cases:
         duration, skip = case.duration or file.duration, file.skip if case.skip is None else case.skip
         below = f"must be below duration = {duration:g} s"
@@ -329,7 +329,7 @@ def _read(path, platform=None):
             problems.append(f"case {case.name!r}: fault.time = {case.fault.time:g} s: {below}")
         if is_field(case.wind) != (file.wind == "full-field") and case.wind is not None:
             problems.append(
-                f"case {case.name!r}: wind = {file.wind!r} of the suite does not fit its kind of wind"
+                f"case {case.name!r}: wind = {file.wind!r} of the suite does not match the kind of its wind"
             )
     try:
         weights = lifetime_weights(cases, file.site)
@@ -337,25 +337,25 @@ def _read(path, platform=None):
         problems.append(str(error))
     raise_problems(where, problems)
     shared = {field.name for field in fields(Suite)} & set(SuiteFile.model_fields)
-    given = {key: getattr(file, key) for key in shared}
-    return Suite(path.stem, cases=tuple(cases), weights=weights, **given)
+    settings = {key: getattr(file, key) for key in shared}
+    return Suite(path.stem, cases=tuple(cases), weights=weights, **settings)
 
 
 _kept = cached(64)(_read)  # of built-in suites and platforms
 
 
-def _spread(entry, file, folder):
-    """Return the Cases of a CaseEntry: one, or one per speed. Raises: InputError."""
+def _expanded(entry, file, folder):
+    """Return the Cases of a CaseEntry: one, or one per speed. Raises: InputError for wrong settings."""
     if entry.speed is not None and "{speed}" not in entry.name and len(entry.speed) > 1:
-        raise InputError("name: needs {speed} in it, for its several speeds")
+        raise InputError("name: must contain {speed}, since the case has several speeds")
     if entry.parked and entry.fault is not None:
-        raise InputError("parked: a parked turbine has no controller that a fault could act on")
+        raise InputError("parked: a case with a parked turbine has no controller, so it cannot have a fault")
     options = {**file.options, **entry.options}
     for key in options:
         if key not in (*OPTIONS, "fidelity", "rotor"):
             raise unknown("option", key, (*OPTIONS, "fidelity", "rotor"))
     if entry.shift is not None and options.get("turbine") is not None:
-        raise InputError("shift: a case with one takes the turbine of its platform, not that of an option")
+        raise InputError("shift: needs the turbine of the platform; remove the option turbine")
     platform = entry.platform or file.platform
     if entry.platform is not None or platform != "oc3_hywind":
         read_platform(platform)
@@ -385,10 +385,10 @@ def check_sensors(name):
 
 
 def _wind(spec, speed, folder):
-    """Return the wind of a case, checked. Raises: InputError."""
+    """Return the checked wind of a case. Raises: InputError for a wrong wind."""
     if spec is None:
         if speed is not None:
-            raise InputError("wind is missing: speed has nothing to fill")
+            raise InputError("wind is missing: speed sets the speed of a wind")
         return None
     if isinstance(spec, str):
         spec = wind_of(str(folder / Path(spec).expanduser()) if is_wind_file(spec) else spec)
@@ -411,7 +411,7 @@ def _wind(spec, speed, folder):
 
 
 def _sea(spec, speed, file):
-    """Return the sea of a case, checked; a scaled wind is limited to its table. Raises: InputError."""
+    """Return the checked sea of a case; a scaled wind is limited to its table. Raises: InputError."""
     if isinstance(spec, dict) and "table" in spec:
         at = spec.get("speed", speed)
         extra = set(spec) - {"table", "speed"}
@@ -427,7 +427,7 @@ def _sea(spec, speed, file):
 
 
 def all_cases(platform=None):
-    """Return {name: Case} of the built-in suites; a name means the same case in each."""
+    """Return {name: Case} of the built-in suites; cases of the same name are identical."""
     cases = {}
     for suite in suite_names():
         for case in read_suite(suite, platform).cases:
@@ -438,7 +438,7 @@ def all_cases(platform=None):
 def chosen_cases(suite, cases, platform=None):
     """Return the Suite or list of Cases for the names of a suite and of cases, either of which may be None.
 
-    platform: a name or a path to which they are scaled; None: that of the suite.
+    platform: name or path of the platform to which the cases are scaled; None: that of the suite.
     Raises: InputError for an unknown name, and for a case that is not in the suite.
     """
     if suite is None:
@@ -455,23 +455,23 @@ def chosen_cases(suite, cases, platform=None):
 
 
 def named_cases(names, platform=None):
-    """Return the list of Cases of some names of cases and suites, each once, in their order.
+    """Return the Cases of names of cases and suites, in this order and without duplicates.
 
     names: a name, several separated by commas, or a sequence of names; a suite may be a path. platform: as
     in read_suite.
     Raises: InputError for an unknown name.
     """
-    wanted = {}
+    selected = {}
     known = all_cases(platform)
     for name in _names(names):
         if name in known:
-            found = [known[name]]
+            matches = [known[name]]
         elif name in suite_names() or str(name).endswith(".toml"):
-            found = read_suite(name, platform).cases
+            matches = read_suite(name, platform).cases
         else:
             raise unknown("case", name, (*suite_names(), *known), "fowt list cases, fowt list suites")
-        for case in found:
-            wanted.setdefault(case.name, case)
-    if not wanted:
-        raise InputError("cases: none were named")
-    return list(wanted.values())
+        for case in matches:
+            selected.setdefault(case.name, case)
+    if not selected:
+        raise InputError("cases: at least one name is needed")
+    return list(selected.values())

@@ -1,4 +1,4 @@
-"""Texts of the conditions of a load case: wind, sea and events."""
+"""Describes the conditions of a load case in words: wind, sea and events."""
 
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.sea_state import SeaState, sea_state_of, sea_states
@@ -8,7 +8,7 @@ UNITS = {"speed": "m/s", "every": "s", "direction": "deg", "recurrence": "years"
 
 
 def wind_text(wind):
-    """Return the text of a wind of build_scene: "ntm 18 m/s, class B", "steady 8 m/s", "no wind"."""
+    """Describe a wind of build_scene in words: "ntm 18 m/s, class B", "steady 8 m/s", "no wind"."""
     if wind is None:
         return "no wind"
     if is_number(wind):
@@ -30,7 +30,7 @@ def wind_text(wind):
 
 
 def sea_text(sea):
-    """Return the text of a sea of build_scene: "JONSWAP Hs 1.86 m, Tp 7.94 s", "regular H 3 m, T 5 s"."""
+    """Describe a sea of build_scene in words: "JONSWAP Hs 1.86 m, Tp 7.94 s", "regular H 3 m, T 5 s"."""
     if sea is None:
         return STILL
     if isinstance(sea, str) and sea not in sea_states():
@@ -47,7 +47,7 @@ def sea_text(sea):
 
 
 def described_texts(about):
-    """Return (text of wind and events, text of the sea) of a case of cases.described."""
+    """Return (description of wind and events, description of the sea) of a case of cases.described."""
     parts = [wind_text(about["wind"])]
     if about["parked"]:
         parts.append("parked")

@@ -1,6 +1,6 @@
-"""Engines of an evaluation: this process, worker processes, or a Ray cluster.
+"""Runs the tasks of an evaluation in this process, in worker processes, or on a Ray cluster.
 
-Every engine yields (index, outcome of the function) as tasks end, in any order, with identical bits.
+Every engine yields (index, outcome of the function) as tasks end, in any order, with bit-identical results.
 """
 
 import itertools
@@ -29,29 +29,29 @@ from fowt_env.training.evaluation.guard import (
 
 ENGINES = ("processes", "ray")
 NICENESS = "RAY_worker_niceness"  # environment variable that sets the niceness of Ray's workers
-WINDOW = 4  # Ray tasks handed out per processor
-ATTEMPTS = 3  # workers that die on a task before the task is given up
-PATIENCE = 10.0  # s that a worker has to end after its last task
+WINDOW = 4  # Ray tasks submitted per processor
+ATTEMPTS = 3  # deaths of workers after which a task is abandoned
+PATIENCE = 10.0  # s in which a worker must end after its last task
 NO_WORKERS = (
     f"worker processes died {ATTEMPTS} times (out of memory, killed, or started by a program without"
-    " `if __name__ == '__main__':`); {} runs are left: the same command continues with them"
+    " `if __name__ == '__main__':`); {} runs are left: repeat the command to continue"
 )
-LONGEST_REASON = 200  # characters of what Ray says
+LONGEST_REASON = 200  # characters of Ray's error message
 SPAWN = multiprocessing.get_context("spawn")  # forking a process that runs numba threads is unsafe
 
 
 class WorkersLost(RuntimeError):
-    """Worker processes that cannot be started; finished tasks are kept."""
+    """Raised if worker processes cannot be started; finished tasks are kept."""
 
 
 def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=None, lost=None):
     """Yield (index, function(task)) for every task as it ends.
 
-    engine   "processes": this process for jobs = 1, else that many spawned ones; "ray": a Ray cluster
-             at the address, or a local one of `jobs` workers
-    limit    time limit of a task, s: after a worker's death later than this the task is not tried again
-    lost     lost(task, reason) is the outcome of a task on which workers die; None: RuntimeError
-    Raises: InputError for an unknown engine, jobs < 1, tasks that cannot be sent, or a Ray that does not
+    engine   "processes": this process for jobs = 1, else as many spawned processes; "ray": a Ray
+             cluster at the address, or a local cluster of `jobs` workers
+    limit    time limit of a task, s: the task is not repeated if its worker dies after this time
+    lost     lost(task, reason) is the outcome of a task during which workers die; None: RuntimeError
+    Raises: InputError for an unknown engine, jobs < 1, tasks that cannot be pickled, or if Ray does not
     start; WorkersLost if workers cannot be started.
     """
     if engine not in ENGINES:
@@ -64,7 +64,7 @@ def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=No
     if engine == "ray":
         yield from _ray(function, tasks, jobs, address, lost or _raise_lost)
         return
-    # one process fills the kernel cache, instead of every worker compiling the same
+    # one process fills the kernel cache, so that not every worker compiles the same kernels
     first = len(tasks) if jobs == 1 else int(not kernels_compiled())
     for index, task in enumerate(tasks[:first]):
         yield index, function(task)
@@ -77,7 +77,7 @@ def _raise_lost(task, reason):
 
 
 def _sendable(tasks, jobs):
-    """Return the pickled tasks. Raises: InputError."""
+    """Return the pickled tasks. Raises: InputError for a task that cannot be pickled."""
     packed, error = attempt(lambda: [pickle.dumps(task) for task in tasks])
     if error is not None:
         raise InputError(
@@ -88,7 +88,7 @@ def _sendable(tasks, jobs):
 
 
 def _processes(function, tasks, indices, jobs, limit, lost):
-    """Yield outcomes from worker processes; tasks at work when one dies are tried again, each alone."""
+    """Yield outcomes from worker processes; tasks running when a worker dies are repeated, one at a time."""
     packed = _sendable(tasks, jobs)
     waiting, suspects, deaths, unborn = deque(indices), deque(), Counter(), 0
     while waiting or suspects:
@@ -137,14 +137,14 @@ def _end(pool, patience):
 
 
 def _start_worker(parent, begun):
-    """Leave Ctrl-C to the parent process, and end when it ends."""
+    """Ignore Ctrl-C, which the parent process handles, and end this worker when the parent ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     begun.set()
 
     def watch():
         while os.getppid() == parent:
             time.sleep(0.5)
-        os._exit(1)  # else the workers of a killed parent wait forever
+        os._exit(1)  # otherwise the workers of a killed parent wait forever
 
     threading.Thread(target=watch, daemon=True).start()
 
@@ -160,9 +160,9 @@ def _answer(function, packed):
 
 @contextmanager
 def session(engine, jobs=1, address=None):
-    """Stay connected to Ray during a block, so that its evaluations share warm workers.
+    """Keep the connection to Ray during a block, so that the evaluations in the block share warm workers.
 
-    Does nothing for other engines, or if this process is connected already.
+    Does nothing for other engines, or if this process is already connected.
     Raises: InputError if Ray is not installed, does not start or cannot be reached.
     """
     ray = _ray_module() if engine == "ray" else None
@@ -178,7 +178,7 @@ def session(engine, jobs=1, address=None):
     try:
         ray.init(log_to_driver=False, logging_level="error", **options)
     except Exception as error:
-        attempt(ray.shutdown)  # a part of it may have started
+        attempt(ray.shutdown)  # Ray may have started partly
         what = f"no cluster at {address!r}" if address else "Ray does not start"
         reason = " ".join(str(error).split())[:LONGEST_REASON]
         raise InputError(
@@ -205,9 +205,9 @@ def _ray(function, tasks, jobs, address, lost):
     _sendable(tasks, jobs)
     deaths = (ray.exceptions.WorkerCrashedError, ray.exceptions.OutOfMemoryError)
     with session("ray", jobs, address):
-        # arguments are small and the code is installed on every node: only results travel far
+        # arguments are small and the code is installed on every node: only results are large
         remote = ray.remote(num_cpus=1, max_retries=ATTEMPTS - 1)(_answer)
-        # enough to keep every worker busy; all at once would make each wait look through all of them
+        # enough to keep every worker busy; with all tasks submitted, each wait would scan all of them
         window = WINDOW * max(1, int(ray.cluster_resources().get("CPU", jobs)))
         waiting, left = {}, iter(enumerate(tasks))
         while True:

@@ -1,11 +1,11 @@
-"""Evaluate controllers on load cases: one table of metrics.
+"""Evaluates controllers on load cases and returns one table of metrics.
 
     from fowt_env.training.evaluation.evaluate import evaluate
     table = evaluate(["pi", "pi_land"], "above_rated", seeds=(1, 2), jobs=2)
 
-Every controller meets the same wind and waves: a (case, seed) is one realisation. A failed run is a row with
-its reason and does not affect the others. With jobs > 1 a script needs the usual `if __name__ == "__main__":`
-guard, since worker processes import it.
+All controllers run in the same wind and waves: a (case, seed) is one realisation. A failed run has a row with
+the reason and does not affect other runs. With jobs > 1 a script needs the usual `if __name__ == "__main__":`
+guard, since worker processes import the script.
 """
 
 import socket
@@ -45,10 +45,10 @@ __all__ = [
     "COLUMNS", "SHORTEST_CASE_WEATHER", "Case", "evaluate", "metrics", "named_cases", "run_file", "summary",
 ]  # fmt: skip
 
-# cases of no suite file, with the defaults of their runs
+# cases without a suite file, with default run settings
 AD_HOC = Suite("", 0, "", "", "", seeds=(1,), duration=660.0, skip=60.0, cases=())
-LARGEST_RUN_SEED = 2**63 - 1  # of a column of whole numbers
-# s of wall clock: a run of eleven minutes takes 0.05 s with compiled laws and some minutes with slow Python
+LARGEST_RUN_SEED = 2**63 - 1  # largest value of an integer column
+# s of wall clock: 11 minutes of simulation take 0.05 s with compiled controllers, minutes with slow Python
 TIME_LIMIT = 3600.0
 
 
@@ -75,7 +75,7 @@ def evaluate(
 
     controllers   names (a sequence, or one string with commas), or {label: name or controller object}
     cases         a Suite (training.evaluation.cases.read_suite), Cases, or names of cases and suites
-    duration      length of each run, s; skip: seconds at its start that are not scored. None: those of the
+    duration      length of each run, s; skip: time at the start that is not scored, s. None: values of the
                   case, else of the Suite, else 660 and 60
     seeds         one realisation of wind and waves each, the same for all controllers. None: as above, else 1
     jobs          worker processes
@@ -85,25 +85,25 @@ def evaluate(
     folder        results folder (results.py) instead of out and runs_folder: finished runs are not repeated,
                   and the returned table is that of the whole folder
     engine        "processes" or "ray" (address: of a running cluster)
-    time_limit    seconds of wall clock after which a run fails; None: none. With jobs = 1 it works in the
-                  main thread only, and not in C code that never returns; with more, the worker is ended
-    sensors       name of the sensor chain of all cases, "exact" for none; None: that of each case
-    retry_failed  whether failed runs of a results folder are repeated, also with changed code
-    reference     controller whose runs are the reference of scores and limits: a name, True for that of the
-                  Suite (none without a score or relative limits), False for none. Its rows have the name
-                  "reference"; they have no trip and no protection, so that they have metrics
+    time_limit    wall clock (s) after which a run fails; None: no limit. With jobs = 1 it applies in the main
+                  thread only, and not to C code that never returns; with more jobs, the worker is ended
+    sensors       name of the sensor chain of all cases, "exact": no sensor errors; None: as in each case
+    retry_failed  whether to repeat failed runs of a results folder, also with changed code
+    reference     controller whose runs are the reference of scores and limits: a name, True for the Suite's
+                  reference (if it has a score or relative limits), False for no reference. Its rows are named
+                  "reference"; these runs have no trip and no protection, so that metrics always exist
     options       further options of simulate: dt, control_dt, output_dt, start, preview
-    Status of a row: "tripped" if the protection ended the run (the metrics are those until then), "lost
-    power" with less than half of the reference's energy (failures.with_lost_power), "failed" with a reason
-    and NaN metrics, also for a controller that cannot be prepared, calls sys.exit, or whose worker process
-    dies three times. Column events: rare numerical events and their counts; warning: commands that are
-    hardly in N m and rad, also warned of (PlantWarning) once per controller. A parked turbine has no
-    controller: such a case is run once, under the name "parked".
-    Raises: InputError for settings that no run could use.
+    Status of a row: "tripped" if the protection ended the run (metrics until then), "lost power" with less
+    than half of the reference's energy (failures.with_lost_power), "failed" with a reason and NaN metrics,
+    also for a controller that cannot be prepared, calls sys.exit, or whose worker process dies three times.
+    Column events: rare numerical events and their counts; warning: commands that are probably not in N m and
+    rad, also issued as a PlantWarning once per controller. A case with a parked turbine has no controller and
+    is run once, under the name "parked".
+    Raises: InputError for unusable settings.
     """
     if folder is not None:
         if out is not None or runs_folder is not None:
-            raise InputError("folder: contains the table and the runs, so out and runs_folder must be None")
+            raise InputError("folder: contains both table and runs, so out and runs_folder must be None")
         runs_folder = Path(folder) / "runs"
     suite = _suite(cases, sensors)
     controllers = _labelled(controllers)
@@ -133,13 +133,13 @@ def evaluate(
 def planned(
     controllers, cases, duration=None, skip=None, seeds=None, runs_folder=None, sensors=None, **options
 ):
-    """Return the list of Runs of an evaluation with these arguments, for `score`."""
+    """Return the list of Runs of an evaluation with the arguments of evaluate, for `score`."""
     suite = _suite(cases, sensors)
     return _plan(_labelled(controllers), suite, duration, skip, seeds, runs_folder, TIME_LIMIT, options)
 
 
 def _go(runs, total, jobs, report, engine, address, keep):
-    """Return {run key: row} of the runs; keep(row) and report are called when each ends."""
+    """Execute the runs and return {run key: row}; keep(row) and report are called after each run."""
     before, rows = total - len(runs), {}
     report(before, total, None)
     function = partial(score, here=versions()) if engine == "ray" else score
@@ -153,10 +153,10 @@ def _go(runs, total, jobs, report, engine, address, keep):
 
 
 def score(run, here=None):
-    """Return (row {column: value}, content of the run's file or None) of a run, which may have failed.
+    """Execute a run and return (row {column: value}, content of the run's file or None), also if it fails.
 
-    here: versions of packages where the rows are collected, if this is another machine.
-    Raises: InputError if this machine has other versions, with other results.
+    here: package versions of the machine that collects the rows, if the run is executed on another machine.
+    Raises: InputError if package versions that affect results differ between the machines.
     """
     if here is not None and (gap := version_gap(here, versions())):
         raise InputError(f"engine = 'ray': {gap[0]} here and {gap[1]} at the worker {socket.gethostname()}")
@@ -165,13 +165,13 @@ def score(run, here=None):
 
 
 def _lost(run, reason):
-    """Return what `score` would return of a run whose worker ended."""
+    """Return the outcome, as from `score`, of a run whose worker process ended."""
     row = lost_row(run, reason)
     return row, None if run.frame_path is None else run_content(None, row)
 
 
 def stored(run, outcome):
-    """Return the row of an outcome of `score`, once the run's file is written, whole or not at all."""
+    """Write the run's file atomically and return the row of an outcome of `score`."""
     row, content = outcome
     if content is not None:
         write_run(content, run.frame_path)
@@ -192,14 +192,14 @@ def _labelled(controllers):
         controllers = labelled
     for label in controllers:
         check_name("controllers: the name", label)
-    for taken, what in ((PARKED, "turbines without one"), (REFERENCE, "the suite's reference")):
+    for taken, what in ((PARKED, "parked turbines"), (REFERENCE, "the suite's reference")):
         if taken in controllers:
-            raise InputError(f"controllers: the name {taken!r} is that of {what}")
+            raise InputError(f"controllers: the name {taken!r} is reserved for {what}")
     return controllers
 
 
 def _suite(cases, sensors):
-    """Return the Suite of the arguments of evaluate, with AD_HOC settings for cases of none."""
+    """Return the Suite for arguments of evaluate, with AD_HOC settings for cases without a suite."""
     if isinstance(cases, Case):
         cases = [cases]
     if isinstance(cases, Suite):
@@ -217,7 +217,7 @@ def _suite(cases, sensors):
 
 
 def _plan(controllers, suite, duration, skip, seeds, runs_folder, time_limit, options):
-    """Return the Runs of an evaluation, case by case, so that an interrupted one has comparable runs."""
+    """Return the Runs of an evaluation, case by case, so that runs are comparable after an interruption."""
     if seeds is not None:
         seeds = [_seed(seed) for seed in seeds]
     if time_limit is not None:
@@ -229,7 +229,7 @@ def _plan(controllers, suite, duration, skip, seeds, runs_folder, time_limit, op
     for values in (seeds or (), [case.name for case in suite.cases]):
         if len(set(values)) < len(values):
             raise InputError("seeds and names of cases must differ from each other")
-    runs, places = [], {}
+    runs, files = [], {}
     for case in suite.cases:
         check_name("cases: the name", case.name)
         length = float(_first(duration, case.duration, suite.duration))
@@ -238,22 +238,22 @@ def _plan(controllers, suite, duration, skip, seeds, runs_folder, time_limit, op
             raise InputError(f"skip = {start} s: must be at least 0 and below duration = {length} s")
         if case.fault is not None and not case.fault.time < length:
             raise InputError(
-                f"duration = {length:g} s: the fault of case {case.name!r} comes at {case.fault.time:g} s"
+                f"duration = {length:g} s: the fault of case {case.name!r} occurs at {case.fault.time:g} s"
             )
-        # a case with a single seed has nothing random: further seeds would repeat the run
-        chosen = case.seeds if case.seeds is not None and len(case.seeds) == 1 else None
+        # a case with a single seed is deterministic: further seeds would repeat the run
+        fixed = case.seeds if case.seeds is not None and len(case.seeds) == 1 else None
         weight = suite.weights.get(case.name, float("nan"))
-        for seed in _first(chosen, seeds, case.seeds, suite.seeds):
+        for seed in _first(fixed, seeds, case.seeds, suite.seeds):
             for label, controller in ({PARKED: None} if case.parked else controllers).items():
                 path = None
                 if runs_folder is not None:
                     # a controller or worker may change the working folder
                     path = run_file(Path(runs_folder).absolute(), label, case.name, seed)
-                    name, other = places.setdefault(str(path).casefold(), (label, case.name))
+                    name, other = files.setdefault(str(path).casefold(), (label, case.name))
                     if (name, other) != (label, case.name):
                         raise InputError(
                             f"controller {name!r} in case {other!r} and controller {label!r} in case"
-                            f" {case.name!r} would have one file, {path.name!r}: rename one"
+                            f" {case.name!r} would share the file {path.name!r}: rename one"
                         )
                 settings = (label, controller, case, seed, length, start, dict(options), path, time_limit)
                 runs.append(Run(*settings, weight))
@@ -261,7 +261,7 @@ def _plan(controllers, suite, duration, skip, seeds, runs_folder, time_limit, op
 
 
 def _seed(value):
-    """Return a seed as an int, also of a float without a fraction. Raises: InputError."""
+    """Return a seed as an int, also from an integral float. Raises: InputError."""
     value = plain_number(value)
     if isinstance(value, float) and value.is_integer():
         value = int(value)
@@ -274,14 +274,14 @@ def _first(*values):
 
 
 def _check_controllers(controllers, runs):
-    """Make each controller once before anything runs. Raises: InputError if one cannot be made."""
+    """Create each controller once before any run. Raises: InputError if a controller cannot be created."""
     turbine = turbine_of(runs[0].case.platform)
     control_dt = runs[0].options.get("control_dt", CONTROL_DT)
     for controller in controllers.values():
         _, error = attempt(lambda each=controller: make(each, turbine, control_dt), runs[0].time_limit)
         if isinstance(error, InputError):
             raise error
-        # any other error is a bug of that controller: its runs fail with the reason
+        # any other error is a bug of the controller: its runs fail with the reason
 
 
 def _settings(controllers, runs, suite, options):
@@ -311,7 +311,7 @@ def _settings(controllers, runs, suite, options):
 
 
 def _appending(path):
-    """Return append(row), which adds a line to a new CSV file (None: does nothing) when a run ends."""
+    """Return append(row), which adds a line to a new CSV file (path None: does nothing)."""
     if path is None:
         return lambda row: None
     path = table_path(path, (".csv",), "evaluation table").absolute()
@@ -323,9 +323,9 @@ def _appending(path):
 
 
 def mean_ratios(table, over, columns):
-    """Return a DataFrame by controller: the mean over the runs of each column's ratio to that of `over`.
+    """Return a DataFrame by controller: the mean over the runs of each column's ratio to controller `over`.
 
-    NaN if a run of either was lost.
+    NaN if a run of either controller was lost.
     """
     values = known_figures(table, columns).set_index(KEY)[list(columns)].sort_index()
     base, names = values.loc[over], dict.fromkeys(table["controller"])
@@ -335,7 +335,7 @@ def mean_ratios(table, over, columns):
 def summary(table):
     """Return a DataFrame by controller and case: runs, lost runs by kind, means of the metrics over seeds.
 
-    Means are over the runs that ended well; NaN if there is none.
+    Means are over the runs that were not lost; NaN if all were lost.
     """
     groups = known_figures(table[table["controller"] != REFERENCE]).groupby(
         ["controller", "case"], sort=False

@@ -1,4 +1,4 @@
-"""Isolation of a run from the code of its controller: exits, time limits, unprintable messages."""
+"""Isolates a run from the code of its controller: exits, time limits, unprintable messages."""
 
 import faulthandler
 import os
@@ -10,35 +10,35 @@ from contextlib import contextmanager, suppress
 from fowt_env.errors import ControllerError, ControllerInputError, SimulationStopped
 
 LONGEST_REASON = 500  # characters
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # from outside: they end the evaluation
-AGAIN = 1.0  # s between repetitions of TimeLimit, for code that catches it
-GRACE = 5.0  # s after the limit at which a worker in C code is ended
-LIMIT_CODE = 1  # exit code of such a worker
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)  # sent from outside: they end the evaluation
+AGAIN = 1.0  # s between repetitions of TimeLimit, for code that catches the exception
+GRACE = 5.0  # s after the time limit at which a worker blocked in C code is ended
+LIMIT_CODE = 1  # exit code of a worker ended after GRACE
 
-_last_words = None  # in a worker: file for the output of faulthandler
+_traceback_file = None  # in a worker: file for the output of faulthandler
 
 
 class TimeLimit(KeyboardInterrupt):
-    """A run that took too long.
+    """Raised in a run that exceeds its time limit.
 
-    No Exception, so that a controller does not catch it with its own errors, but a KeyboardInterrupt, to
+    Not an Exception, so that `except Exception` in a controller does not catch it; a KeyboardInterrupt, to
     which simulate attaches the rows so far.
     """
 
 
 def as_worker():
     """Let faulthandler end this process if a run exceeds its limit by GRACE seconds."""
-    global _last_words
-    if _last_words is None:
-        _last_words = open(os.devnull, "w")  # noqa: SIM115 (for as long as the process lives)
+    global _traceback_file
+    if _traceback_file is None:
+        _traceback_file = open(os.devnull, "w")  # noqa: SIM115 (for as long as the process lives)
 
 
 def attempt(function, limit=None):
     """Return (function(), None), or (None, its exception), including SystemExit and KeyboardInterrupt.
 
-    limit: seconds of wall clock after which TimeLimit is raised in the function. It works in Python code of
-    the main thread; C code that never returns is ended in a worker only, with the worker. The working folder
-    is restored.
+    limit: seconds of wall clock after which TimeLimit is raised in the function. The limit applies to Python
+    code of the main thread; C code that never returns is ended only in a worker, with the worker. The working
+    folder is restored.
     Raises: the exception of a handler of SIGNALS (Ctrl-C: KeyboardInterrupt), even if the function caught it.
     """
     folder = os.path.abspath(os.curdir)
@@ -95,15 +95,15 @@ def _time_limit(seconds):
     began = time.monotonic()
     handler = signal.signal(signal.SIGALRM, late)
     signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN)
-    if _last_words is not None:  # its thread needs no Python, so it ends C code that holds the GIL
-        faulthandler.dump_traceback_later(seconds + GRACE, exit=True, file=_last_words)
+    if _traceback_file is not None:  # runs in a C thread, so it also ends C code that holds the GIL
+        faulthandler.dump_traceback_later(seconds + GRACE, exit=True, file=_traceback_file)
     try:
         try:
             yield
         finally:
             armed.clear()
     finally:
-        if _last_words is not None:
+        if _traceback_file is not None:
             faulthandler.cancel_dump_traceback_later()
         signal.setitimer(
             signal.ITIMER_REAL, max(1e-3, rest + began - time.monotonic()) if rest else 0.0, period
@@ -112,25 +112,25 @@ def _time_limit(seconds):
 
 
 def time_limit_reason(seconds):
-    """Return the reason of a run that took longer than some seconds."""
+    """Return the reason of failure of a run that exceeded a time limit in seconds."""
     return f"time limit: more than {seconds:g} s of wall clock"
 
 
 def reason_of(error):
-    """Return the reason of a failed run, in a printable line of at most LONGEST_REASON characters."""
+    """Return why a run failed, in a printable line of at most LONGEST_REASON characters."""
 
-    def said():
+    def message():
         text = str(error.reason if isinstance(error, SimulationStopped) else error)
         if isinstance(error, SimulationStopped | TimeLimit | ControllerError | ControllerInputError):
             return printable(text)
         return printable(f"{type(error).__name__}: {text}" if text else type(error).__name__)
 
-    text, failure = attempt(said)
+    text, failure = attempt(message)
     return text if failure is None else f"{type(error).__name__}: its message cannot be read"
 
 
 def printable(text):
-    """Return a text in one line of at most LONGEST_REASON characters, unprintable ones escaped."""
+    """Return a text as one line of at most LONGEST_REASON characters, unprintable characters escaped."""
     words = " ".join(text[: 2 * LONGEST_REASON].split())
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in words)
     if len(line) > LONGEST_REASON or len(text) > 2 * LONGEST_REASON:

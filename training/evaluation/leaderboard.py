@@ -1,7 +1,7 @@
-"""Comparison of controllers on equal seeds: means with intervals, paired differences, and a suite's score.
+"""Compares controllers on equal seeds: means with intervals, paired differences, and a suite's score.
 
-Seeds are resampled with all their cases (bootstrap.py). Means are over the lifetime: cases are weighted by
-the wind climate of the suite's site, or equally without a site.
+Seeds are resampled with all their cases (bootstrap.py). Means are lifetime means: cases are weighted by the
+wind climate of the suite's site, or equally without a site.
 """
 
 from typing import NamedTuple
@@ -32,23 +32,23 @@ SHOWN = {  # columns of a leaderboard in a notebook: {heading: metric}
     "blade-pitch travel (deg/s)": "blade_pitch_travel_[deg/s]",
     "tower-base DEL (kN m)": "TwrBsMyt_DEL_[kN-m]",
 }
-MOST_OF_BASELINE = 1e6  # a difference above this multiple of the baseline's value gets no percentage
+MOST_OF_BASELINE = 1e6  # differences above this multiple of the baseline's value have no percentage
 EXPONENTS = np.array([mean_exponent(name) for name in METRICS])
 METHOD = (
-    "lifetime means: each case by its share of the lifetime, deviations by their squares, damage-equivalent"
-    " loads by their S-N exponents; percentile bootstrap over seeds, each with all its cases, widened for n"
-    " seeds by sqrt(n/(n-1)) and by Student's t with n-1 degrees of freedom over the normal; of the logarithm"
-    f" where a figure cannot be negative; none below {LEAST_SEEDS} seeds; differences are paired by case and"
-    " seed; runs that failed, tripped or lost power have no figures, and count in a score"
-    f" {PENALTY:g} times the reference's, which is the suite's baseline without protection"
+    "lifetime means: cases weighted by fraction of the lifetime, deviations averaged as squares, damage-"
+    "equivalent loads by S-N exponents; percentile bootstrap over seeds, each with all its cases, widened for"
+    " n seeds by sqrt(n/(n-1)) and by the ratio of Student's t with n-1 degrees of freedom to the normal; of"
+    f" the logarithm for metrics that cannot be negative; none below {LEAST_SEEDS} seeds; differences paired"
+    " by case and seed; runs that failed, tripped or lost power have no metrics, and count in a score as"
+    f" {PENALTY:g} times the metrics of the reference, which is the suite's baseline without protection"
 )
 
 
 def default_baseline(controllers, baseline=None, failed=()):
-    """Return the name of the baseline, or None if there is none.
+    """Return the name of the baseline, or None without a usable controller.
 
-    It is the named one; else the first of BASELINES, or of all, that is not in `failed` (with failed runs).
-    Raises: InputError if it was not evaluated.
+    Default: the first of BASELINES, else of all controllers, that is not in `failed` (with failed runs).
+    Raises: InputError if the named baseline was not evaluated.
     """
     if baseline is not None:
         if baseline not in controllers:
@@ -59,10 +59,10 @@ def default_baseline(controllers, baseline=None, failed=()):
 
 
 class _Part(NamedTuple):
-    """The runs of a controller over some cases; arrays (cases, seeds[, metrics]), shares (cases,).
+    """Holds the runs of a controller over some cases; arrays (cases, seeds[, metrics]), shares (cases,).
 
-    values and base are NaN for a lost or missing run. The results of a controller depend on its runs, the
-    reference's and the baseline's, on its cases and seeds, and on no other controller of the table.
+    values and base are NaN for a lost or missing run. The results of a controller depend on its cases and
+    seeds, on its runs and those of the reference and the baseline, and on no other controller of the table.
     """
 
     cases: list
@@ -74,26 +74,26 @@ class _Part(NamedTuple):
     shares: np.ndarray
 
     def case(self, number):
-        """Return the _Part of one of its cases."""
+        """Return the _Part of a single case."""
         return _Part(*(each[number : number + 1] for each in self[:-1]), np.ones(1))
 
     @property
     def lost(self):
-        """Whether each run (cases, seeds) exists and was lost."""
+        """Return whether each run (cases, seeds) exists and was lost."""
         return self.runs & (self.statuses != OK)
 
     @property
     def nothing(self):
-        """Whether all runs of a case with a share were lost, so that there is no lifetime mean."""
+        """Return whether a case with a nonzero share has only lost runs, so that no lifetime mean exists."""
         whole = self.runs.any(axis=1) & ~(self.runs & ~self.lost).any(axis=1)
         return bool((whole & (self.shares > 0.0)).any())
 
 
 def _part(table, name, base):
-    """Return the _Part of a controller of a table by KEY, with the runs of a baseline (None: none)."""
-    own = table.loc[[name]]
-    cases = list(dict.fromkeys(own.index.get_level_values("case")))
-    seeds = sorted(set(own.index.get_level_values("seed")))
+    """Return the _Part of a controller from a table indexed by KEY; base: name of the baseline or None."""
+    rows = table.loc[[name]]
+    cases = list(dict.fromkeys(rows.index.get_level_values("case")))
+    seeds = sorted(set(rows.index.get_level_values("seed")))
     shape = len(cases), len(seeds)
 
     def of(who, columns):
@@ -103,50 +103,50 @@ def _part(table, name, base):
     statuses = of(name, ["status"])[..., 0]
     runs = ~pd.isna(statuses)
     statuses = np.where(runs, statuses, OK)
-    # in rows, on whose order in memory the last bit of a weighted sum depends
+    # row-major: the last bit of a weighted sum depends on the memory order
     arrays = (
         np.ascontiguousarray(of(who or "", list(METRICS)), dtype=np.float64)
         for who in (name, base, REFERENCE)
     )
-    return _Part(cases, *arrays, runs, statuses, case_shares(own.reset_index(), cases))
+    return _Part(cases, *arrays, runs, statuses, case_shares(rows.reset_index(), cases))
 
 
 def _means(values, weights, shares, chosen=slice(None)):
-    """Return lifetime_means of METRICS, or of some of them."""
+    """Return lifetime_means of METRICS, or of a selection of them."""
     return lifetime_means(values[..., chosen], weights, shares, EXPONENTS[chosen])
 
 
 def _differences(part, weights, own_resampled, tested):
-    """Return {"estimate", "low", "high", "percent", "pairs", "p"} of a _Part less its base, each (metrics,).
+    """Return {"estimate", "low", "high", "percent", "pairs", "p"} of a _Part minus its base, each (metrics,).
 
-    own_resampled: resampled means of all its runs. tested: whether to add p (NaN with too few seeds or with
-    lost runs, since the others are a biased sample).
+    own_resampled: resampled means of all runs. tested: whether to add p (NaN with too few seeds or with lost
+    runs, since the remaining runs are a biased sample).
     """
     known = np.isfinite(part.values)
     there = known & np.isfinite(part.base)
     pair = [np.where(there, values, np.nan) for values in (part.values, part.base)]
     one = np.ones((1, weights.shape[1]))
-    own, theirs = (_means(values, one, part.shares)[0] for values in pair)
-    gap = np.where(part.nothing, np.nan, own - theirs)
-    if not np.array_equal(there, known):  # else these are the means of the pairs
+    means, base_means = (_means(values, one, part.shares)[0] for values in pair)
+    gap = np.where(part.nothing, np.nan, means - base_means)
+    if not np.array_equal(there, known):  # otherwise all runs are paired
         own_resampled = _means(pair[0], weights, part.shares)
     resampled = own_resampled - _means(pair[1], weights, part.shares)
     seeds = int(there.any(axis=(0, 2)).sum())
     low, high = interval(gap, resampled, seeds)
-    # no ratio to zero or to a rounding error
+    # no ratio to zero or to a rounding error of zero
     with np.errstate(all="ignore"):
-        measured = np.abs(gap) < MOST_OF_BASELINE * np.abs(theirs)
-        percent = 100.0 * np.divide(gap, np.abs(theirs), out=np.full_like(gap, np.nan), where=measured)
+        measured = np.abs(gap) < MOST_OF_BASELINE * np.abs(base_means)
+        percent = 100.0 * np.divide(gap, np.abs(base_means), out=np.full_like(gap, np.nan), where=measured)
     pairs = there.sum(axis=(0, 1)).astype(float)
-    found = {"estimate": gap, "low": low, "high": high, "percent": percent, "pairs": pairs}
+    result = {"estimate": gap, "low": low, "high": high, "percent": percent, "pairs": pairs}
     if tested:
         enough = seeds >= LEAST_SEEDS and not part.lost.any()
-        found["p"] = p_values([(resampled - gap, seeds)] if enough else [], -gap)
-    return found
+        result["p"] = p_values([(resampled - gap, seeds)] if enough else [], -gap)
+    return result
 
 
 def _seed_range(part):
-    """Return (least, greatest), each (metrics,), over the seeds with every case of the lifetime mean."""
+    """Return (minimum, maximum), each (metrics,), over the seeds with all cases of the lifetime mean."""
     used = np.isfinite(part.values).any(axis=(1, 2)) & (part.shares > 0.0)
     values = part.values[used]
     alone = np.eye(values.shape[1])
@@ -165,7 +165,7 @@ def _named(estimate, low, high, **more):
 
 
 class Leaderboard(dict):
-    """The mapping of leaderboard(), which a notebook shows as a table."""
+    """Holds the mapping of leaderboard(), displayed as a table in notebooks."""
 
     def _repr_html_(self):
         """Return HTML of ranks, means of SHOWN with paired differences from the baseline, and scores."""
@@ -193,35 +193,35 @@ class Leaderboard(dict):
 def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     """Return a mapping of plain values that compares the controllers of an evaluation's table.
 
-    baseline   controller of the paired differences; None: gspi_oc3, else pi, else the first, of those
-               without failed runs
+    baseline   controller of the paired differences; None: gspi_oc3, else pi, else the first without failed
+               runs
     score      training.evaluation.cases.Score of a suite, or None
     cases      names of the cases to use; None: all
     limits     training.evaluation.cases.Limits of a suite, or None
-    Means are lifetime means (METHOD) with the shares of the column weight_[-]. Lost runs (failures.py) have
-    no metrics, but count in the score.
-    Keys: baseline (None: each has runs that failed or lost power), interval (level, method, resamples,
-    least_seeds), penalty (of a lost run, times the reference's metrics), unchecked (metrics whose relative
-    limits lack the runs of a reference), cases, shares {case: share}, seeds, controllers: a list of mappings
+    Means are lifetime means (METHOD), weighted by the column weight_[-]. Lost runs (failures.py) have no
+    metrics, but count in the score.
+    Keys: baseline (None: all have runs that failed or lost power), interval (level, method, resamples,
+    least_seeds), penalty (of a lost run, times the reference's metrics), unchecked (metrics with relative
+    limits, without reference runs), cases, shares {case: share}, seeds, controllers: a list of mappings
     with rank (None without a score), controller, runs, lost, failed, tripped, lost_power, metrics {metric:
     mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent, pairs, p},
-    beyond (a text per exceeded limit), score (mean, low, high, valid, why; None without one), cases {case:
+    beyond (a text per exceeded limit), score (mean, low, high, valid, why; or None), cases {case:
     runs, ..., metrics, difference}. seed_low and seed_high: range of the lifetime mean over the seeds; worst:
-    greatest over all runs; percent: mean difference over the baseline's mean of the same runs; p: its
-    two-sided p-value (not case by case, nor with lost runs).
-    The list is in the order of the ranks: first those with all runs within the limits, then those above a
-    limit, then those with lost runs; within each by score, else as in the table.
+    maximum over all runs; percent: mean difference relative to the baseline's mean of the same runs; p: its
+    two-sided p-value (not per case, nor with lost runs).
+    The list is sorted by rank: controllers within all limits, then those above a limit, then those with lost
+    runs; within each group by score, else as in the table.
     Raises: InputError for a baseline that was not evaluated.
     """
     if cases is not None:
         table = table[table["case"].isin(cases)]
-    own = table[table["controller"] != REFERENCE]
-    names = list(dict.fromkeys(own["controller"]))
-    unusable = own[~own["status"].isin((OK, TRIPPED))]
+    evaluated = table[table["controller"] != REFERENCE]
+    names = list(dict.fromkeys(evaluated["controller"]))
+    unusable = evaluated[~evaluated["status"].isin((OK, TRIPPED))]
     able = [name for name in names if name != PARKED] or names
     baseline = default_baseline(able, baseline, set(unusable["controller"]))
     runs = known_figures(table).set_index(KEY)
-    drawn = {}  # weights of resamples, by number of seeds
+    drawn = {}  # {number of seeds: weights of resamples}
     entries = []
     for name in names:
         part = _part(runs, name, baseline)
@@ -236,15 +236,15 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
         entries.append(entry)
     entries.sort(key=_rank_key)
     ranked = any(_known_score(entry) for entry in entries)
-    cases = list(dict.fromkeys(own["case"]))
+    cases = list(dict.fromkeys(evaluated["case"]))
     return Leaderboard(
         baseline=baseline,
         interval={"level": LEVEL, "method": METHOD, "resamples": RESAMPLES, "least_seeds": LEAST_SEEDS},
         penalty=PENALTY,
-        unchecked=[] if limits is None or len(own) < len(table) else list(limits.relative),
+        unchecked=[] if limits is None or len(evaluated) < len(table) else list(limits.relative),
         cases=cases,
-        shares=dict(zip(cases, map(float, case_shares(own, cases)), strict=True)),
-        seeds=sorted({int(seed) for seed in own["seed"]}),
+        shares=dict(zip(cases, map(float, case_shares(evaluated, cases)), strict=True)),
+        seeds=sorted({int(seed) for seed in evaluated["seed"]}),
         controllers=[{"rank": rank if ranked else None} | entry for rank, entry in enumerate(entries, 1)],
     )
 
@@ -262,7 +262,7 @@ def _rank_key(entry):
 
 
 def _entry(part, weights, tested=False):
-    """Return runs, metrics and differences of one controller over the cases of a _Part."""
+    """Return run counts, metrics and differences of a controller over the cases of a _Part."""
     resampled = _means(part.values, weights, part.shares)
     estimate = _means(part.values, np.ones((1, part.values.shape[1])), part.shares)[0]
     estimate[:] = np.nan if part.nothing else estimate
@@ -281,57 +281,57 @@ def _entry(part, weights, tested=False):
 
 
 def _beyond(limits, part):
-    """Return texts "metric = value, allowed value" of the exceeded Limits of runs that were not lost.
+    """Return the exceeded Limits of runs that were not lost, as "metric = value, allowed value".
 
-    A metric that all runs lack is not checked; one that some lack exceeds its limit.
+    A metric missing in all runs is not checked; a metric missing in some runs exceeds its limit.
     """
-    found, one = [], np.ones((1, part.values.shape[1]))
+    exceeded, one = [], np.ones((1, part.values.shape[1]))
 
     def check(name, value, limit, what=""):
         if not value <= limit:
-            found.append(f"{name}{what} = {value:g}, allowed {limit:g}")
+            exceeded.append(f"{name}{what} = {value:g}, allowed {limit:g}")
 
     for name, limit in limits.run.items():
         values = part.values[..., METRICS.index(name)][part.runs & ~part.lost]
         if values.size:
             check(name, values.max(), limit)
     if part.nothing:
-        return found
+        return exceeded
     means = _means(part.values, one, part.shares)[0]
     for name, limit in limits.lifetime.items():
         check(name, means[METRICS.index(name)], limit, " over the lifetime")
     there = np.isfinite(part.values) & np.isfinite(part.reference)
     if there.any():
         pair = (np.where(there, values, np.nan) for values in (part.values, part.reference))
-        own, base = (_means(values, one, part.shares)[0] for values in pair)
+        means, base = (_means(values, one, part.shares)[0] for values in pair)
         with np.errstate(all="ignore"):
-            ratios = own / base
+            ratios = means / base
         for name, limit in limits.relative.items():
             check(name, ratios[METRICS.index(name)], limit, f" over {limits.baseline}")
-    return found
+    return exceeded
 
 
 def _score(score, part, weights, beyond):
-    """Return {"mean", "low", "high", "valid", "why"} of a controller by a Score; None with a reason.
+    """Return {"mean", "low", "high", "valid", "why"} of a controller by a Score; numbers None if undefined.
 
-    A lost run, and a metric that a run lacks and the reference has, count as penalties of the reference's
-    metrics. A case and seed without a metric of the reference is left out.
+    Lost runs, and metrics missing in a run but not in the reference, count as `penalties` of the reference's
+    metrics. Cases and seeds in which the reference lacks a metric are omitted.
     """
     named = list(dict.fromkeys([term.metric for term in score.term] + ([score.power] if score.power else [])))
     chosen = [METRICS.index(name) for name in named]
     base = np.where(part.runs[..., None], part.reference[..., chosen], np.nan)
-    own = part.values[..., chosen]
+    scored = part.values[..., chosen]
     directions = [1 if name == score.power else -1 for name in named]
-    own = np.where(np.isfinite(own), own, penalties(base, directions))
-    paired = np.isfinite(own) & np.isfinite(base)
+    scored = np.where(np.isfinite(scored), scored, penalties(base, directions))
+    paired = np.isfinite(scored) & np.isfinite(base)
     if not paired.any():
         why = f"no run of the reference, which is {score.baseline!r} without protection"
         return {"mean": None, "low": None, "high": None, "valid": False, "why": why}
-    own, base = (np.where(paired, values, np.nan) for values in (own, base))
+    scored, base = (np.where(paired, values, np.nan) for values in (scored, base))
     exponents = EXPONENTS[chosen]
 
     def value(weights):
-        means = (lifetime_means(values, weights, part.shares, exponents) for values in (own, base))
+        means = (lifetime_means(values, weights, part.shares, exponents) for values in (scored, base))
         ratio = dict(zip(named, np.divide(*means).T, strict=True))
         total = sum(term.weight * ratio[term.metric] for term in score.term)
         total = total / sum(term.weight for term in score.term)
@@ -347,5 +347,5 @@ def _score(score, part, weights, beyond):
         for what, count in lost_counts(part.statuses[part.runs]).items()
         if count
     ] + beyond
-    figures = {"mean": float(estimate[0]), "low": float(low[0]), "high": float(high[0])}
-    return figures | {"valid": not why, "why": "; ".join(why)}
+    result = {"mean": float(estimate[0]), "low": float(low[0]), "high": float(high[0])}
+    return result | {"valid": not why, "why": "; ".join(why)}

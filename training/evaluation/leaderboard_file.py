@@ -1,6 +1,6 @@
-"""leaderboard.json of a results folder: written, and checked before a page is made of it.
+"""Writes leaderboard.json of a results folder, and checks such a file before use in a page.
 
-The whole file is checked at once, since another version may have written it; further keys are ignored.
+The whole file is checked at once, since another version may have written it; unknown keys are ignored.
 """
 
 import json
@@ -16,7 +16,7 @@ from fowt_env.training.evaluation.failures import KINDS, lost_text
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.results import write_json
 
-COPIED = ("format", "fowt_env", "plant", "versions", "suite", "options", "created")  # from the manifest
+COPIED = ("format", "fowt_env", "plant", "versions", "suite", "options", "created")  # keys from the manifest
 
 WholeNumber = Annotated[int, Field(ge=0, le=10**9)]
 FiniteNumber = Annotated[float, Field(ge=-1e300, le=1e300)]
@@ -27,9 +27,9 @@ class _Part(BaseModel):
 
 
 class Statistic(_Part):
-    """A mean or a difference with the ends of its interval (null: none).
+    """Holds a mean or a difference with the ends of its interval (null: no interval).
 
-    A difference has also percent, of the baseline's mean, and a two-sided p-value.
+    A difference also has percent, relative to the baseline's mean, and a two-sided p-value.
     """
 
     mean: FiniteNumber | None
@@ -40,7 +40,7 @@ class Statistic(_Part):
 
 
 class Figures(_Part):
-    """Runs and metrics of a controller, over all cases or in one."""
+    """Holds run counts and metrics of a controller, over all cases or in one."""
 
     runs: WholeNumber
     failed: WholeNumber
@@ -51,17 +51,17 @@ class Figures(_Part):
 
     @property
     def lost(self):
-        """Number of lost runs."""
+        """Return the number of lost runs."""
         return self.failed + self.tripped + self.lost_power
 
     @property
     def lost_text(self):
-        """Text "1 failed, 2 tripped" of the lost runs, "" for none."""
+        """Return the lost runs as "1 failed, 2 tripped", or "" without lost runs."""
         return lost_text({name: getattr(self, name) for name in KINDS})
 
 
 class LeaderboardEntry(Figures):
-    """A controller."""
+    """Holds the results of a controller."""
 
     controller: str
     rank: WholeNumber | None = None
@@ -71,7 +71,7 @@ class LeaderboardEntry(Figures):
 
 
 class Interval(_Part):
-    """How the intervals were computed."""
+    """Holds the level and method of the confidence intervals."""
 
     level: Annotated[float, Field(gt=0, lt=1)] = LEVEL
     method: str = ""
@@ -79,7 +79,7 @@ class Interval(_Part):
 
 
 class LeaderboardFile(_Part):
-    """The file."""
+    """Defines the content of leaderboard.json."""
 
     baseline: str | None
     interval: Interval = Interval()
@@ -92,16 +92,16 @@ def check_leaderboard(content, path):
     board, problems = validate(LeaderboardFile, content)
     if problems:
         raise InputError(
-            f"{str(path)!r} is not of this version ({'; '.join(problems[:3])}): run fowt evaluate on the"
-            " folder again, or remove that file to show means of results.csv"
+            f"{str(path)!r} does not match this version ({'; '.join(problems[:3])}): run fowt evaluate on the"
+            " folder again, or remove the file to show the means of results.csv"
         )
     return board
 
 
 def write_leaderboard(table, folder, baseline=None):
-    """Return the leaderboard of a results folder, and write it to leaderboard.json there.
+    """Return the leaderboard of a results folder, and write it to the folder's leaderboard.json.
 
-    Suite, score and limits are those of the folder's manifest.json.
+    Suite, score and limits are read from the folder's manifest.json.
     Raises: InputError for a baseline that was not evaluated.
     """
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))

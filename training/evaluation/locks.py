@@ -1,4 +1,4 @@
-"""Lock of a folder: one process at a time."""
+"""Locks a folder, so that one process at a time uses it."""
 
 import fcntl
 import os
@@ -10,10 +10,10 @@ from fowt_env.errors import InputError
 
 @contextmanager
 def locked(folder, what, busy):
-    """Lock a folder (made if missing) against other blocks; yield its path.
+    """Lock a folder (created if missing) against other processes and blocks; yield its path.
 
-    The lock is the kernel's: it ends with its process, however that ends. If the block raises, folders made
-    for it are removed if they are empty.
+    The operating system releases the lock when its process ends, also after a crash. If the block raises, the
+    folders created are removed if they are empty.
     Raises: InputError "{what}: {busy}" if another block has locked the folder, or if it cannot be locked.
     """
     folder = Path(folder)
@@ -34,9 +34,9 @@ def locked(folder, what, busy):
         try:
             yield folder
         except BaseException:
-            with suppress(OSError):  # one that is not empty, with those above it
+            with suppress(OSError):  # a folder that is not empty, and its parents
                 for path in made:
                     path.rmdir()
             raise
     finally:
-        os.close(handle)  # and with it the lock
+        os.close(handle)  # releases the lock

@@ -1,4 +1,4 @@
-"""The metrics of one run, computed from its OpenFAST-named columns."""
+"""Computes the metrics of a run from its columns with OpenFAST channel names."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -16,17 +16,17 @@ TIME = "Time_[s]"
 # IEC 61400-1 practice. Stud or studless chain at the fairlead: 3 (DNV-OS-E301, T-N curves; 5 is wire rope's).
 # Glass-fibre laminate of blades: 10, as in IEC 61400-1 practice.
 TOWER_EXPONENT, CHAIN_EXPONENT, BLADE_EXPONENT = 4.0, 3.0, 10.0
-BLADE_ROOTS = ("RootMyc", "RootMxc")  # channels of each blade, of which the greatest figure counts
-HUB_LOADS = ("LSSTipMys", "LSSTipMzs", "YawBrMyp", "YawBrMzp")  # in axes that do not turn
+BLADE_ROOTS = ("RootMyc", "RootMxc")  # channels of each blade; the metric is that of the worst blade
+HUB_LOADS = ("LSSTipMys", "LSSTipMzs", "YawBrMyp", "YawBrMzp")  # in non-rotating axes
 BLADES = (1, 2, 3)
 # The constraints of the ATLAS Offshore contest (ARPA-E, 2019).
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
 TOWER_TOP_ACCELERATION_LIMIT = 3.3  # m/s2
 ROTOR_SPEED_LIMIT = 1.3  # of rated: 15.73 rpm
-SETTLED_END = 300.0  # s at the end of a run over which it must have settled
-STANDSTILL = 10.0  # % of rated rotor speed, below which a rotor that was stopped stands: it idles feathered
-SETTLED_BAND = 5.0  # % of rated rotor speed about its final mean, beyond which it has not
-FINAL = 100.0  # s at the end, of that mean and of what still oscillates: some periods of the platform's pitch
+SETTLED_END = 300.0  # s at the end of a run, in which the rotor speed must have settled
+STANDSTILL = 10.0  # % of rated rotor speed, below which a feathered, idling rotor counts as stopped
+SETTLED_BAND = 5.0  # % of rated rotor speed about the final mean: limit of settling
+FINAL = 100.0  # s at the end of a run for final mean and oscillation: some periods of platform pitch
 REQUIRED_CHANNELS = (
     TIME, "RotSpeed_[rpm]", "GenPwr_[kW]", "PtfmPitch_[deg]", "PtfmSurge_[m]", "BldPitch1_[deg]",
     "GenTq_[kN-m]",
@@ -34,10 +34,10 @@ REQUIRED_CHANNELS = (
 
 
 class Metric(NamedTuple):
-    """What a metric or a statistic of a channel is, and how its figures are compared and averaged."""
+    """Defines a metric or a statistic of a channel, and how its values are compared and averaged."""
 
     meaning: str
-    better: int = 0  # -1: less is better, 1: more is, 0: neither can be said
+    better: int = 0  # -1: less is better, 1: more is better, 0: neither
     never_negative: bool = False
     exponent: float = 1.0  # p of its mean over winds and seeds, see mean_exponent
     of: Callable | None = None  # of a statistic: function of values over time, the first axis
@@ -45,10 +45,10 @@ class Metric(NamedTuple):
 
 STATISTICS = {
     "mean": Metric("mean", of=lambda x: np.mean(x, axis=0)),
-    # about the run's own mean, N in the denominator
+    # about the mean of the run, N in the denominator
     "std": Metric("standard deviation", -1, True, 2.0, lambda x: np.std(x, axis=0)),
-    "min": Metric("least value", of=lambda x: np.min(x, axis=0)),
-    "max": Metric("greatest value", -1, of=lambda x: np.max(x, axis=0)),
+    "min": Metric("minimum", of=lambda x: np.min(x, axis=0)),
+    "max": Metric("maximum", -1, of=lambda x: np.max(x, axis=0)),
     "rms": Metric("root mean square", -1, True, 2.0, lambda x: np.sqrt(np.mean(x**2, axis=0))),
 }
 # channel -> its statistics; a channel that a run lacks (mooring without lines) gives NaN
@@ -61,11 +61,11 @@ CHANNELS = dict.fromkeys(
     ),
     ALL,
 ) | {"NcIMUTAxs_[m/s^2]": (*ALL, "rms")}  # fmt: skip
-FURTHER_CHANNELS = (  # of which a run may lack some, as those of CHANNELS
+FURTHER_CHANNELS = (  # of which a run may lack some, as of CHANNELS
     "GenTqLim_[-]", "PtfmSway_[m]", *(f"{name}_[kN-m]" for name in HUB_LOADS),
     *(f"{name}{i}_[kN-m]" for name in BLADE_ROOTS for i in BLADES), *(f"BldPitch{i}_[deg]" for i in BLADES),
 )  # fmt: skip
-WEATHER = ("Wind1VelX_[m/s]", "Wave1Elev_[m]")  # of which neither less nor more is better
+WEATHER = ("Wind1VelX_[m/s]", "Wave1Elev_[m]")  # channels of which neither less nor more is better
 
 
 def _metric_name(channel, statistic):
@@ -75,7 +75,7 @@ def _metric_name(channel, statistic):
 
 
 def _of_channel(channel, statistic):
-    """Return the Metric of a statistic of a channel; of the power alone more is better of the mean."""
+    """Return the Metric of a statistic of a channel; more is better only for the mean power."""
     row = STATISTICS[statistic]
     better = 1 if (channel, statistic) == ("GenPwr_[kW]", "mean") else row.better
     meaning = f"{channel_meaning(channel)}: {row.meaning}"
@@ -83,7 +83,7 @@ def _of_channel(channel, statistic):
 
 
 def _size(meaning):
-    """Return the Metric that cannot be below zero, of which less is better."""
+    """Return a Metric that cannot be below zero, of which less is better."""
     return Metric(meaning, -1, True)
 
 
@@ -99,12 +99,12 @@ def _fatigue(meaning, exponent=TOWER_EXPONENT, material=""):
     )
 
 
-TABLE = {  # metric -> what it is, in the order of columns
+TABLE = {  # metric -> definition, in the order of columns
     _metric_name(channel, statistic): _of_channel(channel, statistic)
     for channel, statistics in CHANNELS.items()
     for statistic in statistics
 } | {
-    "overspeed_[%]": Metric("greatest rotor speed over rated", -1),
+    "overspeed_[%]": Metric("maximum rotor speed above rated", -1),
     "energy_[kWh]": Metric("electrical energy, power counted up to rated", 1),
     "GenPwr_capped_mean_[kW]": Metric("mean electrical power, counted up to rated", 1),
     "blade_pitch_travel_[deg/s]": _size("mean absolute blade-pitch rate"),
@@ -112,7 +112,7 @@ TABLE = {  # metric -> what it is, in the order of columns
     "torque_travel_[kN-m/s]": _size("mean absolute rate of the generator torque"),
     "torque_limited_[s]": _size("time with the generator torque at a range or rate limit"),
     "FAIRTEN_std_[kN]": _deviation("standard deviation of the fairlead tension, worst line"),
-    "FAIRTEN_max_[kN]": _size("greatest fairlead tension of all lines"),
+    "FAIRTEN_max_[kN]": _size("maximum fairlead tension of all lines"),
     "TwrBsMyt_DEL_[kN-m]": _fatigue("fore-aft tower-base moment", material=" (welded steel)"),
     "RotTorq_DEL_[kN-m]": _fatigue("low-speed shaft torque"),
     "FAIRTEN_DEL_[kN]": _fatigue("worst fairlead", CHAIN_EXPONENT, " (chain)"),
@@ -122,21 +122,21 @@ TABLE = {  # metric -> what it is, in the order of columns
     "LSSTipMzs_DEL_[kN-m]": _fatigue("hub's yaw moment, non-rotating"),
     "YawBrMyp_DEL_[kN-m]": _fatigue("yaw bearing's tilt moment"),
     "YawBrMzp_DEL_[kN-m]": _fatigue("yaw bearing's yaw moment"),
-    "each_blade_travel_[deg/s]": _size("mean absolute pitch rate of single blades, mean of the three"),
+    "each_blade_travel_[deg/s]": _size("mean absolute pitch rate of each blade, mean of the three"),
     "PtfmSway_std_[m]": _deviation("standard deviation of the platform's sway"),
     "blade_pitch_rate_beyond_[s]": _size("time with a blade-pitch rate above 10 deg/s"),
-    "blade_pitch_rate_violations_[-]": _size("how often the blade-pitch rate passes 10 deg/s"),
+    "blade_pitch_rate_violations_[-]": _size("exceedances of 10 deg/s by the blade-pitch rate"),
     "tower_top_acceleration_beyond_[s]": _size("time with a tower-top acceleration above 3.3 m/s2"),
-    "tower_top_acceleration_violations_[-]": _size("how often the tower-top acceleration passes 3.3 m/s2"),
+    "tower_top_acceleration_violations_[-]": _size("exceedances of 3.3 m/s2 by the tower-top acceleration"),
     "rotor_speed_beyond_[s]": _size("time with a rotor speed above 1.3 times rated"),
-    "rotor_speed_violations_[-]": _size("how often the rotor speed passes 1.3 times rated"),
-    "RotSpeed_offset_[%]": _size("steady wind: distance of the final mean rotor speed from rated"),
+    "rotor_speed_violations_[-]": _size("exceedances of 1.3 times rated by the rotor speed"),
+    "RotSpeed_offset_[%]": _size("steady wind: deviation of the final mean rotor speed from rated"),
     "BldPitch_oscillation_[deg]": _size("steady wind: peak-to-peak blade pitch of the last 100 s"),
     "settling_time_[s]": _size("time from a gust until the rotor speed stays within 5 % of its final mean"),
     "standstill_time_[s]": _size("time from a stop until the rotor stays below 10 % of rated speed"),
 }
 METRICS = tuple(TABLE)
-UNKNOWN = Metric("")  # a column that is no metric of this version
+UNKNOWN = Metric("")  # a column that is not a metric of this version
 DIRECTIONS = {-1: "lower", 0: "", 1: "higher"}
 
 
@@ -146,44 +146,43 @@ def never_negative(metric):
 
 
 def better(metric):
-    """Return -1 where less of a metric is better, 1 where more is, 0 where neither can be said."""
+    """Return -1 if less of a metric is better, 1 if more is better, 0 if neither."""
     return TABLE.get(metric, UNKNOWN).better
 
 
 def mean_exponent(metric):
     """Return the exponent p with which a metric is averaged over winds and seeds: (mean of x^p)^(1/p).
 
-    Damage-equivalent loads: that of their S-N curve, since damage adds up. Standard deviations and rms: 2,
-    since variances add up: their mean is the deviation of the whole lifetime about the means of the single
-    runs, so that what the means themselves do from wind to wind, which is the wind's doing and no
-    controller's, is no part of it. Any other: 1.
+    Damage-equivalent loads: the exponent of their S-N curve, since damage is additive. Standard deviations
+    and rms: 2, since variances are additive: the result is the lifetime deviation about the means of the
+    individual runs, without the variation of these means with wind speed. Any other: 1.
     """
     return TABLE.get(metric, UNKNOWN).exponent
 
 
 def metric_table():
-    """Return [(name, unit, meaning, "lower", "higher" or "" of which is better)] of all METRICS."""
+    """Return [(name, unit, meaning, better direction: "lower", "higher" or "")] of all METRICS."""
     return [
         (*name.rstrip("]").split("_["), row.meaning, DIRECTIONS[row.better]) for name, row in TABLE.items()
     ]
 
 
 def travel(time, value):
-    """Return the mean absolute rate over time, the first axis: the sum of the steps' sizes per second."""
+    """Return the mean absolute rate over time, the first axis: the sum of absolute increments per second."""
     return np.sum(np.abs(np.diff(value, axis=0)), axis=0) / (time[-1] - time[0])
 
 
 def overspeed(fastest, rated):
-    """Return the greatest rotor speed above the rated one, in percent of it; 0 where it stays below."""
-    return np.maximum(0.0, 100.0 * (fastest / rated - 1.0))  # a plain max() would turn NaN into 0
+    """Return the maximum rotor speed above rated, in percent of rated; 0 if the speed stays below rated."""
+    return np.maximum(0.0, 100.0 * (fastest / rated - 1.0))  # Python's max() would replace NaN by 0
 
 
 def damage_equivalent_load(values, duration, exponent):
-    """Return the range (unit of values) of the 1 Hz cycles that do the same fatigue damage in this time.
+    """Return the range (unit of values) of the 1 Hz cycles with the same fatigue damage as the values.
 
     (sum n_i S_i^m / duration)^(1/m) over the rainflow cycles of the series (ASTM E1049-85, 5.4.4): ranges
-    S_i, counts n_i (what is left over counts half), m the inverse slope of the S-N curve, duration in s.
-    No mean-load correction. NaN anywhere gives NaN.
+    S_i, counts n_i (residual half cycles count 0.5), m the inverse slope of the S-N curve, duration in s.
+    No mean-load correction. Any NaN gives NaN.
     """
     values = np.asarray(values, dtype=np.float64)
     if not np.isfinite(values).all():
@@ -193,7 +192,7 @@ def damage_equivalent_load(values, duration, exponent):
 
 
 def beyond(time, value, limit):
-    """Return (seconds that evenly spaced values spend above a limit, times they pass it); NaN of NaN."""
+    """Return (time in s of evenly spaced values above a limit, number of upcrossings); NaN if any is NaN."""
     if len(value) < 2 or not np.isfinite(value).all():
         return float("nan"), float("nan")
     above = value > limit
@@ -214,15 +213,15 @@ def metrics(
     """Return {metric: value} of a run, in the order and with the names of METRICS.
 
     df                output of simulate: evenly spaced rows
-    skip              seconds at the start that are left out (start-up transient)
-    rated_speed_rpm   overspeed is the greatest rotor speed above this, in percent of it
-    pitch_rate_limit  of the blade-pitch drive, deg/s: the actuator duty is the mean rate in percent of it
-    rated_power_kW    electrical: power beyond it counts neither as energy nor in the capped mean
-    steady            whether the wind is steady and above rated, and the water still: the run has then an
-                      offset and an oscillation, else NaN
-    gust_start        time (s) of a gust after which the rotor has to settle; None: no settling time (NaN)
-    stop              time (s) of what the rotor is to be stopped for; None: no standstill time (NaN)
-    TABLE has the meaning of each metric; a channel that the run lacks gives NaN.
+    skip              time at the start that is not evaluated, s (start-up transient)
+    rated_speed_rpm   rated rotor speed, reference of the overspeed
+    pitch_rate_limit  of the blade-pitch drive, deg/s; the actuator duty is the mean rate in percent of this
+    rated_power_kW    electrical; power above rated counts neither as energy nor in the capped mean
+    steady            whether the wind is steady and above rated in still water, so that offset and
+                      oscillation are computed (else NaN)
+    gust_start        time (s) of a gust after which the rotor must settle; None: no settling time (NaN)
+    stop              time (s) of the event that stops the rotor; None: no standstill time (NaN)
+    TABLE defines each metric; a channel missing in the run gives NaN.
     Raises: InputError for missing columns or if skip leaves fewer than two rows.
     """
     kept = _kept(df, skip)
@@ -270,14 +269,14 @@ def metrics(
 
 
 def turbine_metrics(df, turbine, skip=0.0, steady=False, gust_start=None, stop=None):
-    """Return the metrics of a run of a turbine, by its rated speed and power and its pitch drive."""
+    """Return the metrics of a run, with the turbine's rated speed, rated power and pitch-rate limit."""
     power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
     rate = turbine.pitch_drive.rate_limit / DEGREE
     return metrics(df, skip, turbine.rated_rotor_speed / RPM, rate, power, steady, gust_start, stop)
 
 
 def _kept(df, skip):
-    """Return the scored rows of a run. Raises: InputError."""
+    """Return the rows of a run after `skip`. Raises: InputError."""
     missing = [name for name in REQUIRED_CHANNELS if name not in df.columns]
     if missing:
         raise InputError(f"metrics: the run lacks the columns {', '.join(missing)}")
@@ -291,7 +290,7 @@ def _kept(df, skip):
 
 
 def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
-    """Return the metrics of settling, NaN of a run that has none; not scored rows count in none of them."""
+    """Return the settling metrics from the rows after `skip`; NaN where they are not defined for the run."""
     names = ("RotSpeed_offset_[%]", "BldPitch_oscillation_[deg]", "settling_time_[s]")
     result = dict.fromkeys(names, np.nan)
     if steady:
@@ -308,7 +307,7 @@ def _settling(time, speed, blade_pitch, rated_speed_rpm, steady, gust_start):
 
 
 def _standstill(time, speed, rated_speed_rpm, stop):
-    """Return the seconds from a stop until the rotor stands for good; NaN where it never does."""
+    """Return the time (s) from a stop until the rotor remains at standstill; NaN if never."""
     fast = np.abs(speed) > 0.01 * STANDSTILL * rated_speed_rpm
     if stop is None or fast[-1] or not np.isfinite(speed).all():
         return np.nan
@@ -316,7 +315,7 @@ def _standstill(time, speed, rated_speed_rpm, stop):
 
 
 def _violations(time, speed, axes, blade_pitch, rated_speed_rpm):
-    """Return the metrics of the constraints; axes: horizontal accelerations, fore-aft and side to side."""
+    """Return the metrics of constraints; axes: tower-top accelerations, fore-aft and side to side."""
     rate = np.abs(np.diff(blade_pitch) / np.diff(time))
     acceleration = np.hypot.reduce(axes) if axes else np.full(time.shape, np.nan)
     result = {}

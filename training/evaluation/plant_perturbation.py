@@ -1,8 +1,8 @@
-"""Perturbed plants: factors on the files' values and noise on readings, unknown to the controller.
+"""Defines perturbed plants: factors on parameters of the input files, and noise on the controller's readings.
 
 A controller is made for the nominal turbine and prepared with the nominal scene, so that model-based designs
-(lqr, rosco, preview) are based on a wrong model, as they would be at sea. Metrics are of the true motions:
-noise is only on the controller's readings.
+(lqr, rosco, preview) have a model mismatch, as at sea. Metrics are computed from the true motions: noise
+affects only the controller's readings.
 """
 
 import dataclasses
@@ -19,10 +19,10 @@ from fowt_env.envs.sensors import reading_scales
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import Measurement
 
-# name: (what is drawn, default distribution). Factors multiply the file's value.
+# name: (description, default distribution). Factors multiply the file's value.
 PLANT = {
     "ballast_mass": (
-        "factor on the ballast's mass; the plant floats deeper or higher",
+        "factor on the ballast's mass; changes the draught",
         ("uniform", 0.99, 1.01),
     ),
     "upper_mass": ("factor on the masses and inertias of tower and nacelle", ("uniform", 0.95, 1.05)),
@@ -46,10 +46,10 @@ def plant_settings(factors, platform=PLATFORM):
     def factor(name):
         value = factors.get(name, 1.0)
         if not value > 0.0:
-            raise InputError(f"randomise.{name}: drew {value:g}: factors must be positive")
+            raise InputError(f"randomise.{name}: drew {value:g}, but factors must be positive")
         return value
 
-    def times(by, value):  # None: none
+    def times(by, value):  # None stays None
         if isinstance(value, tuple):
             return tuple(times(by, each) for each in value)
         return None if value is None else by * value
@@ -93,9 +93,9 @@ def plant_settings(factors, platform=PLATFORM):
 
 
 class PlantPerturbation(Record):
-    """Difference of a case's plant from the nominal one; names as in PLANT.
+    """Defines the perturbation of a case's plant: factors on the nominal parameters, with the names of PLANT.
 
-    Factors on the values of the files. noise: standard deviation of white noise on each reading, as a
+    noise: standard deviation of white noise on each reading, as a
     fraction of the channel's scale in observations (rotor speed: 20 % of rated; blade pitch: 15 deg; platform
     pitch: 5 deg, its rate: 1 deg/s; nacelle acceleration: 1 m/s2). delay: control periods from measurement to
     reading.
@@ -113,7 +113,7 @@ class PlantPerturbation(Record):
 
     @property
     def factors(self):
-        """{name of PLANT: factor} of the factors other than 1."""
+        """Return {name of PLANT: factor} of the factors other than 1."""
         return {name: getattr(self, name) for name in PLANT if getattr(self, name) != 1.0}
 
 
@@ -124,7 +124,7 @@ def perturbed_parts(perturbation, platform="oc3_hywind"):
 
 
 def perturbed_sensors(perturbation, turbine, control_dt):
-    """Return the SensorChain of a PlantPerturbation's noise and delay on every reading; None without both."""
+    """Return the SensorChain with a PlantPerturbation's noise and delay on every reading, or None."""
     if perturbation.noise == 0.0 and perturbation.delay == 0:
         return None
     scales = dict(zip(Measurement._fields, reading_scales(turbine).tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""What shaped a run: hashes of the sources it imports and of its controller's, versions of packages."""
+"""Records what affects a run: hashes of the sources of simulator and controller, and package versions."""
 
 import hashlib
 import importlib
@@ -14,15 +14,15 @@ from fowt_env.layout import FOLDERS, PACKAGE, installed_path, module_path
 from fowt_env.plant.compile.sources import imported_files, in_order, keep_sources, read_source
 
 PACKAGES = ("numpy", "numba", "scipy", "pandas", "rainflow", "rosco", "hipersim")
-NO_FIGURES = ("fowt_env", "python", "pandas")  # of the versions: compared otherwise, or shaping no figure
+NO_FIGURES = ("fowt_env", "python", "pandas")  # versions that are compared elsewhere or affect no result
 CONTROLLERS = FOLDERS["controllers"]
-RUN = FOLDERS["training"] / "evaluation" / "run_case.py"  # what it imports shapes a run
-ALWAYS = (CONTROLLERS / "constant.py",)  # of the controllers, what a run without any of them needs
+RUN = FOLDERS["training"] / "evaluation" / "run_case.py"  # its imports affect a run
+ALWAYS = (CONTROLLERS / "constant.py",)  # controllers that every run needs
 INSTALLED = {"site-packages", "dist-packages"}
 
 
 def _digest(paths, key=""):
-    """Return the hash of files in order, Python's by their code, others by their bytes, and of a key."""
+    """Return the hash of ordered files (of Python files: their code, of others: their bytes) and of a key."""
     digest = hashlib.sha256(key.encode())
     for path in map(Path, paths):
         digest.update(read_source(path).code.encode() if path.suffix == ".py" else path.read_bytes())
@@ -31,7 +31,7 @@ def _digest(paths, key=""):
 
 
 def plant_files():
-    """Return the files that shape a run, in order: sources that it imports and data, not the controllers'."""
+    """Return the files that affect a run, in order: imported sources and data, without the controllers."""
 
     def inside(path):
         return _package_of(path) in ("simulator", "training") or path in ALWAYS
@@ -40,23 +40,23 @@ def plant_files():
 
 
 def plant_code():
-    """Return the hash of all sources and data that shape a run, but for the controllers."""
+    """Return the hash of all sources and data that affect a run, without the controllers."""
     return _digest(plant_files())
 
 
 def _data(folder):
-    """Return the files beneath a folder that are no sources."""
-    found = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".py")
-    return [path for path in found if "__pycache__" not in path.parts]
+    """Return the files below a folder that are not Python sources."""
+    paths = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".py")
+    return [path for path in paths if "__pycache__" not in path.parts]
 
 
 def controller_code(controller):
-    """Return {"name", "code"}: what a controller is called, and a hash of the files that define it.
+    """Return {"name", "code"}: the name of a controller, and a hash of the files that define it.
 
-    A name of CONTROLLERS: its module, what it imports of this project, and the data of the package
-    controllers; "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an
-    object: the file that it comes from, and what that imports from its own folder and this project; of an
-    object with a content_key (a text) that too, as where its file only starts another program.
+    A name of CONTROLLERS: its module, imports from this project, and the data of the package controllers;
+    "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an object: its
+    source file, and imports from the same folder and this project. The content_key (a text) of an object is
+    hashed, too, e.g. of one whose file only starts another program.
     """
     from fowt_env.controllers import CONTROLLERS
     from fowt_env.controllers.design import saved_files
@@ -73,7 +73,7 @@ def controller_code(controller):
         files = _package_files(CONTROLLERS.get(controller))
     elif controller.startswith(saved_files.DESIGN_PREFIX):
         files = [controller.removeprefix(saved_files.DESIGN_PREFIX), *_package_files(saved_files.load_design)]
-    elif controller.startswith(POLICY_PREFIX):  # its baseline may be any controller
+    elif controller.startswith(POLICY_PREFIX):  # the policy's baseline may be any controller
         files = [policy_path(controller.removeprefix(POLICY_PREFIX)), *_package_files(None)]
     else:
         files = _user_files(controller.partition(":")[0])
@@ -81,17 +81,17 @@ def controller_code(controller):
 
 
 def _package_files(factory):
-    """Return the files that a factory of our controllers depends on; those of all for any other."""
+    """Return the files on which a built-in controller factory depends; of all controllers for any other."""
     start = getattr(factory, "__module__", None) or ""
     if start.startswith("fowt_env.controllers."):
         starts = [module_path(start).with_suffix(".py")]
     else:
         starts = list(CONTROLLERS.rglob("*.py"))
-    return [*_with_own(starts, [PACKAGE.parent]), *sorted(_data(CONTROLLERS))]
+    return [*_with_imports(starts, [PACKAGE.parent]), *sorted(_data(CONTROLLERS))]
 
 
 def _user_files(module):
-    """Return the files that a user's module depends on: of its project, and what they import of this one."""
+    """Return the files on which a user's module depends: in its project, and their imports from this one."""
     file = _module_file(module)
     if file is None:
         return []
@@ -100,14 +100,14 @@ def _user_files(module):
     top = folder / module.partition(".")[0]
 
     def inside(path):
-        own = path.is_relative_to(folder) and _package_of(path) is None
-        return path == file or own and (path.is_relative_to(top) or not INSTALLED & set(path.parts))
+        in_project = path.is_relative_to(folder) and _package_of(path) is None
+        return path == file or in_project and (path.is_relative_to(top) or not INSTALLED & set(path.parts))
 
-    return _with_own(imported_files([file], [folder], inside), [folder, PACKAGE.parent])
+    return _with_imports(imported_files([file], [folder], inside), [folder, PACKAGE.parent])
 
 
 def _module_file(name):
-    """Return the file of a module, which is imported for it; None where there is none."""
+    """Return the file of a module, after importing the module; None if there is no file."""
     if name not in sys.modules:
         sys.path.insert(0, "")
         try:
@@ -120,9 +120,9 @@ def _module_file(name):
     return None if file is None else _located(Path(file))
 
 
-def _with_own(files, roots):
-    """Return the files, and what they import of this project's controllers, and with those of fowt_env."""
-    files, registry = set(files), CONTROLLERS / "__init__.py"  # which imports every controller
+def _with_imports(files, roots):
+    """Return the files with their imports from this project: controllers, then the simulator."""
+    files, registry = set(files), CONTROLLERS / "__init__.py"  # imports every controller
     for package in ("controllers", "simulator"):
 
         def inside(path, known=frozenset(files), package=package):
@@ -133,36 +133,36 @@ def _with_own(files, roots):
 
 
 def _located(path):
-    """Return a file's one path: of this package as it is imported, which may be by a link; else resolved."""
+    """Return the unique path of a file: its import path (may be a link) in this package, else resolved."""
     return path.resolve() if installed_path(path) is None else path
 
 
 def _package_of(path):
-    """Return the part of this project of a file: "controllers", "training", "visual", "simulator" or None.
+    """Return the part of this project with a file: "controllers", "training", "visual", "simulator" or None.
 
-    visual draws what was computed: environments import it, and it shapes no run.
+    visual is separate since environments import it, but plots do not affect a run.
     """
-    place = installed_path(path)
-    if place is None:
+    installed = installed_path(path)
+    if installed is None:
         return None
-    part = place.relative_to(PACKAGE).parts[0]
+    part = installed.relative_to(PACKAGE).parts[0]
     return part if part in ("controllers", "training", "visual") else "simulator"
 
 
 def versions():
-    """Return {package: version} of what shapes the figures, Python and processor included."""
-    found = {"fowt_env": fowt_env.__version__, "python": machine.python_version()}
-    found["machine"] = machine.machine()
+    """Return {package: version} of all that affects results, including Python and the processor type."""
+    result = {"fowt_env": fowt_env.__version__, "python": machine.python_version()}
+    result["machine"] = machine.machine()
     for name in PACKAGES:
         with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+            result[name] = version(name)
+    return result
 
 
 def version_gap(old, new):
-    """Return the first package that shapes figures and differs between two mappings, with both; or None.
+    """Return both versions of the first package that affects results and differs between mappings; or None.
 
-    One that is missing in a mapping shaped no figure there: its controllers failed.
+    A package missing in a mapping affected no result there: controllers that need it failed.
     """
     for name in sorted(set(old) & set(new) - set(NO_FIGURES)):
         if old[name] != new[name]:

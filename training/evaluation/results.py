@@ -1,12 +1,12 @@
-"""The results folder of an evaluation, which can be interrupted and resumed.
+"""Reads and writes the results folder of an evaluation, which can be interrupted and resumed.
 
     manifest.json                              settings: versions, suite, cases, controllers
-    runs/<controller>/<case>_seed<n>.parquet   time series of one run, its row of the table in the metadata
+    runs/<controller>/<case>_seed<n>.parquet   time series of one run, with its table row in the metadata
     results.csv                                one row per run, columns evaluate.COLUMNS
     leaderboard.json                           means, intervals and paired differences (leaderboard.py)
 
-A run is finished when its Parquet file exists, which is written whole or not at all. results.csv and
-leaderboard.json are made from those files, so an interrupted evaluation loses and repeats nothing.
+A run is finished when its Parquet file exists, which is written atomically. results.csv and leaderboard.json
+are made from the Parquet files, so an interrupted evaluation neither loses nor repeats a finished run.
 """
 
 import hashlib
@@ -37,18 +37,18 @@ from fowt_env.training.evaluation.run_case import FAILED, STATUSES
 
 FORMAT = 4  # version of the folder's files
 ROW_KEY = b"fowt_env.row"
-TABLE_EVERY = 2.0  # s between rewritings of results.csv while runs go on
+TABLE_EVERY = 2.0  # s between updates of results.csv during an evaluation
 PLAIN_NAME = re.compile(r"[a-z0-9_][a-z0-9_.-]{0,99}")  # distinct on every file system
 LONGEST_NAME = 500
 
 
 def run_file(folder, label, case, seed):
-    """Return the path of a run's time series; a name that is no plain file name gets a hash."""
+    """Return the path of a run's time series; a name that is not a PLAIN_NAME gets a hash."""
     return Path(folder) / file_name(label) / f"{file_name(case)}_seed{seed}.parquet"
 
 
 def file_name(text):
-    """Return a name itself if it is a PLAIN_NAME, else its readable characters and a hash."""
+    """Return a PLAIN_NAME unchanged, or the readable characters of another name and a hash."""
     if PLAIN_NAME.fullmatch(text):
         return text
     readable = re.sub(r"[^A-Za-z0-9_.-]", "_", text).lstrip(".")[:80]
@@ -56,7 +56,7 @@ def file_name(text):
 
 
 def check_name(what, name):
-    """Return the name of a controller or case. Raises: InputError."""
+    """Return the name of a controller or case. Raises: InputError for an unusable name."""
     if not isinstance(name, str) or not name.strip() or not name.isprintable() or len(name) > LONGEST_NAME:
         shown = printable(name) if isinstance(name, str) else type(name).__name__
         raise InputError(f"{what} {shown!r} must be a printable text of at most {LONGEST_NAME} characters")
@@ -64,7 +64,7 @@ def check_name(what, name):
 
 
 def run_content(frame, row):
-    """Return the Parquet file of a run as bytes: its time series (None: no rows), its row in the metadata."""
+    """Return the Parquet file of a run as bytes: time series (None: no rows), table row in the metadata."""
     if frame is None:
         frame = pd.DataFrame({"Time_[s]": pd.Series(dtype="float64")})
     table = pa.Table.from_pandas(frame, preserve_index=False)
@@ -76,14 +76,14 @@ def run_content(frame, row):
 
 
 def write_run(content, path):
-    """Write the file of a run, of the bytes of `run_content`, whole or not at all; return its path."""
+    """Write the bytes of `run_content` to the file of a run atomically; return its path."""
     with replacing(path) as temporary:
         temporary.write_bytes(content)
     return path
 
 
 class _Row(BaseModel):
-    """The row of a run; its further columns are numbers."""
+    """Defines the row of a run; further columns are numbers."""
 
     model_config = ConfigDict(strict=True, extra="allow")
     __pydantic_extra__: dict[str, float | None]
@@ -97,7 +97,7 @@ class _Row(BaseModel):
 
 
 class _Manifest(BaseModel):
-    """manifest.json, beside its format."""
+    """Defines manifest.json, except for its format."""
 
     model_config = ConfigDict(strict=True)
     fowt_env: str
@@ -112,7 +112,7 @@ class _Manifest(BaseModel):
 
 
 def read_row(path):
-    """Return the row {column: value} of a run's file. Raises: InputError for any other file."""
+    """Return the row {column: value} from a run's file. Raises: InputError for any other file."""
     try:
         metadata = pq.read_schema(path).metadata or {}
         row = parse_json(metadata[ROW_KEY].decode("utf-8"))
@@ -121,8 +121,8 @@ def read_row(path):
         problems = [str(error)]
     if problems:
         raise InputError(
-            f"{str(path)!r} is no run of an evaluation ({printable(problems[0]):.300}); remove it to run it"
-            " again"
+            f"{str(path)!r} is not a run of an evaluation ({printable(problems[0]):.300}); remove it to run"
+            " it again"
         )
     row |= {name: printable(row[name]) for name in ("reason", "warning")}
     return {key: float("nan") if value is None else value for key, value in row.items()}
@@ -134,7 +134,7 @@ def _json(value, **options):
 
 
 def finite(value):
-    """Return a value of mappings, sequences and numbers with None for NaN and infinity."""
+    """Return nested mappings and sequences with None for NaN and infinity."""
     if isinstance(value, dict):
         return {key: finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -145,22 +145,22 @@ def finite(value):
 
 
 def write_json(value, path):
-    """Write JSON, whole or not at all; return the path."""
+    """Write a JSON file atomically; return the path."""
     with replacing(path) as temporary:
         Path(temporary).write_text(_json(value, indent=1) + "\n", encoding="utf-8")
     return path
 
 
 class ResultsFolder:
-    """The locked folder of an evaluation, with the rows of its runs.
+    """Represents the locked folder of an evaluation, with the rows of its runs.
 
     settings: {"suite", "options", "cases" {name: description}, "seeds", "controllers" {label: code}}.
-    Controllers, cases and seeds may be added to a folder; any other setting must not change.
+    Controllers, cases and seeds may be added to a folder; no other setting may change.
     again: keys (controller, case, seed) of runs to repeat if they failed.
     """
 
     def __init__(self, folder, settings, columns, again):
-        self.name = Path(folder)  # for messages
+        self.name = Path(folder)  # used in messages
         self.folder = self.name.absolute()  # a controller may change the working folder
         self.columns = list(columns)
         self.rows = {}  # (controller, case, seed) -> row
@@ -168,8 +168,8 @@ class ResultsFolder:
         fixed = {"fowt_env": fowt_env.__version__, "plant": provenance.plant_code()}
         fixed |= {key: settings[key] for key in ("suite", "options")}
         old = self._manifest()
-        for place in (self.folder, *self.folder.glob("runs/*/")):
-            remove_leftovers(place)
+        for folder in (self.folder, *self.folder.glob("runs/*/")):
+            remove_leftovers(folder)
         for path in sorted(self.folder.glob("runs/*/[!.]*.parquet")):
             row = read_row(path)
             key = row["controller"], row["case"], row["seed"]
@@ -202,9 +202,9 @@ class ResultsFolder:
             old = parse_json(path.read_text(encoding="utf-8"))
         except ValueError:
             raise self._refused("has a manifest.json that is not valid JSON") from None
-        found = old.get("format") if isinstance(old, dict) else None
-        if found != FORMAT:
-            raise self._refused(f"has format {found}, not {FORMAT}")
+        version = old.get("format") if isinstance(old, dict) else None
+        if version != FORMAT:
+            raise self._refused(f"has format {version}, not {FORMAT}")
         if problems := validate(_Manifest, old)[1]:
             raise self._refused(f"has a manifest.json that cannot be used ({problems[0]})")
         return old
@@ -212,11 +212,11 @@ class ResultsFolder:
     def _compare(self, old, fixed, settings):
         """Compare the settings with those of the manifest. Raises: InputError if they do not match."""
         if old["fowt_env"] != fixed["fowt_env"]:
-            raise self._refused(f"was made by fowt_env {old['fowt_env']}, this is {fixed['fowt_env']}")
+            raise self._refused(f"was made by fowt_env {old['fowt_env']}, not {fixed['fowt_env']}")
         if old["plant"] != fixed["plant"]:
-            raise self._refused("was made by another state of this package's sources")
+            raise self._refused("was made with other sources of this package")
         if gap := provenance.version_gap(old["versions"], provenance.versions()):
-            raise self._refused(f"was made with {gap[0]}, this is {gap[1]}")
+            raise self._refused(f"was made with {gap[0]}, not {gap[1]}")
         now = json.loads(_json(settings))
         for key in ("suite", "options"):
             if old[key] != now[key]:
@@ -231,11 +231,11 @@ class ResultsFolder:
         for label, code in now["controllers"].items():
             done = {row["status"] for key, row in self.rows.items() if key[0] == label}
             if old["controllers"].get(label, code) != code and done:
-                place = run_file(self.name / "runs", label, "", 0).parent
+                runs = run_file(self.name / "runs", label, "", 0).parent
                 failed = ", or use --retry-failed" if done == {FAILED} else ""
                 raise InputError(
                     f"results folder {str(self.name)!r}: controller {label!r} or its code has changed since"
-                    f" its runs there; remove {str(place)!r} to run them again, or choose another"
+                    f" its runs there; remove {str(runs)!r} to run them again, or choose another"
                     f" folder{failed}"
                 )
 
@@ -245,7 +245,7 @@ class ResultsFolder:
         )
 
     def add(self, row):
-        """Add the row of a run whose file has been written."""
+        """Add the row of a run after its file has been written."""
         self.rows[row["controller"], row["case"], row["seed"]] = row
         if time.monotonic() - self.written > TABLE_EVERY:
             self.write()
@@ -253,9 +253,9 @@ class ResultsFolder:
     def table(self):
         """Return a DataFrame of all runs, by case, seed and controller in the manifest's order."""
         table = pd.DataFrame(list(self.rows.values()), columns=self.columns)
-        order = table[["seed"]].assign(  # names that the manifest lacks stand last
+        order = table[["seed"]].assign(  # names missing in the manifest come last
             **{
-                key: table[key].map({name: place for place, name in enumerate(self.manifest[f"{key}s"])})
+                key: table[key].map({name: index for index, name in enumerate(self.manifest[f"{key}s"])})
                 for key in ("case", "controller")
             }
         )

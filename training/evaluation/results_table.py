@@ -1,4 +1,4 @@
-"""Reading the table of an evaluation, with its checks, for reports and scores."""
+"""Reads and checks the table of an evaluation, for reports and scores."""
 
 from pathlib import Path
 
@@ -8,21 +8,21 @@ import pandas as pd
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.run_case import PARKED, REFERENCE
 
-KEY = ["controller", "case", "seed"]  # of a run
-WORDS = ["status", "reason", "events", "warning"]  # columns of text beside those of KEY
-WEIGHT = "weight_[-]"  # share of a run's case in the lifetime; NaN, or no such column: every case alike
-TABLES = ("results.csv", "metrics.csv")  # of a folder: the first that exists
+KEY = ["controller", "case", "seed"]  # identify a run
+WORDS = ["status", "reason", "events", "warning"]  # columns of text in addition to KEY
+WEIGHT = "weight_[-]"  # fraction of the lifetime spent in a run's case; NaN, or no such column: equal weights
+TABLES = ("results.csv", "metrics.csv")  # files of a results folder: the first that exists is read
 
 
 def read_results(paths, needed=(), cases=None, parked=True):
     """Return a DataFrame of the runs of fowt evaluate: controller, case, status, reason, seed, metrics.
 
     paths    a results folder or CSV file, or a sequence of them, whose runs are joined
-    needed   columns of metrics that each of them must have
+    needed   columns of metrics that every table must have
     cases    names of the cases to keep; None: all
-    parked   whether the runs of parked turbines are kept, which have no controller
-    A missing or infinite metric is NaN; other columns of text are left out. A run in several tables counts
-    once. The runs of the reference are left out.
+    parked   whether to keep the runs of parked turbines, which have no controller
+    A missing or infinite metric is NaN; other columns of text and the runs of the reference are omitted. A
+    run in several tables counts once.
     Raises: InputError for any other table, for an unknown case, and if two tables have different metrics of
     the same run.
     """
@@ -34,7 +34,7 @@ def read_results(paths, needed=(), cases=None, parked=True):
     twice = table[table.duplicated(KEY)]
     if len(twice):
         name, case, seed = twice.iloc[0][KEY]
-        raise InputError(f"results: {name} on {case}, seed {seed}, is there twice with different metrics")
+        raise InputError(f"results: {name} on {case}, seed {seed}, occurs twice with different metrics")
     table = table[table["controller"] != REFERENCE]
     if not parked:
         table = table[table["controller"] != PARKED]
@@ -47,11 +47,11 @@ def read_results(paths, needed=(), cases=None, parked=True):
 
 
 def case_shares(table, cases):
-    """Return the shares (cases,) of the lifetime, with sum 1; equal if the table has no weights."""
+    """Return the fraction (cases,) of the lifetime per case, sum 1; equal if the table has no weights."""
     if WEIGHT not in table or not np.isfinite(table[WEIGHT].to_numpy(dtype=np.float64)).all():
         return np.full(len(cases), 1.0 / max(1, len(cases)))
-    share = table.groupby("case")[WEIGHT].first().reindex(cases).to_numpy(dtype=np.float64)
-    return share / share.sum() if share.sum() > 0.0 else np.full(len(cases), 1.0 / len(cases))
+    weights = table.groupby("case")[WEIGHT].first().reindex(cases).to_numpy(dtype=np.float64)
+    return weights / weights.sum() if weights.sum() > 0.0 else np.full(len(cases), 1.0 / len(cases))
 
 
 def _read_one(path, needed):
@@ -60,8 +60,8 @@ def _read_one(path, needed):
     file = next((file for file in files if file.is_file()), None)
     where = f"table {str(file)!r}"
     if file is None:
-        lack = "contains no results.csv" if path.is_dir() else "is no such file or folder"
-        raise InputError(f"results {str(path)!r} {lack}: make it with fowt evaluate --out FOLDER")
+        lack = "contains no results.csv" if path.is_dir() else "does not exist"
+        raise InputError(f"results {str(path)!r} {lack}: create it with fowt evaluate --out FOLDER")
     try:
         texts = pd.read_csv(file, dtype=str, keep_default_na=False, encoding="utf-8")
     except (ValueError, pd.errors.ParserError) as error:
@@ -80,7 +80,7 @@ def _read_one(path, needed):
     for name in texts.columns.difference([*KEY, *WORDS], sort=False):
         numbers = pd.to_numeric(texts[name].replace("", "nan"), errors="coerce")
         filled = ~texts[name].str.lower().isin(["", "nan"])
-        if numbers.notna().sum() == filled.sum():  # else a column of text
+        if numbers.notna().sum() == filled.sum():  # otherwise a column of text
             columns[name] = numbers.astype(float).replace([np.inf, -np.inf], np.nan)
         elif name in needed:
             raise InputError(f"{where}: column {name} must contain numbers")

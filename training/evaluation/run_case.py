@@ -1,4 +1,4 @@
-"""One run of one controller on one case, to its row. Its imports are the sources that affect a result."""
+"""Runs one controller on one case and returns its row. All sources that affect a result are imported here."""
 
 import warnings
 from dataclasses import dataclass
@@ -31,10 +31,10 @@ from fowt_env.weather.wind import GUSTS
 from fowt_env.weather.wind_field import is_field
 
 STATUSES = OK, TRIPPED, FAILED, LOST_POWER = ("ok", "tripped", "failed", "lost power")
-PARKED = "parked"  # what stands for the controller of a parked turbine
+PARKED = "parked"  # name in place of the controller of a parked turbine
 REFERENCE = "reference"  # name of the runs of the suite's baseline without trip and protection
-CONTROL_DT = 0.1  # s, simulate's own
-SHORTEST_CASE_WEATHER = 700.0  # s of wind and waves: shorter runs see the start of the same realisation
+CONTROL_DT = 0.1  # s, default of simulate
+SHORTEST_CASE_WEATHER = 700.0  # s of wind and waves: shorter runs use the start of the same realisation
 COLUMNS = (
     *("controller", "case", "seed", "status", "reason", "events", "warning"),
     *("stopped_[s]", "scored_[s]", "weight_[-]"),
@@ -44,7 +44,7 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Run:
-    """One controller on one realisation of one case."""
+    """Defines a run: one controller on one realisation of one case."""
 
     label: str
     controller: object  # name or object, as simulate takes it
@@ -53,20 +53,20 @@ class Run:
     duration: float
     skip: float
     options: dict  # further options of simulate
-    frame_path: Path | None  # where the time series goes
+    frame_path: Path | None  # file for the time series
     time_limit: float | None = None  # s of wall clock
-    weight: float = float("nan")  # share of the case in the lifetime; NaN: every case alike
+    weight: float = float("nan")  # fraction of the lifetime spent in the case; NaN: equal weights
 
     @property
     def key(self):
-        """Key of the run within its evaluation."""
+        """Return the key of the run within its evaluation."""
         return self.label, self.case.name, self.seed
 
 
 def scored(run):
-    """Return (row, time series or None) of one run; a failed one has its reason instead of metrics.
+    """Return (row, time series or None) of one run; a failed run has a reason instead of metrics.
 
-    A run that the turbine's protection ended has its metrics until then, the time, and the reason.
+    If the turbine's protection ends the run, the row has the metrics until then, the time and the reason.
     Raises: InputError for settings that no controller could use.
     """
     case = run.case
@@ -93,7 +93,7 @@ def scored(run):
             point = trim(scene)
             initial = {name: point[name] + change for name, change in case.displaced.items()}
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", PlantWarning)  # in the row's events and warning
+            warnings.simplefilter("ignore", PlantWarning)  # reported in the row's events and warning
             frame = fowt_env.simulate(
                 scene,
                 controller=run_controller(run, nominal),
@@ -109,30 +109,30 @@ def scored(run):
     # an error of the controller fails this run, not the evaluation
     outcome, error = attempt(work, run.time_limit)
     if error is None:
-        frame, figures = outcome
+        frame, values = outcome
         ended = frame.attrs["tripped"]
         if ended is None:
-            return _row(run, OK, frame) | figures, frame
-        # a trip after a fault that ends operation follows from the case, not from the controller
+            return _row(run, OK, frame) | values, frame
+        # a trip after a fault that ends operation is due to the case, not to the controller
         fault = case.fault
         expected = fault is not None and fault.ends_operation and ended >= fault.time - 1e-9
         reason = _trip_reason(frame.attrs["trip"], ended, case, nominal.turbine)
         about = {"reason": reason, "stopped_[s]": ended}
-        return _row(run, OK if expected else TRIPPED, frame) | figures | about, frame
+        return _row(run, OK if expected else TRIPPED, frame) | values | about, frame
     if isinstance(error, InputError) and not isinstance(error, ControllerInputError):
-        raise error  # the run's settings
+        raise error  # wrong settings of the run
     frame, stopped = _end(error)
     return _row(run, FAILED, frame) | {"reason": reason_of(error), "stopped_[s]": stopped}, frame
 
 
 def faults_of(case):
-    """Return the faults of a Case, among them the grid that a parked turbine is not connected to."""
+    """Return the faults of a Case; a parked turbine is disconnected from the grid."""
     parked = (Fault(kind="grid_loss", time=0.0),) if case.parked else ()
     return parked if case.fault is None else (case.fault, *parked)
 
 
 def protection_of(case, turbine, protected, ends):
-    """Return the protection of a run of a Case: its trips, or none; without any, `ends`: at the overspeed."""
+    """Return the protection of a run of a Case. Without trips: None, or END_AT_OVERSPEED if `ends`."""
     if not protected or (case.trip is None and case.protection is None):
         return END_AT_OVERSPEED if ends else None
     limits = read_protection(case.protection, turbine.protection)
@@ -142,7 +142,7 @@ def protection_of(case, turbine, protected, ends):
 
 
 def lost_row(run, reason):
-    """Return the row of a failed run whose process ended without one."""
+    """Return the row of a failed run whose process ended without a result."""
     return _row(run, FAILED, None) | {"reason": reason}
 
 
@@ -179,11 +179,11 @@ def _end(error):
     return frame, float(stopped)
 
 
-TRIPS = {  # reason of each, with its limit
+TRIPS = {  # reason of each trip, with its limit
     "overspeed": "rotor speed above {:g} of rated",
     "overpower": "generator power above {:g} of rated",
     "acceleration": "tower-top acceleration above {:g} m/s2",
-    "pitch_deviation": "a blade pitch off its command by more than {:.3g} deg",
+    "pitch_deviation": "a blade pitch more than {:.3g} deg from its command",
 }
 
 
@@ -198,10 +198,10 @@ def _trip_reason(trip, time, case, turbine):
 
 
 def run_controller(run, nominal):
-    """Return the controller of a run for simulate, or that of a parked turbine.
+    """Return the controller of a run for simulate; for a parked turbine, idling with feathered blades.
 
-    nominal: the scene that the controller is prepared for.
-    Raises: ControllerInputError if it cannot be made.
+    nominal: the scene for which the controller is prepared.
+    Raises: ControllerInputError if the controller cannot be created.
     """
     case = run.case
     if case.parked:

@@ -1,14 +1,14 @@
-"""Scaling of a suite to another platform: winds, limits and starts for its turbine.
+"""Scales a suite to another platform: winds, limits and initial conditions for its turbine.
 
-Only suites that name a turbine are scaled; those of a site, a paper or a sea state keep their winds. With the
-same turbine the winds stay, and only settings of the platform change.
+Only suites that name a turbine are scaled; suites of a site, paper or sea state keep their winds. With the
+same turbine the winds are unchanged, and only settings of the platform change.
 
 winds above rated   shifted by the difference of the rated winds in whole m/s, up to cut-out
-rated and cut-out   those of the turbine; other fractional winds are shifted by the exact difference
+rated and cut-out   values of the turbine; other fractional winds are shifted by the exact difference
 winds below rated   the same fraction between cut-in and rated, rounded to m/s
 winds above cut-out unchanged (parked turbines)
-limits              powers by the rated power, torques by the rated torque, rotor speeds by the rated one
-starts              `displaced` from the platform's trim, in place of `initial`
+limits              powers scale with rated power, torques with rated torque, rotor speeds with rated speed
+initial conditions  `displaced` from the platform's trim, instead of `initial`
 """
 
 import re
@@ -21,7 +21,7 @@ from fowt_env.descriptions.sea_state import joint_tables
 from fowt_env.descriptions.turbine import Turbine, read_turbine
 from fowt_env.errors import InputError
 
-FIGURES = {  # prefixes of metrics, and the figure of a turbine that they are scaled by
+FIGURES = {  # prefixes of metrics, and the turbine parameter by which they are scaled
     ("GenPwr", "energy"): lambda t: t.torque_law.rated_power * t.drivetrain.generator_efficiency,
     ("GenTq", "torque_travel", "RotTorq"): lambda t: t.torque_law.rated_torque,
     ("RotSpeed",): lambda t: t.rated_rotor_speed,
@@ -30,14 +30,14 @@ FIGURES = {  # prefixes of metrics, and the figure of a turbine that they are sc
 
 @dataclass(frozen=True)
 class Scaling:
-    """Scaling from the turbine of a suite to another."""
+    """Scales winds and limits from the turbine of a suite to another turbine."""
 
     old: Turbine
     new: Turbine
 
     @property
     def shift(self):
-        """Shift of winds above rated, in whole m/s."""
+        """Return the shift of winds above rated, in whole m/s."""
         old, new = self.old.rated_wind_speed, self.new.rated_wind_speed
         moved = round(new - old)
         return moved + 1 if ceil(old) + moved <= new else moved
@@ -48,18 +48,18 @@ class Scaling:
         winds = [(t.cut_in_wind_speed, t.rated_wind_speed, t.cut_out_wind_speed) for t in (old, new)]
         if winds[0] == winds[1] or speed > old.cut_out_wind_speed:
             return speed
-        for was, now in zip(*winds, strict=True):
-            if speed == was:
-                return now
+        for old_wind, new_wind in zip(*winds, strict=True):
+            if speed == old_wind:
+                return new_wind
         difference = new.rated_wind_speed - old.rated_wind_speed
         if not float(speed).is_integer():
             moved = round(speed + difference, 2)
         elif speed > old.rated_wind_speed:
             moved = float(speed + self.shift)
         else:
-            share = (speed - old.cut_in_wind_speed) / (old.rated_wind_speed - old.cut_in_wind_speed)
+            fraction = (speed - old.cut_in_wind_speed) / (old.rated_wind_speed - old.cut_in_wind_speed)
             below = new.rated_wind_speed - new.cut_in_wind_speed
-            moved = float(round(new.cut_in_wind_speed + share * below))
+            moved = float(round(new.cut_in_wind_speed + fraction * below))
         return min(max(moved, new.cut_in_wind_speed), new.cut_out_wind_speed)
 
     def limit(self, metric, value):
@@ -82,17 +82,17 @@ class Scaling:
         elif isinstance(entry.wind, dict) and is_number(before := entry.wind.get("speed")):
             after = self.wind(before)
             changes["wind"] = entry.wind | {"speed": after}
-            # a name that ends with its wind speed
+            # a name that ends with the wind speed
             changes["name"] = re.sub(rf"_{before:g}$", f"_{after:g}".replace(".", "_"), entry.name)
         if entry.initial is not None:
             if entry.displaced is None:
-                raise InputError(f"case {entry.name!r}: initial: is that of another platform; use displaced")
+                raise InputError(f"case {entry.name!r}: initial: applies to another platform; use displaced")
             changes["initial"] = None
         return entry.model_copy(update=changes)
 
 
 def within_table(table, speed):
-    """Return the wind speed (m/s), limited to a table of joint sea states."""
+    """Return the wind speed (m/s), limited to the range of a table of joint sea states."""
     winds = joint_tables()[table].wind if table in joint_tables() else (speed,)
     return float(min(max(speed, winds[0]), winds[-1]))
 

@@ -1,8 +1,8 @@
-"""Disjoint ranges of weather seeds for training, validation and test.
+"""Defines disjoint ranges of weather seeds for training, validation and test.
 
 A realisation of wind and waves is fixed by its weather seed (build_scene's seed).
 
-Seeds listed in a suite are for development: their weather can be rebuilt, and a controller can recognise it.
+Seeds listed in a suite are for development: a controller can recognise their weather, which is reproducible.
 A published comparison needs seeds drawn from a hash that was unknown while the controllers were tuned
 (with_drawn_seeds), or secret ones (new_secret_seeds).
 """
@@ -19,8 +19,8 @@ TEST = range(0, 1000)  # published scores, with the suites' seeds 1, 2, ...
 VALIDATION = range(1000, 100_000)  # choices between agents, and between gains of the baselines
 TRAINING = range(100_000, LARGEST_SEED)  # episodes of the training of agents
 
-DRAWN = range(2**62, 2**63)  # seeds drawn from a hash and secret seeds: too many for a search
-LEAST_SECRET = 2**40  # smaller seeds are found by a search
+DRAWN = range(2**62, 2**63)  # seeds drawn from a hash and secret seeds: too many to try all
+LEAST_SECRET = 2**40  # smaller seeds can be found by trying all
 DRAWING_RULE = "2**62 + (first 8 bytes of SHA-256 of 'HASH/SUITE/VERSION/i', big-endian) // 4, i = 0, 1, ..."
 HASH = re.compile("[0-9a-f]{40,128}")
 
@@ -28,7 +28,7 @@ PURPOSES = {"test": TEST, "validation": VALIDATION, "training": TRAINING}
 
 
 def seeds_for(purpose, first, count):
-    """Return count seeds of a purpose, from index first on. Raises: InputError outside its range."""
+    """Return count seeds of a purpose, starting at index first. Raises: InputError outside its range."""
     allowed = PURPOSES[purpose]
     if first < 0 or count < 1 or first + count > len(allowed):
         raise InputError(
@@ -42,7 +42,7 @@ def drawn_seeds(source, suite, version, count):
 
     source: 40 to 128 hexadecimal digits that were unknown while controllers were tuned, such as the commit
     that fixes them and the suite. suite, version: name and version of the suite.
-    Raises: InputError for another source.
+    Raises: InputError for any other source.
     """
     text = str(source).lower()
     if not HASH.fullmatch(text):
@@ -55,10 +55,10 @@ def drawn_seeds(source, suite, version, count):
 
 
 def with_drawn_seeds(suite, source):
-    """Return the Suite with drawn_seeds in place of its listed ones, as many for each case.
+    """Return the Suite with drawn_seeds instead of its listed seeds, as many for each case.
 
-    Its `drawn` is {"hash", "rule"}, for the manifest of a results folder.
-    Raises: InputError for a source that is no hash.
+    The new Suite's `drawn` is {"hash", "rule"}, for the manifest of a results folder.
+    Raises: InputError for a source that is not a hash.
     """
     most = max(len(seeds) for seeds in (suite.seeds, *(case.seeds or () for case in suite.cases)))
     drawn = drawn_seeds(source, suite.name, suite.version, most)
@@ -67,7 +67,7 @@ def with_drawn_seeds(suite, source):
 
 
 def reseeded(suite, seeds):
-    """Return the Suite with other seeds, of which a case with seeds of its own gets as many as it has."""
+    """Return the Suite with other seeds; the number of seeds of each case is unchanged."""
     cases = (replace(case, seeds=case.seeds and seeds[: len(case.seeds)]) for case in suite.cases)
     return replace(suite, seeds=seeds, cases=tuple(cases))
 
@@ -79,10 +79,10 @@ def new_secret_seeds(count):
 
 def ranges(seeds):
     """Return [(first, last)] of the contiguous ranges of sorted seeds."""
-    found = []
+    limits = []
     for seed in seeds:
-        if found and seed == found[-1][1] + 1:
-            found[-1] = found[-1][0], seed
+        if limits and seed == limits[-1][1] + 1:
+            limits[-1] = limits[-1][0], seed
         else:
-            found.append((seed, seed))
-    return found
+            limits.append((seed, seed))
+    return limits

@@ -1,4 +1,4 @@
-"""Cache of full-field wind boxes, which take far longer to generate than a run."""
+"""Caches full-field wind boxes, which take far longer to generate than a run."""
 
 import hashlib
 import json
@@ -11,12 +11,12 @@ from fowt_env.files.atomic import replacing
 from fowt_env.folders import cache_root, distrust, make_private
 from fowt_env.weather.wind_field import WindBox, read_box
 
-FORMAT = 1  # of the files; increased when read_box makes different boxes of a specification
+FORMAT = 1  # of the files; increased when read_box generates different boxes
 ARRAYS, NUMBERS = ("velocity", "y", "z"), ("dt", "speed", "periodic", "shift")
 
 
 def cached_box(spec, platform, seed, options):
-    """Return the WindBox of a specification for a platform's turbine, from the user's cache if it is there.
+    """Return the WindBox of a specification for a platform's turbine, from the user's cache if available.
 
     Only generated boxes (kind "mann") are cached; files and arrays are read directly.
     """
@@ -38,7 +38,7 @@ def cached_box(spec, platform, seed, options):
     text = json.dumps([FORMAT, spec, arguments], sort_keys=True)
     name = hashlib.sha256(text.encode()).hexdigest()[:24]
     path = folder / f"{name}.npz"
-    # a broken file can raise anything: the box is then generated again
+    # a damaged file can raise any exception: the box is then generated again
     with suppress(Exception), path.open("rb") as content, np.load(content, allow_pickle=False) as file:
         values = {key: file[key] for key in ARRAYS}
         return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
@@ -49,7 +49,7 @@ def cached_box(spec, platform, seed, options):
 
 
 def _folder():
-    """Return the folder of the boxes, beside that of the kernels; None if the user has no private one."""
+    """Return the folder of the boxes, next to that of the kernels; None without a private cache folder."""
     root = cache_root()
     if root is not None:
         with suppress(OSError):

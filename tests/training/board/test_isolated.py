@@ -72,7 +72,7 @@ def test_commands_are_those_of_the_same_controller_here(tmp_path):
     ("body", "words"),
     [
         ("raise ValueError('4611686018427387905')", r"act\(\) raised ValueError$"),
-        ("raise type('Seed_4611', (Exception,), {})()", "raised an exception of its own$"),
+        ("raise type('Seed_4611', (Exception,), {})()", "raised a custom exception$"),
         ("import os; os._exit(3)", "its process ended in act"),
         ("import time; time.sleep(60)", "act.. took longer than 3 s"),
         pytest.param("raise SystemExit(0)", "raised SystemExit", marks=pytest.mark.slow),

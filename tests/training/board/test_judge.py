@@ -184,10 +184,10 @@ def test_figures_that_are_not_those_of_the_series_are_refused(board, judged):
     shown["RotSpeed_[rpm]"] *= 1.001
     try:
         write_run(run_content(shown, row), path)
-        with pytest.raises(InputError, match="from its series"):
+        with pytest.raises(InputError, match="from the time series"):
             check_figures(table, folder, board.suite("short"))
         left = judge(board, trust_code=True)
-        assert "from its series" in left.left_out["mine, short"]
+        assert "from the time series" in left.left_out["mine, short"]
         assert set(left.public["short"]["controller"]) == {"reference", "gspi_oc3"}
     finally:
         shown["RotSpeed_[rpm]"] /= 1.001
@@ -256,7 +256,7 @@ def test_seeds_drawn_from_a_hash_replace_those_that_are_listed(first, tmp_path):
     manifest = folder / "runs" / f"short-v3-exact-{HASH[:12]}" / "manifest.json"
     assert json.loads(manifest.read_text())["suite"]["drawn"]["hash"] == HASH
     text = write_board(judged)[0].read_text()
-    assert f"1 public seeds of each suite, drawn from <code>{HASH}</code>" in text
+    assert f"1 public seeds per suite, drawn from <code>{HASH}</code>" in text
 
 
 # ---------------------------------------------------------------- one that is not sound, and the others
@@ -278,7 +278,7 @@ def test_what_cannot_be_run_is_left_out_and_named(first, tmp_path):
     )
     judged = judge(Board(folder), trust_code=True)
     assert set(judged.left_out) == {"copied", "gspi-oc3", "renamed", "deaf, short"}
-    assert "no card.toml" in judged.left_out["copied"] and "nearly the name" in judged.left_out["gspi-oc3"]
+    assert "no card.toml" in judged.left_out["copied"] and "only in '_'" in judged.left_out["gspi-oc3"]
     assert "'other'" in judged.left_out["renamed"] and "wave_elevation" in judged.left_out["deaf, short"]
 
 

@@ -48,11 +48,11 @@ def test_a_sound_card_is_read_and_nothing_is_run(tmp_path):
         ({"controller": "mine.py:a b"}, "must be FILE.py:Name"),
         ({"controller": "gspi"}, "unknown controller 'gspi'. Did you mean"),
         ({"controller": "mine.npz"}, "no such file"),
-        ({"controller": "lqr"}, "information: is read from a built-in itself"),
+        ({"controller": "lqr"}, "information: must be omitted for a built-in"),
         ({"information": None}, "information is missing"),
         ({"information": ["wind"]}, "unknown input 'wind'"),
         ({"information": ["wind_preview"]}, "preview_times = ..: must be set if and only if"),
-        ({"information": ["wind_preview"], "preview_times": [2.0, 1.0]}, "must rise"),
+        ({"information": ["wind_preview"], "preview_times": [2.0, 1.0]}, "must increase"),
         ({"name": "parked"}, "name = 'parked': is reserved"),
         ({"preview": "../../../../escaped"}, "unknown preview '../../../../escaped'"),
         (FAR | {"preview_times": [0.5 * i for i in range(1, 102)]}, "at most 100 times of at most 60 s"),
@@ -85,7 +85,7 @@ def test_a_new_board_holds_the_package_s_controllers_and_frozen_suites(tmp_path)
     text = tmp_path / "board" / "suites" / "above_rated.toml"
     text.write_text(text.read_text().replace("duration = 800.0", "duration = 700.0"))
     assert board.suite("above_rated").duration == 700.0
-    with pytest.raises(InputError, match="is there already"):
+    with pytest.raises(InputError, match="exists already"):
         new_board(tmp_path / "board")
 
 
@@ -93,7 +93,7 @@ def test_added_submissions_are_kept_and_never_replaced(tmp_path):
     board = new_board(tmp_path / "board")
     assert board.add(write(tmp_path / "a")) == "mine"
     assert board.add(tmp_path / "a") == "mine"
-    with pytest.raises(InputError, match="a different one of this name"):
+    with pytest.raises(InputError, match="another submission of this name"):
         board.add(write(tmp_path / "b", source="x = 1"))
     kept = tmp_path / "board" / "submissions" / "mine" / "mine.py"
     assert "was run" in kept.read_text()
@@ -160,7 +160,7 @@ def test_a_file_of_secret_seeds_is_new_private_and_salted(tmp_path, monkeypatch)
     assert read_seeds(other)[0] == seeds and read_seeds(other)[1] != digest
     with pytest.raises(InputError, match="cannot be written: File exists"):
         write_secret_seeds(one, 6)
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="does not exist"):
         read_seeds(tmp_path / "none.txt")
     monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(one.read_bytes())))
     assert read_seeds("-") == (seeds, digest)

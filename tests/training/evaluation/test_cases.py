@@ -107,7 +107,7 @@ WIND = "wind = 16.0"
     ("text", "messages"),
     [
         ("", ["case is missing"]),
-        (f'[[case]]\nname = "a"\n{WIND}\n[[case]]\nname = "a"\n{WIND}', ["'a': named twice"]),
+        (f'[[case]]\nname = "a"\n{WIND}\n[[case]]\nname = "a"\n{WIND}', ["'a': defined twice"]),
         (f'[[case]]\nnam = "a"\n{WIND}', ["nam: unknown key. Did you mean 'name'?", "name is missing"]),
         ('[[case]]\nname = "a"\nwind = {kind = "ntn", speed = 12}', ["case.1 (a)", "'ntm'"]),
         ('[[case]]\nname = "a"\nwind = {kind = "ntm"}', ["wind.speed is missing"]),
@@ -119,7 +119,7 @@ WIND = "wind = 16.0"
         (f'[[case]]\nname = "a"\n{WIND}\nskip = 200.0', ["skip = 200", "below duration = 100"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_los", time = 50}}', ["'grid_loss'"]),
         (f'[[case]]\nname = "a"\n{WIND}\nfault = {{kind = "grid_loss", time = 500}}', ["fault.time = 500"]),
-        ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not fit"]),
+        ('[[case]]\nname = "a"\nwind = {kind = "mann", speed = 12}', ["does not match"]),
         ('[[case]]\nname = "a"\nparked = true\nfault = {kind = "stuck_pitch", time = 5}', ["parked:"]),
         (f'[[case]]\nname = "a"\n{WIND}\nplatform = "oc3_hywnd"', ["oc3_hywind"]),
         (f'[[case]]\nname = "a"\n{WIND}\nsensors = "standart"', ["standart", "standard"]),

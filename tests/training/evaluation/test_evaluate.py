@@ -209,7 +209,7 @@ def test_the_reference_of_a_suite_runs_to_its_end_where_its_law_as_an_entry_trip
         "pi_land", suite, folder=tmp_path, progress=lambda done, total, row: done < total and 1 / 0
     )
     pd.testing.assert_frame_equal(again, table)
-    with pytest.raises(InputError, match="'reference' is that of the suite's reference"):
+    with pytest.raises(InputError, match="'reference' is reserved for the suite's reference"):
         evaluate({"reference": "pi"}, [CALM], **SHORT)
 
 
@@ -239,13 +239,13 @@ def test_named_suites_hold_their_cases_once():
         ({"cases": "above_ratted"}, "above_rated"),
         ({"controllers": ["pie"]}, "'pi'"),
         ({"controllers": []}, "controllers"),
-        ({"cases": []}, "none were named|at least one"),
+        ({"cases": []}, "at least one"),
         ({"seeds": ()}, "seeds"),
         ({"seeds": (1, 1)}, "differ"),
         ({"cases": [CALM, CALM]}, "differ"),
         ({"jobs": 0}, "jobs = 0"),
         ({"duration": 10.0, "skip": 10.0}, "skip = 10"),
-        ({"cases": [Case("late", 16.0, fault=Fault(kind="grid_loss", time=100.0))]}, "comes at 100 s"),
+        ({"cases": [Case("late", 16.0, fault=Fault(kind="grid_loss", time=100.0))]}, "occurs at 100 s"),
         ({"out": "table.xlsx"}, "csv"),
         ({"dt": 0.03}, "dt = 0.03"),
         ({"cases": [Case("squall", {"kind": "squall", "speed": 12.0})]}, "squall"),

@@ -80,5 +80,5 @@ def test_the_reason_names_the_trip_and_its_limit():
     at = row["stopped_[s]"]
     assert (
         row["reason"]
-        == f"pitch deviation trip at {at:.1f} s: a blade pitch off its command by more than 4 deg"
+        == f"pitch deviation trip at {at:.1f} s: a blade pitch more than 4 deg from its command"
     )

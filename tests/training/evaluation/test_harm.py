@@ -237,7 +237,7 @@ def written_row(tmp_path, **changes):
 )  # fmt: skip
 def test_a_row_with_a_wrong_type_is_refused_by_its_files_name(tmp_path, changes):
     path = written_row(tmp_path, **changes)
-    with pytest.raises(InputError, match=r"calm_seed1.parquet' is no run of an evaluation \(.*remove it"):
+    with pytest.raises(InputError, match=r"calm_seed1.parquet' is not a run of an evaluation \(.*remove it"):
         read_row(path)
 
 
@@ -265,7 +265,7 @@ def test_a_folder_and_a_ray_worker_of_other_versions_are_refused_with_both_of_th
     assert manifest["versions"] == versions
     path.write_text(json.dumps(manifest | {"versions": other}))
     here = re.escape(f"{package} {versions[package]}")
-    with pytest.raises(InputError, match=f"made with {package} 0.1, this is {here}: choose"):
+    with pytest.raises(InputError, match=f"made with {package} 0.1, not {here}: choose"):
         opened()
     with pytest.raises(InputError, match=f"{package} 0.1 here and {here} at the worker"):
         score(None, here=other)

@@ -144,7 +144,7 @@ def test_a_suite_may_carry_shifts_and_names_wrong_ones(tmp_path):
     for more, message in (
         ("shift = {mooring = 1.2}", "mooring"),
         ("shift = {added_mass = 0.0}", "added_mass"),
-        ('shift = {drag = 2.0}\noptions = {turbine = "nrel5mw"}', "takes the turbine of its platform"),
+        ('shift = {drag = 2.0}\noptions = {turbine = "nrel5mw"}', "needs the turbine of the platform"),
     ):
         path = tmp_path / "mine.toml"
         path.write_text(text + more + "\n")

@@ -144,8 +144,8 @@ def test_other_settings_and_versions_are_refused_with_what_to_do(tmp_path, monke
         assert "--out" in str(error.value) and str(tmp_path) in str(error.value)
     new = {"name": "pi", "code": "new"}
     for name, value, message in (
-        ("__version__", "9.9", "was made by fowt_env .* this is 9.9"),
-        ("training.evaluation.provenance.plant_code", lambda: "other", "another state"),
+        ("__version__", "9.9", "was made by fowt_env .* not 9.9"),
+        ("training.evaluation.provenance.plant_code", lambda: "other", "other sources"),
         (
             "training.evaluation.evaluate.controller_code",
             lambda controller: new,

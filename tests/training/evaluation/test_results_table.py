@@ -50,7 +50,7 @@ def test_results_are_joined_and_a_run_with_two_answers_is_refused(tmp_path):
     assert list(read_results([one, two])["seed"]) == [1, 1, 2, 2, 3, 3]
     for column in ("RotSpeed_std_[rpm]", "overspeed_[%]"):  # any figure, whether it is scored or not
         write_table(runs().assign(**{column: -9.0}), two)
-        with pytest.raises(InputError, match="agent on ntm_18, seed 1, is there twice with"):
+        with pytest.raises(InputError, match="agent on ntm_18, seed 1, occurs twice with"):
             read_results([one, two])
 
 
@@ -95,9 +95,9 @@ def test_a_table_that_is_none_is_refused_with_its_file(tmp_path, text, message):
 
 
 def test_where_there_is_no_table_the_message_says_how_to_make_one(tmp_path):
-    with pytest.raises(InputError, match="contains no results.csv: make it with fowt evaluate"):
+    with pytest.raises(InputError, match="contains no results.csv: create it with fowt evaluate"):
         read_results(tmp_path)
-    with pytest.raises(InputError, match="none' is no such file or folder: make it with fowt evaluate"):
+    with pytest.raises(InputError, match="none' does not exist: create it with fowt evaluate"):
         read_results(tmp_path / "none")
     write_table(runs().drop(columns="overspeed_[%]"), tmp_path / "results.csv")
     with pytest.raises(InputError, match=r"lacks the columns overspeed_\[%\]"):

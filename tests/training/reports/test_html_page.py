@@ -189,7 +189,7 @@ def test_a_leaderboard_file_gives_its_intervals_and_differences(copy):
     assert data["board"]["ntm_18"] == []
     assert "rotor-speed std \N{MINUS SIGN}29" in (copy / "report.html").read_text(encoding="utf-8")
     (copy / "leaderboard.json").write_text('{"rows": []}')
-    why = "leaderboard.json' is not of this version .baseline is missing.*controllers is missing"
+    why = "leaderboard.json' does not match this version .baseline is missing.*controllers is missing"
     with pytest.raises(InputError, match=why):
         write_report(copy, schedule=False)
 
