@@ -64,7 +64,7 @@ def test_gust_draws_its_picture_of_each_controller(tmp_path):
         (("baselines", "{}", "--against", "gspi"), "unknown controller of the evaluation 'gspi'"),
         (("baselines", "{}", "--group", "g"), "must be NAME=LABEL,LABEL"),
         (("baselines", "{}", "--group", "g=a", "--group", "g=b"), "used twice"),
-        (("baselines", "nowhere"), "no such file"),
+        (("baselines", "nowhere"), "results 'nowhere' does not exist"),
         (("cases", "{}", "--figures", "power"), "unknown figure 'power'"),
         (("bound", "{}", "--bound", "nowhere.csv"), "no such file"),
         (("gust", "x.png", "--start", "300"), "start = 300 s"),
