@@ -268,7 +268,7 @@ function drawWinds() {
     }));
     return line;
   }));
-  const against = DATA.baseline === null ? "" : ` Below: the difference from ${DATA.baseline}; single cases are not tested, so none of theirs has a star.`;
+  const against = DATA.baseline === null ? "" : ` Below: the difference from ${DATA.baseline}; differences of single cases are not tested for significance.`;
   $("wind-remark").textContent = `${metric.about} Means over the seeds of each case.${against}`;
 }
 
