@@ -1,7 +1,9 @@
-"""Floaters made of members, for tests: a tension-leg platform, a semi-submersible and OC3-Hywind's spar."""
+"""Floaters for tests: a tension-leg platform, a semi, a spar of members, and OC3-Hywind with one value changed."""
 
+import re
 from math import pi
 
+from fowt_env.descriptions.files import DATA
 from fowt_env.descriptions.platform import Ballast, Environment, Line, Member, Platform, read_platform
 
 TENDON = (151.73, 1010.5, 1.5e9)  # unstretched length m, weight in water N/m, EA N
@@ -91,3 +93,11 @@ def semi(**change):
         "lines": lines,
     }
     return Platform(**fields | change)
+
+
+def edited(folder, key, value):
+    """Path of a copy of the OC3-Hywind file in which the first line of that key has another value."""
+    text = (DATA / "platforms" / "oc3_hywind.toml").read_text()
+    path = folder / "mine.toml"
+    path.write_text(re.sub(rf"(?m)^{key} = .*$", f"{key} = {value}", text, count=1))
+    return path

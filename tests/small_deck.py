@@ -4,6 +4,8 @@ No figure that the import takes is zero, one or its default where it can be anot
 
 import numpy as np
 
+from fowt_env.files.openfast_deck.parser import PartFile, same_key
+
 NAMES = {
     "OpenFAST": "small.fst", "ElastoDyn": "ed.dat", "blade": "blade.dat", "tower": "tower.dat",
     "AeroDyn": "ad.dat", "AeroDyn blade": "ad_blade.dat", "polar": "Foils/one.dat", "HydroDyn": "hd.dat",
@@ -471,3 +473,15 @@ def write_wamit(folder):
     stiffness = {(3, 3): 20.0, (3, 5): 1.5, (5, 3): 1.5, (4, 4): -1250.0, (5, 5): -1200.0}
     lines = [f"{i} {j} {stiffness.get((i, j), 0.0)}" for i in range(1, 7) for j in range(1, 7)]
     (folder / "float.hst").write_text("\n".join(lines) + "\n")
+
+
+def set_key(path, kind, key, value):
+    """Give a key of a part file another value; a new line for one that it lacks."""
+    lines = path.read_text(encoding="latin-1").splitlines()
+    found = PartFile(path, kind).entries.get(same_key(key))
+    text = f"{value} {key} - changed"
+    if found is None:
+        lines.insert(2, text)
+    else:
+        lines[found[1]] = text
+    path.write_text("\n".join(lines) + "\n", encoding="latin-1")

@@ -7,7 +7,7 @@ from math import pi, sqrt
 import numba
 import numpy as np
 import pytest
-from floaters import TENDON, semi, spar, tension_leg
+from floaters import TENDON, edited, semi, spar, tension_leg
 from plant_helpers import state
 from typer.testing import CliRunner
 
@@ -16,19 +16,10 @@ from fowt_env.analysis.check import _at_own_frequency, check_platform
 from fowt_env.analysis.linear_model import natural_periods
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.descriptions.builtin import names
-from fowt_env.descriptions.files import DATA
 from fowt_env.descriptions.platform import Line, read_platform
 from fowt_env.scene.geometry import geometry_faults
 from fowt_env.training import cli
 from fowt_env.training.cli import app  # noqa: F401
-
-
-def edited(folder, key, value):
-    """Path of a copy of the OC3-Hywind file in which the first line of that key has another value."""
-    text = (DATA / "platforms" / "oc3_hywind.toml").read_text()
-    path = folder / "mine.toml"
-    path.write_text(re.sub(rf"(?m)^{key} = .*$", f"{key} = {value}", text, count=1))
-    return path
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,9 @@
-import re
 import warnings
 
 import numba
 import numpy as np
 import pytest
+from floaters import edited
 from naive import rigid_body
 from plant_helpers import state
 from typer.testing import CliRunner
@@ -13,7 +13,7 @@ from fowt_env import errors
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated
 from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluctuations
 from fowt_env.descriptions.builtin import names
-from fowt_env.descriptions.platform import DATA, read_platform
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs import FowtEnv
 from fowt_env.errors import InputError
@@ -161,14 +161,6 @@ def test_a_scene_that_cannot_rest_is_refused(bare_scene):
 def warned(monkeypatch):
     """Warnings of platforms as in a process that has given none."""
     monkeypatch.setattr(errors, "_issued", set())
-
-
-def edited(folder, key, value):
-    """Path of a copy of the OC3-Hywind file in which the first line of that key has another value."""
-    text = (DATA / "platforms" / "oc3_hywind.toml").read_text()
-    path = folder / "mine.toml"
-    path.write_text(re.sub(rf"(?m)^{key} = .*$", f"{key} = {value}", text, count=1))
-    return path
 
 
 def complaint(path, wind=None):

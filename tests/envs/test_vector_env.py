@@ -1,10 +1,9 @@
 """The native vector environment: the same bits as single ones, and Gymnasium's autoreset rules."""
 
-import gymnasium
 import numba
 import numpy as np
 import pytest
-from episodes import BOX, DEGRADED, INDIVIDUAL, NAME, ON_LQR, QUICK, WATCHED, actions, quick, same
+from episodes import BOX, DEGRADED, INDIVIDUAL, ON_LQR, QUICK, WATCHED, actions, quick, same
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
@@ -232,18 +231,3 @@ def test_a_single_environment_moved_through_call_stays_in_the_batch():
 def test_no_step_before_the_first_reset():
     with pytest.raises(ResetNeeded):
         vector(2).step(np.zeros((2, 2)))
-
-
-def test_an_unknown_setting_is_a_keyword_that_python_would_refuse():
-    """TorchRL's GymEnv gives every environment `frameskip`, and makes it without where it is refused so."""
-    rule = "unexpected keyword argument 'frameskip'"
-    for make in (gymnasium.make, lambda name, **given: gymnasium.make_vec(name, 2, **given)):
-        with pytest.raises(TypeError, match=rule) as refused:
-            make(NAME, frameskip=1, **QUICK)
-        assert isinstance(refused.value, InputError)
-
-
-@pytest.mark.parametrize("name", ["same_step", "SAME_STEP", "SameStep", AutoresetMode.SAME_STEP])
-def test_an_autoreset_mode_goes_by_either_of_its_names(name):
-    env = FowtVectorEnv(2, autoreset_mode=name, duration=0.2, **QUICK)
-    assert env.autoreset_mode is env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP

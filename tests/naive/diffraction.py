@@ -1,9 +1,8 @@
 """Slow, obvious twins of plant/hydro/diffraction.py: the wave around a cylinder, and the force on strips.
 
-A complex number stands for the real part of itself times exp(-i omega t). A sea is as in naive/waves.py.
+A complex number stands for the real part of itself times exp(-i omega t). A sea is as in naive/waves.py, a
+spar and its surface as in naive/morison.py.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 from naive import waves
@@ -17,40 +16,6 @@ def total_wave(k, a, r, angle, terms=40):
         scattered = jvp(n, k * a) / h1vp(n, k * a) * hankel1(n, k * r)
         total = total + (1.0 if n == 0 else 2.0) * 1j**n * (jv(n, k * r) - scattered) * np.cos(n * angle)
     return total
-
-
-class Spar(NamedTuple):
-    """Coefficient, site and switches of a hull."""
-
-    added_mass: float  # C_A
-    density: float
-    gravity: float
-    depth: float
-    position: str = "instantaneous"
-    surface: str = "instantaneous"
-    stretching: str = "wheeler"
-
-
-def spar_of(platform, *switches):
-    """Spar of a descriptions.platform.Platform with the switches from position on."""
-    site = platform.environment
-    water = site.water_density, site.gravity, site.water_depth
-    return Spar(platform.hydro.added_mass_coefficient, *water, *switches)
-
-
-def surface_on_axis(t, r, R, sea, spar):
-    """(body z where the axis meets the surface, elevation there), by plain iteration."""
-    if spar.position == "fixed":
-        eta = waves.elevation(t, 0.0, 0.0, sea, spar.depth, spar.gravity)
-        return (eta if spar.surface == "instantaneous" else 0.0), eta
-    z, eta = -r[2] / R[2, 2], 0.0
-    for _ in range(60):
-        at = r + R[:, 2] * z
-        eta = waves.elevation(t, at[0], at[1], sea, spar.depth, spar.gravity)
-        if spar.surface == "swl":
-            break
-        z = (eta - r[2]) / R[2, 2]
-    return z, eta
 
 
 def excitation(t, r, R, eta, sea, spar, nodes, inertia):

@@ -3,13 +3,13 @@
 import re
 
 import pytest
-from small_deck import NAMES, write_deck
+from small_deck import NAMES, set_key, write_deck
 
 from fowt_env.errors import InputError
 from fowt_env.files.openfast_deck.deck import read_deck
 from fowt_env.files.openfast_deck.importer import import_deck
 from fowt_env.files.openfast_deck.keys import UNKNOWN
-from fowt_env.files.openfast_deck.parser import PartFile, bare, same_key
+from fowt_env.files.openfast_deck.parser import bare
 from fowt_env.files.openfast_deck.report import make_report
 
 MOORED = {"OpenFAST": [("1    CompMooring", "3    CompMooring"), ("map.dat", "moor.dat")]}
@@ -20,18 +20,6 @@ def deck_with(folder, part, key, value, **changes):
     path = write_deck(folder, **changes)
     set_key(folder / NAMES[part], part, key, value)
     return path
-
-
-def set_key(path, kind, key, value):
-    """Give a key of a part file another value."""
-    lines = path.read_text(encoding="latin-1").splitlines()
-    found = PartFile(path, kind).entries.get(same_key(key))
-    text = f"{value} {key} - changed"
-    if found is None:
-        lines.insert(2, text)
-    else:
-        lines[found[1]] = text
-    path.write_text("\n".join(lines) + "\n", encoding="latin-1")
 
 
 def differences(path):

@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from small_deck import set_key
 
 from fowt_env.errors import InputError
 from fowt_env.files.openfast_deck.conversion import platform_rows, stations, turbine_rows
@@ -73,13 +74,6 @@ WITHOUT_EFFECT = {  # what is read and changes nothing in these decks: why, and 
     },
     "polars of one table": {"polar": "Re"},
 }
-
-
-def set_key(path, kind, key, value):
-    """Give a key of a part file another value."""
-    lines = path.read_text(encoding="latin-1").splitlines()
-    lines[PartFile(path, kind).entries[same_key(key)][1]] = f"{value} {key} - changed"
-    path.write_text("\n".join(lines) + "\n", encoding="latin-1")
 
 
 @pytest.mark.slow

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from naive import diffraction as naive
+from naive import morison
 from naive.rigid_body import rotation
 from plant_helpers import make_pose
 from spar_in_waves import SEAS, STILL, motion, nodes_of, strips_of, waves_of
@@ -110,14 +111,14 @@ def test_series_of_a_taper_is_the_coefficient_at_its_local_diameter(site):
 @pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
 def test_exact_load_is_the_complex_sum_over_components(switches, platform, site):
     strips, waves = strips_of(platform, *switches), waves_of(SEA, site)
-    spar = naive.spar_of(platform, *switches)
+    spar = morison.spar_of(platform, *switches)
     part = build_strip_diffraction(waves, strips)
     rng = np.random.default_rng(2)
     for _ in range(3):
         t, moving = rng.uniform(0.0, 100.0), slow_motion(rng)
         got, plain = exact(t, moving, strips, waves, part), exact(t, moving, strips, waves)
         assert got[1:] == plain[1:]  # the added mass of the hull's own motion is left alone
-        top, eta = naive.surface_on_axis(t, moving[0], moving[1], SEA, spar)
+        top, eta = morison.surface_on_axis(t, moving[0], moving[1], SEA, spar)
         place = t, moving[0], moving[1], eta, SEA, spar, nodes_of(strips, top)
         expected = np.r_[naive.excitation(*place, inertia_coefficient)]
         expected -= np.r_[naive.excitation(*place, lambda ka: 1.0 + spar.added_mass)]
@@ -130,14 +131,14 @@ def test_exact_load_is_the_complex_sum_over_components(switches, platform, site)
 
 def test_cut_taper_follows_the_surface(platform, site):
     # a hull lifted by 7 m: the surface meets the taper, whose nodes move and change their diameter
-    strips, waves, spar = strips_of(platform), waves_of(ONE_WAY, site), naive.spar_of(platform)
+    strips, waves, spar = strips_of(platform), waves_of(ONE_WAY, site), morison.spar_of(platform)
     part = build_strip_diffraction(waves, strips)
     rng = np.random.default_rng(3)
     expected, full, quick = [], [], []
     for t in (1.0, 2.5, 4.0):
         moving = slow_motion(rng, tilt=0.02)
         moving[0][2] = 7.0
-        top, eta = naive.surface_on_axis(t, moving[0], moving[1], ONE_WAY, spar)
+        top, eta = morison.surface_on_axis(t, moving[0], moving[1], ONE_WAY, spar)
         assert -12.0 < top < -4.0
         place = t, moving[0], moving[1], eta, ONE_WAY, spar, nodes_of(strips, top)
         diffracted = np.r_[naive.excitation(*place, inertia_coefficient)]
