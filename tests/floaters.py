@@ -1,4 +1,4 @@
-"""Floaters for tests: a tension-leg platform, a semi, a spar of members, and OC3-Hywind with one value changed."""
+"""Floaters for tests: a tension-leg platform, a semi, a spar of members, OC3-Hywind with a value changed."""
 
 import re
 from math import pi

@@ -9,7 +9,6 @@ from fowt_env.errors import warn_once
 WIDE = 4.0  # fairlead radius over the hull's reach, both from the tower axis, above which to warn
 LOW = 1.2  # fairlead depth over draft, above which to warn
 ABOVE_BED = 0.1  # height of an anchor above the sea bed over water depth, above which to warn
-STRAIN = 0.05  # of a line, twice the breaking strain of chain and wire
 UPRIGHT = 0.2  # largest horizontal over vertical span of a tendon, whose anchor may be anywhere below
 
 

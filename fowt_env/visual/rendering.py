@@ -19,7 +19,6 @@ from fowt_env.plant.hydro.waves import ramp_factor
 from fowt_env.plant.mooring import catenary, line_shape
 
 SIZE = (960, 640)  # pixels of a view
-FPS = 30
 WINDOW = 60.0  # s of a trace
 SIDES = (160, 4000)  # pixels: smallest and largest side of a view
 SAMPLING = 3  # enlargement of the side view before averaging

@@ -193,7 +193,7 @@ class IsolatedController:
 
     def _ask(self, what, content, limit, moment=0.0):
         """Return the answer of the process, as bytes. Raises: ControllerError, after ending the process."""
-        content, began = pickle.dumps((what, content)), time.perf_counter()
+        content, began, why = pickle.dumps((what, content)), time.perf_counter(), None
         try:
             kind, answer = self._exchange(LENGTH.pack(len(content)) + content, time.monotonic() + limit)
         except TimeoutError:
@@ -201,9 +201,9 @@ class IsolatedController:
         except (OSError, EOFError):
             why = f"its process ended in {what}()"
         else:
-            name = answer.decode("ascii", "replace")
-            why = f"{what}() raised {name if name in KNOWN_ERRORS else 'a custom exception'}"
-            why = None if kind == OK else why
+            if kind == ERROR:
+                name = answer.decode("ascii", "replace")
+                why = f"{what}() raised {name if name in KNOWN_ERRORS else 'a custom exception'}"
         if what == ACT:
             self.slowest = max(self.slowest, time.perf_counter() - began)
         if why is None:

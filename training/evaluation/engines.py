@@ -13,7 +13,7 @@ import time
 from collections import Counter, deque
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError, unknown
@@ -96,16 +96,15 @@ def _processes(function, tasks, indices, jobs, limit, lost):
         begun, running, patience = SPAWN.Event(), {}, 0.0
         pool = ProcessPoolExecutor(min(most, len(queue)), SPAWN, _start_worker, (os.getpid(), begun))
         try:
-            while queue or running:
-                while queue and len(running) < most:
-                    future = pool.submit(_answer, function, packed[queue[0]])
-                    running[future] = queue.popleft(), time.monotonic()
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    outcome, reason = future.result()
-                    index, _ = running.pop(future)
-                    yield index, outcome if reason is None else lost(tasks[index], reason)
-            patience = PATIENCE
-        except BrokenProcessPool:
+            with suppress(BrokenProcessPool):
+                while queue or running:
+                    while queue and len(running) < most:
+                        future = pool.submit(_answer, function, packed[queue[0]])
+                        running[future] = queue.popleft(), time.monotonic()
+                    for future in wait(running, return_when=FIRST_COMPLETED).done:
+                        outcome, reason = future.result()
+                        index, _ = running.pop(future)
+                        yield index, outcome if reason is None else lost(tasks[index], reason)
             patience = PATIENCE
         finally:
             codes = _end(pool, patience)
