@@ -152,6 +152,11 @@ def check_one_of(key, value, choices):
     return value
 
 
+def parse_names(text):
+    """Return the list of names in a comma-separated text."""
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
 def parse_numbers(text, what):
     """Return the numbers of "1,2,5" or "3:25:1" (start:stop:step, stop included; default step 1)."""
     if ":" in text:

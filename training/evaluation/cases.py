@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from fowt_env.caches import cached
-from fowt_env.descriptions.checks import is_number, plain_number, short
+from fowt_env.descriptions.checks import is_number, parse_names, plain_number, short
 from fowt_env.descriptions.faults import Fault
 from fowt_env.descriptions.files import locate, raise_problems, read_toml
 from fowt_env.descriptions.platform import platform_names, read_platform
@@ -98,9 +98,9 @@ def _plain(value):
     return value.tolist() if hasattr(value, "tolist") else repr(value)
 
 
-def _names(text):
+def _names(names):
     """Return the list of names in a comma-separated text or a sequence."""
-    return [name.strip() for name in text.split(",") if name.strip()] if isinstance(text, str) else list(text)
+    return parse_names(names) if isinstance(names, str) else list(names)
 
 
 def _many(value):

@@ -11,6 +11,7 @@ import pandas as pd
 import typer
 
 from fowt_env.controllers.policy.controller import policy_path, read_policy
+from fowt_env.descriptions.checks import parse_names
 from fowt_env.descriptions.units import RPM
 from fowt_env.envs import TASKS, FowtEnv, SafetyLayer
 from fowt_env.envs.actions import ACTION_MODES
@@ -119,7 +120,7 @@ def main(
     out: Annotated[str, typer.Option(help="CSV to write.")] = "results/safety.csv",
 ):
     """Run agents with and without the safety layer on validation episodes; print and write the table."""
-    table = safety_study([name for name in agents.split(",") if name])
+    table = safety_study(parse_names(agents))
     print(table.round(2).to_string(index=False))
     write_table(table, out)
 

@@ -14,6 +14,7 @@ import pandas as pd
 
 import fowt_env
 from fowt_env.analysis.trim import trim_prescribed
+from fowt_env.descriptions.checks import parse_names
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
@@ -66,7 +67,7 @@ GROUPS = {"wind": (*CASES,)[:4], "waves": (*CASES,)[4:8], "wind and waves": (*CA
 
 def wanted_cases(text):
     """Return the case names selected by "LC5", "LC1,LC2", "all" or "full_scale". Raises: InputError."""
-    names = [name.strip() for name in text.split(",") if name.strip()]
+    names = parse_names(text)
     if not names:
         raise InputError(f"case = {text!r}: must name at least one case, e.g. LC5, all or {FULL_SCALE}")
     chosen = []
