@@ -20,7 +20,7 @@ def stored_files():
     kept = [
         path
         for path in paths
-        if path.suffix not in (".py", ".pyc") and path != HASHES and DECKS not in path.parents
+        if path.suffix not in (".py", ".pyc", ".md") and path != HASHES and DECKS not in path.parents
     ]
     return sorted(path.relative_to(ROOT).as_posix() for path in kept)
 

@@ -132,9 +132,11 @@ VOLTURNUS = {  # full outputs that make_volturnus.py reduces
 def run(deck, case, folder, program):
     """Run a case in a new folder (or reuse its output) and return a DataFrame. Raises: RuntimeError."""
     if not (folder / "model.out").exists():
+        files = INPUTS | ({"hub_wind": case["wind_file"]} if "wind_file" in case else {})
         deck.write(
             folder, case, rosco=os.environ.get("ROSCO_LIB", "libdiscon.so"),
-            **{name: pd.read_csv(HERE / file, comment="#") for name, file in INPUTS.items()},
+            baseline=os.environ.get("DISCON_OC3_LIB", "DISCON_OC3Hywind.so"),
+            **{name: pd.read_csv(HERE / file, comment="#") for name, file in files.items()},
         )  # fmt: skip
         environment = {"OPENBLAS_NUM_THREADS": "1", "PATH": "/usr/bin:/bin"}
         done = subprocess.run(

@@ -1,4 +1,4 @@
-"""Writes OpenFAST v5.0.0 inputs from the public decks of VolturnUS-S and the OC4 semi-submersible.
+"""Writes OpenFAST v5.0.0 inputs from the public decks of VolturnUS-S, OC3-Hywind and the OC4 semi.
 
 Decks are listed in NOTICE: IEAWindSystems/IEA-15-240-RWT ac5248a (with the DISCON.IN of NREL/ROSCO fc11f43),
 old-NWTC/FAST 0badc8d with the turbine of NREL/ROSCO fc11f43. Values are transferred by key.
@@ -13,6 +13,7 @@ import numpy as np
 
 OPENFAST = "OpenFAST v5.0.0 (2895884d2be01862173c88d70f86b358d2f1a50a)"
 MOTIONS = ("PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmYaw")
+STARTS = ("OoPDefl", "IPDefl", "NacYaw", "Azimuth")
 BLADES = (1, 2, 3)
 
 # keys of v5 in reading order, each with its default; entries starting with "-" are section headings
@@ -102,8 +103,8 @@ SIMPLE = """
 MATRICES = ("AddCLin", "AddBLin", "AddBQuad")
 HYDRO_OUTPUT = """
 - output; HDSum True; OutAll False; OutSwtch 2; OutFmt "ES16.8E2"; OutSFmt "A15";
-- channels; "B1WvsF1xi"; "B1WvsF1zi"; "B1WvsM1yi"; "B1WvsF2xi"; "B1WvsM2yi"; "HydroFxi"; "HydroFzi";
-"HydroMyi"; END
+- channels; "B1WvsF1xi"; "B1WvsF1zi"; "B1WvsM1yi"; "B1WvsF2xi"; "B1WvsF2zi"; "B1WvsM2yi"; "HydroFxi";
+"HydroFzi"; "HydroMyi"; END
 """
 ELASTO_CHANNELS = (
     *MOTIONS, "RotSpeed", "GenSpeed", "BldPitch1", "RotThrust", "RotTorq", "NcIMUTAxs", "TwrBsMyt",
@@ -111,6 +112,14 @@ ELASTO_CHANNELS = (
     "YawBrMyp", "YawBrMzp", "OoPDefl1", "IPDefl1", "LSSTipMya", "LSSTipMza",
 )  # fmt: skip
 AERO_CHANNELS = ("RtFldFxh", "RtFldMxh", "RtFldFyh", "RtFldFzh", "RtFldMyh", "RtFldMzh")
+NODE_CHANNELS = (
+    "Alpha", "VRel", "AxInd", "TnInd", "Cl", "Cd", "Cm", "Cn", "Ct", "Fx", "Fy", "VDisx", "VDisy",
+)  # fmt: skip
+LINE_TENSIONS = "".join(f"{end}Ten{k}\n" for end in ("Fair", "Anch") for k in (1, 2, 3)) + "END\n--- end\n"
+BENDING = {  # degrees of freedom by number of modes: of a blade (first edge, one or two flap), tower each way
+    "blades": {2: ("FlapDOF1", "EdgeDOF"), 3: ("FlapDOF1", "FlapDOF2", "EdgeDOF")},
+    "tower": {1: ("TwFADOF1", "TwSSDOF1"), 2: ("TwFADOF1", "TwFADOF2", "TwSSDOF1", "TwSSDOF2")},
+}
 
 
 def pattern(key):
@@ -185,17 +194,19 @@ def members_text(axial=("1 0 0 1 0 0 1",), joints=(), sections=(), coefficients=
     return "".join([*parts[0], *simple, *parts[1], "- joints\n0 NJOutputs\n0 JOutLst\n"])
 
 
-def write_elastodyn(folder, deck, case, **files):
+def write_elastodyn(folder, deck, case, channels=ELASTO_CHANNELS, **files):
     """Write ED.dat of a run, rigid except for the case's degrees of freedom; copy blade and tower files."""
-    tower = case.get("tower", 0)
     pitches = case.get("pitches", (case.get("pitch", 0),) * 3)
     fixed = {f"Ptfm{k}DOF": False for k in ("Sg", "Sw", "Hv", "R", "P", "Y")} if case.get("fixed") else {}
+    free = {name: True for part, modes in BENDING.items() for name in modes.get(case.get(part), ())}
+    torque = case.get("control") or case.get("torque_until") is not None
     text = filled(
-        ELASTODYN, deck, GenDOF=bool(case.get("control")), TwFADOF1=tower > 0, TwSSDOF1=tower > 0,
-        RotSpeed=case.get("rpm", 0), **{f"BlPitch__{k}": pitches[k - 1] for k in BLADES}, **fixed,
-        **{name: case[name] for name in MOTIONS if name in case},
+        ELASTODYN, deck, GenDOF=bool(torque), DrTrDOF=bool(case.get("torsion")), **free,
+        RotSpeed=case.get("rpm", 0), BldGagNd=case.get("gauges", "5, 9"), **fixed,
+        **{f"BlPitch__{k}": pitches[k - 1] for k in BLADES},
+        **{name: case[name] for name in (*MOTIONS, *STARTS) if name in case},
     )  # fmt: skip
-    channels = "".join(f'"{name}"\n' for name in ELASTO_CHANNELS)
+    channels = "".join(f'"{name}"\n' for name in channels)
     (folder / "ED.dat").write_text(f"v5\n-\n{text}OutList\n{channels}END\n")
     for name, source in files.items():
         shutil.copy(source, folder / f"{name}.dat")
@@ -217,10 +228,13 @@ def write_sea(folder, case, components, **grid):
 def write_glue(folder, case, **settings):
     """Write model.fst of a run."""
     aero = 2 if case.get("wind") is not None else 0
+    servo = any(case.get(key) is not None for key in ("control", "pitch_to", "torque_until"))
+    if case.get("fixed"):
+        settings |= {"CompSeaSt": 0, "CompHydro": 0, "CompMooring": 0}
+    settings |= {key: case[key] for key in ("Gravity", "NumCrctn") if key in case}
     text = filled(
         GLUE, TMax=case["t"], DT=case.get("dt", 0.025), DT_Out=case.get("dtout", 0.1),
-        CompInflow=1 if aero else 0, CompAero=aero,
-        CompServo=1 if case.get("control") or case.get("pitch_to") is not None else 0, **settings,
+        CompInflow=1 if aero else 0, CompAero=aero, CompServo=int(servo), **settings,
     )  # fmt: skip
     (folder / "model.fst").write_text(f"v5\n-\n{text}")
 
@@ -250,19 +264,85 @@ class Deck:
     """Represents a public deck: folder and name, tower and blade files, and files of the floating body."""
 
     ends = (".1", ".3", ".hst", ".12d")
+    hub, diameter, interpolation = 150.0, 241.94, "DEFAULT"
 
     def read(self, part):
         """Return the text of a file of the deck."""
-        return (self.own / f"{self.name}_{part}.dat").read_text()
+        return (self.own / f"{self.name}_{part}.dat").read_text(errors="replace")
+
+    def _elastodyn(self):
+        """Return the text of ElastoDyn's input."""
+        return self.read("ElastoDyn")
 
     def begin(self, folder, case):
         """Create the folder of a run with the files of structure and floating body."""
         folder.mkdir(parents=True)
         tower = self.own / f"{self.name}_{self.tower}.dat"
-        write_elastodyn(folder, self.read("ElastoDyn"), case, blade_ed=self.blade, tower=tower)
+        channels = case.get("channels", ELASTO_CHANNELS)
+        write_elastodyn(folder, self._elastodyn(), case, channels, blade_ed=self.blade, tower=tower)
         (folder / "HydroData").mkdir()
         for end in self.ends:
             shutil.copy(self.own / "HydroData" / f"{self.body}{end}", folder / "HydroData" / f"body{end}")
+
+    def _write_wind(self, folder, case, hub_wind):
+        """Write AD.dat with blade and airfoils, IW.dat, and the uniform wind file if needed."""
+        text, blade, polars = self._aerodyn()
+        text = re.sub(r'"[^"]*Airfoils/', '"Airfoils/', text)
+        text = re.sub(r'"[^"]*blade\.dat"', '"blade_ad.dat"', text)
+        unsteady, nodes = case.get("unsteady", 0), case.get("nodes", ())
+        text = put(
+            text, TwrPotent=case.get("potential", 0), TwrShadow=case.get("shadow", 0),
+            DBEMT_Mod=case.get("dbemt", 0), UA_Mod=unsteady, AoA34=case.get("at_3_4_chord", bool(unsteady)),
+            NBlOuts=len(nodes),
+        )  # fmt: skip
+        if nodes:
+            text = re.sub(r"^[\d, \t]+(\s+BlOutNd)", rf"{', '.join(map(str, nodes))}\1", text, flags=re.M)
+        text = re.sub(r"^\S+\s+Buoyancy\s.*\n", "", text, flags=re.M)
+        start, end = text.index("TwrElev"), text.index("======", text.index("TwrElev"))
+        rows = text[start:end].strip("\n").split("\n")
+        rows = rows[:2] + [f"{row} 0 0" for row in rows[2:]]
+        channels = [f"B1N{k}{name}" for k in range(1, len(nodes) + 1) for name in NODE_CHANNELS]
+        text = text[:start] + "\n".join(rows) + "\n" + text[end:]
+        (folder / "AD.dat").write_text(with_channels(text, [*AERO_CHANNELS, *channels]))
+        (folder / "blade_ad.dat").write_text(end_nodes(blade))
+        (folder / "Airfoils").mkdir()
+        for polar in polars.iterdir():  # coordinates are for acoustics and plots only
+            text = re.sub(r"^\S+(\s+NumCoords)", r"0\1", polar.read_text(), flags=re.M)
+            text = put(text, InterpOrd=self.interpolation)
+            (folder / "Airfoils" / polar.name).write_text(text)
+        wind, kind = case.get("wind") or 0.0, 1
+        if not isinstance(wind, (int, float)):
+            rows, shear = hub_wind.to_numpy() if wind == "hub_wind" else wind, case.get("shear", 0)
+            lines = [f"{time:.4f} {speed:.6f} 0 0 0 {shear} 0 0" for time, speed in rows]
+            head = "! time speed direction vertical shear shear shear gust"
+            (folder / "wind.wnd").write_text("\n".join([head, *lines]) + "\n")
+            wind, kind = 0.0, 2
+        text = filled(
+            INFLOW, WindType=kind, HWindSpeed=wind, PLExp=case.get("shear", 0.0), RefHt=self.hub,
+            RefHt_Uni=self.hub, RefLength=self.diameter, WindVziList=self.hub, RefHt_Hawc=self.hub,
+            PropagationDir=case.get("direction", 0),
+        )  # fmt: skip
+        (folder / "IW.dat").write_text(f"v5\n-\n{text}")
+
+    def _write_servodyn(self, folder, case, library):
+        """Write SV.dat: the library; or a pitch manoeuvre of all blades ("pitch_to" degrees at 20 s); or a
+        generator with constant torque ("torque" N m) up to a time ("torque_until" s).
+        """
+        control, target = 5 if case.get("control") else 0, case.get("pitch_to")
+        stop = case.get("torque_until")
+        text = put(self._servodyn(), PCMode=control, VSContrl=1 if stop is not None else control,
+                   DLL_FileName=f'"{library}"', DLL_InFile='"DISCON.IN"',
+                   DLL_DT=case.get("control_dt", "0.025") if control else '"default"')  # fmt: skip
+        if target is not None:
+            text = put(text, **{f"TPitManS__{k}": 20.0 for k in BLADES},
+                       **{f"PitManRat__{k}": 2.0 for k in BLADES},
+                       **{f"BlPitchF__{k}": target for k in BLADES})  # fmt: skip
+        if stop is not None:  # rated speed 1 rpm: above it the torque is constant
+            text = put(text, TimGenOf=stop, VS_RtGnSp=1.0, VS_RtTq=case["torque"], VS_Rgn2K=1e-6, VS_SlPc=5.0)
+        neutral = {"PitNeut": case.get("pitch", 0), "PitSpr": 0, "PitDamp": 0}  # fixed without a controller
+        springs = "".join(f"{value} {name}({k})\n" for name, value in neutral.items() for k in BLADES)
+        text = re.sub(r"^(.*\sTPCOn\s.*\n)", lambda match: match[1] + springs, text, count=1, flags=re.M)
+        (folder / "SV.dat").write_text(with_channels(text, ("GenTq", "GenPwr")))
 
 
 class Volturnus(Deck):
@@ -293,7 +373,7 @@ class Volturnus(Deck):
             paths.append(self.own / f"{self.name}_ServoDyn.dat")
         return paths
 
-    def write(self, folder, case, components=None, hub_wind=None, rosco="libdiscon.so"):
+    def write(self, folder, case, components=None, hub_wind=None, rosco="libdiscon.so", **_):
         """Write all inputs of a run; rosco: path of the ROSCO library."""
         self.begin(folder, case)
         drag = {
@@ -306,59 +386,33 @@ class Volturnus(Deck):
         strips = filled(SIMPLE) + members_text()
         (folder / "HD.dat").write_text(f"v5\n-\n{platform}{added}{strips}" + filled(HYDRO_OUTPUT))
         write_sea(folder, case, components)
-        lines = re.sub(r"(850\.00\s+1\s+2)", r"\1 tension_fair", self.read("MAP"))
-        # anchors at 837.6 m, as in the MoorDyn file of the deck
-        (folder / "mooring.dat").write_text(lines.replace("-837.800", "-837.600").replace("ˆ", "^"))
+        if case.get("moordyn"):
+            text = self.read("MoorDyn")
+            text = text[: text.index("OUTPUTS")] + "OUTPUTS\n" + LINE_TENSIONS
+        else:
+            text = re.sub(r"(850\.00\s+1\s+2)", r"\1 tension_fair tension_anch", self.read("MAP"))
+            # anchors at 837.6 m, as in the MoorDyn file of the deck
+            text = text.replace("-837.800", "-837.600").replace("ˆ", "^")
+        (folder / "mooring.dat").write_text(text)
         self._write_wind(folder, case, hub_wind)
         self._write_servodyn(folder, case, rosco)
-        fixed = {"CompSeaSt": 0, "CompHydro": 0, "CompMooring": 0} if case.get("fixed") else {}
-        write_glue(folder, case, **fixed)
-
-    def _write_wind(self, folder, case, hub_wind):
-        """Write AD.dat with blade and airfoils, IW.dat, and the uniform wind file if needed."""
-        text = self.read("AeroDyn15").replace("../IEA-15-240-RWT/Airfoils", "Airfoils")
-        text = text.replace("../IEA-15-240-RWT/IEA-15-240-RWT_AeroDyn15_blade.dat", "blade_ad.dat")
-        text = put(text, TwrPotent=0, TwrShadow=0, DBEMT_Mod=case.get("dbemt", 0), UA_Mod=0, AoA34=False)
-        text = re.sub(r"^\S+\s+Buoyancy\s.*\n", "", text, flags=re.M)
-        start, end = text.index("TwrElev"), text.index("======", text.index("TwrElev"))
-        rows = text[start:end].strip("\n").split("\n")
-        rows = rows[:2] + [f"{row} 0 0" for row in rows[2:]]
-        text = with_channels(text[:start] + "\n".join(rows) + "\n" + text[end:], AERO_CHANNELS)
-        (folder / "AD.dat").write_text(text)
-        blade = (self.rotor / "IEA-15-240-RWT_AeroDyn15_blade.dat").read_text()
-        (folder / "blade_ad.dat").write_text(end_nodes(blade))
-        (folder / "Airfoils").mkdir()
-        for polar in (self.rotor / "Airfoils").iterdir():  # coordinates are for acoustics and plots only
-            text = re.sub(r"^\S+(\s+NumCoords)", r"0\1", polar.read_text(), flags=re.M)
-            (folder / "Airfoils" / polar.name).write_text(text)
-        wind, kind = case.get("wind") or 0.0, 1
-        if not isinstance(wind, (int, float)):
-            rows = hub_wind.to_numpy() if wind == "hub_wind" else wind
-            lines = [f"{time:.4f} {speed:.6f} 0 0 0 0 0 0" for time, speed in rows]
-            head = "! time speed direction vertical shear shear shear gust"
-            (folder / "wind.wnd").write_text("\n".join([head, *lines]) + "\n")
-            wind, kind = 0.0, 2
-        text = filled(INFLOW, WindType=kind, HWindSpeed=wind, PLExp=case.get("shear", 0.0))
-        (folder / "IW.dat").write_text(f"v5\n-\n{text}")
-
-    def _write_servodyn(self, folder, case, rosco):
-        """Write SV.dat: ROSCO library, or a pitch manoeuvre of all blades ("pitch_to" degrees at 20 s)."""
-        control, target = 5 if case.get("control") else 0, case.get("pitch_to")
-        text = put(self.read("ServoDyn"), PCMode=control, VSContrl=control, DLL_FileName=f'"{rosco}"',
-                   DLL_InFile='"DISCON.IN"', DLL_DT="0.025" if control else '"default"')  # fmt: skip
-        if target is not None:
-            text = put(text, **{f"TPitManS__{k}": 20.0 for k in BLADES},
-                       **{f"PitManRat__{k}": 2.0 for k in BLADES},
-                       **{f"BlPitchF__{k}": target for k in BLADES})  # fmt: skip
-        neutral = {"PitNeut": case.get("pitch", 0), "PitSpr": 0, "PitDamp": 0}  # fixed without a controller
-        springs = "".join(f"{value} {name}({k})\n" for name, value in neutral.items() for k in BLADES)
-        text = re.sub(r"^(.*\sTPCOn\s.*\n)", lambda match: match[1] + springs, text, count=1, flags=re.M)
-        (folder / "SV.dat").write_text(with_channels(text, ("GenTq", "GenPwr")))
-        if control:
+        if case.get("control"):
             text = re.sub(r'^"[^"]*"(\s*! PerfFileName)', r'"Cp_Ct_Cq.txt"\1', self.discon.read_text(),
                           flags=re.M)  # fmt: skip
+            if case.get("individual"):
+                text = put(text, IPC_ControlMode="1 !")
             (folder / "DISCON.IN").write_text(text)
             shutil.copy(self.rotor / "Cp_Ct_Cq.IEA15MW.txt", folder / "Cp_Ct_Cq.txt")
+        write_glue(folder, case, CompMooring=3 if case.get("moordyn") else 1)
+
+    def _aerodyn(self):
+        """Return texts of AeroDyn's input and blade, and the folder of polars."""
+        blade = (self.rotor / "IEA-15-240-RWT_AeroDyn15_blade.dat").read_text()
+        return self.read("AeroDyn15"), blade, self.rotor / "Airfoils"
+
+    def _servodyn(self):
+        """Return the text of ServoDyn's input."""
+        return self.read("ServoDyn")
 
 
 def section(text, key):
@@ -370,6 +424,31 @@ def section(text, key):
     while not rows[0].lstrip().startswith("("):
         rows = rows[1:]
     return [row.split("!")[0].split() for row in rows[1 : count + 1]]
+
+
+def moordyn_text(text):
+    """Return a MoorDyn file of FAST 8 in v2 format."""
+
+    def rows(name, count):
+        lines = text[text.index(name) :].split("\n")
+        return [line.split() for line in lines[4 : 4 + count]]
+
+    kind = rows("LINE TYPES", 1)[0]
+    points = [[*row[:7], row[10], row[11]] for row in rows("CONNECTION PROPERTIES", 6)]
+    lines = [[row[0], row[1], row[4], row[5], row[2], row[3], "-"] for row in rows("LINE PROPERTIES", 3)]
+    can, cat, cdn, cdt = kind[5:9]
+    parts = {
+        "LINE TYPES": [[*kind[:5], "0", cdn, can, cdt, cat]],
+        "POINTS": points,
+        "LINES": lines,
+        "OPTIONS": [["0.002", "dtM"], ["3.0e6", "kbot"], ["3.0e5", "cbot"], ["2.0", "dtIC"],
+                    ["60.0", "TmaxIC"], ["4.0", "CdScaleIC"], ["0.001", "threshIC"]],
+    }  # fmt: skip
+    out = "--- MoorDyn\nv2\n"
+    for name, table_rows in parts.items():
+        out += f"---- {name} ----\n" + ("" if name == "OPTIONS" else "-\n-\n")
+        out += "".join(" ".join(row) + "\n" for row in table_rows)
+    return out + f"---- OUTPUTS ----\n{LINE_TENSIONS}"
 
 
 class Oc4(Deck):
@@ -391,7 +470,8 @@ class Oc4(Deck):
         """Return the paths of the inputs of a run; the deck lacks a .3 file: excitation of the package."""
         parts = ["ElastoDyn", self.tower, "HydroDyn", "MoorDyn" if case.get("moordyn") else "MAP"]
         paths = [self.own / f"{self.name}_{part}.dat" for part in parts]
-        ends = self.ends if case.get("qtf") else self.ends[:2]
+        second = {"qtf": ".12d", "sum_qtf": ".12s"}
+        ends = [*self.ends[:2], *(end for key, end in second.items() if case.get(key))]
         paths += [self.own / "HydroData" / f"{self.body}{end}" for end in ends]
         return [*paths, self.blade, self.excitation]
 
@@ -399,11 +479,14 @@ class Oc4(Deck):
         """Write all inputs of a run."""
         self.begin(folder, case)
         (folder / "HydroData" / "body.3").write_text(self._excitation_text())
+        if case.get("sum_qtf"):
+            shutil.copy(self.own / "HydroData" / f"{self.body}.12s", folder / "HydroData" / "body.12s")
         (folder / "HD.dat").write_text(self._hydrodyn(case))
         # 2 m along the waves (shortest component: 9 m); all members are within 29 m and 20 m
         grid = {"X_HalfWidth": 60, "NX": 31, "Y_HalfWidth": 40, "NY": 2, "Z_Depth": 24, "NZ": 15}
         write_sea(folder, case, components, WaveDT=0.1, **grid)
-        text = self._moordyn() if case.get("moordyn") else self.read("MAP").replace("ˆ", "^")
+        moordyn = case.get("moordyn")
+        text = moordyn_text(self.read("MoorDyn")) if moordyn else self.read("MAP").replace("ˆ", "^")
         (folder / "mooring.dat").write_text(text)
         write_glue(folder, case, Gravity=self.gravity, CompMooring=3 if case.get("moordyn") else 1)
 
@@ -448,7 +531,8 @@ class Oc4(Deck):
         """Return the text of HD.dat: members of the deck with drag and internal water."""
         text = self.read("HydroDyn")
         wet = bool(case.get("sea") or case.get("waves"))
-        platform = filled(FLOATING, text, DiffQTF=case.get("qtf", 0), ExctnMod=int(wet))
+        quadratic = {"DiffQTF": case.get("qtf", 0), "SumQTF": case.get("sum_qtf", 0)}
+        platform = filled(FLOATING, text, **quadratic, ExctnMod=int(wet))
         # the old HydroDyn kept the weight of the water fixed, which the deck corrects by a stiffness
         restored = -sum(self.gravity * mass * height for mass, height in self.ballast(text))
         stiffness = float(re.search(r"^\s+0\s+0\s+0\s+([1-9]\d+)\s+0\s+0\s*$", text, re.M)[1]) - restored
@@ -475,27 +559,97 @@ class Oc4(Deck):
         )  # fmt: skip
         return f"v5\n-\n{platform}{added}" + filled(SIMPLE) + strips + filled(HYDRO_OUTPUT)
 
-    def _moordyn(self):
-        """Return the MoorDyn file of the deck in v2 format."""
-        text = self.read("MoorDyn")
 
-        def rows(name, count):
-            lines = text[text.index(name) :].split("\n")
-            return [line.split() for line in lines[4 : 4 + count]]
+class Oc3(Deck):
+    """Writes runs of the NREL 5 MW on the OC3-Hywind spar: strip theory, MAP++; zero tilt and cone."""
 
-        kind = rows("LINE TYPES", 1)[0]
-        points = [[*row[:7], row[10], row[11]] for row in rows("CONNECTION PROPERTIES", 6)]
-        lines = [[row[0], row[1], row[4], row[5], row[2], row[3], "-"] for row in rows("LINE PROPERTIES", 3)]
-        can, cat, cdn, cdt = kind[5:9]
-        parts = {
-            "LINE TYPES": [[*kind[:5], "0", cdn, can, cdt, cat]],
-            "POINTS": points,
-            "LINES": lines,
-            "OPTIONS": [["0.002", "dtM"], ["3.0e6", "kbot"], ["3.0e5", "cbot"], ["2.0", "dtIC"],
-                        ["60.0", "TmaxIC"], ["4.0", "CdScaleIC"], ["0.001", "threshIC"]],
-        }  # fmt: skip
-        out = "--- MoorDyn\nv2\n"
-        for name, table_rows in parts.items():
-            out += f"---- {name} ----\n" + ("" if name == "OPTIONS" else "-\n-\n")
-            out += "".join(" ".join(row) + "\n" for row in table_rows)
-        return out + "---- OUTPUTS ----\nFairTen1\nFairTen2\nFairTen3\nEND\n------- end\n"
+    name, body, tower = "NRELOffshrBsline5MW_OC3Hywind", "spar", "ElastoDyn_Tower"
+    ends = ()
+    hub, diameter, interpolation = 90.0, 126.0, 1
+    # of a member: Cd, Ca, Cp, axial Cd, Ca, Cp, Cb, four numbers each
+    coefficients = "0.6 0.6 0 0 0.969954 0.969954 0 0 1 1 1 1 0 0 0 0 0 0 0 0 1 1 1 1 1 1 1 1"
+
+    def __init__(self, decks):
+        self.own = Path(decks) / "nrel5mw_oc3_hywind" / "CertTest" / "5MW_Baseline"
+        self.turbine = Path(decks) / "nrel5mw_turbine" / "Examples" / "Test_Cases" / "NREL-5MW"
+        self.blade = self.turbine / "NRELOffshrBsline5MW_Blade.dat"
+
+    def inputs(self, case):
+        """Return the paths of the deck files that a run uses."""
+        parts = ["ElastoDyn", self.tower] + ([] if case.get("fixed") else ["HydroDyn", "MAP"])
+        paths = [self.own / f"{self.name}_{part}.dat" for part in parts] + [self.blade]
+        if case.get("wind") is not None:
+            paths += [self.turbine / "NRELOffshrBsline5MW_Onshore_AeroDyn15.dat", self.turbine / "Airfoils",
+                      self.turbine / "NRELOffshrBsline5MW_AeroDyn_blade.dat",
+                      self.own / f"{self.name}_AeroDyn15.dat"]  # fmt: skip
+        if case.get("control"):
+            paths.append(self.own / "ServoData" / "DISCON_OC3Hywind.f90")
+        if case.get("control") or case.get("torque_until") is not None:
+            paths.append(self.turbine / "NRELOffshrBsline5MW_Onshore_ServoDyn.dat")
+        return paths
+
+    def write(self, folder, case, components=None, hub_wind=None, baseline="DISCON_OC3Hywind.so", **_):
+        """Write all inputs of a run; baseline: path of the compiled DISCON_OC3Hywind.f90."""
+        self.begin(folder, case)
+        (folder / "HD.dat").write_text(self._hydrodyn())
+        zeros = [f"{i} {j} 0" for i in range(1, 7) for j in range(1, 7)]
+        (folder / "HydroData" / "body.hst").write_text("\n".join(zeros) + "\n")
+        ends = {"-1": "", "0": "", "5": " 0", "10": " 0"}  # damping at finite periods only
+        rows = [f"{period} {row}{end}" for period, end in ends.items() for row in zeros]
+        (folder / "HydroData" / "body.1").write_text("\n".join(rows) + "\n")
+        rows = [f"{t} {b} {k} 0 0 0 0" for t in (5, 10) for b in (-180, 0, 180) for k in range(1, 7)]
+        (folder / "HydroData" / "body.3").write_text("\n".join(rows) + "\n")
+        write_sea(folder, case, components, WaveDT=0.1, Z_Depth=130, NZ=60)
+        if case.get("moordyn"):
+            text = moordyn_text(self.read("MoorDyn"))
+        else:
+            text = self.read("MAP").replace("ˆ", "^").replace("repeat 240 120", "repeat 120 240")
+        (folder / "mooring.dat").write_text(text)
+        self._write_wind(folder, case, hub_wind)
+        self._write_servodyn(folder, {"control_dt": '"default"', **case}, baseline)
+        if case.get("control"):
+            (folder / "DISCON.IN").write_text("unused\n")
+        mooring = 3 if case.get("moordyn") else 1
+        write_glue(folder, case, Gravity=case.get("Gravity", 9.80665), WtrDpth=320, CompMooring=mooring)
+
+    def _elastodyn(self):
+        """Return the text of ElastoDyn's input without tilt and cone, the hub at the same height."""
+        level = {f"PreCone__{k}": 0 for k in BLADES}
+        return put(self.read("ElastoDyn"), ShftTilt=0, Twr2Shft=2.4, **level)
+
+    def _servodyn(self):
+        """Return the text of ServoDyn's input."""
+        return (self.turbine / "NRELOffshrBsline5MW_Onshore_ServoDyn.dat").read_text()
+
+    def _aerodyn(self):
+        """Return texts of AeroDyn's input (tower of the spar) and straight blade, and the polars' folder."""
+        text = (self.turbine / "NRELOffshrBsline5MW_Onshore_AeroDyn15.dat").read_text()
+        text = put(text, AIDrag=True, TIDrag=True, NumTwrNds=11)
+        spar = self.read("AeroDyn15")
+        spar = spar[spar.index("TwrElev") :]
+        rows = spar[: spar.index("======")].strip("\n").split("\n")
+        rows = rows[:2] + [f"{row} 0.1 0" for row in rows[2:]]
+        start, end = text.index("TwrElev"), text.index("======", text.index("TwrElev"))
+        text = text[:start] + "\n".join(rows) + "\n" + text[end:]
+        lines = (self.turbine / "NRELOffshrBsline5MW_AeroDyn_blade.dat").read_text().split("\n")
+        first = next(k for k, line in enumerate(lines) if "NumBlNds" in line)
+        nodes = [line.split() for line in lines[first + 3 : first + 3 + int(lines[first].split()[0])]]
+        nodes[-1][0] = "61.5"  # 61.4999 in the deck, for the sake of BeamDyn
+        nodes = [" ".join([row[0], "0 0 0", *row[4:]]) for row in nodes]
+        return text, "\n".join([*lines[: first + 3], *nodes]) + "\n", self.turbine / "Airfoils"
+
+    def _hydrodyn(self):
+        """Return the text of HD.dat: three members; PotMod 1, without which the added matrices are unused."""
+        text = self.read("HydroDyn")
+        platform = filled(FLOATING, PtfmVol0=0, ExctnMod=0, RdtnMod=0)
+        damping = {(k, k): value for k, value in ((1, 1e5), (2, 1e5), (3, 1.3e5), (6, 1.3e7))}
+        entries = {"AddCLin": {(6, 6): 9.834e7}, "AddBLin": damping}
+        added = "".join(matrix(name, entries.get(name, {})) for name in MATRICES)
+        members = [row[:5] for row in section(text, "NMembers")]
+        strips = members_text(
+            ("1 0 0 1 0 0 1",), [" ".join(row[:6]) for row in section(text, "NJoints")],
+            [" ".join(row[:3]) for row in section(text, "NPropSets")],
+            [f"{row[0]} {self.coefficients}" for row in members],
+            [f"{' '.join(row)} 1 0 2.0 3 1 F" for row in members],
+        )  # fmt: skip
+        return f"v5\n-\n{platform}{added}" + filled(SIMPLE) + strips + filled(HYDRO_OUTPUT)
