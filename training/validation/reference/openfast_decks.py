@@ -333,6 +333,8 @@ class Deck:
         text = put(self._servodyn(), PCMode=control, VSContrl=1 if stop is not None else control,
                    DLL_FileName=f'"{library}"', DLL_InFile='"DISCON.IN"',
                    DLL_DT=case.get("control_dt", "0.025") if control else '"default"')  # fmt: skip
+        if case.get("individual"):
+            text = put(text, Ptch_Cntrl=1)
         if target is not None:
             text = put(text, **{f"TPitManS__{k}": 20.0 for k in BLADES},
                        **{f"PitManRat__{k}": 2.0 for k in BLADES},
@@ -400,7 +402,7 @@ class Volturnus(Deck):
             text = re.sub(r'^"[^"]*"(\s*! PerfFileName)', r'"Cp_Ct_Cq.txt"\1', self.discon.read_text(),
                           flags=re.M)  # fmt: skip
             if case.get("individual"):
-                text = put(text, IPC_ControlMode="1 !")
+                text = re.sub(r"^\S+(\s+! IPC_ControlMode)", r"1\1", text, flags=re.M)
             (folder / "DISCON.IN").write_text(text)
             shutil.copy(self.rotor / "Cp_Ct_Cq.IEA15MW.txt", folder / "Cp_Ct_Cq.txt")
         write_glue(folder, case, CompMooring=3 if case.get("moordyn") else 1)
