@@ -79,10 +79,8 @@ def _torque_loss(deck, **more):
 
 def _turbulent(deck, wind, **more):
     """Return a floating case with uniform turbulent wind, waves and controller."""
-    case = _start(deck, wind) | dict(t=600, dt=0.0125, dtout=0.05, waves=True, control=True, tower=2)
+    case = _start(deck, wind) | dict(t=400, dt=0.0125, dtout=0.05, waves=True, control=True, tower=2)
     file = INPUTS["hub_wind"] if wind == 18 else f"elastic/wind_hub_{wind}mps.csv.gz"
-    if deck is Oc3 and wind in (8, 24):  # shorter: run time
-        case["t"] = 400
     return deck, case | dict(wind="hub_wind", wind_file=file, torsion=deck is Oc3) | more
 
 
@@ -102,9 +100,11 @@ for _deck, _name in NAMES.items():
         "torque_loss": _torque_loss(_deck),
         "torque_loss_rigid_blades": _torque_loss(_deck, **_rigid),
         **{f"turb_{wind}mps": _turbulent(_deck, wind) for wind in OPERATING[_deck]},
-        **{f"turb_{wind}mps_dbemt": _turbulent(_deck, wind, dbemt=2, t=400) for wind in (12, 18)},
+        "turb_18mps_dbemt": _turbulent(_deck, 18, dbemt=2),
     }
     CASES |= {f"{_name}/{case}": settings for case, settings in _runs.items()}
+for _case in ("iea15/turb_12mps", "iea15/turb_24mps", "nrel5mw/turb_18mps"):
+    CASES[_case][1]["t"] = 600
 CASES |= {
     "iea15/turb_18mps_shear": _turbulent(Volturnus, 18, shear=0.2),
     "iea15/turb_18mps_shear_ipc": _turbulent(Volturnus, 18, shear=0.2, individual=True),
@@ -339,6 +339,7 @@ class Reduction:
             words = f"{TURBULENT}; from 100 s, 20 Hz; DEL_10Hz of every second row"
             self.table(f"{name}_turbulent", f"{name}/turb_*", lambda n, f: statistics(f), words)
             self.series(f"{name}/turb_*mps", SERIES, (BEGIN, 600.0), 0.1, TURBULENT, 4)
+        self.series("iea15/turb_18mps_shear*", SERIES, (BEGIN, 400.0), 0.1, TURBULENT, 4)
         self.table("lines", "lines/*", lambda n, f: statistics(f), f"{MOORED}; from 100 s, 20 Hz")
         moved = ("PtfmSurge", "PtfmHeave", "PtfmPitch")
         self.series("lines/[!o]*", (*moved, *TENSIONS), (BEGIN, 500.0), 0.1, MOORED, 5)
