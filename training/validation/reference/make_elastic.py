@@ -79,7 +79,7 @@ def _torque_loss(deck, **more):
 
 def _turbulent(deck, wind, **more):
     """Return a floating case with uniform turbulent wind, waves and controller."""
-    case = _start(deck, wind) | dict(t=400, dt=0.0125, dtout=0.05, waves=True, control=True, tower=2)
+    case = _start(deck, wind) | dict(t=600, dt=0.0125, dtout=0.05, waves=True, control=True, tower=2)
     file = INPUTS["hub_wind"] if wind == 18 else f"elastic/wind_hub_{wind}mps.csv.gz"
     return deck, case | dict(wind="hub_wind", wind_file=file, torsion=deck is Oc3) | more
 
@@ -100,14 +100,12 @@ for _deck, _name in NAMES.items():
         "torque_loss": _torque_loss(_deck),
         "torque_loss_rigid_blades": _torque_loss(_deck, **_rigid),
         **{f"turb_{wind}mps": _turbulent(_deck, wind) for wind in OPERATING[_deck]},
-        "turb_18mps_dbemt": _turbulent(_deck, 18, dbemt=2),
+        "turb_18mps_dbemt": _turbulent(_deck, 18, dbemt=2, t=400),
     }
     CASES |= {f"{_name}/{case}": settings for case, settings in _runs.items()}
-for _case in ("iea15/turb_12mps", "iea15/turb_24mps", "nrel5mw/turb_18mps"):
-    CASES[_case][1]["t"] = 600
 CASES |= {
-    "iea15/turb_18mps_shear": _turbulent(Volturnus, 18, shear=0.2),
-    "iea15/turb_18mps_shear_ipc": _turbulent(Volturnus, 18, shear=0.2, individual=True),
+    "iea15/turb_18mps_shear": _turbulent(Volturnus, 18, shear=0.2, t=400),
+    "iea15/turb_18mps_shear_ipc": _turbulent(Volturnus, 18, shear=0.2, individual=True, t=400),
     "iea15/check_18mps": _turbulent(Volturnus, 18, t=60),
     "iea15/check_18mps_fine": _turbulent(Volturnus, 18, t=60, dt=0.00625),
 }
