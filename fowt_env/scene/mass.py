@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fowt_env.descriptions.turbine import BLADE_MASSES
+from fowt_env.descriptions.rotor_mass import BLADE_MASSES
 from fowt_env.errors import InputError
 from fowt_env.plant.blade_outputs import BladeMasses
 from fowt_env.plant.channels import Layout
