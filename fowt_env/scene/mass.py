@@ -52,6 +52,11 @@ def _bodies(platform, turbine):
     ]
 
 
+def rotor_mass_matrix(rotor):
+    """Return (6, 6) mass matrix of a Rotor about the body origin."""
+    return assemble([_rotor_body(rotor)])
+
+
 def top_mass_matrix(platform, turbine):
     """Return (6, 6) mass matrix of nacelle and rotor about the body origin."""
     return assemble(_bodies(platform, turbine)[2:])
