@@ -86,6 +86,28 @@ def test_the_centrifugal_load_bends_the_coned_blades_as_in_openfast(iea15):
     assert not machine.steady_deflection(0.0).any()
 
 
+def test_the_load_on_a_bent_turning_blade_is_the_slope_of_its_kinetic_energy(iea15):
+    machine = _Turbine(*iea15, "modes2", "rigid", "rigid", "fixed", 0.3)
+    q, none = np.array([6.0, -2.0, 3.0]), np.zeros(3)
+    w = 0.9 * machine.blade_axes(0).T @ machine.shaft
+    (shape, _, shorter), z, mass = machine.nodes.shapes, machine.nodes.z, machine.nodes.mass
+
+    def energy(q):
+        p = np.array([q @ shape[:, 0], q @ shape[:, 1], z - 0.5 * np.einsum("i,ijk,j->k", q, shorter, q)])
+        return 0.5 * mass @ (np.cross(w, p.T) ** 2).sum(axis=1)
+
+    slope = [(energy(q + step) - energy(q - step)) / 2e-3 for step in 1e-3 * np.eye(3)]
+    load = machine.blade(q, none, none, none, w, none)[0] - machine.beam.K @ q
+    assert load == pytest.approx(-np.array(slope), rel=1e-5)
+
+
+def test_tower_hub_and_a_free_generator_act_on_each_other_alike():
+    platform, turbine = read_platform("nrel5mw_iti_barge"), read_turbine("nrel5mw_tilted")
+    mass = _Turbine(platform, turbine, "rigid", "modes2", "torsion", "free", 0.0).linear(1.0)[0]
+    assert np.abs(mass - mass.T).max() < 1e-9 * np.abs(mass[:5, :5]).max()
+    assert np.abs(mass[5, 1]) > 1e5  # of the generator and the second coordinate, side-side
+
+
 def test_the_land_based_5_mw_turbine_has_the_published_frequencies():
     """Within 0.7 %; the second asymmetric flapwise pair within 2.5 %: there the nacelle yaws on a spring."""
     platform, turbine = read_platform("nrel5mw_iti_barge"), read_turbine("nrel5mw_tilted")
