@@ -86,6 +86,8 @@ False  TeetDOF   - teeter
 "blade.dat"  BldFile(3) - blade
 98     GBoxEff   - %
 90     GBRatio   - ratio
+3.0E8  DTTorSpr  - N m/rad
+4.0E6  DTTorDmp  - N m s/rad
 False  Furling   - no
 300    TwrNodes  - nodes
 "tower.dat"  TwrFile - tower
@@ -94,11 +96,34 @@ False  Furling   - no
 BLADE = """------- BLADE -------
 falls to the tip
 2    NBlInpSt - stations
+0.5  BldFlDmp(1) - percent
+0.6  BldFlDmp(2)
+0.7  BldEdDmp(1)
+1.2  FlStTunr(1) - factors on the stiffness of modes
+1.3  FlStTunr(2)
 2.0  AdjBlMs  - factor
+1.5  AdjFlSt  - factor
+0.8  AdjEdSt  - factor
 BlFract PitchAxis StrcTwst BMassDen FlpStff EdgStff
 (-) (-) (deg) (kg/m) (Nm^2) (Nm^2)
-0.0 0.5 0.0 130.0 1e9 1e9
-1.0 0.5 0.0 70.0 1e9 1e9
+0.0 0.5 12.0 130.0 1e9 2e9
+1.0 0.5 -3.0 70.0 3e8 4e8
+---------------------- MODE SHAPES ---------------------------------------------
+0.9     BldFl1Sh(2) - of x^2
+0.5     BldFl1Sh(3) - of x^3
+-0.3    BldFl1Sh(4) - of x^4
+-0.2    BldFl1Sh(5) - of x^5
+0.1     BldFl1Sh(6) - of x^6
+-2.0    BldFl2Sh(2) - of x^2
+-3.0    BldFl2Sh(3) - of x^3
+1.0     BldFl2Sh(4) - of x^4
+6.0     BldFl2Sh(5) - of x^5
+-1.0    BldFl2Sh(6) - of x^6
+0.6     BldEdgSh(2) - of x^2
+0.7     BldEdgSh(3) - of x^3
+-0.4    BldEdgSh(4) - of x^4
+0.3     BldEdgSh(5) - of x^5
+-0.2    BldEdgSh(6) - of x^6
 """
 
 TOWER = """------- TOWER -------

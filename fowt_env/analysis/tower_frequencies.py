@@ -15,7 +15,7 @@ NAMES = {  # mode in each direction -> names, fore-aft and side-side
 }
 
 
-Bending = namedtuple("Bending", "fore_aft mass stiffness inertia weight")
+Bending = namedtuple("Bending", "fore_aft mass stiffness inertia weight damping top_motion")
 
 
 class TowerFrequency(NamedTuple):
@@ -37,7 +37,8 @@ def tower_frequencies(scene, mass, slopes, kinematics, count=None):
     if modes is None:
         return {}
     count = len(modes.fore_aft) if count is None else count
-    fore_aft, modal_mass, stiffness, inertia, weight = bending(scene.platform, scene.turbine, count)
+    tower = bending(scene.platform, scene.turbine, count)
+    fore_aft, modal_mass, stiffness, inertia, weight = tower[:5]
     n = len(fore_aft)
     whole = np.block([[mass, inertia], [inertia.T, modal_mass]])
     restoring = np.block([[-slopes, weight], [weight.T, stiffness]])
@@ -66,7 +67,9 @@ def bending(platform, turbine, count):
     """Return the Bending of an upright tower: linear equations of n deflections q coupled to the platform.
 
     fore_aft (n,) bool; mass (n, n) kg; stiffness (n, n) N/m, including weight; inertia and weight (6, n):
-    terms of the platform's equations in q'' and q. Nacelle and rotor are one rigid body at the tower top.
+    terms of the platform's equations in q'' and q; damping (n, n) N s/m; top_motion (6, n): velocity of the
+    body origin as a point of the nacelle, and angular velocity of the nacelle, per q'. Nacelle and rotor are
+    one rigid body at the tower top.
     """
     tower = build_tower_modes(platform, turbine, count, 0)
     gravity, height, slope = platform.environment.gravity, tower.top_height, tower.slope
@@ -87,4 +90,4 @@ def bending(platform, turbine, count):
     weight = np.zeros_like(inertia)
     weight[State.ROLL], weight[State.PLATFORM_PITCH] = across * aside, -along * aside
     mass, stiffness = tower.mass * aligned + moved.T @ top @ moved, tower.stiffness - gravity * hanging
-    return Bending(along == 1.0, mass, stiffness, inertia, weight)
+    return Bending(along == 1.0, mass, stiffness, inertia, weight, tower.damping, moved)

@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+BLADE_MASSES = ("blade_mass", "blade_first_moment", "blade_second_moment")  # of a Rotor, about the root
+
 
 class RotorMass(NamedTuple):
     """Holds the mass properties of a rotor of equal blades, isotropic for three or more blades."""

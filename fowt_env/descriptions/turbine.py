@@ -7,6 +7,13 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field, model_validator
 
+from fowt_env.descriptions.blade_structure import (
+    BladeStructure,
+    Shaft,
+    StructureTable,
+    mass_problems,
+    read_blade_structure,
+)
 from fowt_env.descriptions.checks import is_number
 from fowt_env.descriptions.files import DATA, column, locate, noted, raise_problems, read_table, read_toml
 from fowt_env.descriptions.protection import Protection
@@ -21,6 +28,7 @@ from fowt_env.descriptions.records import (
     to_si,
     validate,
 )
+from fowt_env.descriptions.rotor_mass import BLADE_MASSES
 from fowt_env.errors import InputError, unknown
 
 Vector3 = tuple[Finite, Finite, Finite]
@@ -37,7 +45,6 @@ class Nacelle(Record):
     cm_left: Finite = 0.0
 
 
-BLADE_MASSES = ("blade_mass", "blade_first_moment", "blade_second_moment")
 BLADE_SLACK = 1.01  # tolerance for rounded values of a turbine file, or bent blades
 
 
@@ -327,6 +334,8 @@ class Turbine(Record):
     gains: dict[str, PitchGains] = {}  # published ones; without any, derived (controllers/gains.py)
     protection: Protection = Protection()
     blade: Blade
+    blade_structure: BladeStructure | None = None  # of blades that bend; None: rigid blades alone
+    shaft_torsion: Shaft | None = None  # None: a rigid shaft alone
     discon: str | None = None  # path of a DISCON.IN of ROSCO for this turbine
     source: str = ""
 
@@ -348,6 +357,8 @@ class Turbine(Record):
             if not hub < radius < tip:
                 allowed = f"must be > hub_radius = {hub} and < tip_radius = {tip} m"
                 yield f"blade.radius.{i} = {radius:g}: {allowed}"
+        if self.blade_structure is not None:
+            yield from mass_problems(self.blade_structure, self.rotor)
 
 
 def turbine_file(name):
@@ -363,8 +374,8 @@ def turbine_names():
 def read_turbine(name_or_path: str | Path) -> Turbine:
     """Return the Turbine from a built-in name (turbine_names()) or a user's TOML file.
 
-    blade.stations and blade.polars are paths relative to the file or, if not there, to the folder of the
-    built-in turbines ("nrel5mw/blade.csv", "nrel5mw/polars"); so is discon.
+    blade.stations, blade.polars and blade_structure.distribution are paths relative to the file or, if not
+    there, to the folder of the built-in turbines ("nrel5mw/blade.csv", "nrel5mw/polars"); so is discon.
     """
     path = locate("turbine", name_or_path, turbine_names(), turbine_file)
     problems = []
@@ -373,6 +384,14 @@ def read_turbine(name_or_path: str | Path) -> Turbine:
     if blade is not None:
         with noted(blade_problems):
             data["blade"] = _read_blade(blade.blade, path.parent)
+    if "blade_structure" in data:
+        structure, wrong = validate(_StructureFile, {"blade_structure": data.pop("blade_structure")}, origin)
+        problems += wrong
+        if structure is not None:
+            table = structure.blade_structure
+            with noted(problems):
+                distribution = _beside(path.parent, table.distribution)
+                data["blade_structure"] = read_blade_structure(table, distribution)
     if isinstance(data.get("discon"), str):
         with noted(problems):
             discon = _beside(path.parent, data["discon"])
@@ -394,6 +413,10 @@ class _BladeTable(Record):
 
 class _BladeFile(Record):
     blade: _BladeTable
+
+
+class _StructureFile(Record):
+    blade_structure: StructureTable
 
 
 def _beside(folder, text):

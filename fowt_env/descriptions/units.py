@@ -4,6 +4,7 @@ from math import pi
 
 RPM = pi / 30.0  # rad/s
 DEGREE = pi / 180.0  # rad
+PERCENT = 0.01
 
 # Keys of files with values in another unit than that of the field: key in the file: (field, unit).
 FILE_UNITS = {
@@ -23,4 +24,5 @@ FILE_UNITS = {
     "cone_deg": ("cone", DEGREE),
     "region3_min_pitch_deg": ("region3_min_pitch", DEGREE),
     "gain_schedule_pitch_deg": ("gain_schedule_pitch", DEGREE),
+    "damping_ratio_percent": ("damping_ratio", PERCENT),
 }

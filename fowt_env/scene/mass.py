@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fowt_env.descriptions.turbine import BLADE_MASSES
+from fowt_env.descriptions.rotor_mass import BLADE_MASSES
 from fowt_env.errors import InputError
 from fowt_env.plant.blade_outputs import BladeMasses
 from fowt_env.plant.channels import Layout
@@ -50,6 +50,11 @@ def _bodies(platform, turbine):
         (nacelle.mass, (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height), nacelle.inertia),
         _rotor_body(turbine.rotor),
     ]
+
+
+def rotor_mass_matrix(rotor):
+    """Return (6, 6) mass matrix of a Rotor about the body origin."""
+    return assemble([_rotor_body(rotor)])
 
 
 def top_mass_matrix(platform, turbine):

@@ -1,4 +1,4 @@
-"""Plots box plots of runs, the steady schedule and response amplitude operators (RAOs).
+"""Plots box plots of runs, the steady schedule, response amplitude operators (RAOs) and Campbell diagrams.
 
 As in time_series.py every function returns a matplotlib Figure and writes the figure to `path` unless None.
 Needs matplotlib: pip install "fowt-env[plot]".
@@ -7,6 +7,7 @@ Needs matplotlib: pip install "fowt-env[plot]".
 import numpy as np
 from scipy.signal import csd, welch
 
+from fowt_env.descriptions.units import RPM
 from fowt_env.errors import InputError
 from fowt_env.visual.style import (
     COLOURS,
@@ -29,6 +30,7 @@ HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of c
 ENERGETIC = 0.02  # of the peak of the wave spectrum: minimum wave energy for the estimate of an RAO
 COHERENT = 0.5  # coherence above which an RAO is drawn solid
 RAO_RANGE = (0.015, 0.3)  # Hz: from below the resonances of spars and semi-submersibles to the end of waves
+CAMPBELL_RANGE = 10.0
 BOXES = tuple(
     panel for panel in PANELS if panel[1] not in ("Wind1VelX_[m/s]", "Wave1Elev_[m]", "GenTq_[kN-m]")
 )
@@ -134,6 +136,37 @@ def plot_schedule(points, path=None, title=None, *, rated_wind=None):
         for axes in cells[: min(3, len(cells))]:
             note(axes, f"rated {rated_wind:g} m/s", (rated_wind, 1.0), (3, -8))
     head_of(figure, cells, list(tables), title)
+    return save_figure(figure, path)
+
+
+def plot_campbell(campbell, path=None, title=None, *, harmonics=(1, 3, 6), rated_speed=None):
+    """Plot an analysis.campbell.Campbell: frequencies over rotor speed, with multiples of the rotor's (1P).
+
+    rated_speed: rad/s, marked by a line; None: not marked. Modes above CAMPBELL_RANGE times the lowest
+    frequency, as a stiff shaft has, are not shown.
+    """
+    if len(campbell.rotor_speed) < 2:
+        raise InputError("Campbell diagram: needs at least two rotor speeds")
+    speed = campbell.rotor_speed / RPM
+    figure = new_figure(8.6, 5.4)
+    axes = figure.subplots()
+    highest = CAMPBELL_RANGE * min(values.min() for values in campbell.frequency.values())
+    shown = {mode: values for mode, values in campbell.frequency.items() if values.max() <= highest}
+    style_axes(axes)
+    top = 1.05 * max(values.max() for values in shown.values())
+    for harmonic in harmonics:
+        axes.plot(speed, harmonic * speed / 60.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)), zorder=1)
+        note(axes, f"{harmonic}P", (speed[-1], min(harmonic * speed[-1] / 60.0 / top, 1.0)), (3, -3))
+    for number, (mode, values) in enumerate(shown.items()):
+        axes.plot(speed, values, linewidth=1.3, label=mode, **line_style(number))
+    if rated_speed is not None and speed[0] <= rated_speed / RPM <= speed[-1]:
+        axes.axvline(rated_speed / RPM, color=SOFT, linewidth=0.9, linestyle=":", zorder=1)
+        note(axes, f"rated {rated_speed / RPM:.4g} rpm", (rated_speed / RPM, 1.0), (3, -8))
+    axes.set_xlim(speed[0], speed[-1])
+    axes.set_ylim(0.0, top)
+    axes.set_xlabel("rotor speed (rpm)", fontsize=8, color=INK)
+    axes.set_ylabel("frequency (Hz)", fontsize=8.5, color=INK)
+    head_of(figure, [axes], list(shown), title)
     return save_figure(figure, path)
 
 

@@ -33,7 +33,7 @@ def platform_text(*changes):
 
 def turbine_text(*changes):
     """Text of the built-in turbine file with its blade named from the built-in folder, and replacements."""
-    text = TURBINE.read_text().replace('"blade.csv"', '"nrel5mw/blade.csv"')
+    text = TURBINE.read_text().replace('"blade', '"nrel5mw/blade')
     return changed(text.replace('"polars"', '"nrel5mw/polars"'), changes)
 
 

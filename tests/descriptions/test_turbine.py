@@ -32,6 +32,7 @@ GEARLESS = (
     ("gear_ratio = 97.0", "gear_ratio = 1.0"),
     ("rated_rotor_speed_rpm = 12.1 ", "rated_rotor_speed_rpm = 7.56 "),
     ('"blade.csv"', '"nrel5mw/blade.csv"'),
+    ('"blade_structure.csv"', '"nrel5mw/blade_structure.csv"'),
     ('"polars"', '"nrel5mw/polars"'),
 )
 
@@ -77,7 +78,7 @@ def test_a_law_that_is_not_complete_names_what_is_wrong(tmp_path, law, part):
 
 
 def test_a_discon_in_that_is_not_there_is_named(tmp_path):
-    text = turbine_file("nrel5mw").read_text().replace('"blade.csv"', '"nrel5mw/blade.csv"')
+    text = turbine_file("nrel5mw").read_text().replace('"blade', '"nrel5mw/blade')
     path = tmp_path / "mine.toml"
     path.write_text(
         text.replace('"polars"', '"nrel5mw/polars"').replace("[rotor]", 'discon = "no.IN"\n[rotor]')
@@ -124,7 +125,7 @@ def test_blades_and_hub_make_the_inertia_about_the_shaft(name, hub):
     ],
 )
 def test_impossible_masses_of_a_blade_are_named(tmp_path, change, part):
-    lines = turbine_file("nrel5mw").read_text().replace('"blade.csv"', '"nrel5mw/blade.csv"').split("\n")
+    lines = turbine_file("nrel5mw").read_text().replace('"blade', '"nrel5mw/blade').split("\n")
     key = change.split(" ")[0] or "blade_first_moment"
     text = "\n".join(change if line.startswith(f"{key} =") else line for line in lines)
     (tmp_path / "mine.toml").write_text(text.replace('"polars"', '"nrel5mw/polars"'))

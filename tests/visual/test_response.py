@@ -4,8 +4,15 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra `plot` is missing")
 
+from fowt_env.analysis.campbell import Campbell  # noqa: E402
 from fowt_env.errors import InputError  # noqa: E402
-from fowt_env.visual.response import plot_boxes, plot_raos, plot_schedule, response_operator  # noqa: E402
+from fowt_env.visual.response import (  # noqa: E402
+    plot_boxes,
+    plot_campbell,
+    plot_raos,
+    plot_schedule,
+    response_operator,
+)
 
 PNG = b"\x89PNG\r\n\x1a\n"
 
@@ -112,3 +119,17 @@ def test_every_plot_is_written_where_it_is_asked_for(tmp_path):
 def test_what_cannot_be_plotted_is_named(call, message):
     with pytest.raises(InputError, match=message):
         call()
+
+
+def test_a_campbell_diagram_has_a_line_per_mode_and_per_harmonic():
+    speed = np.array([0.0, 0.5, 1.0])
+    found = Campbell(speed, {"low": np.array([0.3, 0.3, 0.31]), "shaft": np.full(3, 9.0)}, {})
+    axes = plot_campbell(found, harmonics=(1, 3), rated_speed=0.8).axes[0]
+    assert [line.get_label() for line in axes.lines if line.get_label()[0] != "_"] == ["low"]
+    lines = [line.get_xydata() for line in axes.lines]
+    assert np.allclose(lines[1][-1], [30.0 / np.pi, 3.0 / (2.0 * np.pi)])
+    assert any(np.allclose(line[:, 0], 0.8 * 30.0 / np.pi) for line in lines)
+    assert axes.get_ylim()[1] < 0.4
+    assert {text.get_text() for text in axes.texts} == {"1P", "3P", "rated 7.639 rpm"}
+    with pytest.raises(InputError, match="at least two rotor speeds"):
+        plot_campbell(Campbell(speed[:1], {"low": np.array([0.3])}, {}))

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from fowt_env.descriptions.rotor_mass import rotor_mass_properties
-from fowt_env.descriptions.units import DEGREE, RPM
+from fowt_env.descriptions.units import DEGREE, PERCENT, RPM
 from fowt_env.files.openfast_deck.hydrodyn import is_old
 from fowt_env.files.openfast_deck.rosco_files import DISCON
 from fowt_env.files.openfast_deck.servodyn import LEGACY_SOURCE
@@ -216,20 +216,22 @@ def _tower_rows(deck, distribution):
     if modes is None:
         return tables
 
-    def factors(tuner):
-        return tuner if set(tuner) != {1.0} else None
-
     return tables | {"tower.modes": [
         ("distribution", distribution, "tower: TMassDen, TwFAStif, TwSSStif, with AdjTwMa, AdjFASt, AdjSSSt"),
         ("fore_aft", modes.fore_aft, "tower: TwFAM1Sh, TwFAM2Sh, of the powers 2 to 6"),
         ("side_side", modes.side_side, "tower: TwSSM1Sh, TwSSM2Sh"),
         ("fore_aft_damping", modes.fore_aft_damping, "tower: TwrFADmp"),
         ("side_side_damping", modes.side_side_damping, "tower: TwrSSDmp"),
-        ("fore_aft_tuner", factors(modes.fore_aft_tuner), "tower: FAStTunr"),
-        ("side_side_tuner", factors(modes.side_side_tuner), "tower: SSStTunr"),
+        ("fore_aft_tuner", _factors(modes.fore_aft_tuner), "tower: FAStTunr"),
+        ("side_side_tuner", _factors(modes.side_side_tuner), "tower: SSStTunr"),
         ("top_mass", modes.top_mass or None, "ElastoDyn: YawBrMass, in the mass above too"),
         ("elements", modes.elements, "ElastoDyn: TwrNodes"),
     ]}  # fmt: skip
+
+
+def _factors(tuner):
+    """Return the stiffness tuners of modes; None if all are 1."""
+    return tuner if set(tuner) != {1.0} else None
 
 
 def draft(deck):
@@ -317,6 +319,10 @@ def turbine_rows(deck, name):
             ("bearing_loss", 0.0, "none in ElastoDyn"),
             of_control("generator_efficiency"),
         ],
+        "shaft_torsion": [] if values.shaft is None else [
+            ("stiffness", values.shaft.stiffness, source("DTTorSpr")),
+            ("damping", values.shaft.damping, source("DTTorDmp")),
+        ],
         "pitch_drive": [
             of_control("time_constant"),
             of_control("rate_limit_deg_per_s", "pitch_rate", DEGREE),
@@ -344,4 +350,24 @@ def turbine_rows(deck, name):
             ("gain_schedule_pitch", half, "rad, at which the gains are halved"),
         ]
     tables["blade"] = [("stations", "blade.csv"), ("polars", "polars")]
+    tables["blade_structure"] = _structure_rows(values.structure)
     return tables
+
+
+def _structure_rows(structure):
+    """Return the rows of [blade_structure] of a BladeStructure; none for None."""
+    if structure is None:
+        return []
+    of = "ElastoDyn blade: "
+    columns = "StrcTwst, BMassDen, FlpStff, EdgStff, with AdjBlMs, AdjFlSt, AdjEdSt"
+    return [
+        ("distribution", "blade_structure.csv", of + columns),
+        ("flap_1", structure.flap_1, of + "BldFl1Sh, of the powers 2 to 6"),
+        ("flap_2", structure.flap_2, of + "BldFl2Sh"),
+        ("edge_1", structure.edge_1, of + "BldEdgSh"),
+        ("damping_ratio_percent", [ratio / PERCENT for ratio in structure.damping_ratio],
+         of + "BldFlDmp, BldEdDmp"),
+        ("flap_tuner", _factors(structure.flap_tuner), of + "FlStTunr"),
+        ("tip_mass", structure.tip_mass or None, "ElastoDyn: TipMass(1), in blade_mass too"),
+        ("elements", structure.elements, "ElastoDyn: BldNodes"),
+    ]  # fmt: skip

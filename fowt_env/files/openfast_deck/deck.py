@@ -83,7 +83,8 @@ def read_deck(fst=None, parts=None, folders=(), discon=None):
     if "mooring" in parts:
         lines, more = read_mooring(kind, parts["mooring"], site.water_depth, site.water_density, site.gravity)
     if main is not None and main.whole("CompElast", default=1) == 2:
-        more.append(("blades of BeamDyn (CompElast 2)", "rigid, with the masses of ElastoDyn's BldFile"))
+        here = "rigid, or with the option blades the modes of ElastoDyn's BldFile; its masses"
+        more.append(("blades of BeamDyn (CompElast 2)", here))
     control = read_control(
         parts.get("servodyn"), elastodyn["GBRatio"], discon, folders, site.air_density, elastodyn["TipRad"]
     )

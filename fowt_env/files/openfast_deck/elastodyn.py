@@ -9,9 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fowt_env.descriptions.blade_structure import LARGEST as DISTRIBUTED
+from fowt_env.descriptions.blade_structure import SHAPES, BladeStructure, Shaft
 from fowt_env.descriptions.records import validate
 from fowt_env.descriptions.rotor_mass import BladeMass, blade_mass
 from fowt_env.descriptions.tower_modes import COLUMNS, TowerBending
+from fowt_env.descriptions.units import DEGREE, PERCENT
 from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile
 
@@ -19,7 +22,9 @@ MASS = {"low": 0.0, "high": 1e12}  # kg
 INERTIA = {"low": 0.0, "high": 1e18}  # kg m2
 LENGTH = {"low": -1e4, "high": 1e4}  # m
 NODES = {"low": 1, "high": 999}
-LARGEST = {"kg/m": 1e9, "N m2": 1e18}
+RANGES = {"kg/m": (0.0, 1e9), "N m2": (0.0, 1e18), "deg": (-180.0, 180.0)}
+DAMPING = {"low": 0.0, "high": 99.0}  # percent of critical
+TUNER = {"low": 0.0, "high": 1e3, "open_low": True}
 FIGURES = {
     **dict.fromkeys("OverHang NacCMxn NacCMyn NacCMzn Twr2Shft TowerHt TowerBsHt PtfmCMzt".split(), LENGTH),
     **dict.fromkeys("HubCM PtfmCMxt PtfmCMyt".split(), LENGTH | {"default": 0.0}),
@@ -53,9 +58,11 @@ class ElastoDyn:
     blades: int
     blade: BladeMass
     tower: tuple  # mass (kg), first (kg m) and second (kg m2) moment about the base of the tower
+    structure: BladeStructure | None  # of a blade file with mode shapes
+    shaft: Shaft | None
     bending: TowerBending | None  # of a tower file with mode shapes
     platform_products: list  # PtfmXYIner, PtfmYZIner, PtfmXZIner, kg m2
-    flexible: list  # names of enabled degrees of freedom that the plant lacks
+    flexible: list  # names of enabled degrees of freedom of FLEXIBLE
     notes: list  # (feature of the deck, treatment in the plant)
 
     def __getitem__(self, key):
@@ -92,17 +99,20 @@ def read_elastodyn(path, folders=()):
     if values["OverHang"] > 0.0:
         raise file.wrong("OverHang", values["OverHang"], "<= 0: downwind rotors cannot be represented")
     tower_file, tower, bending = _tower(file, folders, values)
-    blade_file, blade = _blade(file, folders, values, blades)
+    blade_file, blade, structure = _blade(file, folders, values, blades)
     products = [file.number(f"Ptfm{name}Iner", default=0.0) for name in ("XY", "YZ", "XZ")]
     flexible = [what for key, what in FLEXIBLE.items() if file.flag(key, default=False)]
     notes = [row for part in (file, blade_file, tower_file) for row in differences(part)]
-    return ElastoDyn(file, values, blades, blade, tower, bending, products, flexible, notes)
+    shaft = _shaft(file)
+    return ElastoDyn(
+        file, values, blades, blade, tower, structure, shaft, bending, products, flexible, notes
+    )
 
 
 def _distributed(file, count_key, first, *columns):
     """Return [(n,) fraction of the length, then (n,) of each column] of a blade or tower file.
 
-    columns: (name, unit, key of the column's factor); values are from 0 to 1e9 kg/m or to 1e18 N m2.
+    columns: (name, unit of RANGES, key of the column's factor or None).
     """
     count = file.whole(count_key, low=2, high=10_000)
     rows = file.headed(first, count)
@@ -113,23 +123,59 @@ def _distributed(file, count_key, first, *columns):
     result = [station]
     for name, unit, factor in columns:
         file.need(rows[0], name)
-        adjust = file.number(factor, default=1.0, low=0.0, high=1e3)
+        adjust = 1.0 if factor is None else file.number(factor, default=1.0, low=0.0, high=1e3)
+        low, high = RANGES[unit]
         for line, cells in rows:
-            if not 0.0 <= cells[name.lower()] <= LARGEST[unit]:
-                allowed = f"must be from 0 to {LARGEST[unit]:g} {unit}"
+            if not low <= cells[name.lower()] <= high:
+                allowed = f"must be from {low:g} to {high:g} {unit}"
                 raise file.refusal(f"{name} = {cells[name.lower()]:g}: {allowed}", line)
         result.append(adjust * np.array([cells[name.lower()] for _, cells in rows]))
     return result
 
 
 def _blade(file, folders, values, blades):
-    """Return (file, BladeMass) of the blade file, including the tip mass."""
+    """Return (file, BladeMass with the tip mass, BladeStructure or None) of the blade file."""
     nodes = file.whole("BldNodes", default=50, **NODES)
     part = PartFile(file.blade("BldFile", blades, folders), "ElastoDyn blade")
     station, density = _distributed(part, "NBlInpSt", "BlFract", ("BMassDen", "kg/m", "AdjBlMs"))
     tip = values["TipRad"]
     blade = blade_mass(station, density, values["HubRad"], tip, nodes)
-    return part, BladeMass(np.append(blade.radius, tip), np.append(blade.mass, values["TipMass"]))
+    whole = BladeMass(np.append(blade.radius, tip), np.append(blade.mass, values["TipMass"]))
+    return part, whole, _structure(part, nodes, values["TipMass"])
+
+
+def _structure(blade, nodes, tip_mass):
+    """Return the BladeStructure of a blade file; None without mode shapes, or with zero mass or stiffness."""
+    if not blade.has("BldFl1Sh(2)"):
+        return None
+    station, twist, *positive = _distributed(
+        blade, "NBlInpSt", "BlFract", ("StrcTwst", "deg", None), ("BMassDen", "kg/m", "AdjBlMs"),
+        ("FlpStff", "N m2", "AdjFlSt"), ("EdgStff", "N m2", "AdjEdSt"),
+    )  # fmt: skip
+    if min(map(np.min, positive)) <= 0.0 or (station[0], station[-1]) != (0.0, 1.0):
+        return None
+    keys = dict(zip(SHAPES, ("BldFl1Sh", "BldFl2Sh", "BldEdgSh"), strict=True))
+    percent = [blade.number(key, **DAMPING) for key in ("BldFlDmp(1)", "BldFlDmp(2)", "BldEdDmp(1)")]
+    values = {"span_fraction": station, "structural_twist": DEGREE * twist}
+    values |= dict(zip(DISTRIBUTED, positive, strict=True)) | {
+        **{name: tuple(blade.number(f"{key}({i})") for i in range(2, 7)) for name, key in keys.items()},
+        "damping_ratio": tuple(PERCENT * value for value in percent),
+        "flap_tuner": tuple(blade.number(f"FlStTunr({i})", default=1.0, **TUNER) for i in (1, 2)),
+        "tip_mass": tip_mass,
+        "elements": nodes,
+    }
+    structure, problems = validate(BladeStructure, values)
+    if problems:
+        raise blade.refusal("; ".join(problems))
+    return structure
+
+
+def _shaft(file):
+    """Return the Shaft of an ElastoDyn file; None without stiffness."""
+    stiffness = file.number("DTTorSpr", default=0.0, low=0.0, high=1e18)
+    if stiffness == 0.0:
+        return None
+    return Shaft(stiffness=stiffness, damping=file.number("DTTorDmp", default=0.0, low=0.0, high=1e18))
 
 
 def _tower(file, folders, values):
@@ -159,7 +205,7 @@ def _bending(tower, nodes, top_mass):
     if min(map(np.min, columns[1:])) <= 0.0 or (station[0], station[-1]) != (0.0, 1.0):
         return None
 
-    def of_modes(name, factor=1.0, **limits):
+    def of_modes(name, limits, factor=1.0):
         return tuple(factor * tower.number(f"{name}({i})", default=1.0, **limits) for i in (1, 2))
 
     def shapes(letters):
@@ -167,14 +213,13 @@ def _bending(tower, nodes, top_mass):
             tuple(tower.number(f"Tw{letters}M{i}Sh({power})") for power in range(2, 7)) for i in (1, 2)
         )
 
-    damping, tuner = {"factor": 0.01, "low": 0.0, "high": 99.0}, {"low": 0.0, "high": 1e3, "open_low": True}
     values = dict(zip(COLUMNS, (tuple(column.tolist()) for column in columns), strict=True)) | {
         "fore_aft": shapes("FA"),
         "side_side": shapes("SS"),
-        "fore_aft_damping": of_modes("TwrFADmp", **damping),
-        "side_side_damping": of_modes("TwrSSDmp", **damping),
-        "fore_aft_tuner": of_modes("FAStTunr", **tuner),
-        "side_side_tuner": of_modes("SSStTunr", **tuner),
+        "fore_aft_damping": of_modes("TwrFADmp", DAMPING, PERCENT),
+        "side_side_damping": of_modes("TwrSSDmp", DAMPING, PERCENT),
+        "fore_aft_tuner": of_modes("FAStTunr", TUNER),
+        "side_side_tuner": of_modes("SSStTunr", TUNER),
         "top_mass": top_mass,
         "elements": nodes,
     }

@@ -14,7 +14,13 @@ from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.openfast_deck.conversion import platform_rows, stations, turbine_rows
 from fowt_env.files.openfast_deck.deck import read_deck
-from fowt_env.files.openfast_deck.output import blade_text, polar_text, toml_text, tower_text
+from fowt_env.files.openfast_deck.output import (
+    blade_text,
+    polar_text,
+    structure_text,
+    toml_text,
+    tower_text,
+)
 from fowt_env.files.openfast_deck.report import make_report, markdown
 from fowt_env.files.openfast_deck.rosco_files import DISCON, PERFORMANCE, discon_text
 
@@ -98,6 +104,11 @@ def _texts(deck, name, head):
         file = deck.elastodyn.file.text("TwrFile")
         title_line = f"Tower of {file}: mass density in kg/m, stiffness (EI) in N m2."
         texts[DISTRIBUTION] = tower_text(bending, [title_line, *head])
+    if deck.elastodyn.structure is not None:
+        file = deck.elastodyn.file.text("BldFile(1)", "BldFile").replace("\\", "/").rpartition("/")[2]
+        units = "structural twist in degrees, mass density in kg/m, stiffness (EI) in N m2"
+        title_line = f"Blade of {file}: {units}."
+        texts["turbine/blade_structure.csv"] = structure_text(deck.elastodyn.structure, [title_line, *head])
     blade = aero.blade_file.path.name
     texts["turbine/blade.csv"] = blade_text(*stations(deck), [
         f"Nodes of blade {blade}, with the end nodes 0.05 m inside root and tip, where loads are 0.",

@@ -152,7 +152,7 @@ ELASTODYN = _keys(
     " TowerHt TowerBsHt PtfmCMxt PtfmCMyt PtfmCMzt PtfmRefzt PtfmRef TipMass# HubMass HubIner GenIner"
     " NacMass NacYIner YawBrMass PtfmMass PtfmRIner PtfmPIner PtfmYIner PtfmXYIner PtfmYZIner PtfmXZIner"
     " BldNodes BldFile# BldFile GBoxEff GBRatio Furling TwrNodes TwrFile Gravity TeetDOF FlapDOF1 FlapDOF2"
-    " EdgeDOF DrTrDOF YawDOF TwFADOF1 TwFADOF2 TwSSDOF1 TwSSDOF2",
+    " EdgeDOF DrTrDOF YawDOF TwFADOF1 TwFADOF2 TwSSDOF1 TwSSDOF2 DTTorSpr DTTorDmp",
     {
         OUTPUT: _MODULE_OUTPUT + " OutFileFmt ShftGagL NcIMUxn NcIMUyn NcIMUzn AzimB1Up NTwGages TwrGagNd"
         " NBlGages BldGagNd BldNd_BladesOut BldNd_BlOutNd BldNd_BlOutNd_Str",
@@ -161,7 +161,7 @@ ELASTODYN = _keys(
         " PtfmHeave PtfmRoll PtfmPitch PtfmYaw",
         "teetering and furling, which are refused": "Delta3 TeetMod TeetDmpP TeetDmp TeetCDmp TeetSStP"
         " TeetHStP TeetSSSp TeetHSSp HubIner_Teeter FurlFile",
-        "of a degree of freedom that is rigid here, see its row": "DTTorSpr DTTorDmp YawFrctMod"
+        "of a degree of freedom that is rigid here, see its row": "YawFrctMod"
         " M_CSmax M_FCSmax M_MCSmax M_CD M_FCD M_MCD sig_v sig_v2 OmgCut PBrIner# BlPIner#",
     },
     PitchDOF=Otherwise(False, "blade pitch as a degree of freedom", "the pitch drive of the turbine file"),
@@ -180,13 +180,11 @@ ELASTODYN = _keys(
     },
 )  # fmt: skip
 ELASTODYN_BLADE = _keys(
-    "NBlInpSt AdjBlMs BlFract BMassDen",
+    "NBlInpSt AdjBlMs BlFract BMassDen BldFlDmp# BldEdDmp# FlStTunr# AdjFlSt AdjEdSt BldFl1Sh# BldFl2Sh#"
+    " BldEdgSh# StrcTwst FlpStff EdgStff",
     {
-        "stiffness, damping and shapes of flexible blades, see the rows of FlapDOF1, FlapDOF2 and EdgeDOF":
-        "BldFlDmp# BldEdDmp# FlStTunr# AdjFlSt AdjEdSt BldFl1Sh# BldFl2Sh# BldEdgSh# PitchAxis StrcTwst"
-        " FlpStff EdgStff",
         "columns and switches that ElastoDyn does not use": "CalcBMode GJStff EAStff Alpha FlpIner EdgIner"
-        " PrecrvRef PreswpRef FlpcgOf EdgcgOf FlpEAOf EdgEAOf AeroCent",
+        " PrecrvRef PreswpRef FlpcgOf EdgcgOf FlpEAOf EdgEAOf AeroCent PitchAxis",
     },
 )  # fmt: skip
 TOWER = _keys(

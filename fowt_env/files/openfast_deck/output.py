@@ -2,7 +2,10 @@
 
 import numpy as np
 
+from fowt_env.descriptions.blade_structure import COLUMNS as STRUCTURE_COLUMNS
+from fowt_env.descriptions.blade_structure import LARGEST
 from fowt_env.descriptions.tower_modes import COLUMNS
+from fowt_env.descriptions.units import DEGREE
 
 WIDTH = 40  # characters of a line before its comment
 
@@ -59,8 +62,20 @@ def blade_text(columns, airfoils, head):
 
 def tower_text(modes, head):
     """Return the text of the distribution file of a descriptions.tower_modes.TowerBending."""
-    rows = zip(*(getattr(modes, name) for name in COLUMNS), strict=True)
-    return table_text(COLUMNS, [[f"{value + 0.0:.10g}" for value in row] for row in rows], head)
+    return _numbers_text(COLUMNS, [getattr(modes, name) for name in COLUMNS], head)
+
+
+def structure_text(structure, head):
+    """Return the text of the distribution file of a descriptions.blade_structure.BladeStructure."""
+    columns = [structure.span_fraction, structure.structural_twist / DEGREE]
+    columns += [getattr(structure, name) for name in LARGEST]
+    return _numbers_text(STRUCTURE_COLUMNS, columns, head)
+
+
+def _numbers_text(names, columns, head):
+    """Return the text of a CSV file of columns of numbers, to ten digits."""
+    rows = [[f"{value + 0.0:.10g}" for value in row] for row in zip(*columns, strict=True)]
+    return table_text(names, rows, head)
 
 
 def polar_text(polar, head):

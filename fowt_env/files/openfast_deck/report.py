@@ -9,11 +9,15 @@ from fowt_env.files.openfast_deck.consistency import contradictions
 from fowt_env.files.openfast_deck.conversion import ballast, hub_place, mass_properties, rotor_mass
 from fowt_env.files.openfast_deck.hydrodyn import is_old
 
-TOWER_OPTIONS = {  # prefix of a degree of freedom's name: scene option that includes it
-    "first fore-aft": 'tower = "modes"',
-    "first side-to-side": 'tower = "modes"',
-    "second fore-aft": 'tower = "modes2"',
-    "second side-to-side": 'tower = "modes2"',
+OPTIONS = {  # degree of freedom: (data of ElastoDyn that the plant has then, scene option)
+    "first blade flap mode": ("structure", 'blades = "modes"'),
+    "first blade edge mode": ("structure", 'blades = "modes"'),
+    "second blade flap mode": ("structure", 'blades = "modes2"'),
+    "drivetrain torsion": ("shaft", 'shaft = "torsion"'),
+    "first fore-aft tower mode": ("bending", 'tower = "modes"'),
+    "first side-to-side tower mode": ("bending", 'tower = "modes"'),
+    "second fore-aft tower mode": ("bending", 'tower = "modes2"'),
+    "second side-to-side tower mode": ("bending", 'tower = "modes2"'),
 }
 
 
@@ -74,8 +78,8 @@ def _differences(deck):
     """Yield (feature of the deck, treatment in the plant) of all differences."""
     values, hydro = deck.elastodyn, deck.hydrodyn
     for what in values.flexible:
-        option = next((option for word, option in TOWER_OPTIONS.items() if what.startswith(word)), None)
-        available = values.bending is not None and option
+        part, option = OPTIONS.get(what, (None, None))
+        available = part is not None and getattr(values, part) is not None
         yield what, f"rigid; with the option {option} as in the deck" if available else "rigid"
     yield from values.notes
     if any(values.platform_products):

@@ -124,6 +124,47 @@ def test_tower_bends_with_the_shapes_damping_and_factors_of_its_file(imported):
     assert not any("tower mode" in what for what, _ in report.differences)  # the deck has them off
 
 
+def test_blades_bend_with_the_shapes_damping_and_factors_of_their_file(imported):
+    _, turbine, report, folder = imported
+    blade = turbine.blade_structure
+    assert blade.span_fraction.tolist() == [0.0, 1.0] and blade.mass_density.tolist() == [260.0, 140.0]
+    assert blade.structural_twist == pytest.approx(np.radians([12.0, -3.0]), rel=1e-9)
+    assert blade.flapwise_stiffness.tolist() == [1.5e9, 4.5e8]  # AdjFlSt 1.5
+    assert blade.edgewise_stiffness.tolist() == [1.6e9, 3.2e8]  # AdjEdSt 0.8
+    assert blade.flap_1 == (0.9, 0.5, -0.3, -0.2, 0.1) and blade.flap_2 == (-2.0, -3.0, 1.0, 6.0, -1.0)
+    assert blade.edge_1 == (0.6, 0.7, -0.4, 0.3, -0.2)
+    assert blade.damping_ratio == pytest.approx((0.005, 0.006, 0.007)) and blade.flap_tuner == (1.2, 1.3)
+    assert (blade.tip_mass, blade.elements) == (150.0, 400)
+    assert (turbine.shaft_torsion.stiffness, turbine.shaft_torsion.damping) == (3e8, 4e6)
+    text = (folder / "turbine" / "turbine.toml").read_text()
+    assert "BldFlDmp" in text and "DTTorSpr" in text
+    said = dict(report.differences)
+    assert said["first blade flap mode"] == 'rigid; with the option blades = "modes" as in the deck'
+    assert "drivetrain torsion" not in said  # the deck has none
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"blade": [("BldFl1Sh(2)", "BldOtherSh(2)")]},
+        {"blade": [("70.0 3e8", "70.0 0.0")]},
+        {"ElastoDyn": [("3.0E8  DTTorSpr", "0.0  DTTorSpr"), ("True   FlapDOF1", "True  DrTrDOF")]},
+    ],
+)
+def test_a_deck_without_shapes_or_stiffness_gives_a_rigid_part(tmp_path, changes):
+    report = import_deck(write_deck(tmp_path, **changes), tmp_path / "out")
+    turbine = read_turbine(tmp_path / "out" / "turbine" / "turbine.toml")
+    assert (turbine.blade_structure is None) == ("blade" in changes)
+    assert (turbine.shaft_torsion is None) == ("ElastoDyn" in changes)
+    what = "first blade flap mode" if "blade" in changes else "drivetrain torsion"
+    assert dict(report.differences)[what] == "rigid"
+
+
+def test_a_blade_shape_that_is_not_1_at_the_tip_is_refused_with_its_file(tmp_path):
+    text = refused(tmp_path, blade=[("0.6     BldEdgSh(2)", "0.5     BldEdgSh(2)")])
+    assert "blade.dat" in text and "edge_1: adds up to 0.9" in text
+
+
 def test_a_deck_whose_tower_bends_says_which_option_has_it(tmp_path):
     path = write_deck(tmp_path, ElastoDyn=[("False  TwFADOF1", "True   TwFADOF1")])
     said = dict(import_deck(path, tmp_path / "out").differences)["first fore-aft tower mode"]
@@ -569,7 +610,7 @@ def test_the_legacy_controller_of_the_5_mw_turbine_is_known_by_its_library(tmp_p
         ("MAP", "chain  0.1  100.0", "chain  0.5  100.0", ("chain", "must be > 0")),
         ("AeroDyn", "1        NumAFfiles", "1        StallMod", ("AeroDyn 14",)),
         ("polar", "-180.0 0.0 0.02 0.03\n   0.0 0.4", "-90.0 0.0 0.02 0.03\n   0.0 0.4", ("-180 to 180",)),
-        ("blade", "1.0 0.5 0.0 70.0", "0.0 0.5 0.0 70.0", ("blade.dat", "increase")),
+        ("blade", "1.0 0.5 -3.0 70.0", "0.0 0.5 -3.0 70.0", ("blade.dat", "increase")),
     ],
 )  # fmt: skip
 def test_what_cannot_be_represented_is_refused_by_file_line_and_key(tmp_path, part, old, new, expected):

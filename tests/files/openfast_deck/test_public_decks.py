@@ -53,6 +53,7 @@ BY_HAND = {  # keys of the built-in files whose values the import does not give
 }
 FILES = {  # whose names differ
     "platform.tower.modes.distribution", "platform.potential_flow.coefficients", "turbine.discon",
+    "turbine.blade_structure.distribution",
 }  # fmt: skip
 
 
@@ -133,14 +134,17 @@ def test_every_number_of_the_built_in_files_comes_from_the_deck(imported):
 
 
 def test_blade_tower_and_polars_are_the_built_in_ones(imported):
-    blade = tomllib.loads(imported.built_in_turbine.read_text())["blade"]
+    tables = tomllib.loads(imported.built_in_turbine.read_text())
     folder, ours = imported.built_in_turbine.parent, imported.folder / "turbine"
-    polars = next(place / blade["polars"] for place in (folder, folder.parent)
-                  if (place / blade["polars"]).is_dir())  # fmt: skip
+    polars, structure = (
+        next(place / name for place in (folder, folder.parent) if (place / name).exists())
+        for name in (tables["blade"]["polars"], tables["blade_structure"]["distribution"])
+    )
     tower = imported.built_in.with_name(f"{imported.name}_tower.csv")
     pairs = [(ours / "blade.csv", folder / "blade.csv"), (imported.folder / "tower.csv", tower)]
+    pairs += [(ours / "blade_structure.csv", structure)]
     pairs += [(path, polars / path.name) for path in (ours / "polars").iterdir()]
-    assert len(pairs) == 2 + len(list(polars.iterdir()))
+    assert len(pairs) == 3 + len(list(polars.iterdir()))
     for ours, stored in pairs:
         assert table(ours) == table(stored), ours.name
 

@@ -1,0 +1,230 @@
+"""Integrates mass, stiffness and shapes of a blade along its bending modes.
+
+Axes of a blade, which turn with its pitch: z from the apex along the pitch axis to the tip; x, at zero
+pitch, normal to the cone of the pitch axes, downwind; y = z cross x, at zero pitch against the rotation. A
+particle at the distance z from the apex lies at (U1 q, U2 q, z - q S q / 2): deflections by shapes times
+modal coordinates q (m), and the shortening of the bent axis. All integrals are ElastoDyn's sums over equal
+elements (subroutine Coeff).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.descriptions.blade_structure import SHAPES
+from fowt_env.errors import InputError
+from fowt_env.scene.tower import shape_values
+
+MODES = {  # option blades: modes of each blade, from SHAPES
+    "rigid": (),
+    "modes": ("flap_1", "edge_1"),
+    "modes2": ("flap_1", "flap_2", "edge_1"),
+}
+
+
+class Beam(NamedTuple):
+    """Holds the integrals of a beam that bends by n modes: sums over its particles m of products of shapes.
+
+    Positions are in the beam's axes from its origin: the apex of a rotor.
+    """
+
+    count: tuple  # (0,) * n: the number of modes as a type
+    mass: float  # kg
+    first: float  # m z, kg m
+    second: float  # m z^2, kg m2
+    a: np.ndarray  # (n,) kg: m U1
+    b: np.ndarray  # (n,) kg: m U2
+    e: np.ndarray  # (n,) kg m: m z U1
+    f: np.ndarray  # (n,) kg m: m z U2
+    A: np.ndarray  # (n, n) kg: m U1 U1
+    B: np.ndarray  # (n, n) kg: m U2 U2
+    C: np.ndarray  # (n, n) kg: m U1 U2, rows of U1
+    S0: np.ndarray  # (n, n) kg/m: m S
+    S1: np.ndarray  # (n, n) kg: m z S
+    P: np.ndarray  # (n, n, n) kg/m: m U1 S, first axis of U1
+    Q: np.ndarray  # (n, n, n) kg/m: m U2 S, first axis of U2
+    T: np.ndarray  # (n, n, n, n) kg/m2: m S S
+    K: np.ndarray  # (n, n) N/m: structural stiffness, without gravity and rotation
+    D: np.ndarray  # (n, n) N s/m: structural damping
+
+
+class Shapes(NamedTuple):
+    """Holds the shapes of n modes at m points of a beam, each per metre of a modal coordinate."""
+
+    U: np.ndarray  # (n, 2, m) -: deflection along x and y
+    slope: np.ndarray  # (n, 2, m) 1/m: derivative of the deflection along z
+    S: np.ndarray  # (n, n, m) 1/m: the beam is shorter by q S q / 2 up to the point
+
+
+class BeamNodes(NamedTuple):
+    """Holds the particles of a beam, from root to tip: the ends and the midpoints of the elements between."""
+
+    z: np.ndarray  # (m,) m from the beam's origin
+    outer: np.ndarray  # (m,) m, outer end of each element
+    length: np.ndarray  # (m,) m of each element, 0 at both ends
+    mass: np.ndarray  # (m,) kg
+    shapes: Shapes
+
+
+def blade_modes(turbine, modes):
+    """Return the names of the modes of an option "modes" or "modes2". Raises: InputError."""
+    if turbine.blade_structure is None:
+        raise InputError(
+            f"blades = {modes!r}: the turbine {turbine.name!r} has no [blade_structure] in its file; allowed:"
+            " 'rigid'"
+        )
+    return MODES[modes]
+
+
+def blade_beam(turbine, modes, station=None):
+    """Return the Beam of one blade about the apex; None for "rigid".
+
+    modes: "rigid", "modes" (first flapwise, first edgewise) or "modes2" (second flapwise, too, in the order
+    flap 1, flap 2, edge 1). station: distance (m) from the apex, of the Beam of the part outside of it
+    alone, without stiffness and damping: its loads are the internal loads at the station. An element that
+    the station cuts counts by its outer part, as one particle. Raises: InputError for a turbine without
+    [blade_structure].
+    """
+    if modes == "rigid":
+        return None
+    names = blade_modes(turbine, modes)
+    nodes = blade_nodes(turbine, names)
+    zero = np.zeros((len(names), len(names)))
+    if station is not None:
+        return integrated(outer_part(nodes, station), zero, zero)
+    return integrated(nodes, *_stiffness_and_damping(turbine, names))
+
+
+def integrated(nodes, stiffness, damping):
+    """Return the Beam of BeamNodes with (n, n) stiffness (N/m) and damping (N s/m)."""
+    m, z, (u1, u2), s = nodes.mass, nodes.z, np.swapaxes(nodes.shapes.U, 0, 1), nodes.shapes.S
+
+    def total(axes, *factors):
+        return np.ascontiguousarray(np.einsum(axes, *factors))
+
+    return Beam(
+        count=(0,) * len(u1),
+        mass=float(m.sum()),
+        first=float(m @ z),
+        second=float(m @ z**2),
+        a=u1 @ m,
+        b=u2 @ m,
+        e=u1 @ (m * z),
+        f=u2 @ (m * z),
+        A=total("k,ik,jk->ij", m, u1, u1),
+        B=total("k,ik,jk->ij", m, u2, u2),
+        C=total("k,ik,jk->ij", m, u1, u2),
+        S0=total("k,ijk->ij", m, s),
+        S1=total("k,ijk->ij", m * z, s),
+        P=total("k,ik,jlk->ijl", m, u1, s),
+        Q=total("k,ik,jlk->ijl", m, u2, s),
+        T=total("k,ijk,lnk->ijln", m, s, s),
+        K=np.ascontiguousarray(stiffness),
+        D=np.ascontiguousarray(damping),
+    )
+
+
+def blade_nodes(turbine, names=SHAPES):
+    """Return the BeamNodes of one blade with the modes of these names: root, elements, tip.
+
+    Slopes, shapes and shortening are sums of half elements from the root on, as ElastoDyn's.
+    """
+    structure, rotor = turbine.blade_structure, turbine.rotor
+    lumps = structure.lumps(rotor.hub_radius, rotor.tip_radius)
+    x, length, curvature = _elements(turbine, names)
+    twist = np.interp(x, structure.span_fraction, structure.structural_twist)
+    flapwise, edgewise = [np.cos(twist), -np.sin(twist)], [np.sin(twist), np.cos(twist)]
+    axes = np.array([edgewise if name.startswith("edge") else flapwise for name in names])
+    slope = _summed(curvature[:, None] * axes, length)
+    shape = _summed(slope[..., 1:-1], length)
+    shortening = _summed(np.einsum("iak,jak->ijk", slope, slope)[..., 1:-1], length)
+    ends = np.concatenate([[0.0], np.full(len(x), length), [0.0]])
+    z = np.concatenate([[rotor.hub_radius], lumps.radius])
+    mass = np.concatenate([[0.0], lumps.mass])
+    return BeamNodes(z, z + 0.5 * ends, ends, mass, Shapes(shape, slope, shortening))
+
+
+def outer_part(nodes, station):
+    """Return the BeamNodes outside of a station (m from the origin); a cut element by its outer part."""
+    inside = station - (nodes.outer - nodes.length)
+    share = np.ones_like(nodes.mass)
+    whole = nodes.length > 0.0
+    share[whole] = 1.0 - np.clip(inside[whole] / nodes.length[whole], 0.0, 1.0)
+    share[~whole] = nodes.z[~whole] >= station
+    z = np.where(share < 1.0, nodes.outer - 0.5 * share * nodes.length, nodes.z)
+
+    def moved(values):
+        return np.apply_along_axis(lambda row: np.interp(z, nodes.z, row), -1, values)
+
+    return nodes._replace(z=z, mass=share * nodes.mass, shapes=Shapes(*map(moved, nodes.shapes)))
+
+
+def shapes_at(turbine, modes, radii):
+    """Return the Shapes of a blade's modes at distances radii (m,) from the apex along the pitch axis, in m.
+
+    As OpenFAST passes motions from ElastoDyn's nodes to AeroDyn's (Line2 of ModMesh_Mapping): weighted by
+    the distance, each of the two neighbours moves the point as a rigid body, with its slope. Slopes are
+    linear between the neighbours. A point beyond root or tip moves with that end. Raises: InputError.
+    """
+    nodes = blade_nodes(turbine, blade_modes(turbine, modes))
+    return shapes_between(nodes, np.asarray(radii, dtype=float))
+
+
+def shapes_between(nodes, z):
+    """Return the Shapes of BeamNodes at distances z (m,) from the origin (shapes_at)."""
+    left = np.clip(np.searchsorted(nodes.z, z, side="right") - 1, 0, len(nodes.z) - 2)
+    weight = np.clip((z - nodes.z[left]) / (nodes.z[left + 1] - nodes.z[left]), 0.0, 1.0)
+    shape, slope, shortening = nodes.shapes
+    square = np.einsum("iak,jak->ijk", slope, slope)
+
+    def mixed(values, rates):
+        one, two = (values[..., k] + rates[..., k] * (z - nodes.z[k]) for k in (left, left + 1))
+        return (1.0 - weight) * one + weight * two
+
+    return Shapes(mixed(shape, slope), mixed(slope, np.zeros_like(slope)), mixed(shortening, square))
+
+
+def _summed(values, length):
+    """Return (..., m + 2) integrals of midpoint values (..., m) at the root, at the midpoints, at the tip."""
+    ends = np.cumsum(length * values, axis=-1)
+    root = np.zeros_like(values[..., :1])
+    middles = np.concatenate([root, ends[..., :-1]], axis=-1) + 0.5 * length * values
+    return np.concatenate([root, middles, ends[..., -1:]], axis=-1)
+
+
+def _elements(turbine, names):
+    """Return the elements' (m,) span fractions, their length (m), (n, m) curvatures of the modes, 1/m2."""
+    structure, span = turbine.blade_structure, turbine.rotor.tip_radius - turbine.rotor.hub_radius
+    x = (np.arange(structure.elements) + 0.5) / structure.elements
+    curvature = shape_values(_coefficients(structure, names), x, 2).T / span**2
+    return x, span / structure.elements, curvature
+
+
+def _coefficients(structure, names):
+    """Return the (n, 5) coefficients of the modes' polynomials."""
+    return np.array([getattr(structure, name) for name in names])
+
+
+def _stiffness_and_damping(turbine, names):
+    """Return the (n, n) structural stiffness and damping of a blade's modes.
+
+    Flapwise and edgewise modes are uncoupled. ElastoDyn's damping uses the frequency of the polynomial shape
+    without twist, tip mass and rotation.
+    """
+    structure, rotor = turbine.blade_structure, turbine.rotor
+    x, length, curvature = _elements(turbine, names)
+    edge = np.array([name.startswith("edge") for name in names])
+    mine = [SHAPES.index(name) for name in names]
+    tuner = np.array([*structure.flap_tuner, 1.0])[mine]
+    stiffness = np.zeros((len(names), len(names)))
+    for rows, values in (
+        (np.flatnonzero(~edge), structure.flapwise_stiffness),
+        (np.flatnonzero(edge), structure.edgewise_stiffness),
+    ):
+        line = length * np.interp(x, structure.span_fraction, values)
+        stiffness[np.ix_(rows, rows)] = np.einsum("k,ik,jk->ij", line, curvature[rows], curvature[rows])
+    stiffness *= np.sqrt(np.outer(tuner, tuner))
+    mass = structure.lumps(rotor.hub_radius, rotor.tip_radius).mass[:-1]
+    generalised = mass @ shape_values(_coefficients(structure, names), x) ** 2
+    bare = np.sqrt(np.diag(stiffness) / generalised)  # rad/s
+    return stiffness, stiffness * (2.0 * np.array(structure.damping_ratio)[mine] / bare)
