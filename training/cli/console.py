@@ -31,7 +31,8 @@ OUTPUTS = {  # output parameters of commands -> arguments of output(), which che
 err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
 MODULES = (  # modules that add commands to the app
     "simulate", "listing", "check", "evaluate", "validate", "doctor", "warmup", "cache", "benchmark",
-    "design", "plot", "report", "scores", "leaderboard", "import_deck", "hydro", "train", "serve", "compare",
+    "design", "plot", "report", "scores", "leaderboard", "import_deck", "hydro", "train", "serve",
+    "compare", "export_fmu",
 )  # fmt: skip
 GROUPS = {  # headings of fowt --help -> their commands, in the order shown
     "Run": ("simulate", "trim", "plot", "compare", "animate", "check", "import", "hydro"),
