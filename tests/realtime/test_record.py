@@ -1,8 +1,11 @@
+import re
 import struct
 
 import numpy as np
 import pytest
+from doc_pages import DOCS
 
+from fowt_env.realtime import record as records
 from fowt_env.realtime.record import (
     HEADER,
     Kind,
@@ -73,3 +76,22 @@ def test_a_command_must_be_finite_and_complete(payload):
     assert command_values(unpack(GOOD), 2) == (0.0, 0.0)
     with pytest.raises(Malformed, match="command"):
         command_values(Record(Kind.COMMAND, payload=payload), 2)
+
+
+TYPES = {"char[4]": "4s", "uint16": "H", "uint32": "I", "float64": "d"}
+
+
+def test_the_page_describes_the_header_and_the_kinds_as_they_are():
+    page = (DOCS / "guides/hardware-in-the-loop.md").read_text()
+    table = [line for line in (records.__doc__ or "").splitlines() if line.startswith("|")]
+    assert "\n".join(table) in page
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table[2:]]
+    form = "<"
+    for byte, kind, _, _ in rows:
+        assert int(byte) == struct.calcsize(form)
+        form += TYPES[kind]
+    assert form == HEADER.format
+    told = re.findall(r"^\| (\d) \| ([A-Z]+) \|", page, re.M)
+    assert told == [(str(int(kind)), kind.name) for kind in Kind]
+    assert f"The version is {records.VERSION}." in page
+    assert [int(n) for n in re.findall(r"Flags: (\d) .*?; (\d) ", page)[0]] == list(records.Flag)
