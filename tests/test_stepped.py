@@ -1,12 +1,13 @@
 """Runs advanced by single control periods have the rows of simulate."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from served import small_scene
 
 import fowt_env
 from fowt_env.descriptions.units import DEGREE
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.loop.protection import Stop
 from fowt_env.run.stepped import SteppedRun
 
@@ -98,8 +99,19 @@ def test_a_command_that_is_not_one_finite_number_a_column_is_refused(command):
     assert run.time == 0.0
 
 
-def test_nothing_follows_the_end_of_the_run():
-    run = SteppedRun(small_scene(), 0.1, 0.1)
-    run.advance(run.command)
-    with pytest.raises(InputError, match="the run has ended"):
+def test_nothing_follows_the_end_of_the_run_or_its_frame():
+    for duration in (0.1, 1.0):
+        run = SteppedRun(small_scene(), duration, 0.1)
         run.advance(run.command)
+        run.frame()
+        with pytest.raises(InputError, match="the run has ended"):
+            run.advance(run.command)
+
+
+def test_a_capsize_leaves_the_rows_before_it():
+    run = SteppedRun(small_scene(), 4.0, 0.1, initial={"start": "zero", "PtfmRVyi": 60.0})
+    with pytest.raises(SimulationStopped, match="capsize") as stopped:
+        while True:
+            run.advance((0.0, 90.0))
+    pd.testing.assert_frame_equal(run.frame(), stopped.value.frame)
+    assert run.frame()["PtfmRVyi_[deg/s]"].iloc[0] == pytest.approx(60.0)

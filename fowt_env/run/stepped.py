@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.descriptions.units import DEGREE
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.loop.protection import Stop
 from fowt_env.plant.advance import output
 from fowt_env.plant.state import BLADES, Command
@@ -58,6 +58,7 @@ class SteppedRun:
         self._factors = (KILO, *(DEGREE for _ in pitches))
         self._row = np.empty((1, len(self.scene.channels)))
         self._step = 0
+        self._frame: pd.DataFrame | None = None  # once asked for: its rows are those of the run in place
         self.is_stopping = bool(self._run.begin(0))
 
     @property
@@ -105,11 +106,15 @@ class SteppedRun:
                 f"command = {tuple(command)!r}: must be finite numbers, {', '.join(self.command_columns)}"
             )
         run, per_control, last = self._run, self._run.schedule.per_control, self._run.schedule.last
-        if self.has_ended:
+        if self.has_ended or self._frame is not None:
             raise InputError(f"command at {self.time:g} s: the run has ended")
         if not self.is_stopping:
             run.take([value * factor for value, factor in zip(command, self._factors, strict=True)])
-        self._step = run.roll(self._step, min(self._step + per_control, last))
+        try:
+            self._step = run.roll(self._step, min(self._step + per_control, last))
+        except SimulationStopped as error:
+            self._frame = error.frame
+            raise
         if not self.has_ended:
             self.is_stopping = bool(run.begin(self._step))
 
@@ -120,4 +125,6 @@ class SteppedRun:
 
     def frame(self) -> pd.DataFrame:
         """Return the DataFrame of the rows so far, as simulate does; no further period can follow."""
-        return self._run.frame()
+        if self._frame is None:
+            self._frame = self._run.frame()
+        return self._frame

@@ -84,7 +84,7 @@ def serve(
         LEAST_PATIENCE, hold * control_dt / timing.factor, timeout if timing.factor == inf else 0.0
     )
     run = SteppedRun(scene, duration, control_dt, **settings)
-    warm_up(SteppedRun(scene, duration, control_dt, **settings))
+    warm_up(SteppedRun(scene, min(WARM_PERIODS * control_dt, duration), control_dt, **settings))
     link = open_link(protocol, host, port, patience)
     server, reason = None, "interrupted"
     try:
@@ -119,7 +119,7 @@ def parse_address(text):
 
 def warm_up(run):
     """Load every kernel of a run, by its first periods."""
-    for _ in range(min(WARM_PERIODS, run.periods)):
+    while not run.has_ended:
         run.channels()
         run.advance(run.command)
 
