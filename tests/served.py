@@ -42,12 +42,12 @@ class Client:
         rest = size_of(head, 65536) - HEADER.size
         return unpack(head + (self.socket.recv(rest, socket.MSG_WAITALL) if rest else b""), 65536)
 
-    def states(self, law=None):
-        """Every STATE up to the END, each answered by a law of its values; then .end is the END."""
+    def states(self, law=None, answered=lambda record: True):
+        """Every STATE up to the END, of which those `answered` by a law; then .end is the END."""
         states = []
         while (record := self.receive()).kind == Kind.STATE:
             states.append(record)
-            if law is not None:
+            if law is not None and answered(record):
                 self.send(Kind.COMMAND, record.sequence, law(record))
         self.end = record.json()
         return states

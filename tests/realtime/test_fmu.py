@@ -84,6 +84,22 @@ def test_a_step_that_the_plant_cannot_make_fails(fmpy, plant, options):
         result(fmpy, plant, **options)
 
 
+def test_a_step_is_of_whole_control_periods_from_the_time_of_the_plant(fmpy, plant, tmp_path):
+    from fowt_env.realtime.fmu_slave import FloatingTurbine
+
+    with zipfile.ZipFile(plant) as content:
+        content.extract(f"resources/{PLANT}", tmp_path)
+    slave = FloatingTurbine(instance_name="one", resources=str(tmp_path / "resources"))
+    slave.setup_experiment(10.0, None, None)
+    slave.enter_initialization_mode()
+    before = list(slave._values)
+    for start, step, message in ((10.0, 0.15, "whole control periods"), (10.1, 0.1, "the plant is at 10 s")):
+        with pytest.raises(InputError, match=message):
+            slave.do_step(start, step)
+    assert slave._values == before
+    assert slave.do_step(10.0, 0.2) and slave._values[0] == pytest.approx(0.2)
+
+
 def test_an_fmu_of_another_version_is_refused(fmpy, plant, tmp_path):
     other = tmp_path / "other.fmu"
     with zipfile.ZipFile(plant) as old, zipfile.ZipFile(other, "w") as new:

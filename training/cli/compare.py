@@ -24,10 +24,11 @@ def compare(
     out_path: Annotated[str | None, Option("--out", help="Output table: .csv or .parquet.")] = None,
     plot: Annotated[str | None, Option(help="Output plot of series and spectra, e.g. plot.png.")] = None,
 ):
-    """Compare two runs: means, deviations, fatigue loads, spectra, lags, and usual causes of differences.
+    """Compare two runs: statistics, fatigue loads, spectra.
 
-    Differences are those of the first run from the second. Lag: time by which the first run is later.
-    DEL: 1 Hz damage-equivalent load, m = 10 for blades, 3 for mooring chain, 4 for steel.
+    Notes say what differs and what usually causes it. Differences are those of the first run from the second.
+    Lag: time by which the first run is later. DEL: 1 Hz damage-equivalent load, m = 10 for blades, 3 for
+    mooring chain, 4 for other loads.
 
     Examples:
     fowt compare run.outb openfast.outb --from 100 --plot compare.png

@@ -35,8 +35,7 @@ MODULES = (  # modules that add commands to the app
     "compare", "export_fmu",
 )  # fmt: skip
 GROUPS = {  # headings of fowt --help -> their commands, in the order shown
-    "Run": ("simulate", "trim", "plot", "compare", "animate", "check", "import", "hydro"),
-    "Connect": ("serve", "fmu"),
+    "Run": ("simulate", "trim", "plot", "compare", "animate", "check", "import", "hydro", "serve", "fmu"),
     "Design": ("linearize", "design"),
     "Evaluate": ("evaluate", "report", "scores", "leaderboard"),
     "Train": ("train", "export-policy"),

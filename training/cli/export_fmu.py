@@ -30,10 +30,11 @@ def fmu(
     protection: Annotated[str, Option(help=PROTECTION)] = "none",
     option: shared.OptionOption = None,
 ):
-    """Write the plant as an FMU (FMI 2.0, co-simulation) for Simulink, OpenModelica, FMPy and others.
+    """Write the plant as an FMU for co-simulation (FMI 2.0).
 
-    Inputs are the commands of generator torque and blade pitch, outputs all channels, in OpenFAST's units.
-    The host needs this Python with fowt_env: docs, Hardware in the loop.
+    For Simulink, OpenModelica, FMPy and others. Inputs are the commands of generator torque and blade pitch,
+    outputs all channels, in OpenFAST's units. The host needs this Python with fowt_env: docs, Hardware in the
+    loop.
 
     Examples:
     fowt fmu oc3_hywind plant.fmu --wind ntm:18:B --sea jonswap:7.5:10:3.3

@@ -54,7 +54,7 @@ def serve(
     out_path: Annotated[str | None, Option("--out", help="Time series: .csv, .parquet or .outb.")] = None,
     report: Annotated[str | None, Option(help="Deadline statistics as JSON.")] = None,
 ):
-    """Run the plant in real time for a controller outside: hardware in the loop.
+    """Run the plant in real time for a controller outside.
 
     A client connects, receives the channels of each control period and answers with generator torque and
     blade pitch. Records, clients in Python and C, timing: docs, Hardware in the loop.

@@ -38,6 +38,7 @@ MOST_PANELS, HIGHEST = 8, 2.0  # Hz, end of the spectra in the plot
 SLOW, FAST = 0.04, 0.25  # Hz, edges between the bands of platform modes, waves, and rotor and structure
 BANDS = (f"below {SLOW} Hz", f"{SLOW} to {FAST} Hz", f"above {FAST} Hz")
 LONGEST_LAG = 30.0  # s
+TIE = 1e-9  # difference of correlations that is rounding: the smaller lag then counts
 CONSTANT = 1e-6  # of the largest value: a range below is rounding
 MEAN, DEVIATION, FATIGUE, ALIKE = 0.02, 0.05, 0.05, 0.9  # differences from which a note is made
 PHASE = 0.01  # of the period of a channel's spectral peak: a shorter lag of a motion or load is not a note
@@ -214,12 +215,13 @@ def _lag(time, first, second):
             parts.append(total[high] - total[low])
     spreads = [power - part**2 / count for part, power in zip(sums, powers, strict=True)]
     value = (product - sums[0] * sums[1] / count) / np.sqrt(np.maximum(spreads[0] * spreads[1], 1e-300))
-    at = int(np.argmax(np.abs(value)))
+    best = np.flatnonzero(np.abs(value) >= np.abs(value).max() - TIE)
+    at = int(best[np.argmin(np.abs(shifts[best]))])  # a decay, for one, is like itself at any shift
     lag = float(shifts[at])
     if 0 < at < len(shifts) - 1:
         left, middle, right = np.abs(value[at - 1 : at + 2])
         bend = left - 2.0 * middle + right
-        lag += 0.5 * (left - right) / bend if bend < 0.0 else 0.0
+        lag += 0.5 * (left - right) / bend if bend < -TIE else 0.0
     return float(np.clip(value[at], -1.0, 1.0)), lag * step
 
 

@@ -70,6 +70,13 @@ def test_a_run_does_not_differ_from_itself_and_its_figures_are_its_own():
     assert (table["std_difference_[%]"] == 0.0).all()
 
 
+def test_a_slow_drift_has_no_lag_behind_itself():
+    frame = run()
+    frame["PtfmSurge_[m]"] = 20.0 * np.exp(-frame[TIME] / 150.0)
+    (row,) = compare(frame, frame, channels=("PtfmSurge",)).rows
+    assert row.lag == 0.0 and row.correlation == pytest.approx(1.0)
+
+
 FOUND = [  # column, change of the first run, channels and words of the only note
     ("BldPitch1_[deg]", late(0.3, "BldPitch1_[deg]"), "comes 0.3 s later", "pitch drive"),
     ("Wave1Elev_[m]", late(-0.5, "Wave1Elev_[m]"), "comes 0.5 s earlier", "wave series"),
