@@ -262,9 +262,10 @@ FAMILIES = (  # names of channels: (cause of another mean, causes of other varia
     ),
     (
         r"Ptfm",
-        "thrust, mooring stiffness and pretension, weights and their centres, or mean drift of the waves",
+        "thrust and torque of the rotor, mooring stiffness and pretension, weights and their centres, or mean"
+        " drift of the waves",
         (
-            "second-order wave loads, linear damping, mooring, or the controller (negative damping)",
+            "wind, second-order wave loads, linear damping, mooring, or the controller (negative damping)",
             "wave loads: components, stretching, drag, strips or potential flow",
             "modes of the tower, or a time step that is too long",
         ),
@@ -274,7 +275,7 @@ FAMILIES = (  # names of channels: (cause of another mean, causes of other varia
         "thrust, weight of the rotor-nacelle assembly, or the height of the section",
         (
             "wind, or the motion of the platform",
-            "wave loads, or the motion of the platform",
+            "wave loads, the motion of the platform, or a flexible tower, which amplifies both",
             "a flexible tower (fowt_env: tower='modes2'), flexible blades, or 3P of full-field wind",
         ),
     ),
@@ -348,7 +349,7 @@ def _texts(row, pair, known, different, shift):
     if not re.match(CONTROLLED, row.channel) and row.channel not in INPUTS:
         least = max(least, PHASE / row.peak_other)
     if abs(row.lag) > least and row.correlation >= ALIKE:
-        yield _lag_text(row, shift, step)
+        yield _lag_text(row, known, shift, step)
     if scale > 0.0 and _starts_apart(first, second, scale):
         yield (
             "differs far more in the first quarter of the time than later: an initial transient, usually"
@@ -390,7 +391,7 @@ def _factor(row):
     return None
 
 
-def _lag_text(row, shift, step):
+def _lag_text(row, known, shift, step):
     """Return the note on a lag; shift: that of wind and waves, s."""
     side = "later" if row.lag > 0.0 else "earlier"
     what = f"comes {abs(row.lag):.2g} s {side} in the first run: usually"
@@ -402,6 +403,9 @@ def _lag_text(row, shift, step):
     if abs(shift) > 0.75 * step and abs(row.lag - shift) <= step:
         return f"comes {side} as the wind or waves do: align these first"
     if re.match(CONTROLLED, row.channel):
+        speed = known.get("GenSpeed") or known.get("RotSpeed")
+        if speed is not None and abs(row.lag - speed.lag) <= 0.75 * step:
+            return f"comes {side} as the rotor speed does: the cause is in the plant or the wind"
         return (
             f"{what} the lag of the pitch drive or converter, the control period, or a filter of the"
             " generator speed"

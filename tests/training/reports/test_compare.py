@@ -104,6 +104,19 @@ def test_a_difference_is_found_with_its_usual_cause_and_no_other_channel_has_one
     assert any(what in text and why in text for _, text in result.notes), result.notes
 
 
+def test_a_control_that_follows_a_late_rotor_speed_is_not_the_cause():
+    frame = changed("BldPitch1_[deg]", late(0.2, "BldPitch1_[deg]"))
+    frame["RotSpeed_[rpm]"] = late(0.2, "RotSpeed_[rpm]")(frame[TIME].to_numpy(), None)
+    assert compare(frame, run()).notes == [
+        ("BldPitch1", "comes later as the rotor speed does: the cause is in the plant or the wind")
+    ]
+
+
+def test_a_lag_that_is_small_against_the_period_of_a_motion_is_no_note():
+    late_pitch = changed("PtfmPitch_[deg]", late(0.2, "PtfmPitch_[deg]"))  # 0.6 % of its period
+    assert compare(late_pitch, run()).notes == []
+
+
 def test_the_lag_of_everything_with_the_weather_is_one_note():
     notes = dict(compare(run(shift=2.0), run()).notes)
     assert any("align these first" in text for text in notes.values())
