@@ -69,10 +69,9 @@ def serve(
 
     output(out_path, endings=SERIES_SUFFIXES)
     host, port = parse_address(listen)
-    factor_value = parse_number(factor)
-    timing = check_timing(
-        Timing(inf if factor.strip().lower() == "inf" else factor_value, deadline, timeout, hold, then)
-    )
+    number = parse_number(factor)
+    pace = inf if factor.strip().lower() == "inf" else factor if number is None else number
+    timing = check_timing(Timing(pace, deadline, timeout, hold, then))
     scene = scene_of(platform, wind, sea, duration, seed, fidelity, option)
     settings = {
         "dt": dt,
