@@ -1,17 +1,19 @@
 """The plant served over loopback: rows of simulate, missed deadlines, refusals, reconnections."""
 
+import struct
 import time
 from math import inf
 
 import numpy as np
 import pytest
-from served import FAST, served
+from served import FAST, served, small_scene
 
 import fowt_env
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
-from fowt_env.realtime.record import Flag, Kind, Record
-from fowt_env.realtime.server import Timing, check_timing, open_link
+from fowt_env.realtime.record import Flag, Kind, Record, unpack
+from fowt_env.realtime.server import Server, Timing, check_timing, open_link
+from fowt_env.run.stepped import SteppedRun
 
 SILENT = Timing(factor=inf, timeout=0.02, hold=3)
 
@@ -162,19 +164,71 @@ def test_the_silence_that_counts_is_without_a_break():
     assert (server.missed, client.end["longest_silence_[periods]"]) == (8, 2)
 
 
-def test_a_run_in_step_with_the_clock_takes_its_time_without_drift():
-    def slow(record):
-        time.sleep(0.02)  # of a period of 25 ms
-        return answer(record)
-
-    with served(4.0, timing=Timing(4.0, deadline=1.0), channels=("GenSpeed",)) as (_, connect):
+def test_a_run_in_step_with_the_clock_takes_its_time():
+    with served(2.0, timing=Timing(8.0), channels=("GenSpeed",)) as (_, connect):
         client = connect()
         begin = time.perf_counter()
-        client.states(slow)
+        client.states(answer)
         took = time.perf_counter() - begin
-    assert 0.97 < took < 1.6  # 40 periods; with the answers added they would take 1.8 s
-    assert client.end["answer_[ms]"]["p50"] > 19.0
+    assert took > 0.24  # 20 periods of 12.5 ms; longer where other work holds the processor
     assert set(client.end["send_delay_[ms]"]) == {"p50", "p99", "p99.9", "max", "std", "share_below_1_ms"}
+
+
+class ClockedLink:
+    """A client that answers after a set time, by a clock that goes on only while the server waits."""
+
+    malformed = refused = 0
+    connections = 1
+
+    def __init__(self, delay):
+        self.delay, self.now, self.answers, self.sent = delay, 0.0, [], []
+
+    def send(self, data):
+        record = unpack(data)
+        if record.kind == Kind.STATE:
+            self.sent.append(self.now)
+            command = Record(Kind.COMMAND, record.sequence, payload=struct.pack("<2d", 43.0, 15.0))
+            self.answers.append((self.now + self.delay, command))
+
+    def receive(self, timeout):
+        if self.answers and self.answers[0][0] <= self.now + timeout:
+            self.now = max(self.now, self.answers[0][0])
+            return [self.answers.pop(0)[1]]
+        self.now += max(timeout, 1e-6)
+        return []
+
+
+@pytest.mark.parametrize(("delay", "missed"), [(0.001, 0), (0.02, 0), (0.024, 40)])
+def test_instants_do_not_drift_and_a_deadline_is_a_fraction_of_the_period(delay, missed, monkeypatch):
+    link = ClockedLink(delay)
+    server = Server(SteppedRun(small_scene(), 4.0, 0.1), link, Timing(4.0, deadline=0.9, hold=1000))
+    server._ready = True
+    monkeypatch.setattr("fowt_env.realtime.server.perf_counter", lambda: link.now)
+    assert server.serve() == "end of the run"
+    expected = 0.025 * np.arange(40)
+    np.testing.assert_allclose(link.sent[:40], expected, atol=2e-6)  # with the delays added: 0.8 s later
+    late = max(missed - 1, 0)  # the last one comes after the end
+    assert (server.missed, server.late, server.overruns) == (missed, late, 0)
+    assert server.statistics()["send_delay_[ms]"]["max"] < 0.01
+
+
+def test_a_pause_is_caught_up_and_counted(monkeypatch):
+    link = ClockedLink(0.001)
+    server = Server(SteppedRun(small_scene(), 4.0, 0.1), link, Timing(4.0))
+    server._ready = True
+    monkeypatch.setattr("fowt_env.realtime.server.perf_counter", lambda: link.now)
+    advance = server.run.advance
+
+    def stalled(command):
+        link.now += 0.06 if server._sequence == 10 else 0.0
+        advance(command)
+
+    monkeypatch.setattr(server.run, "advance", stalled)
+    server.serve()
+    late = np.array(link.sent[:40]) - 0.025 * np.arange(40)
+    assert late[11] == pytest.approx(0.036, abs=1e-5)  # 1 ms to the answer, and the pause, less a period
+    assert (late[:11] < 1e-5).all() and (late[13:] < 1e-5).all()
+    assert (server.overruns, server.missed) == (2, 0)
 
 
 def test_a_run_that_capsizes_tells_its_client_why():
