@@ -1,7 +1,7 @@
 """Compares two runs channel by channel: statistics, fatigue loads, spectra, lags, and their usual causes."""
 
 import re
-from math import nan
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -348,9 +348,11 @@ def _texts(row, pair, known, different, shift):
     least = 0.75 * step
     if not re.match(CONTROLLED, row.channel) and row.channel not in INPUTS:
         least = max(least, PHASE / row.peak_other)
+    if different:  # equal in statistics at best
+        least = inf
     if abs(row.lag) > least and row.correlation >= ALIKE:
         yield _lag_text(row, known, shift, step)
-    if scale > 0.0 and _starts_apart(first, second, scale):
+    if not different and scale > 0.0 and _starts_apart(first, second, scale):
         yield (
             "differs far more in the first quarter of the time than later: an initial transient, usually"
             " other initial conditions; leave it out (--from)"
@@ -410,7 +412,9 @@ def _lag_text(row, known, shift, step):
             f"{what} the lag of the pitch drive or converter, the control period, or a filter of the"
             " generator speed"
         )
-    return f"{what} another natural frequency, or an initial offset that decays slowly"
+    return (
+        f"comes {side} in the first run: usually another natural frequency, or an initial offset that decays"
+    )
 
 
 def _starts_apart(first, second, scale):

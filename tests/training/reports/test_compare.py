@@ -112,6 +112,17 @@ def test_a_control_that_follows_a_late_rotor_speed_is_not_the_cause():
     ]
 
 
+def test_in_other_waves_no_lag_is_told_and_statistics_are():
+    frame = changed("Wave1Elev_[m]", lambda t, x: waves(t, 2.0, (0.083, 0.1, 0.127), 5))
+    frame["PtfmPitch_[deg]"] = late(2.0, "PtfmPitch_[deg]")(frame[TIME].to_numpy(), None)
+    frame["TwrBsMyt_[kN-m]"] *= 1.1
+    notes = dict(compare(frame, run()).notes)
+    assert set(notes) == {"Wave1Elev", "TwrBsMyt"}
+    frame["Wave1Elev_[m]"] = run()["Wave1Elev_[m]"]
+    notes = dict(compare(frame, run()).notes)
+    assert set(notes) == {"PtfmPitch", "TwrBsMyt"} and "natural frequency" in notes["PtfmPitch"]
+
+
 def test_a_lag_that_is_small_against_the_period_of_a_motion_is_no_note():
     late_pitch = changed("PtfmPitch_[deg]", late(0.2, "PtfmPitch_[deg]"))  # 0.6 % of its period
     assert compare(late_pitch, run()).notes == []
