@@ -1,4 +1,4 @@
-"""Writes and reads OpenFAST binary output (.outb)."""
+"""Writes and reads OpenFAST's binary output (.outb), and reads its text output (.out)."""
 
 import os
 import re
@@ -73,6 +73,45 @@ def read_outb(path):
             raise
         raise InputError(f".outb file {str(path)[:200]!r}: cannot be read: {error}") from None
     return pd.DataFrame(values, columns=names)
+
+
+def read_out(path):
+    """Return the DataFrame of an OpenFAST text output file (.out), with columns as read_outb.
+
+    The channel names are the first line that begins with Time; units and values follow.
+    Raises: InputError naming the file and the line.
+    """
+    import pandas as pd
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f".out file {str(path)!r}: no such file")
+    lines = path.read_text(encoding="latin-1").splitlines()
+    head = next((i for i, line in enumerate(lines) if line.split()[:1] == ["Time"]), None)
+    if head is None or len(lines) < head + 2:
+        raise InputError(f".out file {str(path)!r}: no line begins with Time, as that of the channel names")
+    names, units = lines[head].split(), re.findall(r"\(([^()]*)\)", lines[head + 1])
+    if len(units) != len(names):
+        raise InputError(
+            f".out file {str(path)!r}: line {head + 2}: {len(units)} units of {len(names)} channels"
+        )
+    rows = []
+    for number, line in enumerate(lines[head + 2 :], head + 3):
+        try:
+            row = [float(word) for word in line.split()]
+        except ValueError as error:
+            raise InputError(f".out file {str(path)!r}: line {number}: {error}") from None
+        if row and len(row) != len(names):
+            raise InputError(
+                f".out file {str(path)!r}: line {number}: {len(row)} values of {len(names)} channels"
+            )
+        rows += [row] if row else []
+    columns = [f"{name}_[{unit}]" for name, unit in zip(names, units, strict=True)]
+    if len(set(columns)) < len(columns):
+        raise InputError(
+            f".out file {str(path)!r}: channel {Counter(columns).most_common(1)[0][0]!r} occurs twice"
+        )
+    return pd.DataFrame(np.array(rows).reshape(-1, len(columns)), columns=columns)
 
 
 class _Reader(NamedTuple):

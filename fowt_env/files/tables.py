@@ -7,6 +7,7 @@ from fowt_env.files.atomic import replacing
 
 TABLE_SUFFIXES = (".csv", ".parquet")
 SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series
+READ_SUFFIXES = (*SERIES_SUFFIXES, ".out")  # of a time series that is read
 
 
 def table_path(path, allowed=TABLE_SUFFIXES, what="output file"):
@@ -35,16 +36,16 @@ def write_table(frame, path):
 
 
 def read_series(path):
-    """Return the DataFrame of a time series written by write_table, or of OpenFAST's binary output (.outb).
+    """Return the DataFrame of a time series written by write_table, or of OpenFAST's output (.outb, .out).
 
     Raises: InputError for a missing or broken file, or another suffix.
     """
-    path = table_path(path, SERIES_SUFFIXES, "file")
-    if path.suffix.lower() != ".outb":
+    path = table_path(path, READ_SUFFIXES, "file")
+    if path.suffix.lower() in TABLE_SUFFIXES:
         return read_table(path)
-    from fowt_env.files.openfast import read_outb
+    from fowt_env.files.openfast import read_out, read_outb
 
-    return read_outb(path)
+    return read_outb(path) if path.suffix.lower() == ".outb" else read_out(path)
 
 
 def read_table(path):

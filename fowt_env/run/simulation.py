@@ -152,6 +152,62 @@ def physical_memory() -> float:
         return inf
 
 
+def build_run(
+    scene: Scene,
+    controller: Any,
+    duration: float,
+    dt: float | None = None,
+    control_dt: float = 0.1,
+    output_dt: float = 0.1,
+    initial: str | Mapping[str, Any] | None = None,
+    protection: str | Mapping[str, Any] | Protection | None = None,
+    faults: Fault | Mapping[str, Any] | Sequence[Any] | None = None,
+    sensors: str | SensorChain | None = None,
+    preview: str | Preview | Callable[[Scene, tuple[float, ...]], Preview] = EXACT,
+    nominal: Scene | None = None,
+) -> "Run":
+    """Build the Run of a scene, checked and at its initial conditions. Arguments and errors as simulate."""
+    check_scene(scene)
+    if dt is None:
+        check_period("output_dt", output_dt)  # by its name, not as the step that would follow from it
+        dt = min(scene.dt, control_dt, output_dt)
+    per_control = steps_in("control_dt", control_dt, dt)
+    per_output = steps_in("output_dt", output_dt, dt)
+    last = steps_in("duration", duration, dt)
+    steps_in("duration", duration, output_dt, "output_dt")
+    check_duration(scene, duration)
+    check_memory(scene, duration, output_dt)
+    scene = scene.with_step(dt)
+    turbine = scene.turbine
+    limits = read_protection(protection, turbine.protection, turbine.overspeed / turbine.rated_rotor_speed)
+    chain = sensors_of(sensors, scene.turbine)
+    without_controller = controller is None
+    listed = read_faults(faults)
+    if without_controller and listed:
+        raise InputError(
+            f"faults: {listed[0].kind}: faults need a controller; with controller=None rotor speed and blade"
+            " pitch are constant"
+        )
+    if not without_controller:
+        controller = make(controller, scene.turbine, control_dt)
+        check_pitches(controller, scene.model.pitches is not None)
+        with _controller_errors():
+            controller.prepare(known_scene(scene if nominal is None else nominal, controller))
+    x, u = initial_state(scene, initial)
+    if without_controller:
+        scene = scene.with_model({"rigid_body.rotor_fixed": True})
+        controller = HeldCommand(scene.model.pitches is not None)
+        per_control = last  # no controller reads a measurement
+        chain = None
+    external = not isinstance(controller, CompiledController)
+    schedule = Schedule(float(dt), per_control, per_output, last, bool(controller.individual), external)
+    period = per_control * dt
+    guard = guard_of(scene, limits, listed, period)
+    periods = -(-last // per_control)
+    interface = build_interface(scene, controller, guard, chain, preview, period, periods)
+    return Run(scene, controller, x, u, schedule, interface)
+
+
 def simulate(
     scene: Scene,
     controller: Any = "pi",
@@ -229,50 +285,15 @@ def simulate(
         if name in REPLACED:
             raise InputError(f"simulate({name}=...) was replaced: use {REPLACED[name]}")
         raise unknown_keyword("simulate", name, KEYWORDS)
-    check_scene(scene)
-    if dt is None:
-        check_period("output_dt", output_dt)  # by its name, not as the step that would follow from it
-        dt = min(scene.dt, control_dt, output_dt)
-    per_control = steps_in("control_dt", control_dt, dt)
-    per_output = steps_in("output_dt", output_dt, dt)
-    last = steps_in("duration", duration, dt)
-    steps_in("duration", duration, output_dt, "output_dt")
-    check_duration(scene, duration)
-    check_memory(scene, duration, output_dt)
-    scene = scene.with_step(dt)
-    turbine = scene.turbine
-    limits = read_protection(protection, turbine.protection, turbine.overspeed / turbine.rated_rotor_speed)
-    chain = sensors_of(sensors, scene.turbine)
-    without_controller = controller is None
-    listed = read_faults(faults)
-    if without_controller and listed:
-        raise InputError(
-            f"faults: {listed[0].kind}: faults need a controller; with controller=None rotor speed and blade"
-            " pitch are constant"
-        )
-    if not without_controller:
-        controller = make(controller, scene.turbine, control_dt)
-        check_pitches(controller, scene.model.pitches is not None)
-        with _controller_errors():
-            controller.prepare(known_scene(scene if nominal is None else nominal, controller))
-    x, u = initial_state(scene, initial)
-    if without_controller:
-        scene = scene.with_model({"rigid_body.rotor_fixed": True})
-        controller = HeldCommand(scene.model.pitches is not None)
-        per_control = last  # no controller reads a measurement
-        chain = None
-    external = not isinstance(controller, CompiledController)
-    schedule = Schedule(float(dt), per_control, per_output, last, bool(controller.individual), external)
-    period = per_control * dt
-    guard = guard_of(scene, limits, listed, period)
-    periods = -(-last // per_control)
-    interface = build_interface(scene, controller, guard, chain, preview, period, periods)
-    run = Run(scene, controller, x, u, schedule, interface)
+    run = build_run(
+        scene, controller, duration, dt, control_dt, output_dt, initial, protection, faults, sensors, preview,
+        nominal,
+    )  # fmt: skip
     with _bar(progress) as report, _controller_errors():
         run.advance(report)
     frame = run.frame()
     sentences = [harm(frame.attrs["events"])]
-    if not (without_controller or listed):
+    if not (controller is None or read_faults(faults)):
         sentences += run.out_of_bounds(frame.attrs)
     if message := ". ".join(f"{text[0].upper()}{text[1:]}" for text in sentences if text):
         warnings.warn(f"{scene.label}: {message}", PlantWarning, stacklevel=level_outside())
@@ -297,6 +318,7 @@ class Run:
     def __init__(self, scene, controller, x, u, schedule, interface):
         self.scene = scene
         self.controller = controller
+        self.interface = interface
         self.data = scene.data()
         self.handle = scene.handle(self.data)
         self.x, self.u, self.schedule = x, u, schedule
@@ -318,7 +340,7 @@ class Run:
 
         Raises: SimulationStopped; KeyboardInterrupt with the frame so far.
         """
-        self._begin(0)
+        self.begin(0)
         self.controller.reset(self._reading())
         schedule, last = self.schedule, self.schedule.last
         size = schedule.per_control if schedule.external else max(1, round(FIRST_CHUNK / schedule.dt))
@@ -328,7 +350,7 @@ class Run:
                 began = perf_counter()
                 if schedule.external:
                     self._command(step)
-                step = self._roll(step, min(step + size, last))
+                step = self.roll(step, min(step + size, last))
                 if not schedule.external and perf_counter() - began < 0.25 * CHUNK_TIME:
                     size *= 4
                 report(step / last)
@@ -336,7 +358,7 @@ class Run:
             interrupt.frame = self.frame()  # the caller may keep the rows so far
             raise
 
-    def _begin(self, step):
+    def begin(self, step):
         """Begin the control period of a step; return whether the turbine is being stopped."""
         return begin_command(self.handle, self.x, self.u, self.linked, self.schedule, step)
 
@@ -346,13 +368,16 @@ class Run:
 
     def _command(self, step):
         """Store the command of a Python controller at a step, unless the turbine is being stopped."""
-        if self._begin(step):
-            return
-        command = self.controller.act(self._reading())
+        if not self.begin(step):
+            self.take(self.controller.act(self._reading()))
+
+    def take(self, command):
+        """Store the command (N m, rad) of the control period that has begun."""
         self.link.command[: len(command)] = command
         self.units.see(command[0], command[1], self.x[State.ROTOR_SPEED])
 
-    def _roll(self, first, end):
+    def roll(self, first, end):
+        """Advance from step first to end; return the step reached. Raises: SimulationStopped."""
         status, step, count = rollout(
             self.handle, self.x, self.u, *self.law, self.linked, self.schedule, first, end,
             self.rows[self.filled :],

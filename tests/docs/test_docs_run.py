@@ -75,7 +75,10 @@ def test_the_statistics_that_the_readme_shows_are_those_of_its_program():
 
 
 WHOLE = ("index.md", "reference/environment.md")
-PROGRAMS = ("guides/from-control-design.md", "guides/from-gymnasium.md", "tutorials/first-agent.md")
+PROGRAMS = (
+    "guides/from-control-design.md", "guides/from-gymnasium.md", "guides/hardware-in-the-loop.md",
+    "tutorials/first-agent.md",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("page", WHOLE + PROGRAMS)

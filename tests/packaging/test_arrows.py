@@ -11,10 +11,9 @@ ROOT = Path(fowt_env.__file__).resolve().parent.parent
 # from the ground up; a layer imports itself and what stands before it
 LAYERS = (
     "errors", "caches", "folders", "layout", "display", "registration", "plant", "loop", "descriptions",
-    "weather", "scene", "files", "analysis", "control", "run", "visual", "envs", "warmup", "controllers",
-    "training", "training.evaluation", "training.design", "training.rl", "training.reports", "training.board",
-    "training.validation",
-    "training.benchmarks", "training.studies", "training.cli",
+    "weather", "scene", "files", "analysis", "control", "run", "realtime", "visual", "envs", "warmup",
+    "controllers", "training", "training.evaluation", "training.design", "training.rl", "training.reports",
+    "training.board", "training.validation", "training.benchmarks", "training.studies", "training.cli",
 )  # fmt: skip
 
 

@@ -69,10 +69,8 @@ def simulate(
     """
     import fowt_env
 
-    options = {"duration": max(LEAST_WAVES, duration), **parse_pairs(option, "option")}
     output(out_path, endings=SERIES_SUFFIXES)  # before the run
-    options |= {"seed": seed, "rotor": rotor, "fidelity": fidelity}
-    scene = fowt_env.build_scene(platform, wind=wind_of(wind), sea=sea_of(sea), **options)
+    scene = scene_of(platform, wind, sea, duration, seed, fidelity, option, rotor)
     title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
     with progress_bar("simulating", 1.0) as update:
         try:
@@ -89,11 +87,11 @@ def simulate(
                 progress=update,
             )
         except (SimulationStopped, KeyboardInterrupt) as error:
-            _save_run(getattr(error, "frame", None), out_path)  # the rows so far
+            save_run(getattr(error, "frame", None), out_path)  # the rows so far
             raise
     _print_channels(frame, title)
     _note_limits(frame, scene.turbine)
-    _save_run(frame, out_path)
+    save_run(frame, out_path)
     if plot is not None:
         from fowt_env.visual.time_series import plot_run
 
@@ -101,7 +99,17 @@ def simulate(
     wrote(plot)
 
 
-def _save_run(frame, path):
+def scene_of(platform, wind, sea, duration, seed, fidelity, option, rotor=None):
+    """Return the scene of a command's options, with weather for a run of `duration` s."""
+    import fowt_env
+
+    options = {"duration": max(LEAST_WAVES, duration), **parse_pairs(option, "option")}
+    options |= {"seed": seed, "rotor": rotor, "fidelity": fidelity}
+    return fowt_env.build_scene(platform, wind=wind_of(wind), sea=sea_of(sea), **options)
+
+
+def save_run(frame, path):
+    """Write the rows of a run to the path of an option and print the path; None: do nothing."""
     if path is not None and frame is not None and len(frame):
         note(f"wrote {write_table(frame, path)} ({len(frame)} rows)")
 

@@ -73,7 +73,7 @@ def test_trim_plots_the_schedule_and_plot_does_so_from_its_table(tmp_path):
     [
         (("pie", "run.csv"), "unknown kind of plot 'pie'"),
         (("series", "nothing.csv"), "nothing.csv"),
-        (("series", "run.txt"), "file 'run.txt': must end with .csv, .parquet or .outb"),
+        (("series", "run.txt"), "file 'run.txt': must end with .csv, .parquet, .outb or .out"),
         (("series", "run.csv", "run.csv"), "each must be named once"),
         (("schedule", "run.csv"), "needs a column"),
         (("series", "run.csv", "--out", "run.what"), "unknown extension"),

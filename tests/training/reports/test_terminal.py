@@ -87,9 +87,7 @@ def test_one_name_has_one_figure_and_one_unit_in_all_tables():
     both = board([1, 2, 9], x="ok", factor=1e3)
     _, headings, (_, x), _ = leaderboard_rows(both)
     place = {heading.replace("\n", " "): number for number, heading in enumerate(headings)}
-    assert (
-        x[place["maximum power kW"]] == "1400" == f"{both['controllers'][1]['metrics'][POWER]['mean']:.0f}"
-    )
+    assert x[place["maximum power kW"]] == "1400" == f"{both['controllers'][1]['metrics'][POWER]['mean']:.0f}"
     for heading, metric, *_ in (*LEADERBOARD, *PRINTED_METRICS):
         unit = metric.rpartition("_[")[2][:-1].replace("m/s^2", "m/s²")
         assert heading.split("\n")[-1].replace(" ", "") == unit.replace("-", "")
