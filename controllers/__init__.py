@@ -1,6 +1,8 @@
 """Provides the built-in controllers and resolves controller names for fowt_env.control."""
 
 from fowt_env.control import CheckedController, CompiledController, Controller, make
+from fowt_env.controllers.bladed.controller import DLL_PREFIX as DLL
+from fowt_env.controllers.bladed.controller import named_library
 from fowt_env.controllers.design.saved_files import DESIGN_PREFIX as DESIGN
 from fowt_env.controllers.design.saved_files import load_design
 from fowt_env.controllers.lqr.law import WindEstimator
@@ -24,14 +26,16 @@ __all__ = [
     "make",
     "named",
 ]
-PREFIXES = (DESIGN, POLICY)  # of names other than "module:Name"
+PREFIXES = (DESIGN, DLL, POLICY)  # of names other than "module:Name"
 
 
 def named(name):
-    """Return the factory (turbine, control_dt) of a built-in name, "policy:NAME or PATH" or "design:FILE".
+    """Return the factory (turbine, control_dt) of a name with one of PREFIXES, or of a built-in name.
 
     Raises: InputError for unknown names (with a suggestion) and invalid files.
     """
+    if name.startswith(DLL):
+        return named_library(name)
     if name.startswith(DESIGN):
         return load_design(name.removeprefix(DESIGN))
     if name.startswith(POLICY):
