@@ -9,6 +9,7 @@ from fowt_env.controllers.lqr.law import WindEstimator
 from fowt_env.controllers.policy.controller import POLICY_PREFIX as POLICY
 from fowt_env.controllers.policy.controller import policy, shipped_agents
 from fowt_env.controllers.registry import CONTROLLERS
+from fowt_env.descriptions.checks import parse_names
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import unknown
 
@@ -22,6 +23,7 @@ __all__ = [
     "CompiledController",
     "Controller",
     "WindEstimator",
+    "controller_names",
     "information",
     "make",
     "named",
@@ -44,6 +46,18 @@ def named(name):
         agents = (f"{POLICY}{agent}" for agent in shipped_agents())
         raise unknown("controller", name, (*CONTROLLERS, *agents))
     return CONTROLLERS[name]
+
+
+def controller_names(text):
+    """Return the names in a comma-separated text; an input file and keys after "dll:PATH" belong to it."""
+    names = []
+    for part in parse_names(text):
+        option = "=" in part or not (":" in part or part in CONTROLLERS)
+        if names and names[-1].startswith(DLL) and option:
+            names[-1] += f",{part}"
+        else:
+            names.append(part)
+    return names
 
 
 def information(name, turbine=None):
