@@ -20,6 +20,7 @@ from fowt_env.errors import ControllerError, InputError, unknown
 DLL_PREFIX = "dll:"
 SYMBOL = "DISCON"  # name of the function, as DLL_ProcName of OpenFAST
 PITCH = ("collective", "individual")
+ROOT = "fowt"  # root name of the library's own outputs, in the folder of the run
 TIME_LIMIT = 5.0  # s of one call
 START_LIMIT = 60.0  # s of loading and of the first call, which may read files
 MOST_MESSAGES = 100  # different messages of a run that are kept
@@ -56,6 +57,13 @@ class BladedLibrary:
     def files(self) -> list[Path]:
         """Return the files that define the controller: the library and its input file."""
         return [Path(name).absolute() for name in (self.path, self.input_file) if name]
+
+    def start(self, turbine, control_dt):
+        """Return (LibraryProcess, Swap) of a new run, before the first call. Raises: LibraryFailure."""
+        path, *files = self.files
+        process = LibraryProcess(path, self.symbol, files[0].parent if files else Path.cwd(), START_LIMIT)
+        names = (str(files[0]) if files else "", str(process.folder / ROOT))
+        return process, Swap(process.memory, turbine, control_dt, *names, self.pitch == PITCH[1])
 
     def __call__(self, turbine, control_dt):
         """Return the controller for a turbine and a control period (s)."""
@@ -128,7 +136,7 @@ class BladedController(BladedCalls):
     def __init__(self, library, turbine, control_dt):
         self.library, self.turbine, self.control_dt = library, turbine, check_control_dt(control_dt)
         self.name = f"{DLL_PREFIX}{library.path}"
-        self.individual = library.pitch == "individual"
+        self.individual = library.pitch == PITCH[1]
         self._process = self._swap = None
         self._messages, self._printed = {}, ""
 
@@ -145,17 +153,10 @@ class BladedController(BladedCalls):
         """Start the library in a new process and make the first call. Raises: ControllerError."""
         self.finish()
         self._messages, self._printed = {}, ""
-        path, *files = self.library.files
-        folder = files[0].parent if files else Path.cwd()
-        time = float(measurement.time)
         try:
-            self._process = LibraryProcess(path, self.library.symbol, folder, START_LIMIT)
+            self._process, self._swap = self.library.start(self.turbine, self.control_dt)
         except LibraryFailure as error:
-            raise self._error(str(error), time) from error
-        self._swap = Swap(
-            self._process.memory, self.turbine, self.control_dt, *map(str, files or [""]),
-            output_name=str(self._process.folder / "fowt"), individual=self.individual,
-        )  # fmt: skip
+            raise self._error(str(error), float(measurement.time)) from error
         self._start(measurement)
 
     def _call(self, status, measurement):
