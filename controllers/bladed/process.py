@@ -100,6 +100,7 @@ class LibraryProcess:
         if self.waits:  # the library may then write its files
             with suppress(BrokenPipeError):
                 os.write(self._requests, program.QUIT)
+                self._poll.poll(1e3 * END_LIMIT)  # until the end of the process closes the pipe
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_LIMIT)
         with open(self._printed, "rb") as file:

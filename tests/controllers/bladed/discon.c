@@ -40,10 +40,8 @@ void DISCON(float *avrSWAP, int *aviFAIL, const char *accINFILE, char *avcOUTNAM
     SWAP(45) = integral;
     for (int blade = 0; blade < 3; blade++)
         SWAP(42 + blade) = integral + 0.001f * blade;
-    if (!strcmp(mode, "echo")) { /* the torque demanded is a record of the input, the number follows */
-        SWAP(47) = SWAP((int)SWAP(129) > 0 ? 20 : 1);
-        SWAP(45) = SWAP(4);
-    }
+    if (!strcmp(mode, "scribble"))
+        SWAP(21) = SWAP(200) = 7;
     if (!strcmp(mode, "outname") && status == 0)
         printf("%s %zu %d %d\n", avcOUTNAME, strlen(avcOUTNAME), (int)SWAP(51), (int)SWAP(64));
     if (!strcmp(mode, "logs")) {

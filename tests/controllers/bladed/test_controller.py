@@ -2,10 +2,12 @@
 
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +19,15 @@ from fowt_env.control import make
 from fowt_env.control.views import whole_view
 from fowt_env.controllers import controller_names
 from fowt_env.controllers.bladed.controller import BladedLibrary, named_library
+from fowt_env.controllers.rosco import find_library
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.provenance import controller_code
 
 pytestmark = needs_gcc
+needs_rosco = pytest.mark.skipif(find_spec("rosco") is None, reason="needs pip install --no-deps rosco")
 RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(
     rotor_speed=1.267109,
     generator_speed=122.9096,
@@ -304,3 +311,73 @@ def test_the_files_of_a_library_are_those_that_its_name_has(library, tmp_path, m
     monkeypatch.chdir(tmp_path)
     Path("a.IN").write_text("law")
     assert named_library(f"dll:{library},a.IN").files == [library, tmp_path / "a.IN"]
+
+
+@pytest.mark.slow
+def test_a_crash_is_a_failed_run_of_an_evaluation_and_the_others_go_on(library, tmp_path):
+    for mode in ("crash", "hang"):
+        (tmp_path / f"{mode}.IN").write_text(mode)
+    names = f"dll:{library},{tmp_path}/crash.IN,dll:{library},{tmp_path}/hang.IN,limit=0.3,pi,dll:{library}"
+    case = Case("steady", wind=18.0, sea=None, platform="oc3_hywind")
+    table = evaluate(names, [case], duration=4.0, skip=1.0, reference=False).set_index("controller")
+    assert list(table["status"]) == ["failed", "failed", "ok", "ok"]
+    crashed, hanging = table["reason"].iloc[:2]
+    assert "SIGSEGV" in crashed and "took longer than 0.3 s" in hanging
+
+
+@pytest.mark.slow
+def test_results_are_out_of_date_with_another_library_or_input_file(library, tmp_path):
+    mine, file = tmp_path / "mine.so", tmp_path / "a.IN"
+    mine.write_bytes(library.read_bytes())
+    file.write_text("law")
+    first = controller_code(f"dll:{mine},{file}")["code"]
+    file.write_text("law 2")
+    second = controller_code(f"dll:{mine},{file}")["code"]
+    mine.write_bytes(library.read_bytes() + b"\0")
+    assert len({first, second, controller_code(f"dll:{mine},{file}")["code"]}) == 3
+
+
+@needs_rosco
+def test_rosco_by_its_path_has_the_bits_of_rosco(scene, turbine, tmp_path):
+    rosco = make("rosco", turbine, 0.1)
+    rosco.prepare(scene)
+    for name in ("DISCON.IN", "rotor.txt"):
+        shutil.copyfile(Path(rosco.controller._files, name), tmp_path / name)
+    path = find_library()[0]  # it needs libraries beside it
+    frames = [simulate(scene, name, duration=30.0) for name in ("rosco", f"dll:{path},{tmp_path}/DISCON.IN")]
+    assert np.array_equal(*(frame.to_numpy() for frame in frames))
+
+
+DISCON_OC3 = os.environ.get("FOWT_DISCON_OC3", "")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not DISCON_OC3, reason="needs FOWT_DISCON_OC3, the path of DISCON_OC3Hywind of OpenFAST")
+def test_openfasts_own_controller_of_the_spar_has_the_commands_of_openfast_oc3():
+    """On one series of readings; the law here has OpenFAST's delay of one call, and float64."""
+    scene = build_scene("oc3_hywind", wind="ntm:18:B", sea="jonswap:7.5:10:3.3", duration=100.0)
+
+    class Both:
+        declared = False
+        information = named_library(f"dll:{DISCON_OC3}")(scene.turbine, 0.1).information
+
+        def __init__(self, turbine, control_dt):
+            self.ours = make("openfast_oc3", turbine, control_dt)
+            self.theirs = named_library(f"dll:{DISCON_OC3}")(turbine, control_dt)
+
+        def reset(self, measurement):
+            self.ours.reset(measurement)
+            self.theirs.reset(measurement)
+            self.last = None
+
+        def act(self, measurement):
+            ours, theirs = self.ours.act(measurement), self.theirs.act(measurement)
+            if self.last is not None:
+                assert ours == pytest.approx(self.last, rel=2e-5)
+            self.last = theirs
+            return ours
+
+        def finish(self):
+            self.theirs.finish()
+
+    simulate(scene, Both, duration=100.0)
