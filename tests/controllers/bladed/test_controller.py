@@ -122,7 +122,7 @@ def test_the_last_call_has_status_minus_one_and_the_output_is_kept(started):
     controller = started()
     answers(controller, [123.0] * 5)
     controller.finish()
-    assert controller.output == "5 calls, last at 0.4 s".replace("5", "6")
+    assert controller.output == "6 calls, last at 0.4 s"
     assert controller.controller._process is None
 
 
