@@ -114,7 +114,7 @@ def _whole_series(library, turbine, control_dt, result):
             point.follow(*demands[-1])
     finally:
         controller.finish()
-        result.output = controller.output
+        result.output = controller.console_output
     demands = np.array(demands)
     result.call, result.slowest = float(np.median(durations[1:])), max(durations[1:])
     result.torque = float(demands[:, 0].min()), float(demands[:, 0].max())

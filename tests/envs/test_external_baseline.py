@@ -61,4 +61,4 @@ def test_a_library_is_a_baseline_and_ends_with_the_environment(tmp_path):
     first = trajectory(env)
     assert np.array_equal(trajectory(env), first) and np.ptp(first[:, 0]) > 0.0
     env.close()
-    assert env._baseline.controller.output == "41 calls, last at 3.9 s"
+    assert env._baseline.controller.console_output == "41 calls, last at 3.9 s"

@@ -53,8 +53,10 @@ void DISCON(float *avrSWAP, int *aviFAIL, const char *accINFILE, char *avcOUTNAM
     }
     if (!late)
         return;
-    if (!strcmp(mode, "crash"))
+    if (!strcmp(mode, "crash")) {
+        printf("about to crash\n");
         *(volatile int *)8 = 1;
+    }
     if (!strcmp(mode, "hang"))
         for (volatile int forever = 1; forever;)
             ;

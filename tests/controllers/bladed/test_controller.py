@@ -92,6 +92,11 @@ def test_commands_are_those_of_the_library(started):
     assert {torque for torque, _ in commands} == {float(np.float32(43093.55))}
 
 
+def test_a_first_command_at_a_later_time_is_a_call_of_its_own(started):
+    (_, pitch), *_ = answers(started(), [131.0], first=1)
+    assert pitch == law([131.0, 131.0])[1] > law([131.0])[0]
+
+
 def test_several_libraries_at_once_share_no_state(started):
     up, down = 123.0 + np.linspace(0.0, 8.0, 30), 123.0 - np.linspace(0.0, 8.0, 30)
     first, second = started(), started()
@@ -122,7 +127,7 @@ def test_the_last_call_has_status_minus_one_and_the_output_is_kept(started):
     controller = started()
     answers(controller, [123.0] * 5)
     controller.finish()
-    assert controller.output == "6 calls, last at 0.4 s"
+    assert controller.console_output == "6 calls, last at 0.4 s"
     assert controller.controller._process is None
 
 
@@ -130,18 +135,17 @@ def test_a_message_is_kept_once_and_a_failure_in_the_last_call_too(started):
     controller = started("warn")
     answers(controller, [123.0] * 20)
     controller.finish()
-    assert (
-        controller.output.startswith("t = 1.000 s: vane is noisy") and controller.output.count("noisy") == 1
-    )
+    assert controller.console_output.startswith("t = 1.000 s: vane is noisy")
+    assert controller.console_output.count("noisy") == 1
     controller = started("bad_end")
     controller.finish()
-    assert "last call: code -3: cannot close" in controller.output
+    assert "last call: code -3: cannot close" in controller.console_output
 
 
 @pytest.mark.parametrize(
     ("mode", "part"),
     [
-        ("crash", "a call ended its process by SIGSEGV (Segmentation fault)"),
+        ("crash", "by SIGSEGV (Segmentation fault); its output: about to crash"),
         ("exit", "with exit code 3 (exit, or STOP in Fortran); its output: bad input, stopping"),
         ("fail", "its code is -7: no wind vane"),
         ("yaw", "demands a yaw rate: the nacelle does not yaw (record 48, yaw_rate_demand = 0.01)"),
@@ -180,7 +184,7 @@ def test_the_root_name_of_outputs_is_a_folder_of_the_run(started):
     controller = started("outname")
     folder = controller.controller._process.folder
     controller.finish()
-    name, length, size, capacity = controller.output.splitlines()[0].split()
+    name, length, size, capacity = controller.console_output.splitlines()[0].split()
     assert Path(name).parent == folder and not folder.exists()
     assert int(size) == int(length) + 1 and int(capacity) == 300 * 2 * 21 + 1
 
@@ -194,6 +198,9 @@ def test_readings_that_there_are_not_are_records_of_zero_and_blades_have_theirs(
     assert records[52] == np.float32(-0.3)
     assert records[3] == records[32] == records[33] == np.float32(0.26)
     blades = np.arange(1.0, len(BladeMeasurement._fields) + 1)
+    controller.reset(whole_view([*RATED, *np.full(len(blades), np.nan)]))
+    records = controller.controller._swap.records
+    assert records[3] == records[33] == np.float32(0.26) and not np.isnan(records).any()
     controller.reset(whole_view([*RATED, *blades]))
     records = controller.controller._swap.records
     names = BladeMeasurement._fields
@@ -228,6 +235,22 @@ def test_the_process_ends_with_the_simulator(library, tmp_path):
     pytest.fail("the process of the library survives the simulator")
 
 
+class Ordinary:
+    """A controller whose attributes happen to be called finish and console_output."""
+
+    finish, console_output = 600.0, 3
+
+    def reset(self, measurement):
+        self.command = measurement.generator_torque, measurement.blade_pitch
+
+    def act(self, measurement):
+        return self.command
+
+
+def test_other_controllers_have_no_output(scene):
+    assert "controller_output" not in simulate(scene, Ordinary, duration=1.0).attrs
+
+
 def test_a_run_has_the_output_of_its_library_and_a_failure_is_that_of_the_run(scene, library, tmp_path):
     (tmp_path / "exit.IN").write_text("exit")
     frame = simulate(scene, f"dll:{library}", duration=5.0)
@@ -243,9 +266,11 @@ def test_a_library_from_fortran_has_the_same_commands_and_its_stop_is_a_failure(
     speeds = 123.0 + np.linspace(0.0, 8.0, 9)
     controller = started("law", path=path)
     assert [pitch for _, pitch in answers(controller, speeds)] == pytest.approx(law(speeds), rel=1e-6)
-    assert controller.output == "t = 0.000 s: started in mode law"
+    assert controller.console_output == "t = 0.000 s: started in mode law"
     text = failure(started("stop", path=path))
     assert "exit code 0" in text and "no more wind" in text
+    text = failure(started("abort", path=path))
+    assert "by SIGABRT" in text and "about to abort" in text
 
 
 @pytest.mark.parametrize(
