@@ -36,6 +36,7 @@ void DISCON(float *avrSWAP, int *aviFAIL, const char *accINFILE, char *avcOUTNAM
     }
     /* integral control of the generator speed from the first pitch angle on */
     integral += 1e-3f * SWAP(3) * (SWAP(20) - SWAP(19)) * (status == 1);
+    SWAP(55) = SWAP(56) = 0; /* as they are anyway */
     SWAP(47) = SWAP(22);
     SWAP(45) = integral;
     for (int blade = 0; blade < 3; blade++)
