@@ -66,7 +66,7 @@ REFUSED = {
     "torque_override": "a torque control of the simulator, which there is none of",
     "yaw_control_flag": "a yaw torque: the nacelle does not yaw",
 }
-POWERS = [INDEX["shaft_power"], INDEX["electrical_power"]]
+SHAFT_POWER, ELECTRICAL_POWER = INDEX["shaft_power"], INDEX["electrical_power"]
 LAST_DEMAND, CONTACTOR = INDEX["last_pitch_demand"], INDEX["generator_contactor"]
 TORQUE, LOGS = INDEX["generator_torque_demand"], INDEX["logs"]
 COLLECTIVE = (INDEX["collective_pitch_demand"],)
@@ -137,12 +137,15 @@ class Swap:
 
     def fill(self, status, measurement):
         """Fill the records of a call with its status (START or STEP) from a Measurement."""
-        values = np.array(measurement)
-        power = values[Measure.GENERATOR_TORQUE] * values[Measure.GENERATOR_SPEED]
-        records, values = self.records, values[_FIELDS] * _SIGNS
-        values[values != values] = 0.0  # not declared, or not in the sensor chain
-        records[0], records[_PLACES] = status, values
-        records[POWERS] = (power, self._efficiency * power)
+        values, records = np.array(measurement), self.records
+        if status == START:  # later calls fill the same records, for speed
+            given = values[_FIELDS] == values[_FIELDS]  # declared, and in the sensor chain: not NaN
+            self._given = _PLACES[given], _FIELDS[given], _SIGNS[given]
+        places, fields, signs = self._given
+        records[0], records[places] = status, values[fields] * signs
+        power = float(values[Measure.GENERATOR_TORQUE] * values[Measure.GENERATOR_SPEED])
+        if power == power:
+            records[SHAFT_POWER], records[ELECTRICAL_POWER] = power, self._efficiency * power
         if blades := values_of_blades(measurement):
             values = np.array(blades)[_BLADE_FIELDS]
             given = values == values  # otherwise the pitch of all blades stays in force
