@@ -1,0 +1,1 @@
+"""Runs libraries with the Bladed interface (DISCON) as controllers."""
