@@ -120,8 +120,8 @@ class Hosted:
         lacking = [f for f in self.fields if RECORD_OF[f] >= PLATFORM_START and not extended]
         if lacking and getattr(self.controller, "declared", True):
             raise InputError(
-                f"record {RECORD_OF[lacking[0]]}, {lacking[0]}, is not sent: set EXavrSWAP to True in the"
-                " ServoDyn file"
+                f"{lacking[0]}, record {RECORD_OF[lacking[0]]}, is not sent: it needs a host with the extended"
+                " interface, such as OpenFAST 5"
             )
         if lacking:  # of a controller that declares nothing: reading them raises an error
             information = self.controller.information

@@ -20,7 +20,9 @@ from fowt_env.controllers.design.saved_files import DESIGN_PREFIX
 from fowt_env.controllers.export.hosted import Hosted
 from fowt_env.controllers.export.native import native_law, number, records_used, write_law
 from fowt_env.controllers.export.native import template as c_text
+from fowt_env.controllers.export.rosco_input import differences, rosco_text
 from fowt_env.controllers.policy.controller import POLICY_PREFIX
+from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.scene.build import build_scene
@@ -65,18 +67,16 @@ def export_sources(name, folder, platform="oc3_hywind", control_dt=0.1, stem="la
     return tuple(_write(Path(folder, f"{stem}.{end}"), text) for end, text in zip("hc", texts, strict=True))
 
 
-def export_library(name, path, platform="oc3_hywind", control_dt=0.1, python=None):
+def export_library(name, path, platform="oc3_hywind", control_dt=0.1, python=False):
     """Build the library of a controller at a path; return "C" or "Python", the language of its law.
 
-    python: True runs the law in Python even if it is available in C; None: in Python if it is not.
+    python: run the law in Python even if it is available in C.
     Raises: InputError for a controller that cannot run in a host, and without a C compiler.
     """
     path = Path(path)
     controller, turbine = prepared(name, platform, control_dt)
     Hosted(controller, turbine, control_dt)  # refuses what no host sends
     native = not python and native_law(controller)
-    if python is False and not native:
-        raise InputError(f"export {name!r}: has no law in C; without --native it runs in Python")
     with tempfile.TemporaryDirectory() as folder:
         if native:
             texts = write_law(controller, turbine, control_dt, "law", _title(name, platform))
@@ -87,6 +87,17 @@ def export_library(name, path, platform="oc3_hywind", control_dt=0.1, python=Non
         with replacing(path) as temporary:
             compile_c(sources[-1:], temporary, (*SHARED, f"-I{folder}"))
     return "C" if native else "Python"
+
+
+def export_rosco(name, path, platform="oc3_hywind", control_dt=0.1):
+    """Write a PI law as ROSCO's DISCON.IN; return sentences on what ROSCO does differently.
+
+    Raises: InputError for other laws.
+    """
+    controller, turbine = prepared(name, platform, control_dt)
+    density = read_platform(platform).environment.air_density
+    _write(Path(path), rosco_text(controller, turbine, density, _title(name, platform)))
+    return differences(controller)
 
 
 def settings_of(name, platform, control_dt):

@@ -67,10 +67,10 @@ def native_law(controller):
     if isinstance(inner, PolicyController):
         baseline = inner._baseline
         return not inner.preview_times and (baseline is None or native_law(baseline))
-    return isinstance(inner, CompiledController) and _family(inner) is not None
+    return isinstance(inner, CompiledController) and family(inner) is not None
 
 
-def _family(controller):
+def family(controller):
     """Return the name of a compiled law in C, None without one; a subclass may have another law."""
     for kind, name in ((IPC, "ipc"), (GSPI, "gspi"), (FloatingFeedback, "floating_feedback"), (LQR, "lqr")):
         if isinstance(controller, kind) and type(controller).kernel is kind.kernel:
@@ -94,7 +94,7 @@ def write_law(controller, turbine, control_dt, stem, title):
     if isinstance(inner, PolicyController):
         size = _policy(code, inner, fields)
     else:
-        size, name = _law(code, inner, "PARAMETERS"), _family(inner)
+        size, name = _law(code, inner, "PARAMETERS"), family(inner)
         start, step = (f"{name}_{call.replace('policy_', '').replace('(', '(PARAMETERS, ')}" for call in (start, step))
     code.texts["law"] = (
         _function("start_law", "double *memory, const double *reading", [start])
@@ -167,7 +167,7 @@ def _common(code, controller, fields, turbine, control_dt):
 
 def _law(code, controller, table):
     """Add a compiled law with its parameters as a table, shared if equal; return the size of its memory."""
-    name = _family(controller)
+    name = family(controller)
     same = [key for key, (_, values) in code.tables.items() if np.array_equal(values, controller.parameters)]
     if same:
         code.macros[table] = same[0]
@@ -237,7 +237,7 @@ def _policy(code, policy, fields):
         start.append("estimator_start(ESTIMATOR, memory + POLICY_M_ESTIMATOR, reading)")
         estimate.append("estimate(ESTIMATOR, memory + POLICY_M_ESTIMATOR, reading, command)")
     if policy._baseline is not None:
-        name = _family(policy._baseline)
+        name = family(policy._baseline)
         total += _law(code, policy._baseline, "BASELINE")
         start.append(f"{name}_start(BASELINE, memory + {baseline_at}, reading)")
         baseline.append(f"{name}_step(BASELINE, memory + {baseline_at}, reading, command)")
@@ -307,7 +307,7 @@ def _reads(fields):
     rows = []
     for name in fields:
         number = RECORD_OF[name]
-        lacking = f"{name}, record {number}, is not sent: set EXavrSWAP to True in the ServoDyn file"
+        lacking = f"{name}, record {number}, is not sent: it needs the extended interface, as of OpenFAST 5"
         rows.append(f'    {{{special.get(number, number)}, "{lacking}"}}')
     kinds = f"enum {{ MEAN_PITCH = {MEAN_PITCH}, NACELLE_VELOCITY_INTEGRAL = {VELOCITY} }};"
     table = "static const struct { int record; const char *name; } READ[N_FIELDS] = {\n" + ",\n".join(rows) + "\n};"

@@ -26,7 +26,7 @@ static void report(const float *swap, int *fail, char *message, int status, cons
     message[i] = '\0';
 }
 
-/* Returns whether the host sends the platform's motion (EXavrSWAP of OpenFAST). */
+/* Returns whether the host sends the platform's motion (extended interface, as of OpenFAST 5). */
 static int is_extended(const float *swap)
 {
     return record(swap, RECORD_SIZE) >= LAST_EXTENDED && record(swap, RECORD_EXTENDED_VERSION) >= 1.0;
