@@ -1,50 +1,85 @@
-"""A small host with the Bladed interface: records of measurements, and libraries called by ctypes."""
+"""A small host with the Bladed interface: its records, libraries called by ctypes, runs through both."""
 
 import ctypes
+import shutil
 from _ctypes import dlclose
 
 import numpy as np
+import pytest
 
 from fowt_env.controllers.bladed.records import INDEX, SIZE
 from fowt_env.controllers.export.hosted import RECORD_OF
-from fowt_env.plant.measurement import MEASURED, BladeMeasurement, Measurement
+from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, BladeMeasurement, Measurement
 
-DEMANDS = [INDEX[name] for name in ("generator_torque_demand", "pitch_demand_1", "pitch_demand_2", "pitch_demand_3")]
+needs_compiler = pytest.mark.skipif(
+    not any(map(shutil.which, ("cc", "gcc", "clang"))), reason="no C compiler is installed"
+)
+COMMANDS = ("generator_torque_demand", "pitch_demand_1", "pitch_demand_2", "pitch_demand_3")
+DEMANDS = [INDEX[name] for name in COMMANDS]
 
 
-def records(measurement, status, interval, extended=True):
-    """Return the array (SIZE,) float32 of a host for a Measurement."""
+def records(values, status, interval, individual=False):
+    """Return the array (SIZE,) float32 of a host from {field of a measurement: value}."""
     swap = np.zeros(SIZE, dtype=np.float32)
-    blades = getattr(measurement, "_blades", None)
     for name, number in RECORD_OF.items():
-        if number > 0 and number != 1:
-            value = getattr(measurement, name) if name in MEASURED else getattr(blades, name, 0.0)
-            swap[number - 1] = value
-    if blades is None:
-        for name in ("blade_pitch_1", "blade_pitch_2", "blade_pitch_3"):
-            swap[INDEX[name]] = measurement.blade_pitch
+        if number > 0:
+            swap[number - 1] = values.get(name, 0.0)
+    if not individual:
+        for blade in (1, 2, 3):
+            swap[INDEX[f"blade_pitch_{blade}"]] = values["blade_pitch"]
     swap[INDEX["status"]], swap[INDEX["communication_interval"]] = status, interval
     swap[INDEX["blades"]], swap[INDEX["message_size"]] = 3, 400
-    swap[INDEX["pitch_control"]] = blades is not None
-    swap[INDEX["size"]] = SIZE
-    swap[INDEX["extended_version"]] = 1.0 if extended else 0.0
+    swap[INDEX["pitch_control"]] = individual
+    swap[INDEX["size"]], swap[INDEX["extended_version"]] = SIZE, 1.0
     return swap
 
 
+def series(turbine, individual=False, instants=300, interval=0.1, seed=0):
+    """Return arrays of a host whose readings wander over all operating regions, seed by seed the same."""
+    rng = np.random.default_rng(seed)
+    time = interval * np.arange(instants)
+
+    def wandering(low, high):
+        phases, periods = rng.uniform(0.0, 2.0 * np.pi, 4), rng.uniform(3.0, 40.0, 4)
+        waves = sum(np.sin(2.0 * np.pi * time / t + p) for t, p in zip(periods, phases, strict=True))
+        return low + (high - low) * (0.5 + 0.17 * waves)
+
+    speed, torque = wandering(0.5, 1.25) * turbine.rated_rotor_speed, turbine.torque_law.rated_torque
+    moment = torque * turbine.drivetrain.gear_ratio
+    values = {
+        "time": time,
+        "rotor_speed": speed,
+        "generator_speed": turbine.drivetrain.gear_ratio * speed,
+        "generator_torque": wandering(0.0, 1.1) * torque,
+        "platform_pitch": wandering(-0.05, 0.12),
+        "platform_pitch_rate": wandering(-0.02, 0.02),
+        "nacelle_acceleration": wandering(-1.0, 1.0),
+        "azimuth": np.cumsum(speed * interval) % (2.0 * np.pi),
+        "blade_pitch": wandering(-0.05, 0.4),
+    }
+    for blade in (1, 2, 3):
+        values[f"blade_pitch_{blade}"] = wandering(-0.05, 0.4)
+        values[f"root_out_of_plane_{blade}"] = wandering(0.5, 2.5) * moment
+    return [
+        records({name: value[k] for name, value in values.items()}, min(k, 1), interval, individual)
+        for k in range(instants)
+    ]
+
+
 class Library:
-    """Calls DISCON of a library; the path must be new for each instance."""
+    """Calls DISCON of a library; a path must be loaded once, as a library is one controller."""
 
     def __init__(self, path):
         self.library = ctypes.CDLL(str(path))
         self.library.DISCON.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
         self.library.DISCON.restype = None
-        self.failed, self.message = ctypes.c_int(0), ctypes.create_string_buffer(400)
+        self.message = ctypes.create_string_buffer(400)
 
     def call(self, swap):
-        """Return (torque, three pitches) of a call; raise RuntimeError with the message of a failure."""
-        swap = swap.copy()
-        self.library.DISCON(swap.ctypes.data, ctypes.addressof(self.failed), b"", b"", self.message)
-        if self.failed.value < 0:
+        """Return the command (torque, three pitches) of a call. Raises: RuntimeError with the message."""
+        swap, failed = np.array(swap), ctypes.c_int(7)
+        self.library.DISCON(swap.ctypes.data, ctypes.addressof(failed), b"", b"", self.message)
+        if failed.value:
             raise RuntimeError(self.message.value.decode())
         self.swap = swap
         return tuple(float(value) for value in swap[DEMANDS])
@@ -54,26 +89,30 @@ class Library:
 
 
 class InHost:
-    """Controls a run through the records of a host, and keeps these and the commands."""
+    """Controls a run of simulate through the records of a host."""
 
     name = "in a host"
 
-    def __init__(self, call, control_dt, individual=False, extended=True):
-        self.run, self.control_dt, self.individual, self.extended = call, control_dt, individual, extended
+    def __init__(self, call, interval, individual=False):
+        self.answer, self.interval, self.individual = call, interval, individual
         self.information = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
-        self.series, self.commands = [], []
+        self.arrays = []
 
     def reset(self, measurement):
-        self.status = 0
+        self.arrays = []
 
     def act(self, measurement):
-        swap = records(measurement, self.status, self.control_dt, self.extended)
-        self.status = 1
-        self.series.append(swap)
-        self.commands.append(self.run(swap))
-        return self.commands[-1] if self.individual else self.commands[-1][:2]
+        values = {name: getattr(measurement, name) for name in MEASURED}
+        if self.individual:
+            values |= {name: getattr(measurement.blades, name) for name in BLADES_MEASURED}
+        self.arrays.append(records(values, min(len(self.arrays), 1), self.interval, self.individual))
+        command = self.answer(self.arrays[-1])
+        return command if self.individual else command[:2]
 
 
-def replay(call, series):
-    """Return the commands (n, 4) of a controller to recorded arrays."""
-    return np.array([call(swap) for swap in series])
+def changed(swap, **values):
+    """Return a copy of an array with records changed by name."""
+    swap = swap.copy()
+    for name, value in values.items():
+        swap[INDEX[name]] = value
+    return swap

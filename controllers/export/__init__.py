@@ -1,1 +1,1 @@
-"""Exports controllers: libraries with the Bladed interface for other simulators, C code, ROSCO's input file."""
+"""Exports controllers: Bladed-style libraries for other simulators, C code, ROSCO's input file."""

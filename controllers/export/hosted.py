@@ -120,8 +120,8 @@ class Hosted:
         lacking = [f for f in self.fields if RECORD_OF[f] >= PLATFORM_START and not extended]
         if lacking and getattr(self.controller, "declared", True):
             raise InputError(
-                f"{lacking[0]}, record {RECORD_OF[lacking[0]]}, is not sent: it needs a host with the extended"
-                " interface, such as OpenFAST 5"
+                f"{lacking[0]}, record {RECORD_OF[lacking[0]]}, is not sent: it needs the extended interface,"
+                " as of OpenFAST 5"
             )
         if lacking:  # of a controller that declares nothing: reading them raises an error
             information = self.controller.information
@@ -157,7 +157,8 @@ class Hosted:
             if torque == 0.0:  # the host has not measured it yet
                 speed = float(swap[INDEX["generator_speed"]])
                 torque = generator_torque(speed, sum(blades) / BLADES, self.curve)
-            self._torque, self._force = torque, blades if self.individual else [sum(blades) / BLADES] * BLADES
+            self._torque = clamp(torque, 0.0, self.limits.maximum)
+            self._force = blades if self.individual else [sum(blades) / BLADES] * BLADES
             self._pitch = [clamp(pitch, self.drive.minimum, self.drive.maximum) for pitch in self._force]
             if "generator_torque" in reading:
                 reading["generator_torque"] = torque

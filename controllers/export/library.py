@@ -32,7 +32,10 @@ SHARED = ("-shared", "-fPIC")
 MODULE = "fowt_env.controllers.export.served"
 LONGEST_START, LONGEST_STEP, LONGEST_END = 900.0, 60.0, 5.0  # s; a first start compiles kernels
 REPLY_SIZE = 4 + 4 * 8 + 1000  # code, command and message of an answer
-HEADERS = "errno.h fcntl.h poll.h signal.h spawn.h stddef.h stdint.h string.h sys/socket.h sys/wait.h time.h unistd.h"
+HEADERS = (
+    "errno.h", "fcntl.h", "poll.h", "signal.h", "spawn.h", "stddef.h", "stdint.h", "string.h", "sys/socket.h",
+    "sys/wait.h", "time.h", "unistd.h",
+)  # fmt: skip
 
 
 def prepared(name, platform, control_dt):
@@ -64,7 +67,8 @@ def export_sources(name, folder, platform="oc3_hywind", control_dt=0.1, stem="la
             f"export {name!r}: has no law in C; --dll makes a library that runs the controller in Python"
         )
     texts = write_law(controller, turbine, control_dt, stem, _title(name, platform))
-    return tuple(_write(Path(folder, f"{stem}.{end}"), text) for end, text in zip("hc", texts, strict=True))
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    return _write_law(texts, folder, stem)
 
 
 def export_library(name, path, platform="oc3_hywind", control_dt=0.1, python=False):
@@ -80,12 +84,12 @@ def export_library(name, path, platform="oc3_hywind", control_dt=0.1, python=Fal
     with tempfile.TemporaryDirectory() as folder:
         if native:
             texts = write_law(controller, turbine, control_dt, "law", _title(name, platform))
-            sources = [_write(Path(folder, f"law.{end}"), text) for end, text in zip("hc", texts, strict=True)]
+            *_, source = _write_law(texts, folder, "law")
         else:
             text = bridge_source(settings_of(name, platform, control_dt), path.stem)
-            sources = [_write(Path(folder, "bridge.c"), text)]
+            source = _write(Path(folder, "bridge.c"), text)
         with replacing(path) as temporary:
-            compile_c(sources[-1:], temporary, (*SHARED, f"-I{folder}"))
+            compile_c([source], temporary, SHARED)
     return "C" if native else "Python"
 
 
@@ -118,7 +122,7 @@ def bridge_source(settings, title):
     times = {"LONGEST_START": LONGEST_START, "LONGEST_STEP": LONGEST_STEP, "LONGEST_END": LONGEST_END}
     return "\n".join([
         "#define _POSIX_C_SOURCE 200809L",
-        *(f"#include <{name}>" for name in HEADERS.split()), "",
+        *(f"#include <{name}>" for name in HEADERS), "",
         "extern char **environ;", "#ifndef MSG_NOSIGNAL", "#define MSG_NOSIGNAL 0", "#endif", "",
         *(f"#define {name} {json.dumps(text)}" for name, text in texts.items()),
         *(f"#define {name} {number(value)}" for name, value in times.items()),
@@ -156,8 +160,14 @@ def compile_c(sources, path, options=()):
 
 
 def _title(name, platform):
-    """Return the first line of the C code of a law."""
-    return f"Controller {name} for {platform}".replace("*/", "")
+    """Return the first line of what is written, in plain characters."""
+    text = f"Controller {name} for {platform}".encode("ascii", "replace").decode()
+    return "".join(letter for letter in text if letter.isprintable()).replace("*/", "")
+
+
+def _write_law(texts, folder, stem):
+    """Write header and file of a law; return their paths."""
+    return tuple(_write(Path(folder, f"{stem}.{end}"), text) for end, text in zip("hc", texts, strict=True))
 
 
 def _write(path, text):

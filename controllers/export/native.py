@@ -1,10 +1,11 @@
 """Writes the C code of compiled laws: a header and a file, which need no Python when they run.
 
 The numbers of a law are those of its parameter array, so a prepared controller is exported with its gains,
-models and limits. The laws themselves are in c/, one file each, with the names of the Python module's entries;
-tests compare them with the compiled laws.
+models and limits. The laws themselves are in c/, one file each, with the names of the Python module's
+entries; tests compare them with the compiled laws.
 """
 
+import json
 import re
 from dataclasses import dataclass, field
 from math import isinf, isnan, pi
@@ -44,6 +45,7 @@ from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, Measure
 
 TEMPLATES = Path(__file__).parent / "c"
 LAST_EXTENDED = RECORD_OF["yaw_rate"]
+EXPORTED = "#ifdef _WIN32\n#define EXPORTED __declspec(dllexport)\n#else\n#define EXPORTED\n#endif"
 
 
 @dataclass
@@ -90,12 +92,11 @@ def write_law(controller, turbine, control_dt, stem, title):
     _common(code, controller, fields, turbine, control_dt)
     inner = getattr(controller, "controller", controller)
     code.add("common.c")
-    start, step = "policy_start(memory, reading)", "policy_step(memory, reading, command)"
     if isinstance(inner, PolicyController):
-        size = _policy(code, inner, fields)
+        size, name, table = _policy(code, inner, fields), "policy", ""
     else:
-        size, name = _law(code, inner, "PARAMETERS"), family(inner)
-        start, step = (f"{name}_{call.replace('policy_', '').replace('(', '(PARAMETERS, ')}" for call in (start, step))
+        size, name, table = _law(code, inner, "PARAMETERS"), family(inner), "PARAMETERS, "
+    start, step = f"{name}_start({table}memory, reading)", f"{name}_step({table}memory, reading, command)"
     code.texts["law"] = (
         _function("start_law", "double *memory, const double *reading", [start])
         + "\n"
@@ -111,14 +112,13 @@ def write_law(controller, turbine, control_dt, stem, title):
     code.add("step.c")
     interface = template("records.c") + "\n" + template("discon.c")
     body = "\n".join(code.texts.values())
-    for text, name in (("controller_type", "controller"), ("controller_start", "start"), ("controller_step", "step")):
-        body, interface = (part.replace(text, f"{stem}_{name}") for part in (body, interface))
     lines = [
         f"/* {title}\n   Made by fowt_env {fowt_env.__version__}; the laws are those of its folder"
         " controllers/export/c. */",
         "#include <math.h>", "#include <stddef.h>", "#include <string.h>", f'#include "{stem}.h"', "",
+        *(f"#define controller_{name} {stem}_{name}" for name in ("type", "start", "step")), "",
         _beginning(code), body, "#ifndef FOWT_WITHOUT_DISCON", "",
-        f'#define LIBRARY "{stem}"', records_used(interface), _reads(fields), interface, "#endif",
+        f"#define LIBRARY {json.dumps(title)}", records_used(interface), _reads(fields), interface, "#endif",
     ]  # fmt: skip
     return header, "\n".join(lines) + "\n"
 
@@ -128,17 +128,12 @@ def template(name):
     return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
-def exported_line():
-    """Return the C lines that define EXPORTED, which makes a function visible in a library."""
-    return "#ifdef _WIN32\n#define EXPORTED __declspec(dllexport)\n#else\n#define EXPORTED\n#endif"
-
-
 def records_used(text):
     """Return an enum of the records of the Bladed interface that a C text names."""
     names = sorted(set(re.findall(r"\bRECORD_([A-Z0-9_]+)\b", text)), key=lambda name: NUMBER[name.lower()])
-    lines = [f"    RECORD_{name} = {NUMBER[name.lower()]}," for name in names]
-    last = [f"    LAST_STANDARD = {LAST_STANDARD},", f"    LAST_EXTENDED = {LAST_EXTENDED}"]
-    return "\n".join([exported_line(), "", "enum { /* numbers of records, from 1 */", *lines, *last, "};", ""])
+    rows = {f"RECORD_{name}": NUMBER[name.lower()] for name in names}
+    rows |= {"LAST_STANDARD": LAST_STANDARD, "LAST_EXTENDED": LAST_EXTENDED}
+    return f"{EXPORTED}\n\n/* numbers of records, from 1 */\n{_enum(rows)}\n"
 
 
 def _function(name, arguments, calls):
@@ -205,7 +200,8 @@ def _lqr_names(code):
     code.enums |= {f"LQR_B_{name}": getattr(e, name) for name in "TRIM TORQUE PITCH A B C L K".split()}
     entries = "OPERATING_WIND INTEGRAL TORQUE_COMMAND PITCH_COMMAND INNOVATION DEVIATION FED_BACK STARTED"
     code.enums |= {f"LQR_M_{name}": getattr(e, name) for name in entries.split()}
-    code.enums |= {f"LQR_{name}": getattr(design, name) for name in "N_PLANT N_SENSORS N_STATE N_FEEDBACK".split()}
+    sizes = ("N_PLANT", "N_SENSORS", "N_STATE", "N_FEEDBACK")
+    code.enums |= {f"LQR_{name}": getattr(design, name) for name in sizes}
     code.enums |= {
         "LQR_BLOCKS": e.BLOCKS, "LQR_BLOCK": e.BLOCK, "LQR_ROTOR": e.ROTOR, "LQR_N_MEMORY": e.N_MEMORY,
         "LQR_WIND": design.WIND, "LQR_MOMENT": design.MOMENT,
@@ -222,8 +218,8 @@ def _policy(code, policy, fields):
     at, entries = 0, {}
     for name, length in (
         ("ACCEPTED", 2), ("ACTION", 2), ("SMOOTHED", 2), ("LASTING", 2), ("MEAN", 1), ("VARIANCE", 1),
-        ("DECISION", 2), ("TRACKING", 1), ("CALLS", 1), ("PERIOD", 1), ("NEWEST", channels), ("HISTORY", size),
-        ("ESTIMATOR", 0),
+        ("DECISION", 2), ("TRACKING", 1), ("CALLS", 1), ("PERIOD", 1), ("NEWEST", channels),
+        ("HISTORY", size), ("ESTIMATOR", 0),
     ):  # fmt: skip
         entries[f"POLICY_M_{name}"] = at
         at += length
@@ -245,6 +241,8 @@ def _policy(code, policy, fields):
     wind = (-1, 1.0, 0.0) if decisions.wind is None else decisions.wind
     low, high = (0.0, 1.0) if chosen.authority is None else chosen.authority
     sizes = [size, *(len(bias) for bias in network.biases)]
+    layers = zip(network.weights, network.biases, strict=True)
+    weights = np.concatenate([np.append(weight.ravel(), bias) for weight, bias in layers])
     code.enums |= {f"POLICY_{mode.name}": int(mode) for mode in ActionMode}
     code.enums |= {
         "POLICY_CHANNELS": channels, "POLICY_INSTANTS": instants, "POLICY_WIND_ENTRY": int(wind[0]),
@@ -267,10 +265,7 @@ def _policy(code, policy, fields):
         "POLICY_CENTRE": ("double", observed.centre), "POLICY_SCALE": ("double", observed.scale),
         "POLICY_LOW": ("double", observed.low), "POLICY_HIGH": ("double", observed.high),
         "POLICY_MEAN": ("double", network.mean), "POLICY_DEVIATION": ("double", network.scale),
-        "POLICY_SIZES": ("int", sizes),
-        "POLICY_WEIGHTS": ("float", np.concatenate([
-            np.append(weight.ravel(), bias) for weight, bias in zip(network.weights, network.biases, strict=True)
-        ])),
+        "POLICY_SIZES": ("int", sizes), "POLICY_WEIGHTS": ("float", weights),
     }  # fmt: skip
     reads = "double *memory, const double *reading"
     code.texts["parts of the policy"] = "\n".join((
@@ -296,8 +291,8 @@ def _field_lines(stem, fields):
     table, lines = MEASURED | BLADES_MEASURED, []
     for name in fields:
         known = table[name]
-        about = ", ".join(text for text in (known.unit, known.meaning, f"positive {known.positive}" * bool(known.positive)) if text)
-        lines.append(f"    {stem.upper()}_{name.upper()}, /* {about} */")
+        positive = f", positive {known.positive}" if known.positive else ""
+        lines += [f"    /* {known.unit}: {known.meaning}{positive} */", f"    {stem.upper()}_{name.upper()},"]
     return "\n".join([*lines, f"    {stem.upper()}_READINGS"])
 
 
@@ -309,9 +304,15 @@ def _reads(fields):
         number = RECORD_OF[name]
         lacking = f"{name}, record {number}, is not sent: it needs the extended interface, as of OpenFAST 5"
         rows.append(f'    {{{special.get(number, number)}, "{lacking}"}}')
-    kinds = f"enum {{ MEAN_PITCH = {MEAN_PITCH}, NACELLE_VELOCITY_INTEGRAL = {VELOCITY} }};"
-    table = "static const struct { int record; const char *name; } READ[N_FIELDS] = {\n" + ",\n".join(rows) + "\n};"
-    return f'{kinds}\n\n{table}\n'
+    kinds = _enum({"MEAN_PITCH": MEAN_PITCH, "NACELLE_VELOCITY_INTEGRAL": VELOCITY})
+    table = "static const struct { int record; const char *lacking; } READ[N_FIELDS] = {\n"
+    return kinds + "\n" + table + ",\n".join(rows) + "\n};\n"
+
+
+def _enum(values):
+    """Return the C text of an enum of {name: int}."""
+    rows = ",\n".join(f"    {name} = {value}" for name, value in values.items())
+    return f"enum {{\n{rows}\n}};\n"
 
 
 def number(value):
@@ -326,10 +327,7 @@ def number(value):
 
 def _beginning(code):
     """Return the C text of enums, macros and tables."""
-    lines = ["enum {"]
-    lines += [f"    {name} = {value}," for name, value in code.enums.items()]
-    lines[-1] = lines[-1].rstrip(",")
-    lines += ["};", ""]
+    lines = [_enum(code.enums)]
     for name, value in code.macros.items():
         lines.append(f"#define {name} {value if isinstance(value, str) else f'({number(value)})'}")
     lines.append("")

@@ -1,10 +1,11 @@
 """Writes a PI law of this package as DISCON.IN, the input file of the ROSCO library.
 
-ROSCO's law is not the same: its integral of gain times error, unlike GK times the integral here, has the small-signal
-gains of the law at a blade pitch if the schedule is 1/(1 + 2 pitch/gain_schedule_pitch) in place of 1/(1 +
-pitch/gain_schedule_pitch) (theory.md, Eq. (A7)); so the file has this schedule. It follows a low pass of the last
-pitch commands, here the last command; the low pass of the generator speed is discretised by Tustin's rule; and
-between rated torque and the parabola of region 2 a PI law on speed controls the torque, here a line.
+ROSCO integrates gain times error, the law here multiplies the integral by its gain GK. A law here has the
+small-signal gains of ROSCO's at every blade pitch if ROSCO's schedule is 1/(1 + 2 pitch/p) where that of GK
+is 1/(1 + pitch/p), p = gain_schedule_pitch (theory.md, Eq. (A7)); the file has this schedule. ROSCO's follows
+a low pass of the pitch commands, here the last command; its low pass of the generator speed is discretised by
+Tustin's rule; between rated torque and the parabola of region 2, and below region 2, a PI law on speed
+controls the torque, here lines of the torque curve.
 """
 
 import numpy as np
@@ -15,10 +16,10 @@ from fowt_env.controllers.pi import PI
 from fowt_env.controllers.rosco import SCHEDULE, RoscoSettings, deck, deck_text, rotor_table, steady_states
 from fowt_env.errors import InputError
 
-FADE = 1.0  # m/s above rated wind over which the feedback of the platform's motion fades in; step of its table
+FADE = 1.0  # m/s above rated wind over which the feedback of the platform's motion fades in
 ACCEPTED = "the PI laws (pi, gspi_oc3, floating_feedback, design:FILE of kind pi)"
 ALWAYS = (
-    "The gains have the small-signal values of the law at each blade pitch, since ROSCO integrates gain x error.",
+    "The gains have the small-signal values of the law at each pitch, since ROSCO integrates gain x error.",
     "They follow a low pass of the pitch commands; below rated, PI control of the speed replaces two lines of"
     " the torque curve.",
 )
@@ -60,7 +61,7 @@ def rosco_values(controller, turbine, density):
         "VS_MaxRat": settings.torque_rate_limit,
         "VS_MaxTq": curve.maximum_torque,
         "VS_Rgn2K": curve.region2_constant,
-        "VS_MinOMSpd": 0.5 * (curve.cut_in_speed + curve.region2_start_speed),  # mid of the line of region 1.5
+        "VS_MinOMSpd": 0.5 * (curve.cut_in_speed + curve.region2_start_speed),  # mid of region 1.5
         "VS_RefSpd": rated,
         "SS_Mode": 0,
         "WE_Mode": 0,  # no wind estimate is needed
@@ -81,8 +82,8 @@ def _feedback(feedback, name):
 def _scheduled(gain, settings, turbine, density, table):
     """Return the {name: value} of the feedback's gain over the wind.
 
-    Below rated wind it is zero, as in the law at minimum pitch; above, the gain schedule of the law, which follows
-    the sum of both parts of the command, reduces a change of the feedback by (p + pitch)/(p + 2 pitch) with p =
+    Below rated wind it is zero, as in the law at minimum pitch. Above, the gain schedule of the law, which
+    follows the whole command, reduces a change of the feedback by (p + pitch)/(p + 2 pitch), p =
     gain_schedule_pitch.
     """
     winds = np.arange(turbine.rated_wind_speed, turbine.cut_out_wind_speed + FADE, FADE)
@@ -96,7 +97,7 @@ def differences(controller):
     """Return sentences on what ROSCO does differently from a PI law, as the module's description."""
     sentences = list(ALWAYS)
     if isinstance(controller, FloatingFeedback):
-        sentences.append("The feedback of the platform's motion fades in over the wind speed, not over the pitch.")
+        sentences.append("The feedback of the platform's motion fades in over the wind, not over the pitch.")
         if controller.feedback.torque_gain:
             sentences.append(
                 f"torque_gain = {controller.feedback.torque_gain:g} N m per m/s is left out: ROSCO's feedback"

@@ -2,8 +2,8 @@
 
 Started by the library as `python -m fowt_env.controllers.export.served SETTINGS` with a socket as standard
 input; SETTINGS is JSON with controller, platform, control_dt and the folder of the export, in which the
-controller runs. A request is the number of records (int32) and the records (float32); an answer a code (int32, 0
-or -1), four numbers (float64: torque, pitch of each blade) and a message.
+controller runs. A request is the number of records (int32) and the records (float32); an answer a code
+(int32, 0 or -1), four numbers (float64: torque, pitch of each blade) and a message.
 """
 
 import json

@@ -17,7 +17,7 @@ AGAIN = "Run the law in a Python process, even if it is available in C."
 def export(
     controller: Annotated[str, Argument(help=CONTROLLER.partition(" none:")[0])],
     dll: Annotated[str | None, Option(help="Output library with the Bladed interface: .so.")] = None,
-    c_folder: Annotated[str | None, Option("--c", help="Output folder of the C code, law.h and law.c.")] = None,
+    c_folder: Annotated[str | None, Option("--c", help="Output folder of law.h and law.c, C99.")] = None,
     rosco: Annotated[str | None, Option(help="Output file of ROSCO: .IN.")] = None,
     platform: shared.PlatformOption = "oc3_hywind",
     control_dt: Annotated[float, Option(help="Control period, s; a multiple of the host's.")] = 0.1,
@@ -32,8 +32,8 @@ def export(
     fowt export policy:ppo_lqr --c plc  # C99 without allocation: law.h and law.c
     fowt export design:mine.json --rosco DISCON.IN  # gains and limits of a PI law for the ROSCO library
 
-    The PI laws, floating_feedback, ipc, lqr and agents on these become C code, all others run in a Python process
-    that the library starts and ends. A C compiler is needed: gcc, clang or pip install ziglang.
+    The PI laws, floating_feedback, ipc, lqr and agents on these become C code, all others run in a Python
+    process that the library starts and ends. A C compiler is needed: gcc, clang or pip install ziglang.
     docs/guides/export.md has the settings of OpenFAST.
     """
     from fowt_env.controllers.export import library
@@ -52,8 +52,10 @@ def export(
             notes = library.export_rosco(controller, rosco, platform, control_dt)
     if dll is not None:
         wrote(dll)
-        note(f"the law runs in {language}; in ServoDyn: PCMode 5, VSContrl 5, DLL_FileName, and a DLL_DT that divides"
-             f" {control_dt:g} s")  # fmt: skip
+        note(
+            f"the law runs in {language}; in ServoDyn: PCMode 5, VSContrl 5, DLL_FileName, and a DLL_DT that"
+            f" divides {control_dt:g} s"
+        )
     if c_folder is not None:
         wrote(*sources)
     if rosco is not None:

@@ -22,7 +22,7 @@ static const char *read_records(const float *swap, double *reading, int first)
             host.velocity = first ? 0.0 : VELOCITY_LEFT * host.velocity + LIMIT_DT * acceleration;
             reading[i] = host.velocity;
         } else if (READ[i].record > LAST_STANDARD && !is_extended(swap)) {
-            return READ[i].name;
+            return READ[i].lacking;
         } else {
             reading[i] = record(swap, READ[i].record);
         }

@@ -17,7 +17,7 @@ int controller_start(controller_type *law, const double *reading)
     if (!usable(reading, N_FIELDS))
         return 1;
     start_law(law->memory, reading);
-    law->force[0] = reading[GENERATOR_TORQUE];
+    law->force[0] = clamp(reading[GENERATOR_TORQUE], 0.0, LIMIT_TORQUE);
     for (i = 0; i < 3; i++) {
         law->force[1 + i] = reading[FIRST_PITCH + i * INDIVIDUAL];
         law->pitch[i] = clamp(law->force[1 + i], LIMIT_PITCH_MINIMUM, LIMIT_PITCH_MAXIMUM);
