@@ -30,6 +30,10 @@ from scipy.optimize import brentq
 
 from fowt_env.caches import Cache
 from fowt_env.control import check_control_dt
+from fowt_env.controllers.bladed.controller import SYMBOL, BladedCalls
+from fowt_env.controllers.bladed.library import MEMORY_SIZE, Library
+from fowt_env.controllers.bladed.records import INDEX
+from fowt_env.controllers.bladed.swap import Swap
 from fowt_env.controllers.gains import published_set, with_gains
 from fowt_env.controllers.ipc.design import BANDWIDTH, lead_time, root_slope
 from fowt_env.controllers.settings import POSITIVE, Settings
@@ -37,14 +41,12 @@ from fowt_env.controllers.tuned import tuned_for
 from fowt_env.descriptions.checks import check_one_of
 from fowt_env.descriptions.files import read_text
 from fowt_env.descriptions.units import DEGREE
-from fowt_env.errors import ControllerError, InputError, unknown
+from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import performance
 
 INSTALL = "pip install --no-deps rosco"
 PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with libdiscon; not found from a copy
-SWAP_SIZE = 4096  # floats: the library accesses entries above 3,300 with every interface
-TEXT_SIZE = 1024  # length of the library's message
 RATIOS = np.linspace(2.0, 20.0, 37)  # tip-speed ratios of the table
 PITCHES = DEGREE * np.concatenate([np.arange(-5.0, 30.0, 1.0), np.linspace(30.0, 90.0, 13)])
 SCHEDULE = 0.5 * pi * np.linspace(0.0, 1.0, 40) ** 2  # blade pitch of the gain table, rad
@@ -60,6 +62,11 @@ IPC_AMPLITUDE = 0.2618  # rad, largest cyclic pitch: IPC_IntSat of ROSCO's toolb
 IPC_RAMP = (0.8, 1.0)  # of rated wind, range over which IPC fades in: IPC_Vramp of ROSCO's toolbox
 SILENT = {"LoggingLevel": 0, "Echo": 0, "Ext_Interface": 0}  # no log files, standard interface
 ENTRY = re.compile(r"^(?P<value>[^!]*?)(?P<gap>\s*!\s*)(?P<name>\w+)\b")
+BLADES_READ = (
+    "azimuth", "blade_pitch_1", "blade_pitch_2", "blade_pitch_3", "root_out_of_plane_1",
+    "root_out_of_plane_2", "root_out_of_plane_3",
+)  # fmt: skip
+OUT_NAME = "rosco"  # root name of log files at higher logging levels
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
 
 
@@ -168,7 +175,7 @@ def _preload(paths):
 _redirecting = threading.Lock()  # overlapping redirections could leave standard output redirected
 
 
-class Rosco:
+class Rosco(BladedCalls):
     """Runs one ROSCO controller, see the module docstring; call prepare(scene) before reset.
 
     settings: RoscoSettings, from which DISCON.IN is written for a scene, or a Discon, used unchanged.
@@ -188,7 +195,7 @@ class Rosco:
         rotation = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
         motion = {0: (), 1: ("nacelle_acceleration",), 2: (rotation,)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
-        blades = tuple(SWAPPED.values()) if self.individual else ()
+        blades = BLADES_READ if self.individual else ()
         self.information = (*used, *motion, *blades, "plant_model")
         self._motion = motion
 
@@ -210,7 +217,7 @@ class Rosco:
         self._source, needed = find_library()
         _preload(needed)
         turbine, density = scene.turbine, scene.platform.environment.air_density
-        self._efficiency = turbine.drivetrain.generator_efficiency
+        self._turbine = turbine
         if isinstance(self.settings, Discon):
             text, table = self.settings.texts(self.changes, lambda: rotor_table(turbine, density))
         else:
@@ -235,86 +242,48 @@ class Rosco:
         """
         if self._files is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
-        self._library = _Copy(self._source, self._files)
-        self._swap = np.zeros(SWAP_SIZE, dtype=np.float32)
-        self._deck = str(Path(self._files, "DISCON.IN")).encode()
+        memory = bytearray(MEMORY_SIZE)
+        self._library = _Copy(self._source, self._files, memory)
+        deck = str(Path(self._files, "DISCON.IN"))
+        self._swap = Swap(memory, self._turbine, self.control_dt, deck, OUT_NAME, self.individual)
         self._rate = None
-        self._first = (measurement.time, self._call(0, measurement))
+        self._start(measurement)
 
-    def act(self, measurement):
-        """Return (generator torque, blade pitch) or, with individual pitch, (torque, pitch of each blade).
-
-        Raises: ControllerError with ROSCO's message if the call fails.
-        """
-        if self._first is not None:
-            time, commands = self._first
-            self._first = None
-            if time == measurement.time:  # reset() has already made this call
-                return commands
-        return self._call(1, measurement)
-
-    def _call(self, status, m):
-        s = self._swap
-        s[0], s[1], s[2] = status, m.time, self.control_dt
-        s[3] = s[32] = s[33] = m.blade_pitch
-        power = m.generator_torque * m.generator_speed
-        s[13], s[14] = power, self._efficiency * power
-        s[19], s[20], s[22], s[26] = m.generator_speed, m.rotor_speed, m.generator_torque, m.wind_speed
-        s[48], s[49], s[50] = TEXT_SIZE, len(self._deck), len(OUT_NAME)
-        for entry, name in ((52, "nacelle_acceleration"), (82, "platform_pitch_acceleration")):
-            s[entry] = getattr(m, name) if name in self._motion else 0.0
+    def _call(self, status, measurement):
+        swap = self._swap
+        swap.fill(status, measurement)
         if "platform_pitch_rate" in self._motion:
-            rate = m.platform_pitch_rate
-            s[82] = 0.0 if self._rate is None else (rate - self._rate) / self.control_dt
+            rate = measurement.platform_pitch_rate
+            slope = 0.0 if self._rate is None else (rate - self._rate) / self.control_dt
+            swap.records[INDEX["nacelle_nodding_acceleration"]] = slope
             self._rate = rate
-        s[60] = 3.0
-        if self.individual:
-            s[27] = 1.0
-            for entry, name in SWAPPED.items():
-                s[entry] = getattr(m.blades, name)
-        failed = self._library.call(s, self._deck)
-        if failed is not None:
-            raise ControllerError(
-                f"controller {self.name!r} failed at t = {m.time:.3f} s: ROSCO reports {failed!r}",
-                controller=self.name,
-                time=m.time,
-                returned=None,
-            )
-        return tuple(float(s[i]) for i in ((46, 41, 42, 43) if self.individual else (46, 41)))
+        self._library.call()
+        if swap.failure < 0:
+            raise self._error(f"ROSCO reports {swap.message!r}", measurement.time)
+        return swap.demands()
 
 
-# entries of the interface's array
-SWAPPED = {59: "azimuth", 3: "blade_pitch_1", 32: "blade_pitch_2", 33: "blade_pitch_3"}
-SWAPPED |= {28 + blade: f"root_out_of_plane_{blade}" for blade in (1, 2, 3)}
-OUT_NAME = b"rosco"  # root name of log files at higher logging levels
-
-
-class _Copy:
+class _Copy(Library):
     """Loads a private copy of libdiscon, which is unloaded with this object."""
 
-    def __init__(self, source, folder):
+    def __init__(self, source, folder, memory):
         handle, path = tempfile.mkstemp(suffix=".so", dir=folder)
         os.close(handle)
         shutil.copyfile(source, path)
         try:
-            library = ctypes.CDLL(path)
-            self._discon = library.DISCON
+            super().__init__(path, SYMBOL, memory)
         except (OSError, AttributeError) as error:
             raise InputError(f"controller 'rosco': {path} cannot be used ({error}); {INSTALL}") from error
         finally:
             os.unlink(path)  # the file is not needed after loading
-        self._discon.argtypes = [ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_char_p] * 3]
-        self._discon.restype = None
-        self._message = ctypes.create_string_buffer(TEXT_SIZE)
-        self._failure = ctypes.c_int32(0)
         # flushes the Fortran library's buffer of standard output
         flushing = (library for library in _needed if hasattr(library, "_gfortran_flush_i4"))
         self._flush = getattr(next(flushing, None), "_gfortran_flush_i4", lambda unit: None)
         self._null = os.open(os.devnull, os.O_WRONLY)
-        self._end = weakref.finalize(self, _unload, library._handle, self._null)
+        self._end = weakref.finalize(self, _unload, self.handle, self._null)
 
-    def call(self, swap, deck):
-        """Call DISCON on the swap array; return None, or the message of a failure.
+    def call(self):
+        """Call DISCON.
 
         Standard output is suppressed during the call, because at every logging level the library prints six
         lines at each start and a message when its wind estimator leaves its bounds.
@@ -323,14 +292,11 @@ class _Copy:
             saved = os.dup(1)
             os.dup2(self._null, 1)
             try:
-                self._discon(swap.ctypes.data, ctypes.addressof(self._failure), deck, OUT_NAME, self._message)
+                super().call()
                 self._flush(None)
             finally:
                 os.dup2(saved, 1)
                 os.close(saved)
-        if self._failure.value < 0:
-            return self._message.value.decode(errors="replace").strip()
-        return None
 
 
 def _unload(library, null):

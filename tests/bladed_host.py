@@ -7,8 +7,10 @@ from _ctypes import dlclose
 import numpy as np
 import pytest
 
-from fowt_env.controllers.bladed.records import INDEX, SIZE
-from fowt_env.controllers.export.hosted import RECORD_OF
+from fowt_env.control import whole_view
+from fowt_env.controllers.bladed.library import MEMORY_SIZE
+from fowt_env.controllers.bladed.records import INDEX
+from fowt_env.controllers.bladed.swap import Swap
 from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, BladeMeasurement, Measurement
 
 needs_compiler = pytest.mark.skipif(
@@ -18,20 +20,12 @@ COMMANDS = ("generator_torque_demand", "pitch_demand_1", "pitch_demand_2", "pitc
 DEMANDS = [INDEX[name] for name in COMMANDS]
 
 
-def records(values, status, interval, individual=False):
-    """Return the array (SIZE,) float32 of a host from {field of a measurement: value}."""
-    swap = np.zeros(SIZE, dtype=np.float32)
-    for name, number in RECORD_OF.items():
-        if number > 0:
-            swap[number - 1] = values.get(name, 0.0)
-    if not individual:
-        for blade in (1, 2, 3):
-            swap[INDEX[f"blade_pitch_{blade}"]] = values["blade_pitch"]
-    swap[INDEX["status"]], swap[INDEX["communication_interval"]] = status, interval
-    swap[INDEX["blades"]], swap[INDEX["message_size"]] = 3, 400
-    swap[INDEX["pitch_control"]] = individual
-    swap[INDEX["size"]], swap[INDEX["extended_version"]] = SIZE, 1.0
-    return swap
+def records(turbine, values, status, interval, individual=False):
+    """Return the array of a host, as for libraries that this package runs, from {measured field: value}."""
+    swap = Swap(bytearray(MEMORY_SIZE), turbine, interval, individual=individual)
+    fields = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
+    swap.fill(status, whole_view([values.get(name, 0.0) for name in fields]))
+    return swap.records.copy()
 
 
 def series(turbine, individual=False, instants=300, interval=0.1, seed=0):
@@ -61,7 +55,7 @@ def series(turbine, individual=False, instants=300, interval=0.1, seed=0):
         values[f"blade_pitch_{blade}"] = wandering(-0.05, 0.4)
         values[f"root_out_of_plane_{blade}"] = wandering(0.5, 2.5) * moment
     return [
-        records({name: value[k] for name, value in values.items()}, min(k, 1), interval, individual)
+        records(turbine, {name: value[k] for name, value in values.items()}, min(k, 1), interval, individual)
         for k in range(instants)
     ]
 
@@ -93,8 +87,8 @@ class InHost:
 
     name = "in a host"
 
-    def __init__(self, call, interval, individual=False):
-        self.answer, self.interval, self.individual = call, interval, individual
+    def __init__(self, call, turbine, interval, individual=False):
+        self.answer, self.turbine, self.interval, self.individual = call, turbine, interval, individual
         self.information = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
         self.arrays = []
 
@@ -105,7 +99,8 @@ class InHost:
         values = {name: getattr(measurement, name) for name in MEASURED}
         if self.individual:
             values |= {name: getattr(measurement.blades, name) for name in BLADES_MEASURED}
-        self.arrays.append(records(values, min(len(self.arrays), 1), self.interval, self.individual))
+        status = min(len(self.arrays), 1)
+        self.arrays.append(records(self.turbine, values, status, self.interval, self.individual))
         command = self.answer(self.arrays[-1])
         return command if self.individual else command[:2]
 

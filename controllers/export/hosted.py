@@ -19,6 +19,7 @@ from fowt_env.controllers.bladed.records import (
     PLATFORM_START,
     START,
 )
+from fowt_env.controllers.bladed.swap import BLADE_READINGS, READINGS
 from fowt_env.descriptions.sensors import built_in_chains
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.plant.drivetrain import (
@@ -34,19 +35,13 @@ from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, BladeMeasureme
 MEAN_PITCH, VELOCITY = 0, -1  # in place of a record's number: mean over the blades, integrated acceleration
 PITCHES = [INDEX[f"blade_pitch_{blade + 1}"] for blade in range(BLADES)]
 LAST_STANDARD = NUMBER["size"]  # record that is read of every host; those above are extended ones
-_AXES = ("surge", "sway", "heave", "roll", "platform_pitch", "yaw")
-_MOTIONS = [f"platform_{kind}_{axis}" for kind in ("displacement", "rotation_displacement") for axis in "xyz"]
-RECORD_OF = {  # field of a measurement -> number of the record that a host sends of it
-    "time": NUMBER["time"],
+RECORD_OF = {  # field of a measurement -> number of the record that a host sends of it; the first one counts
+    **{field.name.lower(): NUMBER[name] for name, (field, sign) in reversed(READINGS.items()) if sign > 0.0},
+    **{field.name.lower(): NUMBER[name] for name, field in BLADE_READINGS.items()},
     "blade_pitch": MEAN_PITCH,
     "nacelle_velocity": VELOCITY,
-    "nacelle_acceleration": NUMBER["tower_top_fore_aft_acceleration"],
-    "platform_pitch_acceleration": NUMBER["nacelle_nodding_acceleration"],
-    "wind_speed": NUMBER["hub_wind_speed"],
-    **{field: NUMBER[name] for field, name in zip(_AXES, _MOTIONS, strict=True)},
-    **{f"{field}_rate": NUMBER[name] + 6 for field, name in zip(_AXES, _MOTIONS, strict=True)},
-    **{field: NUMBER[field] for field in (*MEASURED, *BLADES_MEASURED) if field in NUMBER},
 }
+LAST_EXTENDED = max(RECORD_OF.values())
 
 
 def fields_of(controller):
@@ -115,8 +110,9 @@ class Hosted:
             raise InputError(f"record 61, the number of blades, is {swap[INDEX['blades']]:g}: must be 3")
         if self.individual and swap[INDEX["pitch_control"]] != 1.0:
             raise InputError("record 28: this law commands each blade: set Ptch_Cntrl to 1")
-        size, last = swap[INDEX["size"]], RECORD_OF["yaw_rate"]
-        extended = size >= last and swap[INDEX["extended_version"]] >= EXTENDED_VERSION
+        extended = (
+            swap[INDEX["size"]] >= LAST_EXTENDED and swap[INDEX["extended_version"]] >= EXTENDED_VERSION
+        )
         lacking = [f for f in self.fields if RECORD_OF[f] >= PLATFORM_START and not extended]
         if lacking and getattr(self.controller, "declared", True):
             raise InputError(

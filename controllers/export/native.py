@@ -17,6 +17,7 @@ import fowt_env
 from fowt_env.control import CompiledController
 from fowt_env.controllers.bladed.records import NUMBER
 from fowt_env.controllers.export.hosted import (
+    LAST_EXTENDED,
     LAST_STANDARD,
     MEAN_PITCH,
     RECORD_OF,
@@ -44,7 +45,6 @@ from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, build_tor
 from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, Measure
 
 TEMPLATES = Path(__file__).parent / "c"
-LAST_EXTENDED = RECORD_OF["yaw_rate"]
 EXPORTED = "#ifdef _WIN32\n#define EXPORTED __declspec(dllexport)\n#else\n#define EXPORTED\n#endif"
 
 

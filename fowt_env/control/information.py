@@ -35,7 +35,7 @@ def check_pitches(controller: Any, individual: bool) -> None:
     lacking = ""
     if getattr(controller, "individual", False):
         lacking = "commands the pitch of each blade"
-    elif declares_blades(controller):
+    elif declares_blades(controller) and getattr(controller, "declared", True):
         name = next(name for name in controller.information if name in BladeMeasurement._fields)
         lacking = f"declares {name!r}, which is measured with individual pitch"
     if lacking:

@@ -14,6 +14,7 @@ import pandas as pd
 
 from fowt_env.control import (
     EXACT,
+    CheckedController,
     CommandUnits,
     CompiledController,
     check_pitches,
@@ -210,6 +211,7 @@ def simulate(
     frame.filter(like="RotSpeed") selects a column without the unit. attrs["events"] of the DataFrame:
     {name: count} of events outside the usual range of the plant's models (fowt_env.plant.events), without
     zeros. attrs["doubtful_commands"]: the warning about commands implausible in N m and rad, "" for none.
+    attrs["controller_output"]: messages and printed text of a library with the Bladed interface, if any.
     attrs["torque_limited"]: time (s) for which the generator torque differed from the command.
     attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: name of
     that trip, such as "overspeed"; attrs["stop"]: "normal" or "emergency" if a trip or a fault was stopping
@@ -269,7 +271,11 @@ def simulate(
     interface = build_interface(scene, controller, guard, chain, preview, period, periods)
     run = Run(scene, controller, x, u, schedule, interface)
     with _bar(progress) as report, _controller_errors():
-        run.advance(report)
+        try:
+            run.advance(report)
+        finally:
+            if isinstance(controller, CheckedController):
+                controller.finish()
     frame = run.frame()
     sentences = [harm(frame.attrs["events"])]
     if not (without_controller or listed):
@@ -381,6 +387,8 @@ class Run:
             torque, speed = (frame.iloc[:, out].to_numpy() for out in (Out.GENTQ, Out.ROTSPEED))
             self.units.see_run(torque * 1e3, speed * RPM, period)
         frame.attrs["doubtful_commands"] = self.units.said
+        if output := getattr(self.controller, "output", ""):
+            frame.attrs["controller_output"] = output
         return frame
 
     def out_of_bounds(self, attrs):

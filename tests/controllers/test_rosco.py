@@ -264,7 +264,7 @@ def test_the_feedback_of_a_deck_is_given_the_slope_of_the_platforms_pitch_rate(s
     seen = []
     for k in range(1, 5):
         controller.act(rated._replace(time=0.1 * k, platform_pitch_rate=0.004 * 0.1 * k))
-        seen.append(controller._swap[82])
+        seen.append(controller._swap.records[82])
     assert seen == pytest.approx([0.004] * 4, rel=1e-5)
 
 

@@ -30,12 +30,12 @@ OUTPUTS = {  # output parameters of commands -> arguments of output(), which che
 }
 err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
 MODULES = (  # modules that add commands to the app
-    "simulate", "listing", "check", "evaluate", "validate", "doctor", "warmup", "cache", "benchmark",
-    "design", "plot", "report", "scores", "leaderboard", "import_deck", "export", "hydro",
+    "simulate", "listing", "check", "check_dll", "evaluate", "validate", "doctor", "warmup", "cache",
+    "benchmark", "design", "plot", "report", "scores", "leaderboard", "import_deck", "export", "hydro",
     "train",
 )  # fmt: skip
 GROUPS = {  # headings of fowt --help -> their commands, in the order shown
-    "Run": ("simulate", "trim", "plot", "animate", "check", "import", "hydro"),
+    "Run": ("simulate", "trim", "plot", "animate", "check", "check-dll", "import", "hydro"),
     "Design": ("linearize", "design", "export"),
     "Evaluate": ("evaluate", "report", "scores", "leaderboard"),
     "Train": ("train", "export-policy"),

@@ -11,7 +11,6 @@ from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import write_table
 from fowt_env.training.cli import options as shared
-from fowt_env.training.cli.arguments import parse_names
 from fowt_env.training.cli.console import (
     EXIT_INTERRUPTED,
     EXIT_STOPPED,
@@ -24,7 +23,7 @@ from fowt_env.training.cli.console import (
 from fowt_env.training.cli.tables import out, print_table, table_width
 
 MOST_CASES = 12  # largest number of cases whose conditions are printed
-CONTROLLERS = "Names, policy:NAME, design:FILE or module:Name, comma-separated."
+CONTROLLERS = "Names, policy:NAME, design:FILE, dll:FILE.so or module:Name, comma-separated."
 CASES = "Cases or suites, comma-separated; with --suite: a selection of its cases. Default: above_rated."
 PLATFORM = "Platform (name or path), to which winds and limits are scaled. Default: the suite's."
 SEEDS = f"{shared.WHOLE}, the same for each controller. Default: the suite's, else 1."
@@ -75,6 +74,7 @@ def evaluate_command(
     leaderboard.json, manifest.json (the settings), summary.csv (means by case) and plots. The same command
     resumes an interrupted evaluation and adds further controllers, cases or seeds to the folder.
     """
+    from fowt_env.controllers import controller_names
     from fowt_env.training.evaluation.cases import chosen_cases
     from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.evaluation.evaluate import evaluate, summary
@@ -89,7 +89,7 @@ def evaluate_command(
         if suite is None or seeds is not None:
             raise InputError("--draw-seeds: needs a --suite, and no --seeds")
         chosen = with_drawn_seeds(chosen, draw_seeds)
-    if baseline is not None and baseline not in (names := parse_names(controllers)):
+    if baseline is not None and baseline not in (names := controller_names(controllers)):
         raise unknown("baseline among --controllers", baseline, names)
     finished = 0
     with progress_bar("evaluating") as update:

@@ -10,7 +10,7 @@ from fowt_env.descriptions.wind import wind_of
 from fowt_env.errors import SimulationStopped
 from fowt_env.files.tables import SERIES_SUFFIXES, TABLE_SUFFIXES, write_table
 from fowt_env.training.cli import options as shared
-from fowt_env.training.cli.arguments import parse_fault, parse_names, parse_pairs, parse_protection
+from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection
 from fowt_env.training.cli.console import command, note, output, progress_bar, save_table, wrote
 from fowt_env.training.cli.tables import print_table
 
@@ -23,8 +23,9 @@ WIND = (
 )
 SEA = "Name from fowt list seas, jonswap:HS:TP[:GAMMA], regular:H:T, JSON, or none (still water)."
 CONTROLLER = (
-    "Name from fowt list controllers, policy:NAME from fowt list agents, policy:FILE.npz, design:FILE.json or"
-    " your module:Name. none: constant rotor speed and blade pitch (at rest without wind); constant: constant"
+    "Name from fowt list controllers, policy:NAME from fowt list agents, policy:FILE.npz, design:FILE.json,"
+    " dll:FILE.so[,DISCON.IN] or your module:Name. none: constant rotor speed and blade pitch (at rest"
+    " without wind); constant: constant"
     " torque and blade pitch, variable rotor speed."
 )
 FIDELITY = "reference, standard (1000 times faster, within 0.1 %), or fast (tabulated rotor)."
@@ -93,6 +94,8 @@ def simulate(
             raise
     _print_channels(frame, title)
     _note_limits(frame, scene.turbine)
+    if printed := frame.attrs.get("controller_output"):
+        note(f"the controller says:\n{printed}")
     _save_run(frame, out_path)
     if plot is not None:
         from fowt_env.visual.time_series import plot_run
@@ -143,9 +146,10 @@ def _print_channels(frame, title):
 def compared_runs(controllers, duration, progress, platform="oc3_hywind", wind=None, sea=None, **options):
     """Return (scene, {controller: run}) of comma-separated controllers in the same wind and waves."""
     import fowt_env
+    from fowt_env.controllers import controller_names
 
     options = {"duration": max(LEAST_WAVES, duration)} | options
-    names, runs = list(dict.fromkeys(parse_names(controllers))), {}
+    names, runs = list(dict.fromkeys(controller_names(controllers))), {}
     scene = fowt_env.build_scene(platform, wind=wind_of(wind), sea=sea_of(sea), **options)
     for number, name in enumerate(names, 1):
         runs[name] = fowt_env.simulate(scene, controller=name, duration=duration)

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from fowt_env.controllers import make
-from fowt_env.descriptions.checks import check_number, check_whole_number, parse_names, plain_number
+from fowt_env.controllers import controller_names, make
+from fowt_env.descriptions.checks import check_number, check_whole_number, plain_number
 from fowt_env.descriptions.platform import turbine_of
 from fowt_env.errors import InputError, PlantWarning, level_outside
 from fowt_env.files.tables import table_path, write_table
@@ -181,7 +181,7 @@ def stored(run, outcome):
 def _labelled(controllers):
     """Return {label: controller} of the argument of evaluate."""
     if isinstance(controllers, str):
-        controllers = parse_names(controllers)
+        controllers = controller_names(controllers)
     if not isinstance(controllers, dict):
         labelled = {}
         for each in controllers:

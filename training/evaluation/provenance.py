@@ -54,11 +54,13 @@ def controller_code(controller):
     """Return {"name", "code"}: the name of a controller, and a hash of the files that define it.
 
     A name of CONTROLLERS: its module, imports from this project, and the data of the package controllers;
-    "design:FILE", "policy:NAME": the file and all controllers; "module:Name", a class or an object: its
+    "design:FILE", "policy:NAME": the file and all controllers; "dll:PATH": library, input file and the code
+    that calls it; "module:Name", a class or an object: its
     source file, and imports from the same folder and this project. The content_key (a text) of an object is
     hashed, too, e.g. of one whose file only starts another program.
     """
     from fowt_env.controllers import CONTROLLERS
+    from fowt_env.controllers.bladed.controller import DLL_PREFIX, named_library
     from fowt_env.controllers.design import saved_files
     from fowt_env.controllers.policy.controller import POLICY_PREFIX, policy_path
 
@@ -73,6 +75,8 @@ def controller_code(controller):
         files = _package_files(CONTROLLERS.get(controller))
     elif controller.startswith(saved_files.DESIGN_PREFIX):
         files = [controller.removeprefix(saved_files.DESIGN_PREFIX), *_package_files(saved_files.load_design)]
+    elif controller.startswith(DLL_PREFIX):
+        files = [*named_library(controller).files, *_package_files(named_library)]
     elif controller.startswith(POLICY_PREFIX):  # the policy's baseline may be any controller
         files = [policy_path(controller.removeprefix(POLICY_PREFIX)), *_package_files(None)]
     else:

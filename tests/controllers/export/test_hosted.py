@@ -7,7 +7,7 @@ from bladed_host import InHost, changed, series
 from fowt_env import build_scene, simulate
 from fowt_env.control import CheckedController, make
 from fowt_env.controllers.bladed.records import PLATFORM_START, RECORDS
-from fowt_env.controllers.export.hosted import RECORD_OF, Hosted, fields_of
+from fowt_env.controllers.export.hosted import LAST_EXTENDED, RECORD_OF, Hosted, fields_of
 from fowt_env.controllers.export.library import hosted
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import ControllerError, InputError
@@ -32,7 +32,7 @@ class Feathering:
 def test_a_run_through_the_records_of_a_host_is_the_run_of_simulate(name):
     scene = build_scene("oc3_hywind", wind=16.0, sea="paper_wind_wave", duration=700.0)
     controller = make(name, scene.turbine, DT)
-    host = InHost(Hosted(controller, scene.turbine, DT).call, DT)
+    host = InHost(Hosted(controller, scene.turbine, DT).call, scene.turbine, DT)
     there = simulate(scene, controller=host, duration=30.0)
     here = simulate(scene, controller=name, duration=30.0)
     for channel in ("RotSpeed_[rpm]", "BldPitch1_[deg]", "GenTq_[kN-m]", "PtfmPitch_[deg]"):
@@ -48,7 +48,8 @@ def test_each_field_is_read_from_the_record_with_its_unit():
         if number > 0:
             assert units[number] == table[name].unit
     assert RECORD_OF["platform_pitch"] == 1005 and RECORD_OF["platform_pitch_rate"] == 1011
-    assert RECORD_OF["surge"] == PLATFORM_START and RECORD_OF["yaw_rate"] == 1012
+    assert RECORD_OF["surge"] == PLATFORM_START and RECORD_OF["yaw_rate"] == LAST_EXTENDED == 1012
+    assert RECORD_OF["platform_pitch_acceleration"] == 83  # as ROSCO, in any host
 
 
 def test_information_that_no_host_sends_is_refused_by_name():

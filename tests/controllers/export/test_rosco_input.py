@@ -65,7 +65,7 @@ def test_rosco_replays_the_records_of_the_law_within_a_tenth_of_a_degree(tmp_pat
     path = tmp_path / "DISCON.IN"
     export_rosco("pi", path, control_dt=DT)
     scene = build_scene("oc3_hywind", wind="ntm:18:B", sea="paper_wind_wave", seed=3, duration=700.0)
-    host = InHost(Hosted(*prepared("pi", "oc3_hywind", DT), DT).call, DT)
+    host = InHost(Hosted(*prepared("pi", "oc3_hywind", DT), DT).call, TURBINE, DT)
     frame = simulate(scene, controller=host, duration=60.0)
     rosco = read_back(path)
     rosco.prepare(scene)

@@ -1,0 +1,306 @@
+"""Libraries with the Bladed interface as controllers: commands, messages, and the ways in which one fails."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bladed_library import built, needs_gcc, needs_gfortran
+
+from fowt_env import build_scene, simulate
+from fowt_env.control import make
+from fowt_env.control.views import whole_view
+from fowt_env.controllers import controller_names
+from fowt_env.controllers.bladed.controller import BladedLibrary, named_library
+from fowt_env.errors import ControllerError, InputError
+from fowt_env.plant.measurement import BladeMeasurement, Measurement
+
+pytestmark = needs_gcc
+RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(
+    rotor_speed=1.267109,
+    generator_speed=122.9096,
+    generator_torque=43093.55,
+    wind_speed=18.0,
+    blade_pitch=0.26,
+)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory):
+    return built(tmp_path_factory.mktemp("c"))
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return build_scene("oc3_hywind", wind=18.0, duration=100.0, fidelity="standard")
+
+
+@pytest.fixture
+def started(turbine, library, tmp_path):
+    """Function that starts the library in a mode, with further words of its name."""
+
+    def start(mode="law", *words, path=None):
+        (tmp_path / f"{mode}.IN").write_text(mode)
+        name = ",".join([f"dll:{path or library}", str(tmp_path / f"{mode}.IN"), *words])
+        controller = make(name, turbine, 0.1)
+        controller.reset(RATED)
+        return controller
+
+    return start
+
+
+def answers(controller, speeds, first=0):
+    return [
+        controller.act(RATED._replace(time=0.1 * (first + k), generator_speed=speed))
+        for k, speed in enumerate(speeds)
+    ]
+
+
+def law(speeds):
+    """Plain twin of the law of the C library, in float32 as there."""
+    integral, pitches = np.float32(0.26), []
+    for k, speed in enumerate(speeds):
+        error = np.float32(speed) - np.float32(122.9096)
+        integral = integral + np.float32(1e-3) * np.float32(0.1) * error * np.float32(k > 0)
+        pitches.append(float(integral))
+    return pitches
+
+
+def failure(controller):
+    """The message with which a controller fails within two seconds of simulated time."""
+    with pytest.raises(ControllerError) as caught:
+        answers(controller, [123.0] * 20)
+    return str(caught.value)
+
+
+def test_commands_are_those_of_the_library(started):
+    speeds = 123.0 + np.linspace(0.0, 8.0, 40)
+    commands = answers(started(), speeds)
+    assert [pitch for _, pitch in commands] == law(speeds)
+    assert {torque for torque, _ in commands} == {float(np.float32(43093.55))}
+
+
+def test_several_libraries_at_once_share_no_state(started):
+    up, down = 123.0 + np.linspace(0.0, 8.0, 30), 123.0 - np.linspace(0.0, 8.0, 30)
+    first, second = started(), started()
+    together = []
+    for k in range(30):
+        together += answers(second, down[k : k + 1], k) and answers(first, up[k : k + 1], k)
+    assert [pitch for _, pitch in together] == law(up)
+
+
+def test_a_second_reset_starts_afresh_and_so_does_a_pickled_copy(started):
+    speeds = 123.0 + np.linspace(0.0, 5.0, 15)
+    controller = started()
+    before = answers(controller, speeds)
+    copy = pickle.loads(pickle.dumps(controller))
+    for one in (controller, copy):
+        one.reset(RATED)
+        assert answers(one, speeds) == before
+
+
+def test_each_blade_gets_its_demand_with_individual_pitch(started):
+    controller = started("law", "pitch=individual")
+    assert controller.individual
+    _, *pitches = answers(controller, [122.9096])[0]
+    assert np.diff(pitches) == pytest.approx([0.001, 0.001], rel=1e-4)
+
+
+def test_the_last_call_has_status_minus_one_and_the_output_is_kept(started):
+    controller = started()
+    answers(controller, [123.0] * 5)
+    controller.finish()
+    assert controller.output == "5 calls, last at 0.4 s".replace("5", "6")
+    assert controller.controller._process is None
+
+
+def test_a_message_is_kept_once_and_a_failure_in_the_last_call_too(started):
+    controller = started("warn")
+    answers(controller, [123.0] * 20)
+    controller.finish()
+    assert (
+        controller.output.startswith("t = 1.000 s: vane is noisy") and controller.output.count("noisy") == 1
+    )
+    controller = started("bad_end")
+    controller.finish()
+    assert "last call: code -3: cannot close" in controller.output
+
+
+@pytest.mark.parametrize(
+    ("mode", "part"),
+    [
+        ("crash", "a call ended its process by SIGSEGV (Segmentation fault)"),
+        ("exit", "with exit code 3 (exit, or STOP in Fortran); its output: bad input, stopping"),
+        ("fail", "its code is -7: no wind vane"),
+        ("yaw", "demands a yaw rate: the nacelle does not yaw (record 48, yaw_rate_demand = 0.01)"),
+        ("yaw_torque", "demands a yaw torque: the nacelle does not yaw (record 102"),
+        ("brake", "demands the shaft brake, which the plant does not have (record 36, shaft_brake = 1)"),
+        ("override", "record 55"),
+        ("contactor", "generator contactor (record 35) to 2"),
+        ("many_logs", "301 values for logging (record 65): must be at most 300"),
+        ("nan", "nan"),
+    ],
+)
+def test_a_library_that_fails_fails_the_call_with_the_reason(started, mode, part):
+    text = failure(started(mode))
+    assert part in text and "t = 1.000 s" in text
+
+
+def test_an_endless_loop_ends_at_the_time_limit_with_its_process(started):
+    controller = started("hang", "limit=0.5")
+    process = controller.controller._process._process
+    began = time.monotonic()
+    assert "a call took longer than 0.5 s" in failure(controller)
+    assert time.monotonic() - began < 5.0 and process.poll() == -signal.SIGKILL
+
+
+def test_a_generator_taken_off_has_no_torque(started):
+    torques = [torque for torque, _ in answers(started("generator_off"), [123.0] * 12)]
+    assert torques[9] > 0.0 and torques[10:] == [0.0, 0.0]
+
+
+def test_values_for_logging_and_their_names_are_ignored(started):
+    speeds = 123.0 + np.linspace(0.0, 5.0, 15)
+    assert answers(started("logs"), speeds) == answers(started(), speeds)
+
+
+def test_the_root_name_of_outputs_is_a_folder_of_the_run(started):
+    controller = started("outname")
+    folder = controller.controller._process.folder
+    controller.finish()
+    name, length, size, capacity = controller.output.splitlines()[0].split()
+    assert Path(name).parent == folder and not folder.exists()
+    assert int(size) == int(length) + 1 and int(capacity) == 300 * 2 * 21 + 1
+
+
+def test_readings_that_there_are_not_are_records_of_zero_and_blades_have_theirs(turbine, library):
+    controller = make(BladedLibrary(str(library)), turbine, 0.1)
+    nothing = RATED._replace(wind_speed=float("nan"), yaw=0.2, nacelle_acceleration=-0.3)
+    controller.reset(nothing)
+    records = controller.controller._swap.records
+    assert records[26] == 0.0 and records[23] == -records[36] == np.float32(-0.2)
+    assert records[52] == np.float32(-0.3)
+    assert records[3] == records[32] == records[33] == np.float32(0.26)
+    blades = np.arange(1.0, len(BladeMeasurement._fields) + 1)
+    controller.reset(whole_view([*RATED, *blades]))
+    records = controller.controller._swap.records
+    names = BladeMeasurement._fields
+    assert records[59] == 1.0 + names.index("azimuth")
+    assert records[33] == 1.0 + names.index("blade_pitch_3")
+    assert list(records[29:32]) == [1.0 + names.index(f"root_out_of_plane_{blade}") for blade in (1, 2, 3)]
+    assert list(records[68:71]) == [1.0 + names.index(f"root_in_plane_{blade}") for blade in (1, 2, 3)]
+    assert records[74] == 1.0 + names.index("hub_tilt_moment")
+    assert records[77] == 1.0 + names.index("yaw_bearing_yaw_moment")
+
+
+@pytest.mark.slow
+def test_the_process_ends_with_the_simulator(library, tmp_path):
+    """Also where the library never returns."""
+    (tmp_path / "hang.IN").write_text("hang")
+    code = (
+        "import os, pathlib, threading\n"
+        "from fowt_env.controllers.bladed import library, process\n"
+        f"p = process.LibraryProcess(pathlib.Path({str(library)!r}), 'DISCON', '.', 60.0)\n"
+        f"library.put_text(p.memory, library.INPUT_FILE_AT, 1000, b{str(tmp_path / 'hang.IN')!r})\n"
+        "p.call(9.0); p.memory[0:8] = b'\\0\\0\\x80\\x3f\\0\\0\\x80\\x3f'  # status and time 1\n"
+        "print(p._process.pid, flush=True); threading.Timer(0.3, os._exit, (0,)).start(); p.call(99.0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    pid = int(done.stdout)
+    for _ in range(50):
+        if not Path(f"/proc/{pid}").exists():
+            return
+        time.sleep(0.1)
+    os.kill(pid, signal.SIGKILL)
+    pytest.fail("the process of the library survives the simulator")
+
+
+def test_a_run_has_the_output_of_its_library_and_a_failure_is_that_of_the_run(scene, library, tmp_path):
+    (tmp_path / "exit.IN").write_text("exit")
+    frame = simulate(scene, f"dll:{library}", duration=5.0)
+    assert frame.attrs["controller_output"] == "51 calls, last at 4.9 s"
+    assert frame["BldPitch1_[deg]"].iloc[-1] != frame["BldPitch1_[deg]"].iloc[0]
+    with pytest.raises(ControllerError, match="bad input, stopping"):
+        simulate(scene, f"dll:{library},{tmp_path / 'exit.IN'}", duration=5.0)
+
+
+@needs_gfortran
+def test_a_library_from_fortran_has_the_same_commands_and_its_stop_is_a_failure(started, tmp_path):
+    path = built(tmp_path, "discon.f90", "gfortran")
+    speeds = 123.0 + np.linspace(0.0, 8.0, 9)
+    controller = started("law", path=path)
+    assert [pitch for _, pitch in answers(controller, speeds)] == pytest.approx(law(speeds), rel=1e-6)
+    assert controller.output == "t = 0.000 s: started in mode law"
+    text = failure(started("stop", path=path))
+    assert "exit code 0" in text and "no more wind" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "part"),
+    [
+        ("dll:", "must be dll:PATH[,INPUT_FILE][,KEY=VALUE...]"),
+        ("dll:none.so", "'none.so': there is no such file"),
+        ("dll:.", "is a folder"),
+        ("dll:{library},no.IN", "input file 'no.IN'"),
+        ("dll:{library},a.IN,b.IN", "must be dll:PATH"),
+        ("dll:{library},speed=3", "unknown key"),
+        ("dll:{library},limit=fast", "limit = 'fast': must be a positive number of seconds"),
+        ("dll:{library},limit=0", "limit = 0.0: must be a positive number of seconds"),
+        ("dll:{library},pitch=both", "pitch = 'both': must be one of collective, individual"),
+        (
+            "dll:{library},symbol=discon",
+            "no function 'discon'; it exports 'DISCON': use symbol=DISCON",
+        ),
+        ("dll:{library},symbol=run", "exports no function 'run'; it exports DISCON"),
+        ("dll:{text}", "is no shared library (ELF)"),
+        ("dll:{windows}", "is a Windows DLL"),
+        ("dll:{small}", "is a 32-bit or big-endian library"),
+        ("dll:{other}", "is built for machine 9999"),
+        ("dll:{program}", "is no shared library"),
+    ],
+)
+def test_an_unusable_name_or_file_is_refused_before_anything_runs(turbine, library, tmp_path, name, part):
+    content = bytearray(library.read_bytes())
+    files = {"text": b"no library", "windows": b"MZ" + bytes(100)}
+    small, other, program = bytearray(content), bytearray(content), bytearray(content)
+    small[4], other[18:20], program[16] = 1, (9999).to_bytes(2, "little"), 2
+    files |= {"small": small, "other": other, "program": program}
+    for key, value in files.items():
+        (tmp_path / key).write_bytes(value)
+    with pytest.raises(InputError) as caught:
+        make(name.format(library=library, **{key: tmp_path / key for key in files}), turbine, 0.1)
+    assert part in str(caught.value)
+
+
+def test_a_library_that_lacks_another_is_refused_when_it_is_loaded(turbine, library, tmp_path):
+    path = tmp_path / "lacking.so"
+    built(tmp_path).rename(tmp_path / "libneeded.so")
+    words = ["gcc", "-shared", "-fPIC", "-Wl,--no-as-needed", "-o", str(path), f"-L{tmp_path}", "-lneeded"]
+    source = tmp_path / "calls.c"
+    source.write_text("void DISCON(void) {}\n")
+    subprocess.run([*words[:4], str(source), *words[4:]], check=True)
+    with pytest.raises(ControllerError, match="cannot be loaded: libneeded.so"):
+        make(f"dll:{path}", turbine, 0.1).reset(RATED)
+    origin = [*words[:4], str(source), *words[4:], "-Wl,-rpath,$ORIGIN"]
+    subprocess.run(origin, check=True)  # beside it, where its copy does not find it
+    controller = make(f"dll:{path}", turbine, 0.1)
+    controller.reset(RATED)
+    assert controller.act(RATED) == (0.0, 0.0)
+
+
+def test_a_comma_separated_list_keeps_input_file_and_keys_with_their_library():
+    names = ["pi", "dll:a.so,b.IN,limit=2", "gspi_oc3", "dll:c.so,pitch=individual", "policy:ppo_lqr"]
+    names += ["mine:Law", "dll:d.so"]
+    assert controller_names(",".join(names)) == names
+
+
+def test_the_files_of_a_library_are_those_that_its_name_has(library, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("a.IN").write_text("law")
+    assert named_library(f"dll:{library},a.IN").files == [library, tmp_path / "a.IN"]
