@@ -62,6 +62,14 @@ class Code:
         for name in names:
             self.texts.setdefault(name, template(name))
 
+    def table(self, name):
+        """Return the C text of a table."""
+        kind, values = self.tables[name]
+        write = {"int": str, "double": number, "float": "{!s}f".format}[kind]
+        words = [write(value) for value in values]
+        rows = [", ".join(words[i : i + 5]) for i in range(0, len(words), 5)]
+        return f"static const {kind} {name}[{len(words)}] = {{\n    " + ",\n    ".join(rows) + "\n};\n"
+
 
 def native_law(controller):
     """Return whether the law of a controller is available in C."""
@@ -110,8 +118,8 @@ def write_law(controller, turbine, control_dt, stem, title):
     for name, text in marks.items():
         header = header.replace(f"@{name}@", text)
     code.add("step.c")
-    interface = template("records.c") + "\n" + template("discon.c")
-    body = "\n".join(code.texts.values())
+    parts = [template(name) for name in ("curve.c", "records.c", "discon.c") if name not in code.texts]
+    interface, body = "\n".join([code.table("CURVE"), *parts]), "\n".join(code.texts.values())
     lines = [
         f"/* {title}\n   Made by fowt_env {fowt_env.__version__}; the laws are those of its folder"
         " controllers/export/c. */",
@@ -145,7 +153,8 @@ def _function(name, arguments, calls):
 
 
 def _common(code, controller, fields, turbine, control_dt):
-    """Add fields and limits."""
+    """Add fields and limits, and the torque curve on which a law starts in a host."""
+    code.tables["CURVE"] = "double", [*build_torque_curve(turbine.torque_law)]
     limits, drive = build_torque_limits(turbine.torque_law), turbine.pitch_drive
     individual = int(bool(controller.individual))
     code.enums |= {name.upper(): i for i, name in enumerate(fields)}
@@ -157,12 +166,12 @@ def _common(code, controller, fields, turbine, control_dt):
         "LIMIT_PITCH_MINIMUM": drive.minimum, "LIMIT_PITCH_MAXIMUM": drive.maximum,
         "LIMIT_PITCH_RATE": drive.rate_limit, "VELOCITY_LEFT": velocity_decay(control_dt),
     }  # fmt: skip
-    code.tables["CURVE"] = "double", [*build_torque_curve(turbine.torque_law)]
 
 
 def _law(code, controller, table):
     """Add a compiled law with its parameters as a table, shared if equal; return the size of its memory."""
     name = family(controller)
+    code.add("rate_limit.c", "curve.c")
     same = [key for key, (_, values) in code.tables.items() if np.array_equal(values, controller.parameters)]
     if same:
         code.macros[table] = same[0]
@@ -331,9 +340,5 @@ def _beginning(code):
     for name, value in code.macros.items():
         lines.append(f"#define {name} {value if isinstance(value, str) else f'({number(value)})'}")
     lines.append("")
-    for name, (kind, values) in code.tables.items():
-        write = {"int": str, "double": number, "float": "{!s}f".format}[kind]
-        words = [write(value) for value in values]
-        rows = [", ".join(words[i : i + 5]) for i in range(0, len(words), 5)]
-        lines.append(f"static const {kind} {name}[{len(words)}] = {{\n    " + ",\n    ".join(rows) + "\n};\n")
+    lines += [code.table(name) for name in code.tables if name != "CURVE"]
     return "\n".join(lines)

@@ -8,6 +8,13 @@ static struct {
     int running, periods, call; /* periods: calls in one control period; call: number of the last one */
 } host;
 
+static double mean_pitch(const float *swap)
+{
+    double sum = record(swap, RECORD_BLADE_PITCH_1) + record(swap, RECORD_BLADE_PITCH_2);
+
+    return (sum + record(swap, RECORD_BLADE_PITCH_3)) / 3.0;
+}
+
 /* Fills the readings of a control instant; returns NULL or the field that the host does not send. */
 static const char *read_records(const float *swap, double *reading, int first)
 {
@@ -15,8 +22,7 @@ static const char *read_records(const float *swap, double *reading, int first)
 
     for (i = 0; i < N_FIELDS; i++) {
         if (READ[i].record == MEAN_PITCH) {
-            double sum = record(swap, RECORD_BLADE_PITCH_1) + record(swap, RECORD_BLADE_PITCH_2);
-            reading[i] = (sum + record(swap, RECORD_BLADE_PITCH_3)) / 3.0;
+            reading[i] = mean_pitch(swap);
         } else if (READ[i].record == NACELLE_VELOCITY_INTEGRAL) {
             double acceleration = record(swap, RECORD_TOWER_TOP_FORE_AFT_ACCELERATION);
             host.velocity = first ? 0.0 : VELOCITY_LEFT * host.velocity + LIMIT_DT * acceleration;
@@ -28,7 +34,7 @@ static const char *read_records(const float *swap, double *reading, int first)
         }
     }
     if (first && reading[GENERATOR_TORQUE] == 0.0) /* the host has not measured it yet */
-        reading[GENERATOR_TORQUE] = curve_torque(reading[GENERATOR_SPEED], reading[BLADE_PITCH], CURVE);
+        reading[GENERATOR_TORQUE] = curve_torque(record(swap, RECORD_GENERATOR_SPEED), mean_pitch(swap), CURVE);
     return NULL;
 }
 

@@ -4,6 +4,8 @@
    @STEM@_type law;
    @STEM@_start(&law, reading);          once, with the readings of the first control instant
    @STEM@_step(&law, reading, command);  at every control instant, every @CONTROL_DT@ s, the first included
+
+   The file also has DISCON of the Bladed interface, unless FOWT_WITHOUT_DISCON is defined.
 */
 #ifndef @GUARD@_H
 #define @GUARD@_H
@@ -23,10 +25,5 @@ typedef struct {
    high-speed shaft) and the pitch of the three blades (rad), within limits of value and rate. */
 int @STEM@_start(@STEM@_type *law, const double *reading);
 int @STEM@_step(@STEM@_type *law, const double *reading, double *command);
-
-#ifndef FOWT_WITHOUT_DISCON
-/* The Bladed interface of the same law, with one controller for each loaded library. */
-void DISCON(float *swap, int *fail, const char *infile, const char *outname, char *message);
-#endif
 
 #endif

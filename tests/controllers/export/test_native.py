@@ -1,6 +1,8 @@
 """The laws in C against the compiled laws of the package, and their code against compilers and sanitizers."""
 
 import ctypes
+import json
+import re
 import shutil
 import subprocess
 from functools import cache
@@ -12,6 +14,7 @@ from bladed_host import Library, changed, needs_compiler, series
 from fowt_env.controllers.bladed.records import INDEX
 from fowt_env.controllers.export.hosted import Hosted, fields_of
 from fowt_env.controllers.export.library import SHARED, compile_c, export_sources, prepared
+from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.descriptions.turbine import read_turbine
 
 pytestmark = needs_compiler
@@ -25,10 +28,12 @@ STRICT = ("-pedantic", "-Wconversion", "-Werror")
 
 @cache
 def built(name, folder):
-    """Return (library, paths of the sources) of a law."""
-    sources = export_sources(name, folder / name.replace(":", "_"), control_dt=DT)
-    path = folder / f"lib{name.replace(':', '_')}.so"
-    compile_c(sources[1:], path, (*SHARED, *STRICT))
+    """Return (library, paths of the sources) of a law, compiled without a warning."""
+    stem = re.sub(r"\W", "_", name.removesuffix(".npz"))[-20:]
+    sources = export_sources(name, folder / stem, control_dt=DT)
+    path = folder / f"lib{stem}.so"
+    assert compile_c(sources[1:], path, (*SHARED, *STRICT)) == ""
+    compile_c(sources[1:], folder / "plc.o", ("-c", "-DFOWT_WITHOUT_DISCON", *STRICT))
     return path, sources
 
 
@@ -45,8 +50,35 @@ class Reading(Hosted):
         return self.last
 
 
+@pytest.fixture(scope="module")
+def other_policies(folder):
+    """Names of policies in the other action modes, without estimator, washout and authority."""
+    with np.load(AGENTS / "ppo_lqr.npz") as shipped:
+        arrays = dict(shipped)
+    settings = json.loads(str(arrays["settings"]))
+    channels = ["rotor_speed", "blade_pitch", "generator_torque", "previous_action"]
+    settings |= {"observation": channels, "baseline": "gspi_oc3", "squash": "tanh", "activation": "relu"}
+    arrays["weight_0"] = arrays["weight_0"][:, :10]
+    arrays |= {"mean": arrays["mean"][:10], "scale": arrays["scale"][:10] + 0.1}
+    for mode in ("direct", "setpoint", "residual"):
+        decisions = {"hold": 2, "smoothing": 0.3, "history": 1}
+        arrays["settings"] = np.array(json.dumps(settings | {"action_mode": mode, "decisions": decisions}))
+        np.savez(folder / f"{mode}.npz", **arrays)
+    return {mode: f"policy:{folder / mode}.npz" for mode in ("direct", "setpoint", "residual")}
+
+
+@pytest.mark.parametrize("mode", ("direct", "setpoint", "residual"))
+def test_a_policy_of_another_mode_commands_in_c_what_it_does_here(mode, other_policies, folder):
+    check_law(other_policies[mode], folder)
+
+
 @pytest.mark.parametrize("name", LAWS)
 def test_a_law_in_c_commands_what_the_compiled_law_commands(name, folder):
+    check_law(name, folder)
+
+
+def check_law(name, folder):
+    """Compare the commands of a law in C, by records and by its functions, with those of the package."""
     controller, turbine = prepared(name, "oc3_hywind", DT)
     if name.startswith("policy"):  # layers in double precision, as in C
         network = controller.controller.network
@@ -92,6 +124,8 @@ HARNESS = r"""
 #include <stdlib.h>
 #include <string.h>
 #include "law.h"
+
+void DISCON(float *swap, int *fail, const char *infile, const char *outname, char *message);
 
 /* Arrays of a host with hostile values, each on the heap with the size that the host gives. */
 int main(void)
