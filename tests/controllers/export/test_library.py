@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from bladed_host import Library, changed, needs_compiler, series
 
+from fowt_env import build_scene, simulate
 from fowt_env.controllers.export import library
 from fowt_env.controllers.export.library import export_library, hosted
 from fowt_env.descriptions.turbine import read_turbine
@@ -95,6 +96,19 @@ def test_a_library_runs_again_and_its_process_ends_when_it_is_unloaded(own, tmp_
     assert there.call(arrays[0]) == first and pid_of(tmp_path) != pid
     there.close()
     wait_for_end(pid_of(tmp_path))
+
+
+@pytest.mark.slow
+def test_a_library_controls_the_plant_of_this_package_as_its_law_does(tmp_path):
+    scene = build_scene("oc3_hywind", wind=16.0, sea="paper_wind_wave", duration=700.0)
+    export_library("floating_feedback", tmp_path / "libff.so")
+    export_library("gspi_oc3", tmp_path / "libgspi.so", python=True)
+    # the feedback reads an integral in place of the velocity
+    for name, law, allowed in (("libgspi", "gspi_oc3", 1e-5), ("libff", "floating_feedback", 0.2)):
+        there = simulate(scene, controller=f"dll:{tmp_path / name}.so", duration=30.0)
+        here = simulate(scene, controller=law, duration=30.0)
+        for channel in ("RotSpeed_[rpm]", "BldPitch1_[deg]", "GenTq_[kN-m]", "PtfmPitch_[deg]"):
+            np.testing.assert_allclose(there[channel], here[channel], rtol=0.0, atol=allowed)
 
 
 @pytest.mark.slow
