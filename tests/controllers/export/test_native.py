@@ -86,12 +86,15 @@ def check_law(name, folder):
     here, there = Reading(controller, turbine, DT), Library(built(name, folder)[0])
     law, command = ctypes.create_string_buffer(100_000), (ctypes.c_double * 4)()
     travelled = []
-    for number, swap in enumerate(series(turbine, controller.individual)):
+    again = series(turbine, controller.individual, instants=40, seed=1)
+    for blade in (1, 2, 3):  # a second run, from the lower limit of the pitch
+        again[0][INDEX[f"blade_pitch_{blade}"]] = 0.0
+    for swap in series(turbine, controller.individual) + again:
         ours, theirs = np.array(here.call(swap)), np.array(there.call(swap))
         np.testing.assert_allclose(theirs / SCALE, ours / SCALE, rtol=1.2e-7, atol=1e-9)  # records: float32
         reading = (ctypes.c_double * len(here.last))(*here.last.values())
         assert tuple(here.last) == fields_of(controller)
-        if number == 0:
+        if swap[0] == 0.0:
             assert there.library.law_start(law, reading) == 0
         assert there.library.law_step(law, reading, command) == 0
         np.testing.assert_allclose(np.array(command) / SCALE, ours / SCALE, rtol=0.0, atol=1e-9)
@@ -216,6 +219,19 @@ def test_hostile_records_neither_crash_a_law_nor_reach_its_commands(name, folder
     assert first.stdout == second.stdout
     failures = int(first.stdout.split()[0])
     assert 3000 < failures < 50_000  # hostile arrays are refused, others are answered
+
+
+def test_a_law_that_overflows_says_so_until_it_is_started_again(folder):
+    law, command = ctypes.create_string_buffer(100_000), (ctypes.c_double * 4)()
+    functions = ctypes.CDLL(str(built("lqr", folder)[0]))
+    good = (ctypes.c_double * 6)(122.9, 0.2, 43e3, 0.05, 0.0, 0.1)
+    for bad, code in ((np.nan, 1), (-np.inf, 1), (1e308, 2)):
+        assert functions.law_start(law, good) == 0 and functions.law_step(law, good, command) == 0
+        expected = list(command)
+        assert functions.law_step(law, (ctypes.c_double * 6)(*good[:4], bad, bad), command) == code
+        assert list(command) == expected  # nothing is commanded
+        assert functions.law_step(law, good, command) == (0 if code == 1 else 2)
+    assert functions.law_start(law, (ctypes.c_double * 6)(*good[:5], np.nan)) == 1
 
 
 # ------------------------------------------------------------------ the interface
