@@ -49,6 +49,7 @@ def test_each_field_is_read_from_the_record_with_its_unit():
             assert units[number] == table[name].unit
     assert RECORD_OF["platform_pitch"] == 1005 and RECORD_OF["platform_pitch_rate"] == 1011
     assert RECORD_OF["surge"] == PLATFORM_START and RECORD_OF["yaw_rate"] == LAST_EXTENDED == 1012
+    assert RECORD_OF["yaw"] == 37 and RECORD_OF["generator_speed"] == 20
     assert RECORD_OF["platform_pitch_acceleration"] == 83  # as ROSCO, in any host
 
 
@@ -79,6 +80,14 @@ def test_a_controller_that_declares_nothing_runs_in_a_plain_host_until_it_reads_
         Hosted(make(Feathering, TURBINE, DT), TURBINE, DT).call(plain[0])
 
 
+def test_the_blade_pitch_is_the_mean_over_the_blades():
+    def mean(m):
+        return m.generator_torque, m.blade_pitch
+
+    array = changed(series(TURBINE, instants=1)[0], blade_pitch_1=0.1, blade_pitch_2=0.2, blade_pitch_3=0.6)
+    assert Hosted(make(mean, TURBINE, DT), TURBINE, DT).call(array)[1] == pytest.approx(0.3)
+
+
 def test_the_nacelle_s_velocity_is_the_integral_of_its_acceleration():
     seen = []
 
@@ -106,18 +115,20 @@ def test_the_nacelle_s_velocity_is_the_integral_of_its_acceleration():
 def test_limits_of_generator_and_pitch_drive_hold_for_any_controller():
     class Wild:
         def reset(self, m):
-            self.sign = 1.0
+            self.calls = 0
 
         def act(self, m):
-            self.sign = -self.sign
-            return 1e9 * self.sign, 9.0 * self.sign
+            self.calls += 1
+            sign = 1.0 if self.calls // 120 % 2 else -1.0
+            return 1e9 * sign, 9.0 * sign
 
     one = Hosted(make(Wild, TURBINE, DT), TURBINE, DT)
-    commands = np.array([one.call(swap) for swap in series(TURBINE, instants=50)])
+    commands = np.array([one.call(swap) for swap in series(TURBINE, instants=240)])
     law, drive = TURBINE.torque_law, TURBINE.pitch_drive
     assert np.abs(np.diff(commands[:, 0])).max() == pytest.approx(DT * law.max_torque_rate)
     assert np.abs(np.diff(commands[:, 1])).max() == pytest.approx(DT * drive.rate_limit)
-    assert commands[:, 0].min() >= 0.0 and commands[:, 1].min() >= drive.minimum
+    assert (commands[:, 0].min(), commands[:, 0].max()) == (0.0, law.max_torque)
+    assert (commands[:, 1].min(), commands[:, 1].max()) == (drive.minimum, drive.maximum)
 
 
 def test_a_start_below_the_period_of_the_host_and_a_command_that_is_no_number_are_refused():

@@ -84,8 +84,9 @@ def test_the_process_commands_as_here_and_ends_with_the_run(own, tmp_path):
     assert answers == [tuple(row) for row in np.array(expected, dtype=np.float32).tolist()]
     pid = pid_of(tmp_path)
     assert pid != os.getpid() and running(pid)
+    began = time.monotonic()
     there.call(changed(arrays[-1], status=-1))
-    assert not running(pid)
+    assert not running(pid) and time.monotonic() - began < 0.8 * library.LONGEST_END  # by itself
 
 
 @pytest.mark.slow
@@ -131,14 +132,15 @@ def test_a_controller_that_leaves_or_hangs_is_a_message_and_no_endless_wait(own,
     monkeypatch.setattr(library, "LONGEST_END", 0.2)
     for name, late, words in (
         ("leaving", "os._exit(3)", "process has ended"),
-        ("hanging", "while True: pass", "does not answer in time"),
+        ("hanging", "__import__('ctypes').PyDLL(None).sleep(40)", "does not answer in time"),  # with the GIL
     ):
         there = Library(own(name, late))
         for swap in arrays[:11]:
             there.call(swap)
+        began = time.monotonic()
         with pytest.raises(RuntimeError, match=words):
             there.call(arrays[11])
-        wait_for_end(pid_of(tmp_path))
+        assert not running(pid_of(tmp_path)) and time.monotonic() - began < 20.0
 
 
 HOST = """
