@@ -144,7 +144,7 @@ class BladedController(BladedCalls):
         return type(self), (self.library, self.turbine, self.control_dt)  # without the running library
 
     @property
-    def output(self) -> str:
+    def console_output(self) -> str:
         """Return the messages of the library in this run, and after the run what it printed."""
         lines = [f"t = {time:.3f} s: {message}" for message, time in self._messages.items()]
         return "\n".join([*lines, *filter(None, [self._printed.strip()])])
@@ -182,7 +182,7 @@ class BladedController(BladedCalls):
         """Return the ControllerError of a failed call with the library's output, after ending its process."""
         process, self._process = self._process, None
         self._printed = process.end()
-        shown = " ".join(self.output.split())[-LONGEST_SHOWN:]
+        shown = " ".join(self.console_output.split())[-LONGEST_SHOWN:]
         return self._error(f"{why}; its output: {shown}" if shown else why, time)
 
     def finish(self) -> None:

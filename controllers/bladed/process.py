@@ -62,7 +62,11 @@ class LibraryProcess:
         self._end = weakref.finalize(self, _end, self._process, (own_requests, own_answers), self.folder)
         self._poll = select.poll()
         self._poll.register(own_answers, select.POLLIN)
-        self._wait(limit, "loading")
+        try:
+            self._wait(limit, "loading")
+        except BaseException:
+            self._end()
+            raise
 
     def call(self, limit):
         """Call the library on the shared memory. Raises: LibraryFailure after `limit` seconds, or a crash."""
@@ -100,6 +104,7 @@ class LibraryProcess:
         if self.waits:  # the library may then write its files
             with suppress(BrokenPipeError):
                 os.write(self._requests, program.QUIT)
+                self._poll.poll(1e3 * END_LIMIT)  # until the end of the process closes the pipe
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_LIMIT)
         with open(self._printed, "rb") as file:

@@ -16,6 +16,9 @@ from pathlib import Path
 import typer
 from rich.text import Text
 
+from fowt_env.controllers.bladed.library import MEMORY_SIZE
+from fowt_env.controllers.bladed.records import FROM, RECORDS
+from fowt_env.controllers.bladed.swap import BLADE_READINGS, READINGS, Swap
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
@@ -281,6 +284,27 @@ def events():
     return markdown(("counter", "counted event", "loads less accurate", "remedy"), rows)
 
 
+def bladed_records():
+    """Records that a library with the Bladed interface is given, with what each holds here."""
+    turbine = read_turbine("nrel5mw")
+    fine = turbine.pitch_drive.model_copy(update={"minimum": 0.01})  # 0 would look like a record of nothing
+    turbine = turbine.model_copy(update={"pitch_drive": fine})
+    swap = Swap(bytearray(MEMORY_SIZE), turbine, 0.1, "DISCON.IN", "run", individual=True)
+    values = {
+        name: f"`{'-' if sign < 0.0 else ''}{field.name.lower()}`" for name, (field, sign) in READINGS.items()
+    }
+    values |= {name: f"`{field.name.lower()}`" for name, field in BLADE_READINGS.items()}
+    values |= dict.fromkeys(("shaft_power", "electrical_power"), "`generator_torque`, `generator_speed`")
+    values |= dict.fromkeys(("status", "last_pitch_demand"), "run")
+    rows = []
+    for record in RECORDS:
+        if record.direction != FROM:
+            constant = "turbine, run" if swap.records[record.index] else "0"
+            value = values.get(record.name, constant)
+            rows.append((record.number, f"`{record.name}`", record.unit, record.meaning, value))
+    return markdown(("record", "name", "unit", "meaning", "value here"), rows)
+
+
 def loads():
     """The loads of the plant, with what leaves each out."""
     rows = []
@@ -312,6 +336,7 @@ TABLES = {
     ),
     "reference/controllers.md": (measurements, blade_measurements),
     "explanation/theory.md": (loads, integrators),
+    "guides/your-dll.md": (bladed_records,),
 }  # fmt: skip
 
 

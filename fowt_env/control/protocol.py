@@ -17,8 +17,8 @@ set on a function too, as f.information = ("wind_speed",). Optional attributes o
 - preview_times (s, increasing), required by "wind_preview": look-ahead times of the rotor-averaged wind in
   `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's array;
 - declared = False: a field of information that a sensor chain or scene does not have is NaN, not an error;
-- finish(), called once at the end of a run, also of a failed one; after it `output`, what the controller has
-  printed, is kept in attrs["controller_output"] of the run's table;
+- finish(), called once at the end of a run, also of a failed one; after it the text console_output, what the
+  controller has printed, is kept in attrs["controller_output"] of the run's table;
 - individual = True if the controller commands the pitch of each blade: act returns (generator torque, pitch
   of blade 1, of blade 2, of blade 3), and a compiled law writes these four. This needs a scene with
   pitch="individual". In such a scene the command of other controllers applies to all blades, blade_pitch is
@@ -156,15 +156,16 @@ class CheckedController:
                 self.controller.prepare(scene)
 
     @property
-    def output(self) -> str:
-        """Return what the wrapped controller has printed, "" without its attribute output."""
-        return str(getattr(self.controller, "output", ""))
+    def console_output(self) -> str:
+        """Return what the wrapped controller has printed, "" without its text console_output."""
+        text = getattr(self.controller, "console_output", "")
+        return text if isinstance(text, str) else ""
 
     def finish(self) -> None:
         """End the run of the wrapped controller, if the controller has finish(). Raises: ControllerError."""
-        if hasattr(self.controller, "finish"):
+        if callable(finish := getattr(self.controller, "finish", None)):
             with named_failure(self.name, "in finish()"):
-                self.controller.finish()
+                finish()
 
     def reset(self, measurement: Measurement) -> None:
         """Reset the wrapped controller. Raises: ControllerError for any error of the wrapped controller."""

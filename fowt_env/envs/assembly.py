@@ -9,6 +9,7 @@ import numpy as np
 from fowt_env.control import CompiledController, catalogue, make
 from fowt_env.envs.actions import build_action_map, n_actions
 from fowt_env.envs.episode import N_COUNTS, EpisodeConfig, EpisodeData
+from fowt_env.envs.external_baseline import ExternalBaseline
 from fowt_env.envs.observations import BLADE_CHANNELS, PREVIEW, build_observation_map, check_channels
 from fowt_env.envs.rewards import N_TERMS, Reference, build_scales, check_weights, weight_array
 from fowt_env.envs.settings import Settings
@@ -43,17 +44,15 @@ def check_shown(names, chain):
 
 
 def named_baseline(name, turbine, control_dt):
-    """Return the compiled controller of a name or object accepted by controllers.make.
+    """Return the CompiledController of a name or object accepted by controllers.make.
 
-    Raises: InputError for unknown names and for controllers written in Python.
+    Raises: InputError for unknown names.
     """
     names = catalogue().CONTROLLERS
     if isinstance(name, str) and ":" not in name and name not in names:
         raise unknown("baseline", name, names)
     baseline = make(name, turbine, control_dt)
-    if not isinstance(baseline, CompiledController):
-        raise InputError(f"baseline = {name!r}: must be a compiled controller, such as 'pi' or 'gspi_oc3'")
-    return baseline
+    return baseline if isinstance(baseline, CompiledController) else ExternalBaseline(baseline)
 
 
 def nominal_parts(setting):

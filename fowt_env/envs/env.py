@@ -46,6 +46,7 @@ from fowt_env.envs.episode import (
     rewrite_observation,
     start_episode,
 )
+from fowt_env.envs.external_baseline import ExternalBaseline
 from fowt_env.envs.observations import ESTIMATE_CHANNELS, entries
 from fowt_env.envs.reset import Start, kept_if_refused, moved_state, with_options
 from fowt_env.envs.rewards import REWARD_TERMS, Reference, check_own_reward, paid
@@ -459,9 +460,13 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         Call after driving with step_physical: internal controller states were not updated meanwhile.
         """
         if self._baseline is not None:
-            self._baseline.reset(view_of(self._baseline)(self._episode.link.law_reading.tolist()))
+            self._baseline.reset(self._baseline_reading())
         elif self._config.actions.mode == ActionMode.SETPOINT:
             start_tracking(self._episode.memory, self.measurement(), self._config.actions)
+
+    def _baseline_reading(self):
+        """Return the readings at the present control instant as the baseline's view."""
+        return view_of(self._baseline)(self._episode.link.law_reading.tolist())
 
     def step(self, action: npt.ArrayLike) -> StepResult:
         """Advance one control period; return (observation, reward, terminated, truncated, info)."""
@@ -473,6 +478,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise InputError(f"action = {action!r}: must be {self._episode.action.size} numbers") from None
         if requested.shape != self._episode.action.shape:
             raise InputError(f"action has shape {requested.shape}: must be {self.action_space.shape}")
+        if isinstance(self._baseline, ExternalBaseline) and np.isfinite(requested).all():
+            self._baseline.ask(self._baseline_reading())
         status, reward = act(self._handle, self._baseline_law, self._estimator_law, requested)
         if status == BAD_ACTION:
             raise InputError(f"action = {action!r}: must be finite")
@@ -562,6 +569,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._handle is None:
             raise ResetNeeded("call reset() first: there is no state yet")
+        if isinstance(self._baseline, ExternalBaseline):
+            raise InputError(
+                f"baseline = {self._baseline.name!r}: is not compiled, so its state cannot be saved"
+            )
         arrays = [None if array is None else array.copy() for array in carried(self._episode)]
         generator = None if self._np_random is None else self._np_random.bit_generator.state
         return Snapshot(
@@ -749,6 +760,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     def close(self) -> None:
         """Close the environment and its window; reset and step then raise ClosedEnvironmentError."""
         self._running, self._closed = False, True
+        if isinstance(self._baseline, ExternalBaseline):
+            self._baseline.finish()
         if self._view is not None:
             self._view.close()
             self._view = None

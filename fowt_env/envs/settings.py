@@ -41,7 +41,7 @@ class ControlSettings:
     """Holds the action mode, the control period and the compiled baseline controller."""
 
     action_mode: str = "direct"  # "direct", "setpoint", "residual" or "individual"
-    baseline: Any = "pi"  # compiled controller (name or object) that the residual mode adds to
+    baseline: Any = "pi"  # controller (name or object) that the residual mode adds to
     control_dt: float = 0.1  # s between actions, a multiple of dt
     # {"platform": ..., "turbine": ...}: plant that baseline and estimator are designed on; None: the true one
     nominal_plant: Mapping[str, Any] | None = None

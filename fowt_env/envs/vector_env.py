@@ -17,6 +17,7 @@ from fowt_env.descriptions.checks import short
 from fowt_env.envs.env import CLOSED, REWARD_KEYS, FowtEnv
 from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
+from fowt_env.envs.external_baseline import ExternalBaseline
 from fowt_env.envs.reset import kept_if_refused
 from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
@@ -85,6 +86,10 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         _count("threads", self.threads, most)
         self.envs = tuple(_environments(num_envs, per_env, settings))
         first = self.envs[0]
+        if isinstance(first._baseline, ExternalBaseline):
+            raise InputError(
+                f"baseline = {first._baseline.name!r}: is not compiled: use gymnasium.vector.SyncVectorEnv"
+            )
         self.render_mode = None
         self.single_observation_space = first.observation_space
         self.single_action_space = first.action_space

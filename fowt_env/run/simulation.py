@@ -387,7 +387,7 @@ class Run:
             torque, speed = (frame.iloc[:, out].to_numpy() for out in (Out.GENTQ, Out.ROTSPEED))
             self.units.see_run(torque * 1e3, speed * RPM, period)
         frame.attrs["doubtful_commands"] = self.units.said
-        if output := getattr(self.controller, "output", ""):
+        if output := getattr(self.controller, "console_output", ""):
             frame.attrs["controller_output"] = output
         return frame
 

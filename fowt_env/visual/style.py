@@ -76,6 +76,7 @@ def short_names(names):
 def _short(name):
     kind, colon, rest = name.partition(":")
     if colon and rest:
+        rest = rest.partition(",")[0]  # a library without its input file
         name = Path(rest).stem if "/" in rest or Path(rest).suffix else rest
     if len(name) > LONGEST_NAME:
         half = LONGEST_NAME // 2

@@ -3,6 +3,9 @@
 import contextlib
 import io
 import re
+import shlex
+import shutil
+import subprocess
 import sys
 import tomllib
 
@@ -30,12 +33,21 @@ def run_blocks(page_blocks, folder):
                 exec(compile(block.text, f"<{block.heading}>", "exec"), names)
             printed = out.getvalue()
         elif block.language == "bash":
-            printed = "".join(fowt(line) for line in block.text.splitlines() if not SETUP.match(line))
+            printed = "".join(fowt(line) for line in commands(block, folder))
         elif block.language == "text":
             assert_printed(printed, block.text)
         else:
             raise AssertionError(f"a block of {block.language!r} that nobody runs")
     return names
+
+
+def commands(block, folder):
+    """Commands of fowt in a block; those of a compiler are run on the way, those of installing left out."""
+    for line in block.text.splitlines():
+        if line.startswith("gcc "):
+            subprocess.run(shlex.split(line), cwd=folder, check=True)
+        elif not SETUP.match(line):
+            yield line
 
 
 @pytest.fixture
@@ -62,6 +74,16 @@ def test_every_block_of_extending_runs(folder):
     assert (table["status"] == "ok").all()
     swing = table["PtfmPitch_std_[deg]"]
     assert swing["damper:Damper"] < 0.95 * swing["pi"]  # it damps
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc, which builds the library of the page")
+def test_every_block_of_your_dll_runs(folder):
+    run_blocks([block for block in blocks("guides/your-dll.md") if block.language], folder)
+    table = pd.read_csv(folder / "results" / "dll" / "results.csv").set_index("controller")
+    assert (table["status"] == "ok").all()
+    power = table["GenPwr_mean_[kW]"]
+    assert power["dll:libmine.so"] == pytest.approx(power["pi"], rel=0.02)
 
 
 def test_the_statistics_that_the_readme_shows_are_those_of_its_program():

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from fowt_env.control import CheckedController
+from fowt_env.controllers.bladed.controller import DLL_PREFIX
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.folders import cache_root, make_private
 from fowt_env.training.board import supervisor
@@ -44,7 +45,7 @@ PATIENCE = 10.0  # s allowed for the supervisor to end
 WARM_UP = 1.0  # s of simulated time, in which a submission compiles its kernels
 # names of exceptions that are reported: names defined by a submission could carry data
 KNOWN_ERRORS = {name for name, kind in vars(builtins).items() if isinstance(kind, type)} | {
-    "ControllerError", "InputError", "LinAlgError",
+    "ControllerError", "InputError", "LibraryFailure", "LinAlgError",
 }  # fmt: skip
 
 
@@ -92,11 +93,10 @@ class ProcessLimits:
 
 @dataclass(frozen=True)
 class IsolatedFactory:
-    """Creates controllers from a Python file, each in a separate process; can be pickled."""
+    """Creates controllers from files of a folder, each in a separate process; can be pickled."""
 
     folder: str
-    file: str
-    attribute: str
+    controller: str  # "module:Name" or "dll:FILE.so" in the folder, for fowt_env.control.make
     name: str
     information: tuple[str, ...]
     preview_times: tuple[float, ...]
@@ -111,7 +111,7 @@ class IsolatedFactory:
     def content_key(self) -> str:
         """Return the hash of all that affects its runs except the sources of this package."""
         parts = (
-            *(self.digest, self.file, self.attribute, self.name, self.information, self.preview_times),
+            *(self.digest, self.controller, self.name, self.information, self.preview_times),
             *(asdict(self.limits), self.within),
         )
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
@@ -132,6 +132,7 @@ class IsolatedController:
         self.factory, self.turbine, self.control_dt = factory, turbine, control_dt
         self.name, self.information = factory.name, factory.information
         self.preview_times = factory.preview_times
+        self.declared = not factory.controller.startswith(DLL_PREFIX)
         self.slowest = 0.0  # s, slowest call of act()
         self.known: Any = None
         self.folder: Path | None = None  # of the process
@@ -152,7 +153,7 @@ class IsolatedController:
         except BaseException:
             self.close()
             raise
-        self._ask(START, (factory.file, factory.attribute, self.turbine, self.control_dt), limits.start)
+        self._ask(START, (factory.controller, self.turbine, self.control_dt), limits.start)
         self._ask(PREPARE, self.known, limits.prepare)
         self._ask(RESET, measurement, limits.prepare)
 
@@ -330,9 +331,8 @@ def _done(what, content, controller):
     if what == START:
         from fowt_env.control import make
 
-        file, attribute, turbine, control_dt = content
         sys.path.insert(0, os.getcwd())
-        return make(f"{file.removesuffix('.py')}:{attribute}", turbine, control_dt), b""
+        return make(*content), b""
     if what == ACT:
         return controller, COMMAND.pack(*controller.act(content))
     getattr(controller, what)(content)  # prepare or reset

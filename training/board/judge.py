@@ -1,8 +1,8 @@
 """Evaluates every submission on the board's suites, and checks all metrics against the time series.
 
 A run is stored under a key of everything that affects it, so that runs of a changed submission, card or limit
-are never shown. Controllers of Python files run in separate processes (training.board.isolated). The page
-shows only the number of secret seeds and the hash of their file, so that the seeds can be verified later.
+are never shown. Submitted code runs in separate processes (training.board.isolated). The page shows only the
+number of secret seeds and the hash of their file, so that the seeds can be verified later.
 """
 
 import hashlib
@@ -23,7 +23,7 @@ from fowt_env.files.tables import read_table
 from fowt_env.scene.build import build_scene
 from fowt_env.training.board.folder import Board, read_seeds
 from fowt_env.training.board.isolated import digest_of, warmed_up
-from fowt_env.training.board.submission import PYTHON_FILE
+from fowt_env.training.board.submission import CODE, LIBRARY
 from fowt_env.training.evaluation.cases import described
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.guard import printable
@@ -80,16 +80,16 @@ def judge(
     if baseline not in names:
         why = f" ({left_out[baseline]})" if baseline in left_out else ""
         raise InputError(f"{unknown('baseline among the submissions', baseline, names)}{why}")
-    code = [each.name for each in submissions if each.kind == PYTHON_FILE]
+    code = [each.name for each in submissions if each.kind in CODE]
     if code and not trust_code:
         raise InputError(
-            f"submissions {', '.join(code)}: contain Python code, which will be executed: review it, then use"
+            f"submissions {', '.join(code)}: contain code, which will be executed: review it, then use"
             " --trust-code (each runs in a separate process with this user's rights)"
         )
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if code and jobs > processors:
         raise InputError(
-            f"jobs = {jobs}: calls of Python files are limited in wall-clock time, and this machine has"
+            f"jobs = {jobs}: calls of submitted code are limited in wall-clock time, and this machine has"
             f" {processors} processors: use at most that many"
         )
     if (secret is None) != (private is None):
@@ -128,8 +128,10 @@ def _factories(submissions, limits, within, suites):
     """Return {name: controller for evaluate}; controllers of Python files have their kernels precompiled."""
     result = {each.name: each.controller(limits) for each in submissions}
     for each in submissions:
-        if each.kind == PYTHON_FILE:
-            factory = replace(result[each.name], within=within)
+        if each.kind in CODE:
+            factory = result[each.name] = replace(result[each.name], within=within)
+            if each.kind == LIBRARY:  # compiles nothing
+                continue
             cases = _kinds(suites) if "plant_model" in factory.information else _kinds(suites)[:1]
             key = json.dumps([plant_code(), [described(case) for case, _ in cases]])
             result[each.name] = warmed_up(factory, lambda cases=cases: (_quiet(*case) for case in cases), key)
@@ -169,7 +171,7 @@ def _suite_table(made, factories, suite, folder, jobs, progress):
         for each in made.submissions:
             if each.card.preview == preview:
                 controller = factories[each.name]
-                if each.kind == PYTHON_FILE:
+                if each.kind in CODE:
                     controller = replace(controller, log=str(target.absolute() / CALLS))
                 label = f"{each.name}.{_key(each, controller)}"
                 labelled[label], names[label] = controller, each.name
@@ -248,6 +250,6 @@ def check_figures(table, folder, suite):
 
 def inputs_of(submission, turbine):
     """Return the inputs of a submission, as declared in the card or by the built-in controller or policy."""
-    if submission.kind == PYTHON_FILE:
-        return tuple(submission.card.information)
+    if submission.kind in CODE:
+        return tuple(submission.controller(None).information)
     return tuple(make(submission.controller(None), turbine, CONTROL_DT).information)

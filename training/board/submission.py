@@ -2,10 +2,10 @@
 
     my_controller/
         card.toml            author, licence, inputs
-        controller.py        or a policy file (.npz): the controller named in card.toml
+        controller.py        or a policy file (.npz), or a library with the Bladed interface (.so)
 
-A policy file contains arrays and no code. `fowt leaderboard run` runs a Python file only with --trust-code,
-and then in a separate process (training.board.isolated).
+A policy file contains arrays and no code. `fowt leaderboard run` runs a Python file or a library only with
+--trust-code, and then in a separate process (training.board.isolated).
 """
 
 import re
@@ -17,7 +17,10 @@ from pydantic import BeforeValidator
 
 from fowt_env.control import EXACT, PRIVILEGED_INPUTS
 from fowt_env.controllers import CONTROLLERS
+from fowt_env.controllers.bladed.controller import DLL_PREFIX, PITCH, named_library
+from fowt_env.controllers.bladed.swap import INFORMATION
 from fowt_env.controllers.policy.network_file import read_policy
+from fowt_env.descriptions.checks import parse_names
 from fowt_env.descriptions.files import raise_problems, read_toml
 from fowt_env.descriptions.lidar import lidars
 from fowt_env.descriptions.records import Positive, Record, checked_record
@@ -27,12 +30,14 @@ from fowt_env.training.board.isolated import digest_of
 from fowt_env.training.evaluation.run_case import PARKED
 
 CARD = "card.toml"
-BUILT_IN, POLICY_FILE, PYTHON_FILE = "built-in", "policy file", "Python file"
+BUILT_IN, POLICY_FILE, PYTHON_FILE, LIBRARY = "built-in", "policy file", "Python file", "library"
+CODE = (PYTHON_FILE, LIBRARY)  # kinds that run in a process of their own
 NAME = re.compile(r"[a-z0-9][a-z0-9_-]{0,49}")
 RESERVED = (PARKED,)  # name of turbines without a controller
 MOST_TIMES, FURTHEST = 100, 60.0  # number of preview_times (one time series in memory each); s
 LONGEST_TEXT = 2000  # characters of each text of a card
 INPUTS = (*Measurement._fields, *PRIVILEGED_INPUTS)
+COLLECTIVE_INFORMATION = tuple(name for name in INFORMATION if name in Measurement._fields)
 
 
 def _tuple(value):
@@ -43,10 +48,10 @@ def _tuple(value):
 class Card(Record):
     """Defines the content of card.toml.
 
-    controller     a name of fowt list controllers; "FILE.npz"; or "FILE.py:Name", where Name is a class or
-                   factory called with (turbine, control_dt), or with nothing
+    controller     a name of fowt list controllers; "FILE.npz"; "FILE.py:Name", where Name is a class or
+                   factory called with (turbine, control_dt), or with nothing; or "FILE.so[,INPUT_FILE]"
     information    inputs of the controller: fields of Measurement and PRIVILEGED_INPUTS; only for Python
-                   files (built-in controllers and policy files declare their inputs)
+                   files (built-in controllers, policy files and libraries have theirs)
     preview_times  times ahead of the wind preview, s, increasing; with "wind_preview" in information
     preview        "exact", or the lidar preset (fowt list lidars) that measures the wind ahead
     tuning         tuned settings or training, with seeds and budget
@@ -70,7 +75,7 @@ class Submission:
 
     card: Card
     folder: Path
-    kind: str  # BUILT_IN, POLICY_FILE or PYTHON_FILE
+    kind: str  # BUILT_IN, POLICY_FILE, PYTHON_FILE or LIBRARY
     digest: str  # SHA-256 of all files
 
     @property
@@ -81,7 +86,7 @@ class Submission:
     def controller(self, limits: Any, **options: Any) -> Any:
         """Return the controller for evaluate: a name, or a factory of isolated controllers.
 
-        limits: training.board.isolated.ProcessLimits of a Python file; options: further fields of the
+        limits: training.board.isolated.ProcessLimits of CODE; options: further fields of the
         IsolatedFactory.
         """
         if self.kind == BUILT_IN:
@@ -90,10 +95,13 @@ class Submission:
             return f"policy:{(self.folder / self.card.controller).absolute()}"
         from fowt_env.training.board.isolated import IsolatedFactory
 
-        file, _, attribute = self.card.controller.partition(":")
+        name, information = f"{DLL_PREFIX}{self.card.controller}", COLLECTIVE_INFORMATION
+        if self.kind == PYTHON_FILE:
+            file, _, attribute = self.card.controller.partition(":")
+            name, information = f"{file.removesuffix('.py')}:{attribute}", tuple(self.card.information or ())
         return IsolatedFactory(
-            str(self.folder.absolute()), file, attribute, self.name, tuple(self.card.information or ()),
-            self.card.preview_times, limits, self.digest, **options,
+            str(self.folder.absolute()), name, self.name, information, self.card.preview_times, limits,
+            self.digest, **options,
         )  # fmt: skip
 
 
@@ -134,8 +142,18 @@ def read_submission(folder: Path | str) -> Submission:
 
 
 def _kind(card, folder, problems):
-    """Return BUILT_IN, POLICY_FILE or PYTHON_FILE; append problems of the controller to `problems`."""
+    """Return the kind of the controller of a card; append problems of the controller to `problems`."""
     file, colon, attribute = card.controller.partition(":")
+    if card.controller.partition(",")[0].endswith(".so"):
+        files = [part for part in parse_names(card.controller) if "=" not in part]
+        absent = [name for name in files if not _inside(folder, name)]
+        problems += [f"controller: there is no file {name!r} in the folder" for name in absent]
+        if not absent:
+            try:
+                _check_library(card.controller, folder)
+            except InputError as error:
+                problems.append(f"controller: {error}")
+        return LIBRARY
     if file.endswith(".py") and colon:
         if not attribute.isidentifier():
             problems.append(f"controller = {card.controller!r}: must be FILE.py:Name")
@@ -153,9 +171,18 @@ def _kind(card, folder, problems):
         return POLICY_FILE
     if card.controller not in CONTROLLERS:
         problems.append(
-            f"controller: {unknown('controller', card.controller, CONTROLLERS)}; or FILE.npz, FILE.py:Name"
+            f"controller: {unknown('controller', card.controller, CONTROLLERS)}; or FILE.npz, FILE.so,"
+            " FILE.py:Name"
         )
     return BUILT_IN
+
+
+def _check_library(controller, folder):
+    """Raise InputError for a library that cannot be loaded here, or that commands each blade."""
+    path, *rest = parse_names(controller)
+    rest = [part if "=" in part else str(folder / part) for part in rest]
+    if named_library(",".join([f"{DLL_PREFIX}{folder / path}", *rest])).pitch != PITCH[0]:
+        raise InputError("pitch=individual: a board has one pitch for all blades")
 
 
 def _inside(folder, name):

@@ -20,7 +20,7 @@ def check_dll(
     ),
     control_dt: Annotated[float, Option(help="Time between two calls, s.")] = 0.1,
 ):
-    """Check a controller library with the Bladed interface (DISCON).
+    """Check a controller library (Bladed DISCON).
 
     Runs the library in a process of its own on a series of an operating point, without a plant, and prints
     the records that it reads and writes, its demands, its messages and the time of a call. The library's code

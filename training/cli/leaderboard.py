@@ -41,7 +41,7 @@ def add_command(
         tuning = "gains by hand, seeds 1001 to 1004"
     """
     from fowt_env.training.board.folder import SETTINGS, Board, new_board
-    from fowt_env.training.board.submission import PYTHON_FILE, read_submission
+    from fowt_env.training.board.submission import CODE, read_submission
 
     kinds = [read_submission(folder).kind for folder in submissions]
     if not (board / SETTINGS).exists():
@@ -51,7 +51,7 @@ def add_command(
         note(f"created the board {board} with the controllers of the package: {first}")
     for kind, folder in zip(kinds, submissions, strict=True):
         name = Board(board).add(folder)
-        trusted = " --trust-code (once you have read its Python file)" if kind == PYTHON_FILE else ""
+        trusted = " --trust-code (once you have read its code)" if kind in CODE else ""
         note(f"added {name}; judge it with: fowt leaderboard run --board {board}{trusted}")
 
 
@@ -79,7 +79,7 @@ def run_command(
     draw_seeds: Annotated[str | None, Option(help=DRAWN)] = None,
     secret: Annotated[Path | None, Option(help="File of fowt leaderboard seeds; -: standard input.")] = None,
     private: Annotated[Path | None, Option(help="Folder for the runs of the secret seeds.")] = None,
-    trust_code: Annotated[bool, Option("--trust-code", help="Run submitted Python files.")] = False,
+    trust_code: Annotated[bool, Option("--trust-code", help="Run submitted code.")] = False,
     within: Annotated[str | None, Option(help=WITHIN)] = None,
 ):
     """Run every submission on the board's frozen suites and write the page of the board.
@@ -89,8 +89,8 @@ def run_command(
     fowt leaderboard run --draw-seeds $COMMIT  # seeds from a commit
     fowt leaderboard run --secret seeds.txt --private private --trust-code  # also on secret seeds
 
-    Python files run only with [bold]--trust-code[/bold], each in a separate process, with your user's
-    permissions: read them first, or run them in a container with [bold]--within[/bold]
+    Python files and libraries run only with [bold]--trust-code[/bold], each in a separate process, with your
+    user's permissions: read them first, or run them in a container with [bold]--within[/bold]
     (docs/guides/leaderboard.md). The same command resumes an interrupted run.
     """
     from fowt_env.training.board.folder import Board

@@ -36,14 +36,13 @@ void DISCON(float *avrSWAP, int *aviFAIL, const char *accINFILE, char *avcOUTNAM
     }
     /* integral control of the generator speed from the first pitch angle on */
     integral += 1e-3f * SWAP(3) * (SWAP(20) - SWAP(19)) * (status == 1);
+    SWAP(55) = SWAP(56) = 0; /* as they are anyway */
     SWAP(47) = SWAP(22);
     SWAP(45) = integral;
     for (int blade = 0; blade < 3; blade++)
         SWAP(42 + blade) = integral + 0.001f * blade;
-    if (!strcmp(mode, "echo")) { /* the torque demanded is a record of the input, the number follows */
-        SWAP(47) = SWAP((int)SWAP(129) > 0 ? 20 : 1);
-        SWAP(45) = SWAP(4);
-    }
+    if (!strcmp(mode, "scribble"))
+        SWAP(21) = SWAP(200) = 7;
     if (!strcmp(mode, "outname") && status == 0)
         printf("%s %zu %d %d\n", avcOUTNAME, strlen(avcOUTNAME), (int)SWAP(51), (int)SWAP(64));
     if (!strcmp(mode, "logs")) {
@@ -55,8 +54,10 @@ void DISCON(float *avrSWAP, int *aviFAIL, const char *accINFILE, char *avcOUTNAM
     }
     if (!late)
         return;
-    if (!strcmp(mode, "crash"))
+    if (!strcmp(mode, "crash")) {
+        printf("about to crash\n");
         *(volatile int *)8 = 1;
+    }
     if (!strcmp(mode, "hang"))
         for (volatile int forever = 1; forever;)
             ;

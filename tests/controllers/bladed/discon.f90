@@ -1,4 +1,4 @@
-! A library with the Bladed interface from Fortran: integral control of the generator speed; stops after a second
+! A library with the Bladed interface from Fortran: integral control of the generator speed; ends after a second
 ! where its input file says so.
 subroutine discon(avrswap, avifail, accinfile, avcoutname, avcmsg) bind(c, name="DISCON")
    use, intrinsic :: iso_c_binding
@@ -12,6 +12,10 @@ subroutine discon(avrswap, avifail, accinfile, avcoutname, avcmsg) bind(c, name=
    character(len=32), save :: mode = "law"
    real(c_float), save :: integral
    integer :: status
+   interface
+      subroutine abort_in_c() bind(c, name="abort")
+      end subroutine
+   end interface
 
    status = nint(avrswap(1))
    if (status == 0) then
@@ -30,5 +34,10 @@ subroutine discon(avrswap, avifail, accinfile, avcoutname, avcmsg) bind(c, name=
    avrswap(47) = avrswap(22)
    avrswap(45) = integral
    avrswap(42:44) = integral
-   if (mode == "stop" .and. avrswap(2) > 0.95) stop "no more wind"
+   if (avrswap(2) < 0.95) return
+   if (mode == "stop") stop "no more wind"
+   if (mode == "abort") then
+      print *, "about to abort"
+      call abort_in_c()
+   end if
 end subroutine

@@ -2,10 +2,12 @@
 
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +19,15 @@ from fowt_env.control import make
 from fowt_env.control.views import whole_view
 from fowt_env.controllers import controller_names
 from fowt_env.controllers.bladed.controller import BladedLibrary, named_library
+from fowt_env.controllers.rosco import find_library
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.provenance import controller_code
 
 pytestmark = needs_gcc
+needs_rosco = pytest.mark.skipif(find_spec("rosco") is None, reason="needs pip install --no-deps rosco")
 RATED = Measurement(*[0.0] * len(Measurement._fields))._replace(
     rotor_speed=1.267109,
     generator_speed=122.9096,
@@ -85,6 +92,11 @@ def test_commands_are_those_of_the_library(started):
     assert {torque for torque, _ in commands} == {float(np.float32(43093.55))}
 
 
+def test_a_first_command_at_a_later_time_is_a_call_of_its_own(started):
+    (_, pitch), *_ = answers(started(), [131.0], first=1)
+    assert pitch == law([131.0, 131.0])[1] > law([131.0])[0]
+
+
 def test_several_libraries_at_once_share_no_state(started):
     up, down = 123.0 + np.linspace(0.0, 8.0, 30), 123.0 - np.linspace(0.0, 8.0, 30)
     first, second = started(), started()
@@ -115,7 +127,7 @@ def test_the_last_call_has_status_minus_one_and_the_output_is_kept(started):
     controller = started()
     answers(controller, [123.0] * 5)
     controller.finish()
-    assert controller.output == "5 calls, last at 0.4 s".replace("5", "6")
+    assert controller.console_output == "6 calls, last at 0.4 s"
     assert controller.controller._process is None
 
 
@@ -123,18 +135,17 @@ def test_a_message_is_kept_once_and_a_failure_in_the_last_call_too(started):
     controller = started("warn")
     answers(controller, [123.0] * 20)
     controller.finish()
-    assert (
-        controller.output.startswith("t = 1.000 s: vane is noisy") and controller.output.count("noisy") == 1
-    )
+    assert controller.console_output.startswith("t = 1.000 s: vane is noisy")
+    assert controller.console_output.count("noisy") == 1
     controller = started("bad_end")
     controller.finish()
-    assert "last call: code -3: cannot close" in controller.output
+    assert "last call: code -3: cannot close" in controller.console_output
 
 
 @pytest.mark.parametrize(
     ("mode", "part"),
     [
-        ("crash", "a call ended its process by SIGSEGV (Segmentation fault)"),
+        ("crash", "by SIGSEGV (Segmentation fault); its output: about to crash"),
         ("exit", "with exit code 3 (exit, or STOP in Fortran); its output: bad input, stopping"),
         ("fail", "its code is -7: no wind vane"),
         ("yaw", "demands a yaw rate: the nacelle does not yaw (record 48, yaw_rate_demand = 0.01)"),
@@ -173,7 +184,7 @@ def test_the_root_name_of_outputs_is_a_folder_of_the_run(started):
     controller = started("outname")
     folder = controller.controller._process.folder
     controller.finish()
-    name, length, size, capacity = controller.output.splitlines()[0].split()
+    name, length, size, capacity = controller.console_output.splitlines()[0].split()
     assert Path(name).parent == folder and not folder.exists()
     assert int(size) == int(length) + 1 and int(capacity) == 300 * 2 * 21 + 1
 
@@ -187,6 +198,9 @@ def test_readings_that_there_are_not_are_records_of_zero_and_blades_have_theirs(
     assert records[52] == np.float32(-0.3)
     assert records[3] == records[32] == records[33] == np.float32(0.26)
     blades = np.arange(1.0, len(BladeMeasurement._fields) + 1)
+    controller.reset(whole_view([*RATED, *np.full(len(blades), np.nan)]))
+    records = controller.controller._swap.records
+    assert records[3] == records[33] == np.float32(0.26) and not np.isnan(records).any()
     controller.reset(whole_view([*RATED, *blades]))
     records = controller.controller._swap.records
     names = BladeMeasurement._fields
@@ -221,6 +235,22 @@ def test_the_process_ends_with_the_simulator(library, tmp_path):
     pytest.fail("the process of the library survives the simulator")
 
 
+class Ordinary:
+    """A controller whose attributes happen to be called finish and console_output."""
+
+    finish, console_output = 600.0, 3
+
+    def reset(self, measurement):
+        self.command = measurement.generator_torque, measurement.blade_pitch
+
+    def act(self, measurement):
+        return self.command
+
+
+def test_other_controllers_have_no_output(scene):
+    assert "controller_output" not in simulate(scene, Ordinary, duration=1.0).attrs
+
+
 def test_a_run_has_the_output_of_its_library_and_a_failure_is_that_of_the_run(scene, library, tmp_path):
     (tmp_path / "exit.IN").write_text("exit")
     frame = simulate(scene, f"dll:{library}", duration=5.0)
@@ -236,9 +266,11 @@ def test_a_library_from_fortran_has_the_same_commands_and_its_stop_is_a_failure(
     speeds = 123.0 + np.linspace(0.0, 8.0, 9)
     controller = started("law", path=path)
     assert [pitch for _, pitch in answers(controller, speeds)] == pytest.approx(law(speeds), rel=1e-6)
-    assert controller.output == "t = 0.000 s: started in mode law"
+    assert controller.console_output == "t = 0.000 s: started in mode law"
     text = failure(started("stop", path=path))
     assert "exit code 0" in text and "no more wind" in text
+    text = failure(started("abort", path=path))
+    assert "by SIGABRT" in text and "about to abort" in text
 
 
 @pytest.mark.parametrize(
@@ -304,3 +336,73 @@ def test_the_files_of_a_library_are_those_that_its_name_has(library, tmp_path, m
     monkeypatch.chdir(tmp_path)
     Path("a.IN").write_text("law")
     assert named_library(f"dll:{library},a.IN").files == [library, tmp_path / "a.IN"]
+
+
+@pytest.mark.slow
+def test_a_crash_is_a_failed_run_of_an_evaluation_and_the_others_go_on(library, tmp_path):
+    for mode in ("crash", "hang"):
+        (tmp_path / f"{mode}.IN").write_text(mode)
+    names = f"dll:{library},{tmp_path}/crash.IN,dll:{library},{tmp_path}/hang.IN,limit=0.3,pi,dll:{library}"
+    case = Case("steady", wind=18.0, sea=None, platform="oc3_hywind")
+    table = evaluate(names, [case], duration=4.0, skip=1.0, reference=False).set_index("controller")
+    assert list(table["status"]) == ["failed", "failed", "ok", "ok"]
+    crashed, hanging = table["reason"].iloc[:2]
+    assert "SIGSEGV" in crashed and "took longer than 0.3 s" in hanging
+
+
+@pytest.mark.slow
+def test_results_are_out_of_date_with_another_library_or_input_file(library, tmp_path):
+    mine, file = tmp_path / "mine.so", tmp_path / "a.IN"
+    mine.write_bytes(library.read_bytes())
+    file.write_text("law")
+    first = controller_code(f"dll:{mine},{file}")["code"]
+    file.write_text("law 2")
+    second = controller_code(f"dll:{mine},{file}")["code"]
+    mine.write_bytes(library.read_bytes() + b"\0")
+    assert len({first, second, controller_code(f"dll:{mine},{file}")["code"]}) == 3
+
+
+@needs_rosco
+def test_rosco_by_its_path_has_the_bits_of_rosco(scene, turbine, tmp_path):
+    rosco = make("rosco", turbine, 0.1)
+    rosco.prepare(scene)
+    for name in ("DISCON.IN", "rotor.txt"):
+        shutil.copyfile(Path(rosco.controller._files, name), tmp_path / name)
+    path = find_library()[0]  # it needs libraries beside it
+    frames = [simulate(scene, name, duration=30.0) for name in ("rosco", f"dll:{path},{tmp_path}/DISCON.IN")]
+    assert np.array_equal(*(frame.to_numpy() for frame in frames))
+
+
+DISCON_OC3 = os.environ.get("FOWT_DISCON_OC3", "")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not DISCON_OC3, reason="needs FOWT_DISCON_OC3, the path of DISCON_OC3Hywind of OpenFAST")
+def test_openfasts_own_controller_of_the_spar_has_the_commands_of_openfast_oc3():
+    """On one series of readings; the law here has OpenFAST's delay of one call, and float64."""
+    scene = build_scene("oc3_hywind", wind="ntm:18:B", sea="jonswap:7.5:10:3.3", duration=100.0)
+
+    class Both:
+        declared = False
+        information = named_library(f"dll:{DISCON_OC3}")(scene.turbine, 0.1).information
+
+        def __init__(self, turbine, control_dt):
+            self.ours = make("openfast_oc3", turbine, control_dt)
+            self.theirs = named_library(f"dll:{DISCON_OC3}")(turbine, control_dt)
+
+        def reset(self, measurement):
+            self.ours.reset(measurement)
+            self.theirs.reset(measurement)
+            self.last = None
+
+        def act(self, measurement):
+            ours, theirs = self.ours.act(measurement), self.theirs.act(measurement)
+            if self.last is not None:
+                assert ours == pytest.approx(self.last, rel=2e-5)
+            self.last = theirs
+            return ours
+
+        def finish(self):
+            self.theirs.finish()
+
+    simulate(scene, Both, duration=100.0)

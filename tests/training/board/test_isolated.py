@@ -13,11 +13,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
+from bladed_library import built, needs_gcc
 
 import fowt_env
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.training.board.isolated import IsolatedFactory, ProcessLimits, digest_of, warmed_up
+from fowt_env.training.board.judge import inputs_of
+from fowt_env.training.board.submission import read_submission
 
 SOUND = """
 class Mine:
@@ -40,13 +45,12 @@ def factory(folder, source, information=("generator_speed", "blade_pitch"), with
     folder.mkdir(exist_ok=True)
     (folder / "mine.py").write_text(source)
     limits = ProcessLimits(**{"call": 2.0, **limits})  # a machine that is busy answers late
-    return IsolatedFactory(str(folder), "mine.py", "Mine", "mine", information, (), limits, within=within)
+    return IsolatedFactory(str(folder), "mine:Mine", "mine", information, (), limits, within=within)
 
 
-def run(controller, duration=20.0):
-    return fowt_env.simulate(
-        fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="reference"), controller, duration
-    )
+def run(controller, duration=20.0, sensors=None):
+    scene = fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="reference")
+    return fowt_env.simulate(scene, controller, duration, sensors=sensors)
 
 
 @pytest.fixture
@@ -66,6 +70,24 @@ def test_commands_are_those_of_the_same_controller_here(tmp_path):
     here = run(scope["Mine"])
     assert (there["BldPitch1_[deg]"] == here["BldPitch1_[deg]"]).all()
     assert there["BldPitch1_[deg]"].std() > 0.0
+
+
+@needs_gcc
+def test_a_library_of_a_submission_runs_as_it_does_here_and_its_crash_ends_its_run_alone(tmp_path):
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    library = built(folder)
+    card = 'name = "mine"\nauthor = "A"\nlicence = "MIT"\ncontroller = "discon.so,mode.IN"\n'
+    (folder / "card.toml").write_text(card)
+    (folder / "mode.IN").write_text("law")
+    found = read_submission(folder)
+    assert found.kind == "library" and "yaw" in inputs_of(found, read_turbine("nrel5mw"))
+    made = found.controller(ProcessLimits(call=2.0))
+    here, there = run(f"dll:{library}", 5.0, "standard"), run(made, 5.0, "standard")  # sensors lack readings
+    assert np.array_equal(there.to_numpy(), here.to_numpy())
+    (folder / "mode.IN").write_text("crash")
+    with pytest.raises(ControllerError, match="raised LibraryFailure"):
+        run(read_submission(folder).controller(ProcessLimits(call=2.0)), 5.0)
 
 
 @pytest.mark.parametrize(
@@ -232,7 +254,7 @@ def test_what_a_controller_starts_ends_with_a_judge_that_is_killed(tmp_path, tem
         "memory = numpy.ones(3 * 10**8)\n"
         "for _ in range(8): threading.Thread(target=time.sleep, args=(600.0,), daemon=True).start()\n"
         "from fowt_env.training.board.isolated import IsolatedController, IsolatedFactory\n"
-        f"made = IsolatedFactory({str(submission)!r}, 'mine.py', 'Mine', 'mine', (), ())\n"
+        f"made = IsolatedFactory({str(submission)!r}, 'mine:Mine', 'mine', (), ())\n"
         "IsolatedController(made, None, 0.1).reset(None)\n"
     )
     judge = subprocess.Popen([sys.executable, "-c", program])

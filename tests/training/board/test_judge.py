@@ -108,7 +108,7 @@ def judged(board, tmp_path_factory):
 
 
 def test_code_runs_only_where_it_is_trusted(board):
-    with pytest.raises(InputError, match="submissions mine: contain Python code"):
+    with pytest.raises(InputError, match="submissions mine: contain code"):
         judge(board)
     with pytest.raises(InputError, match="jobs = 100000: .* use at most that many"):
         judge(board, 100000, trust_code=True)

@@ -29,6 +29,7 @@ def write(folder, source="raise SystemExit('was run')", **changes):
     card = {key: value for key, value in (CARD | changes).items() if value is not None}
     (folder / "card.toml").write_text("".join(f"{key} = {value!r}\n" for key, value in card.items()))
     (folder / "mine.py").write_text(source)
+    (folder / "mine.py.so").write_text("no library")
     return folder
 
 
@@ -57,6 +58,10 @@ def test_a_sound_card_is_read_and_nothing_is_run(tmp_path):
         ({"preview": "../../../../escaped"}, "unknown preview '../../../../escaped'"),
         (FAR | {"preview_times": [0.5 * i for i in range(1, 102)]}, "at most 100 times of at most 60 s"),
         (FAR | {"preview_times": [60.5]}, "at most 100 times of at most 60 s"),
+        ({"controller": "none.so", "information": None}, "no file 'none.so' in the folder"),
+        ({"controller": "../mine.so", "information": None}, "no file '../mine.so' in the folder"),
+        ({"controller": "mine.py.so,other.IN", "information": None}, "no file 'other.IN' in the folder"),
+        ({"controller": "mine.py.so", "information": None}, "is no shared library"),
         ({"description": "x" * 2001}, "description: has more than 2000"),
     ],
 )
