@@ -23,7 +23,7 @@ def export(
     control_dt: Annotated[float, Option(help="Control period, s; a multiple of the host's.")] = 0.1,
     python: Annotated[bool, Option("--python", help=AGAIN)] = False,
 ):
-    """Export a controller to OpenFAST, Bladed, QBlade, a PLC or ROSCO.
+    """Export a controller for OpenFAST, a PLC or ROSCO.
 
     Examples:
     fowt export gspi_oc3 --dll libgspi.so  # a library that OpenFAST loads in place of DISCON
