@@ -45,6 +45,8 @@ from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, build_tor
 from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, Measure
 
 TEMPLATES = Path(__file__).parent / "c"
+FAMILIES = {IPC: "ipc", GSPI: "gspi", FloatingFeedback: "floating_feedback", LQR: "lqr", PI: "pi"}
+METHODS = ("kernel", "reset", "act")  # that a law in C repeats
 EXPORTED = "#ifdef _WIN32\n#define EXPORTED __declspec(dllexport)\n#else\n#define EXPORTED\n#endif"
 
 
@@ -81,11 +83,12 @@ def native_law(controller):
 
 
 def family(controller):
-    """Return the name of a compiled law in C, None without one; a subclass may have another law."""
-    for kind, name in ((IPC, "ipc"), (GSPI, "gspi"), (FloatingFeedback, "floating_feedback"), (LQR, "lqr")):
-        if isinstance(controller, kind) and type(controller).kernel is kind.kernel:
-            return name
-    return "pi" if isinstance(controller, PI) and type(controller).kernel is PI.kernel else None
+    """Return the name of a compiled law in C, None without one: a subclass may have another law or start."""
+    for kind, name in FAMILIES.items():
+        if isinstance(controller, kind):
+            own = type(controller)
+            return name if all(getattr(own, key) is getattr(kind, key) for key in METHODS) else None
+    return None
 
 
 def write_law(controller, turbine, control_dt, stem, title):

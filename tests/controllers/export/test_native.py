@@ -11,16 +11,22 @@ import numpy as np
 import pytest
 from bladed_host import Library, changed, needs_compiler, series
 
+from fowt_env.control import make
 from fowt_env.controllers.bladed.records import INDEX
 from fowt_env.controllers.export.hosted import Hosted, fields_of
 from fowt_env.controllers.export.library import SHARED, compile_c, export_sources, prepared
+from fowt_env.controllers.export.native import native_law
+from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.descriptions.turbine import read_turbine
 
 pytestmark = needs_compiler
 TURBINE = read_turbine("nrel5mw")
 POLICY = "policy:ppo_lqr"
-LAWS = ("pi", "pi_land_power", "pi_unscheduled", "gspi_oc3", "floating_feedback", "ipc", "lqr", POLICY)
+LAWS = (
+    "pi", "pi_land_power", "pi_unscheduled", "gspi_oc3", "floating_feedback", "ipc", "ipc_constrained",
+    "ipc_floating", "lqr", POLICY,
+)  # fmt: skip
 SCALE = np.array([TURBINE.torque_law.rated_torque, 1.0, 1.0, 1.0])  # of torque and pitch, N m and rad
 DT = 0.1
 STRICT = ("-pedantic", "-Wconversion", "-Werror")
@@ -100,6 +106,18 @@ def check_law(name, folder):
         np.testing.assert_allclose(np.array(command) / SCALE, ours / SCALE, rtol=0.0, atol=1e-9)
         travelled.append(ours)
     assert np.ptp(travelled, axis=0).min() > 0.01  # neither command is at a limit throughout
+
+
+def test_a_law_of_the_user_is_not_mistaken_for_the_one_that_it_changes():
+    class Stepwise(PI):
+        def reset(self, measurement):
+            super().reset(measurement)
+            self.memory[:] = 0.0
+
+    settings = PISettings.published(TURBINE)
+    assert native_law(PI(settings, DT)) and not native_law(Stepwise(settings, DT))
+    assert not native_law(make("constant", TURBINE, DT)) and not native_law(make("mpc", TURBINE, DT))
+    assert not native_law(make("policy:ppo_lqr_preview", TURBINE, DT))
 
 
 def test_a_policy_s_single_precision_in_python_is_within_a_millionth(folder):
