@@ -219,9 +219,9 @@ class Rosco(BladedCalls):
         turbine, density = scene.turbine, scene.platform.environment.air_density
         self._turbine = turbine
         if isinstance(self.settings, Discon):
-            text, table = self.settings.texts(self.changes, lambda: _table(turbine, density))
+            text, table = self.settings.texts(self.changes, lambda: rotor_table(turbine, density))
         else:
-            computed = _table(turbine, density)
+            computed = rotor_table(turbine, density)
             values = deck(with_gains(scene), density, computed, self.settings)
             if self.individual:
                 values |= individual_entries(turbine, self.control_dt)
@@ -318,7 +318,7 @@ class Table(NamedTuple):
 _tables = Cache(16)  # (id of the turbine, density) -> (turbine, Table)
 
 
-def _table(turbine, density):
+def rotor_table(turbine, density):
     """Return the Table of a turbine's blade elements."""
     key = (id(turbine), density)
 
@@ -334,20 +334,28 @@ def poles(turbine, density, table):
     radius = turbine.rotor.tip_radius
     scale = 0.5 * density * pi * radius**3
     inertia = _inertia(turbine)
+    cq = RectBivariateSpline(table.ratio, table.blade_pitch, table.cq)
+    winds = np.linspace(turbine.cut_in_wind_speed, turbine.cut_out_wind_speed, POLE_SPEEDS)
+    ratios, pitches = steady_states(turbine, density, table, winds)
+    # torque = scale V^2 Cq(omega R/V, pitch)
+    slopes = [cq(*state, dx=1)[0, 0] for state in zip(ratios, pitches, strict=True)]
+    return winds, scale * winds * radius * np.array(slopes) / inertia
+
+
+def steady_states(turbine, density, table, winds):
+    """Return (tip-speed ratio, blade pitch rad), each (n,), of steady operation at winds (n,), m/s."""
+    radius = turbine.rotor.tip_radius
+    scale = 0.5 * density * pi * radius**3
     rated, finest = turbine.rated_rotor_speed, turbine.pitch_drive.minimum
     torque = turbine.torque_law.rated_torque * turbine.drivetrain.gear_ratio
     cq = RectBivariateSpline(table.ratio, table.blade_pitch, table.cq)
     best = best_ratio(turbine, table)
-    winds = np.linspace(turbine.cut_in_wind_speed, turbine.cut_out_wind_speed, POLE_SPEEDS)
-    values = np.empty(POLE_SPEEDS)
-    for i, wind in enumerate(winds):
-        ratio, pitch = min(best, rated * radius / wind), finest
+    ratios, pitches = np.minimum(best, rated * radius / winds), np.full(len(winds), finest)
+    for i, (wind, ratio) in enumerate(zip(winds, ratios, strict=True)):
         surplus = lambda b, w=wind, r=ratio: scale * w * w * cq(r, b)[0, 0] - torque  # noqa: E731
         if ratio < best and surplus(finest) > 0.0:
-            pitch = brentq(surplus, finest, table.blade_pitch[-1])
-        # torque = scale V^2 Cq(omega R/V, pitch)
-        values[i] = scale * wind * radius * cq(ratio, pitch, dx=1)[0, 0] / inertia
-    return winds, values
+            pitches[i] = brentq(surplus, finest, table.blade_pitch[-1])
+    return ratios, pitches
 
 
 def best_ratio(turbine, table):
@@ -475,10 +483,10 @@ def _words(value):
     return " ".join(str(v) if isinstance(v, int) else f"{v:.8g}" for v in np.atleast_1d(value).tolist())
 
 
-def deck_text(values):
-    """Return the text of DISCON.IN with a value and its name on each line."""
+def deck_text(values, title="ROSCO deck, written for one run"):
+    """Return the text of DISCON.IN with a value and its name on each line, below the title."""
     lines = [f"{_words(value)}   ! {name} -" for name, value in values.items()]
-    return "\n".join(["! ROSCO deck, written for one run", *lines, ""])
+    return "\n".join([*(f"! {line}" for line in title.splitlines()), *lines, ""])
 
 
 def table_text(table):

@@ -17,11 +17,11 @@ from fowt_env.controllers.rosco import (
     Discon,
     Rosco,
     RoscoSettings,
-    _table,
     deck,
     find_library,
     pitch_gains,
     poles,
+    rotor_table,
 )
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
@@ -70,7 +70,7 @@ def test_the_estimator_and_the_torque_loop_are_those_of_roscos_own_deck(turbine)
 
     Within 0.5 %: the blades' inertia in its deck is that of another table of masses (0.4 %).
     """
-    found = deck(turbine, 1.225, _table(turbine, 1.225), RoscoSettings())
+    found = deck(turbine, 1.225, rotor_table(turbine, 1.225), RoscoSettings())
     assert found["WE_Jtot"] == pytest.approx(43702538.057, rel=5e-3)
     assert found["VS_KP"] == pytest.approx(-6.97771e2, rel=5e-3)
     assert found["VS_KI"] == pytest.approx(-1.04507e2, rel=5e-3)
@@ -84,7 +84,7 @@ def test_the_poles_are_those_of_roscos_own_deck(turbine, wind, pole):
 
     Within 5 %: its best tip-speed ratio is 7.50 and ours 7.68, and the slopes come from unlike tables.
     """
-    ours = np.interp(wind, *poles(turbine, 1.225, _table(turbine, 1.225)))
+    ours = np.interp(wind, *poles(turbine, 1.225, rotor_table(turbine, 1.225)))
     if wind > turbine.rated_wind_speed:
         ours += 43093.55 * 97.0 / (1.267109 * 43702538.057)
     assert ours == pytest.approx(pole, rel=0.05)

@@ -11,9 +11,11 @@ import tomllib
 
 import pandas as pd
 import pytest
+from bladed_host import needs_compiler
 from doc_pages import DOCS, NUMBER, assert_printed, blocks, fowt
 
 EXTRAS = tomllib.loads((DOCS.parent / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+RUN = ("python", "bash", "text")
 SETUP = re.compile(r"(python3 -m venv|\. \.venv|pip install)\b")
 
 
@@ -94,6 +96,14 @@ def test_the_statistics_that_the_readme_shows_are_those_of_its_program():
     for a, b in zip(NUMBER.findall(printed), NUMBER.findall(shown.text), strict=True):
         # another machine's last bits may turn over the last digit that is shown
         assert abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(b.partition(".")[2]), again
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_every_block_of_export_runs_in_this_package_as_host(folder):
+    run_blocks([block for block in blocks("guides/export.md") if block.language in RUN], folder)
+    for name in ("plc/law.h", "plc/law.c", "DISCON.IN", "float_DISCON.IN"):
+        assert (folder / name).stat().st_size > 1000
 
 
 WHOLE = ("index.md", "reference/environment.md")

@@ -24,6 +24,7 @@ SHIPPED = {  # one of each kind of file that is no source
     "fowt_env/data/sea_states.toml",
     "fowt_env/data/turbines/nrel5mw/polars/NACA64_A17.csv",
     "fowt_env/controllers/tuned.toml",
+    "fowt_env/controllers/export/c/lqr.c",
     "fowt_env/controllers/policy/agents/ppo_lqr.npz",
     "fowt_env/training/design/data/linear_bound.csv",
     "fowt_env/training/evaluation/suites/above_rated.toml",

@@ -31,13 +31,13 @@ OUTPUTS = {  # output parameters of commands -> arguments of output(), which che
 err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
 MODULES = (  # modules that add commands to the app
     "simulate", "listing", "check", "check_dll", "evaluate", "validate", "doctor", "warmup", "cache",
-    "benchmark", "design", "plot", "report", "scores", "leaderboard", "import_deck", "hydro", "campbell",
-    "train", "serve", "compare", "export_fmu",
+    "benchmark", "design", "plot", "report", "scores", "leaderboard", "import_deck", "export", "hydro",
+    "campbell", "train", "serve", "compare", "export_fmu",
 )  # fmt: skip
 GROUPS = {  # headings of fowt --help -> their commands, in the order shown
     "Run": ("simulate", "trim", "plot", "compare", "animate", "check"),
     "Build": ("import", "hydro", "campbell"),
-    "Connect": ("check-dll", "serve", "fmu"),
+    "Connect": ("check-dll", "export", "serve", "fmu"),
     "Design": ("linearize", "design"),
     "Evaluate": ("evaluate", "report", "scores", "leaderboard"),
     "Train": ("train", "export-policy"),

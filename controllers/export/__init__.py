@@ -1,0 +1,1 @@
+"""Exports controllers: Bladed-style libraries for other simulators, C code, ROSCO's input file."""
