@@ -140,9 +140,12 @@ OPTIONS = {
     "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
     "tower_drag": Option(True, (False, True), "wind drag of the tower"),
     "hydrodynamics": Option(True, (False, True), "all loads of the water"),
-    # True: that of the fidelity; "table": tensions tabulated about rest, solved outside the table
-    "mooring": Option(True, (False, True, "catenary", "table"),
-        "lines: catenary solved at each step, a table of tensions, or none"),
+    # True: that of the fidelity; "table": tensions tabulated about rest, solved outside the table; "dynamic":
+    # lumped masses of [[lines]] with dynamics
+    "mooring": Option(True, (False, True, "catenary", "table", "dynamic"),
+        "lines: catenary solved at each step, a table of tensions, moving lines (dynamic), or none"),
+    "line_segments": Option(None, Range("None (the platform file's) or 4 to 500", 4, 500, whole=True),
+        "segments of each moving line (mooring dynamic)"),
     "planar": Option(False, (False, True), "motion in the vertical plane of the wind alone"),
     "pitch": Option("collective", ("collective", "individual"),
         "blades pitch together, or independently (individual pitch control)"),
