@@ -171,7 +171,7 @@ OPTIONS = {
         "where waves act on a potential-flow body: at rest, or following its slow drift"),
     "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "low-pass cut-off of the drift"),
     "second_order": Option(None, (None, "none", *METHODS),
-        "difference-frequency wave forces of a potential-flow body"),
+        "second-order wave forces of a potential-flow body: of differences; full_sum: and sums"),
     "second_order_cutoff": Option(None, Range("None or rad/s, > 0", 0.0, 100.0, low_open=True),
         "difference frequency above which the force is zero"),
     "duration": Option(700.0, Range("seconds of random wind and sea, > 0", 0.0, 1e6, low_open=True),

@@ -161,6 +161,11 @@ def excitation_in_waves(platform, waves, options, first_state):
             f"second_order = {second!r}: the platform {platform.name!r} has no difference-frequency QTF;"
             " allowed without one: None or 'none'"
         )
+    if second == "full_sum" and body.sum_qtf is None:
+        raise InputError(
+            f"second_order = 'full_sum': the platform {platform.name!r} has no sum-frequency QTF (WAMIT's"
+            " .12s); allowed without one: None, 'none', 'mean_drift', 'newman' or 'full'"
+        )
     position = None
     if options["excitation_position"] == "filtered":
         position = build_filtered_position(first_state, options["excitation_cutoff"])
