@@ -222,7 +222,7 @@ def test_a_linear_model_has_the_lines_as_catenaries():
 
 @pytest.mark.slow
 def test_an_environment_with_moving_lines_returns_to_a_snapshot():
-    env = FowtEnv("above_rated", options={"mooring": "dynamic"})
+    env = FowtEnv("above_rated", mooring="dynamic")
     env.reset(seed=1)
     action = np.zeros(env.action_space.shape, dtype=env.action_space.dtype)
     for _ in range(20):
