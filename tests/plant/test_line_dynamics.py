@@ -78,12 +78,12 @@ def driven(mooring, times, rise=20.0):
 
 
 def test_a_driven_line_moves_as_its_plain_twin():
-    """On the bed and off it; the error, most of it of the longest substep, falls with the step."""
-    mooring, times = volturnus(8), np.arange(0.0, 15.01, 0.1)
+    """On the bed and off it, heavier across than along; the error falls with the longest substep."""
+    mooring, times = volturnus(8, added_mass_coefficient=2.0), np.arange(0.0, 15.01, 0.1)
     length = 850.0 / 8
     twin = {
         "EA": 3.27e9, "BA": length * np.sqrt(3.27e9 * MASS), "l": length, "w": mooring.weight[0],
-        "rho": DENSITY, "d": 0.333, "m": MASS, "Cdn": 2.0, "Cdt": 0.4, "Can": 0.82, "Cat": 0.27,
+        "rho": DENSITY, "d": 0.333, "m": MASS, "Cdn": 2.0, "Cdt": 0.4, "Can": 2.0, "Cat": 0.27,
         "bed": -DEPTH, "kbot": 3e6, "cbot": 3e5,
     }  # fmt: skip
     nodes = state_of(mooring)[N_RIGID:].reshape(6, 7).T
@@ -93,9 +93,10 @@ def test_a_driven_line_moves_as_its_plain_twin():
 
     slow = naive.run(nodes[:, :3], nodes[:, 3:], path, mooring.anchor[0], twin, times, steps=12)
     scale = slow[:, 2].std()
-    for parts, limit in ((1, 0.06), (10, 0.02)):
+    for parts, limit in ((1, 0.065), (10, 0.03)):
         fast = driven(mooring, np.linspace(0.0, 15.0, 150 * parts + 1), rise=4.0)[::parts]
-        assert np.sqrt(((fast - slow) ** 2).mean(axis=0)).max() < limit * scale
+        error = np.sqrt(((fast - slow) ** 2).mean(axis=0)).max() / scale
+        assert error < limit
         assert np.abs(fast[:, 1]).max() < 1e-6 * scale
 
 
