@@ -3,7 +3,7 @@
 import numpy as np
 
 from fowt_env.descriptions.platform import read_platform
-from fowt_env.descriptions.potential_flow import DifferenceQtf, PotentialFlow
+from fowt_env.descriptions.potential_flow import PotentialFlow, Qtf
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.training.validation.openfast_cases import table
 from fowt_env.weather.waves import build_waves
@@ -32,6 +32,7 @@ def made_up_body(headings=tuple(range(-180, 181, 30)), qtf_headings=((0, 0), (0,
     for row, (first, last) in enumerate(pairs):
         smooth = 0.8 * (one + other - 1.8) + 0.3 * np.cos(first) * np.cos(last)
         value[row] = 0.02 * SIZE * smooth * np.exp(1j * (one - other) * lag + 1j * lead * (first - last))
+    sums = value * np.exp(2j * other * lag)  # symmetric in the two waves
     return PotentialFlow(
         omega=omega,
         added_mass=np.tile(np.eye(6) * 1e7, (40, 1, 1)),
@@ -43,7 +44,8 @@ def made_up_body(headings=tuple(range(-180, 181, 30)), qtf_headings=((0, 0), (0,
         stiffness=stiffness,
         volume=8029.0,
         centre_of_buoyancy=(0.0, 0.0),
-        difference_qtf=DifferenceQtf(second, pairs, value),
+        difference_qtf=Qtf(second, pairs, value),
+        sum_qtf=Qtf(second, pairs, 3.0 * sums, of_sums=True),
         draft=120.0,
         source="a made-up body",
     )

@@ -9,6 +9,7 @@ from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import derivative
 from fowt_env.plant.hydro.member_buoyancy import displaced
+from fowt_env.plant.line_dynamics import line_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import N_RIGID, State, pose_of
 
@@ -70,10 +71,18 @@ def named_periods(values, shapes, names):
     return {name: periods[name] for name in names}
 
 
+def with_hanging_lines(scene):
+    """Return the scene whose moving lines hang as catenaries, with a model of the same types."""
+    if not line_states(scene.model.mooring):
+        return scene
+    return scene.with_model({"mooring.dynamics.resting": True})
+
+
 class Evaluation:
     """Evaluates a scene's loads; at(x) stores them in data."""
 
     def __init__(self, scene):
+        scene = with_hanging_lines(scene)
         self.data = scene.data()
         self.handle = scene.handle(self.data)
         self.u = np.zeros(scene.n_commands)

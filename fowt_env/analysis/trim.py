@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
-from fowt_env.analysis.statics import Evaluation, central_difference, mean_derivative
+from fowt_env.analysis.statics import Evaluation, central_difference, mean_derivative, with_hanging_lines
 from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
@@ -18,6 +18,7 @@ from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
+from fowt_env.plant.line_dynamics import rest_lines
 from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.actuators import rest_actuators
@@ -113,7 +114,7 @@ def without_fluctuations(scene, wind_speed=None):
             reference_length=aero.wind.reference_length,
             shear_exponent=aero.wind.shear_exponent,
         )
-    return scene.with_model(parts)
+    return with_hanging_lines(scene.with_model(parts))
 
 
 @entry
@@ -410,6 +411,7 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
 def _point(scene, steady, platform):
     """Return the OperatingPoint at the current state, with channels averaged over the azimuth."""
     rest_actuators(scene.model, steady.x, steady.u)
+    rest_lines(scene, steady.x)
     state, command = steady.x.copy(), steady.u.copy()
     rows = []
     for i in range(AZIMUTHS):

@@ -8,6 +8,7 @@ from math import floor
 from fowt_env.analysis.trim import trim
 from fowt_env.caches import Cache
 from fowt_env.descriptions.records import Record
+from fowt_env.plant.line_dynamics import rest_lines
 
 GRID = 0.25  # m/s between exact trims; between them the state is linear in the wind speed
 _TRIMS = Cache(4096)  # (plant, water, shear exponent, wind speed) -> (state, command)
@@ -61,4 +62,6 @@ def interpolated_trim(scene, key, speed):
         return cached_trim(scene, key, speed)
     low = cached_trim(scene, key, cell * GRID)
     high = cached_trim(scene, key, (cell + 1) * GRID)
-    return tuple((1.0 - weight) * a + weight * b for a, b in zip(low, high, strict=True))
+    state, command = ((1.0 - weight) * a + weight * b for a, b in zip(low, high, strict=True))
+    rest_lines(scene, state)  # a mean of two equilibria stretches a line
+    return state, command

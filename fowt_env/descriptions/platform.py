@@ -6,6 +6,7 @@ together, each with file, key, value and allowed range.
 
 import math
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -174,6 +175,23 @@ class Tower(Record):
             yield from mass_problem(self.modes, self.mass, self.top_height - self.base_height)
 
 
+class MovingLine(Record):
+    """Holds what a moving line of lumped masses needs beyond a catenary, as MoorDyn does.
+
+    Coefficients multiply 1/2 rho D |v| v across the line, 1/2 rho pi D |v| v along it and the displaced mass.
+    """
+
+    segments: Annotated[int, Field(strict=True, ge=4, le=500)] = 20
+    diameter: Positive  # of a cylinder with the displaced volume, m; the mass follows from wet_weight
+    drag_coefficient: NonNegative
+    axial_drag_coefficient: NonNegative = 0.0
+    added_mass_coefficient: NonNegative = 1.0
+    axial_added_mass_coefficient: NonNegative = 0.0
+    damping_ratio: NonNegative = 1.0  # of a segment along the line, MoorDyn's -BA
+    seabed_stiffness: Positive = 3e6  # per area of diameter times length, Pa/m
+    seabed_damping: NonNegative = 3e5  # Pa s/m
+
+
 class LineProperties(Record):
     """Holds the properties of a mooring line."""
 
@@ -181,6 +199,7 @@ class LineProperties(Record):
     wet_weight: Positive  # per length, N/m
     EA: Positive  # N
     seabed_friction: NonNegative = 0.0  # C_B
+    dynamics: MovingLine | None = None  # for mooring = "dynamic"; None: the platform's line_dynamics
 
 
 class Line(LineProperties):
@@ -205,6 +224,7 @@ class Platform(Record):
     members: tuple[Member, ...] = ()
     shapes: tuple[Shape, ...] = ()  # drawn in place of hull and members
     lines: tuple[Line, ...] = ()
+    line_dynamics: MovingLine | None = None  # of lines without their own dynamics
     options: dict = Field(default_factory=dict)  # defaults of the options of build_scene
     published: dict = Field(default_factory=dict)  # values that tests compare with
     source: str = ""

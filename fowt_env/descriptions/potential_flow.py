@@ -19,15 +19,22 @@ MAX_BYTES = 200_000_000  # of a file of coefficients: a full difference-frequenc
 
 
 @dataclass(frozen=True, eq=False)
-class DifferenceQtf:
+class Qtf:
     """Holds the quadratic transfer function of difference forces, Re(sum a_i a_j* Q_ij exp(i (w_i-w_j) t)).
 
-    On a grid of frequency pairs and of pairs of headings; N/m2 and N m/m2.
+    Or of sum forces, Re(sum a_i a_j Q_ij exp(i (w_i+w_j) t)). On a grid of frequency pairs and of pairs of
+    headings; N/m2 and N m/m2.
     """
 
     omega: np.ndarray  # (k,) rad/s, increasing
     heading: np.ndarray  # (p, 2) rad, of the two waves
     value: np.ndarray  # (p, k, k, 6) complex, Q(w_i, w_j); nan where the file has none
+    of_sums: bool = False
+
+    def mirrored(self, value):
+        """Return the values (..., k, k, 6) of the exchanged pairs of frequencies: Q(w_j, w_i)."""
+        value = np.swapaxes(value, -3, -2)
+        return value if self.of_sums else np.conj(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +56,8 @@ class PotentialFlow:
     volume: float  # displaced, m3
     centre_of_buoyancy: tuple[float, float]  # x, y, m
     added_mass_zero: np.ndarray | None = None  # (6, 6) at zero frequency, where it is known
-    difference_qtf: DifferenceQtf | None = None
+    difference_qtf: Qtf | None = None
+    sum_qtf: Qtf | None = None
     draft: float | None = None  # m, where it is known
     source: str = ""
 
@@ -67,13 +75,21 @@ class _PotentialFlowTable(Record):
 ARRAYS = {  # of a file, name: shape, with letters for the sizes in SIZES
     "omega": "n", "added_mass": "n66", "damping": "n66", "added_mass_infinite": "66", "excitation_omega": "k",
     "heading": "m", "excitation": "km6", "stiffness": "66", "added_mass_zero": "66", "qtf_omega": "q",
-    "qtf_heading": "p2", "qtf_value": "pqq6",
+    "qtf_heading": "p2", "qtf_value": "pqq6", "sum_qtf_omega": "s", "sum_qtf_heading": "t2",
+    "sum_qtf_value": "tss6",
 }  # fmt: skip
-SIZES = {"n": "omega", "k": "excitation_omega", "m": "heading", "q": "qtf_omega", "p": "qtf_heading"}
-LOWEST = {"omega": 0.0, "excitation_omega": 0.0, "heading": -math.inf, "qtf_omega": 0.0}  # exclusive
-COMPLEX = ("excitation", "qtf_value")
-QTF_ARRAYS = tuple(name for name in ARRAYS if name.startswith("qtf_"))
-OPTIONAL = ("added_mass_zero", *QTF_ARRAYS)
+SIZES = {
+    "n": "omega", "k": "excitation_omega", "m": "heading", "q": "qtf_omega", "p": "qtf_heading",
+    "s": "sum_qtf_omega", "t": "sum_qtf_heading",
+}  # fmt: skip
+LOWEST = dict.fromkeys(("omega", "excitation_omega", "qtf_omega", "sum_qtf_omega"), 0.0)  # exclusive
+LOWEST["heading"] = -math.inf
+COMPLEX = ("excitation", "qtf_value", "sum_qtf_value")
+QTF_ARRAYS = {  # field of PotentialFlow: its arrays, all or none in a file
+    field: tuple(f"{start}_{name}" for name in ("omega", "heading", "value"))
+    for field, start in (("difference_qtf", "qtf"), ("sum_qtf", "sum_qtf"))
+}
+OPTIONAL = ("added_mass_zero", *(name for names in QTF_ARRAYS.values() for name in names))
 
 
 def read_potential_flow(table, folder, gravity, density):
@@ -114,8 +130,9 @@ def read_coefficients(path):
         raise
     except Exception as error:  # any error of zipfile, zlib and numpy for a broken file
         raise InputError(f"{where} cannot be read: {error!s:.300}") from None
-    used = [name for name in ARRAYS if name not in QTF_ARRAYS or arrays.keys() >= set(QTF_ARRAYS)]
-    arrays = {name: value for name, value in arrays.items() if name in (*used, "source")}
+    partial = {name for names in QTF_ARRAYS.values() if not arrays.keys() >= set(names) for name in names}
+    used = (*(name for name in ARRAYS if name not in partial), "source")
+    arrays = {name: value for name, value in arrays.items() if name in used}
     missing = [name for name in ARRAYS if name not in arrays and name not in OPTIONAL]
     if missing:
         raise InputError(f"{where}: arrays {', '.join(missing)} are missing")
@@ -126,21 +143,23 @@ def read_coefficients(path):
         for name, value in arrays.items()
         if name != "source"
     }
-    parts = [values.pop(name, None) for name in QTF_ARRAYS]
-    qtf = None if parts[0] is None else DifferenceQtf(*parts)
+    for field, names in QTF_ARRAYS.items():
+        parts = [values.pop(name, None) for name in names]
+        values[field] = None if parts[0] is None else Qtf(*parts, of_sums=field == "sum_qtf")
     source = str(arrays["source"]) if "source" in arrays else ""
     return PotentialFlow(
-        **values, volume=math.nan, centre_of_buoyancy=(0.0, 0.0), difference_qtf=qtf, source=source[:2000]
+        **values, volume=math.nan, centre_of_buoyancy=(0.0, 0.0), source=source[:2000]
     )
 
 
 def coefficient_arrays(body):
     """Return {name: array} of a PotentialFlow for savez_compressed, single precision but for frequencies."""
     values = {name: getattr(body, name, None) for name in ARRAYS}
-    if (qtf := body.difference_qtf) is not None:
-        values |= dict(zip(QTF_ARRAYS, (qtf.omega, qtf.heading, qtf.value), strict=True))
+    for field, names in QTF_ARRAYS.items():
+        if (qtf := getattr(body, field)) is not None:
+            values |= dict(zip(names, (qtf.omega, qtf.heading, qtf.value), strict=True))
     kinds = dict.fromkeys(ARRAYS, np.float32) | dict.fromkeys(COMPLEX, np.complex64)
-    kinds |= dict.fromkeys((*LOWEST, "qtf_heading"))  # dtype unchanged
+    kinds |= dict.fromkeys((*LOWEST, "qtf_heading", "sum_qtf_heading"))  # dtype unchanged
     arrays = {name: np.asarray(value, kinds[name]) for name, value in values.items() if value is not None}
     return arrays | {"source": np.array(body.source)}
 
@@ -153,7 +172,7 @@ def _array_problems(arrays):
             continue
         if value.dtype.kind not in ("fiuc" if name in COMPLEX else "fiu"):
             problems.append(f"{name}: must be numbers, is {value.dtype}")
-        elif name != "qtf_value" and not np.isfinite(value).all():
+        elif not name.endswith("qtf_value") and not np.isfinite(value).all():
             problems.append(f"{name}: must be finite numbers")
     if problems:
         return problems

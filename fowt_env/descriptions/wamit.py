@@ -1,13 +1,14 @@
-"""Reads WAMIT's numeric output of one body: files .1, .3, .hst and .12d."""
+"""Reads WAMIT's numeric output of one body: files .1, .3, .hst, .12d and .12s."""
 
 import math
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
 import numpy as np
 
 from fowt_env.descriptions.files import read_text
-from fowt_env.descriptions.potential_flow import MAX_BYTES, DifferenceQtf, PotentialFlow
+from fowt_env.descriptions.potential_flow import MAX_BYTES, PotentialFlow, Qtf
 from fowt_env.errors import InputError
 
 MODES = 6
@@ -18,7 +19,7 @@ _LIMITS = {-1.0: "zero frequency (period < 0)", 0.0: "infinite frequency (period
 def read_wamit(
     root: str | Path, *, length_scale: float, gravity: float, density: float, excitation: tuple | None = None
 ) -> PotentialFlow:
-    """Return the PotentialFlow of root.1, root.3, root.hst and, if present, root.12d, in SI units.
+    """Return the PotentialFlow of root.1, root.3, root.hst and, if present, root.12d and root.12s, in SI.
 
     root          path without the extension; the case of file names is ignored
     length_scale  WAMIT's ULEN, m; gravity (m/s2) and density (kg/m3) of the water
@@ -38,10 +39,12 @@ def read_wamit(
         excitation_omega, heading, force = _read_excitation(_path(root, ".3", "wave excitation"))
         force = force * water * scale ** np.array([2.0] * 3 + [3.0] * 3)
     stiffness = _read_stiffness(_path(root, ".hst", "hydrostatic stiffness"))
-    qtf = None
-    if (quadratic := _path(root, ".12d")) is not None:
-        qtf_omega, pairs, value = _read_qtf(quadratic)
-        qtf = DifferenceQtf(qtf_omega, pairs, value * water * scale ** np.array([1.0] * 3 + [2.0] * 3))
+    qtfs = {}
+    for field, ending in (("difference_qtf", ".12d"), ("sum_qtf", ".12s")):
+        if (quadratic := _path(root, ending)) is not None:
+            qtf = _read_qtf(quadratic, of_sums=field == "sum_qtf")
+            dimension = water * scale ** np.array([1.0] * 3 + [2.0] * 3)
+            qtfs[field] = replace(qtf, value=qtf.value * dimension)
     return PotentialFlow(
         omega=omega,
         added_mass=added * density * power,
@@ -54,7 +57,7 @@ def read_wamit(
         stiffness=stiffness * water * scale ** _powers(2),
         volume=math.nan,
         centre_of_buoyancy=(0.0, 0.0),
-        difference_qtf=qtf,
+        **qtfs,
         source=f"WAMIT files {root.name}",
     )
 
@@ -237,11 +240,11 @@ def _read_stiffness(path):
     return stiffness
 
 
-def _read_qtf(path):
-    """Return (omega, heading pairs rad, dimensionless (p, k, k, 6)) of a .12d file; nan for missing entries.
+def _read_qtf(path, of_sums):
+    """Return the dimensionless Qtf of a .12d or .12s file (of_sums); nan for missing entries.
 
-    Entries on one side of the diagonal are copied to the other: Q(j, i) = conj Q(i, j), with the headings
-    exchanged.
+    Entries on one side of the diagonal are copied to the other, with the headings exchanged: Q(j, i) is the
+    conjugate of Q(i, j) for differences, and equal to it for sums.
     """
     file, table = _Rows(path, 9), {}
     for line, (first, second, one, other, i, _, _, real, imaginary) in file.rows:
@@ -259,10 +262,10 @@ def _read_qtf(path):
         raise file.refusal(f"{what}: not a grid")
     value = np.full((len(headings), len(periods), len(periods), MODES), np.nan, dtype=complex)
     for (one, other, first, second, mode), force in table.items():
-        value[column[other, one], row[second], row[first], mode] = force.conjugate()
+        value[column[other, one], row[second], row[first], mode] = force if of_sums else force.conjugate()
     for (one, other, first, second, mode), force in table.items():  # overwrites copied entries
         value[column[one, other], row[first], row[second], mode] = force
     omega = np.array([2.0 * math.pi / period for period in periods])
     missing = set(range(MODES)) - {key[4] for key in table}
     value[..., sorted(missing)] = np.where(np.isnan(value).all(axis=-1), np.nan, 0.0)[..., None]
-    return omega, np.radians(np.array(headings)), value
+    return Qtf(omega, np.radians(np.array(headings)), value, of_sums)

@@ -15,6 +15,7 @@ from fowt_env.envs.tasks import Episode, draw_offsets, draw_weather, is_mixture,
 from fowt_env.errors import InputError, unknown
 from fowt_env.loop.protection import Guard
 from fowt_env.plant.channels import DEG_PER_RAD
+from fowt_env.plant.line_dynamics import rest_lines
 from fowt_env.plant.state import Command, State
 from fowt_env.run.initial_conditions import INITIAL
 from fowt_env.scene.actuators import rest_actuators
@@ -67,6 +68,8 @@ def moved_state(scene, state, command, offsets):
     x[list(scene.pitch_states)] = min(max(x[State.BLADE_PITCH], drive.minimum), drive.maximum)
     u[Command.BLADE_PITCH :] = x[State.BLADE_PITCH]
     rest_actuators(scene.model, x, u)
+    if offsets:
+        rest_lines(scene, x)
     return x, u
 
 

@@ -17,8 +17,8 @@ from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_force
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
+from fowt_env.plant.line_dynamics import lines_load
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.mooring import mooring_load
 from fowt_env.plant.rigid_body import attitude_rate_at, gravity_load
 from fowt_env.plant.state import State, Wrench, add, fill_sines, pose_by_sines
 from fowt_env.plant.tower.loads import add_bent_weight, add_modal, add_modal_weight, begin_modal, carried
@@ -47,7 +47,7 @@ def evaluate_loads(t, x, model, data, dx):
     aero = aero_load(t, pose, nacelle, x, model.aero, model.pitches, model.tower, data, dx)
     hydro = hydro_load(t, pose, x, model.hydro, data)
     hydro_rates(x, model.hydro, dx)
-    mooring = mooring_load(pose, model.mooring, data.lines, data.counters)
+    mooring = lines_load(pose, x, model.mooring, data.lines, data.counters)
     evaluate_user_loads(t, pose, nacelle, bend, x, model.aero, model.hydro, model.user, data, dx)
 
     tower = add_user_loads(aero.tower, True, bend, model.user, data)

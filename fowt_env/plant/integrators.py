@@ -1,7 +1,8 @@
 """Defines the fixed-step integrators: a class, a step and a row of INTEGRATORS each.
 
 Within a step, blade pitch and generator torque are exact (constant command), the states of radiation memory
-are exact for velocities linear in time (hydro/radiation.py), and the rotor load in a wind box is evaluated
+are exact for velocities linear in time (hydro/radiation.py), moving mooring lines have steps of their own
+(line_dynamics.py), and the rotor load in a wind box is evaluated
 several times a step (rotor_substeps.py), so that none of these limits the step.
 """
 
@@ -14,7 +15,7 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
-from fowt_env.plant.hydro.radiation import begin_memory, end_memory, integrated_states, memory_after
+from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
@@ -66,50 +67,50 @@ def rates(t, x, u, model, data, dx):
 def rk4(t, x, u, dt, model, method, data):
     """Advance x in place by one classical Runge-Kutta step, blade pitch exact at every stage."""
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
-    n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
+    n = integrated_states(x, model)
     rates(t, x, u, model, data, k1)
-    begin_memory(x, dt, True, plane, model.hydro, memory)
+    begin_followers(x, dt, True, model, data)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
-    memory_after(x, y, True, plane, model.hydro, memory)
+    follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
-    memory_after(x, y, True, plane, model.hydro, memory)
+    follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
     for i in range(n):
         y[i] = x[i] + dt * k3[i]
     advance_actuators(x, u, dt, model, y)
-    memory_after(x, y, False, plane, model.hydro, memory)
+    follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k4)
     for i in range(n):
         y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     advance_actuators(x, u, dt, model, y)
     for i in range(n):
         x[i] = y[i]
-    end_memory(x, plane, model.hydro, memory)
+    end_followers(x, dt, model, data)
 
 
 @inlined_kernel
 def heun(t, x, u, dt, model, method, data):
     """Advance x in place by one step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
-    n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
+    n = integrated_states(x, model)
     rates(t, x, u, model, data, k1)
-    begin_memory(x, dt, False, plane, model.hydro, memory)
+    begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
     advance_actuators(x, u, dt, model, y)
-    memory_after(x, y, False, plane, model.hydro, memory)
+    follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
     advance_actuators(x, u, dt, model, y)
     for i in range(n):
         x[i] = y[i]
-    end_memory(x, plane, model.hydro, memory)
+    end_followers(x, dt, model, data)
 
 
 @kernel
@@ -150,7 +151,7 @@ def adams(t, x, u, dt, model, method, data):
     """
     history, new, y = data.history, data.stages[1], data.stages[4]
     cache = data.cache
-    n, plane, memory = integrated_states(x, model.hydro), model.rigid_body.plane, data.radiation
+    n = integrated_states(x, model)
     steps = int(cache[LoadCache.STEPS])
     order = min(steps + 1, START_STEPS + 1)
     for k in range(START_STEPS, 0, -1):
@@ -158,13 +159,13 @@ def adams(t, x, u, dt, model, method, data):
             history[k, i] = history[k - 1, i]
     keep_elastic(x, model.tower, data.elastic)
     rates(t, x, u, model, data, history[0])
-    begin_memory(x, dt, False, plane, model.hydro, memory)
+    begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     advance_actuators(x, u, dt, model, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
-        memory_after(x, y, False, plane, model.hydro, memory)
+        follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
@@ -182,7 +183,7 @@ def adams(t, x, u, dt, model, method, data):
         x[i] += dt * moulton(order, new[i], i, history)
     for i in range(State.VX, n):
         x[i] = y[i]
-    end_memory(x, plane, model.hydro, memory)
+    end_followers(x, dt, model, data)
     cache[LoadCache.STEPS] = steps + 1.0
 
 

@@ -84,6 +84,7 @@ class Data(NamedTuple):
     """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
+    line_work: np.ndarray  # line_dynamics.line_work; empty with quasi-static lines
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes
     bands: object  # hydro.wave_bands.BandScratch, the same for strips with wave bands

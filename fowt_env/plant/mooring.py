@@ -56,6 +56,7 @@ class Mooring(NamedTuple):
     EA: np.ndarray  # (n,), N
     friction: np.ndarray  # (n,), seabed friction coefficient C_B
     table: object = None  # LineTable, or None: every line is solved
+    dynamics: object = None  # line_dynamics.LineDynamics, or None: lines are quasi-static
 
 
 class Catenary(NamedTuple):

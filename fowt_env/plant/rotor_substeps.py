@@ -9,7 +9,7 @@ from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.blade_pitches import advance_actuators
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.hydro.radiation import integrated_states
+from fowt_env.plant.followers import integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State, Wrench, pose_in
 from fowt_env.plant.tower.loads import carried
@@ -63,7 +63,7 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
     for part in range(1, n):
         after = part * dt / n
         bend = 0.5 * after * after / dt
-        for i in range(integrated_states(x, model.hydro)):
+        for i in range(integrated_states(x, model)):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
         advance_actuators(x, u, after, model, between)
         now = wind_now(t + after, model.aero.wind)

@@ -42,7 +42,9 @@ class Block(NamedTuple):
     offset: int  # index of the first state
     size: int
     kind: str  # "position", "velocity", or "internal": a state of a load or an actuator
-    steady: str  # treatment in a trim: "solved" for, "zero", "averaged" over, "settled": its rate is zero
+    # treatment in a trim: "solved" for, "zero", "averaged" over, "settled": its rate is zero, "hanging": as
+    # catenaries during the trim, then relaxed
+    steady: str
 
 
 RIGID_BLOCKS = (
@@ -61,6 +63,7 @@ FURTHER_BLOCKS = {  # (kind, steady) of blocks other than ("internal", "settled"
     "pitch_rate": ("internal", "zero"),
     "followed_pitch": ("internal", "solved"),
     "generator_torque": ("internal", "solved"),
+    "lines": ("internal", "hanging"),
 }
 
 

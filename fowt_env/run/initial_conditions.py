@@ -14,6 +14,7 @@ from fowt_env.errors import (
     InputError,
     unknown,
 )
+from fowt_env.plant.line_dynamics import rest_lines
 from fowt_env.plant.state import OUT_OF_PLANE, Command, State, pose_of
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.channel_names import channel_name
@@ -103,6 +104,8 @@ def initial_state(
             )
         u[Command.BLADE_PITCH + blade] = x[index]
     rest_actuators(scene.model, x, u)
+    if values:
+        rest_lines(scene, x)
     return x, u
 
 

@@ -9,6 +9,8 @@ from fowt_env.descriptions.platform import Platform, read_platform
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.turbine import Turbine, read_turbine, with_second_order_drive
 from fowt_env.plant.drivetrain import build_drivetrain, build_torque_limits
+from fowt_env.plant.hydro.excitation import position_states
+from fowt_env.plant.hydro.radiation import memory_states
 from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model
 from fowt_env.plant.state import BLADES, N_RIGID
@@ -23,11 +25,12 @@ from fowt_env.scene.parts import (
     build_hydro,
     build_moorings,
     check_symmetry,
+    fastest_motion,
     wake_states,
 )
 from fowt_env.scene.plausibility import warn_of_weather
 from fowt_env.scene.scene import Scene
-from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_frequency, tower_states
+from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
 
@@ -87,7 +90,7 @@ def build_scene(
     if options["planar"]:
         members = platform.members if options["hydrodynamics"] else ()
         check_symmetry(platform.lines if options["mooring"] else (), current, members)
-    mooring = build_moorings(platform.lines, options["mooring"])
+    mooring = build_moorings(platform, options)
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], options["planar"])
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
     first_state = N_RIGID + wake_states(aero)
@@ -95,7 +98,8 @@ def build_scene(
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
     tower = with_masses(tower, platform, turbine)
-    dt = default_step(options, tower_frequency(tower))
+    body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
+    dt = default_step(options, fastest_motion(tower, mooring, body))
     pitches = None
     if options["pitch"] == "individual":
         pitches = build_blade_pitches(turbine, rotor, next_state)
@@ -104,14 +108,19 @@ def build_scene(
     next_state += sum(drive_states(actuator, pitches).values())
     converter = build_converter(turbine.drivetrain, next_state)
     next_state += 0 if converter is None else 1
-    water = options["hydrodynamics"]
+    hydro = None
+    if options["hydrodynamics"]:
+        hydro = build_hydro(platform, waves, current, options, dt, next_state)
+        next_state += position_states(hydro) + memory_states(hydro)
+    if mooring is not None and mooring.dynamics is not None:
+        mooring = mooring._replace(dynamics=mooring.dynamics._replace(first=next_state))
     model = Model(
-        rigid_body=build_rigid_body(platform, turbine, plane=True if options["planar"] else None),
+        rigid_body=body,
         layout=build_layout(platform, turbine, pitches is not None),
         drivetrain=build_drivetrain(turbine),
         actuator=actuator,
         generator=build_torque_limits(turbine.torque_law),
-        hydro=build_hydro(platform, waves, current, options, dt, next_state) if water else None,
+        hydro=hydro,
         mooring=mooring,
         aero=aero,
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),

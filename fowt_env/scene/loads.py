@@ -106,8 +106,8 @@ LOADS = {
         strength=EXCITATION,
     ),
     "moorings": LoadFacts(
-        "elastic catenaries on the seabed, quasi-static at the current position",
-        "mooring.py", "5.5", "mooring", "MOORING", {"mooring": False},
+        "elastic catenaries on the seabed, quasi-static at the current position; or moving lines",
+        "mooring.py, line_dynamics.py", "5.5", "mooring", "MOORING", {"mooring": False},
     ),
     "rotor": LoadFacts(
         "thrust, torque and the other loads of the blades",

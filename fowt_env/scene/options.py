@@ -140,9 +140,12 @@ OPTIONS = {
     "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
     "tower_drag": Option(True, (False, True), "wind drag of the tower"),
     "hydrodynamics": Option(True, (False, True), "all loads of the water"),
-    # True: that of the fidelity; "table": tensions tabulated about rest, solved outside the table
-    "mooring": Option(True, (False, True, "catenary", "table"),
-        "lines: catenary solved at each step, a table of tensions, or none"),
+    # True: that of the fidelity; "table": tensions tabulated about rest, solved outside the table; "dynamic":
+    # lumped masses of [[lines]] with dynamics
+    "mooring": Option(True, (False, True, "catenary", "table", "dynamic"),
+        "lines: catenary solved at each step, a table of tensions, moving lines (dynamic), or none"),
+    "line_segments": Option(None, Range("None (the platform file's) or 4 to 500", 4, 500, whole=True),
+        "segments of each moving line (mooring dynamic)"),
     "planar": Option(False, (False, True), "motion in the vertical plane of the wind alone"),
     "pitch": Option("collective", ("collective", "individual"),
         "blades pitch together, or independently (individual pitch control)"),
@@ -168,7 +171,7 @@ OPTIONS = {
         "where waves act on a potential-flow body: at rest, or following its slow drift"),
     "excitation_cutoff": Option(0.01, Range("Hz, 0.0001 to 0.5", 1e-4, 0.5), "low-pass cut-off of the drift"),
     "second_order": Option(None, (None, "none", *METHODS),
-        "difference-frequency wave forces of a potential-flow body"),
+        "second-order wave forces of a potential-flow body: of differences; full_sum: and sums"),
     "second_order_cutoff": Option(None, Range("None or rad/s, > 0", 0.0, 100.0, low_open=True),
         "difference frequency above which the force is zero"),
     "duration": Option(700.0, Range("seconds of random wind and sea, > 0", 0.0, 1e6, low_open=True),

@@ -27,11 +27,13 @@ from fowt_env.plant.hydro.morison import Current
 from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadrature
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
+from fowt_env.plant.line_dynamics import build_line_dynamics, line_frequency
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.plant.tilt import build_tilt
 from fowt_env.scene.options import ROTORS, chosen_stations
 from fowt_env.scene.radiation_fit import build_radiation
+from fowt_env.scene.tower import tower_frequency
 from fowt_env.scene.weather import IN_PLANE
 from fowt_env.weather.excitation import build_excitation, still_excitation
 from fowt_env.weather.waves import flat_waves, is_flat
@@ -159,6 +161,11 @@ def excitation_in_waves(platform, waves, options, first_state):
             f"second_order = {second!r}: the platform {platform.name!r} has no difference-frequency QTF;"
             " allowed without one: None or 'none'"
         )
+    if second == "full_sum" and body.sum_qtf is None:
+        raise InputError(
+            f"second_order = 'full_sum': the platform {platform.name!r} has no sum-frequency QTF (WAMIT's"
+            " .12s); allowed without one: None, 'none', 'mean_drift', 'newman' or 'full'"
+        )
     position = None
     if options["excitation_position"] == "filtered":
         position = build_filtered_position(first_state, options["excitation_cutoff"])
@@ -273,6 +280,36 @@ def build_current(spec):
     return Current(speed * cos(heading), speed * sin(heading), exponent)
 
 
-def build_moorings(lines, option):
-    """Return the mooring part for the option mooring, None without lines or with False."""
-    return build_mooring(lines, tabulated=option == "table") if option else None
+def build_moorings(platform, options):
+    """Return the mooring part for the options mooring and line_segments, None without lines or with False.
+
+    Moving lines have states from 0 on: line_dynamics.first is to be set. Raises: InputError for moving lines
+    without properties, and for a number of segments of lines that do not move.
+    """
+    option, segments = options["mooring"], options["line_segments"]
+    if segments is not None and option != "dynamic":
+        raise InputError(f"line_segments = {segments}: needs mooring = 'dynamic', not {option!r}")
+    if not option:
+        return None
+    mooring = build_mooring(platform.lines, tabulated=option == "table")
+    if mooring is None or option != "dynamic":
+        return mooring
+    own = [line.dynamics or platform.line_dynamics for line in platform.lines]
+    if None in own:
+        raise InputError(
+            f"mooring = 'dynamic': the file of the platform {platform.name!r} has no [line_dynamics]"
+            f" (diameter, drag, added mass) for line {own.index(None) + 1}; allowed without it: True, False,"
+            " 'catenary' or 'table'"
+        )
+    if segments is not None:
+        own = [part.model_copy(update={"segments": segments}) for part in own]
+    site = platform.environment
+    fluid = site.water_density, site.gravity, site.water_depth
+    dynamics = build_line_dynamics(platform.lines, own, *fluid)
+    # moving lines have no friction on the bed, and their states of rest none either
+    return mooring._replace(dynamics=dynamics, friction=np.zeros_like(mooring.friction))
+
+
+def fastest_motion(tower, mooring, body):
+    """Return the largest natural frequency (rad/s) of the structure: of its tower, or on moving lines."""
+    return max(tower_frequency(tower), line_frequency(mooring, body.mass))

@@ -22,6 +22,7 @@ from fowt_env.plant.hydro.members import N_NODE
 from fowt_env.plant.hydro.radiation import memory_data, memory_states
 from fowt_env.plant.hydro.wave_bands import band_scratch
 from fowt_env.plant.integrators import rotor_samples
+from fowt_env.plant.line_dynamics import line_states, line_work
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, N_MEASUREMENTS
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
@@ -29,9 +30,9 @@ from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Bloc
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.options import OPTIONS, default_step, least_lag
-from fowt_env.scene.parts import hydro_in_waves, wake_states
+from fowt_env.scene.parts import fastest_motion, hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
-from fowt_env.scene.tower import tower_frequency, tower_states
+from fowt_env.scene.tower import tower_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
 from fowt_env.scene.weather import Sea, Wind, build_weather
 from fowt_env.weather.wind import hub_series
@@ -80,7 +81,8 @@ class Scene:
         internal |= drive_states(self.model.actuator, self.model.pitches)
         internal |= {"generator_torque": 0 if self.model.converter is None else 1}
         internal |= {"filtered position": position_states(self.model.hydro)}
-        return state_blocks(internal | {"radiation": memory_states(self.model.hydro)})
+        internal |= {"radiation": memory_states(self.model.hydro)}
+        return state_blocks(internal | {"lines": line_states(self.model.mooring)})
 
     @property
     def n_state(self) -> int:
@@ -156,6 +158,7 @@ class Scene:
         nodes = 0 if members is None else laid or len(members.nodes)
         return Data(
             lines=np.zeros((self.n_lines, 6)),
+            line_work=line_work(self.model.mooring),
             counters=np.zeros(N_COUNTERS),
             kinematics=np.zeros((7, 0 if strips is None else strips.shape.nodes)),
             bands=band_scratch(getattr(strips, "bands", None), getattr(strips, "quadrature", None)),
@@ -218,8 +221,9 @@ class Scene:
 
     @property
     def dt(self) -> float:
-        """Return the default physics step (s) of the integrator, or a finer one for the fidelity or tower."""
-        return default_step(self.options, tower_frequency(self.model.tower))
+        """Return the default physics step (s) of the integrator; finer for fidelity, tower or lines."""
+        model = self.model
+        return default_step(self.options, fastest_motion(model.tower, model.mooring, model.rigid_body))
 
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).

@@ -39,7 +39,7 @@ def build_excitation(body, waves, *, duration, fast, planar, position=None, seco
     fast          first order from a table; else by the sum over components
     planar        whether sway, roll and yaw are zeroed
     position      FilteredPosition at which the waves meet the body; None: undisplaced
-    second_order  None, "none", "mean_drift", "newman" or "full"; cutoff: rad/s, of the differences, or None
+    second_order  None, "none" or one of second_order.METHODS; cutoff: rad/s, of the differences, or None
 
     Raises: InputError for a sea outside the body's headings or frequencies. Warns: PlantWarning if some of
     the energy lies outside the frequencies.

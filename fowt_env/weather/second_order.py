@@ -1,7 +1,8 @@
-"""Computes difference-frequency wave forces on a potential-flow body from its quadratic transfer function.
+"""Computes second-order wave forces on a potential-flow body from its quadratic transfer functions.
 
 The double sum (A42) of theory.md, with Q interpolated bilinearly, is evaluated as the quadratic form (A43) of
 sums A_p(t), which needs a transform per frequency of the file instead of a loop over pairs of components.
+Sum frequencies have the same form without conjugates.
 """
 
 import warnings
@@ -10,7 +11,7 @@ from math import ceil, pi
 from typing import NamedTuple
 
 import numpy as np
-from scipy.fft import ifft, irfft, next_fast_len, rfft
+from scipy.fft import fft, ifft, irfft, next_fast_len, rfft
 from scipy.ndimage import spline_filter1d
 
 from fowt_env.errors import InputError, PlantWarning, level_outside
@@ -24,9 +25,10 @@ from fowt_env.weather.harmonics import (
     pack_table,
     response_of_spline,
     step_for,
+    table_of,
 )
 
-METHODS = ("mean_drift", "newman", "full")
+METHODS = ("mean_drift", "newman", "full", "full_sum")
 QUIET = 1e-2  # fraction of the sea's energy outside the QTF's frequencies that is ignored
 SAME_HEADING = 1e-4  # rad
 EDGE = 24  # extra rows at both ends of a fitted spline: the influence of an end falls by 3.7 per row
@@ -40,6 +42,7 @@ def build_second_order(body, waves, method, *, duration, cutoff=None):
     newman      Newman's approximation from the diagonal of the QTF: |sum a_i sqrt(Q_ii) exp(i w_i t)|^2 over
                 positive Q_ii, less the same sum over negative Q_ii
     full        all pairs of frequencies
+    full_sum    the same, and the forces of sum frequencies
     cutoff      rad/s: forces at higher difference frequencies are omitted; None: no cutoff
 
     Raises: InputError for a sea whose headings or pairs of frequencies the QTF lacks.
@@ -54,14 +57,35 @@ def build_second_order(body, waves, method, *, duration, cutoff=None):
     wave = waves.amplitude[used] * np.exp(-1j * waves.phase[used])
     omega = waves.omega[used]
     groups = _heading_groups(qtf, np.arctan2(waves.sin_heading, waves.cos_heading)[used])
+    sums = _of_sums(body.sum_qtf, waves) if method == "full_sum" else None
     mean = _mean(qtf, omega, wave, groups)
     if method == "mean_drift":
         return SecondOrder(constant_table(mean), mean, ramp)
-    form = (_full if method == "full" else _newman)(qtf, omega, wave, groups)
+    form = (_newman if method == "newman" else _full)(qtf, omega, wave, groups)
     harmonics = harmonics_of(omega)
-    if harmonics is None:
-        return SecondOrder(_uneven_table(omega, form, duration, cutoff), mean, ramp)
+    if harmonics is None or (sums is not None and sums.harmonics is None):
+        return SecondOrder(_uneven_table(omega, form, duration, cutoff, sums), mean, ramp)
+    if sums is not None:
+        return SecondOrder(_joined_table(harmonics, form, cutoff, sums, duration), mean, ramp)
     return SecondOrder(_even_table(harmonics, form, cutoff), mean, ramp)
+
+
+class _Sums(NamedTuple):
+    """Holds the sum-frequency force of a sea."""
+
+    omega: np.ndarray  # (n,) of the components that the QTF covers
+    harmonics: object  # Harmonics of omega, or None
+    form: object  # _Form, whose force is complex
+
+
+def _of_sums(qtf, waves):
+    """Return the _Sums of a sea with the QTF of sum frequencies; None if it covers no waves."""
+    used = _inside(qtf, waves)
+    if not waves.amplitude[used].any():
+        return None
+    omega, wave = waves.omega[used], waves.amplitude[used] * np.exp(-1j * waves.phase[used])
+    groups = _heading_groups(qtf, np.arctan2(waves.sin_heading, waves.cos_heading)[used])
+    return _Sums(omega, harmonics_of(omega), _full(qtf, omega, wave, groups))
 
 
 def _inside(qtf, waves):
@@ -72,7 +96,7 @@ def _inside(qtf, waves):
     left_out = float(energy[~used].sum()) / max(float(energy.sum()), 1e-300)
     if left_out > QUIET:
         warnings.warn(
-            f"sea: {100.0 * left_out:.3g} % of its energy lies outside the difference-frequency QTF, which"
+            f"sea: {100.0 * left_out:.3g} % of its energy lies outside the {_name(qtf)} QTF, which"
             f" has {qtf.omega[0]:.4g} to {qtf.omega[-1]:.4g} rad/s, and causes no second-order force",
             PlantWarning,
             stacklevel=level_outside(),
@@ -101,9 +125,13 @@ def _pair(qtf, first, second):
                 return row, exchanged
     available = ", ".join(f"({one:g}, {other:g})" for one, other in np.degrees(qtf.heading)[:12])
     raise InputError(
-        f"sea: the difference-frequency QTF has no pair of headings ({np.degrees(first):.4g},"
+        f"sea: the {_name(qtf)} QTF has no pair of headings ({np.degrees(first):.4g},"
         f" {np.degrees(second):.4g}) deg; it has {available} deg"
     )
+
+
+def _name(qtf):
+    return f"{'sum' if qtf.of_sums else 'difference'}-frequency"
 
 
 def _same(a, b):
@@ -111,13 +139,13 @@ def _same(a, b):
 
 
 def _table(qtf, row, exchanged):
-    """Return Q (k, k, 6) of a pair of headings; missing values are conjugates of the exchanged pair."""
+    """Return Q (k, k, 6) of a pair of headings; missing values are those of the exchanged pair."""
     value = qtf.value[row]
     if exchanged:
-        return np.conj(value.transpose(1, 0, 2))
+        return qtf.mirrored(value)
     one, other = qtf.heading[row]
     if _same(one, other):
-        return np.where(np.isnan(value), np.conj(value.transpose(1, 0, 2)), value)
+        return np.where(np.isnan(value), qtf.mirrored(value), value)
     return value
 
 
@@ -195,9 +223,15 @@ def _full(qtf, omega, wave, groups):
             matrix[:, *position] = block
     if np.isnan(matrix).any():
         raise InputError(
-            "the difference-frequency QTF lacks pairs of frequencies that the sea needs"
+            f"the {_name(qtf)} QTF lacks pairs of frequencies that the sea needs"
             f" (between {qtf.omega[nodes[0]]:.4g} and {qtf.omega[nodes[-1]]:.4g} rad/s)"
         )
+    if qtf.of_sums:
+
+        def of_sums(sums):
+            return np.column_stack([np.einsum("kp,kp->k", sums @ one, sums) for one in matrix])
+
+        return _Form(columns, of_sums)
     # only the Hermitian part of the matrix contributes to the real part of the form
     matrix = 0.5 * (matrix + np.conj(matrix.transpose(0, 2, 1)))
 
@@ -207,8 +241,8 @@ def _full(qtf, omega, wave, groups):
     return _Form(columns, force)
 
 
-def _even_table(harmonics, form, cutoff):
-    """Return the TimeTable of a sea of Harmonics, which repeats with the period of the differences."""
+def _even_changes(harmonics, form, cutoff):
+    """Return (omega (k,), one-sided coefficients (k, 6)) of the difference-frequency force of Harmonics."""
     highest = int(harmonics.index.max())
     size = next_fast_len(2 * highest + 2)
     spectrum = np.zeros((size, form.coefficient.shape[1]), dtype=complex)
@@ -218,7 +252,30 @@ def _even_table(harmonics, form, cutoff):
     omega = harmonics.spacing * np.arange(highest + 1)
     if cutoff is not None:
         change[omega > cutoff * (1.0 + 1e-9)] = 0.0
-    rows = max(8, size)
+    return omega, change
+
+
+def _joined_table(harmonics, form, cutoff, sums, duration):
+    """Return the TimeTable of the difference- and sum-frequency forces of a sea of Harmonics."""
+    omega, change = _even_changes(harmonics, form, cutoff)
+    change[1:] *= 2.0
+    grid = sums.harmonics
+    highest = int(grid.index.max())
+    size = next_fast_len(2 * highest + 1)
+    spectrum = np.zeros((size, sums.form.coefficient.shape[1]), dtype=complex)
+    np.add.at(spectrum, grid.index, sums.form.coefficient)
+    # the squares of the envelopes, whose carrier has twice the lowest frequency
+    force = sums.form.force(ifft(spectrum, axis=0, norm="forward", overwrite_x=True))
+    double = fft(force, axis=0, norm="forward")[: 2 * highest + 1]
+    frequency = 2.0 * grid.start + grid.spacing * np.arange(2 * highest + 1)
+    return table_of(np.concatenate([omega, frequency]), np.concatenate([change, double]), duration)
+
+
+def _even_table(harmonics, form, cutoff):
+    """Return the TimeTable of a sea of Harmonics, which repeats with the period of the differences."""
+    omega, change = _even_changes(harmonics, form, cutoff)
+    highest = omega.size - 1
+    rows = max(8, next_fast_len(2 * highest + 2))
     if highest > 0 and np.abs(change[1:]).any():
         rows = next_fast_len(max(rows, ceil(harmonics.period / step_for(omega[1:], change[1:]))), real=True)
     rows = min(rows, MOST_ROWS)
@@ -228,7 +285,7 @@ def _even_table(harmonics, form, cutoff):
     return pack_table(values[np.arange(-1, rows + 2) % rows], step, harmonics.period, True)
 
 
-def _uneven_table(omega, form, duration, cutoff):
+def _uneven_table(omega, form, duration, cutoff, sums=None):
     """Return the TimeTable of a sea whose frequencies are not evenly spaced, over the duration."""
     spread = float(np.ptp(omega))
     if cutoff is not None and cutoff < spread:
@@ -236,10 +293,15 @@ def _uneven_table(omega, form, duration, cutoff):
             f"second_order_cutoff = {cutoff:g} rad/s: needs a sea of evenly spaced frequencies, from a"
             " spectrum or from harmonics of one period"
         )
-    step = 2.0 * pi / (SAMPLES * spread)
+    highest = spread if sums is None else max(spread, 2.0 * float(sums.omega.max()))
+    step = 2.0 * pi / (SAMPLES * highest)
     rows = min(ceil((duration + MARGIN) / step), MOST_ROWS)
-    # rows from -step, and EDGE more on both sides, where the spline fit still depends on the ends
-    turned = form.coefficient * np.exp(-1j * omega * EDGE * step)[:, None]
-    sums = direct_sum(omega, turned, step, rows + 3 + 2 * EDGE)
-    values = spline_filter1d(form.force(sums), order=3, axis=0, mode="mirror")
+
+    def force(omega, form):
+        # rows from -step, and EDGE more on both sides, where the spline fit still depends on the ends
+        turned = form.coefficient * np.exp(-1j * omega * EDGE * step)[:, None]
+        return form.force(direct_sum(omega, turned, step, rows + 3 + 2 * EDGE)).real
+
+    total = force(omega, form) + (0.0 if sums is None else force(sums.omega, sums.form))
+    values = spline_filter1d(total, order=3, axis=0, mode="mirror")
     return pack_table(values[EDGE : EDGE + rows + 3], step, rows * step, False)

@@ -94,6 +94,17 @@ def test_the_other_side_of_a_qtf_is_conjugate_with_its_headings_exchanged(tmp_pa
     assert (qtf.value[0, 0, 0, [1, 2, 3, 5]] == 0.0).all()
 
 
+def test_the_other_side_of_a_qtf_of_sums_is_equal_with_its_headings_exchanged(tmp_path):
+    root = files(tmp_path)
+    assert read_wamit(root, **WATER).sum_qtf is None
+    (tmp_path / "body.12s").write_text((tmp_path / "body.12d").read_text())
+    body = read_wamit(root, **WATER)
+    of_sums, difference = body.sum_qtf, body.difference_qtf
+    assert of_sums.of_sums and not difference.of_sums
+    assert of_sums.value[0, 0, 1, 0] == difference.value[0, 0, 1, 0] == pytest.approx((0.1 + 1j) * 1e4 * 2.0)
+    assert np.nan_to_num(of_sums.value[1]) == pytest.approx(np.nan_to_num(of_sums.value[0]).swapaxes(0, 1))
+
+
 def test_names_are_found_whatever_their_case_and_platform_files_take_them(tmp_path):
     files(tmp_path, "BODY")
     assert read_wamit(tmp_path / "body", **WATER).omega.size == 4

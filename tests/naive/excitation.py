@@ -38,6 +38,20 @@ def difference_pairs(body, waves):
     return pairs
 
 
+def sum_pairs(body, waves):
+    """[(omega_i + omega_j, (6,) complex a_i a_j Q_ij)] of all pairs of waves."""
+    qtf, pairs = body.sum_qtf, []
+    for i, first in enumerate(waves.omega):
+        for j, second in enumerate(waves.omega):
+            one = np.arctan2(waves.sin_heading[i], waves.cos_heading[i])
+            other = np.arctan2(waves.sin_heading[j], waves.cos_heading[j])
+            row = np.argmin(np.abs(qtf.heading - [one, other]).sum(axis=1))
+            value = RegularGridInterpolator((qtf.omega, qtf.omega), qtf.value[row])((first, second))
+            phase = np.exp(-1j * (waves.phase[i] + waves.phase[j]))
+            pairs.append((first + second, waves.amplitude[i] * waves.amplitude[j] * phase * value))
+    return pairs
+
+
 def newman_pairs(body, waves):
     """The same with sqrt(Q_ii Q_jj) for Q_ij of one heading, of its sign where both have one, and else 0."""
     qtf, pairs, own = body.difference_qtf, [], []

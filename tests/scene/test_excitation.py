@@ -106,6 +106,8 @@ def test_second_order_needs_a_qtf():
         build_scene(sea=JONSWAP, second_order="full", fidelity="reference")
     with pytest.raises(InputError, match="second_order = 'newman': .* has no difference-frequency QTF"):
         scene_of(body=replace(BODY, difference_qtf=None), second_order="newman")
+    with pytest.raises(InputError, match="'full_sum': the platform .* has no sum-frequency QTF"):
+        scene_of(body=replace(BODY, sum_qtf=None), second_order="full_sum")
     with pytest.raises(InputError, match="second_order = 'sum': allowed None, 'none', 'mean_drift'"):
         scene_of(second_order="sum")
     with pytest.raises(InputError, match="second_order_cutoff = -1"):

@@ -67,6 +67,30 @@ def test_full_forces_are_the_sum_over_all_pairs(sea):
     assert second.table.periodic and second.table.span == pytest.approx(20.0 * np.pi)
 
 
+@pytest.mark.parametrize(
+    ("sea", "span", "tolerance"),
+    [(HARMONIC, 20.0 * np.pi, 2e-5), (TWO_HEADINGS, 20.0 * np.pi, 2e-5), (UNEVEN, None, 1e-3)],
+    ids=["one heading", "two headings", "uneven"],
+)
+def test_sum_forces_are_added_over_all_pairs(sea, span, tolerance):
+    """With the phases of both waves and no conjugate: the double sum of HydroDyn's SumQTF."""
+    body = BODY
+    if sea is TWO_HEADINGS:  # the twin takes pairs of headings as they are: give it (60, 0) too
+        qtf = BODY.sum_qtf
+        heading = np.vstack([qtf.heading, qtf.heading[1, ::-1]])
+        value = np.concatenate([qtf.value, qtf.value[1].transpose(1, 0, 2)[None]])
+        body = replace(BODY, sum_qtf=replace(qtf, heading=heading, value=value))
+    both = built(sea, "full_sum", cutoff=0.5 if sea is HARMONIC else None)
+    pairs = naive.sum_pairs(body, sea_of(sea))
+    differences = forces(built(sea, "full", cutoff=0.5 if sea is HARMONIC else None))
+    expected = [naive.second_order(t, pairs) for t in TIMES]
+    assert_close(forces(both) - differences, expected, tolerance)
+    assert both.table.periodic == (span is not None)
+    if span is not None:
+        assert both.table.span == pytest.approx(span)
+    np.testing.assert_array_equal(both.mean, built(sea, "mean_drift").mean)
+
+
 def test_frequencies_that_are_not_evenly_spaced_make_the_same_sum_and_beyond_the_table_its_mean():
     second = built(UNEVEN, "full")
     pairs = naive.difference_pairs(BODY, sea_of(UNEVEN))

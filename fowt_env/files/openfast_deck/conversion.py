@@ -179,6 +179,8 @@ def platform_rows(deck, name, turbine, coefficients, distribution):
         # members inside the potential-flow body have drag only
         if not member.potential_flow or any(member.drag) or any(any(end[:2]) for end in member.axial)
     ]  # fmt: skip
+    alike = bool(deck.lines) and deck.lines[0].dynamics is not None
+    alike = alike and all(line.dynamics == deck.lines[0].dynamics for line in deck.lines)
     tables["lines"] = [
         [
             ("anchor", line.anchor),
@@ -187,9 +189,12 @@ def platform_rows(deck, name, turbine, coefficients, distribution):
             ("wet_weight", line.wet_weight, f"of {line.kind}: mass less displaced water, times gravity"),
             ("EA", line.EA),
             ("seabed_friction", line.seabed_friction or None),
+            ("dynamics", None if alike else line.dynamics),
         ]
         for line in deck.lines
     ]
+    if alike:
+        tables["line_dynamics"] = list(deck.lines[0].dynamics.items())
     return tables
 
 

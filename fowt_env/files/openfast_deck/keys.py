@@ -399,15 +399,15 @@ INFLOWWIND = _keys(
     VFlowAng=Otherwise(0, "wind inclined to the horizontal", "horizontal wind"),
 )
 
-_LINE = "line dynamics: lines are quasi-static here, see the row"
+_LINE = "line dynamics without a counterpart here, see the row"
 MOORDYN = _keys(
     "g gravity rhoW rho WtrDpth depth WaterDepth Name Diam MassDen EA ID Type X Y Z M V FX FY FZ LineType"
-    " AttachA AttachB UnstrLen",
+    " AttachA AttachB UnstrLen NumSegs BA Cd CdAx CaAx kBot kB cBot cB",
     {
         OUTPUT: "Echo WriteLog WriteUnits OutSwitch dtOut DisableOutTime DisableOutput Outputs",
         STEPS: "dtM tScheme cfl dtIC TmaxIC ICDfac CdScaleIC threshIC ICgenDynamic inertialF"
-        " inertialF_rampT NumSegs",
-        _LINE: "BA Cd CdAx CaAx dF cF kBot kB cBot cB mc cv FricDamp",
+        " inertialF_rampT",
+        _LINE: "dF cF mc cv FricDamp",
     },
     EI=Otherwise(0, "bending stiffness of lines", "none"),
     Cl=Otherwise(0, "vortex-induced vibrations of lines", "none"),

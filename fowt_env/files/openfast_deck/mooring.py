@@ -8,6 +8,7 @@ from fowt_env.files.openfast_deck.keys import differences
 from fowt_env.files.openfast_deck.parser import PartFile, bare, number_of, same_key, words_of
 
 MOST_LINES = 1000
+FEWEST_SEGMENTS, MOST_SEGMENTS = 4, 500  # of a moving line here
 KINDS_OF_ENDS = dict.fromkeys(("fix", "fixed", "anchor", "fixedpoint"), "anchor")
 KINDS_OF_ENDS |= dict.fromkeys(("vessel", "coupled", "cpldpin", "turbine1", "t1", "cpld"), "fairlead")
 MAP_LINE = ("Line", "LineType", "UnstrLen", "NodeAnch", "NodeFair")
@@ -31,6 +32,13 @@ _REFUSED = ("bodies", "rods", "external loads", "control", "failure")
 _COUNTS = ("ntypes", "nconnects", "nlines", "npoints", "nconns")  # of version 1
 _ON_BED = ("seabed", "ground", "floor", "depth")
 _DYNAMIC = "dynamic lines (MoorDyn): drag, added mass, damping and inertia of the lines"
+_HERE = 'quasi-static catenaries; with the option mooring = "dynamic" as in the deck'
+_COEFFICIENTS = {  # of MovingLine: columns of the line types of version 1, and of version 2
+    "drag_coefficient": (7, 6),
+    "axial_drag_coefficient": (8, 8),
+    "added_mass_coefficient": (5, 7),
+    "axial_added_mass_coefficient": (6, 9),
+}
 
 
 class MooringLine(NamedTuple):
@@ -43,6 +51,7 @@ class MooringLine(NamedTuple):
     EA: float
     seabed_friction: float
     kind: str
+    dynamics: dict | None = None  # of descriptions.platform.MovingLine; None: MAP++ has none
 
 
 class _Mooring:
@@ -50,10 +59,14 @@ class _Mooring:
 
     def __init__(self, file, sea):
         self.file, self.sea = file, sea
-        self.types, self.points = {}, {}
+        self.types, self.points, self.motions = {}, {}, {}
+        self.bed = {}  # stiffness and damping of the sea bed, of MoorDyn
 
-    def add_type(self, number, words, stiffness, friction=0.0):
-        """Add a line type; the row starts with name, diameter and mass per length."""
+    def add_type(self, number, words, stiffness, friction=0.0, motion=None):
+        """Add a line type; the row starts with name, diameter and mass per length.
+
+        motion: (BA, {coefficient of MovingLine: number or None}) of MoorDyn.
+        """
         name = self.file.new(number, self.types, words[0].lower(), "line type")
         diameter, mass = (number_of(word) for word in words[1:3])
         if None in (diameter, mass) or not (0.0 <= diameter <= 100.0 and 0.0 <= mass <= 1e6):
@@ -64,7 +77,10 @@ class _Mooring:
         if weight <= 0.0:
             what = f"line type {words[0]}: weighs {weight:.4g} N/m in water: must be > 0 (no buoyant lines)"
             raise self.file.refusal(what, number)
-        self.types[name] = weight, self.positive(number, "EA", stiffness), friction
+        axial = self.positive(number, "EA", stiffness)
+        self.types[name] = weight, axial, friction
+        if motion is not None and diameter > 0.0:
+            self.motions[name] = diameter, mass, axial, *motion
 
     def add_point(self, number, words, what):
         """Add the point of a row; return (name, whether on the vessel). what: term for messages."""
@@ -108,8 +124,22 @@ class _Mooring:
             length = self.positive(number, "UnstrLen", row["UnstrLen"])
             names = [row[key] for key in columns if key.startswith(("Node", "Attach"))]
             ends = self.ends(number, names, words[0])
-            lines.append(MooringLine(*ends, length, *self.types[kind.lower()], kind))
+            motion = self.motion(kind.lower(), length, row.get("NumSegs"))
+            lines.append(MooringLine(*ends, length, *self.types[kind.lower()], kind, motion))
         return lines
+
+    def motion(self, kind, length, segments):
+        """Return the values of MovingLine of a line of this type; None without. BA < 0 is a damping ratio."""
+        if kind not in self.motions:
+            return None
+        diameter, mass, axial, damping, coefficients = self.motions[kind]
+        count = number_of(segments or "")
+        count = 20 if count is None else int(min(max(count, FEWEST_SEGMENTS), MOST_SEGMENTS))
+        ratio = None if damping is None else -damping
+        if ratio is not None and ratio < 0.0:
+            ratio = damping * count / length / math.sqrt(axial * mass)
+        values = {"segments": count, "diameter": diameter, **coefficients, "damping_ratio": ratio, **self.bed}
+        return {key: value for key, value in values.items() if value is not None}
 
     def ends(self, number, names, line):
         """Return the positions (anchor, fairlead) of a line, whose points may be in either order."""
@@ -238,7 +268,7 @@ def _moordyn_lines(file, sea):
         if section in _REFUSED:
             raise file.refusal(f"{section} cannot be represented: this section must be empty", number)
         of[section].append((number, words))
-    notes = [(_DYNAMIC, "quasi-static catenaries"), *_moordyn_options(file, of["options"], *sea)]
+    notes = [(_DYNAMIC, _HERE), *_moordyn_options(file, of["options"], *sea)]
     depth, density, gravity = sea
     gravity = file.positive("g", "gravity", default=gravity, high=100.0)
     mooring = _Mooring(file, (depth, file.number("rhoW", "rho", default=density, low=0.0, high=1e5), gravity))
@@ -259,7 +289,18 @@ def _moordyn_lines(file, sea):
         if len(words) > 9:
             keep(number, words, 5, ("EI",))
             keep(number, words, 10, ("Cl",))
-        mooring.add_type(number, words, words[3])
+        version = 1 if len(words) > 9 else 0
+        coefficients = {
+            name: number_of(words[columns[version]]) if len(words) > columns[version] else None
+            for name, columns in _COEFFICIENTS.items()
+        }
+        damping = number_of(words[4]) if len(words) > 4 else None
+        known = all(value is None or value >= 0.0 for value in coefficients.values())
+        known = known and coefficients["drag_coefficient"] is not None
+        mooring.add_type(number, words, words[3], motion=(damping, coefficients) if known else None)
+    for key, names in (("seabed_stiffness", ("kBot", "kB")), ("seabed_damping", ("cBot", "cB"))):
+        if file.has(*names):
+            mooring.bed[key] = file.number(*names, low=0.0, high=1e12)
     for number, words in of["points"]:
         if len(words) > 1 and words[1].lower() not in KINDS_OF_ENDS:  # some files have "Vessel1"
             words[1] = words[1].rstrip("0123456789")

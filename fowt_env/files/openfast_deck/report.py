@@ -114,6 +114,8 @@ def _differences(deck):
     for key, value in hydro.second_order.items():
         if key == "DiffQTF" and value == 12:
             yield f"difference-frequency forces (DiffQTF {value})", "with the option second_order"
+        elif key == "SumQTF" and value == 12:
+            yield "sum-frequency forces (SumQTF 12)", 'with the option second_order = "full_sum"'
         else:
             yield f"second-order forces ({key} {value})", "left out"
     if any(end[0] for member in hydro.members for end in member.axial):

@@ -448,6 +448,41 @@ def test_moordyn_gives_the_lines_of_map(tmp_path):
         assert a.anchor == pytest.approx(b.anchor, abs=1e-6)
         assert a.fairlead == pytest.approx(b.fairlead, abs=1e-6)
         assert (a.length, a.wet_weight, a.EA) == (b.length, b.wet_weight, b.EA)
+        assert a.dynamics is None and b.dynamics == MOVING
+
+
+MOVING = {
+    "segments": 20, "diameter": 0.1, "drag_coefficient": 2.0, "axial_drag_coefficient": 0.4,
+    "added_mass_coefficient": 0.8, "axial_added_mass_coefficient": 0.3, "damping_ratio": 1.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("edits", "changed"),
+    [
+        ([("-1.0 0", "2.0E6 0")], {"damping_ratio": 2e6 * 20 / 450.0 / math.sqrt(4e8 * 100.0)}),
+        ([("0.001 dtM - step", "1.0e5 kbot\n2.0e4 cbot")], {"seabed_stiffness": 1e5, "seabed_damping": 2e4}),
+    ],
+)
+def test_dynamics_of_moordyn_are_those_of_moving_lines(tmp_path, edits, changed):
+    """BA > 0 in N s, as the damping ratio of a segment; the bed of the options."""
+    write_deck(tmp_path, MoorDyn=edits)
+    lines, _ = read_mooring(None, tmp_path / NAMES["MoorDyn"], 200.0, 1025.0, 9.81)
+    assert lines[0].dynamics == pytest.approx(MOVING | changed)
+
+
+def test_lines_of_several_types_keep_their_own_dynamics(tmp_path):
+    """Alike, in one table; else with each line, and a scene is built of both."""
+    more = ("chain 0.1", "rope 0.2 150.0 4.0E8 -0.5 0 1.2 1.0 0.1 0.0\nchain 0.1")
+    switch = {"OpenFAST": [("1    CompMooring", "3    CompMooring"), ("map.dat", "moor.dat")]}
+    for number, edits in enumerate(([], [more, ("3 chain 5 6", "3 rope 5 6")])):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        import_deck(write_deck(folder, MoorDyn=edits, **switch), folder=folder / "out")
+        platform = read_platform(folder / "out" / "platform.toml")
+        own = [line.dynamics or platform.line_dynamics for line in platform.lines]
+        assert [part.diameter for part in own] == [0.1, 0.1, 0.2 if edits else 0.1]
+        assert (platform.line_dynamics is None) == bool(edits)
 
 
 def test_a_repetition_by_zero_doubles_the_lines(tmp_path):

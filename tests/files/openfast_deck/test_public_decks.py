@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fowt_env
-from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.platform import MovingLine, read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.files.openfast_deck.deck import read_deck
 from fowt_env.files.openfast_deck.importer import import_deck
@@ -41,6 +41,8 @@ ARGUMENTS = {
     "nrel5mw_oc4_semi": of_fast("OC4DeepCwindSemi"),
 }
 BESIDE = {"name", "source", "turbine", "shapes", "published", "protection"}  # not of a deck
+# of the deck's MoorDyn file, while the import takes its MAP++ file
+MOVING = {f"platform.line_dynamics.{key}" for key in MovingLine.model_fields}
 BY_HAND = {  # keys of the built-in files whose values the import does not give
     "iea15_volturnus_s": {
         # CB of the deck's MAP++ file: the deck runs with its MoorDyn file, which has none
@@ -48,8 +50,9 @@ BY_HAND = {  # keys of the built-in files whose values the import does not give
         "platform.potential_flow.draft",  # of the report: the deck has no members
         "platform.options.blade_stations",  # a choice
     },
-    "nrel5mw_iti_barge": {"turbine.blade.polars"},  # a folder, which another turbine shares
-    "nrel5mw_oc4_semi": {"turbine.blade.polars"},
+    # blade.polars: a folder, which another turbine shares
+    "nrel5mw_iti_barge": {"turbine.blade.polars", *MOVING},
+    "nrel5mw_oc4_semi": {"turbine.blade.polars", *MOVING},
 }
 FILES = {  # whose names differ
     "platform.tower.modes.distribution", "platform.potential_flow.coefficients", "turbine.discon",
@@ -256,9 +259,11 @@ def test_volumes_ballast_water_and_lines_are_those_of_hydrodyn_s_and_map_s_summa
         assert moment == pytest.approx(BALLAST_MOMENT[name], rel=1e-4)
 
 
-@pytest.mark.parametrize("floater", ["ITIBarge4", "OC4DeepCwindSemi"])
-def test_the_lines_of_moordyn_1_are_those_of_map(floater):
-    """Of one deck, in its two files: places to the 4 cm by which they differ."""
+@pytest.mark.parametrize(
+    ("floater", "platform"), [("ITIBarge4", "nrel5mw_iti_barge"), ("OC4DeepCwindSemi", "nrel5mw_oc4_semi")]
+)
+def test_the_lines_of_moordyn_1_are_those_of_map(floater, platform):
+    """Of one deck, in its two files: places to the 4 cm by which they differ; the built-in file has both."""
     arguments = of_fast(floater)
     lines = {}
     for kind in ("MAP", "MoorDyn"):
@@ -271,3 +276,5 @@ def test_the_lines_of_moordyn_1_are_those_of_map(floater):
         assert other.fairlead == pytest.approx(ours.fairlead, abs=0.04)
         assert (other.length, other.EA) == (ours.length, ours.EA)
         assert other.wet_weight == pytest.approx(ours.wet_weight, rel=1e-9)
+        assert MovingLine(**other.dynamics) == read_platform(platform).line_dynamics
+        assert ours.dynamics is None
