@@ -14,6 +14,7 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
+from fowt_env.plant.elastic.steps import damp_blades
 from fowt_env.plant.hydro.radiation import begin_memory, end_memory, integrated_states, memory_after
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
@@ -175,6 +176,7 @@ def adams(t, x, u, dt, model, method, data):
             dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.elastic,
             data.stages[2], data.stages[3], y,
         )  # fmt: skip
+        damp_blades(dt, history, model.blades, data.rotor, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     bend_on(dt, x, order, history, model.tower, y)
