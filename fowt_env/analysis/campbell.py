@@ -147,7 +147,7 @@ class _Turbine:
         acceleration = acceleration + _total(a, moved)
         acceleration[:, 2] -= np.einsum("i,ijk,j->k", v, S, v)
         load = mass[:, None] * acceleration
-        modal = np.einsum("ikx,kx->i", moved, load) + self.beam.K @ q + self.beam.D @ v
+        modal = np.einsum("ikx,kx->i", moved, load) + self.beam.stiffness @ q + self.beam.damping @ v
         return modal, load.sum(axis=0), np.cross(p, load).sum(axis=0)
 
     def steady_deflection(self, speed):

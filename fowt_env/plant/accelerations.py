@@ -210,7 +210,7 @@ def _add_modes(x, upper, mass, bend, tower, matrix):
 
 
 @inlined_kernel
-def _subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
+def subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
     """Subtract velocity terms from modal (n,): of the tower's line mass, and of a wrench at the tower top."""
     n = len(tower.count)
     q, v = tower.first, tower.first + n
@@ -238,7 +238,7 @@ def _subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
 
 
 @inlined_kernel
-def _factor_modes(matrix, n):
+def factor_modes(matrix, n):
     """Eliminate the n modes from the platform's system, last mode first; only the lower triangle is used."""
     for k in range(n - 1, -1, -1):
         row = 6 + k
@@ -251,7 +251,7 @@ def _factor_modes(matrix, n):
 
 @inlined_kernel
 def without_modes(matrix, b, modal, n):
-    """Eliminate the modes from the right-hand sides b (6,) and modal (n,), after _factor_modes."""
+    """Eliminate the modes from the right-hand sides b (6,) and modal (n,), after factor_modes."""
     for k in range(n - 1, -1, -1):
         row = 6 + k
         force = modal[k] / matrix[row, row]
@@ -301,7 +301,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache,
     b[3] = load.mx - c.mx - e.mx - mx - bend.y * fz + bend.z * fy
     b[4] = load.my - c.my - e.my - my - bend.z * fx + bend.x * fz
     b[5] = load.mz - c.mz - e.mz - mz - bend.x * fy + bend.y * fx
-    _subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
+    subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
 
     if cache[LoadCache.FACTORED] < 0.5:
         for i in range(6):
@@ -309,7 +309,7 @@ def accelerate_bending(pose, x, load, torque, added, body, tower, matrix, cache,
                 matrix[i, j] = tower.lower[i, j] + added[i, j]
         _add_body(matrix, d, free, mass, bend)
         _add_modes(x, free, mass, bend, tower, matrix)
-        _factor_modes(matrix, n)
+        factor_modes(matrix, n)
         if not body.platform_fixed:
             factor_spd(matrix)
         cache[LoadCache.FACTORED] = 1.0

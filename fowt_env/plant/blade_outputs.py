@@ -12,13 +12,18 @@ import numpy as np
 
 from fowt_env.plant.aero.blade_shape import BladeLoad
 from fowt_env.plant.blade_pitches import pitch_of
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import stored
+from fowt_env.plant.elastic.blades import BladeModes
+from fowt_env.plant.elastic.chain import rotor_frame
+from fowt_env.plant.elastic.outputs import bearing_moment, hub_load, root_load
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, BladeMeasure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import BLADES, State
+from fowt_env.plant.state import BLADES, State, pose_by_sines
 from fowt_env.plant.tilt import across_shaft, along_shaft, in_rotor_axes, rotor_pose
+from fowt_env.plant.tower.modes import bend_of
 
 N_BLADE_CHANNELS = 2 + 2 * BLADES + 2 + 3  # of channels.BLADE_CHANNELS: pitches, roots, hub, yaw bearing
 
@@ -175,27 +180,58 @@ def bearing_moments(pose, rates, speed, rate, rotor, masses, body, layout):
     return mx + height * fy, my - height * fx, mz
 
 
-@kernel
-def blade_moments(pose, rates, x, dx, model, data):
-    """Return the BladeMoments at a state with its last loads; pose and rates of the nacelle frame."""
-    layout, body, blades = model.layout, model.rigid_body, data.blades
+@inlined_kernel
+def _of_bending(pose, rates, x, dx, model, blades, data):
+    """Return the BladeMoments of bending blades; pose and rates of the nacelle frame are not needed."""
+    plane = model.rigid_body.plane
+    pose = pose_by_sines(x, data.cache[LoadCache.SINES :], plane)
+    bend = bend_of(x, model.tower)
+    frame, _ = rotor_frame(pose, bend, model.rigid_body.gravity, blades)
+    _, _, _, _, tilt, yaw = hub_load(x, frame, data.blades, blades, data.rotor)
+    wrench = stored(data.cache, LoadCache.ROTOR)
+    mx, my, mz = bearing_moment(bend, wrench, data.rotor, model.layout.tower_top[2])
+    return BladeMoments(
+        _coned_root(0, x, dx, frame, model.pitches, data.blades, blades, data.rotor),
+        _coned_root(1, x, dx, frame, model.pitches, data.blades, blades, data.rotor),
+        _coned_root(2, x, dx, frame, model.pitches, data.blades, blades, data.rotor),
+        tilt, yaw, mx, my, mz,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _coned_root(number, x, dx, frame, pitches, loads, blades, work):
+    """Return the RootMoments of a bending blade, coned axes."""
+    pitch = pitch_of(number, x, pitches)
+    load, c, s = root_load(number, x, dx, frame, pitch, loads, blades, work), cos(pitch), sin(pitch)
+    return RootMoments(c * load.mx + s * load.my, c * load.my - s * load.mx)
+
+
+@inlined_kernel
+def _of_rigid(pose, rates, x, dx, model, blades, data):
+    """Return the BladeMoments of rigid blades."""
+    layout, body, loads = model.layout, model.rigid_body, data.blades
     masses = layout.blade_masses
     speed, rate = x[State.ROTOR_SPEED], dx[State.ROTOR_SPEED]
     hub = hub_motion(pose, rates, speed, rate, body.gravity, layout)
     azimuth, third = x[State.AZIMUTH], 2.0 * pi / BLADES
-    tilt, yaw = hub_moments(azimuth, hub, masses, layout, blades)
+    tilt, yaw = hub_moments(azimuth, hub, masses, layout, loads)
     wrench = stored(data.cache, LoadCache.ROTOR)
     mx, my, mz = bearing_moments(pose, rates, speed, rate, wrench, masses, body, layout)
     return BladeMoments(
-        root_moments(azimuth, blade_load(0, blades), hub, masses, layout),
-        root_moments(azimuth + third, blade_load(1, blades), hub, masses, layout),
-        root_moments(azimuth + 2.0 * third, blade_load(2, blades), hub, masses, layout),
+        root_moments(azimuth, blade_load(0, loads), hub, masses, layout),
+        root_moments(azimuth + third, blade_load(1, loads), hub, masses, layout),
+        root_moments(azimuth + 2.0 * third, blade_load(2, loads), hub, masses, layout),
         tilt,
         yaw,
         mx,
         my,
         mz,
     )
+
+
+# (pose, rates, x, dx, model, blades, data) -> BladeMoments at a state with its last loads; pose and rates of
+# the nacelle frame
+blade_moments = chosen_by_class("blades", {type(None): _of_rigid, BladeModes: _of_bending}, inlined=True)
 
 
 @kernel
@@ -206,7 +242,7 @@ def record_blades(pose, rates, x, dx, pitches, model, data, row):
     """
     if pitches is None:
         return
-    moments = blade_moments(pose, rates, x, dx, model, data)
+    moments = blade_moments(pose, rates, x, dx, model, model.blades, data)
     out = row[row.shape[0] - N_BLADE_CHANNELS :]
     out[0], out[1] = pitch_of(1, x, pitches), pitch_of(2, x, pitches)
     out[2], out[3], out[4] = moments.first.in_plane, moments.second.in_plane, moments.third.in_plane
@@ -223,7 +259,7 @@ def measure_blades(pose, rates, x, dx, pitches, model, data, m):
     """
     if pitches is None:
         return
-    moments = blade_moments(pose, rates, x, dx, model, data)
+    moments = blade_moments(pose, rates, x, dx, model, model.blades, data)
     out = m[m.shape[0] - N_BLADE_MEASUREMENTS :]
     out[BladeMeasure.AZIMUTH] = x[State.AZIMUTH] % (2.0 * pi)
     for blade in range(BLADES):

@@ -13,7 +13,6 @@ from fowt_env.plant.pitch_actuator import PitchActuator, followed_pitch, pitch_a
 from fowt_env.plant.pitch_drive import PitchDrive, advance_drive, fill_drive_rates, halt_drive, keep, stays
 from fowt_env.plant.state import BLADES, Command, State
 
-N_BLADE_LOAD = 6  # entries of a blade_shape.BladeLoad
 FIRST_PITCH = int(Command.BLADE_PITCH)  # numba has no int() of an enum
 
 

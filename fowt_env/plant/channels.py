@@ -12,6 +12,8 @@ from fowt_env.plant.blade_outputs import measure_blades, record_blades
 from fowt_env.plant.blade_pitches import mean_pitch
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import torque_in_force
+from fowt_env.plant.elastic.chain import weighed_body
+from fowt_env.plant.elastic.outputs import add_upper_load, record_bending, shaft_load
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
@@ -19,7 +21,7 @@ from fowt_env.plant.state import State, pose_by_sines, to_inertial
 from fowt_env.plant.tilt import along_shaft, rotor_pose
 from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.tower.rates import Twist, nacelle_rates
-from fowt_env.plant.tower_outputs import carried_at_base, record_tower
+from fowt_env.plant.tower_outputs import carried_at_base, record_tower, tower_channels
 from fowt_env.plant.user_loads import record_user_loads, user_channels
 
 DEG_PER_RAD = 180.0 / pi
@@ -71,9 +73,22 @@ BLADE_CHANNELS = _channels(  # of a rotor with individual pitch
     " RootMyc2_[kN-m] RootMyc3_[kN-m] LSSTipMys_[kN-m] LSSTipMzs_[kN-m] YawBrMxp_[kN-m] YawBrMyp_[kN-m]"
     " YawBrMzp_[kN-m]"
 )
+BENDING_CHANNELS = _channels(  # of bending blades; OoPDefl and IPDefl are TipDxc and TipDyc
+    "OoPDefl1_[m] OoPDefl2_[m] OoPDefl3_[m] IPDefl1_[m] IPDefl2_[m] IPDefl3_[m] TipDzc1_[m] TipDzc2_[m]"
+    " TipDzc3_[m] RootFxc1_[kN] RootFxc2_[kN] RootFxc3_[kN] RootFyc1_[kN] RootFyc2_[kN] RootFyc3_[kN]"
+    " RootFzc1_[kN] RootFzc2_[kN] RootFzc3_[kN] RootMxb1_[kN-m] RootMxb2_[kN-m] RootMxb3_[kN-m]"
+    " RootMyb1_[kN-m] RootMyb2_[kN-m] RootMyb3_[kN-m] Spn1MLxb1_[kN-m] Spn1MLxb2_[kN-m] Spn1MLxb3_[kN-m]"
+    " Spn1MLyb1_[kN-m] Spn1MLyb2_[kN-m] Spn1MLyb3_[kN-m] Spn2MLxb1_[kN-m] Spn2MLxb2_[kN-m] Spn2MLxb3_[kN-m]"
+    " Spn2MLyb1_[kN-m] Spn2MLyb2_[kN-m] Spn2MLyb3_[kN-m] LSSTipMya_[kN-m] LSSTipMza_[kN-m] LSShftFys_[kN]"
+    " LSShftFzs_[kN]"
+)
 # of a flexible tower
 TOWER_CHANNELS = _channels("TTDspFA_[m] TTDspSS_[m] YawBrTAxp_[m/s^2] YawBrTAyp_[m/s^2]")
-GROUPS = {"tower": TOWER_CHANNELS, "blades": BLADE_CHANNELS}  # of parts that a scene may have, in row order
+GROUPS = {
+    "tower": TOWER_CHANNELS,
+    "bending": BENDING_CHANNELS,
+    "blades": BLADE_CHANNELS,
+}  # of parts that a scene may have, in row order
 
 
 def channels(n_lines, loads=(), groups=()):
@@ -243,12 +258,14 @@ def record(model, data, x, dx, u, t, loads, row):
     hub, cm, tilt = layout.hub, layout.rotor_cm, layout.tilt
     cx, _, cz = acceleration_at(nacelle, moving, cm[0], cm[1], cm[2])
     push = along_shaft(cx + body.gravity * nacelle.r31, cz + body.gravity * nacelle.r33, tilt)
-    row[Out.ROTTHRUST] = loads.rotor.thrust - layout.rotor_mass * push
     turning = dx[State.ROTOR_SPEED] + along_shaft(moving.wx, moving.wz, tilt)
-    row[Out.ROTTORQ] = loads.rotor.torque - layout.rotor_inertia * turning
+    row[Out.ROTTHRUST], row[Out.ROTTORQ] = shaft_load(
+        loads.rotor.thrust - layout.rotor_mass * push, loads.rotor.torque - layout.rotor_inertia * turning,
+        pose, bend, x, body, model.blades, data.blades, data.rotor,
+    )  # fmt: skip
     row[Out.RTFLDFXH] = loads.rotor.thrust
     row[Out.RTFLDMXH] = loads.rotor.torque
-    tower_base(pose, x, dx, loads, bend, body, layout, model.tower, row)
+    tower_base(pose, x, dx, loads, bend, body, layout, model.tower, model.blades, data.rotor, row)
 
     h = loads.hydro
     row[Out.HYDROFXI], row[Out.HYDROFYI], row[Out.HYDROFZI] = to_inertial(pose, h.fx, h.fy, h.fz)
@@ -263,18 +280,24 @@ def record(model, data, x, dx, u, t, loads, row):
         row[N_FIXED + n + i] = data.lines[i, 3]
     n = N_FIXED + 2 * n
     record_user_loads(pose, bend, model.user, data, row[n:])
-    record_tower(bend, ax, ay, row[n + user_channels(model.user) :])
+    n += user_channels(model.user)
+    record_tower(bend, ax, ay, row[n:])
+    record_bending(
+        pose, bend, x, dx, model.pitches, body, model.aero, model.blades, data.blades, data.rotor,
+        row[n + tower_channels(bend) :],
+    )  # fmt: skip
     record_blades(nacelle, moving, x, dx, model.pitches, model, data, row)
 
 
 @inlined_kernel
-def tower_base(pose, x, dx, loads, bend, body, layout, tower, row):
+def tower_base(pose, x, dx, loads, bend, body, layout, tower, blades, work, row):
     """Fill the tower-base loads of a row: aerodynamics and weight above it less the momentum rate there.
 
     Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
     on the lower one).
     """
-    load = carried_at_base(pose, x, dx, loads, bend, body, layout, tower)
+    load = carried_at_base(pose, x, dx, loads, bend, weighed_body(body, blades), layout, tower)
+    load = add_upper_load(load, bend, blades, work)
     z = layout.base_height
     row[Out.TWRBSFXT], row[Out.TWRBSFYT], row[Out.TWRBSFZT] = load.fx, load.fy, load.fz
     row[Out.TWRBSMXT] = load.mx + z * load.fy

@@ -10,12 +10,15 @@ function that takes the part. compile/variants.py is for parts of several classe
 
 from typing import NamedTuple
 
-from fowt_env.plant.accelerations import accelerate_turbine, fill_tower_rates
+from fowt_env.plant.accelerations import fill_tower_rates
 from fowt_env.plant.aero.blade_sweep import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_force
+from fowt_env.plant.elastic.blades import fill_deflection_rates
+from fowt_env.plant.elastic.chain import accelerate_all, condense_blades, weighed_body
+from fowt_env.plant.elastic.forces import fill_blade_forces
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.line_dynamics import lines_load
 from fowt_env.plant.model import LoadCache
@@ -52,7 +55,7 @@ def evaluate_loads(t, x, model, data, dx):
 
     tower = add_user_loads(aero.tower, True, bend, model.user, data)
     load = add(carried(aero.rotor.wrench, bend), tower)
-    load = add(load, gravity_load(pose, model.rigid_body))
+    load = add(load, gravity_load(pose, weighed_body(model.rigid_body, model.blades)))
     load = add_bent_weight(load, pose, x, bend, model.tower, model.rigid_body.gravity)
     load = add(load, hydro.buoyancy)
     load = add(load, hydro.strips)
@@ -62,6 +65,9 @@ def evaluate_loads(t, x, model, data, dx):
     add_modal(aero.rotor.wrench, bend, model.tower, modal)
     add_modal_user_loads(bend, model.tower, model.user, data, modal)
     add_modal_weight(pose, x, bend, model.tower, model.rigid_body.gravity, modal)
+
+    fill_blade_forces(x, model.aero, model.pitches, model.blades, data.blades, data.rotor)
+    condense_blades(pose, x, bend, model.rigid_body, model.pitches, model.blades, data.rotor)
 
     cache[LoadCache.FACTORED] = 0.0
     store(cache, LoadCache.TOTAL, load)
@@ -89,8 +95,12 @@ def respond(x, u, model, data, dx):
     fill_pitch_rates(x, u, model.actuator, model.pitches, dx)
     fill_torque_rate(x, u, model.converter, dx)
     fill_tower_rates(x, cache[LoadCache.MODAL :], model.tower, dx)
+    fill_deflection_rates(x, model.blades, dx)
     load = stored(cache, LoadCache.TOTAL)
-    accelerate_turbine(pose, x, load, torque, data.added_mass, body, model.tower, data.matrix, cache, dx)
+    accelerate_all(
+        pose, x, load, torque, data.added_mass, body, model.tower, model.blades, data.matrix, data.rotor,
+        cache, dx,
+    )  # fmt: skip
 
 
 @inlined_kernel

@@ -15,11 +15,12 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
+from fowt_env.plant.elastic.steps import damp_blades
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
-from fowt_env.plant.state import State, Wrench, add, pose_in
+from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
 from fowt_env.plant.tower.loads import add_modal, carried
 from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.tower.steps import correct_elastic, keep_elastic
@@ -173,12 +174,14 @@ def adams(t, x, u, dt, model, method, data):
     else:
         follow_rotor(dt, model, method.substeps, data, y)
         correct_elastic(
-            dt, x, history, model.rigid_body, model.tower, data.matrix, data.elastic, data.stages[2],
-            data.stages[3], y,
+            dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.elastic,
+            data.stages[2], data.stages[3], y,
         )  # fmt: skip
+        damp_blades(dt, history, model.blades, data.rotor, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     bend_on(dt, x, order, history, model.tower, y)
+    bend_blades(dt, x, order, history, model.blades, y)
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
     for i in range(State.VX, n):
@@ -197,6 +200,16 @@ def bend_on(dt, x, order, history, tower, y):
         y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
 
+@kernel
+def bend_blades(dt, x, order, history, blades, y):
+    """Fill y with the deflections of the blades by Adams-Moulton, from their new velocities in y."""
+    if blades is None:
+        return
+    size = BLADES * len(blades.beam.count)
+    for i in range(blades.first, blades.first + size):
+        y[i] = x[i] + dt * moulton(order, y[size + i], i, history)
+
+
 @inlined_kernel
 def set_pitch(t, x, u, dt, model, method, data):
     """Set the blade pitch to another value at once, for a method without memory of past steps."""
@@ -205,14 +218,16 @@ def set_pitch(t, x, u, dt, model, method, data):
 
 
 @inlined_kernel
-def renew_loads(t, x, model, user, data):
+def renew_loads(t, x, model, user, blades, data):
     """Update the loads of the last evaluation to another blade pitch, which changes the rotor load alone.
 
-    User loads may depend on the blade pitch: with user loads all loads are evaluated again.
+    User loads may depend on the blade pitch, and bending blades turn their masses: all loads are then
+    evaluated again.
     """
     if user is None:
-        renew_rotor(t, x, model, model.aero, data)
-        return
+        if blades is None:
+            renew_rotor(t, x, model, model.aero, data)
+            return
     evaluate_loads(t, x, model, data, data.stages[0])
 
 
@@ -251,12 +266,13 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     was = stored(cache, LoadCache.ROTOR)
     torque = cache[LoadCache.TORQUE]
     set_followed(x, u, dt, model.actuator, model.pitches)
-    renew_loads(t, x, model, model.user, data)
+    renew_loads(t, x, model, model.user, model.blades, data)
     respond(x, u, model, data, after)
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
         shift_tower(after, before, model.tower, history[k])
+        shift_blades(after, before, model.blades, history[k])
     shift_samples(was, torque, method.substeps, data)
 
 
@@ -267,6 +283,16 @@ def shift_tower(after, before, tower, row):
         return
     n = len(tower.count)
     for i in range(tower.first + n, tower.first + 2 * n):
+        row[i] += after[i] - before[i]
+
+
+@kernel
+def shift_blades(after, before, blades, row):
+    """Add the difference of two derivatives to the rates of the blades' deflection velocities in a row."""
+    if blades is None:
+        return
+    size = BLADES * len(blades.beam.count)
+    for i in range(blades.first + size, blades.first + 2 * size):
         row[i] += after[i] - before[i]
 
 

@@ -46,6 +46,7 @@ class Model(NamedTuple):
     pitches: object = None  # blade_pitches.BladePitches, or None: one pitch for all blades
     converter: object = None  # drivetrain.TorqueLag, or None: the torque follows its command at once
     tower: object = None  # tower.modes.TowerModes, or None: a rigid tower
+    blades: object = None  # elastic.blades.BladeModes, or None: rigid blades
 
 
 class LoadCache(IntEnum):
@@ -101,5 +102,7 @@ class Data(NamedTuple):
     elastic: np.ndarray
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data; empty without radiation memory
-    # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades
+    # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades. With
+    # bending blades the loads of the stations follow (blade_shape.put_station)
     blades: np.ndarray
+    rotor: object = None  # elastic.blades.RotorScratch, or None: rigid blades

@@ -59,6 +59,8 @@ RIGID_BLOCKS = (
 FURTHER_BLOCKS = {  # (kind, steady) of blocks other than ("internal", "settled")
     "tower_deflection": ("position", "solved"),
     "tower_velocity": ("velocity", "zero"),
+    "blade_deflection": ("position", "solved"),
+    "blade_velocity": ("velocity", "zero"),
     "other_blade_pitches": ("internal", "solved"),
     "pitch_rate": ("internal", "zero"),
     "followed_pitch": ("internal", "solved"),
@@ -95,6 +97,7 @@ class Command(IntEnum):
 N_COMMANDS = len(Command)
 BLADES = 3  # of a rotor with individual pitch
 N_INDIVIDUAL_COMMANDS = N_COMMANDS + BLADES - 1
+N_BLADE_LOAD = 6  # entries of the load of a blade, aero.blade_shape.BladeLoad
 
 
 class Wrench(NamedTuple):

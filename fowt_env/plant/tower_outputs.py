@@ -22,6 +22,14 @@ def record_tower(bend, ax, ay, row):
     row[0], row[1], row[2], row[3] = bend.x, bend.y, ax, ay
 
 
+@kernel
+def tower_channels(bend):
+    """Return the number of channels of the group "tower"."""
+    if bend is None:
+        return 0
+    return 4
+
+
 @inlined_kernel
 def _rigid(pose, x, dx, loads, bend, body, layout, tower):
     m = layout.upper_matrix

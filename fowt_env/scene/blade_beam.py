@@ -13,6 +13,11 @@ import numpy as np
 
 from fowt_env.descriptions.blade_structure import SHAPES
 from fowt_env.errors import InputError
+from fowt_env.plant.aero.blade_shape import blade_line
+from fowt_env.plant.elastic.beam import Beam
+from fowt_env.plant.elastic.blades import BladeModes, Point, Section
+from fowt_env.plant.state import BLADES
+from fowt_env.scene.mass import assemble, build_lower_body, nacelle_centre
 from fowt_env.scene.tower import shape_values
 
 MODES = {  # option blades: modes of each blade, from SHAPES
@@ -22,30 +27,108 @@ MODES = {  # option blades: modes of each blade, from SHAPES
 }
 
 
-class Beam(NamedTuple):
-    """Holds the integrals of a beam that bends by n modes: sums over its particles m of products of shapes.
+LIFT_SLOPE = 2.0 * np.pi  # 1/rad
+DAMPED = 1.3  # factor on the damping at rated speed, for gusts and overspeed
+FINE = 20_001  # points of the sums over the span that divide a station's load
+SECTIONS = (0.25, 0.5)  # of the span, for internal loads
 
-    Positions are in the beam's axes from its origin: the apex of a rotor.
+
+def build_blade_modes(platform, turbine, option, first_state, tower, aero):
+    """Return the BladeModes of option blades, with states from first_state on; None for "rigid".
+
+    tower: TowerModes, or None: rigid; aero: Aero or None. Raises: InputError for a turbine without
+    [blade_structure], or whose blades have more mass or inertia than its rotor.
     """
+    beam = blade_beam(turbine, option)
+    if beam is None:
+        return None
+    rotor, nacelle, drivetrain = turbine.rotor, turbine.nacelle, turbine.drivetrain
+    cosine, sine = np.cos(rotor.cone), np.sin(rotor.cone)
+    hub = {
+        "mass": rotor.mass - BLADES * beam.mass,
+        "first": rotor.mass * rotor.cm_offset + BLADES * sine * beam.first,
+        "axial": rotor.inertia - BLADES * cosine**2 * beam.second,
+        "across": rotor.inertia_diameter
+        + rotor.mass * rotor.cm_offset**2
+        - BLADES * (sine**2 + 0.5 * cosine**2) * beam.second,
+    }
+    for name in ("mass", "axial"):
+        if hub[name] < 0.0:
+            raise InputError(
+                f"blades = {option!r}: the blades of the turbine {turbine.name!r} exceed rotor.mass or"
+                f" rotor.inertia by {-hub[name]:g} kg or kg m2; check [blade_structure]"
+            )
+    height = 0.0 if tower is None else tower.top_height
+    origin = np.array([0.0, 0.0, height])
+    above = assemble([(nacelle.mass, np.subtract(nacelle_centre(nacelle), origin), nacelle.inertia)])
+    return BladeModes(
+        first=int(first_state),
+        beam=beam,
+        cone_cosine=float(cosine),
+        cone_sine=float(sine),
+        hub_radius=float(rotor.hub_radius),
+        **{f"hub_{name}": float(value) for name, value in hub.items()},
+        nacelle_mass=float(nacelle.mass),
+        nacelle_moment=np.array([above[1, 5], -above[0, 5], above[0, 4]]),
+        nacelle_inertia=np.ascontiguousarray(above[3:, 3:]),
+        centre=np.array([-rotor.overhang, 0.0, rotor.hub_height]) - origin,
+        tilt_cosine=float(np.cos(rotor.shaft_tilt)),
+        tilt_sine=float(np.sin(rotor.shaft_tilt)),
+        generator_coupling=float(drivetrain.gear_ratio * drivetrain.generator_inertia),
+        generator_row=float(drivetrain.gear_ratio**2 * drivetrain.generator_inertia),
+        lower=build_lower_body(platform),
+        decay=_decay(beam, aero, turbine.rated_rotor_speed),
+        tip=_point(shapes_at(turbine, option, [rotor.tip_radius])),
+        inner=_section(turbine, option, SECTIONS[0], aero),
+        outer=_section(turbine, option, SECTIONS[1], aero),
+    )
 
-    count: tuple  # (0,) * n: the number of modes as a type
-    mass: float  # kg
-    first: float  # m z, kg m
-    second: float  # m z^2, kg m2
-    a: np.ndarray  # (n,) kg: m U1
-    b: np.ndarray  # (n,) kg: m U2
-    e: np.ndarray  # (n,) kg m: m z U1
-    f: np.ndarray  # (n,) kg m: m z U2
-    A: np.ndarray  # (n, n) kg: m U1 U1
-    B: np.ndarray  # (n, n) kg: m U2 U2
-    C: np.ndarray  # (n, n) kg: m U1 U2, rows of U1
-    S0: np.ndarray  # (n, n) kg/m: m S
-    S1: np.ndarray  # (n, n) kg: m z S
-    P: np.ndarray  # (n, n, n) kg/m: m U1 S, first axis of U1
-    Q: np.ndarray  # (n, n, n) kg/m: m U2 S, first axis of U2
-    T: np.ndarray  # (n, n, n, n) kg/m2: m S S
-    K: np.ndarray  # (n, n) N/m: structural stiffness, without gravity and rotation
-    D: np.ndarray  # (n, n) N s/m: structural damping
+
+def _decay(beam, aero, rotor_speed):
+    """Return the (n, n) decay rates (1/s) of modal velocities by the lift of blades at a speed (rad/s).
+
+    A section that moves downwind by v has the angle of attack, in a flow of speed times radius, smaller by
+    their quotient. Zero without wind.
+    """
+    n = len(beam.count)
+    if aero is None:
+        return np.zeros((n, n))
+    e = aero.rotor.elements
+    line = 0.5 * e.air_density * LIFT_SLOPE * e.chord * e.weight * rotor_speed * e.radius
+    damping = np.einsum("j,ji,jk->ik", line, e.modes.x, e.modes.x)
+    return np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, DAMPED * damping))
+
+
+def _point(shapes):
+    """Return the Point of Shapes at one distance."""
+    return Point(
+        *(
+            np.ascontiguousarray(values[:, axis, 0])
+            for values in (shapes.U, shapes.slope)
+            for axis in range(2)
+        ),
+        np.ascontiguousarray(shapes.S[:, :, 0]),
+    )
+
+
+def _section(turbine, option, fraction, aero):
+    """Return the Section at a fraction of a blade's span."""
+    rotor = turbine.rotor
+    distance = rotor.hub_radius + fraction * (rotor.tip_radius - rotor.hub_radius)
+    outside = np.zeros(0)
+    if aero is not None:
+        stations = aero.rotor.elements.shape.distance
+        nodes = np.array([rotor.hub_radius, *stations, rotor.tip_radius])
+        fine = np.linspace(rotor.hub_radius, rotor.tip_radius, FINE)
+        hats = np.array([np.interp(fine, nodes, row) for row in np.eye(len(nodes))[1:-1]])
+        outside = hats[:, fine >= distance].sum(axis=1) / hats.sum(axis=1)
+    point = _point(shapes_at(turbine, option, [distance]))
+    structure = turbine.blade_structure
+    twist = np.interp(fraction, structure.span_fraction, structure.structural_twist)
+    return Section(
+        float(distance), float(np.cos(twist)), float(np.sin(twist)), point,
+        blade_beam(turbine, option, distance), outside,
+    )  # fmt: skip
 
 
 class Shapes(NamedTuple):
@@ -119,8 +202,8 @@ def integrated(nodes, stiffness, damping):
         P=total("k,ik,jlk->ijl", m, u1, s),
         Q=total("k,ik,jlk->ijl", m, u2, s),
         T=total("k,ijk,lnk->ijln", m, s, s),
-        K=np.ascontiguousarray(stiffness),
-        D=np.ascontiguousarray(damping),
+        stiffness=np.ascontiguousarray(stiffness),
+        damping=np.ascontiguousarray(damping),
     )
 
 
@@ -168,6 +251,20 @@ def shapes_at(turbine, modes, radii):
     """
     nodes = blade_nodes(turbine, blade_modes(turbine, modes))
     return shapes_between(nodes, np.asarray(radii, dtype=float))
+
+
+def blade_states(blades):
+    """Return the number of states of BladeModes or None: deflections and their velocities."""
+    return 0 if blades is None else 2 * BLADES * len(blades.beam.count)
+
+
+def station_bending(turbine, option):
+    """Return the Shapes of an option blades at the points of the turbine's blade_line; None for "rigid"."""
+    if option == "rigid":
+        return None
+    rotor = turbine.rotor
+    line = blade_line(turbine.blade, rotor.hub_radius, rotor.tip_radius)
+    return shapes_at(turbine, option, line.points[:, 2])
 
 
 def shapes_between(nodes, z):

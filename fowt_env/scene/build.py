@@ -15,6 +15,7 @@ from fowt_env.plant.integrators import build_integrator
 from fowt_env.plant.model import Model
 from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.scene.actuators import build_actuator, build_converter, drive_states
+from fowt_env.scene.blade_beam import blade_states, build_blade_modes
 from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
 from fowt_env.scene.options import checked_options, choose_parts, default_step, samples_per_step
@@ -27,6 +28,7 @@ from fowt_env.scene.parts import (
     check_symmetry,
     fastest_motion,
     wake_states,
+    with_blade_states,
 )
 from fowt_env.scene.plausibility import warn_of_weather
 from fowt_env.scene.scene import Scene
@@ -97,7 +99,9 @@ def build_scene(
     next_state = first_state + sum(load.states for load in user)
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
-    tower = with_masses(tower, platform, turbine)
+    tower = with_masses(tower, platform, turbine, hanging=options["blades"] == "rigid")
+    blades = build_blade_modes(platform, turbine, options["blades"], next_state, tower, aero)
+    next_state += blade_states(blades)
     body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
     dt = default_step(options, fastest_motion(tower, mooring, body))
     pitches = None
@@ -116,17 +120,18 @@ def build_scene(
         mooring = mooring._replace(dynamics=mooring.dynamics._replace(first=next_state))
     model = Model(
         rigid_body=body,
-        layout=build_layout(platform, turbine, pitches is not None),
+        layout=build_layout(platform, turbine, pitches is not None, blades is not None),
         drivetrain=build_drivetrain(turbine),
         actuator=actuator,
         generator=build_torque_limits(turbine.torque_law),
         hydro=hydro,
         mooring=mooring,
-        aero=aero,
+        aero=with_blade_states(aero, blades),
         integrator=build_integrator(options["integrator"], samples_per_step(options, air.field)),
         user=build_user_loads(user, platform.tower.base_height, first_state),
         pitches=pitches,
         converter=converter,
         tower=tower,
+        blades=blades,
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

@@ -41,13 +41,26 @@ def _rotor_body(rotor):
     return rotor.mass, centre, inertia
 
 
-def _bodies(platform, turbine):
-    """Return ballast, tower, nacelle and rotor as (mass, centre, inertia)."""
-    ballast, tower, nacelle = platform.ballast, platform.tower, turbine.nacelle
+def nacelle_centre(nacelle):
+    """Return the centre of mass of a nacelle, m from the body origin."""
+    return nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height
+
+
+def _lower_bodies(platform):
+    """Return ballast and tower as (mass, centre, inertia)."""
+    ballast, tower = platform.ballast, platform.tower
     return [
         (ballast.mass, (ballast.cm_downwind, ballast.cm_left, -ballast.cm_depth), ballast.inertia),
         (tower.mass, (0.0, 0.0, tower.cm_height), tower.inertia),
-        (nacelle.mass, (nacelle.cm_downwind, nacelle.cm_left, nacelle.cm_height), nacelle.inertia),
+    ]
+
+
+def _bodies(platform, turbine):
+    """Return ballast, tower, nacelle and rotor as (mass, centre, inertia)."""
+    nacelle = turbine.nacelle
+    return [
+        *_lower_bodies(platform),
+        (nacelle.mass, nacelle_centre(nacelle), nacelle.inertia),
         _rotor_body(turbine.rotor),
     ]
 
@@ -72,6 +85,20 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
             " needs 0 (planar = False)"
         )
     drivetrain = build_drivetrain(turbine)
+    return _rigid_body(
+        matrix,
+        platform,
+        (drivetrain.coupling, drivetrain.inertia_row, build_tilt(turbine.rotor.shaft_tilt)),
+        (platform_fixed, rotor_fixed, plane),
+    )
+
+
+def build_lower_body(platform):
+    """Return the RigidBody of floater and straight tower alone, without a rotor."""
+    return _rigid_body(assemble(_lower_bodies(platform)), platform, (0.0, 0.0, None), (False, False))
+
+
+def _rigid_body(matrix, platform, rotor, fixed):
     return RigidBody(
         np.ascontiguousarray(matrix),
         float(matrix[0, 0]),
@@ -79,19 +106,16 @@ def build_rigid_body(platform, turbine, platform_fixed=False, rotor_fixed=False,
         float(-matrix[0, 5]) if matrix[0, 5] != 0.0 else None,
         float(matrix[0, 4]),
         float(platform.environment.gravity),
-        drivetrain.coupling,
-        drivetrain.inertia_row,
-        build_tilt(turbine.rotor.shaft_tilt),
-        platform_fixed,
-        rotor_fixed,
-        plane,
+        *rotor,
+        *fixed,
     )
 
 
-def with_masses(modes, platform, turbine):
+def with_masses(modes, platform, turbine, hanging=True):
     """Return the TowerModes (or None) with the mass properties below and above the tower top.
 
     Floater and straight tower are one rigid body, nacelle and rotor another, as in build_rigid_body.
+    hanging: whether the weight of nacelle and rotor is a load of the tower.
     """
     if modes is None:
         return None
@@ -99,13 +123,16 @@ def with_masses(modes, platform, turbine):
     top = (0.0, 0.0, modes.top_height)
     above = [(mass, np.subtract(centre, top), inertia) for mass, centre, inertia in upper]
     matrix, tilt = assemble(above), turbine.rotor.shaft_tilt
+    moment = np.array([matrix[1, 5], -matrix[0, 5], matrix[0, 4]])
     return modes._replace(
         lower=np.ascontiguousarray(assemble([ballast, tower])),
         straight=np.ascontiguousarray(assemble([tower])),
         upper_mass=float(matrix[0, 0]),
-        upper_moment=np.array([matrix[1, 5], -matrix[0, 5], matrix[0, 4]]),
+        upper_moment=moment,
         upper_inertia=np.ascontiguousarray(matrix[3:, 3:]),
         shaft=np.array([np.cos(tilt), 0.0, -np.sin(tilt)]),
+        hanging_mass=float(matrix[0, 0]) if hanging else 0.0,
+        hanging_moment=moment if hanging else np.zeros(3),
     )
 
 
@@ -127,8 +154,11 @@ def build_blade_masses(platform, turbine):
     )
 
 
-def build_layout(platform, turbine, individual=False):
-    """Return the layout part: points and masses for outputs; individual: including those of single blades."""
+def build_layout(platform, turbine, individual=False, bending=False):
+    """Return the layout part: points and masses for outputs; individual: including those of single blades.
+
+    bending: nacelle and rotor are not in the mass matrix above the tower base.
+    """
     rotor = turbine.rotor
     hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
     return Layout(
@@ -137,7 +167,7 @@ def build_layout(platform, turbine, individual=False):
         float(platform.tower.base_height),
         float(rotor.mass),
         float(rotor.inertia),
-        np.ascontiguousarray(assemble(_bodies(platform, turbine)[1:])),
+        np.ascontiguousarray(assemble(_bodies(platform, turbine)[1 : 2 if bending else None])),
         float(turbine.drivetrain.gear_ratio),
         float(turbine.drivetrain.generator_efficiency),
         int(rotor.blades),

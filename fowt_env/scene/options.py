@@ -98,6 +98,7 @@ FIDELITIES = {
 # oscillation grows with a damping ratio of -0.5 % (heun) or -0.04 % (abm4)
 SLOW_GROWTH = 0.7
 LAG_MARGIN = 1.25  # ratio of the shortest lag to the limit of stability
+ELASTIC_STEP = 0.025  # s, largest default step with bending blades, whose flapping the wind damps strongly
 FIELD_SAMPLES = 3  # rotor loads per step in a wind box, whose cells the blades cross in 0.1 s
 
 
@@ -155,6 +156,9 @@ OPTIONS = {
     # tower bending: none, or the first one or two modes in each direction ([tower.modes] of the file)
     "tower": Option("rigid", ("rigid", "modes", "modes2"),
         "rigid, or with one or two bending modes in each direction"),
+    # blade bending: none, or the modes of blade_beam.MODES ([blade_structure] of the turbine file)
+    "blades": Option("rigid", ("rigid", "modes", "modes2"),
+        "rigid, or with the first flapwise and edgewise bending mode of each blade, or two flapwise modes"),
     "integrator": Option(None, (None, *INTEGRATORS), "time stepping; None: the fidelity's"),
     # of the rotor load per step; None: FIELD_SAMPLES in a wind box with an integrator that samples it, else 1
     "rotor_samples": Option(None, Range("None or a number of samples, 1 to 10", 1, 10, whole=True),
@@ -215,6 +219,19 @@ def choose_parts(fidelity, rotor, options):
             options[part] = getattr(level, part)
     if options["mooring"] is True:
         options["mooring"] = level.mooring
+    if options["blades"] != "rigid":
+        able = [name for name in able if ROTORS[name].full_field]
+        if rotor is not None and rotor not in able:
+            raise InputError(
+                f"rotor = {rotor!r}: tabulates the whole rotor with rigid blades;"
+                f" blades = {options['blades']!r} needs rotor = {' or '.join(map(repr, able))}"
+            )
+        if options["planar"]:
+            raise InputError(
+                f"blades = {options['blades']!r}: bending blades shake the rotor sideways; a planar scene"
+                " needs 'rigid' (or planar = False)"
+            )
+        options["pitch"] = "individual"
     if rotor is None:
         rotor = level.rotor if level.rotor in able else able[-1]  # the cheapest
     return rotor
@@ -229,6 +246,8 @@ def default_step(options, fastest=0.0):
     level, method = FIDELITIES[options["fidelity"]], INTEGRATORS[options["integrator"]]
     default = level.dt is not None and options["integrator"] == level.integrator
     dt = level.dt if default else method.dt
+    if options["blades"] != "rigid":
+        dt = min(dt, ELASTIC_STEP)
     while dt * fastest > 0.5 * (method.oscillation_limit or SLOW_GROWTH):
         dt *= 0.5
     return dt
@@ -268,7 +287,7 @@ def samples_per_step(options, field):
             f" not {integrator!r}"
         )
     if count is None:
-        count = FIELD_SAMPLES if field is not None and able else 1
+        count = FIELD_SAMPLES if field is not None and able and options["blades"] == "rigid" else 1
     return count
 
 

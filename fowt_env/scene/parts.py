@@ -31,6 +31,7 @@ from fowt_env.plant.line_dynamics import build_line_dynamics, line_frequency
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.plant.tilt import build_tilt
+from fowt_env.scene.blade_beam import station_bending
 from fowt_env.scene.options import ROTORS, chosen_stations
 from fowt_env.scene.radiation_fit import build_radiation
 from fowt_env.scene.tower import tower_frequency
@@ -45,21 +46,34 @@ def wake_states(aero):
     return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
 
 
-def build_elements(turbine, density, count):
-    """Return the BladeElements of a turbine with `count` of its stations; None: all. Raises: InputError."""
+def build_elements(turbine, density, count, bending=None):
+    """Return the BladeElements of a turbine with `count` of its stations; None: all. Raises: InputError.
+
+    bending: of build_blade_elements.
+    """
     stations = chosen_stations(count, turbine)
-    if stations is None or not is_curved(turbine):
-        return build_blade_elements(turbine, density, stations)
-    return build_fewer_elements(turbine, density, count)
+    if stations is None or not (bending or is_curved(turbine)):
+        return build_blade_elements(turbine, density, stations, bending=bending)
+    return build_fewer_elements(turbine, density, count, bending)
 
 
 def build_aero(platform, turbine, air, rotor, options):
     """Return the aero part of a scene with wind."""
     density = platform.environment.air_density
-    elements = build_elements(turbine, density, options["blade_stations"])
+    bending = station_bending(turbine, options["blades"])
+    elements = build_elements(turbine, density, options["blade_stations"], bending)
     model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
     return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)
+
+
+def with_blade_states(aero, blades):
+    """Return an Aero or None with the index of the first state of BladeModes (None: unchanged)."""
+    if aero is None or blades is None:
+        return aero
+    elements = aero.rotor.elements
+    elements = elements._replace(modes=elements.modes._replace(first=blades.first))
+    return aero._replace(rotor=aero.rotor._replace(elements=elements))
 
 
 def build_blade_pitches(turbine, rotor, first_state):

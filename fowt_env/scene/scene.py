@@ -12,9 +12,10 @@ from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.display import html_table
 from fowt_env.errors import InputError
-from fowt_env.plant.blade_pitches import N_BLADE_LOAD
+from fowt_env.plant.aero.blade_shape import N_STATION_LOAD
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
+from fowt_env.plant.elastic.blades import rotor_scratch
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.hydro.excitation import excitation_scratch, position_states
 from fowt_env.plant.hydro.member_series import N_WATER
@@ -26,9 +27,18 @@ from fowt_env.plant.line_dynamics import line_states, line_work
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, N_MEASUREMENTS
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
-from fowt_env.plant.state import BLADES, N_COMMANDS, N_INDIVIDUAL_COMMANDS, Block, State, state_blocks
+from fowt_env.plant.state import (
+    BLADES,
+    N_BLADE_LOAD,
+    N_COMMANDS,
+    N_INDIVIDUAL_COMMANDS,
+    Block,
+    State,
+    state_blocks,
+)
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
+from fowt_env.scene.blade_beam import blade_states
 from fowt_env.scene.options import OPTIONS, default_step, least_lag
 from fowt_env.scene.parts import fastest_motion, hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
@@ -77,6 +87,8 @@ class Scene:
         internal |= {f"load {load.name}": load.states for load in self.loads}
         bending = tower_states(self.model.tower) // 2
         internal |= {"tower_deflection": bending, "tower_velocity": bending}
+        flapping = blade_states(self.model.blades) // 2
+        internal |= {"blade_deflection": flapping, "blade_velocity": flapping}
         internal |= {"other_blade_pitches": 0 if self.model.pitches is None else BLADES - 1}
         internal |= drive_states(self.model.actuator, self.model.pitches)
         internal |= {"generator_torque": 0 if self.model.converter is None else 1}
@@ -113,7 +125,7 @@ class Scene:
     @property
     def channel_groups(self) -> tuple[str, ...]:
         """Return the names of the GROUPS of channels of this scene, in addition to the fixed channels."""
-        parts = {"tower": self.model.tower, "blades": self.model.pitches}
+        parts = {"tower": self.model.tower, "bending": self.model.blades, "blades": self.model.pitches}
         return tuple(name for name, part in parts.items() if part is not None)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
@@ -174,8 +186,17 @@ class Scene:
             elastic=np.zeros((4, bending)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
-            blades=np.zeros((0 if self.model.pitches is None else BLADES, N_BLADE_LOAD)),
+            blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
+            rotor=rotor_scratch(self.model.blades),
         )
+
+    @property
+    def _n_blade_load(self):
+        """Return the number of entries of Data.blades for each blade."""
+        aero = self.model.aero
+        if self.model.blades is None or aero is None:
+            return N_BLADE_LOAD
+        return N_BLADE_LOAD + N_STATION_LOAD * len(aero.rotor.elements.radius)
 
     def handle(self, data: Data | None = None) -> Handle:
         """Return the model and data in the form that kernels take from Python."""

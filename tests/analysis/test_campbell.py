@@ -97,7 +97,7 @@ def test_the_load_on_a_bent_turning_blade_is_the_slope_of_its_kinetic_energy(iea
         return 0.5 * mass @ (np.cross(w, p.T) ** 2).sum(axis=1)
 
     slope = [(energy(q + step) - energy(q - step)) / 2e-3 for step in 1e-3 * np.eye(3)]
-    load = machine.blade(q, none, none, none, w, none)[0] - machine.beam.K @ q
+    load = machine.blade(q, none, none, none, w, none)[0] - machine.beam.stiffness @ q
     assert load == pytest.approx(-np.array(slope), rel=1e-5)
 
 
@@ -133,7 +133,7 @@ def test_a_rotor_alone_has_blade_frequencies_and_these_less_and_plus_1p(iea15):
     parts = damped(*iea15, 0.0)
     found = campbell(*parts, speeds, tower="rigid", shaft="rigid", generator="fixed").frequency
     beam = blade_beam(iea15[1], "modes2")
-    squares = np.linalg.eigvals(np.linalg.solve(beam.A + beam.B, beam.K))
+    squares = np.linalg.eigvals(np.linalg.solve(beam.A + beam.B, beam.stiffness))
     rest = np.sort(np.sqrt(squares.real)) / (2.0 * np.pi)
     # rated: a blade that turns about an axis across it, straight, of ElastoDyn's integrals
     rated = (0.56714, 0.74581, 1.63753)

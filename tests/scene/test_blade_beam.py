@@ -79,8 +79,8 @@ def test_a_blade_has_the_sums_of_its_deck(name, modes):
     order = list(ORDER[modes])
     for key, wanted in integrals(twin["nodes"], order).items():
         assert close(getattr(beam, key), wanted, 2e-8), key
-    assert close(beam.K, twin["stiffness"][np.ix_(order, order)], 1e-8)
-    assert close(beam.D, twin["damping"][np.ix_(order, order)], 1e-8)
+    assert close(beam.stiffness, twin["stiffness"][np.ix_(order, order)], 1e-8)
+    assert close(beam.damping, twin["damping"][np.ix_(order, order)], 1e-8)
     assert beam.count == (0,) * len(order)
     assert all(array.flags.c_contiguous and array.dtype == float for array in beam[4:])
 
@@ -94,10 +94,10 @@ def test_stiffness_tuners_and_damping_are_those_of_each_mode():
     changed = with_structure("iea15", flap_tuner=(4.0, 9.0), damping_ratio=(0.01, 0.02, 0.03))
     plain, tuned = (blade_beam(turbine, "modes2") for turbine in (read_turbine("iea15"), changed))
     factor = np.array([[4.0, 6.0, 1.0], [6.0, 9.0, 1.0], [1.0, 1.0, 1.0]])
-    assert tuned.K == pytest.approx(factor * plain.K, rel=1e-12)
+    assert tuned.stiffness == pytest.approx(factor * plain.stiffness, rel=1e-12)
     # 2 zeta K / omega, of the second mode: omega grows with the root of the tuner
     ratio = np.array([0.01 / 2.0, 0.02 / 3.0, 0.03]) / 0.0048
-    assert tuned.D == pytest.approx(factor * plain.D * ratio, rel=1e-9)
+    assert tuned.damping == pytest.approx(factor * plain.damping * ratio, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_the_frequencies_at_rest_are_elastodyns_and_near_those_of_finite_element
     ]  # fmt: skip
     assert frequencies == pytest.approx((*alone[0][:2], alone[1][0]), rel=near)
     # twist couples the modes
-    squares = np.linalg.eigvals(np.linalg.solve(beam.A + beam.B, beam.K))
+    squares = np.linalg.eigvals(np.linalg.solve(beam.A + beam.B, beam.stiffness))
     coupled = np.sort(np.sqrt(squares.real)) / (2.0 * np.pi)
     assert coupled == pytest.approx(sorted(frequencies), rel=0.012)
 
@@ -150,7 +150,7 @@ def test_a_uniform_blade_has_the_integrals_of_its_powers():
     assert beam.S0[0, 0] == pytest.approx(mass / 3 / length, rel=1e-5)
     assert beam.P[1, 0, 0] == pytest.approx(mass * 4 / 3 / 7 / length, rel=1e-5)
     assert beam.T[0, 0, 0, 0] == pytest.approx(mass * 16 / 9 / 7 / length**2, rel=1e-5)
-    assert beam.K == pytest.approx(
+    assert beam.stiffness == pytest.approx(
         1e9 / length**3 * np.array([[4, 6, 0], [6, 12, 0], [0, 0, 2 * (16 - 24 + 12)]]), rel=1e-5, abs=1e-6
     )
 
@@ -202,7 +202,7 @@ def test_the_part_outside_a_station_has_the_sums_of_its_nodes():
     cut = blade_beam(turbine, "modes2", z)
     for key, wanted in integrals([near, *twin[21:]], (0, 1, 2)).items():
         assert close(getattr(cut, key), wanted, 1e-7), key
-    assert not cut.K.any() and not cut.D.any()
+    assert not cut.stiffness.any() and not cut.damping.any()
     tip = blade_beam(turbine, "modes", turbine.rotor.tip_radius)
     assert tip.mass == 55.0 and blade_beam(turbine, "modes", turbine.rotor.tip_radius + 1.0).mass == 0.0
 

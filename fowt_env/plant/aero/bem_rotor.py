@@ -15,6 +15,7 @@ from fowt_env.plant.aero.blade_sweep import (
     motion_of,
     rotor_axes_load,
     rotor_flow,
+    shape_of,
     swept,
 )
 from fowt_env.plant.aero.station_response import Solved
@@ -47,10 +48,11 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
     total = NO_LOAD
     for number in range(rotor.blades):
         motion, turn = motion_of(number, x, rotor, flow), turn_of(pitch_of(number, x, pitches))
+        shape = shape_of(number, x, rotor.shape, rotor.modes, blades)
         response = Solved(
-            number, turn, motion, induction, wind_speed, skewed, skew, wake, x, dx, counters, rotor
+            number, turn, motion, shape, induction, wind_speed, skewed, skew, wake, x, dx, counters, rotor
         )
-        blade = Blade(number, motion, turn, response)
-        force = swept(SampledWind(flow, motion), blade, rotor.radius, rotor.shape)
+        blade = Blade(number, motion, turn, shape, response)
+        force = swept(SampledWind(flow, motion), blade, rotor.radius)
         total = add_blade(total, blade, force.load, 1.0, pitches, blades)
     return rotor_axes_load(total, 1.0, rotor)

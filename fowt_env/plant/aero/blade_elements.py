@@ -22,7 +22,14 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.errors import InputError
-from fowt_env.plant.aero.blade_shape import blade_line, build_blade_shape, is_curved, line_integrals
+from fowt_env.plant.aero.blade_shape import (
+    blade_line,
+    build_blade_shape,
+    build_station_modes,
+    is_curved,
+    line_integrals,
+    modal_columns,
+)
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.tilt import rotor_axes
 
@@ -73,6 +80,7 @@ class BladeElements(NamedTuple):
     polars: Polars
     shape: object  # blade_shape.BladeShape, or None: straight blades in the rotor plane
     guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, initial inflow angles; see first_guess
+    modes: object = None  # blade_shape.StationModes, or None: blades that do not bend
 
 
 class Element(NamedTuple):
@@ -570,11 +578,12 @@ def _zero_lift(polar):
     return high / rise - np.radians(6.0) if rise > 1.0 else 0.0
 
 
-def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=None):
+def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=None, bending=None):
     """Return the BladeElements of a turbine description; stations: indices of a subset, default all.
 
     shaped: with a BladeShape even for straight blades in the rotor plane.
     fit: for curved blades, a function that replaces the factors (force, first) of a station_choice.Fit.
+    bending: scene.blade_beam.Shapes of the modes at the points of blade_line, or None: rigid blades.
 
     Raises: InputError if a station lies outside the blade or a polar does not span -180 to 180 deg.
     """
@@ -602,14 +611,18 @@ def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=
         moments.append(_cm_segments(polar))
         start += len(part)
     area, moment = _hat_weights(radius, rotor.hub_radius, rotor.tip_radius)
-    blades, shape = rotor.blades, None
+    blades, shape, modes = rotor.blades, None, None
     along, end, apart = radius, rotor.tip_radius, radius  # lengths along the blade, distance from the shaft
-    if shaped or is_curved(turbine):
+    if shaped or bending is not None or is_curved(turbine):
         line = blade_line(blade, rotor.hub_radius, rotor.tip_radius)
-        area, first = line_integrals(line, station_weights(line.length, chosen))
+        columns = line.points if bending is None else np.hstack([line.points, modal_columns(line, bending)])
+        area, first = line_integrals(line.length, columns, station_weights(line.length, chosen))
         if fit is not None:
             area, first = fit(area, first)
-        shape = build_blade_shape(turbine, line, chosen, first / area[:, None], np.concatenate(moments))
+        arms = first / area[:, None]
+        shape = build_blade_shape(turbine, line, chosen, arms[:, :3], np.concatenate(moments))
+        if bending is not None:
+            modes = build_station_modes(line, bending, chosen, arms[:, 3:])
         along, end = line.length[1:-1][chosen], line.length[-1]
         apart = np.hypot(shape.cone_cosine * radius + shape.cone_sine * shape.prebend, shape.sweep)
         moment = area * shape.arm_distance
@@ -640,5 +653,6 @@ def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=
         ),
         shape,
         np.zeros((len(radius), GUESSES, GUESSES), dtype=np.float32),
+        modes,
     )
     return elements._replace(guess=_guess_table(elements))

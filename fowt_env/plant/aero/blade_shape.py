@@ -35,6 +35,39 @@ class BladeShape(NamedTuple):
     reach: float  # m, largest distance of a station from the rotor centre
 
 
+N_STATION_LOAD = 3  # entries of the loads of a station
+
+
+class StationModes(NamedTuple):
+    """Holds shapes of a blade's n bending modes at m stations, each per metre of a modal coordinate.
+
+    x: normal to the cone at zero pitch, downwind; y: against the rotation at zero pitch.
+    """
+
+    first: int  # index in the state of the first blade's first deflection, set by the scene
+    count: tuple  # n zeros: a tuple, so that n is known at compile time
+    x: np.ndarray  # (m, n)
+    y: np.ndarray
+    slope_x: np.ndarray  # (m, n) 1/m, derivatives along the pitch axis
+    slope_y: np.ndarray
+    axial: np.ndarray  # (m, n) the station moves towards the root by axial q + q S q / 2
+    shortening: np.ndarray  # (m, n, n) S, 1/m
+    load_x: np.ndarray  # (m, n) the same three for the point where the load of the station acts
+    load_y: np.ndarray
+    load_axial: np.ndarray
+    load_shortening: np.ndarray  # (m, n, n)
+
+
+class BentShape(NamedTuple):
+    """Describes one blade that bends, in a state."""
+
+    rest: BladeShape
+    modes: StationModes
+    q: np.ndarray  # (n,) m, deflections
+    v: np.ndarray  # (n,) m/s
+    loads: np.ndarray  # output: N_STATION_LOAD entries for each station, see put_station
+
+
 class OnAxis(NamedTuple):
     """Holds the position of a station of a straight blade in the rotor plane."""
 
@@ -49,6 +82,29 @@ class Station(NamedTuple):
     t: float
     nx: float  # normal of the blade axis, downwind; the axis itself is (-nr, nx, 0)
     nr: float
+
+
+class BentStation(NamedTuple):
+    """Holds position, direction and velocity by bending of a station of a bent blade, in blade directions."""
+
+    x: float  # m
+    r: float
+    t: float
+    nx: float  # normal of the blade axis, as in Station
+    nr: float
+    vx: float  # m/s
+    vr: float
+    vt: float
+
+
+class Attitude(NamedTuple):
+    """Holds the direction of a section of a bent blade, by products with the normal of the coned blade."""
+
+    lean: (
+        float  # of the blade axis: sine of its angle to the pitch axis, in the plane of shaft and pitch axis
+    )
+    across: float  # of the section's axes at zero twist, against the rotation and downwind
+    along: float
 
 
 class Plane(NamedTuple):
@@ -126,12 +182,20 @@ class BladeLoad(NamedTuple):
 
 
 @kernel
-def effective_pitch(j, blade_pitch, shape):
-    """Return the rotation of the section of station j about the local blade axis by blade pitch, rad."""
-    if shape is None:
-        return blade_pitch
+def _pitch_on_axis(j, blade_pitch, shape):
+    return blade_pitch
+
+
+@kernel
+def _pitch_of_curved(j, blade_pitch, shape):
     s = shape.slope[j]
     return atan2(sin(blade_pitch), sqrt(1.0 - s * s) * cos(blade_pitch))
+
+
+@kernel
+def _pitch_of_bent(j, blade_pitch, shape):
+    at = bent_attitude(j, turn_of(blade_pitch), shape)
+    return atan2(at.across, at.along)
 
 
 @kernel
@@ -140,7 +204,7 @@ def turn_of(blade_pitch):
     return Turn(blade_pitch, cos(blade_pitch), sin(blade_pitch))
 
 
-# ----------------------------------------------------- variants for straight and curved blades
+# ----------------------------------------------- variants for straight, curved and bent blades
 
 
 @inlined_kernel
@@ -161,6 +225,95 @@ def curved_station(j, turn, radius, shape):
         c * shape.cone_cosine + s * shape.cone_sine,
         c * shape.cone_sine - s * shape.cone_cosine,
     )
+
+
+@inlined_kernel
+def attitude_of(sine, ahead, side, turn):
+    """Return the Attitude of a section of a bent blade.
+
+    sine: of the slope of prebend; ahead, side: slopes by bending, rotations of ElastoDyn about pitched axes,
+    which are components of a rotation vector to second order (SmllRotTrans), so that both together twist the
+    section, as AeroDyn sees it.
+    """
+    c, s = turn.cosine, turn.sine
+    cosine, both = sqrt(1.0 - sine * sine), 0.5 * ahead * side
+    w = sqrt(1.0 - 0.25 * (ahead * ahead + side * side))
+    level, lift = 1.0 - 0.5 * ahead * ahead, ahead * w
+    return Attitude(
+        c * (sine * level + cosine * lift) + s * (cosine * side * w - sine * both),
+        s * (1.0 - 0.5 * side * side) - c * both,
+        c * (cosine * level - sine * lift) - s * (cosine * both + sine * side * w),
+    )
+
+
+@inlined_kernel
+def bent_attitude(j, turn, shape):
+    """Return the Attitude of station j of a blade that bends."""
+    m, ahead, side = shape.modes, 0.0, 0.0
+    for i in range(len(m.count)):
+        ahead += m.slope_x[j, i] * shape.q[i]
+        side += m.slope_y[j, i] * shape.q[i]
+    return attitude_of(shape.rest.slope[j], ahead, side, turn)
+
+
+@inlined_kernel
+def bent_station(j, turn, radius, shape):
+    """Return the BentStation j of a blade that bends."""
+    rest, m, q, v = shape.rest, shape.modes, shape.q, shape.v
+    px, py, z, ahead, side = rest.prebend[j], rest.sweep[j], rest.distance[j], 0.0, 0.0
+    vx = vy = vz = back = turning_x = turning_y = 0.0
+    for i in range(len(m.count)):
+        shorter = m.axial[j, i]
+        for k in range(len(m.count)):
+            shorter += m.shortening[j, i, k] * q[k]
+        px += m.x[j, i] * q[i]
+        py += m.y[j, i] * q[i]
+        z -= 0.5 * (shorter + m.axial[j, i]) * q[i]
+        back += m.axial[j, i] * q[i]
+        ahead += m.slope_x[j, i] * q[i]
+        side += m.slope_y[j, i] * q[i]
+        vx += m.x[j, i] * v[i]
+        vy += m.y[j, i] * v[i]
+        vz -= shorter * v[i]
+        turning_x += m.slope_x[j, i] * v[i]
+        turning_y += m.slope_y[j, i] * v[i]
+    px, py = px - 0.5 * ahead * back, py - 0.5 * side * back  # rotation of prebend and sweep, second order
+    vx, vy = vx - turning_x * back, vy - turning_y * back
+    c, s, cosine, sine = turn.cosine, turn.sine, rest.cone_cosine, rest.cone_sine
+    out, flapping = c * px + s * py, c * vx + s * vy
+    lean = attitude_of(rest.slope[j], ahead, side, turn).lean
+    up = sqrt(1.0 - lean * lean)
+    return BentStation(
+        cosine * out - sine * z, cosine * z + sine * out, s * px - c * py,
+        up * cosine + lean * sine, up * sine - lean * cosine,
+        cosine * flapping - sine * vz, cosine * vz + sine * flapping, s * vx - c * vy,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def bent_lever(j, turn, shape):
+    """Return the Lever of station j of a blade that bends."""
+    rest, m, q = shape.rest, shape.modes, shape.q
+    px, py, z = rest.arm_prebend[j], rest.arm_sweep[j], rest.arm_distance[j]
+    ahead = side = back = 0.0
+    for i in range(len(m.count)):
+        shorter = 2.0 * m.load_axial[j, i]
+        for k in range(len(m.count)):
+            shorter += m.load_shortening[j, i, k] * q[k]
+        px += m.load_x[j, i] * q[i]
+        py += m.load_y[j, i] * q[i]
+        z -= 0.5 * shorter * q[i]
+        back += m.load_axial[j, i] * q[i]
+        ahead += m.slope_x[j, i] * q[i]
+        side += m.slope_y[j, i] * q[i]
+    px, py = px - 0.5 * ahead * back, py - 0.5 * side * back
+    c, s, cosine, sine = turn.cosine, turn.sine, rest.cone_cosine, rest.cone_sine
+    lean = attitude_of(rest.slope[j], ahead, side, turn).lean
+    up = sqrt(1.0 - lean * lean)
+    nx, nr = up * cosine + lean * sine, up * sine - lean * cosine
+    out = c * px + s * py
+    x, r, t = cosine * out - sine * z, cosine * z + sine * out, s * px - c * py
+    return Lever(nx, nr, x * nr - r * nx, t * nx, t * nr, x, r)
 
 
 @inlined_kernel
@@ -186,6 +339,16 @@ def _value_at_station(plane, at):
 
 
 @inlined_kernel
+def _against_motion(tangential, at):
+    return tangential
+
+
+@inlined_kernel
+def _against_bending(tangential, at):
+    return tangential + at.vt
+
+
+@inlined_kernel
 def _along_shaft(along, out, at):
     return along
 
@@ -193,6 +356,11 @@ def _along_shaft(along, out, at):
 @inlined_kernel
 def _along_normal(along, out, at):
     return at.nx * along + at.nr * out
+
+
+@inlined_kernel
+def _along_bent_normal(along, out, at):
+    return at.nx * (along - at.vx) + at.nr * (out - at.vr)
 
 
 @inlined_kernel
@@ -206,7 +374,16 @@ def _add_to_straight(load, part, j, turn, shape):
 
 @inlined_kernel
 def _add_to_curved(load, part, j, turn, shape):
-    lever = lever_of(j, turn, shape)
+    return _add_by_lever(load, part, lever_of(j, turn, shape))
+
+
+@inlined_kernel
+def _add_to_bent(load, part, j, turn, shape):
+    return _add_by_lever(load, part, bent_lever(j, turn, shape))
+
+
+@inlined_kernel
+def _add_by_lever(load, part, lever):
     fn, ft, moment = part.length * part.normal, part.length * part.tangential, part.length * part.moment
     return BladeLoad(
         load.fx + fn * lever.nx,
@@ -218,17 +395,54 @@ def _add_to_curved(load, part, j, turn, shape):
     )
 
 
-# (j, turn, radius, shape) -> position of station j: OnAxis or Station
+@inlined_kernel
+def _keep_nothing(part, j, shape):
+    return
+
+
+@inlined_kernel
+def _keep_station(part, j, shape):
+    row = shape.loads[N_STATION_LOAD * j : N_STATION_LOAD * (j + 1)]
+    row[0], row[1], row[2] = (
+        part.length * part.normal,
+        part.length * part.tangential,
+        part.length * part.moment,
+    )
+
+
+# (j, blade_pitch, shape) -> rotation of the section of station j about the local blade axis by pitch, rad
+effective_pitch = chosen_by_class(
+    "shape", {type(None): _pitch_on_axis, BladeShape: _pitch_of_curved, BentShape: _pitch_of_bent}
+)
+# (j, turn, radius, shape) -> position of station j: OnAxis, Station or BentStation
 station_at = chosen_by_class(
-    "shape", {type(None): _station_on_axis, BladeShape: curved_station}, inlined=True
+    "shape",
+    {type(None): _station_on_axis, BladeShape: curved_station, BentShape: bent_station},
+    inlined=True,
+)
+# (part, j, shape): StationLoad of a blade that bends into its loads: normal, tangential, pitching moment
+put_station = chosen_by_class(
+    "shape", {type(None): _keep_nothing, BladeShape: _keep_nothing, BentShape: _keep_station}, inlined=True
 )
 # (plane, at) -> value of a Plane at the position of a station
-value_at = chosen_by_class("at", {OnAxis: _value_on_axis, Station: _value_at_station}, inlined=True)
+value_at = chosen_by_class(
+    "at",
+    {OnAxis: _value_on_axis, Station: _value_at_station, BentStation: _value_at_station},
+    inlined=True,
+)
 # (along, out, at) -> component normal to the blade axis of a vector (along, out) in x and r
-normal_part = chosen_by_class("at", {OnAxis: _along_shaft, Station: _along_normal}, inlined=True)
+normal_part = chosen_by_class(
+    "at", {OnAxis: _along_shaft, Station: _along_normal, BentStation: _along_bent_normal}, inlined=True
+)
+# (tangential, at) -> relative wind against the motion, with that of bending
+tangential_part = chosen_by_class(
+    "at", {OnAxis: _against_motion, Station: _against_motion, BentStation: _against_bending}, inlined=True
+)
 # (load, part, j, turn, shape) -> BladeLoad with the StationLoad of station j added
 add_station = chosen_by_class(
-    "shape", {type(None): _add_to_straight, BladeShape: _add_to_curved}, inlined=True
+    "shape",
+    {type(None): _add_to_straight, BladeShape: _add_to_curved, BentShape: _add_to_bent},
+    inlined=True,
 )
 
 
@@ -304,14 +518,50 @@ def is_curved(turbine):
     return turbine.rotor.cone != 0.0 or any(v is not None and np.any(np.asarray(v) != 0.0) for v in offsets)
 
 
-def line_integrals(line, weights):
-    """Integrate line loads (m, n + 2) along a BladeLine; return force (m,) and first moments (m, 3)."""
-    steps = np.diff(line.length)[:, None]
+def line_integrals(length, columns, weights):
+    """Integrate line loads (m, n + 2) along a blade; return force (m,) and moments (m, k) over columns.
+
+    length (n + 2,): of the points of a BladeLine; columns (n + 2, k): arms, linear between the points.
+    """
+    steps = np.diff(length)[:, None]
     low, high = weights[:, :-1], weights[:, 1:]
     force = 0.5 * (low + high) @ steps[:, 0]
-    first = (low @ (steps * (2.0 * line.points[:-1] + line.points[1:]))) / 6.0
-    first += (high @ (steps * (line.points[:-1] + 2.0 * line.points[1:]))) / 6.0
+    first = (low @ (steps * (2.0 * columns[:-1] + columns[1:]))) / 6.0
+    first += (high @ (steps * (columns[:-1] + 2.0 * columns[1:]))) / 6.0
     return force, first
+
+
+def modal_columns(line, shapes):
+    """Return (n + 2, k) shapes of bending modes at the points of a BladeLine: columns of modes_of_columns.
+
+    shapes: scene.blade_beam.Shapes at the distances of the points.
+    """
+    prebend, sweep = line.points[:, 0], line.points[:, 1]
+    axial = shapes.slope[:, 0] * prebend + shapes.slope[:, 1] * sweep
+    shortening = shapes.S.reshape(-1, len(line.points))
+    return np.vstack([shapes.U[:, 0], shapes.U[:, 1], axial, shortening]).T
+
+
+def _parts_of_columns(columns, count):
+    """Return (x, y, axial, shortening) of modal_columns."""
+    parts = np.split(columns, [count, 2 * count, 3 * count], axis=1)
+    return *parts[:3], parts[3].reshape(-1, count, count)
+
+
+def build_station_modes(line, shapes, chosen, arms):
+    """Return the StationModes of chosen stations of a BladeLine; arms: modal_columns where loads act."""
+    count = len(shapes.U)
+    here = _parts_of_columns(modal_columns(line, shapes)[1:-1][chosen], count)
+    slopes = (shapes.slope[:, k, 1:-1][:, chosen].T for k in range(2))
+    x, y, axial, shortening = here
+    parts = (x, y, *slopes, axial, shortening, *_parts_of_columns(arms, count))
+    return StationModes(0, (0,) * count, *(np.ascontiguousarray(part, dtype=np.float64) for part in parts))
+
+
+def arms_of(modes):
+    """Return the (m, k) modal_columns where the loads of StationModes act."""
+    m, n = modes.load_x.shape
+    return np.hstack([modes.load_x, modes.load_y, modes.load_axial, modes.load_shortening.reshape(m, n * n)])
 
 
 def build_blade_shape(turbine, line, chosen, arm, moment):

@@ -12,14 +12,19 @@ import numpy as np
 
 from fowt_env.plant.aero.blade_elements import smoothstep
 from fowt_env.plant.aero.blade_shape import (
+    BentShape,
     BladeLoad,
     BladeMotion,
+    BladeShape,
     Plane,
+    StationModes,
     Turn,
     add_station,
     blade_motion,
     normal_part,
+    put_station,
     station_at,
+    tangential_part,
     value_at,
     with_blade,
 )
@@ -36,7 +41,7 @@ from fowt_env.plant.aero.wind import (
 from fowt_env.plant.aero.wind_field import GridPlace, cell_wind
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.state import NO_LOAD, Pose, State, Wrench
+from fowt_env.plant.state import BLADES, N_BLADE_LOAD, NO_LOAD, Pose, State, Wrench
 
 SLOW_ROTOR, FAST_ROTOR = 1.0, 2.0  # tip-speed ratios between which the induction fades in
 
@@ -88,6 +93,7 @@ class Blade(NamedTuple):
     number: int  # 0, 1, ...
     motion: BladeMotion
     turn: Turn
+    shape: object  # blade_shape.BladeShape or BentShape, or None: straight in the rotor plane
     response: object  # of station_response.py
 
 
@@ -260,7 +266,7 @@ def _relative(u, v, w, at, pose, motion):
     along = value_at(Plane(pose.r11 * u + pose.r21 * v + pose.r31 * w - m.vx, 0.0, m.wt, -m.wr), at)
     out = value_at(Plane(m.rx * u + m.ry * v + m.rz * w - m.vr, -m.wt, 0.0, m.wx), at)
     moving = value_at(Plane(m.vt, -m.wr, m.wx, 0.0), at)
-    return normal_part(along, out, at), moving - (m.tx * u + m.ty * v + m.tz * w)
+    return normal_part(along, out, at), tangential_part(moving - (m.tx * u + m.ty * v + m.tz * w), at)
 
 
 @inlined_kernel
@@ -284,7 +290,8 @@ def _sheared(wind, at):
     shear = profile_at(value_at(wind.height, at), wind.profile)
     along = value_at(wind.along, at) + wind.scaled_along * shear
     out = value_at(wind.out, at) + wind.scaled_out * shear
-    return normal_part(along, out, at), value_at(wind.tangential, at) + wind.scaled_tangential * shear
+    tangential = value_at(wind.tangential, at) + wind.scaled_tangential * shear
+    return normal_part(along, out, at), tangential_part(tangential, at)
 
 
 @inlined_kernel
@@ -304,36 +311,42 @@ relative_wind = chosen_by_class(
 
 
 @inlined_kernel
-def _station(j, wind, blade, radius, shape):
+def _station(j, wind, blade, radius):
     """Return the StationLoad of station j of a Blade."""
-    v_normal, v_tangential = relative_wind(wind, station_at(j, blade.turn, radius, shape))
+    v_normal, v_tangential = relative_wind(wind, station_at(j, blade.turn, radius, blade.shape))
     return station_load(blade.response, v_normal, v_tangential, j)
 
 
 @inlined_kernel
-def _with_station(force, part, j, blade, shape):
+def _with_station(force, part, j, blade):
     """Return a BladeForce plus the StationLoad of station j."""
-    return BladeForce(add_station(force.load, part, j, blade.turn, shape), force.outside + part.outside)
+    return BladeForce(add_station(force.load, part, j, blade.turn, blade.shape), force.outside + part.outside)
 
 
 @inlined_kernel
-def swept(wind, blade, radius, shape):
+def _put(part, j, blade):
+    """Put the rates of the wake states and the load of station j into arrays, where a blade has them."""
+    put_rates(part.rates, blade.response)
+    put_station(part, j, blade.shape)
+
+
+@inlined_kernel
+def swept(wind, blade, radius):
     """Return the BladeForce of a Blade, summed over the stations.
 
     wind    SampledWind, ShearedWind or BoxWind
     radius  (n,) m, of the stations
-    shape   BladeShape, or None: straight blades in the rotor plane
     """
     force = NO_FORCE
     for j in range(radius.shape[0]):
-        part = _station(j, wind, blade, radius, shape)
-        force = _with_station(force, part, j, blade, shape)
-        put_rates(part.rates, blade.response)
+        part = _station(j, wind, blade, radius)
+        force = _with_station(force, part, j, blade)
+        _put(part, j, blade)
     return force
 
 
 @inlined_kernel
-def swept_together(winds, blades, radius, shape):
+def swept_together(winds, blades, radius):
     """Return the BladeForce of each of three Blades.
 
     Evaluating a station for all three blades at a time uses the processor better than blade by blade. Terms
@@ -341,20 +354,20 @@ def swept_together(winds, blades, radius, shape):
     """
     a = b = c = NO_FORCE
     for j in range(radius.shape[0]):
-        p = _station(j, winds[0], blades[0], radius, shape)
-        q = _station(j, winds[1], blades[1], radius, shape)
-        r = _station(j, winds[2], blades[2], radius, shape)
-        a = _with_station(a, p, j, blades[0], shape)
-        b = _with_station(b, q, j, blades[1], shape)
-        c = _with_station(c, r, j, blades[2], shape)
-        put_rates(p.rates, blades[0].response)
-        put_rates(q.rates, blades[1].response)
-        put_rates(r.rates, blades[2].response)
+        p = _station(j, winds[0], blades[0], radius)
+        q = _station(j, winds[1], blades[1], radius)
+        r = _station(j, winds[2], blades[2], radius)
+        a = _with_station(a, p, j, blades[0])
+        b = _with_station(b, q, j, blades[1])
+        c = _with_station(c, r, j, blades[2])
+        _put(p, j, blades[0])
+        _put(q, j, blades[1])
+        _put(r, j, blades[2])
     return a, b, c
 
 
 @inlined_kernel
-def sheared_forces(p, q, r, flow, reach, radius, shape):
+def sheared_forces(p, q, r, flow, reach, radius):
     """Return the BladeForce of each of three Blades in a sheared wind; reach: rotor_reach."""
     profile = power_profile(flow.hub.Z - reach, flow.hub.Z + reach, flow.series)
     winds = (
@@ -362,7 +375,7 @@ def sheared_forces(p, q, r, flow, reach, radius, shape):
         sheared_wind(flow, q.motion, profile),
         sheared_wind(flow, r.motion, profile),
     )
-    return swept_together(winds, (p, q, r), radius, shape)
+    return swept_together(winds, (p, q, r), radius)
 
 
 @kernel
@@ -376,9 +389,45 @@ def store_blade_load(number, load, factor, pitches, blades):
 
 
 @inlined_kernel
+def _nothing_to_scale(factor, shape):
+    return
+
+
+@inlined_kernel
+def _scale_stations(factor, shape):
+    for i in range(shape.loads.shape[0]):
+        shape.loads[i] *= factor
+
+
+_scale_loads = chosen_by_class(
+    "shape",
+    {type(None): _nothing_to_scale, BladeShape: _nothing_to_scale, BentShape: _scale_stations},
+    inlined=True,
+)
+
+
+@kernel
+def _at_rest(number, x, shape, modes, blades):
+    return shape
+
+
+@inlined_kernel
+def _bent_by_modes(number, x, shape, modes, blades):
+    n = len(modes.count)
+    q = modes.first + n * number
+    v = q + BLADES * n
+    return BentShape(shape, modes, x[q : q + n], x[v : v + n], blades[number, N_BLADE_LOAD:])
+
+
+# (number, x, shape, modes, blades) -> shape of a blade (0, 1, ...) in a state
+shape_of = chosen_by_class("modes", {type(None): _at_rest, StationModes: _bent_by_modes}, inlined=True)
+
+
+@inlined_kernel
 def add_blade(total, blade, load, factor, pitches, blades):
     """Return total plus a BladeLoad, about the rotor centre; put factor times the load into blades."""
     store_blade_load(blade.number, load, factor, pitches, blades)
+    _scale_loads(factor, blade.shape)
     return with_blade(total, load, blade.motion)
 
 

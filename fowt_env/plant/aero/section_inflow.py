@@ -31,6 +31,7 @@ from fowt_env.plant.aero.blade_sweep import (
     motion_of,
     rotor_flow,
     rotor_reach,
+    shape_of,
     sheared_forces,
     stations_outside,
     swept,
@@ -40,11 +41,10 @@ from fowt_env.plant.aero.section_table import (
     load_components,
     pitches_in_table,
     put_moment,
-    rows_of,
     station_arms,
     table_pitches,
 )
-from fowt_env.plant.aero.station_response import AHEAD, BEHIND, REVERSED, Lagging, WakeRate
+from fowt_env.plant.aero.station_response import AHEAD, BEHIND, REVERSED, Lagging, WakeRate, rows_of
 from fowt_env.plant.aero.wake import PER_ELEMENT, DynamicInflow, time_constants
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
@@ -118,33 +118,35 @@ def _filled_tables(elements):
 
 
 @inlined_kernel
-def _pitch_rows(blade_pitch, rotor):
-    """Return (Turn, Rows of induced velocity, Rows of load) of a blade pitch (rad) within the table."""
-    return turn_of(blade_pitch), rows_of(blade_pitch, rotor.induced), rows_of(blade_pitch, rotor.load)
+def _pitch_rows(blade_pitch, shape, rotor):
+    """Return (Turn, rows of induced velocity, rows of load) of a blade pitch (rad) within the table."""
+    turn = turn_of(blade_pitch)
+    return turn, rows_of(turn, rotor.induced, shape), rows_of(turn, rotor.load, shape)
 
 
 @inlined_kernel
-def _blade_rows(number, first, x, rotor, pitches):
+def _blade_rows(number, first, x, shape, rotor, pitches):
     """Return the _pitch_rows of a blade; first: _pitch_rows of the first blade."""
     if pitches is None:
         return first
-    return _pitch_rows(pitch_of(number, x, pitches), rotor)
+    return _pitch_rows(pitch_of(number, x, pitches), shape, rotor)
 
 
 @inlined_kernel
-def _blade(number, first, x, flow, rate, rotor, dx, pitches):
+def _blade(number, first, x, flow, rate, rotor, dx, pitches, blades):
     """Return the Blade with this number; first: _pitch_rows of the first blade."""
     elements = rotor.elements
-    turn, induced, load = _blade_rows(number, first, x, rotor, pitches)
+    shape = shape_of(number, x, elements.shape, elements.modes, blades)
+    turn, induced, load = _blade_rows(number, first, x, shape, rotor, pitches)
     state = State.INTERNAL + PER_ELEMENT * elements.radius.shape[0] * number
-    response = Lagging(state, induced, load, rate, rotor.ratio, rotor.arm, elements.shape, x, dx)
-    return Blade(number, motion_of(number, x, elements, flow), turn, response)
+    response = Lagging(state, induced, load, rate, rotor.ratio, rotor.arm, shape, x, dx)
+    return Blade(number, motion_of(number, x, elements, flow), turn, shape, response)
 
 
 @kernel
-def _sampled_force(blade, flow, radius, shape):
+def _sampled_force(blade, flow, radius):
     """Return the BladeForce with the wind sampled at each station."""
-    return swept(SampledWind(flow, blade.motion), blade, radius, shape)
+    return swept(SampledWind(flow, blade.motion), blade, radius)
 
 
 @kernel
@@ -155,17 +157,18 @@ def _tabled_load(flow, x, rotor, dx, pitches, blades):
         0.0, flow.hub.speed, 0.0, elements.tip_radius, DynamicInflow(rotor.wake.scale, 0.0)
     )
     rate = WakeRate(1.0 / slow, 1.0 / max(rotor.wake.least, LEAST_LAG))
-    first, reach = _pitch_rows(x[State.BLADE_PITCH], rotor), rotor_reach(elements.tip_radius, shape)
-    p = _blade(0, first, x, flow, rate, rotor, dx, None)
-    q = _blade(1, first, x, flow, rate, rotor, dx, pitches)
-    r = _blade(2, first, x, flow, rate, rotor, dx, pitches)
+    bent = shape_of(0, x, shape, elements.modes, blades)
+    first, reach = _pitch_rows(x[State.BLADE_PITCH], bent, rotor), rotor_reach(elements.tip_radius, shape)
+    p = _blade(0, first, x, flow, rate, rotor, dx, None, blades)
+    q = _blade(1, first, x, flow, rate, rotor, dx, pitches, blades)
+    r = _blade(2, first, x, flow, rate, rotor, dx, pitches, blades)
     if is_sheared(flow.hub, reach, flow.field):
-        forces = sheared_forces(p, q, r, flow, reach, radius, shape)
+        forces = sheared_forces(p, q, r, flow, reach, radius)
     else:
         forces = (
-            _sampled_force(p, flow, radius, shape),
-            _sampled_force(q, flow, radius, shape),
-            _sampled_force(r, flow, radius, shape),
+            _sampled_force(p, flow, radius),
+            _sampled_force(q, flow, radius),
+            _sampled_force(r, flow, radius),
         )
     return stations_outside(forces), load_of_three(p, q, r, forces, elements, pitches, blades)
 

@@ -8,7 +8,6 @@ between roots of the momentum balance (deep stall), or fades within hundredths o
 it over a cell. Induction is not tabulated: dynamic inflow needs section_inflow.py, skewed wake rotor_load.
 """
 
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
@@ -38,17 +37,28 @@ from fowt_env.plant.aero.blade_sweep import (
     rotor_axes_load,
     rotor_flow,
     rotor_reach,
+    shape_of,
     sheared_forces,
     stations_outside,
     swept,
 )
-from fowt_env.plant.aero.station_response import AHEAD, BEHIND, Rows, Tabled, TabledOrSolved
+from fowt_env.plant.aero.station_response import (
+    AHEAD,
+    BEHIND,
+    COARSE_END,
+    COARSE_ROWS,
+    DENSE_END,
+    DENSE_ROWS,
+    DENSE_START,
+    Tabled,
+    TabledOrSolved,
+    pitch_row,
+    rows_of,
+)
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.state import BLADES, NO_LOAD, State
 
-DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches in operation
-COARSE_END, COARSE_ROWS = 90.0, 60  # deg, up to feather
 LEAST_NORMAL = 1e-9  # v_normal of the first direction: limit from upwind, since the load jumps at zero
 
 
@@ -130,17 +140,6 @@ def _filled_table(elements):
 
 
 @kernel
-def pitch_row(blade_pitch):
-    """Return the fractional row index of a blade pitch (rad) in the table; -1 outside."""
-    degrees = blade_pitch * (180.0 / pi)
-    if DENSE_START <= degrees < DENSE_END:
-        return (degrees - DENSE_START) * (DENSE_ROWS / (DENSE_END - DENSE_START))
-    if DENSE_END <= degrees < COARSE_END:
-        return DENSE_ROWS + (degrees - DENSE_END) * (COARSE_ROWS / (COARSE_END - DENSE_END))
-    return -1.0
-
-
-@kernel
 def pitches_in_table(x, pitches):
     """Return whether the pitch of every blade lies in the table."""
     if pitches is None:
@@ -152,32 +151,27 @@ def pitches_in_table(x, pitches):
 
 
 @inlined_kernel
-def rows_of(blade_pitch, table):
-    """Return the Rows of a table (blade pitches, ...) that enclose a blade pitch (rad)."""
-    row = pitch_row(blade_pitch)
-    i = int(row)
-    return Rows(table[i], table[i + 1], row - i)
+def turn_and_response(blade_pitch, shape, table):
+    """Return (Turn, Tabled) of a blade pitch (rad) within the table and the shape of the blade."""
+    turn = turn_of(blade_pitch)
+    return turn, Tabled(rows_of(turn, table.load, shape), table.arm, shape)
 
 
 @inlined_kernel
-def turn_and_response(blade_pitch, table):
-    """Return (Turn, Tabled) of a blade pitch (rad) within the table."""
-    return turn_of(blade_pitch), Tabled(rows_of(blade_pitch, table.load), table.arm, table.elements.shape)
-
-
-@inlined_kernel
-def _blade_response(number, first, x, table, pitches):
+def _blade_response(number, first, x, shape, table, pitches):
     """Return (Turn, Tabled) of a blade; first: (Turn, Tabled) of the first blade."""
     if pitches is None:
         return first
-    return turn_and_response(pitch_of(number, x, pitches), table)
+    return turn_and_response(pitch_of(number, x, pitches), shape, table)
 
 
 @inlined_kernel
-def tabled_blade(number, first, x, flow, table, pitches):
+def tabled_blade(number, first, x, flow, table, pitches, blades):
     """Return the Blade with this number; first: (Turn, Tabled) of the first blade."""
-    turn, response = _blade_response(number, first, x, table, pitches)
-    return Blade(number, motion_of(number, x, table.elements, flow), turn, response)
+    elements = table.elements
+    shape = shape_of(number, x, elements.shape, elements.modes, blades)
+    turn, response = _blade_response(number, first, x, shape, table, pitches)
+    return Blade(number, motion_of(number, x, elements, flow), turn, shape, response)
 
 
 @inlined_kernel
@@ -187,15 +181,15 @@ def box_force(blade, flow, field, boxed, elements):
         return UNKNOWN_FORCE
     if not boxed:
         return UNKNOWN_FORCE
-    return swept(box_wind(flow, blade.motion, field), blade, elements.radius, elements.shape)
+    return swept(box_wind(flow, blade.motion, field), blade, elements.radius)
 
 
 @kernel
 def sampled_force(blade, flow, elements, counters):
     """Return the BladeForce with the wind sampled at each station; inflows outside the table are solved."""
     sure = TabledOrSolved(blade.response, blade.turn, elements, counters)
-    blade = Blade(blade.number, blade.motion, blade.turn, sure)
-    return swept(SampledWind(flow, blade.motion), blade, elements.radius, elements.shape)
+    blade = Blade(blade.number, blade.motion, blade.turn, blade.shape, sure)
+    return swept(SampledWind(flow, blade.motion), blade, elements.radius)
 
 
 @kernel
@@ -213,18 +207,22 @@ def section_table_load(t, pose, x, now, series, field, table, counters, pitches,
     induction = faded_induction(x[State.ROTOR_SPEED], flow.hub.speed, elements)
     if not (induction == 1.0 and pitches_in_table(x, pitches)):
         return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters, pitches, blades)
-    first, reach = turn_and_response(x[State.BLADE_PITCH], table), rotor_reach(elements.tip_radius, shape)
+    bent = shape_of(0, x, shape, elements.modes, blades)
+    first, reach = (
+        turn_and_response(x[State.BLADE_PITCH], bent, table),
+        rotor_reach(elements.tip_radius, shape),
+    )
     density = elements.air_density
     if elements.blades == BLADES and is_sheared(flow.hub, reach, field):
-        p = tabled_blade(0, first, x, flow, table, None)
-        q = tabled_blade(1, first, x, flow, table, pitches)
-        r = tabled_blade(2, first, x, flow, table, pitches)
-        forces = sheared_forces(p, q, r, flow, reach, elements.radius, shape)
+        p = tabled_blade(0, first, x, flow, table, None, blades)
+        q = tabled_blade(1, first, x, flow, table, pitches, blades)
+        r = tabled_blade(2, first, x, flow, table, pitches, blades)
+        forces = sheared_forces(p, q, r, flow, reach, elements.radius)
         if stations_outside(forces) == 0:
             return load_of_three(p, q, r, forces, elements, pitches, blades)
     total, boxed = NO_LOAD, is_boxed(flow, reach, shape, field)
     for number in range(elements.blades):
-        blade = tabled_blade(number, first, x, flow, table, pitches)
+        blade = tabled_blade(number, first, x, flow, table, pitches, blades)
         force = box_force(blade, flow, field, boxed, elements)
         if force.outside > 0:
             force = sampled_force(blade, flow, elements, counters)

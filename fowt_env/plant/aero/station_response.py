@@ -9,6 +9,7 @@ class of the response:
 * Lagging: the tables of induced velocity and of load, with the states of dynamic inflow (section_inflow.py).
 """
 
+from math import pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,15 @@ from fowt_env.plant.aero.blade_elements import (
     pitching_moment,
     solve_section,
 )
-from fowt_env.plant.aero.blade_shape import BladeMotion, StationLoad, Turn, effective_pitch
+from fowt_env.plant.aero.blade_shape import (
+    BentShape,
+    BladeMotion,
+    BladeShape,
+    StationLoad,
+    Turn,
+    bent_attitude,
+    effective_pitch,
+)
 from fowt_env.plant.aero.wake import PER_ELEMENT, Skew, filtered_induction, pace, skew_factor
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
@@ -37,12 +46,17 @@ AHEAD, BEHIND = 512, 64
 REVERSED = 64
 
 
+DENSE_START, DENSE_END, DENSE_ROWS = -5.0, 30.0, 140  # deg, blade pitches in operation
+COARSE_END, COARSE_ROWS = 90.0, 60  # deg, up to feather
+
+
 class Solved(NamedTuple):
     """Computes the response of a blade by blade element momentum."""
 
     number: int  # of the blade
     turn: Turn
     motion: BladeMotion
+    shape: object  # BladeShape, BentShape or None
     induction: float  # 1: momentum balance, 0: none (parked rotor), between: faded
     wind_speed: float  # m/s, relative to the hub
     skewed: Skew
@@ -62,12 +76,19 @@ class Rows(NamedTuple):
     fraction: float
 
 
+class PitchedRows(NamedTuple):
+    """Holds a table over blade pitch of a blade that bends: bending changes the pitch of each section."""
+
+    table: np.ndarray  # (blade pitches, n, directions, components) float32
+    turn: Turn
+
+
 class Tabled(NamedTuple):
     """Computes the response of a blade from the table of quasi-steady loads over the air density."""
 
-    rows: Rows
+    rows: object  # Rows, or PitchedRows of a blade that bends
     arm: np.ndarray  # (n,) m, see section_table.SectionTable
-    shape: object  # BladeShape or None
+    shape: object  # BladeShape, BentShape or None
 
 
 class TabledOrSolved(NamedTuple):
@@ -100,12 +121,12 @@ class Lagging(NamedTuple):
     """Computes the response of a blade from the tables of dynamic inflow, loads over the air density."""
 
     first: int  # index in the state of the blade's first wake state
-    induced: Rows  # of the quasi-steady induced velocity
-    load: Rows  # of the load
+    induced: object  # Rows or PitchedRows of the quasi-steady induced velocity
+    load: object  # of the load
     rate: WakeRate
     ratio: np.ndarray  # (n,) tau_1 over tau_2
     arm: np.ndarray  # (n,) m
-    shape: object  # BladeShape or None
+    shape: object  # BladeShape, BentShape or None
     x: np.ndarray  # state
     dx: np.ndarray  # rates of the state; only those of wake states are written
 
@@ -124,7 +145,7 @@ class Cell(NamedTuple):
 def _solved_load(response, v_normal, v_tangential, j):
     """Return the StationLoad of station j, N/m."""
     elements = response.elements
-    turned = effective_pitch(j, response.turn.pitch, elements.shape)
+    turned = effective_pitch(j, response.turn.pitch, response.shape)
     element = element_of(j, turned, elements)
     guess = first_guess(v_normal, v_tangential, turned, j, elements)
     section = solve_section(v_normal, v_tangential, response.induction, guess, element, elements.polars)
@@ -175,6 +196,58 @@ def cell_of(v_normal, v_tangential, total, first):
     return Cell(np.uintp(k), position - k)  # unsigned indices avoid the test for negative indices
 
 
+@kernel
+def pitch_row(blade_pitch):
+    """Return the fractional row index of a blade pitch (rad) in the table; -1 outside."""
+    degrees = blade_pitch * (180.0 / pi)
+    if DENSE_START <= degrees < DENSE_END:
+        return (degrees - DENSE_START) * (DENSE_ROWS / (DENSE_END - DENSE_START))
+    if DENSE_END <= degrees < COARSE_END:
+        return DENSE_ROWS + (degrees - DENSE_END) * (COARSE_ROWS / (COARSE_END - DENSE_END))
+    return -1.0
+
+
+@inlined_kernel
+def _straight_rows(turn, table, shape):
+    row = pitch_row(turn.pitch)
+    i = int(row)
+    return Rows(table[i], table[i + 1], row - i)
+
+
+@inlined_kernel
+def _bent_rows(turn, table, shape):
+    return PitchedRows(table, turn)
+
+
+@inlined_kernel
+def _same_rows(j, rows, shape):
+    return rows
+
+
+@inlined_kernel
+def _rows_at_station(j, rows, shape):
+    """Return the Rows at the pitch that gives a section without bending the effective pitch of station j."""
+    turn, table, s = rows.turn, rows.table, shape.rest.slope[j]
+    at = bent_attitude(j, turn, shape)
+    across = sqrt(1.0 - s * s) * at.across
+    change = (across * turn.cosine - at.along * turn.sine) / (at.along * turn.cosine + across * turn.sine)
+    change -= change * change * change / 3.0  # of its tangent, a few hundredths
+    low, high = DENSE_START * pi / 180.0, COARSE_END * pi / 180.0 - 1e-9
+    row = pitch_row(min(max(turn.pitch + change, low), high))
+    i = int(row) if row > 0.0 else 0
+    return Rows(table[i], table[i + 1], row - i)
+
+
+# (turn, table, shape) -> Rows of a table that enclose a blade pitch within it, or PitchedRows
+rows_of = chosen_by_class(
+    "shape", {type(None): _straight_rows, BladeShape: _straight_rows, BentShape: _bent_rows}, inlined=True
+)
+# (j, rows, shape) -> Rows of station j
+_station_rows = chosen_by_class(
+    "shape", {type(None): _same_rows, BladeShape: _same_rows, BentShape: _rows_at_station}, inlined=True
+)
+
+
 @inlined_kernel
 def looked_up(cell, j, component, rows):
     """Return a table component of station j in a Cell, bilinear in rows and directions."""
@@ -199,10 +272,11 @@ def _tabled_load(response, v_normal, v_tangential, j):
     total = abs(v_normal) + abs(v_tangential)
     cell, square = cell_of(v_normal, v_tangential, total, 0), total * total
     outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED else 1
+    rows = _station_rows(j, response.rows, response.shape)
     return StationLoad(
-        square * looked_up(cell, j, 0, response.rows),
-        square * looked_up(cell, j, 1, response.rows),
-        square * _tabled_moment(cell, j, response.rows, response.shape),
+        square * looked_up(cell, j, 0, rows),
+        square * looked_up(cell, j, 1, rows),
+        square * _tabled_moment(cell, j, rows, response.shape),
         1.0,
         response.arm[j],
         outside,
@@ -223,7 +297,7 @@ def _tabled_or_solved_load(response, v_normal, v_tangential, j):
 def _exact_load(response, v_normal, v_tangential, j):
     """Return the StationLoad of station j over the air density, by blade element momentum."""
     elements, arm = response.elements, response.tabled.arm
-    turned = effective_pitch(j, response.turn.pitch, elements.shape)
+    turned = effective_pitch(j, response.turn.pitch, response.tabled.shape)
     section = blade_section(v_normal, v_tangential, turned, j, 1.0, elements)
     if not section.solved:
         response.counters[Counter.BEM_FALLBACK] += 1.0
@@ -245,8 +319,9 @@ def _lagging_load(response, v_normal, v_tangential, j):
     x, rate = response.x, response.rate
     total = abs(v_normal) + abs(v_tangential)
     cell = cell_of(v_normal, v_tangential, total, 0)
-    steady_normal = total * looked_up(cell, j, 0, response.induced)
-    steady_tangential = total * looked_up(cell, j, 1, response.induced)
+    rows = _station_rows(j, response.induced, response.shape)
+    steady_normal = total * looked_up(cell, j, 0, rows)
+    steady_tangential = total * looked_up(cell, j, 1, rows)
     slow = pace(-steady_normal / v_normal) * rate.slow
     fast = min(slow * response.ratio[j], rate.most)
     slow = min(slow, rate.most)
@@ -258,10 +333,11 @@ def _lagging_load(response, v_normal, v_tangential, j):
     outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1
     local = abs(through) + abs(along)
     cell, square = cell_of(through, along, local, REVERSED), local * local
+    rows = _station_rows(j, response.load, response.shape)
     return StationLoad(
-        square * looked_up(cell, j, 0, response.load),
-        square * looked_up(cell, j, 1, response.load),
-        square * _tabled_moment(cell, j, response.load, response.shape),
+        square * looked_up(cell, j, 0, rows),
+        square * looked_up(cell, j, 1, rows),
+        square * _tabled_moment(cell, j, rows, response.shape),
         1.0,
         response.arm[j],
         outside,

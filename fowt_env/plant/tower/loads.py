@@ -66,7 +66,7 @@ def displaced_moment(x, bend, tower):
     for i in range(0, n, 2):
         dx += tower.first_moment[i] * x[q + i]
         dy += tower.first_moment[i + 1] * x[q + i + 1]
-    s, m = tower.upper_moment, tower.upper_mass
+    s, m = tower.hanging_moment, tower.hanging_mass
     sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
     return dx + m * bend.x + sx - s[0], dy + m * bend.y + sy - s[1], sz - s[2] - shortening(x, tower)
 
@@ -92,7 +92,7 @@ def add_modal_weight(pose, x, bend, tower, gravity, modal):
     if bend is None:
         return
     n, q, g = len(tower.count), tower.first, gravity
-    s, m = tower.upper_moment, tower.upper_mass
+    s, m = tower.hanging_moment, tower.hanging_mass
     nx, ny, nz = pose.r31, pose.r32, pose.r33
     sx, sy, sz = from_nacelle(bend, s[0], s[1], s[2])
     turning = sx * nz - sz * nx  # moment about the top, over g, along y

@@ -40,6 +40,9 @@ class TowerModes(NamedTuple):
     upper_moment: object = None  # (3,) kg m, first moment of both about the tower top, nacelle axes
     upper_inertia: object = None  # (3, 3) kg m2, about the tower top, nacelle axes
     shaft: object = None  # (3,) direction of the shaft, downwind, nacelle axes
+    # upper_mass and upper_moment, or zeros where the weight of both is in their own equations (elastic/)
+    hanging_mass: float = 0.0
+    hanging_moment: object = None
 
 
 class Bend(NamedTuple):

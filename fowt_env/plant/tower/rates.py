@@ -5,7 +5,7 @@ from typing import NamedTuple
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import State, Wrench
+from fowt_env.plant.state import NO_LOAD, State, Wrench
 from fowt_env.plant.tower.inertia import cross, deflection_rate, masses_of, top_bias, upper_of, upper_rate
 from fowt_env.plant.tower.modes import TowerModes, to_nacelle, turned_pose
 
@@ -65,11 +65,14 @@ nacelle_rates = chosen_by_class("tower", {type(None): _platform_rates, TowerMode
 
 
 @kernel
-def above_base_rate(pose, x, dx, bend, body, tower):
-    """Return the rate of momentum of bent tower, nacelle and rotor, about the body origin, body axes."""
-    n, mass = len(tower.count), tower.upper_mass
-    q, v = tower.first, tower.first + n
-    top, upper, d = _top_rates(pose, bend, dx, tower), upper_of(bend, tower), masses_of(x, tower)
+def upper_momentum_rate(pose, x, dx, bend, body, tower):
+    """Return the rate of momentum of nacelle and rotor, about the body origin, body axes.
+
+    Zero for bending blades, where this is a part of RotorScratch.top_load.
+    """
+    if body.rotor_row == 0.0:
+        return NO_LOAD
+    mass, top, upper = tower.upper_mass, _top_rates(pose, bend, dx, tower), upper_of(bend, tower)
     _, _, _, _, _, _, wx, wy, wz = top_bias(pose, bend)
     spin = body.coupling * x[State.ROTOR_SPEED]
     fx, fy, fz, mx, my, mz = upper_rate(
@@ -79,7 +82,16 @@ def above_base_rate(pose, x, dx, bend, body, tower):
     mx += spun * upper.nx + bend.y * fz - bend.z * fy
     my += spun * upper.ny + bend.z * fx - bend.x * fz
     mz += spun * upper.nz + bend.x * fy - bend.y * fx
+    return Wrench(fx, fy, fz, mx, my, mz)
 
+
+@kernel
+def above_base_rate(pose, x, dx, bend, body, tower):
+    """Return the rate of momentum of bent tower, nacelle and rotor, about the body origin, body axes."""
+    n, d = len(tower.count), masses_of(x, tower)
+    q, v = tower.first, tower.first + n
+    u = upper_momentum_rate(pose, x, dx, bend, body, tower)
+    fx, fy, fz, mx, my, mz = u.fx, u.fy, u.fz, u.mx, u.my, u.mz
     c, e, m = momentum_rate(pose, 0.0, tower.straight, 0.0, None), deflection_rate(pose, d), tower.straight
     ax, ay, az = dx[State.VX], dx[State.VY], dx[State.VZ]
     bx, by, bz = dx[State.WX], dx[State.WY], dx[State.WZ]

@@ -52,14 +52,17 @@ def keep_elastic(x, tower, elastic):
 
 
 @kernel
-def correct_elastic(dt, x, history, body, tower, matrix, elastic, still, extra, y):
+def correct_elastic(dt, x, history, body, tower, blades, matrix, elastic, still, extra, y):
     """Correct the Adams-Bashforth 4 velocities in y for the structural force of the tower.
 
     The force is linear in the new deflections and velocities, so its fourth difference with the new state is
     cheap to evaluate: theory.md, 6.3. matrix: factors left by the solve at the beginning of the step; still
-    and extra (n_state,): scratch. No-op for a rigid tower.
+    and extra (n_state,): scratch. No-op for a rigid tower, and with bending blades, whose short steps resolve
+    the tower.
     """
     if tower is None:
+        return
+    if blades is not None:
         return
     n, q = len(tower.count), tower.first
     v = q + n

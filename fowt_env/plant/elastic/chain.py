@@ -1,0 +1,432 @@
+"""Solves the equation of motion with bending blades: platform, tower, nacelle, shaft, blades.
+
+The rotor is one (6, 6) inertia with a bias (blades.py). Its speed is eliminated, the nacelle is added, then
+the modes of the tower are eliminated as in accelerations.py, and the platform remains. Weight of nacelle and
+rotor enters as an upward acceleration of their frames, so their masses are not in the other weights.
+"""
+
+from typing import NamedTuple
+
+from fowt_env.plant.accelerations import (
+    accelerate_turbine,
+    factor_modes,
+    factor_spd,
+    find_modes,
+    substitute_spd,
+    subtract_modal_rates,
+    without_modes,
+)
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.elastic.blades import (
+    BladeModes,
+    RotorFrame,
+    condense_rotor,
+    fill_blade_accelerations,
+)
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.rigid_body import momentum_rate
+from fowt_env.plant.state import NO_LOAD, State
+from fowt_env.plant.tower.inertia import cross, deflection_rate, masses_of, top_bias
+from fowt_env.plant.tower.modes import Bend, TowerModes, bend_of, from_nacelle, to_nacelle
+
+
+class Top(NamedTuple):
+    """Holds the motion of the frame that carries nacelle and rotor, platform axes, for zero accelerations.
+
+    Its origin is the tower top of a flexible tower, and the body origin with a rigid one.
+    """
+
+    x: float  # m, from the body origin
+    y: float
+    z: float
+    ax: float  # m/s2, without gravity
+    ay: float
+    az: float
+    bx: float  # rad/s2
+    by: float
+    bz: float
+    wx: float  # rad/s
+    wy: float
+    wz: float
+
+
+@kernel
+def _top_of_rigid(pose, bend):
+    ax, ay, az = cross(pose.wx, pose.wy, pose.wz, pose.vx, pose.vy, pose.vz)
+    return Top(0.0, 0.0, 0.0, ax, ay, az, 0.0, 0.0, 0.0, pose.wx, pose.wy, pose.wz)
+
+
+@kernel
+def _top_of_bent(pose, bend):
+    ax, ay, az, bx, by, bz, wx, wy, wz = top_bias(pose, bend)
+    return Top(bend.x, bend.y, bend.z, ax, ay, az, bx, by, bz, wx, wy, wz)
+
+
+@kernel
+def _same_axes(bend, x, y, z):
+    return x, y, z
+
+
+top_of = chosen_by_class("bend", {type(None): _top_of_rigid, Bend: _top_of_bent})
+# (bend, x, y, z) -> platform components of a vector in nacelle axes
+to_platform = chosen_by_class("bend", {type(None): _same_axes, Bend: from_nacelle})
+to_nacelle_axes = chosen_by_class("bend", {type(None): _same_axes, Bend: to_nacelle})
+
+
+@inlined_kernel
+def rotor_frame(pose, bend, gravity, blades):
+    """Return (RotorFrame, rotor centre from the origin of Top (3)), platform axes."""
+    top, c, s = top_of(pose, bend), blades.tilt_cosine, blades.tilt_sine
+    dx, dy, dz = to_platform(bend, blades.centre[0], blades.centre[1], blades.centre[2])
+    nx, ny, nz = to_platform(bend, c, 0.0, -s)
+    zx, zy, zz = to_platform(bend, s, 0.0, c)
+    yx, yy, yz = to_platform(bend, 0.0, 1.0, 0.0)
+    wx, wy, wz = top.wx, top.wy, top.wz
+    px, py, pz = cross(wx, wy, wz, dx, dy, dz)
+    cx, cy, cz = cross(wx, wy, wz, px, py, pz)
+    ex, ey, ez = cross(top.bx, top.by, top.bz, dx, dy, dz)
+    frame = RotorFrame(
+        top.ax + cx + ex + gravity * pose.r31,
+        top.ay + cy + ey + gravity * pose.r32,
+        top.az + cz + ez + gravity * pose.r33,
+        top.bx, top.by, top.bz, wx, wy, wz,
+        nx, ny, nz, zx, zy, zz, yx, yy, yz,
+    )  # fmt: skip
+    return frame, (dx, dy, dz)
+
+
+@kernel
+def _no_rotor(pose, x, bend, body, pitches, blades, work):
+    return
+
+
+@inlined_kernel
+def _condense(pose, x, bend, body, pitches, blades, work):
+    frame, _ = rotor_frame(pose, bend, body.gravity, blades)
+    condense_rotor(x, frame, pitches, blades, work)
+
+
+@inlined_kernel
+def _whole(body, blades):
+    return body
+
+
+@inlined_kernel
+def _below_nacelle(body, blades):
+    return blades.lower
+
+
+# (body, blades) -> RigidBody whose weight is a load: with bending blades without nacelle and rotor
+weighed_body = chosen_by_class("blades", {type(None): _whole, BladeModes: _below_nacelle}, inlined=True)
+
+
+# (pose, x, bend, body, pitches, blades, work): inertia of the rotor with bending blades into work
+condense_blades = chosen_by_class("blades", {type(None): _no_rotor, BladeModes: _condense}, inlined=True)
+
+
+@inlined_kernel
+def _times(matrix, i, j, x, y, z):
+    """Return three rows, from i on, of three columns of a matrix, from j on, times a vector."""
+    return (
+        matrix[i, j] * x + matrix[i, j + 1] * y + matrix[i, j + 2] * z,
+        matrix[i + 1, j] * x + matrix[i + 1, j + 1] * y + matrix[i + 1, j + 2] * z,
+        matrix[i + 2, j] * x + matrix[i + 2, j + 1] * y + matrix[i + 2, j + 2] * z,
+    )
+
+
+@inlined_kernel
+def _shift(inertia, x, y, z):
+    """Move a (6, 6) inertia in place to a point from which its present one lies at (x, y, z)."""
+    for j in range(6):  # moments: plus position times force
+        fx, fy, fz = inertia[0, j], inertia[1, j], inertia[2, j]
+        inertia[3, j] += y * fz - z * fy
+        inertia[4, j] += z * fx - x * fz
+        inertia[5, j] += x * fy - y * fx
+    for i in range(6):
+        fx, fy, fz = inertia[i, 0], inertia[i, 1], inertia[i, 2]
+        inertia[i, 3] += y * fz - z * fy
+        inertia[i, 4] += z * fx - x * fz
+        inertia[i, 5] += x * fy - y * fx
+
+
+@inlined_kernel
+def _add_nacelle(bend, blades, upper):
+    """Add the nacelle to the (6, 6) inertia about the origin of Top, platform axes."""
+    s, m, tensor = blades.nacelle_moment, blades.nacelle_mass, blades.nacelle_inertia
+    sx, sy, sz = to_platform(bend, s[0], s[1], s[2])
+    ax, ay, az = to_platform(bend, tensor[0, 0], tensor[1, 0], tensor[2, 0])  # columns of A tensor
+    bx, by, bz = to_platform(bend, tensor[0, 1], tensor[1, 1], tensor[2, 1])
+    cx, cy, cz = to_platform(bend, tensor[0, 2], tensor[1, 2], tensor[2, 2])
+    xx, xy, xz = to_platform(bend, ax, bx, cx)
+    _, yy, yz = to_platform(bend, ay, by, cy)
+    _, _, zz = to_platform(bend, az, bz, cz)
+    upper[0, 0] += m
+    upper[1, 1] += m
+    upper[2, 2] += m
+    upper[3, 1] -= sz
+    upper[1, 3] -= sz
+    upper[3, 2] += sy
+    upper[2, 3] += sy
+    upper[4, 0] += sz
+    upper[0, 4] += sz
+    upper[4, 2] -= sx
+    upper[2, 4] -= sx
+    upper[5, 0] -= sy
+    upper[0, 5] -= sy
+    upper[5, 1] += sx
+    upper[1, 5] += sx
+    upper[3, 3] += xx
+    upper[4, 4] += yy
+    upper[5, 5] += zz
+    upper[4, 3] += xy
+    upper[3, 4] += xy
+    upper[5, 3] += xz
+    upper[3, 5] += xz
+    upper[5, 4] += yz
+    upper[4, 5] += yz
+
+
+@inlined_kernel
+def _nacelle_load(pose, top, bend, gravity, blades):
+    """Return force and moment of inertia and weight of the nacelle about the origin of Top."""
+    s, m, tensor = blades.nacelle_moment, blades.nacelle_mass, blades.nacelle_inertia
+    wx, wy, wz = top.wx, top.wy, top.wz
+    sx, sy, sz = to_platform(bend, s[0], s[1], s[2])
+    ax, ay, az = top.ax + gravity * pose.r31, top.ay + gravity * pose.r32, top.az + gravity * pose.r33
+    px, py, pz = cross(wx, wy, wz, sx, sy, sz)
+    cx, cy, cz = cross(wx, wy, wz, px, py, pz)
+    ex, ey, ez = cross(top.bx, top.by, top.bz, sx, sy, sz)
+    gx, gy, gz = cross(sx, sy, sz, ax, ay, az)
+    ux, uy, uz = to_nacelle_axes(bend, wx, wy, wz)
+    vx, vy, vz = to_nacelle_axes(bend, top.bx, top.by, top.bz)
+    kx, ky, kz = _times(tensor, 0, 0, ux, uy, uz)
+    tx, ty, tz = _times(tensor, 0, 0, vx, vy, vz)
+    hx, hy, hz = cross(ux, uy, uz, kx, ky, kz)
+    hx, hy, hz = to_platform(bend, tx + hx, ty + hy, tz + hz)
+    return m * ax + cx + ex, m * ay + cy + ey, m * az + cz + ez, gx + hx, gy + hy, gz + hz
+
+
+@inlined_kernel
+def _no_deflection(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
+    return NO_LOAD
+
+
+@inlined_kernel
+def _deflected(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
+    subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
+    return deflection_rate(pose, masses_of(x, tower))
+
+
+# -> Wrench of the velocity terms of the deflected tower; those of the modes, with the force and moment of
+# nacelle and rotor, are subtracted from modal
+_tower_rates = chosen_by_class("tower", {type(None): _no_deflection, TowerModes: _deflected}, inlined=True)
+
+
+@inlined_kernel
+def _only_platform(x, upper, bend, tower, matrix):
+    for i in range(6):
+        for j in range(i + 1):
+            matrix[i, j] += upper[i, j]
+
+
+@inlined_kernel
+def _with_modes(x, upper, bend, tower, matrix):
+    d, n = masses_of(x, tower), len(tower.count)
+    tx, tz = bend.ca, -bend.sa  # axis about which side-side modes rotate the nacelle
+    px, py, pz = bend.x, bend.y, bend.z
+    for i in range(n):
+        slope = tower.slope[i] if i % 2 == 0 else -tower.slope[i]
+        ux, uy = (0.0, slope) if i % 2 == 0 else (slope * tx, 0.0)
+        uz = 0.0 if i % 2 == 0 else slope * tz
+        k = i % 2
+        fx = upper[0, k] + upper[0, 3] * ux + upper[0, 4] * uy + upper[0, 5] * uz
+        fy = upper[1, k] + upper[1, 3] * ux + upper[1, 4] * uy + upper[1, 5] * uz
+        fz = upper[2, k] + upper[2, 3] * ux + upper[2, 4] * uy + upper[2, 5] * uz
+        mx = upper[3, k] + upper[3, 3] * ux + upper[3, 4] * uy + upper[3, 5] * uz
+        my = upper[4, k] + upper[4, 3] * ux + upper[4, 4] * uy + upper[4, 5] * uz
+        mz = upper[5, k] + upper[5, 3] * ux + upper[5, 4] * uy + upper[5, 5] * uz
+        for j in range(i + 1):
+            if j % 2 == 0:
+                value = fx + tower.slope[j] * my
+            else:
+                value = fy - tower.slope[j] * (tx * mx + tz * mz)
+            matrix[6 + i, 6 + j] = value + (tower.mass[i, j] if (i + j) % 2 == 0 else 0.0)
+        over = 0.0  # integral of line mass times shape times the other direction's deflection
+        for j in range(1 - k, n, 2):
+            over += tower.mass[i, j] * x[tower.first + j]
+        row = matrix[6 + i]
+        row[0], row[1], row[2] = fx, fy, fz
+        row[3], row[4], row[5] = mx + py * fz - pz * fy, my + pz * fx - px * fz, mz + px * fy - py * fx
+        row[k] += tower.first_moment[i]
+        if k == 0:
+            row[4] += tower.height_moment[i]
+            row[5] -= over
+        else:
+            row[3] -= tower.height_moment[i]
+            row[5] += over
+    _shift(upper, px, py, pz)
+    for i in range(6):
+        for j in range(i + 1):
+            matrix[i, j] += upper[i, j]
+    _shift(upper, -px, -py, -pz)
+    matrix[3, 2] += d.dy
+    matrix[4, 2] -= d.dx
+    matrix[5, 0] -= d.dy
+    matrix[5, 1] += d.dx
+    matrix[3, 3] += d.gyy
+    matrix[4, 4] += d.gxx
+    matrix[5, 5] += d.gxx + d.gyy
+    matrix[4, 3] -= d.gxy
+    matrix[5, 3] -= d.ex
+    matrix[5, 4] -= d.ey
+
+
+# (x, upper, bend, tower, matrix): upper and the rows of the tower modes into matrix (lower triangle)
+_add_upper = chosen_by_class("tower", {type(None): _only_platform, TowerModes: _with_modes}, inlined=True)
+
+
+@inlined_kernel
+def _no_tower_motion(top, b, modal, bend, tower):
+    return (
+        b[0] + b[4] * top.z - b[5] * top.y, b[1] + b[5] * top.x - b[3] * top.z,
+        b[2] + b[3] * top.y - b[4] * top.x, b[3], b[4], b[5],
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _tower_motion(top, b, modal, bend, tower):
+    ax, ay, az, bx, by, bz = _no_tower_motion(top, b, modal, bend, tower)
+    for i in range(0, len(tower.count), 2):
+        rolling = tower.slope[i + 1] * modal[i + 1]
+        ax += modal[i]
+        ay += modal[i + 1]
+        bx -= rolling * bend.ca
+        by += tower.slope[i] * modal[i]
+        bz += rolling * bend.sa
+    return ax, ay, az, bx, by, bz
+
+
+# (top, b, modal, bend, tower) -> accelerations of the origin of Top and of the nacelle, without their bias
+_top_motion = chosen_by_class(
+    "tower", {type(None): _no_tower_motion, TowerModes: _tower_motion}, inlined=True
+)
+
+
+@kernel
+def _no_modes(tower):
+    return 0, 0
+
+
+@kernel
+def _velocities_of(tower):
+    return tower.first + len(tower.count), len(tower.count)
+
+
+# (tower) -> (index of the first velocity of a deflection, number of modes)
+_modes_in_state = chosen_by_class("tower", {type(None): _no_modes, TowerModes: _velocities_of})
+
+
+@inlined_kernel
+def accelerate_elastic(pose, x, load, torque, added, body, tower, blades, matrix, work, cache, dx):
+    """Fill dx with the accelerations of platform, tower modes, rotor and blade modes.
+
+    load: on the whole turbine about the body origin, without the weight of nacelle and rotor. On entry dx has
+    the generalised forces on the tower deflections in place of their accelerations, and work the rotor
+    (condense_blades). matrix (6 + n, 6 + n) keeps its factors as in accelerate.
+    """
+    bend = bend_of(x, tower)
+    top = top_of(pose, bend)
+    f, centre = rotor_frame(pose, bend, body.gravity, blades)
+    cx, cy, cz = centre
+    first, n = _modes_in_state(tower)
+    b, modal = dx[State.VX : State.WZ + 1], dx[first : first + n]
+    bias, h, upper, gear = work.bias, work.shaft, work.upper, blades.generator_coupling
+    if cache[LoadCache.FACTORED] < 0.5:
+        for i in range(6):
+            h[i] = work.inertia[i, 3] * f.nx + work.inertia[i, 4] * f.ny + work.inertia[i, 5] * f.nz
+        h[3] += gear * f.nx
+        h[4] += gear * f.ny
+        h[5] += gear * f.nz
+    row = f.nx * h[3] + f.ny * h[4] + f.nz * h[5] + blades.generator_row - gear
+    known = torque - f.nx * bias[3] - f.ny * bias[4] - f.nz * bias[5]
+    known -= gear * (f.nx * f.bx + f.ny * f.by + f.nz * f.bz)
+    free = 0.0 if body.rotor_fixed else 1.0 / row
+    if cache[LoadCache.FACTORED] < 0.5:
+        for i in range(6):
+            for j in range(6):
+                upper[i, j] = work.inertia[i, j] - free * h[i] * h[j]
+        _shift(upper, cx, cy, cz)
+        _add_nacelle(bend, blades, upper)
+        for i in range(6):
+            for j in range(i + 1):
+                matrix[i, j] = blades.lower.mass_matrix[i, j] + added[i, j]
+        _add_upper(x, upper, bend, tower, matrix)
+        factor_modes(matrix, n)
+        if not body.platform_fixed:
+            factor_spd(matrix)
+        cache[LoadCache.FACTORED] = 1.0
+    spin, push = gear * x[State.ROTOR_SPEED], free * known
+    gx, gy, gz = cross(f.wx, f.wy, f.wz, f.nx, f.ny, f.nz)
+    fx, fy, fz = bias[0] + push * h[0], bias[1] + push * h[1], bias[2] + push * h[2]
+    mx, my, mz = bias[3] + push * h[3], bias[4] + push * h[4], bias[5] + push * h[5]
+    mx, my, mz = mx + spin * gx, my + spin * gy, mz + spin * gz
+    mx, my, mz = mx + cy * fz - cz * fy, my + cz * fx - cx * fz, mz + cx * fy - cy * fx
+    ex, ey, ez, kx, ky, kz = _nacelle_load(pose, top, bend, body.gravity, blades)
+    fx, fy, fz, mx, my, mz = fx + ex, fy + ey, fz + ez, mx + kx, my + ky, mz + kz
+
+    c = momentum_rate(pose, 0.0, blades.lower.mass_matrix, 0.0, None)
+    e = _tower_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
+    b[0] = load.fx - c.fx - e.fx - fx
+    b[1] = load.fy - c.fy - e.fy - fy
+    b[2] = load.fz - c.fz - e.fz - fz
+    b[3] = load.mx - c.mx - e.mx - mx - top.y * fz + top.z * fy
+    b[4] = load.my - c.my - e.my - my - top.z * fx + top.x * fz
+    b[5] = load.mz - c.mz - e.mz - mz - top.x * fy + top.y * fx
+    without_modes(matrix, b, modal, n)
+    if body.platform_fixed:
+        b[:] = 0.0
+    else:
+        substitute_spd(matrix, b)
+    find_modes(matrix, b, modal, n)
+
+    ax, ay, az, bx, by, bz = _top_motion(top, b, modal, bend, tower)
+    load_of_top, load_of_hub, motion = work.top_load, work.hub_load, work.motion
+    for i in range(6):
+        load_of_top[i] = -(
+            upper[i, 0] * ax + upper[i, 1] * ay + upper[i, 2] * az
+            + upper[i, 3] * bx + upper[i, 4] * by + upper[i, 5] * bz
+        )  # fmt: skip
+    load_of_top[0] -= fx
+    load_of_top[1] -= fy
+    load_of_top[2] -= fz
+    load_of_top[3] -= mx
+    load_of_top[4] -= my
+    load_of_top[5] -= mz
+    motion[0], motion[1], motion[2] = ax + by * cz - bz * cy, ay + bz * cx - bx * cz, az + bx * cy - by * cx
+    motion[3], motion[4], motion[5] = bx, by, bz
+    turning = 0.0
+    for i in range(6):
+        turning += h[i] * motion[i]
+    rate = free * (known - turning)
+    dx[State.ROTOR_SPEED] = rate
+    motion[3] += rate * f.nx
+    motion[4] += rate * f.ny
+    motion[5] += rate * f.nz
+    for i in range(6):
+        total = bias[i]
+        for j in range(6):
+            total += work.inertia[i, j] * motion[j]
+        load_of_hub[i] = -total
+    fill_blade_accelerations(motion, blades, work, dx)
+
+
+@inlined_kernel
+def _with_rigid_blades(pose, x, load, torque, added, body, tower, blades, matrix, work, cache, dx):
+    accelerate_turbine(pose, x, load, torque, added, body, tower, matrix, cache, dx)
+
+
+# (pose, x, load, torque, added, body, tower, blades, matrix, work, cache, dx): accelerations into dx
+accelerate_all = chosen_by_class(
+    "blades", {type(None): _with_rigid_blades, BladeModes: accelerate_elastic}, inlined=True
+)
