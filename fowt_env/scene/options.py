@@ -12,6 +12,7 @@ from fowt_env.plant.aero.coefficient_table import build_coefficient_table
 from fowt_env.plant.aero.load import BemRotor
 from fowt_env.plant.aero.section_inflow import build_dynamic_sections
 from fowt_env.plant.aero.section_table import build_section_table
+from fowt_env.plant.aero.tower_influence import POTENTIAL, SHADOW
 from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.weather.second_order import METHODS
@@ -22,7 +23,7 @@ class RotorModel(NamedTuple):
 
     summary: str
     build: Callable[[BladeElements, Mapping[str, Any]], Any]  # (elements, options) -> part of the model
-    wake: tuple[str, ...]  # entries of WAKE_OPTIONS that the model supports
+    supports: tuple[str, ...]  # entries of STATION_OPTIONS
     full_field: bool  # whether blades sample a wind box point by point; else the rotor average is used
     error: float  # of a motion or tension at most, rms over its standard deviation: performance.md
 
@@ -62,19 +63,21 @@ def _build_lookup(elements, options):
 
 
 WAKE_OPTIONS = ("dynamic_inflow", "skewed_wake")  # options that need the induced velocity
+# options that need the flow at each blade station
+STATION_OPTIONS = (*WAKE_OPTIONS, "tower_potential", "tower_shadow")
 ROTORS = {
     "bem": RotorModel(
         "blade-element momentum solved at every blade and station",
-        _build_bem, wake=WAKE_OPTIONS, full_field=True, error=0.0,
+        _build_bem, supports=STATION_OPTIONS, full_field=True, error=0.0,
     ),
     "lookup": RotorModel(
         "the same sweep from a table per station",
-        _build_lookup, wake=("dynamic_inflow",), full_field=True, error=2e-4,
+        _build_lookup, supports=("dynamic_inflow", "tower_potential", "tower_shadow"), full_field=True, error=2e-4,
     ),
     "table": RotorModel(
         "the whole rotor as one table",
         lambda elements, options: build_coefficient_table(elements),
-        wake=(), full_field=False, error=2e-2,
+        supports=(), full_field=False, error=2e-2,
     ),
 }  # fmt: skip
 FIDELITIES = {
@@ -138,6 +141,9 @@ OPTIONS = {
         "correction of wave loads on a large column; None: the platform's"),
     "skewed_wake": Option(False, (False, True), "loads of yawed inflow at rotor model bem"),
     "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
+    "tower_potential": Option(False, POTENTIAL,
+        "potential flow around the tower at the blades, also with the correction of Bak"),
+    "tower_shadow": Option(False, SHADOW, "wake behind the tower at the blades"),
     "tower_drag": Option(True, (False, True), "wind drag of the tower"),
     "hydrodynamics": Option(True, (False, True), "all loads of the water"),
     # True: that of the fidelity; "table": tensions tabulated about rest, solved outside the table
@@ -198,11 +204,11 @@ def choose_parts(fidelity, rotor, options):
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in tuple(ROTORS):
         raise unknown("rotor model", rotor, ROTORS)
-    # not all models support a wake: a fidelity falls back to one that does, an explicit choice is rejected
-    required = [name for name in WAKE_OPTIONS if options[name]]
-    able = [name for name, model in ROTORS.items() if set(required) <= set(model.wake)]
+    # a fidelity falls back to a model that supports these options, an explicit choice is rejected
+    required = [name for name in STATION_OPTIONS if options[name]]
+    able = [name for name, model in ROTORS.items() if set(required) <= set(model.supports)]
     if rotor is not None and rotor not in able:
-        lacking = " and ".join(name for name in required if name not in ROTORS[rotor].wake)
+        lacking = " and ".join(name for name in required if name not in ROTORS[rotor].supports)
         need = " or ".join(repr(name) for name in able)
         raise InputError(f"rotor = {rotor!r}: does not support {lacking}, which needs rotor = {need}")
     options["fidelity"] = fidelity

@@ -5,6 +5,7 @@ from math import cos, radians, sin
 import numpy as np
 
 from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.platform import tower_sections
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.blade_shape import is_curved
@@ -12,6 +13,7 @@ from fowt_env.plant.aero.load import Aero, BemRotor
 from fowt_env.plant.aero.section_inflow import DynamicSections
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.tower_drag import build_tower_drag
+from fowt_env.plant.aero.tower_influence import build_tower_influence
 from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
@@ -55,9 +57,16 @@ def build_aero(platform, turbine, air, rotor, options):
     """Return the aero part of a scene with wind."""
     density = platform.environment.air_density
     elements = build_elements(turbine, density, options["blade_stations"])
+    elements = elements._replace(tower=tower_influence_of(platform, turbine, options))
     model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
     return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)
+
+
+def tower_influence_of(platform, turbine, options):
+    """Return the TowerInfluence of a scene, None without one."""
+    models = options["tower_potential"], options["tower_shadow"]
+    return build_tower_influence(tower_sections(platform.tower), *models, turbine.rotor)
 
 
 def build_blade_pitches(turbine, rotor, first_state):

@@ -13,6 +13,7 @@ from fowt_env.plant.aero.blade_sweep import (
     add_blade,
     faded_induction,
     motion_of,
+    near_tower,
     rotor_axes_load,
     rotor_flow,
     swept,
@@ -50,7 +51,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
         response = Solved(
             number, turn, motion, induction, wind_speed, skewed, skew, wake, x, dx, counters, rotor
         )
-        blade = Blade(number, motion, turn, response)
+        blade = Blade(number, motion, turn, response, near_tower(flow, flow.tower))
         force = swept(SampledWind(flow, motion), blade, rotor.radius, rotor.shape)
         total = add_blade(total, blade, force.load, 1.0, pitches, blades)
     return rotor_axes_load(total, 1.0, rotor)

@@ -73,6 +73,7 @@ class BladeElements(NamedTuple):
     polars: Polars
     shape: object  # blade_shape.BladeShape, or None: straight blades in the rotor plane
     guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, initial inflow angles; see first_guess
+    tower: object = None  # tower_influence.TowerInfluence on the wind of the blades, or None
 
 
 class Element(NamedTuple):

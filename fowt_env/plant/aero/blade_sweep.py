@@ -24,6 +24,7 @@ from fowt_env.plant.aero.blade_shape import (
     with_blade,
 )
 from fowt_env.plant.aero.station_response import put_rates, station_load
+from fowt_env.plant.aero.tower_influence import beside_tower
 from fowt_env.plant.aero.wind import (
     Profile,
     WindNow,
@@ -80,6 +81,7 @@ class RotorFlow(NamedTuple):
     now: WindNow
     series: WindSeries
     field: object  # wind_field.WindField or None
+    tower: object  # tower_influence.TowerInfluence or None
 
 
 class Blade(NamedTuple):
@@ -89,6 +91,7 @@ class Blade(NamedTuple):
     motion: BladeMotion
     turn: Turn
     response: object  # of station_response.py
+    near: object  # RotorFlow if the tower disturbs the wind, else None
 
 
 class SampledWind(NamedTuple):
@@ -150,7 +153,15 @@ def hub_flow(t, pose, now, series, field, overhang, hub_height):
 def rotor_flow(t, pose, now, series, field, elements):
     """Return the RotorFlow at time t; pose in rotor axes (tilt.py), wind as in wind.wind_at."""
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
-    return RotorFlow(t, pose, hub, now, series, field)
+    return RotorFlow(t, pose, hub, now, series, field, elements.tower)
+
+
+@kernel
+def near_tower(flow, tower):
+    """Return the RotorFlow of a rotor whose wind the tower disturbs; tower None: None."""
+    if tower is None:
+        return None
+    return flow
 
 
 @kernel
@@ -306,7 +317,9 @@ relative_wind = chosen_by_class(
 @inlined_kernel
 def _station(j, wind, blade, radius, shape):
     """Return the StationLoad of station j of a Blade."""
-    v_normal, v_tangential = relative_wind(wind, station_at(j, blade.turn, radius, shape))
+    at = station_at(j, blade.turn, radius, shape)
+    v_normal, v_tangential = relative_wind(wind, at)
+    v_normal, v_tangential = beside_tower(v_normal, v_tangential, at, blade.motion, blade.near)
     return station_load(blade.response, v_normal, v_tangential, j)
 
 

@@ -29,6 +29,7 @@ from fowt_env.plant.aero.blade_sweep import (
     is_sheared,
     load_of_three,
     motion_of,
+    near_tower,
     rotor_flow,
     rotor_reach,
     sheared_forces,
@@ -100,7 +101,7 @@ def build_dynamic_sections(elements, wake):
 
     19 stations: 37 MB, 1 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
-    unit = elements._replace(air_density=1.0)
+    unit = elements._replace(air_density=1.0, tower=None)
     induced, load = _tables.get(elements_key(unit), lambda: _filled_tables(unit))
     free = wake._replace(least=0.0)
     lags = np.array([time_constants(0.0, 1.0, r, elements.tip_radius, free) for r in elements.radius])
@@ -138,7 +139,8 @@ def _blade(number, first, x, flow, rate, rotor, dx, pitches):
     turn, induced, load = _blade_rows(number, first, x, rotor, pitches)
     state = State.INTERNAL + PER_ELEMENT * elements.radius.shape[0] * number
     response = Lagging(state, induced, load, rate, rotor.ratio, rotor.arm, elements.shape, x, dx)
-    return Blade(number, motion_of(number, x, elements, flow), turn, response)
+    near = near_tower(flow, flow.tower)
+    return Blade(number, motion_of(number, x, elements, flow), turn, response, near)
 
 
 @kernel

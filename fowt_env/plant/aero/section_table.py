@@ -35,6 +35,7 @@ from fowt_env.plant.aero.blade_sweep import (
     is_sheared,
     load_of_three,
     motion_of,
+    near_tower,
     rotor_axes_load,
     rotor_flow,
     rotor_reach,
@@ -98,7 +99,7 @@ def build_section_table(elements):
 
     19 stations: 18 MB, 0.8 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
-    unit = elements._replace(air_density=1.0)
+    unit = elements._replace(air_density=1.0, tower=None)
     load = _tables.get(elements_key(unit), lambda: _filled_table(unit))
     return SectionTable(load, station_arms(elements), elements)
 
@@ -177,7 +178,8 @@ def _blade_response(number, first, x, table, pitches):
 def tabled_blade(number, first, x, flow, table, pitches):
     """Return the Blade with this number; first: (Turn, Tabled) of the first blade."""
     turn, response = _blade_response(number, first, x, table, pitches)
-    return Blade(number, motion_of(number, x, table.elements, flow), turn, response)
+    near = near_tower(flow, flow.tower)
+    return Blade(number, motion_of(number, x, table.elements, flow), turn, response, near)
 
 
 @inlined_kernel
@@ -194,7 +196,7 @@ def box_force(blade, flow, field, boxed, elements):
 def sampled_force(blade, flow, elements, counters):
     """Return the BladeForce with the wind sampled at each station; inflows outside the table are solved."""
     sure = TabledOrSolved(blade.response, blade.turn, elements, counters)
-    blade = Blade(blade.number, blade.motion, blade.turn, sure)
+    blade = Blade(blade.number, blade.motion, blade.turn, sure, blade.near)
     return swept(SampledWind(flow, blade.motion), blade, elements.radius, elements.shape)
 
 
