@@ -46,20 +46,23 @@ def least_lag(dt, integrator):
     return LAG_MARGIN * dt / INTEGRATORS[integrator].decay_limit
 
 
-def _build_wake(options):
-    return build_dynamic_inflow(least=least_lag(default_step(options), options["integrator"]))
+def _wake_models(options):
+    """Return (DynamicInflow or None, SkewedWake or None) of the options."""
+    least = least_lag(default_step(options), options["integrator"])
+    wake = build_dynamic_inflow(least=least) if options["dynamic_inflow"] else None
+    return wake, build_skewed_wake() if options["skewed_wake"] else None
 
 
 def _build_bem(elements, options):
-    skew = build_skewed_wake() if options["skewed_wake"] else None
-    wake = _build_wake(options) if options["dynamic_inflow"] else None
+    wake, skew = _wake_models(options)
     return BemRotor(elements, skew, wake)
 
 
 def _build_lookup(elements, options):
-    if options["dynamic_inflow"]:
-        return build_dynamic_sections(elements, _build_wake(options))
-    return build_section_table(elements)
+    wake, skew = _wake_models(options)
+    if wake is None and skew is None:
+        return build_section_table(elements)
+    return build_dynamic_sections(elements, wake, skew)
 
 
 WAKE_OPTIONS = ("dynamic_inflow", "skewed_wake")  # options that need the induced velocity
@@ -72,7 +75,7 @@ ROTORS = {
     ),
     "lookup": RotorModel(
         "the same sweep from a table per station",
-        _build_lookup, supports=("dynamic_inflow", "tower_potential", "tower_shadow"), full_field=True, error=2e-4,
+        _build_lookup, supports=STATION_OPTIONS, full_field=True, error=2e-4,
     ),
     "table": RotorModel(
         "the whole rotor as one table",
@@ -139,7 +142,7 @@ OPTIONS = {
     "stretching": Option("wheeler", ("wheeler", "none"), "wave kinematics above still water"),
     "diffraction": Option(None, (None, "none", "maccamy_fuchs"),
         "correction of wave loads on a large column; None: the platform's"),
-    "skewed_wake": Option(False, (False, True), "loads of yawed inflow at rotor model bem"),
+    "skewed_wake": Option(False, (False, True), "induction over the azimuth in yawed or tilted inflow"),
     "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
     "tower_potential": Option(False, POTENTIAL,
         "potential flow around the tower at the blades, also with the correction of Bak"),

@@ -24,7 +24,7 @@ from fowt_env.plant.aero.blade_shape import (
     with_blade,
 )
 from fowt_env.plant.aero.station_response import put_rates, station_load
-from fowt_env.plant.aero.tower_influence import beside_tower
+from fowt_env.plant.aero.tower_influence import TowerInfluence, beside_tower
 from fowt_env.plant.aero.wind import (
     Profile,
     WindNow,
@@ -156,12 +156,18 @@ def rotor_flow(t, pose, now, series, field, elements):
     return RotorFlow(t, pose, hub, now, series, field, elements.tower)
 
 
-@kernel
-def near_tower(flow, tower):
-    """Return the RotorFlow of a rotor whose wind the tower disturbs; tower None: None."""
-    if tower is None:
-        return None
+@inlined_kernel
+def _undisturbed(flow, tower):
+    return None
+
+
+@inlined_kernel
+def _disturbed(flow, tower):
     return flow
+
+
+# (flow, tower) -> the RotorFlow where the tower disturbs the wind, else None
+near_tower = chosen_by_class("tower", {type(None): _undisturbed, TowerInfluence: _disturbed}, inlined=True)
 
 
 @kernel

@@ -6,7 +6,8 @@ class of the response:
 * Solved: blade element momentum, with the optional models of the wake (bem_rotor.py);
 * Tabled: the table of quasi-steady loads (section_table.py);
 * TabledOrSolved: as Tabled, with blade element momentum for inflows outside the table;
-* Lagging: the tables of induced velocity and of load, with the states of dynamic inflow (section_inflow.py).
+* Induced: the tables of induced velocity and of load (section_inflow.py), for a skewed wake;
+* Lagging: as Induced, with the states of dynamic inflow.
 """
 
 from typing import NamedTuple
@@ -24,7 +25,14 @@ from fowt_env.plant.aero.blade_elements import (
     solve_section,
 )
 from fowt_env.plant.aero.blade_shape import BladeMotion, StationLoad, Turn, effective_pitch
-from fowt_env.plant.aero.wake import PER_ELEMENT, Skew, filtered_induction, pace, skew_factor
+from fowt_env.plant.aero.wake import (
+    PER_ELEMENT,
+    Skew,
+    filtered_induction,
+    pace,
+    skew_factor,
+    skewed_induction,
+)
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
@@ -96,6 +104,16 @@ class WakeRates(NamedTuple):
     tangential_1: float
 
 
+class Induced(NamedTuple):
+    """Computes the response of a blade from the tables of induced velocity and load over the air density."""
+
+    induced: Rows  # of the quasi-steady induced velocity
+    load: Rows  # of the load
+    arm: np.ndarray  # (n,) m
+    shape: object  # BladeShape or None
+    skew: object  # wake.BladeSkew or None
+
+
 class Lagging(NamedTuple):
     """Computes the response of a blade from the tables of dynamic inflow, loads over the air density."""
 
@@ -106,6 +124,7 @@ class Lagging(NamedTuple):
     ratio: np.ndarray  # (n,) tau_1 over tau_2
     arm: np.ndarray  # (n,) m
     shape: object  # BladeShape or None
+    skew: object  # wake.BladeSkew or None
     x: np.ndarray  # state
     dx: np.ndarray  # rates of the state; only those of wake states are written
 
@@ -237,23 +256,19 @@ def _exact_load(response, v_normal, v_tangential, j):
 
 
 @inlined_kernel
-def _lagging_load(response, v_normal, v_tangential, j):
-    """Return the StationLoad of station j over the air density, with WakeRates.
-
-    The filter is that of wake.filtered_induction.
-    """
-    x, rate = response.x, response.rate
+def _steady_induction(response, v_normal, v_tangential, j):
+    """Return the quasi-steady induced velocity (normal, tangential) of station j, m/s."""
     total = abs(v_normal) + abs(v_tangential)
     cell = cell_of(v_normal, v_tangential, total, 0)
-    steady_normal = total * looked_up(cell, j, 0, response.induced)
-    steady_tangential = total * looked_up(cell, j, 1, response.induced)
-    slow = pace(-steady_normal / v_normal) * rate.slow
-    fast = min(slow * response.ratio[j], rate.most)
-    slow = min(slow, rate.most)
-    i = response.first + PER_ELEMENT * j
-    a, b, c, d = np.uintp(i), np.uintp(i + 1), np.uintp(i + 2), np.uintp(i + 3)
-    first_normal, normal, first_tangential, tangential = x[a], x[b], x[c], x[d]
-    through, along = v_normal + normal, v_tangential + tangential
+    return total * looked_up(cell, j, 0, response.induced), total * looked_up(cell, j, 1, response.induced)
+
+
+@inlined_kernel
+def _local_load(response, v_normal, v_tangential, normal, tangential, rates, j):
+    """Return the StationLoad of station j over the air density with this induced velocity and WakeRates."""
+    total = abs(v_normal) + abs(v_tangential)
+    through = v_normal + skewed_induction(normal, v_normal, j, response.skew)
+    along = v_tangential + tangential
     known = through > 0.0 or REVERSED * v_tangential >= -AHEAD * through
     outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1
     local = abs(through) + abs(along)
@@ -265,14 +280,39 @@ def _lagging_load(response, v_normal, v_tangential, j):
         1.0,
         response.arm[j],
         outside,
-        WakeRates(
-            i,
-            (0.4 * steady_normal - first_normal) * slow,
-            (first_normal + 0.6 * steady_normal - normal) * fast,
-            (0.4 * steady_tangential - first_tangential) * slow,
-            (first_tangential + 0.6 * steady_tangential - tangential) * fast,
-        ),
+        rates,
     )
+
+
+@inlined_kernel
+def _induced_table_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j over the air density."""
+    normal, tangential = _steady_induction(response, v_normal, v_tangential, j)
+    return _local_load(response, v_normal, v_tangential, normal, tangential, None, j)
+
+
+@inlined_kernel
+def _lagging_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j over the air density, with WakeRates.
+
+    The filter is that of wake.filtered_induction.
+    """
+    x, rate = response.x, response.rate
+    steady_normal, steady_tangential = _steady_induction(response, v_normal, v_tangential, j)
+    slow = pace(-steady_normal / v_normal) * rate.slow
+    fast = min(slow * response.ratio[j], rate.most)
+    slow = min(slow, rate.most)
+    i = response.first + PER_ELEMENT * j
+    a, b, c, d = np.uintp(i), np.uintp(i + 1), np.uintp(i + 2), np.uintp(i + 3)
+    first_normal, normal, first_tangential, tangential = x[a], x[b], x[c], x[d]
+    rates = WakeRates(
+        i,
+        (0.4 * steady_normal - first_normal) * slow,
+        (first_normal + 0.6 * steady_normal - normal) * fast,
+        (0.4 * steady_tangential - first_tangential) * slow,
+        (first_tangential + 0.6 * steady_tangential - tangential) * fast,
+    )
+    return _local_load(response, v_normal, v_tangential, normal, tangential, rates, j)
 
 
 @inlined_kernel
@@ -292,6 +332,7 @@ station_load = chosen_by_class(
         Solved: _solved_load,
         Tabled: _tabled_load,
         TabledOrSolved: _tabled_or_solved_load,
+        Induced: _induced_table_load,
         Lagging: _lagging_load,
     },
     inlined=True,
