@@ -17,6 +17,7 @@ from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
 from fowt_env.scene.options import checked_options, choose_parts, default_step, samples_per_step
 from fowt_env.scene.parts import (
+    airfoil_states,
     build_aero,
     build_blade_pitches,
     build_current,
@@ -24,6 +25,7 @@ from fowt_env.scene.parts import (
     build_moorings,
     check_symmetry,
     wake_states,
+    with_airfoil_step,
 )
 from fowt_env.scene.plausibility import warn_of_weather
 from fowt_env.scene.scene import Scene
@@ -90,12 +92,13 @@ def build_scene(
     mooring = build_moorings(platform.lines, options["mooring"])
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], options["planar"])
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
-    first_state = N_RIGID + wake_states(aero)
+    first_state = N_RIGID + wake_states(aero) + airfoil_states(aero)
     next_state = first_state + sum(load.states for load in user)
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
     tower = with_masses(tower, platform, turbine)
     dt = default_step(options, tower_frequency(tower))
+    aero = with_airfoil_step(aero, dt)
     pitches = None
     if options["pitch"] == "individual":
         pitches = build_blade_pitches(turbine, rotor, next_state)

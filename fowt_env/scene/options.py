@@ -13,8 +13,10 @@ from fowt_env.plant.aero.load import BemRotor
 from fowt_env.plant.aero.section_inflow import build_dynamic_sections
 from fowt_env.plant.aero.section_table import build_section_table
 from fowt_env.plant.aero.tower_influence import POTENTIAL, SHADOW
-from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake
+from fowt_env.plant.aero.unsteady_airfoil import build_unsteady_airfoils
+from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
 from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.plant.state import N_RIGID
 from fowt_env.weather.second_order import METHODS
 
 
@@ -53,21 +55,30 @@ def _wake_models(options):
     return wake, build_skewed_wake() if options["skewed_wake"] else None
 
 
+def _with_airfoils(elements, wake, options):
+    """Return the BladeElements with UnsteadyAirfoils, whose states follow those of the wake; or unchanged."""
+    if not options["unsteady_airfoils"]:
+        return elements
+    first = N_RIGID + n_wake_states(elements, wake)
+    return elements._replace(airfoils=build_unsteady_airfoils(elements, first, default_step(options)))
+
+
 def _build_bem(elements, options):
     wake, skew = _wake_models(options)
-    return BemRotor(elements, skew, wake)
+    return BemRotor(_with_airfoils(elements, wake, options), skew, wake)
 
 
 def _build_lookup(elements, options):
     wake, skew = _wake_models(options)
-    if wake is None and skew is None:
+    elements = _with_airfoils(elements, wake, options)
+    if wake is None and skew is None and elements.airfoils is None:
         return build_section_table(elements)
     return build_dynamic_sections(elements, wake, skew)
 
 
 WAKE_OPTIONS = ("dynamic_inflow", "skewed_wake")  # options that need the induced velocity
 # options that need the flow at each blade station
-STATION_OPTIONS = (*WAKE_OPTIONS, "tower_potential", "tower_shadow")
+STATION_OPTIONS = (*WAKE_OPTIONS, "unsteady_airfoils", "tower_potential", "tower_shadow")
 ROTORS = {
     "bem": RotorModel(
         "blade-element momentum solved at every blade and station",
@@ -144,6 +155,8 @@ OPTIONS = {
         "correction of wave loads on a large column; None: the platform's"),
     "skewed_wake": Option(False, (False, True), "induction over the azimuth in yawed or tilted inflow"),
     "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
+    "unsteady_airfoils": Option(False, (False, "hgm"),
+        "lag of lift and drag behind the angle of attack: Beddoes-Leishman model with four states (hgm)"),
     "tower_potential": Option(False, POTENTIAL,
         "potential flow around the tower at the blades, also with the correction of Bak"),
     "tower_shadow": Option(False, SHADOW, "wake behind the tower at the blades"),

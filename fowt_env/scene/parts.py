@@ -14,6 +14,7 @@ from fowt_env.plant.aero.section_inflow import DynamicSections
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.tower_drag import build_tower_drag
 from fowt_env.plant.aero.tower_influence import build_tower_influence
+from fowt_env.plant.aero.unsteady_airfoil import n_airfoil_states
 from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
@@ -43,6 +44,21 @@ def wake_states(aero):
     """Return the number of states of the wake of an Aero part or None."""
     rotor = None if aero is None else aero.rotor
     return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
+
+
+def airfoil_states(aero):
+    """Return the number of states of the unsteady airfoils of an Aero part or None."""
+    rotor = None if aero is None else aero.rotor
+    return n_airfoil_states(rotor.elements) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
+
+
+def with_airfoil_step(aero, dt):
+    """Return the Aero part with unsteady airfoils for the time step dt (s); unchanged without them."""
+    if not airfoil_states(aero):
+        return aero
+    elements = aero.rotor.elements
+    elements = elements._replace(airfoils=elements.airfoils._replace(dt=float(dt)))
+    return aero._replace(rotor=aero.rotor._replace(elements=elements))
 
 
 def build_elements(turbine, density, count):

@@ -201,6 +201,7 @@ TOWER = _keys(
 
 _INDUCTION = Otherwise(True, "", "included")
 _QUASI_STEADY = "quasi-steady induction; dynamic with the option dynamic_inflow"
+_STEADY_POLARS = "quasi-steady polars; with the option unsteady_airfoils the four-state model (UA_Mod 4)"
 _SKEWED = "with the option skewed_wake the correction of Pitt and Peters, 15 pi / 32"
 AERODYN = _keys(
     "NumAFfiles InCol_Alfa InCol_Cl InCol_Cd InCol_Cm UseBlCm AFTabMod AFNames ADBlFile# ADBlFile"
@@ -225,8 +226,8 @@ AERODYN = _keys(
         for key in ("Wake_Mod", "WakeMod")
     },
     DBEMT_Mod=Otherwise((0, -1), "dynamic wake", _QUASI_STEADY, when=_blade_element_wake),
-    UA_Mod=Otherwise(0, "unsteady airfoil aerodynamics", "quasi-steady polars"),
-    AFAeroMod=Otherwise(1, "unsteady airfoil aerodynamics", "quasi-steady polars"),
+    UA_Mod=Otherwise(0, "unsteady airfoil aerodynamics", _STEADY_POLARS),
+    AFAeroMod=Otherwise(1, "unsteady airfoil aerodynamics", _STEADY_POLARS),
     Buoyancy=Otherwise(False, "buoyancy of blades and tower", "none"),
     NacelleDrag=Otherwise(False, "drag of the nacelle", "none"),
     TFinAero=Otherwise(False, "tail fin", "none"),

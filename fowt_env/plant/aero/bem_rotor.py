@@ -19,6 +19,7 @@ from fowt_env.plant.aero.blade_sweep import (
     swept,
 )
 from fowt_env.plant.aero.station_response import Solved
+from fowt_env.plant.aero.unsteady_airfoil import airfoil_blade
 from fowt_env.plant.aero.wake import skew_of
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import kernel
@@ -32,7 +33,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
     pose                in rotor axes (tilt.py)
     now, series, field  wind (wind.py), sampled at the present position of every station
     skew, wake          optional SkewedWake and DynamicInflow (wake.py)
-    dx                  rates of the state: only those of wake states are written
+    dx                  rates of the state: only those of wake and airfoil states are written
     counters            counters[Counter.BEM_FALLBACK] is incremented for each station without a root
     pitches             BladePitches, or None: one pitch for all blades
     blades              with pitches: output, the BladeLoad of each blade, (blades, 6)
@@ -48,8 +49,9 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
     total = NO_LOAD
     for number in range(rotor.blades):
         motion, turn = motion_of(number, x, rotor, flow), turn_of(pitch_of(number, x, pitches))
+        airfoils = airfoil_blade(number, turn.pitch, rotor, rotor.airfoils, x, dx)
         response = Solved(
-            number, turn, motion, induction, wind_speed, skewed, skew, wake, x, dx, counters, rotor
+            number, turn, motion, induction, wind_speed, skewed, skew, wake, airfoils, x, dx, counters, rotor
         )
         blade = Blade(number, motion, turn, response, near_tower(flow, flow.tower))
         force = swept(SampledWind(flow, motion), blade, rotor.radius, rotor.shape)

@@ -73,6 +73,7 @@ class BladeElements(NamedTuple):
     polars: Polars
     shape: object  # blade_shape.BladeShape, or None: straight blades in the rotor plane
     guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, initial inflow angles; see first_guess
+    airfoils: object = None  # unsteady_airfoil.UnsteadyAirfoils, or None: quasi-steady
     tower: object = None  # tower_influence.TowerInfluence on the wind of the blades, or None
 
 

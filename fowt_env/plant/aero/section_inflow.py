@@ -46,6 +46,7 @@ from fowt_env.plant.aero.section_table import (
     table_pitches,
 )
 from fowt_env.plant.aero.station_response import AHEAD, BEHIND, REVERSED, Induced, Lagging, WakeRate
+from fowt_env.plant.aero.unsteady_airfoil import airfoil_blade
 from fowt_env.plant.aero.wake import (
     PER_ELEMENT,
     DynamicInflow,
@@ -112,7 +113,7 @@ def build_dynamic_sections(elements, wake, skew=None):
 
     19 stations: 37 MB, 1 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
-    unit = elements._replace(air_density=1.0, tower=None)
+    unit = elements._replace(air_density=1.0, airfoils=None, tower=None)
     induced, load = _tables.get(elements_key(unit), lambda: _filled_tables(unit))
     free = build_dynamic_inflow()
     lags = np.array([time_constants(0.0, 1.0, r, elements.tip_radius, free) for r in elements.radius])
@@ -156,20 +157,24 @@ def _rate(wind_speed, elements, wake):
 
 
 @inlined_kernel
-def _induced(number, induced, load, skewed, rate, rotor, x, dx):
-    return Induced(induced, load, rotor.arm, rotor.elements.shape, skewed)
+def _induced(number, induced, load, skewed, airfoils, rate, rotor, x, dx):
+    elements = rotor.elements
+    return Induced(induced, load, rotor.arm, elements.shape, skewed, airfoils, elements.weight)
 
 
 @inlined_kernel
-def _lagging(number, induced, load, skewed, rate, rotor, x, dx):
+def _lagging(number, induced, load, skewed, airfoils, rate, rotor, x, dx):
     elements = rotor.elements
     state = State.INTERNAL + PER_ELEMENT * elements.radius.shape[0] * number
-    return Lagging(state, induced, load, rate, rotor.ratio, rotor.arm, elements.shape, skewed, x, dx)
+    return Lagging(
+        state, induced, load, rate, rotor.ratio, rotor.arm, elements.shape, skewed, airfoils, elements.weight,
+        x, dx,
+    )  # fmt: skip
 
 
 # (wind_speed, elements, wake) -> WakeRate in a wind relative to the hub, m/s; None without dynamic inflow
 _wake_rate = chosen_by_class("wake", {type(None): _no_rate, DynamicInflow: _rate}, inlined=True)
-# (number, induced, load, skewed, rate, rotor, x, dx) -> response of a blade
+# (number, induced, load, skewed, airfoils, rate, rotor, x, dx) -> response of a blade
 _response = chosen_by_class("rate", {type(None): _induced, WakeRate: _lagging}, inlined=True)
 
 
@@ -180,7 +185,8 @@ def _blade(number, first, x, flow, rate, skewed, rotor, dx, pitches):
     turn, induced, load = _blade_rows(number, first, x, rotor, pitches)
     motion = motion_of(number, x, elements, flow)
     of_blade = blade_skew(skewed, rotor.skew, motion, elements)
-    response = _response(number, induced, load, of_blade, rate, rotor, x, dx)
+    airfoils = airfoil_blade(number, turn.pitch, elements, elements.airfoils, x, dx)
+    response = _response(number, induced, load, of_blade, airfoils, rate, rotor, x, dx)
     return Blade(number, motion, turn, response, near_tower(flow, flow.tower))
 
 

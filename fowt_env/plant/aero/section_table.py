@@ -99,7 +99,7 @@ def build_section_table(elements):
 
     19 stations: 18 MB, 0.8 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
-    unit = elements._replace(air_density=1.0, tower=None)
+    unit = elements._replace(air_density=1.0, airfoils=None, tower=None)
     load = _tables.get(elements_key(unit), lambda: _filled_table(unit))
     return SectionTable(load, station_arms(elements), elements)
 

@@ -25,6 +25,7 @@ from fowt_env.plant.aero.blade_elements import (
     solve_section,
 )
 from fowt_env.plant.aero.blade_shape import BladeMotion, StationLoad, Turn, effective_pitch
+from fowt_env.plant.aero.unsteady_airfoil import unsteady_load
 from fowt_env.plant.aero.wake import (
     PER_ELEMENT,
     Skew,
@@ -56,6 +57,7 @@ class Solved(NamedTuple):
     skewed: Skew
     skew: object  # wake.SkewedWake or None
     wake: object  # wake.DynamicInflow or None
+    airfoils: object  # unsteady_airfoil.AirfoilBlade or None
     x: np.ndarray  # state
     dx: np.ndarray  # rates of the state; only those of wake states are written
     counters: np.ndarray
@@ -112,6 +114,8 @@ class Induced(NamedTuple):
     arm: np.ndarray  # (n,) m
     shape: object  # BladeShape or None
     skew: object  # wake.BladeSkew or None
+    airfoils: object  # unsteady_airfoil.AirfoilBlade or None
+    weight: np.ndarray  # (n,) m, of the stations
 
 
 class Lagging(NamedTuple):
@@ -125,6 +129,8 @@ class Lagging(NamedTuple):
     arm: np.ndarray  # (n,) m
     shape: object  # BladeShape or None
     skew: object  # wake.BladeSkew or None
+    airfoils: object  # unsteady_airfoil.AirfoilBlade or None
+    weight: np.ndarray  # (n,) m, of the stations
     x: np.ndarray  # state
     dx: np.ndarray  # rates of the state; only those of wake states are written
 
@@ -152,6 +158,7 @@ def _solved_load(response, v_normal, v_tangential, j):
     normal, tangential = _induced(section, v_normal, j, response, response.skew, response.wake)
     v_normal, v_tangential = v_normal + normal, v_tangential + tangential
     fn, ft = _induced_load(section, v_normal, v_tangential, element, elements, response.skew, response.wake)
+    fn, ft = unsteady_load(fn, ft, elements.air_density, v_normal, v_tangential, j, response.airfoils)
     moment = pitching_moment(v_normal, v_tangential, j, element, elements.shape, elements.polars)
     return StationLoad(fn, ft, moment, elements.weight[j], elements.moment_weight[j], 0, None)
 
@@ -273,15 +280,10 @@ def _local_load(response, v_normal, v_tangential, normal, tangential, rates, j):
     outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1
     local = abs(through) + abs(along)
     cell, square = cell_of(through, along, local, REVERSED), local * local
-    return StationLoad(
-        square * looked_up(cell, j, 0, response.load),
-        square * looked_up(cell, j, 1, response.load),
-        square * _tabled_moment(cell, j, response.load, response.shape),
-        1.0,
-        response.arm[j],
-        outside,
-        rates,
-    )
+    fn, ft = square * looked_up(cell, j, 0, response.load), square * looked_up(cell, j, 1, response.load)
+    fn, ft = unsteady_load(fn, ft, response.weight[j], through, along, j, response.airfoils)
+    moment = square * _tabled_moment(cell, j, response.load, response.shape)
+    return StationLoad(fn, ft, moment, 1.0, response.arm[j], outside, rates)
 
 
 @inlined_kernel
