@@ -476,7 +476,8 @@ def check_linear(scene, known=LINEAR):
     """Raise InputError for a scene with internal states that are not linearised."""
     internal = [block.name for block in scene.blocks if block.steady == "settled" and block.name not in known]
     if internal:
-        hint = " (dynamic_inflow=False)" if "wake" in internal else ""
+        switches = {"wake": "dynamic_inflow", "airfoil": "unsteady_airfoils"}
+        hint = "".join(f" ({option}=False)" for name, option in switches.items() if name in internal)
         raise InputError(
             f"linearize: the states of {', '.join(internal)} cannot be linearised: build the scene without"
             f" them{hint}"

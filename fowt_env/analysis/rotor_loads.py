@@ -14,7 +14,7 @@ from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.plant.tilt import build_tilt, rotor_pose
 from fowt_env.scene.options import chosen_stations
-from fowt_env.scene.parts import build_elements
+from fowt_env.scene.parts import build_elements, tower_influence_of
 
 
 class RotorLoads(NamedTuple):
@@ -30,7 +30,7 @@ def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
     """Return the RotorLoads of a scene's rotor by blade element momentum theory, on the undisplaced platform.
 
     rotor_speed rad/s, blade_pitch rad, azimuth rad, time s. Induction is quasi-steady for any rotor model of
-    the scene; skewed_wake and blade_stations are those of the scene.
+    the scene; skewed wake, tower influence and blade stations are those of the scene.
     Raises: InputError for a scene without wind.
     """
     aero, turbine = scene.model.aero, scene.turbine
@@ -40,6 +40,7 @@ def rotor_loads(scene, rotor_speed, blade_pitch, azimuth=0.0, time=0.0):
     rotor = build_elements(turbine, density, count)
     if rotor.shape is None:
         rotor = build_blade_elements(turbine, density, chosen_stations(count, turbine), shaped=True)
+    rotor = rotor._replace(tower=tower_influence_of(scene.platform, turbine, scene.options))
     skew = build_skewed_wake() if scene.options["skewed_wake"] else None
     pitches = BladePitches(N_RIGID)  # individual pitch, for which the load of each blade is stored
     x = np.zeros(N_RIGID + rotor.blades - 1)

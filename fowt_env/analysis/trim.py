@@ -13,6 +13,7 @@ from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.advance import output_row
 from fowt_env.plant.aero.load import settled_wake
+from fowt_env.plant.aero.unsteady_airfoil import STEADY
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.channels import to_units
 from fowt_env.plant.compile.decorators import entry
@@ -23,7 +24,7 @@ from fowt_env.plant.state import Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.channel_names import channel_name, channel_unit
-from fowt_env.scene.parts import still_hydro
+from fowt_env.scene.parts import airfoil_states, still_hydro
 from fowt_env.scene.scene import Scene, check_scene
 from fowt_env.weather.wind import make_series
 from fowt_env.weather.wind_field import steady_field
@@ -97,6 +98,7 @@ def without_fluctuations(scene, wind_speed=None):
     """Return the scene in steady mean wind and flat water: same types, so no recompilation.
 
     Waves are removed entirely. A box of wind is replaced by its time mean, which keeps the box's profile.
+    Airfoils are quasi-steady.
     """
     parts = {}
     aero, hydro = scene.model.aero, scene.model.hydro
@@ -107,6 +109,8 @@ def without_fluctuations(scene, wind_speed=None):
         if aero.field is not None:
             factor = 1.0 if wind_speed is None else wind_speed / scene.wind_speed
             parts["aero.field"] = steady_field(aero.field, factor)
+        if airfoil_states(aero):
+            parts["aero.rotor.elements.airfoils.dt"] = STEADY
         parts["aero.wind"] = make_series(
             np.zeros(1),
             np.array([[speed, 0.0, 0.0, 0.0, 0.0]]),
@@ -160,6 +164,10 @@ class _Steady(Evaluation):
             settle_wake(self.handle, self.x, self.dx)
             return
         rows = slice(block.offset, block.offset + block.size)
+        if block.name == "airfoil":  # at rest after one step of this length
+            mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+            self.x[rows] += STEADY * self.mean[rows]
+            return
         if block.name == "radiation":  # zero for a platform at rest
             self.x[rows] = 0.0
             return

@@ -15,6 +15,7 @@ from fowt_env.descriptions.files import DATA, locate, noted, raise_problems, rea
 from fowt_env.descriptions.potential_flow import PotentialFlow, read_potential_flow
 from fowt_env.descriptions.records import (
     Finite,
+    FloatArray,
     NonNegative,
     Position,
     Positive,
@@ -155,6 +156,47 @@ class Shape(Straight):
             yield "diameter: must be given if section is not, and only then"
 
 
+class TowerSections(Record):
+    """Describes the tower at heights above still water, for its influence on the wind of the blades."""
+
+    height: FloatArray  # m, increasing
+    diameter: FloatArray  # m
+    drag_coefficient: FloatArray
+    turbulence_intensity: FloatArray  # in the tower's wake
+
+    def _problems(self):
+        heights = self.height
+        if len(heights) < 2 or (np.diff(heights) <= 0.0).any():
+            yield f"height = {heights.tolist()}: must be two or more increasing numbers"
+        for key, (low, high) in SECTION_LIMITS.items():
+            values = getattr(self, key)
+            if len(values) != len(heights):
+                yield f"{key}: has {len(values)} values; must be one for each height, {len(heights)}"
+            elif not ((values >= low) & (values <= high)).all():
+                yield f"{key} = {values.tolist()}: each must be in [{low:g}, {high:g}]"
+
+
+SECTION_LIMITS = {
+    "diameter": (0.01, 50.0),
+    "drag_coefficient": (0.0, 10.0),
+    "turbulence_intensity": (0.05, 1.0),
+}
+TURBULENCE = 0.1  # turbulence intensity in the tower's wake of a platform file without sections
+
+
+def tower_sections(tower):
+    """Return (height, diameter, drag coefficient, turbulence intensity), each (k,), of a Tower."""
+    if tower.sections is not None:
+        sections = tower.sections
+        return sections.height, sections.diameter, sections.drag_coefficient, sections.turbulence_intensity
+    return (
+        np.array([tower.base_height, tower.top_height]),
+        np.array([tower.base_diameter, tower.top_diameter]),
+        np.full(2, tower.drag_coefficient),
+        np.full(2, TURBULENCE),
+    )
+
+
 class Tower(Record):
     """Describes the tower as one rigid body, with taper for the wind drag and optional bending modes."""
 
@@ -167,6 +209,7 @@ class Tower(Record):
     top_diameter: Positive
     drag_coefficient: NonNegative = 1.0
     modes: TowerBending | None = None
+    sections: TowerSections | None = None  # for its influence on the wind; None: the taper
 
     def _problems(self):
         if self.top_height <= self.base_height:

@@ -9,7 +9,7 @@ several times a step (rotor_substeps.py), so that none of these limits the step.
 from typing import NamedTuple
 
 from fowt_env.errors import unknown
-from fowt_env.plant.aero.load import rotor_part
+from fowt_env.plant.aero.load import rotor_part, step_air
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_jump, set_followed
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
@@ -89,6 +89,7 @@ def rk4(t, x, u, dt, model, method, data):
     for i in range(n):
         y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     advance_actuators(x, u, dt, model, y)
+    step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
     end_followers(x, dt, model, data)
@@ -109,6 +110,7 @@ def heun(t, x, u, dt, model, method, data):
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
     advance_actuators(x, u, dt, model, y)
+    step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
     end_followers(x, dt, model, data)
@@ -182,6 +184,7 @@ def adams(t, x, u, dt, model, method, data):
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     bend_on(dt, x, order, history, model.tower, y)
     bend_blades(dt, x, order, history, model.blades, y)
+    step_air(x, dt, model.aero, history[0], y)
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
     for i in range(State.VX, n):

@@ -20,6 +20,7 @@ from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
 from fowt_env.scene.options import checked_options, choose_parts, default_step, samples_per_step
 from fowt_env.scene.parts import (
+    airfoil_states,
     build_aero,
     build_blade_pitches,
     build_current,
@@ -28,6 +29,7 @@ from fowt_env.scene.parts import (
     check_symmetry,
     fastest_motion,
     wake_states,
+    with_airfoil_step,
     with_blade_states,
 )
 from fowt_env.scene.plausibility import warn_of_weather
@@ -95,7 +97,7 @@ def build_scene(
     mooring = build_moorings(platform, options)
     user = checked_loads(loads, 0 if mooring is None else mooring.length.shape[0], options["planar"])
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
-    first_state = N_RIGID + wake_states(aero)
+    first_state = N_RIGID + wake_states(aero) + airfoil_states(aero)
     next_state = first_state + sum(load.states for load in user)
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
@@ -104,6 +106,7 @@ def build_scene(
     next_state += blade_states(blades)
     body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
     dt = default_step(options, fastest_motion(tower, mooring, body))
+    aero = with_airfoil_step(aero, dt)
     pitches = None
     if options["pitch"] == "individual":
         pitches = build_blade_pitches(turbine, rotor, next_state)

@@ -12,8 +12,11 @@ from fowt_env.plant.aero.coefficient_table import build_coefficient_table
 from fowt_env.plant.aero.load import BemRotor
 from fowt_env.plant.aero.section_inflow import build_dynamic_sections
 from fowt_env.plant.aero.section_table import build_section_table
-from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake
+from fowt_env.plant.aero.tower_influence import POTENTIAL, SHADOW
+from fowt_env.plant.aero.unsteady_airfoil import build_unsteady_airfoils
+from fowt_env.plant.aero.wake import build_dynamic_inflow, build_skewed_wake, n_wake_states
 from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.plant.state import N_RIGID
 from fowt_env.weather.second_order import METHODS
 
 
@@ -22,7 +25,7 @@ class RotorModel(NamedTuple):
 
     summary: str
     build: Callable[[BladeElements, Mapping[str, Any]], Any]  # (elements, options) -> part of the model
-    wake: tuple[str, ...]  # entries of WAKE_OPTIONS that the model supports
+    supports: tuple[str, ...]  # entries of STATION_OPTIONS
     full_field: bool  # whether blades sample a wind box point by point; else the rotor average is used
     error: float  # of a motion or tension at most, rms over its standard deviation: performance.md
 
@@ -45,36 +48,50 @@ def least_lag(dt, integrator):
     return LAG_MARGIN * dt / INTEGRATORS[integrator].decay_limit
 
 
-def _build_wake(options):
-    return build_dynamic_inflow(least=least_lag(default_step(options), options["integrator"]))
+def _wake_models(options):
+    """Return (DynamicInflow or None, SkewedWake or None) of the options."""
+    least = least_lag(default_step(options), options["integrator"])
+    wake = build_dynamic_inflow(least=least) if options["dynamic_inflow"] else None
+    return wake, build_skewed_wake() if options["skewed_wake"] else None
+
+
+def _with_airfoils(elements, wake, options):
+    """Return the BladeElements with UnsteadyAirfoils, whose states follow those of the wake; or unchanged."""
+    if not options["unsteady_airfoils"]:
+        return elements
+    first = N_RIGID + n_wake_states(elements, wake)
+    return elements._replace(airfoils=build_unsteady_airfoils(elements, first, default_step(options)))
 
 
 def _build_bem(elements, options):
-    skew = build_skewed_wake() if options["skewed_wake"] else None
-    wake = _build_wake(options) if options["dynamic_inflow"] else None
-    return BemRotor(elements, skew, wake)
+    wake, skew = _wake_models(options)
+    return BemRotor(_with_airfoils(elements, wake, options), skew, wake)
 
 
 def _build_lookup(elements, options):
-    if options["dynamic_inflow"]:
-        return build_dynamic_sections(elements, _build_wake(options))
-    return build_section_table(elements)
+    wake, skew = _wake_models(options)
+    elements = _with_airfoils(elements, wake, options)
+    if wake is None and skew is None and elements.airfoils is None:
+        return build_section_table(elements)
+    return build_dynamic_sections(elements, wake, skew)
 
 
 WAKE_OPTIONS = ("dynamic_inflow", "skewed_wake")  # options that need the induced velocity
+# options that need the flow at each blade station
+STATION_OPTIONS = (*WAKE_OPTIONS, "unsteady_airfoils", "tower_potential", "tower_shadow")
 ROTORS = {
     "bem": RotorModel(
         "blade-element momentum solved at every blade and station",
-        _build_bem, wake=WAKE_OPTIONS, full_field=True, error=0.0,
+        _build_bem, supports=STATION_OPTIONS, full_field=True, error=0.0,
     ),
     "lookup": RotorModel(
         "the same sweep from a table per station",
-        _build_lookup, wake=("dynamic_inflow",), full_field=True, error=2e-4,
+        _build_lookup, supports=STATION_OPTIONS, full_field=True, error=2e-4,
     ),
     "table": RotorModel(
         "the whole rotor as one table",
         lambda elements, options: build_coefficient_table(elements),
-        wake=(), full_field=False, error=2e-2,
+        supports=(), full_field=False, error=2e-2,
     ),
 }  # fmt: skip
 FIDELITIES = {
@@ -137,8 +154,13 @@ OPTIONS = {
     "stretching": Option("wheeler", ("wheeler", "none"), "wave kinematics above still water"),
     "diffraction": Option(None, (None, "none", "maccamy_fuchs"),
         "correction of wave loads on a large column; None: the platform's"),
-    "skewed_wake": Option(False, (False, True), "loads of yawed inflow at rotor model bem"),
+    "skewed_wake": Option(False, (False, True), "induction over the azimuth in yawed or tilted inflow"),
     "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
+    "unsteady_airfoils": Option(False, (False, "hgm"),
+        "lag of lift and drag behind the angle of attack: Beddoes-Leishman model with four states (hgm)"),
+    "tower_potential": Option(False, POTENTIAL,
+        "potential flow around the tower at the blades, also with the correction of Bak"),
+    "tower_shadow": Option(False, SHADOW, "wake behind the tower at the blades"),
     "tower_drag": Option(True, (False, True), "wind drag of the tower"),
     "hydrodynamics": Option(True, (False, True), "all loads of the water"),
     # True: that of the fidelity; "table": tensions tabulated about rest, solved outside the table; "dynamic":
@@ -205,11 +227,11 @@ def choose_parts(fidelity, rotor, options):
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in tuple(ROTORS):
         raise unknown("rotor model", rotor, ROTORS)
-    # not all models support a wake: a fidelity falls back to one that does, an explicit choice is rejected
-    required = [name for name in WAKE_OPTIONS if options[name]]
-    able = [name for name, model in ROTORS.items() if set(required) <= set(model.wake)]
+    # a fidelity falls back to a model that supports these options, an explicit choice is rejected
+    required = [name for name in STATION_OPTIONS if options[name]]
+    able = [name for name, model in ROTORS.items() if set(required) <= set(model.supports)]
     if rotor is not None and rotor not in able:
-        lacking = " and ".join(name for name in required if name not in ROTORS[rotor].wake)
+        lacking = " and ".join(name for name in required if name not in ROTORS[rotor].supports)
         need = " or ".join(repr(name) for name in able)
         raise InputError(f"rotor = {rotor!r}: does not support {lacking}, which needs rotor = {need}")
     options["fidelity"] = fidelity

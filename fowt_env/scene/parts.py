@@ -5,6 +5,7 @@ from math import cos, radians, sin
 import numpy as np
 
 from fowt_env.descriptions.checks import check_number
+from fowt_env.descriptions.platform import tower_sections
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.blade_shape import is_curved
@@ -12,6 +13,8 @@ from fowt_env.plant.aero.load import Aero, BemRotor
 from fowt_env.plant.aero.section_inflow import DynamicSections
 from fowt_env.plant.aero.station_choice import build_fewer_elements
 from fowt_env.plant.aero.tower_drag import build_tower_drag
+from fowt_env.plant.aero.tower_influence import build_tower_influence
+from fowt_env.plant.aero.unsteady_airfoil import n_airfoil_states
 from fowt_env.plant.aero.wake import n_wake_states
 from fowt_env.plant.blade_pitches import BladePitches
 from fowt_env.plant.hydro.added_inertia import build_added_inertia
@@ -46,6 +49,21 @@ def wake_states(aero):
     return n_wake_states(rotor.elements, rotor.wake) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
 
 
+def airfoil_states(aero):
+    """Return the number of states of the unsteady airfoils of an Aero part or None."""
+    rotor = None if aero is None else aero.rotor
+    return n_airfoil_states(rotor.elements) if isinstance(rotor, (BemRotor, DynamicSections)) else 0
+
+
+def with_airfoil_step(aero, dt):
+    """Return the Aero part with unsteady airfoils for the time step dt (s); unchanged without them."""
+    if not airfoil_states(aero):
+        return aero
+    elements = aero.rotor.elements
+    elements = elements._replace(airfoils=elements.airfoils._replace(dt=float(dt)))
+    return aero._replace(rotor=aero.rotor._replace(elements=elements))
+
+
 def build_elements(turbine, density, count, bending=None):
     """Return the BladeElements of a turbine with `count` of its stations; None: all. Raises: InputError.
 
@@ -62,6 +80,7 @@ def build_aero(platform, turbine, air, rotor, options):
     density = platform.environment.air_density
     bending = station_bending(turbine, options["blades"])
     elements = build_elements(turbine, density, options["blade_stations"], bending)
+    elements = elements._replace(tower=tower_influence_of(platform, turbine, options))
     model = ROTORS[rotor].build(elements, options)
     tower = build_tower_drag(platform.tower, density) if options["tower_drag"] else None
     return Aero(air.series, air.field, model, build_tilt(turbine.rotor.shaft_tilt), tower)
@@ -74,6 +93,12 @@ def with_blade_states(aero, blades):
     elements = aero.rotor.elements
     elements = elements._replace(modes=elements.modes._replace(first=blades.first))
     return aero._replace(rotor=aero.rotor._replace(elements=elements))
+
+
+def tower_influence_of(platform, turbine, options):
+    """Return the TowerInfluence of a scene, None without one."""
+    models = options["tower_potential"], options["tower_shadow"]
+    return build_tower_influence(tower_sections(platform.tower), *models, turbine.rotor)
 
 
 def build_blade_pitches(turbine, rotor, first_state):

@@ -40,7 +40,7 @@ from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.blade_beam import blade_states
 from fowt_env.scene.options import OPTIONS, default_step, least_lag
-from fowt_env.scene.parts import fastest_motion, hydro_in_waves, wake_states
+from fowt_env.scene.parts import airfoil_states, fastest_motion, hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
 from fowt_env.scene.tower import tower_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
@@ -83,7 +83,7 @@ class Scene:
     @cached_property
     def blocks(self) -> tuple[Block, ...]:
         """Return the blocks of this scene's state vector, in order."""
-        internal = {"wake": wake_states(self.model.aero)}
+        internal = {"wake": wake_states(self.model.aero), "airfoil": airfoil_states(self.model.aero)}
         internal |= {f"load {load.name}": load.states for load in self.loads}
         bending = tower_states(self.model.tower) // 2
         internal |= {"tower_deflection": bending, "tower_velocity": bending}
@@ -249,7 +249,8 @@ class Scene:
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).
 
-        A radiation convolution holds for one step only, and lags of dynamic inflow are limited by the step.
+        A radiation convolution and unsteady airfoils hold for one step only, and lags of dynamic inflow are
+        limited by the step.
         """
         hydro, parts = self.model.hydro, {}
         memory = None if hydro is None else hydro.radiation
@@ -258,6 +259,8 @@ class Scene:
             parts["hydro.radiation"] = adapted
         if wake_states(self.model.aero):
             parts["aero.rotor.wake.least"] = least_lag(dt, self.options["integrator"])
+        if airfoil_states(self.model.aero):
+            parts["aero.rotor.elements.airfoils.dt"] = float(dt)
         return self.with_model(parts) if parts else self
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":

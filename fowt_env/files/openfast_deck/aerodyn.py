@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.files.openfast_deck.keys import differences
-from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, words_of
+from fowt_env.files.openfast_deck.parser import PartFile, bare, locate, number_of, truth_of, words_of
+from fowt_env.plant.aero.tower_influence import POTENTIAL, SHADOW
 
 MOST_AIRFOILS = 1000
 FULL = 180.0  # deg, required range of a polar
@@ -22,8 +23,9 @@ class AeroDyn(NamedTuple):
     airfoil: list  # (n,) names
     polars: dict  # name: (m, 4) alpha (deg), cl, cd, cm
     tables: dict  # name: (number of the table used, tables in the file, Reynolds number in millions)
-    tower: np.ndarray  # (k, 3) height above still water, diameter, drag coefficient
+    tower: np.ndarray  # (k, 4) height above still water, diameter, drag coefficient, turbulence intensity
     tower_loads: bool
+    tower_influence: dict  # scene options {tower_potential, tower_shadow} of the models in use
     notes: list  # (feature of the deck, treatment in the plant)
 
 
@@ -50,15 +52,28 @@ def read_aerodyn(path, folders=(), blades=3):
         parts.append(PartFile(polar_path, "polar"))
         polars[name], tables[name] = _polar(parts[-1], columns, moment, mode)
     heights = file.table("NumTwrNds", needs=("TwrElev", "TwrDiam", "TwrCd"), high=10_000)
-    tower = np.array([[cells[key] for key in ("twrelev", "twrdiam", "twrcd")] for _, cells in heights])
-    tower = tower.reshape(-1, 3)
+    names_of = ("twrelev", "twrdiam", "twrcd", "twrti")
+    tower = np.array([[cells.get(key, 0.0) for key in names_of] for _, cells in heights]).reshape(-1, 4)
     if len(tower) > 1 and (np.diff(tower[:, 0]) < 0.0).any():
         raise file.refusal("TwrElev must increase from row to row", heights[0][0])
-    if (tower[:, 1:] < 0.0).any():
+    if (tower[:, 1:3] < 0.0).any():
         raise file.refusal("TwrDiam and TwrCd must be >= 0", heights[0][0])
     airfoil, tower_loads = [names[number][0] for number in numbers], file.flag("TwrAero", default=True)
     notes = [row for part in parts for row in differences(part)]
-    return AeroDyn(file, blade_file, blade, airfoil, polars, tables, tower, tower_loads, notes)
+    influence = _tower_influence(file)
+    return AeroDyn(file, blade_file, blade, airfoil, polars, tables, tower, tower_loads, influence, notes)
+
+
+def _tower_influence(file):
+    """Return {option: value} of the models of TwrPotent and TwrShadow in use; TwrShadow may be a flag."""
+    numbers = {"tower_potential": file.whole("TwrPotent", default=0, low=0, high=2)}
+    word = file.text("TwrShadow", default="0")
+    numbers["tower_shadow"] = (
+        int(file.flag("TwrShadow")) if truth_of(word) is not None
+        else file.whole("TwrShadow", default=0, low=0, high=2)
+    )  # fmt: skip
+    models = {"tower_potential": POTENTIAL, "tower_shadow": SHADOW}
+    return {option: models[option][number] for option, number in numbers.items() if number}
 
 
 def _blade(file, count):

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from fowt_env.descriptions.platform import TURBULENCE
 from fowt_env.descriptions.rotor_mass import rotor_mass_properties
 from fowt_env.descriptions.units import DEGREE, PERCENT, RPM
 from fowt_env.files.openfast_deck.hydrodyn import is_old
@@ -126,6 +127,20 @@ def tower_drag(deck):
     return *ends, float(coefficient)
 
 
+def tower_table(deck):
+    """Return AeroDyn's tower table (k, 4) for the influence on the wind; None if it has no such tower.
+
+    A turbulence intensity that only Eames' model reads is replaced where it is out of that model's range.
+    """
+    aero = deck.aerodyn
+    table = aero.tower.copy()
+    if len(table) < 2 or not ((table[:, 1] > 0.0).all() and (np.diff(table[:, 0]) > 0.0).all()):
+        return None
+    if aero.tower_influence.get("tower_shadow") != "eames":
+        table[(table[:, 3] < 0.05) | (table[:, 3] > 1.0), 3] = TURBULENCE
+    return table
+
+
 # --------------------------------------------------------------------------- files
 
 
@@ -199,7 +214,7 @@ def platform_rows(deck, name, turbine, coefficients, distribution):
 
 
 def _tower_rows(deck, distribution):
-    """Return the tables [tower] and, for a deck with mode shapes, [tower.modes]."""
+    """Return the tables of the tower and of its influence on the wind; [tower.modes] with mode shapes."""
     values, modes = deck.elastodyn, deck.elastodyn.bending
     source, aero = values.file.source, deck.aerodyn.file.source
     base, extra, length = values["TowerBsHt"], values["YawBrMass"], values["TowerHt"] - values["TowerBsHt"]
@@ -218,6 +233,17 @@ def _tower_rows(deck, distribution):
         ("top_diameter", top_diameter, aero("TwrDiam")),
         ("drag_coefficient", drag, aero("TwrCd") + ", of the table's load"),
     ]}  # fmt: skip
+    if (sections := tower_table(deck)) is not None:
+        keys = ("height", "diameter", "drag_coefficient", "turbulence_intensity")
+        names = ("TwrElev", "TwrDiam", "TwrCd", "TwrTI")
+        tables["tower.sections"] = [
+            (key, list(column), aero(name)) for key, name, column in zip(keys, names, sections.T, strict=True)
+        ]
+        if deck.aerodyn.tower_influence:
+            names = {"tower_potential": "TwrPotent", "tower_shadow": "TwrShadow"}
+            tables["options"] = [
+                (option, model, aero(names[option])) for option, model in deck.aerodyn.tower_influence.items()
+            ]
     if modes is None:
         return tables
 

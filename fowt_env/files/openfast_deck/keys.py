@@ -199,10 +199,11 @@ TOWER = _keys(
 
 _INDUCTION = Otherwise(True, "", "included")
 _QUASI_STEADY = "quasi-steady induction; dynamic with the option dynamic_inflow"
+_STEADY_POLARS = "quasi-steady polars; with the option unsteady_airfoils the four-state model (UA_Mod 4)"
 _SKEWED = "with the option skewed_wake the correction of Pitt and Peters, 15 pi / 32"
 AERODYN = _keys(
     "NumAFfiles InCol_Alfa InCol_Cl InCol_Cd InCol_Cm UseBlCm AFTabMod AFNames ADBlFile# ADBlFile"
-    " NumTwrNds AirDens TwrAero TwrElev TwrDiam TwrCd",
+    " NumTwrNds AirDens TwrAero TwrPotent TwrShadow TwrElev TwrDiam TwrCd TwrTI",
     {
         OUTPUT: _MODULE_OUTPUT + " NBlOuts BlOutNd NTwOuts TwOutNd BldNd_BladesOut BldNd_BlOutNd CompAA"
         " AA_InputFile CavitCheck InCol_Cpmin",
@@ -211,7 +212,7 @@ AERODYN = _keys(
         "fluid properties that no load here depends on": "KinVisc SpdSound Patm Pvap FluidDepth AddedMass",
         "of a model with a separate switch": "tau1_const OLAFInputFileName FVWFile AoA34 UAMod"
         " FLookup IntegrationMethod UAStartRad UAEndRad SectAvgWeighting SectAvgNPoints SectAvgPsiBwd"
-        " SectAvgPsiFwd VolHub HubCenBx VolNac NacCenB NacArea NacCd NacDragAC TFinFile TwrTI TwrCb TwrCp"
+        " SectAvgPsiFwd VolHub HubCenBx VolNac NacCenB NacArea NacCd NacDragAC TFinFile TwrCb TwrCp"
         " TwrCa TwrCpCS SkewMomCorr",
     },
     **{
@@ -223,10 +224,8 @@ AERODYN = _keys(
         for key in ("Wake_Mod", "WakeMod")
     },
     DBEMT_Mod=Otherwise((0, -1), "dynamic wake", _QUASI_STEADY, when=_blade_element_wake),
-    UA_Mod=Otherwise(0, "unsteady airfoil aerodynamics", "quasi-steady polars"),
-    AFAeroMod=Otherwise(1, "unsteady airfoil aerodynamics", "quasi-steady polars"),
-    TwrPotent=Otherwise(0, "potential flow around the tower", "no influence of the tower on the wind"),
-    TwrShadow=Otherwise((0, False), "tower shadow", "no influence of the tower on the wind"),
+    UA_Mod=Otherwise(0, "unsteady airfoil aerodynamics", _STEADY_POLARS),
+    AFAeroMod=Otherwise(1, "unsteady airfoil aerodynamics", _STEADY_POLARS),
     Buoyancy=Otherwise(False, "buoyancy of blades and tower", "none"),
     NacelleDrag=Otherwise(False, "drag of the nacelle", "none"),
     TFinAero=Otherwise(False, "tail fin", "none"),

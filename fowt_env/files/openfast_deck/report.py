@@ -70,6 +70,9 @@ def _figures(deck, body):
         inside = sum(member.potential_flow for member in hydro.members)
         yield "members", f"{len(hydro.members)}, {inside} of them in the potential-flow body"
     yield "mooring lines", str(len(deck.lines))
+    if deck.aerodyn.tower_influence:
+        models = ", ".join(f"{option} = {model}" for option, model in deck.aerodyn.tower_influence.items())
+        yield "influence of the tower on the wind", models
     yield "rated torque, speed", f"{control['rated_torque']:.6g} N m, {control['rated_speed']:.6g} rad/s"
     yield "rated wind speed", f"{control['rated_wind_speed']:.4g} m/s"
 

@@ -13,12 +13,14 @@ from fowt_env.plant.aero.blade_sweep import (
     add_blade,
     faded_induction,
     motion_of,
+    near_tower,
     rotor_axes_load,
     rotor_flow,
     shape_of,
     swept,
 )
 from fowt_env.plant.aero.station_response import Solved
+from fowt_env.plant.aero.unsteady_airfoil import airfoil_blade
 from fowt_env.plant.aero.wake import skew_of
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import kernel
@@ -32,7 +34,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
     pose                in rotor axes (tilt.py)
     now, series, field  wind (wind.py), sampled at the present position of every station
     skew, wake          optional SkewedWake and DynamicInflow (wake.py)
-    dx                  rates of the state: only those of wake states are written
+    dx                  rates of the state: only those of wake and airfoil states are written
     counters            counters[Counter.BEM_FALLBACK] is incremented for each station without a root
     pitches             BladePitches, or None: one pitch for all blades
     blades              with pitches: output, the BladeLoad of each blade, (blades, 6)
@@ -49,10 +51,12 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
     for number in range(rotor.blades):
         motion, turn = motion_of(number, x, rotor, flow), turn_of(pitch_of(number, x, pitches))
         shape = shape_of(number, x, rotor.shape, rotor.modes, blades)
+        airfoils = airfoil_blade(number, turn.pitch, shape, rotor, rotor.airfoils, x, dx)
         response = Solved(
-            number, turn, motion, shape, induction, wind_speed, skewed, skew, wake, x, dx, counters, rotor
-        )
-        blade = Blade(number, motion, turn, shape, response)
+            number, turn, motion, shape, induction, wind_speed, skewed, skew, wake, airfoils, x, dx, counters,
+            rotor,
+        )  # fmt: skip
+        blade = Blade(number, motion, turn, shape, response, near_tower(flow, flow.tower))
         force = swept(SampledWind(flow, motion), blade, rotor.radius)
         total = add_blade(total, blade, force.load, 1.0, pitches, blades)
     return rotor_axes_load(total, 1.0, rotor)

@@ -81,6 +81,8 @@ class BladeElements(NamedTuple):
     shape: object  # blade_shape.BladeShape, or None: straight blades in the rotor plane
     guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, initial inflow angles; see first_guess
     modes: object = None  # blade_shape.StationModes, or None: blades that do not bend
+    airfoils: object = None  # unsteady_airfoil.UnsteadyAirfoils, or None: quasi-steady
+    tower: object = None  # tower_influence.TowerInfluence on the wind of the blades, or None
 
 
 class Element(NamedTuple):

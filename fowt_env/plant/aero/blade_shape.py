@@ -432,10 +432,14 @@ value_at = chosen_by_class(
 )
 # (along, out, at) -> component normal to the blade axis of a vector (along, out) in x and r
 normal_part = chosen_by_class(
+    "at", {OnAxis: _along_shaft, Station: _along_normal, BentStation: _along_normal}, inlined=True
+)
+# the same of a relative wind, with that of bending
+relative_normal_part = chosen_by_class(
     "at", {OnAxis: _along_shaft, Station: _along_normal, BentStation: _along_bent_normal}, inlined=True
 )
-# (tangential, at) -> relative wind against the motion, with that of bending
-tangential_part = chosen_by_class(
+# (tangential, at) -> relative wind against the motion, the same
+relative_tangential_part = chosen_by_class(
     "at", {OnAxis: _against_motion, Station: _against_motion, BentStation: _against_bending}, inlined=True
 )
 # (load, part, j, turn, shape) -> BladeLoad with the StationLoad of station j added

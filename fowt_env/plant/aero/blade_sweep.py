@@ -21,14 +21,15 @@ from fowt_env.plant.aero.blade_shape import (
     Turn,
     add_station,
     blade_motion,
-    normal_part,
     put_station,
+    relative_normal_part,
+    relative_tangential_part,
     station_at,
-    tangential_part,
     value_at,
     with_blade,
 )
 from fowt_env.plant.aero.station_response import put_rates, station_load
+from fowt_env.plant.aero.tower_influence import TowerInfluence, beside_tower
 from fowt_env.plant.aero.wind import (
     Profile,
     WindNow,
@@ -85,6 +86,7 @@ class RotorFlow(NamedTuple):
     now: WindNow
     series: WindSeries
     field: object  # wind_field.WindField or None
+    tower: object  # tower_influence.TowerInfluence or None
 
 
 class Blade(NamedTuple):
@@ -95,6 +97,7 @@ class Blade(NamedTuple):
     turn: Turn
     shape: object  # blade_shape.BladeShape or BentShape, or None: straight in the rotor plane
     response: object  # of station_response.py
+    near: object  # RotorFlow if the tower disturbs the wind, else None
 
 
 class SampledWind(NamedTuple):
@@ -156,7 +159,21 @@ def hub_flow(t, pose, now, series, field, overhang, hub_height):
 def rotor_flow(t, pose, now, series, field, elements):
     """Return the RotorFlow at time t; pose in rotor axes (tilt.py), wind as in wind.wind_at."""
     hub = hub_flow(t, pose, now, series, field, elements.overhang, elements.hub_height)
-    return RotorFlow(t, pose, hub, now, series, field)
+    return RotorFlow(t, pose, hub, now, series, field, elements.tower)
+
+
+@inlined_kernel
+def _undisturbed(flow, tower):
+    return None
+
+
+@inlined_kernel
+def _disturbed(flow, tower):
+    return flow
+
+
+# (flow, tower) -> the RotorFlow where the tower disturbs the wind, else None
+near_tower = chosen_by_class("tower", {type(None): _undisturbed, TowerInfluence: _disturbed}, inlined=True)
 
 
 @kernel
@@ -266,7 +283,8 @@ def _relative(u, v, w, at, pose, motion):
     along = value_at(Plane(pose.r11 * u + pose.r21 * v + pose.r31 * w - m.vx, 0.0, m.wt, -m.wr), at)
     out = value_at(Plane(m.rx * u + m.ry * v + m.rz * w - m.vr, -m.wt, 0.0, m.wx), at)
     moving = value_at(Plane(m.vt, -m.wr, m.wx, 0.0), at)
-    return normal_part(along, out, at), tangential_part(moving - (m.tx * u + m.ty * v + m.tz * w), at)
+    against = moving - (m.tx * u + m.ty * v + m.tz * w)
+    return relative_normal_part(along, out, at), relative_tangential_part(against, at)
 
 
 @inlined_kernel
@@ -291,7 +309,7 @@ def _sheared(wind, at):
     along = value_at(wind.along, at) + wind.scaled_along * shear
     out = value_at(wind.out, at) + wind.scaled_out * shear
     tangential = value_at(wind.tangential, at) + wind.scaled_tangential * shear
-    return normal_part(along, out, at), tangential_part(tangential, at)
+    return relative_normal_part(along, out, at), relative_tangential_part(tangential, at)
 
 
 @inlined_kernel
@@ -313,7 +331,9 @@ relative_wind = chosen_by_class(
 @inlined_kernel
 def _station(j, wind, blade, radius):
     """Return the StationLoad of station j of a Blade."""
-    v_normal, v_tangential = relative_wind(wind, station_at(j, blade.turn, radius, blade.shape))
+    at = station_at(j, blade.turn, radius, blade.shape)
+    v_normal, v_tangential = relative_wind(wind, at)
+    v_normal, v_tangential = beside_tower(v_normal, v_tangential, at, blade.motion, blade.near)
     return station_load(blade.response, v_normal, v_tangential, j)
 
 

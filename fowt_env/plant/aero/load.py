@@ -8,6 +8,7 @@ from fowt_env.plant.aero.coefficient_table import CoefficientTable, coefficient_
 from fowt_env.plant.aero.section_inflow import DynamicSections, dynamic_sections_load
 from fowt_env.plant.aero.section_table import SectionTable, section_table_load
 from fowt_env.plant.aero.tower_drag import bent_tower_load, tower_load
+from fowt_env.plant.aero.unsteady_airfoil import step_airfoils
 from fowt_env.plant.aero.wake import PER_ELEMENT
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
@@ -80,6 +81,40 @@ _rotor_model = chosen_by_class(
     },
     inlined=True,
 )
+
+
+@inlined_kernel
+def _step_no_rotor(x, dt, rotor, rates, y):
+    return
+
+
+@inlined_kernel
+def _step_rotor(x, dt, rotor, rates, y):
+    step_airfoils(x, dt, rotor.elements.airfoils, rotor.elements, rates, y)
+
+
+# (x, dt, rotor, rates, y): puts the states of the airfoils after a step of dt from x into y
+_step_airfoils = chosen_by_class(
+    "rotor",
+    {
+        BemRotor: _step_rotor,
+        SectionTable: _step_no_rotor,
+        DynamicSections: _step_rotor,
+        CoefficientTable: _step_no_rotor,
+    },
+    inlined=True,
+)
+
+
+@inlined_kernel
+def step_air(x, dt, aero, rates, y):
+    """Put the states that integrators do not advance after a step of dt (s) from x into y.
+
+    rates: of the internal states at x. The states are those of unsteady airfoils.
+    """
+    if aero is None:
+        return
+    _step_airfoils(x, dt, aero.rotor, rates, y)
 
 
 @kernel

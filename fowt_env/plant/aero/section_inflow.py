@@ -1,10 +1,10 @@
-"""Computes rotor loads with dynamic inflow from tables per blade station (section_table.py: without).
+"""Computes rotor loads with dynamic inflow or skewed wake from tables per blade station.
 
-Loads in section_table.py include the induced velocity of the momentum balance. With dynamic inflow that
-velocity has states, so there are two tables: the quasi-steady induced velocity of a station over the inflow
-direction, input of the filter of wake.py, and the load over the direction of the local flow, which includes
-the filtered velocity, without momentum balance. Directions, rows and limits of both tables are as in
-section_table.py. States, and loads outside the tables, are as in rotor_load.
+Loads in section_table.py include the induced velocity of the momentum balance. Here that velocity is changed
+by the models of wake.py, so there are two tables: the quasi-steady induced velocity of a station over the
+inflow direction, and the load over the direction of the local flow with the changed velocity, without
+momentum balance. Directions, rows and limits of both tables are as in section_table.py. States, and loads
+outside the tables, are as in rotor_load.
 """
 
 from typing import NamedTuple
@@ -29,6 +29,7 @@ from fowt_env.plant.aero.blade_sweep import (
     is_sheared,
     load_of_three,
     motion_of,
+    near_tower,
     rotor_flow,
     rotor_reach,
     shape_of,
@@ -44,10 +45,19 @@ from fowt_env.plant.aero.section_table import (
     station_arms,
     table_pitches,
 )
-from fowt_env.plant.aero.station_response import AHEAD, BEHIND, REVERSED, Lagging, WakeRate, rows_of
-from fowt_env.plant.aero.wake import PER_ELEMENT, DynamicInflow, time_constants
+from fowt_env.plant.aero.station_response import AHEAD, BEHIND, REVERSED, Induced, Lagging, WakeRate, rows_of
+from fowt_env.plant.aero.unsteady_airfoil import airfoil_blade
+from fowt_env.plant.aero.wake import (
+    PER_ELEMENT,
+    DynamicInflow,
+    blade_skew,
+    build_dynamic_inflow,
+    skew_of,
+    time_constants,
+)
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import BLADES, State
 
 LEAST_LAG = 1e-6  # s, lower limit of time constants where the wake has none
@@ -61,7 +71,8 @@ class DynamicSections(NamedTuple):
     arm: np.ndarray  # (n,) m, radius at which the station's part of a straight blade's force acts
     ratio: np.ndarray  # (n,) tau_1 over tau_2
     elements: BladeElements  # of the exact solution
-    wake: DynamicInflow
+    wake: object  # DynamicInflow, or None: quasi-steady induction
+    skew: object  # SkewedWake or None
 
 
 @entry
@@ -95,16 +106,19 @@ def _fill(induced, load, blade_pitch, elements, shape):
 _tables = Cache(8)  # two per blade, 37 MB together: building takes about a second
 
 
-def build_dynamic_sections(elements, wake):
-    """Return the DynamicSections of a BladeElements; the cached tables serve all air densities.
+def build_dynamic_sections(elements, wake, skew=None):
+    """Return the DynamicSections of a BladeElements with DynamicInflow and SkewedWake, each or None.
+
+    The cached tables serve all air densities.
 
     19 stations: 37 MB, 1 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
-    unit = elements._replace(air_density=1.0)
+    unit = elements._replace(air_density=1.0, airfoils=None, tower=None)
     induced, load = _tables.get(elements_key(unit), lambda: _filled_tables(unit))
-    free = wake._replace(least=0.0)
+    free = build_dynamic_inflow()
     lags = np.array([time_constants(0.0, 1.0, r, elements.tip_radius, free) for r in elements.radius])
-    return DynamicSections(induced, load, station_arms(elements), lags[:, 0] / lags[:, 1], elements, wake)
+    ratio = lags[:, 0] / lags[:, 1]
+    return DynamicSections(induced, load, station_arms(elements), ratio, elements, wake, skew)
 
 
 def _filled_tables(elements):
@@ -133,14 +147,47 @@ def _blade_rows(number, first, x, shape, rotor, pitches):
 
 
 @inlined_kernel
-def _blade(number, first, x, flow, rate, rotor, dx, pitches, blades):
+def _no_rate(wind_speed, elements, wake):
+    return None
+
+
+@inlined_kernel
+def _rate(wind_speed, elements, wake):
+    slow, _ = time_constants(0.0, wind_speed, 0.0, elements.tip_radius, DynamicInflow(wake.scale, 0.0))
+    return WakeRate(1.0 / slow, 1.0 / max(wake.least, LEAST_LAG))
+
+
+@inlined_kernel
+def _induced(number, induced, load, shape, skewed, airfoils, rate, rotor, x, dx):
+    return Induced(induced, load, rotor.arm, shape, skewed, airfoils, rotor.elements.weight)
+
+
+@inlined_kernel
+def _lagging(number, induced, load, shape, skewed, airfoils, rate, rotor, x, dx):
+    elements = rotor.elements
+    state = State.INTERNAL + PER_ELEMENT * elements.radius.shape[0] * number
+    return Lagging(
+        state, induced, load, rate, rotor.ratio, rotor.arm, shape, skewed, airfoils, elements.weight, x, dx
+    )
+
+
+# (wind_speed, elements, wake) -> WakeRate in a wind relative to the hub, m/s; None without dynamic inflow
+_wake_rate = chosen_by_class("wake", {type(None): _no_rate, DynamicInflow: _rate}, inlined=True)
+# (number, induced, load, shape, skewed, airfoils, rate, rotor, x, dx) -> response of a blade
+_response = chosen_by_class("rate", {type(None): _induced, WakeRate: _lagging}, inlined=True)
+
+
+@inlined_kernel
+def _blade(number, first, x, flow, rate, skewed, rotor, dx, pitches, blades):
     """Return the Blade with this number; first: _pitch_rows of the first blade."""
     elements = rotor.elements
     shape = shape_of(number, x, elements.shape, elements.modes, blades)
     turn, induced, load = _blade_rows(number, first, x, shape, rotor, pitches)
-    state = State.INTERNAL + PER_ELEMENT * elements.radius.shape[0] * number
-    response = Lagging(state, induced, load, rate, rotor.ratio, rotor.arm, shape, x, dx)
-    return Blade(number, motion_of(number, x, elements, flow), turn, shape, response)
+    motion = motion_of(number, x, elements, flow)
+    of_blade = blade_skew(skewed, rotor.skew, motion, elements)
+    airfoils = airfoil_blade(number, turn.pitch, shape, elements, elements.airfoils, x, dx)
+    response = _response(number, induced, load, shape, of_blade, airfoils, rate, rotor, x, dx)
+    return Blade(number, motion, turn, shape, response, near_tower(flow, flow.tower))
 
 
 @kernel
@@ -153,15 +200,12 @@ def _sampled_force(blade, flow, radius):
 def _tabled_load(flow, x, rotor, dx, pitches, blades):
     """Return (stations outside the tables, RotorLoad) of a fast three-bladed rotor, pitched within them."""
     elements, shape, radius = rotor.elements, rotor.elements.shape, rotor.elements.radius
-    slow, _ = time_constants(
-        0.0, flow.hub.speed, 0.0, elements.tip_radius, DynamicInflow(rotor.wake.scale, 0.0)
-    )
-    rate = WakeRate(1.0 / slow, 1.0 / max(rotor.wake.least, LEAST_LAG))
+    rate, skewed = _wake_rate(flow.hub.speed, elements, rotor.wake), skew_of(flow.hub, rotor.skew)
     bent = shape_of(0, x, shape, elements.modes, blades)
     first, reach = _pitch_rows(x[State.BLADE_PITCH], bent, rotor), rotor_reach(elements.tip_radius, shape)
-    p = _blade(0, first, x, flow, rate, rotor, dx, None, blades)
-    q = _blade(1, first, x, flow, rate, rotor, dx, pitches, blades)
-    r = _blade(2, first, x, flow, rate, rotor, dx, pitches, blades)
+    p = _blade(0, first, x, flow, rate, skewed, rotor, dx, None, blades)
+    q = _blade(1, first, x, flow, rate, skewed, rotor, dx, pitches, blades)
+    r = _blade(2, first, x, flow, rate, skewed, rotor, dx, pitches, blades)
     if is_sheared(flow.hub, reach, flow.field):
         forces = sheared_forces(p, q, r, flow, reach, radius)
     else:
@@ -191,5 +235,5 @@ def dynamic_sections_load(t, pose, x, now, series, field, rotor, dx, counters, p
         if outside == 0:
             return load
     return rotor_load(
-        t, pose, x, now, series, field, elements, None, rotor.wake, dx, counters, pitches, blades
+        t, pose, x, now, series, field, elements, rotor.skew, rotor.wake, dx, counters, pitches, blades
     )

@@ -34,6 +34,7 @@ from fowt_env.plant.aero.blade_sweep import (
     is_sheared,
     load_of_three,
     motion_of,
+    near_tower,
     rotor_axes_load,
     rotor_flow,
     rotor_reach,
@@ -108,7 +109,7 @@ def build_section_table(elements):
 
     19 stations: 18 MB, 0.8 s compiled; many minutes with the JIT off (use rotor_load instead).
     """
-    unit = elements._replace(air_density=1.0)
+    unit = elements._replace(air_density=1.0, airfoils=None, tower=None)
     load = _tables.get(elements_key(unit), lambda: _filled_table(unit))
     return SectionTable(load, station_arms(elements), elements)
 
@@ -171,7 +172,8 @@ def tabled_blade(number, first, x, flow, table, pitches, blades):
     elements = table.elements
     shape = shape_of(number, x, elements.shape, elements.modes, blades)
     turn, response = _blade_response(number, first, x, shape, table, pitches)
-    return Blade(number, motion_of(number, x, elements, flow), turn, shape, response)
+    near = near_tower(flow, flow.tower)
+    return Blade(number, motion_of(number, x, elements, flow), turn, shape, response, near)
 
 
 @inlined_kernel
@@ -188,7 +190,7 @@ def box_force(blade, flow, field, boxed, elements):
 def sampled_force(blade, flow, elements, counters):
     """Return the BladeForce with the wind sampled at each station; inflows outside the table are solved."""
     sure = TabledOrSolved(blade.response, blade.turn, elements, counters)
-    blade = Blade(blade.number, blade.motion, blade.turn, blade.shape, sure)
+    blade = Blade(blade.number, blade.motion, blade.turn, blade.shape, sure, blade.near)
     return swept(SampledWind(flow, blade.motion), blade, elements.radius)
 
 

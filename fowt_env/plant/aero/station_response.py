@@ -6,7 +6,8 @@ class of the response:
 * Solved: blade element momentum, with the optional models of the wake (bem_rotor.py);
 * Tabled: the table of quasi-steady loads (section_table.py);
 * TabledOrSolved: as Tabled, with blade element momentum for inflows outside the table;
-* Lagging: the tables of induced velocity and of load, with the states of dynamic inflow (section_inflow.py).
+* Induced: the tables of induced velocity and of load (section_inflow.py), for a skewed wake;
+* Lagging: as Induced, with the states of dynamic inflow.
 """
 
 from math import pi, sqrt
@@ -33,7 +34,15 @@ from fowt_env.plant.aero.blade_shape import (
     bent_attitude,
     effective_pitch,
 )
-from fowt_env.plant.aero.wake import PER_ELEMENT, Skew, filtered_induction, pace, skew_factor
+from fowt_env.plant.aero.unsteady_airfoil import unsteady_load
+from fowt_env.plant.aero.wake import (
+    PER_ELEMENT,
+    Skew,
+    filtered_induction,
+    pace,
+    skew_factor,
+    skewed_induction,
+)
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.events import Counter
@@ -62,6 +71,7 @@ class Solved(NamedTuple):
     skewed: Skew
     skew: object  # wake.SkewedWake or None
     wake: object  # wake.DynamicInflow or None
+    airfoils: object  # unsteady_airfoil.AirfoilBlade or None
     x: np.ndarray  # state
     dx: np.ndarray  # rates of the state; only those of wake states are written
     counters: np.ndarray
@@ -117,6 +127,18 @@ class WakeRates(NamedTuple):
     tangential_1: float
 
 
+class Induced(NamedTuple):
+    """Computes the response of a blade from the tables of induced velocity and load over the air density."""
+
+    induced: object  # Rows or PitchedRows of the quasi-steady induced velocity
+    load: object  # of the load
+    arm: np.ndarray  # (n,) m
+    shape: object  # BladeShape, BentShape or None
+    skew: object  # wake.BladeSkew or None
+    airfoils: object  # unsteady_airfoil.AirfoilBlade or None
+    weight: np.ndarray  # (n,) m, of the stations
+
+
 class Lagging(NamedTuple):
     """Computes the response of a blade from the tables of dynamic inflow, loads over the air density."""
 
@@ -127,6 +149,9 @@ class Lagging(NamedTuple):
     ratio: np.ndarray  # (n,) tau_1 over tau_2
     arm: np.ndarray  # (n,) m
     shape: object  # BladeShape, BentShape or None
+    skew: object  # wake.BladeSkew or None
+    airfoils: object  # unsteady_airfoil.AirfoilBlade or None
+    weight: np.ndarray  # (n,) m, of the stations
     x: np.ndarray  # state
     dx: np.ndarray  # rates of the state; only those of wake states are written
 
@@ -154,6 +179,7 @@ def _solved_load(response, v_normal, v_tangential, j):
     normal, tangential = _induced(section, v_normal, j, response, response.skew, response.wake)
     v_normal, v_tangential = v_normal + normal, v_tangential + tangential
     fn, ft = _induced_load(section, v_normal, v_tangential, element, elements, response.skew, response.wake)
+    fn, ft = unsteady_load(fn, ft, elements.air_density, v_normal, v_tangential, j, response.airfoils)
     moment = pitching_moment(v_normal, v_tangential, j, element, elements.shape, elements.polars)
     return StationLoad(fn, ft, moment, elements.weight[j], elements.moment_weight[j], 0, None)
 
@@ -311,44 +337,60 @@ def _exact_load(response, v_normal, v_tangential, j):
 
 
 @inlined_kernel
+def _steady_induction(response, v_normal, v_tangential, j):
+    """Return the quasi-steady induced velocity (normal, tangential) of station j, m/s."""
+    total = abs(v_normal) + abs(v_tangential)
+    cell = cell_of(v_normal, v_tangential, total, 0)
+    rows = _station_rows(j, response.induced, response.shape)
+    return total * looked_up(cell, j, 0, rows), total * looked_up(cell, j, 1, rows)
+
+
+@inlined_kernel
+def _local_load(response, v_normal, v_tangential, normal, tangential, rates, j):
+    """Return the StationLoad of station j over the air density with this induced velocity and WakeRates."""
+    total = abs(v_normal) + abs(v_tangential)
+    through = v_normal + skewed_induction(normal, v_normal, j, response.skew)
+    along = v_tangential + tangential
+    known = through > 0.0 or REVERSED * v_tangential >= -AHEAD * through
+    outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1
+    local = abs(through) + abs(along)
+    cell, square = cell_of(through, along, local, REVERSED), local * local
+    rows = _station_rows(j, response.load, response.shape)
+    fn, ft = square * looked_up(cell, j, 0, rows), square * looked_up(cell, j, 1, rows)
+    fn, ft = unsteady_load(fn, ft, response.weight[j], through, along, j, response.airfoils)
+    moment = square * _tabled_moment(cell, j, rows, response.shape)
+    return StationLoad(fn, ft, moment, 1.0, response.arm[j], outside, rates)
+
+
+@inlined_kernel
+def _induced_table_load(response, v_normal, v_tangential, j):
+    """Return the StationLoad of station j over the air density."""
+    normal, tangential = _steady_induction(response, v_normal, v_tangential, j)
+    return _local_load(response, v_normal, v_tangential, normal, tangential, None, j)
+
+
+@inlined_kernel
 def _lagging_load(response, v_normal, v_tangential, j):
     """Return the StationLoad of station j over the air density, with WakeRates.
 
     The filter is that of wake.filtered_induction.
     """
     x, rate = response.x, response.rate
-    total = abs(v_normal) + abs(v_tangential)
-    cell = cell_of(v_normal, v_tangential, total, 0)
-    rows = _station_rows(j, response.induced, response.shape)
-    steady_normal = total * looked_up(cell, j, 0, rows)
-    steady_tangential = total * looked_up(cell, j, 1, rows)
+    steady_normal, steady_tangential = _steady_induction(response, v_normal, v_tangential, j)
     slow = pace(-steady_normal / v_normal) * rate.slow
     fast = min(slow * response.ratio[j], rate.most)
     slow = min(slow, rate.most)
     i = response.first + PER_ELEMENT * j
     a, b, c, d = np.uintp(i), np.uintp(i + 1), np.uintp(i + 2), np.uintp(i + 3)
     first_normal, normal, first_tangential, tangential = x[a], x[b], x[c], x[d]
-    through, along = v_normal + normal, v_tangential + tangential
-    known = through > 0.0 or REVERSED * v_tangential >= -AHEAD * through
-    outside = 0 if v_normal > 0.0 and total < LARGEST_SPEED and known else 1
-    local = abs(through) + abs(along)
-    cell, square = cell_of(through, along, local, REVERSED), local * local
-    rows = _station_rows(j, response.load, response.shape)
-    return StationLoad(
-        square * looked_up(cell, j, 0, rows),
-        square * looked_up(cell, j, 1, rows),
-        square * _tabled_moment(cell, j, rows, response.shape),
-        1.0,
-        response.arm[j],
-        outside,
-        WakeRates(
-            i,
-            (0.4 * steady_normal - first_normal) * slow,
-            (first_normal + 0.6 * steady_normal - normal) * fast,
-            (0.4 * steady_tangential - first_tangential) * slow,
-            (first_tangential + 0.6 * steady_tangential - tangential) * fast,
-        ),
+    rates = WakeRates(
+        i,
+        (0.4 * steady_normal - first_normal) * slow,
+        (first_normal + 0.6 * steady_normal - normal) * fast,
+        (0.4 * steady_tangential - first_tangential) * slow,
+        (first_tangential + 0.6 * steady_tangential - tangential) * fast,
     )
+    return _local_load(response, v_normal, v_tangential, normal, tangential, rates, j)
 
 
 @inlined_kernel
@@ -368,6 +410,7 @@ station_load = chosen_by_class(
         Solved: _solved_load,
         Tabled: _tabled_load,
         TabledOrSolved: _tabled_or_solved_load,
+        Induced: _induced_table_load,
         Lagging: _lagging_load,
     },
     inlined=True,

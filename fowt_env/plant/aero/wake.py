@@ -6,7 +6,10 @@ Both models are off by default (None). Source: theory.md, 5.1.
 from math import atan2, pi, sqrt, tan
 from typing import NamedTuple
 
-from fowt_env.plant.compile.decorators import kernel
+import numpy as np
+
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import State
 
 PER_ELEMENT = 4  # wake states of a blade element: first stage and induced velocity, axial and tangential
@@ -80,6 +83,40 @@ def skew_factor(induced_normal, v_normal, ey, ez, span, skewed, skew):
     a = -induced_normal / v_normal if v_normal != 0.0 else 0.0
     chi = min((0.6 * min(max(a, 0.0), 1.0) + 1.0) * skewed.angle, 0.5 * pi)
     return 1.0 + skew.strength * tan(0.5 * chi) * span * (skewed.y * ey + skewed.z * ez)
+
+
+class BladeSkew(NamedTuple):
+    """Holds the skewed wake as one blade meets it."""
+
+    skew: SkewedWake
+    skewed: Skew
+    ey: float  # azimuth direction (0, ey, ez) of the blade
+    ez: float
+    radius: np.ndarray  # (n,) m, of the stations
+    tip_radius: float  # m
+
+
+@inlined_kernel
+def _no_skew(skewed, skew, motion, elements):
+    return None
+
+
+@inlined_kernel
+def _with_skew(skewed, skew, motion, elements):
+    return BladeSkew(skew, skewed, motion.ey, motion.ez, elements.radius, elements.tip_radius)
+
+
+# (skewed, skew, motion, elements) -> BladeSkew of a blade with this BladeMotion, None without a skew model
+blade_skew = chosen_by_class("skew", {type(None): _no_skew, SkewedWake: _with_skew}, inlined=True)
+
+
+@inlined_kernel
+def skewed_induction(normal, v_normal, j, skew):
+    """Return the axial induced velocity (m/s) of station j with the BladeSkew; None: unchanged."""
+    if skew is None:
+        return normal
+    span = skew.radius[j] / skew.tip_radius
+    return normal * skew_factor(normal, v_normal, skew.ey, skew.ez, span, skew.skewed, skew.skew)
 
 
 @kernel

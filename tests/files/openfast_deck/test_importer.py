@@ -74,6 +74,44 @@ def test_rotor_has_the_mass_properties_of_its_tapered_blades_with_their_tips_and
     assert rotor.shaft_tilt == pytest.approx(math.radians(5.0))
 
 
+@pytest.mark.parametrize(
+    ("potential", "shadow", "intensity", "expected"),
+    [
+        ("0", "False", "0.0 0.1 0.2", {}),
+        ("1", "0", "0.0 0.1 0.2", {"tower_potential": "potential"}),
+        ("2", "True", "0.0 0.1 0.2", {"tower_potential": "bak", "tower_shadow": "powles"}),
+        ("0", "2", "0.06 0.1 0.2", {"tower_shadow": "eames"}),
+    ],
+)
+def test_the_tower_s_influence_on_the_wind_is_taken_with_its_table(
+    tmp_path, potential, shadow, intensity, expected
+):
+    first, second, third = intensity.split()
+    rows = [
+        ("0        TwrPotent", f"{potential} TwrPotent"),
+        ("0        TwrShadow", f"{shadow} TwrShadow"),
+        ("TwrElev TwrDiam TwrCd\n(m) (m) (-)", "TwrElev TwrDiam TwrCd TwrTI\n(m) (m) (-) (-)"),
+        ("10.0 6.0 0.7", f"10.0 6.0 0.7 {first}"),
+        ("45.0 5.6 0.4", f"45.0 5.6 0.4 {second}"),
+        ("80.0 4.0 0.6", f"80.0 4.0 0.6 {third}"),
+    ]
+    report = import_deck(write_deck(tmp_path, AeroDyn=rows), tmp_path / "out")
+    platform = read_platform(tmp_path / "out" / "platform.toml")
+    assert platform.options == expected
+    assert any("influence of the tower" in row[0] for row in report.figures) == bool(expected)
+    sections = platform.tower.sections
+    assert sections.diameter.tolist() == [6.0, 5.6, 4.0] and sections.height[-1] == 80.0
+    assert sections.drag_coefficient.tolist() == [0.7, 0.4, 0.6]
+    # the default where AeroDyn does not read it
+    assert sections.turbulence_intensity.tolist() == [0.1 if first == "0.0" else 0.06, 0.1, 0.2]
+
+
+def test_a_tower_influence_that_aerodyn_does_not_have_is_refused(tmp_path):
+    rows = [("0        TwrPotent", "3        TwrPotent")]
+    with pytest.raises(InputError, match="TwrPotent = 3: must be a whole number from 0 to 2"):
+        import_deck(write_deck(tmp_path, AeroDyn=rows), tmp_path / "out")
+
+
 def test_rotor_centre_lies_along_the_tilted_shaft(imported):
     rotor = imported[1].rotor
     assert rotor.overhang == pytest.approx(4.0 * math.cos(math.radians(5.0)))

@@ -90,7 +90,6 @@ def test_a_comment_in_a_table_of_map_is_refused_as_map_takes_it_for_a_row(tmp_pa
         ("AeroDyn", "Wake_Mod", "0", "no induction", "induction always on"),
         ("AeroDyn", "DBEMT_Mod", "2", "dynamic wake", "dynamic_inflow"),
         ("AeroDyn", "UA_Mod", "3", "unsteady airfoil", "quasi-steady"),
-        ("AeroDyn", "TwrShadow", "True", "tower shadow", "no influence"),
         ("ServoDyn", "VSContrl", "4", "generator torque by another law", "DISCON.IN"),
         ("ServoDyn", "PCMode", "0", "no pitch control", "controller of a run"),
         ("ServoDyn", "TPitManS(1)", "10", "override of the blade pitch", "run"),

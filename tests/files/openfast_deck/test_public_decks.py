@@ -49,10 +49,12 @@ BY_HAND = {  # keys of the built-in files whose values the import does not give
         *(f"platform.lines.{i}.seabed_friction" for i in range(3)),
         "platform.potential_flow.draft",  # of the report: the deck has no members
         "platform.options.blade_stations",  # a choice
+        "platform.options.tower_potential",  # off in the built-in files
+        "platform.options.tower_shadow",
     },
     # blade.polars: a folder, which another turbine shares
-    "nrel5mw_iti_barge": {"turbine.blade.polars", *MOVING},
-    "nrel5mw_oc4_semi": {"turbine.blade.polars", *MOVING},
+    "nrel5mw_iti_barge": {"turbine.blade.polars", "platform.options.tower_potential", *MOVING},
+    "nrel5mw_oc4_semi": {"turbine.blade.polars", "platform.options.tower_potential", *MOVING},
 }
 FILES = {  # whose names differ
     "platform.tower.modes.distribution", "platform.potential_flow.coefficients", "turbine.discon",
