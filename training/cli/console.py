@@ -63,8 +63,8 @@ class Overview(TyperGroup):
             out.print(f"  [cyan]{command:{width}}[/cyan]  # {text}")
         names = max(map(len, self.commands))
         headings = max(map(len, GROUPS))
+        out.print()
         for group, commands in self.by_group().items():
-            out.print()
             for number, command in enumerate(commands):
                 first = " ".join(self.commands[command].help.split("\n\n")[0].split()).removesuffix(".")
                 heading = f"[bold]{group if number == 0 else '':{headings}}[/bold]"
