@@ -24,7 +24,9 @@ def records(turbine, values, status, interval, individual=False):
     """Return the array of a host, as for libraries that this package runs, from {measured field: value}."""
     swap = Swap(bytearray(MEMORY_SIZE), turbine, interval, individual=individual)
     fields = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))
-    swap.fill(status, whole_view([values.get(name, 0.0) for name in fields]))
+    measured = whole_view([values.get(name, 0.0) for name in fields])
+    for call in range(status + 1):  # the first call of a run settles which readings there are
+        swap.fill(call, measured)
     return swap.records.copy()
 
 

@@ -295,8 +295,8 @@ def simulate(
         try:
             run.advance(report)
         finally:
-            if isinstance(controller, CheckedController):
-                controller.finish()
+            if isinstance(run.controller, CheckedController):
+                run.controller.finish()
     frame = run.frame()
     sentences = [harm(frame.attrs["events"])]
     if not (controller is None or read_faults(faults)):
