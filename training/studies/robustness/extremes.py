@@ -119,9 +119,13 @@ def without_line(scene, line):
     """
     check_whole_number("line", line, 0, scene.n_lines - 1)
     # mooring tables are only valid near the rest position of all lines
-    arrays = scene.model.mooring._replace(table=None)[:-1]
-    kept = [np.ascontiguousarray(np.delete(array, line, axis=0)) for array in arrays]
-    return scene.with_model(mooring=Mooring(*kept))
+    arrays = scene.model.mooring._replace(table=None, dynamics=None)._asdict()
+    kept = {
+        name: np.ascontiguousarray(np.delete(array, line, axis=0))
+        for name, array in arrays.items()
+        if array is not None
+    }
+    return scene.with_model(mooring=Mooring(**kept))
 
 
 def course(case, scene, dt):
