@@ -8,7 +8,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.errors import InputError
 from fowt_env.loop.rollout import rollout
-from fowt_env.plant.aero.load import BemRotor
+from fowt_env.plant.aero.section_inflow import DynamicSections
 from fowt_env.plant.hydro.load import ExactStrips
 from fowt_env.scene.options import ARGUMENTS
 
@@ -38,7 +38,7 @@ MOTIONS = ["PtfmSurge", "PtfmSway", "PtfmHeave", "PtfmRoll", "PtfmPitch", "PtfmY
         ({"wave_components": 0}, ["wave_components = 0", "1 to 10000"]),
         ({"current": {"sped": 1.0}}, ["sped", "Did you mean 'speed'"]),
         ({"current": -1.0}, ["current.speed = -1.0"]),
-        ({"wind": 8.0, "rotor": "lookup", "skewed_wake": True}, ["lookup", "skewed_wake", "bem"]),
+        ({"wind": 8.0, "rotor": "table", "skewed_wake": True}, ["table", "skewed_wake", "lookup", "bem"]),
         ({"wind": 8.0, "rotor": "table", "dynamic_inflow": True}, ["table", "dynamic_inflow", "bem"]),
         ({"sea": SPREAD | {"heading": [0.0, 30.0]}, "wave_loads": "fast"}, ["wave_loads", "one heading"]),
         ({"sea": SEA, "wave_loads": "fast", "stretching": "none"}, ["wave_loads", "exact"]),
@@ -65,8 +65,8 @@ def test_every_argument_of_build_scene_is_among_those_that_a_refusal_names():
 def test_a_level_falls_back_to_what_the_scene_needs():
     spread = build_scene(sea=SPREAD | {"heading": [0.0, 30.0]}, fidelity="standard")
     assert isinstance(spread.model.hydro.strips, ExactStrips)
-    skewed = build_scene(wind=8.0, fidelity="standard", skewed_wake=True)
-    assert skewed.rotor == "bem" and isinstance(skewed.model.aero.rotor, BemRotor)
+    skewed = build_scene(wind=8.0, fidelity="fast", skewed_wake=True)
+    assert skewed.rotor == "lookup" and isinstance(skewed.model.aero.rotor, DynamicSections)
 
 
 def test_new_weather_cannot_add_or_remove_aerodynamics():

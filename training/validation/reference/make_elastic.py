@@ -84,25 +84,31 @@ def _turbulent(deck, wind, **more):
     return deck, case | dict(wind="hub_wind", wind_file=file, torsion=deck is Oc3) | more
 
 
-CASES = {}
-for _deck, _name in NAMES.items():
-    _rated, _pitch, *_ = OPERATING[_deck][12]
-    _both = dict(shear=0.14, pitches=(_pitch + 2.0, _pitch - 1.0, _pitch))
-    _rigid = dict(blades=0, OoPDefl=0, IPDefl=0)
-    _runs = {f"steady_{wind}mps": _held(_deck, wind) for wind in OPERATING[_deck]} | {
-        "steady_12mps_shear": _held(_deck, 12, shear=0.14),
-        "steady_12mps_shear_pitches": _held(_deck, 12, **_both),
-        "steady_12mps_2modes": _held(_deck, 12, blades=2),
-        "decay_rest": _decay(_deck, 0.0),
-        "decay_rated": _decay(_deck, _rated),
-        "decay_rated_pitch15": _decay(_deck, _rated, pitch=15.0),
-        "decay_rated_2modes": _decay(_deck, _rated, blades=2),
-        "torque_loss": _torque_loss(_deck),
-        "torque_loss_rigid_blades": _torque_loss(_deck, **_rigid),
-        **{f"turb_{wind}mps": _turbulent(_deck, wind) for wind in OPERATING[_deck]},
-        "turb_18mps_dbemt": _turbulent(_deck, 18, dbemt=2, t=400),
+def _turbine_cases(deck):
+    """Return {name: settings} of the cases that every turbine has."""
+    rated, pitch, *_ = OPERATING[deck][12]
+    both = dict(shear=0.14, pitches=(pitch + 2.0, pitch - 1.0, pitch))
+    rigid = dict(blades=0, OoPDefl=0, IPDefl=0)
+    return {f"steady_{wind}mps": _held(deck, wind) for wind in OPERATING[deck]} | {
+        "steady_12mps_shear": _held(deck, 12, shear=0.14),
+        "steady_12mps_shear_pitches": _held(deck, 12, **both),
+        "steady_12mps_2modes": _held(deck, 12, blades=2),
+        "decay_rest": _decay(deck, 0.0),
+        "decay_rated": _decay(deck, rated),
+        "decay_rated_pitch15": _decay(deck, rated, pitch=15.0),
+        "decay_rated_2modes": _decay(deck, rated, blades=2),
+        "torque_loss": _torque_loss(deck),
+        "torque_loss_rigid_blades": _torque_loss(deck, **rigid),
+        **{f"turb_{wind}mps": _turbulent(deck, wind) for wind in OPERATING[deck]},
+        "turb_18mps_dbemt": _turbulent(deck, 18, dbemt=2, t=400),
     }
-    CASES |= {f"{_name}/{case}": settings for case, settings in _runs.items()}
+
+
+CASES = {
+    f"{name}/{case}": settings
+    for deck, name in NAMES.items()
+    for case, settings in _turbine_cases(deck).items()
+}
 CASES |= {
     "iea15/turb_18mps_shear": _turbulent(Volturnus, 18, shear=0.2, t=400),
     "iea15/turb_18mps_shear_ipc": _turbulent(Volturnus, 18, shear=0.2, individual=True, t=400),
