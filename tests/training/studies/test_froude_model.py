@@ -47,8 +47,8 @@ def test_every_figure_of_a_description_has_its_power_of_the_scale():
     records |= {"torque_law": turbine.torque_law, "gains": turbine.gains["oc3"]}
     records |= {"protection": turbine.protection, "trip": turbine.protection.overspeed}
     for name, record in records.items():
-        # the modes of a tower are a file of their own, which scaled platforms do without
-        assert set(EXPONENTS[name]) == set(type(record).model_fields) - {"modes"}, name
+        # scaled platforms do without the tower's modes, a file of their own, and its sections, a straight taper
+        assert set(EXPONENTS[name]) == set(type(record).model_fields) - {"modes", "sections"}, name
     assert set(EXPONENTS["lines"]) == set(Line.model_fields)
     # a scaled turbine is rigid
     apart = {"name", "source", "gains", "blade", "blade_structure", "shaft_torsion", "discon", *records}
