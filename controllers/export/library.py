@@ -1,8 +1,8 @@
 """Builds a library with the Bladed interface from a controller, with the C compiler of this machine.
 
 A law that is available in C (native.py) becomes C code; any other controller runs in a process with Python
-(served.py), which the library (c/bridge.c) starts and ends. The wheel has the sources and no built library:
-the settings of a controller are compiled in, and a wheel with machine code would be one for each platform.
+(served.py), which the library (c/bridge.c) starts and ends. Wheels built on Linux, x86-64, have that library
+ready (setup.py): an export writes the settings of the controller into a copy of it.
 """
 
 import importlib.util
@@ -18,8 +18,7 @@ from pathlib import Path
 from fowt_env.control import known_scene, make
 from fowt_env.controllers.design.saved_files import DESIGN_PREFIX
 from fowt_env.controllers.export.hosted import Hosted
-from fowt_env.controllers.export.native import native_law, number, records_used, write_law
-from fowt_env.controllers.export.native import template as c_text
+from fowt_env.controllers.export.native import TEMPLATES, native_law, write_law
 from fowt_env.controllers.export.rosco_input import differences, rosco_text
 from fowt_env.controllers.policy.controller import POLICY_PREFIX
 from fowt_env.descriptions.platform import read_platform
@@ -29,13 +28,9 @@ from fowt_env.scene.build import build_scene
 
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra")
 SHARED = ("-shared", "-fPIC")
-MODULE = "fowt_env.controllers.export.served"
-LONGEST_START, LONGEST_STEP, LONGEST_END = 900.0, 60.0, 5.0  # s; a first start compiles kernels
-REPLY_SIZE = 4 + 4 * 8 + 1000  # code, command and message of an answer
-HEADERS = (
-    "errno.h", "fcntl.h", "poll.h", "signal.h", "spawn.h", "stddef.h", "stdint.h", "string.h", "sys/socket.h",
-    "sys/wait.h", "time.h", "unistd.h",
-)  # fmt: skip
+MARK = b"fowt_env: title, interpreter and settings"  # at the beginning of fowt_settings in bridge.c
+SETTINGS_SIZE = 8192  # bytes of fowt_settings
+READY = TEMPLATES / "bridge.so"  # of a wheel
 
 
 def prepared(name, platform, control_dt):
@@ -85,11 +80,14 @@ def export_library(name, path, platform="oc3_hywind", control_dt=0.1, python=Fal
         if native:
             texts = write_law(controller, turbine, control_dt, "law", _title(name, platform))
             *_, source = _write_law(texts, folder, "law")
+            with replacing(path) as temporary:
+                compile_c([source], temporary, SHARED)
         else:
-            text = bridge_source(settings_of(name, platform, control_dt), path.stem)
-            source = _write(Path(folder, "bridge.c"), text)
-        with replacing(path) as temporary:
-            compile_c([source], temporary, SHARED)
+            bridge = _bridge(folder)
+            settings = json.dumps(settings_of(name, platform, control_dt))
+            with replacing(path) as temporary:
+                temporary.write_bytes(with_settings(bridge.read_bytes(), path.stem, sys.executable, settings))
+                temporary.chmod(0o755)
     return "C" if native else "Python"
 
 
@@ -115,19 +113,27 @@ def settings_of(name, platform, control_dt):
     return {"controller": name, "platform": platform, "control_dt": control_dt, "folder": os.getcwd()}
 
 
-def bridge_source(settings, title):
-    """Return the C code of the library that runs a controller in Python."""
-    texts = {"LIBRARY": title, "PYTHON": sys.executable, "MODULE": MODULE, "SETTINGS": json.dumps(settings)}
-    body = c_text("records.c") + "\n" + c_text("bridge.c")
-    times = {"LONGEST_START": LONGEST_START, "LONGEST_STEP": LONGEST_STEP, "LONGEST_END": LONGEST_END}
-    return "\n".join([
-        "#define _POSIX_C_SOURCE 200809L",
-        *(f"#include <{name}>" for name in HEADERS), "",
-        "extern char **environ;", "#ifndef MSG_NOSIGNAL", "#define MSG_NOSIGNAL 0", "#endif", "",
-        *(f"#define {name} {json.dumps(text)}" for name, text in texts.items()),
-        *(f"#define {name} {number(value)}" for name, value in times.items()),
-        f"#define REPLY_SIZE {REPLY_SIZE}", "", records_used(body), body,
-    ])  # fmt: skip
+def _bridge(folder):
+    """Return the path of a library that runs a controller in Python: ready, or built in a folder."""
+    if READY.exists() and sys.platform == "linux" and os.uname().machine == "x86_64":
+        return READY
+    built = Path(folder, "bridge.so")
+    compile_c([TEMPLATES / "bridge.c"], built, SHARED)
+    return built
+
+
+def with_settings(library, *texts):
+    """Return the bytes of a built bridge.c with its title, Python interpreter and settings written into it.
+
+    Raises: InputError for texts that are longer than the room for them.
+    """
+    packed = b"".join(text.encode() + b"\0" for text in texts)
+    if len(packed) > SETTINGS_SIZE:
+        raise InputError(
+            f"export: names of files and folders take {len(packed)} bytes: at most {SETTINGS_SIZE}"
+        )
+    at = library.index(MARK)
+    return library[:at] + packed.ljust(SETTINGS_SIZE, b"\0") + library[at + SETTINGS_SIZE :]
 
 
 def compiler():

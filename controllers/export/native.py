@@ -15,10 +15,7 @@ import numpy as np
 
 import fowt_env
 from fowt_env.control import CompiledController
-from fowt_env.controllers.bladed.records import NUMBER
 from fowt_env.controllers.export.hosted import (
-    LAST_EXTENDED,
-    LAST_STANDARD,
     MEAN_PITCH,
     RECORD_OF,
     VELOCITY,
@@ -47,7 +44,6 @@ from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, Measure
 TEMPLATES = Path(__file__).parent / "c"
 FAMILIES = {IPC: "ipc", GSPI: "gspi", FloatingFeedback: "floating_feedback", LQR: "lqr", PI: "pi"}
 METHODS = ("kernel", "reset", "act")  # that a law in C repeats
-EXPORTED = "#ifdef _WIN32\n#define EXPORTED __declspec(dllexport)\n#else\n#define EXPORTED\n#endif"
 
 
 @dataclass
@@ -129,7 +125,7 @@ def write_law(controller, turbine, control_dt, stem, title):
         "#include <math.h>", "#include <stddef.h>", "#include <string.h>", f'#include "{stem}.h"', "",
         *(f"#define controller_{name} {stem}_{name}" for name in ("type", "start", "step")), "",
         _beginning(code), body, "#ifndef FOWT_WITHOUT_DISCON", "",
-        f"#define LIBRARY {json.dumps(title)}", records_used(interface), _reads(fields), interface, "#endif",
+        f"#define LIBRARY {json.dumps(title)}", template("records.h"), _reads(fields), interface, "#endif",
     ]  # fmt: skip
     return header, "\n".join(lines) + "\n"
 
@@ -137,14 +133,6 @@ def write_law(controller, turbine, control_dt, stem, title):
 def template(name):
     """Return the text of a file of c/."""
     return (TEMPLATES / name).read_text(encoding="utf-8")
-
-
-def records_used(text):
-    """Return an enum of the records of the Bladed interface that a C text names."""
-    names = sorted(set(re.findall(r"\bRECORD_([A-Z0-9_]+)\b", text)), key=lambda name: NUMBER[name.lower()])
-    rows = {f"RECORD_{name}": NUMBER[name.lower()] for name in names}
-    rows |= {"LAST_STANDARD": LAST_STANDARD, "LAST_EXTENDED": LAST_EXTENDED}
-    return f"{EXPORTED}\n\n/* numbers of records, from 1 */\n{_enum(rows)}\n"
 
 
 def _function(name, arguments, calls):

@@ -45,8 +45,8 @@ def plant_code():
 
 
 def _data(folder):
-    """Return the files below a folder that are not Python sources."""
-    paths = (path for path in folder.rglob("*") if path.is_file() and path.suffix != ".py")
+    """Return the files below a folder that are neither Python sources nor built of sources (setup.py)."""
+    paths = (path for path in folder.rglob("*") if path.is_file() and path.suffix not in (".py", ".so"))
     return [path for path in paths if "__pycache__" not in path.parts]
 
 

@@ -1,13 +1,69 @@
 /* The Bladed interface of a controller in Python, which runs in a process of its own.
 
+   fowt_settings holds a title, the Python interpreter and the settings of the controller, each ended by a zero.
+   An export writes them into the built library in place of their mark, so that one library serves all
+   controllers and an export needs no compiler where the library is ready.
+
    The first call starts the process and connects it by a pair of sockets, its standard input; each call sends
    the records and waits for the command; the last call, the end of the host and the unloading of this library
    end the process, which ends by itself where its socket is closed. */
+
+#define _POSIX_C_SOURCE 200809L
+#include <errno.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+#include "records.h"
+#include "records.c"
+
+extern char **environ;
+#ifndef MSG_NOSIGNAL
+#define MSG_NOSIGNAL 0
+#endif
+
+#define MODULE "fowt_env.controllers.export.served"
+#define REPLY_SIZE 1036 /* bytes: code (int32), command (4 doubles) and message (1000) of an answer */
+#ifndef LONGEST_STEP /* s; a first call compiles kernels */
+#define LONGEST_START 900.0
+#define LONGEST_STEP 60.0
+#define LONGEST_END 5.0
+#endif
+
+/* visible, so that no compiler takes its content for known */
+char fowt_settings[8192] = "fowt_env: title, interpreter and settings";
 
 static struct {
     int running, socket;
     pid_t child;
 } host;
+
+/* Returns a text of fowt_settings, by its number. */
+static char *setting(int number)
+{
+    char *text = fowt_settings;
+
+    while (number-- > 0)
+        text += strlen(text) + 1;
+    return text;
+}
+
+/* Appends a text as far as it fits. */
+static void append(char *text, size_t size, const char *more)
+{
+    size_t at = strlen(text);
+
+    while (at + 1 < size && *more != '\0')
+        text[at++] = *more++;
+    text[at] = '\0';
+}
 
 static double now(void)
 {
@@ -47,7 +103,7 @@ __attribute__((destructor)) static void unload(void)
 /* Starts the process; returns NULL or what is wrong. */
 static const char *begin(void)
 {
-    char *arguments[] = {PYTHON, "-m", MODULE, SETTINGS, NULL};
+    char *python = setting(1), *arguments[] = {python, "-m", MODULE, setting(2), NULL};
     posix_spawn_file_actions_t actions;
     int pair[2], failed;
 
@@ -58,12 +114,16 @@ static const char *begin(void)
     fcntl(pair[1], F_SETFD, FD_CLOEXEC);
     posix_spawn_file_actions_init(&actions);
     posix_spawn_file_actions_adddup2(&actions, pair[1], 0);
-    failed = posix_spawn(&host.child, PYTHON, &actions, NULL, arguments, environ);
+    failed = posix_spawn(&host.child, python, &actions, NULL, arguments, environ);
     posix_spawn_file_actions_destroy(&actions);
     close(pair[1]);
     if (failed) {
+        static char text[1100] = "cannot start ";
+
         close(pair[0]);
-        return "cannot start " PYTHON;
+        text[13] = '\0';
+        append(text, sizeof text, python);
+        return text;
     }
     host.socket = pair[0];
     host.running = 1;
@@ -118,12 +178,12 @@ static const char *ask(const float *swap, int first, char *reply)
 EXPORTED void DISCON(float *swap, int *fail, const char *infile, const char *outname, char *message)
 {
     int status = whole(swap, RECORD_STATUS, -100, 100, -100);
-    char reply[REPLY_SIZE + 1], text[REPLY_SIZE + 300] = LIBRARY ": ";
+    char reply[REPLY_SIZE + 1], text[REPLY_SIZE + 300] = "";
     const char *wrong = NULL;
     double command[4];
     int32_t code = -1;
 
-    (void)infile; /* all settings are in this library */
+    (void)infile; /* all settings are in fowt_settings */
     (void)outname;
     *fail = 0;
     if (status == -1) {
@@ -146,7 +206,9 @@ EXPORTED void DISCON(float *swap, int *fail, const char *infile, const char *out
         demand(swap, command);
         return;
     }
-    strncat(text, wrong, sizeof text - strlen(text) - 1);
+    append(text, 300, setting(0));
+    append(text, sizeof text, ": ");
+    append(text, sizeof text, wrong);
     report(swap, fail, message, -1, text);
     finish();
 }

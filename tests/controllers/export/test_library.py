@@ -1,7 +1,7 @@
 """Libraries that run a controller in a Python process: the same commands, and no process is left behind."""
 
-import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +12,7 @@ import pytest
 from bladed_host import Library, changed, needs_compiler, series
 
 from fowt_env import build_scene, simulate
+from fowt_env.controllers.bladed.records import NUMBER
 from fowt_env.controllers.export import library
 from fowt_env.controllers.export.library import export_library, hosted
 from fowt_env.descriptions.turbine import read_turbine
@@ -86,7 +87,7 @@ def test_the_process_commands_as_here_and_ends_with_the_run(own, tmp_path):
     assert pid != os.getpid() and running(pid)
     began = time.monotonic()
     there.call(changed(arrays[-1], status=-1))
-    assert not running(pid) and time.monotonic() - began < 0.8 * library.LONGEST_END  # by itself
+    assert not running(pid) and time.monotonic() - began < 4.0  # s, by itself: killed after 5 s
 
 
 @pytest.mark.slow
@@ -128,8 +129,8 @@ def test_an_error_of_the_controller_ends_the_run_with_its_words(own, tmp_path):
 @pytest.mark.slow
 def test_a_controller_that_leaves_or_hangs_is_a_message_and_no_endless_wait(own, tmp_path, monkeypatch):
     arrays = series(TURBINE, instants=25)
-    monkeypatch.setattr(library, "LONGEST_STEP", 0.5)
-    monkeypatch.setattr(library, "LONGEST_END", 0.2)
+    times = ("-DLONGEST_START=900.0", "-DLONGEST_STEP=0.5", "-DLONGEST_END=0.2")
+    monkeypatch.setattr(library, "READY", built_bridge(tmp_path, *times))
     for name, late, words in (
         ("leaving", "os._exit(3)", "process has ended"),
         ("hanging", "__import__('ctypes').PyDLL(None).sleep(40)", "does not answer in time"),  # with the GIL
@@ -175,25 +176,44 @@ def test_the_process_ends_with_a_host_that_is_killed(hangs, own, tmp_path):
 
 
 @pytest.mark.slow
-def test_what_cannot_be_started_is_said_at_the_first_call(own, tmp_path):
+def test_what_cannot_be_started_is_said_at_the_first_call(own, tmp_path, monkeypatch):
     path = own("gone")
     (tmp_path / "gone.py").unlink()
     with pytest.raises(RuntimeError, match="cannot import 'gone'"):
         Library(path).call(series(TURBINE, instants=1)[0])
-    no_python = own("pythonless")
-    source = library.bridge_source(library.settings_of("pi", "oc3_hywind", 0.1), "title")
-    text = tmp_path / "bridge.c"
-    text.write_text(source.replace(json.dumps(sys.executable), '"/no/such/python"'))
-    library.compile_c([text], no_python, library.SHARED)
+    monkeypatch.setattr(sys, "executable", "/no/such/python")
     with pytest.raises(RuntimeError, match="cannot start /no/such/python|process has ended"):
-        Library(no_python).call(series(TURBINE, instants=1)[0])
+        Library(own("pythonless")).call(series(TURBINE, instants=1)[0])
 
 
-def test_the_bridge_compiles_without_a_warning(tmp_path):
-    source = tmp_path / "bridge.c"
-    source.write_text(library.bridge_source(library.settings_of("pi", "oc3_hywind", 0.1), 'quo"ted\\'))
-    strict = ("-pedantic", "-Wconversion", "-Werror")
-    assert library.compile_c([source], tmp_path / "bridge.so", (*library.SHARED, *strict)) == ""
+def built_bridge(folder, *options):
+    """Return the path of bridge.c built in a folder, as a wheel has it, without a warning."""
+    path = folder / "bridge.so"
+    source, strict = library.TEMPLATES / "bridge.c", ("-pedantic", "-Wconversion", "-Werror")
+    assert library.compile_c([source], path, (*library.SHARED, *strict, *options)) == ""
+    return path
+
+
+def test_a_ready_bridge_needs_no_compiler(own, tmp_path, monkeypatch):
+    arrays, by_compiler = series(TURBINE, instants=3), Library(own("plain"))
+    expected = [by_compiler.call(swap) for swap in arrays]
+    monkeypatch.setattr(library, "READY", built_bridge(tmp_path))
+    monkeypatch.setenv("CC", "/no/such/compiler")
+    there = Library(own("plain"))
+    assert [there.call(swap) for swap in arrays] == expected
+
+
+def test_records_have_the_numbers_of_the_bladed_interface():
+    found = dict(re.findall(r"RECORD_(\w+) = (\d+)", (library.TEMPLATES / "records.h").read_text()))
+    assert len(found) > 20
+    assert {name.lower(): int(text) for name, text in found.items()}.items() <= NUMBER.items()
+
+
+def test_settings_that_are_too_long_for_the_library_are_refused(tmp_path):
+    bridge = built_bridge(tmp_path).read_bytes()
+    assert len(library.with_settings(bridge, "t", "p", "{}")) == len(bridge)
+    with pytest.raises(InputError, match="take 9002 bytes: at most 8192"):
+        library.with_settings(bridge, "", "", "x" * 8999)
 
 
 def test_a_missing_or_failing_compiler_says_what_to_do(tmp_path, monkeypatch):
