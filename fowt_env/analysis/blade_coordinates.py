@@ -53,6 +53,14 @@ def turned_to(x, azimuth, states):
     return placed(mean, azimuth, states, cyclic)
 
 
+def blade_waves(tilt, yaw):
+    """Return {"regressive", "progressive": wave} of complex components q_c, q_s of a mode exp(i w t).
+
+    q_i = cos(w t - psi_i) runs with the rotation; its q_s lags behind q_c.
+    """
+    return {"regressive": 0.5 * (tilt - 1j * yaw), "progressive": 0.5 * (tilt + 1j * yaw)}
+
+
 class CyclicMean:
     """Averages the rates of a scene with bending blades over the azimuth, in multi-blade coordinates."""
 
