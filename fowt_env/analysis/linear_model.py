@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 from scipy.linalg import expm
+from scipy.optimize import linear_sum_assignment
 
 from fowt_env.analysis.blade_coordinates import blade_waves
 from fowt_env.analysis.linear_plant import (
@@ -15,6 +16,7 @@ from fowt_env.analysis.linear_plant import (
     MEASURED,
     RECORDED,
     TOWER,
+    TWIST_STATES,
     WAKE,
     Plant,
     bending_names,
@@ -61,6 +63,7 @@ COLUMNS = {  # state: column of the output of simulate
     "rotor_speed": "RotSpeed", "blade_pitch": "BldPitch1", "generator_torque_in_force": "GenTq",
 }  # fmt: skip
 BENDING = tuple(f"{part}{name}" for name in SHAPES for part in ("", *CYCLIC))  # of blades
+STRUCTURAL = (*TOWER, *BENDING, TWIST_STATES[0])  # deflections of the structure
 UNITS = {  # of states, inputs and outputs, SI
     **{field: measured.unit for field, measured in FIELDS.items()},
     **{name: FIELDS[field].unit for name, field in MEASURED_AS.items()},
@@ -68,6 +71,7 @@ UNITS = {  # of states, inputs and outputs, SI
     "tower_base_moment": "N m",
     **{name: "m" for name in TOWER}, **{f"{name}_rate": "m/s" for name in TOWER},
     **{name: "m" for name in BENDING}, **{f"{name}_rate": "m/s" for name in BENDING},
+    **dict(zip(TWIST_STATES, ("rad", "rad/s"), strict=True)),
 }  # fmt: skip
 
 
@@ -120,9 +124,9 @@ class LinearModel:
     outputs; E (m, 6) and F (n, 6) apply to further forces on the hull (FORCES). point is the OperatingPoint.
     The first 14 states are plant.state.STATES, followed by the states that the plant has of: dynamic inflow
     (wake_1 ...), deflections of a flexible tower (TOWER) and their rates (tower_fore_aft_rate ...),
-    deflections of bending blades, mean of the blades (flap_1 ...), and their rates, ACTUATOR_STATES, cosine
-    and sine components of the blades' states (tilt_flap_1, yaw_flap_1 ...: multi-blade coordinates), and
-    radiation memory (radiation_1 ...).
+    deflections of bending blades, mean of the blades (flap_1 ...), and their rates, TWIST_STATES of a shaft,
+    ACTUATOR_STATES, cosine and sine components of the blades' states (tilt_flap_1, yaw_flap_1 ...:
+    blade_coordinates.py), and radiation memory (radiation_1 ...).
 
     All variables are deviations from the operating point, given by `equilibrium` and `equilibrium_inputs`;
     state() computes the states from measurements. Velocities (vx to wz) are those of the body origin in body
@@ -359,26 +363,27 @@ class Mode(NamedTuple):
 def modes(a, names, cm_height, arm):
     """Return the modes [Mode] of a system matrix a (n, n) with these state names, slowest first.
 
-    A mode is named by its largest motion: translations of the centre of mass (at the water line a
-    platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s,
-    and deflections of tower and blades unscaled. A wave of blade bending around the rotor is regressive or
-    progressive (flap_1_regressive), in which all blades bend alike it has the name of the bending mode.
-    Modes dominated, by participation factors, by states of radiation memory, dynamic inflow, a pitch drive
-    with inertia or cyclic blade pitch are omitted.
+    A mode of the structure, by participation factors, is named by the deflection with the largest ones, each
+    name once: a wave of blade bending around the rotor is regressive or progressive (flap_1_regressive); if
+    all blades bend alike, it has the name of the bending mode. Another mode is named by its largest motion:
+    translations of the centre of mass (at the water line a platform-pitch mode moves more in surge than in
+    pitch), angles times arm (m), and rotor speed times arm/12 s.
+    Modes dominated by states of radiation memory, dynamic inflow, a pitch drive with inertia or cyclic blade
+    pitch are omitted.
     """
     values, vectors = np.linalg.eig(a)
-    result = []
     drive = DRIVE if "pitch_rate" in names else ()
     cyclic = tuple(f"{part}pitch" for part in CYCLIC)
     internal = [name.startswith((MEMORY, WAKE, *cyclic)) or name in drive for name in names]
-    bending = [name for name in SHAPES if name in names]
-    fractions = np.zeros(len(values))
-    if any(internal):
+    bent = any(name in STRUCTURAL for name in names)
+    factors = np.zeros((len(names), len(values)))
+    if any(internal) or bent:
         factors = np.abs(vectors * np.linalg.inv(vectors).T)
-        fractions = factors[internal].sum(axis=0) / factors.sum(axis=0)
-    for value, vector, fraction in zip(values, vectors.T, fractions, strict=True):
-        if value.imag <= 1e-6 or fraction > 0.5:
-            continue
+        factors /= factors.sum(axis=0)
+    kept = [k for k, value in enumerate(values) if value.imag > 1e-6 and factors[internal, k].sum() <= 0.5]
+    of_structure = _structural_modes(names, vectors[:, kept], factors[:, kept]) if bent else {}
+    result = []
+    for k, (value, vector) in enumerate(zip(values[kept], vectors[:, kept].T, strict=True)):
         part = dict(zip(names, vector, strict=True))
         participation = {
             "surge": abs(part["surge"] + cm_height * part["platform_pitch"]),
@@ -386,15 +391,33 @@ def modes(a, names, cm_height, arm):
             "heave": abs(part["heave"]),
             **{angle: arm * abs(part[angle]) for angle in MOTIONS[3:]},
             "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
-            **{deflection: abs(part[deflection]) for deflection in (*TOWER, *bending) if deflection in part},
         }
-        for mode in bending:
-            tilt, yaw = (part[f"{prefix}{mode}"] for prefix in CYCLIC)
-            participation |= {f"{mode}_{way}": abs(wave) for way, wave in blade_waves(tilt, yaw).items()}
-        name = max(participation, key=participation.get)
+        name = of_structure.get(k, max(participation, key=participation.get))
         size = abs(value)
         result.append(Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / size), float(size)))
     return sorted(result, key=lambda mode: -mode.period)
+
+
+def _structural_modes(names, vectors, factors):
+    """Return {column: name} of the modes dominated by tower, blades and shaft (modes)."""
+    shares = {}
+    for row, name in enumerate(names):
+        deflection, rate = name.removesuffix("_rate"), name.endswith("_rate")
+        if deflection not in STRUCTURAL:
+            continue
+        if not deflection.startswith(CYCLIC):
+            shares[deflection] = shares.get(deflection, 0.0) + factors[row]
+            continue
+        mode = deflection.removeprefix(CYCLIC[0]).removeprefix(CYCLIC[1])
+        tilt, yaw = (vectors[names.index(f"{part}{mode}{'_rate' * rate}")] for part in CYCLIC)
+        waves = {way: np.abs(wave) ** 2 for way, wave in blade_waves(tilt, yaw).items()}
+        for way, wave in waves.items():
+            label = f"{mode}_{way}"
+            shares[label] = shares.get(label, 0.0) + factors[row] * wave / sum(waves.values())
+    labels, table = list(shares), np.array(list(shares.values()))
+    columns = np.flatnonzero(table.sum(axis=0) > 0.5)
+    rows, chosen_columns = linear_sum_assignment(-table[:, columns])
+    return {int(columns[k]): labels[i] for i, k in zip(rows, chosen_columns, strict=True)}
 
 
 def check_linear(scene, known=LINEAR):
@@ -537,8 +560,8 @@ def settled(model, names):
 def natural_periods(scene):
     """Return {motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
-    Tower modes of a flexible tower follow, named by TOWER; blades bend quasi-statically. A motion without
-    restoring (no moorings) gets inf.
+    Tower modes of a flexible tower follow, named by TOWER; blades bend and the shaft twists quasi-statically.
+    A motion without restoring (no moorings) gets inf.
     Modes are named by their largest motion, angles weighted with half the draft. With radiation memory the
     added mass is taken at the natural frequency of the motion.
     """
@@ -554,7 +577,8 @@ def natural_periods(scene):
 
 def _periods(model, omega):
     """Return {motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
-    model = settled(model, [name for name in model.states if name.removesuffix("_rate") in BENDING])
+    quick = [name for name in model.states if name.removesuffix("_rate") in STRUCTURAL[len(TOWER) :]]
+    model = settled(model, quick)
     deflections = [name for name in TOWER if name in model.states]
     names = (*MOTIONS, *deflections)
     n = len(names)

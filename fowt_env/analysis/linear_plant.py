@@ -24,6 +24,8 @@ STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e
 TOWER = ("tower_fore_aft", "tower_side_side", "tower_fore_aft_2", "tower_side_side_2")  # deflections
 TOWER_BLOCKS = {"tower_deflection": ("", 1e-3), "tower_velocity": ("_rate", 1e-5)}  # name suffixes, steps
 BLADE_BLOCKS = {"blade_deflection": ("", 1e-3), "blade_velocity": ("_rate", 1e-4)}  # of the modes of MODES
+TWIST_STATES = ("shaft_twist", "shaft_twist_rate")  # blocks of the scene's state vector
+TWIST_STEP = 1e-5  # rad and rad/s
 ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in a linear model, step)
     "pitch_rate": ("pitch_rate", 1e-5),
     "generator_torque": ("generator_torque_in_force", 1.0),
@@ -78,6 +80,8 @@ def plant_states(scene):
             end, step = BLADE_BLOCKS[name]
             indices = (list(range(first + k, first + size, len(modes))) for k in range(len(modes)))
             rows += [(mode + end, blades, step) for mode, blades in zip(modes, indices, strict=True)]
+        elif name in TWIST_STATES:
+            rows.append((name, [first], TWIST_STEP))
         elif name in ACTUATOR_STATES:
             state, step = ACTUATOR_STATES[name]
             rows.append((state, list(range(first, first + size)), step))
