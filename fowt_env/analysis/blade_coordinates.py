@@ -14,7 +14,6 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import BLADES, State
 
 TURN = 2.0 * pi / BLADES  # rad, the period of a rotor of three equal blades
-HARMONICS = 2  # components besides the mean
 
 
 def bending_states(scene):
@@ -28,9 +27,9 @@ def bending_states(scene):
 
 
 def waves_of(azimuth):
-    """Return the (2, 3) cosines and sines of the blades' azimuths, the first at an azimuth (rad)."""
-    psi = azimuth + TURN * np.arange(BLADES)
-    return np.array([np.cos(psi), np.sin(psi)])
+    """Return the (..., 2, 3) cosines and sines of the blades' azimuths, the first at azimuth (...), rad."""
+    psi = np.asarray(azimuth)[..., None] + TURN * np.arange(BLADES)
+    return np.stack([np.cos(psi), np.sin(psi)], axis=-2)
 
 
 def coordinates(x, states):
@@ -41,10 +40,10 @@ def coordinates(x, states):
 
 
 def placed(x, azimuth, states, cyclic):
-    """Return the state vector at an azimuth (rad) of one in multi-blade coordinates."""
-    y = x.copy()
-    y[State.AZIMUTH] = azimuth
-    y[states] += cyclic @ waves_of(azimuth)
+    """Return the state vectors (..., n_state) at azimuth (...), rad, of one in multi-blade coordinates."""
+    y = np.broadcast_to(x, (*np.shape(azimuth), len(x))).copy()
+    y[..., State.AZIMUTH] = azimuth
+    y[..., states] += cyclic @ waves_of(azimuth)
     return y
 
 
@@ -54,25 +53,34 @@ def turned_to(x, azimuth, states):
     return placed(mean, azimuth, states, cyclic)
 
 
+def blade_waves(tilt, yaw):
+    """Return {"regressive", "progressive": wave} of complex components q_c, q_s of a mode exp(i w t).
+
+    q_i = cos(w t - psi_i) runs with the rotation; its q_s lags behind q_c.
+    """
+    return {"regressive": 0.5 * (tilt - 1j * yaw), "progressive": 0.5 * (tilt + 1j * yaw)}
+
+
 class CyclicMean:
     """Averages the rates of a scene with bending blades over the azimuth, in multi-blade coordinates."""
 
     def __init__(self, scene, data, handle):
         self.states, self.data, self.handle = bending_states(scene), data, handle
-        self.dx, self.row = np.zeros(scene.n_state), np.zeros(len(scene.channels))
+        self.row = np.zeros(len(scene.channels))
 
     def __call__(self, x, cyclic, u, azimuths, mean):
         """Fill mean (n_state,) at a state; return the rates (k, 2) of cyclic, zero in a periodic state.
 
         azimuths: samples of TURN.
         """
-        states, turned = self.states, np.zeros_like(cyclic)
-        mean[:] = 0.0
-        for azimuth in x[State.AZIMUTH] + TURN * np.arange(azimuths) / azimuths:
+        azimuth, states = x[State.AZIMUTH] + TURN * np.arange(azimuths) / azimuths, self.states
+        every = placed(x, azimuth, states, cyclic)
+        rates = np.zeros_like(every)
+        for y, dx in zip(every, rates, strict=True):
             self.data.cache[LoadCache.VALID] = 0.0
-            output(self.handle, placed(x, azimuth, states, cyclic), u, 0.0, self.dx, self.row)
-            mean += self.dx / azimuths
-            turned += self.dx[states] @ waves_of(azimuth).T * (2.0 / BLADES / azimuths)
+            output(self.handle, y, u, 0.0, dx, self.row)
+        mean[:] = rates.mean(axis=0)
         mean[states] = mean[states].mean(axis=1)[:, None]
+        turned = np.einsum("akb,awb->kw", rates[:, states], waves_of(azimuth)) * (2.0 / BLADES / azimuths)
         # d(q_c cos psi + q_s sin psi)/dt: the coordinates do not rotate with the blades
         return turned + x[State.ROTOR_SPEED] * np.array([-cyclic[:, 1], cyclic[:, 0]]).T

@@ -33,7 +33,7 @@ from fowt_env.weather.wind_field import steady_field
 AZIMUTHS = 12  # samples over 120 degrees, the period of three blades
 NEWTON_ROUNDS = 40
 TOLERANCE = 1e-11  # m/s2 and rad/s2 of remaining acceleration
-BENT = 1e-10  # m/s2, of the modes of blades
+BENT = 1e-10  # m/s2, of the modes of blades, and rad/s2, of the twist of the shaft
 OUTER_ROUNDS = 30
 FEATHERED = 0.5 * pi
 HALVINGS = 12
@@ -44,6 +44,7 @@ DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     int(State.BLADE_PITCH): 1e-5,
 }
 DEFLECTION_STEP = 1e-3  # m, of the deflections of a flexible tower and of blades
+TWIST_STEP = 1e-5  # rad, of the shaft
 PLATFORM_MODES = ("floating", "fixed")
 
 
@@ -147,7 +148,8 @@ class _Steady(Evaluation):
         self.slope = None  # last Jacobian of the motions
         self.bent = bending_states(scene)  # x has the mean of the blades
         modes = len(self.bent) // 2
-        self.bending = np.zeros((modes, 3))  # mean, cosine and sine components of the deflections
+        # mean, cosine and sine components of the blades' deflections, then the twist of a shaft that twists
+        self.bending = np.zeros(3 * modes + (scene.model.shaft is not None))
         self.bending_slope = None
         self.cyclic = np.zeros((2 * modes, 2))
         self.average = CyclicMean(scene, self.data, self.handle) if modes else None
@@ -155,10 +157,10 @@ class _Steady(Evaluation):
     def rates(self):
         """Return the azimuth-averaged derivative at the current state and command, with actuators at rest."""
         rest_actuators(self.scene.model, self.x, self.u)
-        if self.average is None:
-            self.settled_rates()
+        if len(self.bending):
+            self.settle_bending()
         else:
-            self.settle_blades()
+            self.settled_rates()
         if fault := self.scene.first_nonfinite_load(self.data):
             raise InputError(f"no steady state found for {label(self.scene)}: {fault}")
         return self.mean
@@ -186,23 +188,29 @@ class _Steady(Evaluation):
         """Return the number of azimuths that are averaged: that of the start alone for a rotor at rest."""
         return 1 if self.x[State.ROTOR_SPEED] == 0.0 and self.average is not None else AZIMUTHS
 
-    def settle_blades(self):
-        """Set the deflections of the blades to their periodic state, with platform, tower and rotor fixed.
+    def settle_bending(self):
+        """Set blades and shaft to their periodic state, with platform, tower and rotor fixed.
 
         Weight bends each blade once per turn: the state has the mean and the first harmonic.
         """
+        modes, shaft = len(self.bent) // 2, self.scene.model.shaft
+        bending, twist = np.split(self.bending, [3 * modes])
+        bending = bending.reshape(modes, 3)
 
         def accelerations():
-            modes, speed = len(self.bending), self.x[State.ROTOR_SPEED]
-            self.x[self.bent[:modes]] = self.bending[:, :1]
-            self.cyclic[:modes] = self.bending[:, 1:]
-            self.cyclic[modes:] = speed * np.array([self.bending[:, 2], -self.bending[:, 1]]).T
+            speed = self.x[State.ROTOR_SPEED]
+            self.x[self.bent[:modes]] = bending[:, :1]
+            self.cyclic[:modes] = bending[:, 1:]
+            self.cyclic[modes:] = speed * np.array([bending[:, 2], -bending[:, 1]]).T
+            if shaft is not None:
+                self.x[shaft.first] = twist[0]
             turned = self.settled_rates()
-            return np.column_stack([self.mean[self.bent[modes:, 0]], turned[modes:]]).ravel()
+            found = np.column_stack([self.mean[self.bent[modes:, 0]], turned[modes:]]).ravel()
+            return found if shaft is None else np.append(found, self.mean[shaft.first + 1])
 
-        flat = self.bending.reshape(-1)
-        every, steps = list(range(flat.size)), np.full(flat.size, DEFLECTION_STEP)
-        _, self.bending_slope = newton(accelerations, flat, every, steps, BENT, self.bending_slope)
+        every = list(range(len(self.bending)))
+        steps = [DEFLECTION_STEP] * bending.size + [TWIST_STEP] * len(twist)
+        _, self.bending_slope = newton(accelerations, self.bending, every, steps, BENT, self.bending_slope)
 
     def settle_internal(self, block):
         """Set a block of internal states to its equilibrium, with all other states fixed.

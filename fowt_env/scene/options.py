@@ -43,6 +43,7 @@ class Fidelity(NamedTuple):
     dt: float | None = None  # s, default step with this integrator; None: default of the integrator
     blades: str = "rigid"
     tower: str = "rigid"
+    shaft: str = "rigid"
     dynamic_inflow: bool = False
 
 
@@ -109,9 +110,10 @@ FIDELITIES = {
         radiation="state_space", error=5e-4,
     ),
     "elastic": Fidelity(
-        "standard with bending blades and tower and the lag of the wake",
+        "standard with blades and tower that bend, a shaft that twists and a wake that lags",
         rotor="lookup", wave_loads="fast", integrator="ab4", mooring="catenary", radiation="state_space",
-        error=5e-3, blades="modes2", tower="modes2", dynamic_inflow=True,
+        error=5e-3, blades="modes2", tower="modes2", shaft="torsion",
+        dynamic_inflow=True,
     ),
     "fast": Fidelity(
         "the rotor and the tensions of the lines as tables",
@@ -188,9 +190,12 @@ OPTIONS = {
     "tower": Option(None, (None, "rigid", "modes", "modes2"),
         "rigid, or with one or two bending modes in each direction; None: the fidelity's"),
     # blade bending: none, or the modes of blade_beam.MODES ([blade_structure] of the turbine file)
-    "blades": Option(None, (None, "rigid", "modes", "modes2"),
+"blades": Option(None, (None, "rigid", "modes", "modes2"),
         "rigid, or with the first flapwise and edgewise bending mode of each blade, or two flapwise modes;"
         " None: the fidelity's"),
+    # torsion of the shaft between generator and rotor ([shaft_torsion] of the turbine file)
+    "shaft": Option(None, (None, "rigid", "torsion"),
+        "rigid, or twisting between generator and rotor; None: the fidelity's"),
     "integrator": Option(None, (None, *INTEGRATORS), "time stepping; None: the fidelity's"),
     # of the rotor load per step; None: FIELD_SAMPLES in a wind box with an integrator that samples it, else 1
     "rotor_samples": Option(None, Range("None or a number of samples, 1 to 10", 1, 10, whole=True),
@@ -227,7 +232,7 @@ OPTIONS = {
 }  # fmt: skip
 # defaults of a floater other than a slender spar: linear theory is valid for the undisplaced pose only
 UNDISPLACED = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none"}
-LEVEL_PARTS = ("wave_loads", "integrator", "radiation", "blades", "tower", "dynamic_inflow")  # of a Fidelity
+LEVEL_PARTS = ("wave_loads", "integrator", "radiation", "blades", "tower", "shaft", "dynamic_inflow")
 ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # and OPTIONS
 
 

@@ -4,17 +4,16 @@ OpenFAST's runs and their settings: training/validation/reference/elastic. Both 
 freedom: blades="modes2" and tower="modes2" are ElastoDyn's three modes a blade and two a direction.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import pandas as pd
 
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.state import BLADES
-from fowt_env.run.simulation import build_run, simulate
+from fowt_env.run.simulation import simulate
 from fowt_env.scene.blade_beam import section_at
 from fowt_env.scene.build import build_scene
 from fowt_env.training.evaluation.metrics import damage_equivalent_load
@@ -22,7 +21,6 @@ from fowt_env.training.validation.comparison import SETTLED, STATISTICS, TIME, n
 from fowt_env.training.validation.openfast_cases import (
     hub_wind,
     reference,
-    rotor_start,
     table,
     wave_components,
     without_rosco,
@@ -63,10 +61,18 @@ class Machine:
     name: str  # of the reference files
     platform: str
     operating: dict  # wind, m/s: (rotor speed rpm, blade pitch deg)
+    bent: dict  # wind, m/s: first tip deflection (out of plane, in plane), m
+    released: tuple  # m, tip deflection (out of plane, in plane) at the start of free decays
     gauges: tuple  # fractions of the span, of Spn1 and Spn2: the middles of ElastoDyn's elements
     control_dt: float  # s
     shaft: str  # option of the turbulent runs
     under_rosco: bool
+
+    def start(self, rotor_speed, pitches, deflection):
+        """Return initial conditions: rotor speed rpm, blade pitches (3,) deg, tip deflections (2,) m."""
+        pitches = {f"BldPitch{blade}": pitch for blade, pitch in enumerate(pitches, 1)}
+        tips = dict(zip(("OoPDefl", "IPDefl"), deflection, strict=True))
+        return {"start": "zero", "RotSpeed": rotor_speed, **pitches, **tips}
 
     def controller(self, individual=False):
         """Return the controller of the turbulent runs."""
@@ -77,12 +83,16 @@ class Machine:
 
 
 IEA15 = Machine(
-    "iea15", "iea15_volturnus_s", {8: (5.68, 0.0), 12: (7.56, 6.3), 18: (7.56, 15.4), 24: (7.56, 21.8)},
+    "iea15", "iea15_volturnus_s",
+    {8: (5.68, 0.0), 12: (7.56, 6.3), 18: (7.56, 15.4), 24: (7.56, 21.8)},
+    {8: (9.0, 0.0), 12: (10.3, -1.3), 18: (3.6, -0.9), 24: (1.0, -0.5)}, (4.0, 2.0),
     (12.5 / 50.0, 24.5 / 50.0), 0.025, "rigid", True,
 )  # fmt: skip
 NREL5 = Machine(
-    "nrel5mw", "oc3_hywind_openfast", {8: (9.208, 0.0), 12: (12.1, 3.963), 18: (12.1, 14.95),
-    24: (12.1, 22.141)}, (4.5 / 17.0, 8.5 / 17.0), 0.0125, "torsion", False,
+    "nrel5mw", "oc3_hywind_openfast",
+    {8: (9.208, 0.0), 12: (12.1, 3.963), 18: (12.1, 14.95), 24: (12.1, 22.141)},
+    {8: (3.2, -0.4), 12: (4.0, -0.6), 18: (1.2, -0.6), 24: (0.0, -0.5)}, (2.0, 1.0),
+    (4.5 / 17.0, 8.5 / 17.0), 0.0125, "torsion", False,
 )  # fmt: skip
 
 
@@ -137,10 +147,10 @@ def steady_run(machine, case, **options):
     wind, more, chosen = STEADY_CASES[case]
     rotor_speed, pitch = machine.operating[wind]
     scene = _held(_scene(machine, {"kind": "steady", "speed": float(wind)}, **DRY, **chosen, **options))
-    pitches = {f"BldPitch{blade}": pitch + extra for blade, extra in enumerate(more, 1)}
+    pitches = [pitch + extra for extra in more]
     return simulate(
         scene, controller=None, duration=STEADY, control_dt=STEADY_STEP, output_dt=STEADY_STEP,
-        initial={"start": "zero", "RotSpeed": rotor_speed, **pitches},
+        initial=machine.start(rotor_speed, pitches, machine.bent[wind]),
     )  # fmt: skip
 
 
@@ -175,7 +185,6 @@ DECAY_CASES = {  # case: (whether the rotor turns at rated speed, blade pitch de
     "decay_rated_pitch15": (True, 15.0, "modes2"),
     "decay_rated_2modes": (True, 0.0, "modes"),
 }
-COORDINATES = {"modes2": ("F1", "F2", "E1"), "modes": ("F1", "E1")}  # OpenFAST's names, in our order
 MODES = {"modes2": ("first flap", "first edge", "second flap"), "modes": ("first flap", "first edge")}
 FREE_CHANNELS = {  # column of the reference: ours
     "TipDxc1_[m]": "OoPDefl1_[m]", "TipDyc1_[m]": "IPDefl1_[m]",
@@ -199,18 +208,16 @@ def poles(time, values):
     return [(abs(pole) / (2.0 * np.pi), -pole.real / abs(pole)) for pole in found]
 
 
-def free_run(machine, case, start, **options):
-    """Return the frame of a free decay without air and gravity, from deflections start (n,) of each blade."""
+def free_run(machine, case, **options):
+    """Return the frame of a free decay without air and gravity, from bent blades."""
     rated, pitch, blades = DECAY_CASES[case]
     scene = _held(_scene(machine, None, blades=blades, **DRY, **options))
     scene = scene.with_model({"rigid_body.gravity": 0.0})
-    initial = {f"BldPitch{blade}": pitch for blade in (1, 2, 3)}
-    initial |= {"start": "zero", "RotSpeed": machine.operating[12][0] if rated else 0.0}
-    run = build_run(scene, None, FREE, FREE_DT, FREE_STEP, FREE_STEP, initial)
-    first, n = scene.model.blades.first, len(start)
-    run.x[first : first + BLADES * n] = np.tile(start, BLADES)
-    run.advance(None)
-    return run.frame()
+    rotor_speed = machine.operating[12][0] if rated else 0.0
+    return simulate(
+        scene, controller=None, duration=FREE, dt=FREE_DT, control_dt=FREE_STEP, output_dt=FREE_STEP,
+        initial=machine.start(rotor_speed, (pitch,) * BLADES, machine.released),
+    )  # fmt: skip
 
 
 def blade_decays(study, machine):
@@ -219,16 +226,15 @@ def blade_decays(study, machine):
     for case, (_, _, blades) in DECAY_CASES.items():
         study.say(f"{machine.name}, {case}")
         theirs = table(f"{PLACE}/{machine.name}_{case}.csv.gz", study.folder)
-        start = [theirs[f"Q_B1{mode}_[m]"].iloc[0] for mode in COORDINATES[blades]]
-        ours = free_run(machine, case, start)
-        outputs = ours[list(FREE_CHANNELS.values())[: len(start)]]
+        ours = free_run(machine, case)
+        outputs = ours[list(FREE_CHANNELS.values())[: len(MODES[blades])]]
         found = poles(ours[TIME].to_numpy(), outputs.to_numpy())
         rows = stored[stored["case"] == f"{machine.name}/{case}"].to_dict("records")
         for mode, (frequency, ratio), row in zip(MODES[blades], found, rows, strict=True):
             there = row["frequency_Hz"]
             study.add(f"blades, {case}", f"{mode}, frequency", "Hz", there, frequency, allowed=FREQUENCY)
             study.add(f"blades, {case}", f"{mode}, damping ratio", "-", row["damping_ratio"], ratio)
-        early = ours[ours[TIME] <= FIRST_SECONDS + 1e-6].iloc[:: len(ours) // (len(ours) // 2)]
+        early = ours[ours[TIME] <= FIRST_SECONDS + 1e-6].iloc[::2]  # the step of the reference is 0.04 s
         for channel, mine in FREE_CHANNELS.items():
             (name, unit), both = name_and_unit(channel), (theirs[channel], early[mine])
             error = 100.0 * normalised_rms(both[1], both[0])
@@ -250,11 +256,12 @@ def turbulent_wind(wind, folder=None):
 def turbulent_run(machine, wind, duration, folder=None, individual=False, **options):
     """Return the frame of a turbulent run in waves under the controller of the reference."""
     options = {"tower": "modes2", "shaft": machine.shaft, **options}
+    rotor_speed, pitch = machine.operating[wind]
     scene = _scene(machine, turbulent_wind(wind, folder), sea=wave_components(folder), **options)
     return simulate(
         scene, controller=machine.controller(individual), duration=duration,
         dt=min(scene.dt, machine.control_dt), control_dt=machine.control_dt, output_dt=TURBULENT_STEP,
-        initial={"start": "zero"} | rotor_start(*machine.operating[wind]),
+        initial=machine.start(rotor_speed, (pitch,) * BLADES, machine.bent[wind]),
     )  # fmt: skip
 
 
