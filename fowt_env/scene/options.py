@@ -190,7 +190,7 @@ OPTIONS = {
     "tower": Option(None, (None, "rigid", "modes", "modes2"),
         "rigid, or with one or two bending modes in each direction; None: the fidelity's"),
     # blade bending: none, or the modes of blade_beam.MODES ([blade_structure] of the turbine file)
-"blades": Option(None, (None, "rigid", "modes", "modes2"),
+    "blades": Option(None, (None, "rigid", "modes", "modes2"),
         "rigid, or with the first flapwise and edgewise bending mode of each blade, or two flapwise modes;"
         " None: the fidelity's"),
     # torsion of the shaft between generator and rotor ([shaft_torsion] of the turbine file)

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from fowt_env.controllers import make
+from fowt_env.controllers.rosco import Discon, Rosco
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.state import BLADES
@@ -79,7 +79,8 @@ class Machine:
         if not self.under_rosco:
             return "openfast_oc3"
         turbine = read_turbine(read_platform(self.platform).turbine)
-        return make("rosco_ipc" if individual else "rosco", turbine, self.control_dt)
+        deck = Discon(turbine.discon, individual)
+        return Rosco(deck, self.control_dt, individual=individual, nodding=True)
 
 
 IEA15 = Machine(
