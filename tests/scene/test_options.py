@@ -10,6 +10,7 @@ from plant_helpers import state
 import fowt_env
 from fowt_env import build_scene
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
@@ -124,10 +125,15 @@ def test_a_level_has_its_parts_and_its_step(name):
     assert scene.options["integrator"] == level.integrator
     assert type(model.integrator) is type(INTEGRATORS[level.integrator].part)
     assert (model.mooring.table is not None) == (level.mooring == "table")
-    assert scene.dt == (level.dt or INTEGRATORS[level.integrator].dt)
+    bends = name == "elastic"
+    modes = [0 if part is None else len(part.count) for part in (model.blades and model.blades.beam, model.tower)]
+    assert modes == ([3, 4] if bends else [0, 0])
+    assert (scene.options["dynamic_inflow"] is True) == bends
+    own = level.dt or INTEGRATORS[level.integrator].dt
+    assert 0.0 < scene.dt <= own if bends else scene.dt == own
 
 
-@pytest.mark.parametrize("name", FIDELITIES)
+@pytest.mark.parametrize("name", [name for name in FIDELITIES if name != "elastic"])
 def test_what_is_given_overrides_a_level(name):
     for rotor in ROTORS:
         assert build_scene(wind=12.0, fidelity=name, rotor=rotor).rotor == rotor
@@ -141,6 +147,25 @@ def test_what_is_given_overrides_a_level(name):
     for mooring in ("catenary", "table"):
         table = build_scene(fidelity=name, mooring=mooring).model.mooring.table
         assert (table is not None) == (mooring == "table")
+
+
+def test_what_is_given_overrides_the_bending_parts_of_a_level():
+    rigid = {"blades": "rigid", "tower": "rigid", "dynamic_inflow": False}
+    scene = build_scene(wind=12.0, fidelity="elastic", **rigid)
+    assert scene.model.blades is None and scene.model.tower is None
+    assert scene.dt == build_scene(wind=12.0).dt and scene.n_state == build_scene(wind=12.0).n_state
+    assert len(build_scene(wind=12.0, fidelity="elastic", blades="modes").model.blades.beam.count) == 2
+    assert build_scene(wind=12.0, fidelity="elastic", rotor="bem").rotor == "bem"
+    with pytest.raises(InputError, match="rotor = 'table': does not support dynamic_inflow"):
+        build_scene(wind=12.0, fidelity="elastic", rotor="table")
+
+
+def test_a_bending_level_names_what_a_turbine_lacks():
+    platform = read_platform("oc3_hywind")
+    turbine = read_turbine(platform.turbine).model_copy(update={"blade_structure": None})
+    with pytest.raises(InputError, match=r"blades = 'modes2': .* has no \[blade_structure\]"):
+        build_scene(wind=12.0, fidelity="elastic", turbine=turbine)
+    assert build_scene(wind=12.0, fidelity="elastic", turbine=turbine, blades="rigid").model.tower is not None
 
 
 def test_levels_err_as_stored_each_more_than_the_one_before():
