@@ -59,13 +59,13 @@ def decide(limits, part, weights):
             most_of_all = float(values.max())
             found.append(Decision(name, "", "", *[most_of_all] * 3, -np.inf, most))
     over = f" over {limits.baseline}"
-    whole = [(name, " over the lifetime", (most,), _mean) for name, most in limits.lifetime.items()]
-    whole += [(name, over, (most,), _ratio) for name, most in limits.relative.items()]
-    each = [(name, "", (most,), _mean) for name, most in limits.case.items()]
-    each += [(name, over, bound, _ratio) for name, bound in limits.case_relative.items()]
+    whole = [(name, " over the lifetime", (-np.inf, most), _mean) for name, most in limits.lifetime.items()]
+    whole += [(name, over, (-np.inf, most), _ratio) for name, most in limits.relative.items()]
+    each = [(name, "", (-np.inf, most), _mean) for name, most in limits.case.items()]
+    each += [(name, over, allowed_range(name, bound), _ratio) for name, bound in limits.case_relative.items()]
     for name, point in limits.set_point.items():
         what = f", % of {point.rated:g} further from it than {limits.baseline}"
-        each.append((name, what, (100.0 * point.within,), _distance(point.rated)))
+        each.append((name, what, (-np.inf, 100.0 * point.within), _distance(point.rated)))
     places = [("", part, whole), *((case, part.case(i), each) for i, case in enumerate(part.cases) if each)]
     for case, here, rules in places:
         for rule in () if here.nothing else rules:
@@ -88,7 +88,7 @@ def _distance(rated):
     return lambda own, base: 100.0 * (np.abs(own / rated - 1.0) - np.abs(base / rated - 1.0))
 
 
-def _decision(part, case, weights, name, what, bound, of):
+def _decision(part, case, weights, name, what, allowed, of):
     """Return [Decision] on one limit of a mean over the cases of a _Part; [] if it cannot be checked."""
     column = slice(METRICS.index(name), METRICS.index(name) + 1)
     own, base = part.values[..., column], part.reference[..., column]
@@ -107,7 +107,7 @@ def _decision(part, case, weights, name, what, bound, of):
         positive = of is _ratio or (of is _mean and never_negative(name))
         low, high = interval(estimate, value(weights), seeds, positive, TWO_SIDED)
     ends = (float(each[0]) for each in (estimate, low, high))
-    return [Decision(name, what, case, *ends, *allowed_range(name, bound))]
+    return [Decision(name, what, case, *ends, *allowed)]
 
 
 def limit_texts(decisions, state):

@@ -9,7 +9,7 @@ from fowt_env.training.reports.metric_words import counted, seeds_text
 PRINTED_METRICS = (
     ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f", 3, "rotor speed, mean (rpm)"),
     ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f", None, "rotor speed, std (rpm)"),
-    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", None, "rotor speed above rated, max (%)"),
+    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", 8, "rotor speed above rated, max (%)"),
     ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f", 7, "power up to rated, mean (kW)"),
     ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f", None, "power, std (kW)"),
     ("power\n\nmax\nkW", "GenPwr_max_[kW]", ".0f", 6, "power, max (kW)"),
@@ -18,7 +18,7 @@ PRINTED_METRICS = (
     ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f", 4, "platform pitch, max (deg)"),
     ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", None, "pitch rate, mean (deg/s)"),
     ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f", None, "torque rate, mean (kN m/s)"),
-    ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", None, "shaft torque, fatigue load (kN m)"),
+    ("shaft\n\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", 9, "shaft torque, fatigue load (kN m)"),
     ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f", 2, "nacelle acceleration, rms (m/s²)"),
     ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f", 1, "mooring tension, max (kN)"),
 )

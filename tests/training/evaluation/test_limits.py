@@ -106,6 +106,8 @@ def test_a_limit_of_each_run_and_one_of_the_mean_of_a_case_are_in_their_own_unit
     assert states(entry) == {"": EXCEEDED} and entry["beyond"] == [f"{SHAFT} = 6500, allowed 6000"]
     entry = board({"a": [1.01] * 4, "b": [1.0] * 4}, base=5000.0, case={SHAFT: 5025.0})
     assert states(entry) == {"a": EXCEEDED, "b": HELD}
+    entry = board({"a": [1.0] * 4}, ENERGY, 5000.0, case={ENERGY: 5025.0})  # at most, though more is better
+    assert states(entry) == {"a": HELD}
     assert states(board({"a": [1.0] * 4}, lifetime={SHAFT: 1.1})) == {"": HELD}
 
 
@@ -160,7 +162,7 @@ def test_a_suite_scores_and_limits_only_loads_that_its_scenes_carry(metric, tmp_
             assert word in str(error.value)
         path.write_text(HEAD.format(options="rigid_loads = true") + text)
         read_suite(path)
-        path.write_text(HEAD.format(options=f'[options]\n{option} = "{values[-1]}"') + text)
+        path.write_text(HEAD.format(options=f'options = {{{option} = "{values[-1]}"}}') + text)
         read_suite(path)
 
 
