@@ -121,6 +121,11 @@ def _remarks(board, intervals):
         lines.append(f"differences from {board['baseline']} are over the runs that the baseline did not lose")
     for words, key in (("exceeds a limit", "beyond"), ("has limits not decided", "undecided")):
         lines += [f"{entry['controller']} {words}: {'; '.join(entry[key])}" for entry in entries if entry[key]]
+    suite = board.get("suite") or {}
+    if suite.get("score") and not suite.get("drawn"):
+        lines.append(
+            "seeds not drawn from a hash (--draw-seeds): for development, since controllers can recognise them"
+        )
     if board["unchecked"]:
         lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")
     return lines

@@ -10,6 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from gaming_laws import GAMERS, TWIN, Recogniser, listed_winds
+
 from fowt_env.control import make
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import RPM
@@ -21,6 +23,7 @@ from fowt_env.training.evaluation.failures import PENALTY, penalised, with_lost_
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS, better
 from fowt_env.training.evaluation.run_case import REFERENCE
+from fowt_env.training.evaluation.seeds import drawn_seeds
 from fowt_env.training.reports.scores import agent_scores
 
 
@@ -407,6 +410,60 @@ class LowerSetPoint:
         return self.inner.act(self._told(measurement))
 
 
+def on_rigid_turbine(suite):
+    """The suite on a turbine with rigid parts and without the blade roots, in seconds instead of minutes."""
+    loads = suite.limits.case_relative
+    return replace(
+        suite,
+        cases=tuple(replace(case, options={"fidelity": "standard"}) for case in suite.cases),
+        score=suite.score.model_copy(update={"term": tuple(t for t in suite.score.term if t.metric != ROOT)}),
+        limits=suite.limits.model_copy(update={"case_relative": {n: b for n, b in loads.items() if n != ROOT}}),
+    )
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(on_rigid_turbine, marks=pytest.mark.slow),
+        pytest.param(lambda suite: suite, marks=[pytest.mark.slow, pytest.mark.nightly]),
+    ],
+    ids=["rigid", "elastic"],
+)
+def played(request):
+    """Entries of the laws of GAMERS and their twin in three winds of the headline, two seeds of each."""
+    whole = request.param(HEADLINE)
+    cases = tuple(case for case in whole.cases if case.wind["speed"] in (14.0, 18.0, 22.0))
+    laws = {TWIN: TWIN} | {law.__name__: law for law in GAMERS}
+    runs = evaluate(laws, replace(whole, cases=cases), seeds=(1001, 1002))
+    board = leaderboard(runs, score=whole.score, limits=whole.limits)
+    return {entry["controller"]: entry for entry in board["controllers"]}
+
+
+@pytest.mark.parametrize("law", GAMERS)
+def test_a_law_that_games_the_score_is_beyond_a_limit_that_its_twin_is_not(played, law):
+    gamer, twin = played[law.__name__], played[TWIN]
+    assert not twin["beyond"] and twin["lost"] == 0 and twin["score"]["mean"] < 1.0
+    for metric in GAMERS[law]:
+        assert any(text.startswith(metric) for text in gamer["beyond"]), gamer["beyond"]
+    assert twin["rank"] == 1 < gamer["rank"]
+
+
+def test_who_recognises_listed_seeds_is_better_than_its_twin_on_these_and_equal_on_others():
+    suite = on_rigid_turbine(HEADLINE)
+    case = next(case for case in suite.cases if case.wind["speed"] == 18.0)
+    winds = listed_winds(case, suite.seeds[:3])
+    laws = {"gspi_oc3": "gspi_oc3", "recogniser": lambda turbine, dt: Recogniser(turbine, dt, winds)}
+
+    def score(seeds):
+        runs = evaluate(laws, [case], seeds=seeds, duration=300.0, skip=80.0, reference="gspi_oc3")
+        board = leaderboard(runs, score=suite.score)
+        return {entry["controller"]: entry["score"]["mean"] for entry in board["controllers"]}
+
+    assert score(suite.seeds[:2])["recogniser"] < 0.8
+    drawn = drawn_seeds("5" * 40, suite.name, suite.version, 2)
+    assert score(drawn)["recogniser"] == score(drawn)["gspi_oc3"] == 1.0
+
+
 def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_twin():
     case = Case("ntm_18", {"kind": "ntm", "speed": 18.0, "class": "B"}, None)
     turbine = read_turbine("nrel5mw")
@@ -414,7 +471,7 @@ def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_tw
     runs = evaluate({"gspi_oc3": "gspi_oc3", "quitter": Quitter(turbine)}, [case], **options)
     lost = runs[runs["controller"] == "quitter"]
     assert (lost["status"] == "failed").any() and "enough of this" in " ".join(lost["reason"])
-    board = leaderboard(runs, score=HEADLINE.score)
+    board = leaderboard(runs, score=on_rigid_turbine(HEADLINE).score)
     assert [entry["controller"] for entry in board["controllers"]] == ["gspi_oc3", "quitter"]
     quitter = board["controllers"][1]
     assert quitter["score"]["mean"] >= 1.0 and not quitter["score"]["valid"]
