@@ -1,8 +1,8 @@
 """Control laws that look better than they are, each with the honest law that it is made of.
 
-    fowt evaluate --suite above_rated_elastic --controllers lqr,gaming_laws:sag,gaming_laws:overrate --out results/gaming
+    PYTHONPATH=tests fowt evaluate --suite above_rated_elastic --controllers lqr,gaming_laws:sag --out results
 
-with PYTHONPATH=tests judges them by a suite; tests/training/evaluation/test_gaming.py has what must come of it.
+judges them by a suite; tests/training/evaluation/test_gaming.py has what must come of it.
 """
 
 from math import exp, pi, sin

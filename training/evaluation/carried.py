@@ -38,11 +38,11 @@ def missing_part(metric, case):
     if metric not in CARRIED:
         return None
     option, needed = CARRIED[metric]
-    value = read_platform(case.platform).options | case.options
-    level = value.get("fidelity", "standard")
+    options = read_platform(case.platform).options | case.options
+    level = options.get("fidelity", "standard")
     if level not in FIDELITIES:
         raise unknown("fidelity", level, FIDELITIES)
-    value = value.get(option)
-    if value is None or value is True:
+    value = options.get(option)
+    if value is None or value is True:  # as by the fidelity
         value = getattr(FIDELITIES[level], option)
     return None if value in needed else (option, value, needed)

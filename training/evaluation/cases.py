@@ -391,7 +391,7 @@ def _rigid_loads(key, names, cases):
             option, value, needed = part
             allowed = " or ".join(map(repr, needed))
             lines.append(
-                f"{key}: {name}: case {case!r} has {option} = {value!r}, which does not carry this load: needs"
+                f"{key}: {name}: case {case!r} has {option} = {value!r}, which lacks this load: needs"
                 f" {option} = {allowed} (or rigid_loads = true, to count what a rigid part would have)"
             )
     return lines

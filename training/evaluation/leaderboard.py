@@ -196,7 +196,7 @@ class Leaderboard(dict):
 
 
 def score_text(score, key):
-    """Return one of SCORES as "0.743 [0.721, 0.758]", in brackets if a limit is exceeded or a run was lost."""
+    """Return one of SCORES as "0.743 [0.721, 0.758]", in brackets if it is not valid."""
     figure = score and score[key]
     if not figure or figure["mean"] is None or not np.isfinite(figure["mean"]):
         return "-"
@@ -207,7 +207,7 @@ def score_text(score, key):
 
 
 def limits_text(entry):
-    """Return the state of the limits of an entry: "held", "2 not decided", "1 exceeded, 2 not decided", "-"."""
+    """Return the state of the limits of an entry: "held", "1 exceeded, 2 not decided", "-" without limits."""
     if entry["held"] is None:
         return "-"
     states = [each["state"] for each in entry["limits"]]
@@ -230,8 +230,8 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     limits, without reference runs), cases, shares {case: share}, seeds, controllers: a list of mappings
     with rank (None without a score), controller, runs, lost, failed, tripped, lost_power, metrics {metric:
     mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent, pairs, p},
-    beyond and undecided (a text per limit that is exceeded or not decided: limits.py), held (whether every
-    limit is held; None without limits), limits (a mapping per limit and case, with its state), score (mean,
+    beyond and undecided (a text per limit that is exceeded, or not decided by its interval: limits.py), held
+    (whether every limit is held; None without limits), limits (a mapping per limit and case, with its state), score (mean,
     low, high of the ranked score, valid, why, lifetime and winds {mean, low, high}; or None), cases {case:
     runs, ..., metrics, difference}. seed_low and seed_high: range of the lifetime mean over the seeds; worst:
     maximum over all runs; percent: mean difference relative to the baseline's mean of the same runs; p: its
@@ -259,7 +259,8 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
         entry = {"controller": name, **_entry(part, weights, tested=True)}
         decisions = [] if limits is None else decide(limits, part, weights)
         entry["beyond"] = limit_texts(decisions, EXCEEDED)
-        entry["undecided"] = limit_texts(decisions, UNDECIDED)
+        known = [each for each in decisions if np.isfinite(each.high)]
+        entry["undecided"] = limit_texts(known, UNDECIDED)
         entry["held"] = all(each.state == HELD for each in decisions) if decisions else None
         entry["limits"] = [each._asdict() | {"state": each.state} for each in decisions]
         entry["score"] = None if score is None else _score(score, part, weights, entry["beyond"])

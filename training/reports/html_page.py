@@ -38,6 +38,7 @@ from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
 PAGE_METRICS = tuple(SHORT)  # columns of the leaderboard before "all metrics" is chosen
 PARETO_AXES = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]")  # across, up, size
+SORTS = ("rank", "score_lifetime", PARETO_AXES[0], "controller")  # the first that there is
 ALL_CASES = ""
 DISPLAY_RATE = 2.0  # Hz
 MAX_POINTS = 3000  # of one drawn series
@@ -299,7 +300,7 @@ def _metric_columns(table):
 def _score_columns():
     """Return the columns of the two scores, as of _metric_columns."""
     what = {"lifetime": "of lifetime means", "winds": "mean of those of the single cases"}
-    about = "Score of the suite, {}: weighted mean of the ratios of metrics to the reference's. Less is better."
+    about = "Score, {}: weighted mean of the ratios of metrics to the reference's. Less is better."
     shared = {"unit": "", "headline": True, "better": -1}
     return [
         {"name": f"score_{key}", "label": heading, "about": about.format(what[key]), **shared}
@@ -444,7 +445,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         "conditions": {row["case"]: page_words.conditions_text(row) for row in conditions},
         "lost": lost,
         "metrics": metrics,
-        "sort": next(name for name in ("rank", "score_lifetime", PARETO_AXES[0], "controller") if name in sortable),
+        "sort": next(name for name in SORTS if name in sortable),
         "board": board,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
         "pareto": list(PARETO_AXES),

@@ -120,11 +120,13 @@ def _remarks(board, intervals):
     if board["baseline"] in lost:
         lines.append(f"differences from {board['baseline']} are over the runs that the baseline did not lose")
     for words, key in (("exceeds a limit", "beyond"), ("has limits not decided", "undecided")):
-        lines += [f"{entry['controller']} {words}: {'; '.join(entry[key])}" for entry in entries if entry[key]]
+        lines += [
+            f"{entry['controller']} {words}: {'; '.join(entry[key])}" for entry in entries if entry[key]
+        ]
     suite = board.get("suite") or {}
     if suite.get("score") and not suite.get("drawn"):
         lines.append(
-            "seeds not drawn from a hash (--draw-seeds): for development, since controllers can recognise them"
+            "seeds not drawn from a hash (--draw-seeds): for development, as a controller can recognise them"
         )
     if board["unchecked"]:
         lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")

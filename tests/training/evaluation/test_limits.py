@@ -56,8 +56,9 @@ def test_a_limit_is_decided_in_each_case_by_the_mean_and_by_its_bound():
 
 def test_a_mean_over_the_cases_hides_none_of_them():
     ratios = {"a": [0.5, 0.51, 0.5, 0.49], "b": BAD}
-    assert states(board(ratios, relative={SHAFT: 1.25}, weights={"a": 0.9, "b": 0.1}))[""] == HELD
-    assert states(board(ratios, case_relative={SHAFT: (1.25,)}, weights={"a": 0.9, "b": 0.1}))["b"] == EXCEEDED
+    weights = {"a": 0.9, "b": 0.1}
+    assert states(board(ratios, relative={SHAFT: 1.25}, weights=weights))[""] == HELD
+    assert states(board(ratios, case_relative={SHAFT: (1.25,)}, weights=weights))["b"] == EXCEEDED
 
 
 def test_a_bound_is_one_sided_and_few_seeds_have_none():
@@ -66,7 +67,7 @@ def test_a_bound_is_one_sided_and_few_seeds_have_none():
     assert found["value"] == pytest.approx(both["mean"]) and both["low"] < found["low"] < 1.0
     assert found["high"] < both["high"]  # of 95 % on one side, not 97.5 %
     few = board({"a": QUIET[: LEAST_SEEDS - 1]}, case_relative={SHAFT: (1.25,)})
-    assert states(few) == {"a": UNDECIDED}
+    assert states(few) == {"a": UNDECIDED} and few["held"] is False and not few["undecided"]
     assert states(board({"a": [1.3]}, case_relative={SHAFT: (1.25,)})) == {"a": EXCEEDED}
 
 
@@ -77,7 +78,8 @@ def test_scatter_and_a_single_bad_seed_protect_from_no_limit():
 
 
 def test_a_single_number_limits_what_is_worse_and_two_limit_both_sides():
-    assert allowed_range(SHAFT, (1.25,)) == (-np.inf, 1.25) and allowed_range(ENERGY, (0.99,)) == (0.99, np.inf)
+    assert allowed_range(SHAFT, (1.25,)) == (-np.inf, 1.25)
+    assert allowed_range(ENERGY, (0.99,)) == (0.99, np.inf)
     less = [0.97, 0.971, 0.969, 0.97]
     assert states(board({"a": less}, ENERGY, case_relative={ENERGY: (0.99,)})) == {"a": EXCEEDED}
     assert states(board({"a": QUIET}, ENERGY, case_relative={ENERGY: (0.99,)})) == {"a": HELD}
