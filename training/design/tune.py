@@ -4,7 +4,7 @@
 
 Settings are evaluated on the cases of a suite with validation seeds (1000 and above, never used for scoring).
 The cost is the mean of the lifetime deviations of rotor speed and platform pitch over those of gspi_oc3 on
-the same runs, plus PENALTY times the relative excess over the suite's limits and over LIMITS,
+the same runs, plus PENALTY times the relative excess over the suite's limits, in each wind, and over LIMITS,
 plus LOST times the fraction of lost runs. The current settings come first, then up to half of the budget
 in a Sobol sequence, then the Nelder-Mead method from the best. OUT/tune_NAME.csv is written after each.
 """
@@ -36,6 +36,7 @@ from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.failures import penalised, with_lost_power
+from fowt_env.training.evaluation.leaderboard import decisions
 from fowt_env.training.evaluation.metrics import EXPONENTS, METRICS, better
 from fowt_env.training.evaluation.results_table import case_shares
 from fowt_env.training.evaluation.run_case import CONTROL_DT, OK, REFERENCE
@@ -161,16 +162,17 @@ class Objective:
         made = evaluate(
             {"candidate": controller}, self.suite, seeds=self.seeds, reference=False, **self.engine
         )
-        table = with_lost_power(pd.concat([self.base, made], ignore_index=True))
-        runs = table[table["controller"] == "candidate"]
-        table = penalised(table, REFERENCE)
+        made = with_lost_power(pd.concat([self.base, made], ignore_index=True))
+        runs = made[made["controller"] == "candidate"]
+        table = penalised(made, REFERENCE)
         tuned, base = (self._means(table[table["controller"] == name]) for name in ("candidate", REFERENCE))
         ratio = tuned / base
         lost = float((runs["status"] != OK).mean())
         limits = self.suite.limits
-        beyond = [-better(k) * (ratio[k] / x - 1.0) for k, x in (limits.relative | LIMITS).items()]
-        beyond += [tuned[name] / limit - 1.0 for name, limit in limits.lifetime.items()]
-        beyond += [runs[name].max() / limit - 1.0 for name, limit in limits.run.items()]
+        others = {name: limit for name, limit in limits.relative.items() if name not in LIMITS}
+        limits = limits.model_copy(update={"relative": others})
+        beyond = [-better(name) * (ratio[name] / limit - 1.0) for name, limit in LIMITS.items()]
+        beyond += [each.excess for each in decisions(made, "candidate", limits)]
         excess = sum(max(0.0, each) for each in beyond)
         cost = float(np.mean([ratio[name] for name in AIMS])) + PENALTY * excess + LOST * lost
         result = {"cost": cost if np.isfinite(cost) else 2.0 * LOST}

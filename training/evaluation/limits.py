@@ -37,6 +37,12 @@ class Decision(NamedTuple):
         below = self.most == np.inf or self.high <= self.most
         return HELD if above and below else UNDECIDED
 
+    @property
+    def excess(self):
+        """Return how far the value is beyond the limit, as a fraction of it (in its unit if it is zero)."""
+        beyond, limit = max((self.value - self.most, self.most), (self.least - self.value, self.least))
+        return max(0.0, beyond) / (abs(limit) or 1.0) if np.isfinite(limit) else 0.0
+
 
 def allowed_range(metric, bound):
     """Return (least, most) of a limit: two numbers, or one in the metric's better direction."""

@@ -97,6 +97,18 @@ def test_beyond_a_limit_costs_in_proportion(suite, monkeypatch):
     assert plain["beyond"] > one["beyond"]
 
 
+def test_a_limit_of_each_wind_costs_in_each_wind(tmp_path, monkeypatch):
+    path = tmp_path / "limited.toml"
+    path.write_text(f'{SUITE}[limits.case_relative]\n"blade_pitch_travel_[deg/s]" = 1.0\n')
+    monkeypatch.setattr(module, "LIMITS", {})
+    objective = Objective(path, seeds=(1001,))
+    found, table = objective("pi_unscheduled"), objective.base
+    runs = pd.concat([table, evaluate("pi_unscheduled", objective.suite, seeds=(1001,), reference=False)])
+    travel = runs.pivot(index="case", columns="controller", values="blade_pitch_travel_[deg/s]")
+    excess = (travel["pi_unscheduled"] / travel["reference"] - 1.0).clip(lower=0.0)
+    assert found["beyond"] == pytest.approx(excess.sum()) and (excess > 0.0).any()
+
+
 def test_the_search_starts_from_the_settings_of_now_and_takes_the_cheapest(monkeypatch, tmp_path):
     class Bowl:
         """Cost with its least at KP 1.5 and KI 0.5."""

@@ -10,7 +10,7 @@ from fowt_env.training.evaluation.carried import CARRIED, missing_part
 from fowt_env.training.evaluation.cases import Case, Limits, Score, ScoreTerm, SetPoint, read_suite
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.leaderboard import leaderboard
-from fowt_env.training.evaluation.limits import EXCEEDED, HELD, UNDECIDED, allowed_range
+from fowt_env.training.evaluation.limits import EXCEEDED, HELD, UNDECIDED, Decision, allowed_range
 from fowt_env.training.evaluation.metrics import METRICS
 from fowt_env.training.evaluation.run_case import REFERENCE
 
@@ -135,6 +135,18 @@ def test_a_score_is_the_worse_of_lifetime_and_mean_of_winds_where_the_suite_says
     for each in (found, found["winds"], found["lifetime"]):
         assert each["low"] < each["mean"] < each["high"]
     assert score("lifetime")["mean"] == found["lifetime"]["mean"] != score("winds")["mean"]
+
+
+@pytest.mark.parametrize(
+    ("value", "allowed", "excess"),
+    [
+        (1.5, (-np.inf, 1.25), 0.2), (1.2, (-np.inf, 1.25), 0.0), (0.9, (0.99, np.inf), 0.09 / 0.99),
+        (1.0, (0.99, np.inf), 0.0), (0.9, (0.995, 1.005), 0.095 / 0.995), (2.0, (-np.inf, 0.0), 2.0),
+    ],
+)  # fmt: skip
+def test_an_excess_is_a_fraction_of_the_limit(value, allowed, excess):
+    nan = float("nan")
+    assert Decision(SHAFT, "", "", value, nan, nan, *allowed).excess == pytest.approx(excess)
 
 
 HEAD = """
