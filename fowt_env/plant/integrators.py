@@ -15,7 +15,7 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
-from fowt_env.plant.elastic.steps import damp_blades
+from fowt_env.plant.elastic.steps import correct_blades, keep_blades
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
@@ -161,6 +161,7 @@ def adams(t, x, u, dt, model, method, data):
         for i in range(n):
             history[k, i] = history[k - 1, i]
     keep_elastic(x, model.tower, data.elastic)
+    keep_blades(x, model.blades, data.elastic)
     rates(t, x, u, model, data, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
@@ -179,7 +180,7 @@ def adams(t, x, u, dt, model, method, data):
             dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.elastic,
             data.stages[2], data.stages[3], y,
         )  # fmt: skip
-        damp_blades(dt, history, model.blades, data.rotor, y)
+        correct_blades(dt, x, history, data.elastic, model.blades, data.rotor, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     bend_on(dt, x, order, history, model.tower, y)

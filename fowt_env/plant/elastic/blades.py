@@ -63,7 +63,9 @@ class BladeModes(NamedTuple):
     generator_coupling: float  # kg m2, gear ratio times generator inertia
     generator_row: float  # kg m2, square of the gear ratio times generator inertia
     lower: RigidBody  # floater and straight tower
-    decay: np.ndarray  # (n, n) 1/s, of the modal velocities by the wind at rated speed, see steps.py
+    # accelerations of the modes on a hub at rest, less their signs, see steps.py
+    spring: np.ndarray  # (n, n) 1/s2, over the deflections, by stiffness
+    decay: np.ndarray  # (n, n) 1/s, over their velocities, by structural damping and the wind at rated speed
     tip: Point
     inner: Section  # at a quarter and at half of the span
     outer: Section
