@@ -66,7 +66,7 @@ def evaluate_loads(t, x, model, data, dx):
     add_modal_user_loads(bend, model.tower, model.user, data, modal)
     add_modal_weight(pose, x, bend, model.tower, model.rigid_body.gravity, modal)
 
-    fill_blade_forces(x, model.aero, model.pitches, model.blades, data.blades, data.rotor)
+    fill_blade_forces(x, model.aero, model.blades, data.blades, data.rotor)
     condense_blades(pose, x, bend, model.rigid_body, model.pitches, model.blades, data.rotor)
 
     cache[LoadCache.FACTORED] = 0.0
