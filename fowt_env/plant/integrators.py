@@ -1,9 +1,9 @@
 """Defines the fixed-step integrators: a class, a step and a row of INTEGRATORS each.
 
-Within a step, blade pitch and generator torque are exact (constant command), the states of radiation memory
-are exact for velocities linear in time (hydro/radiation.py), moving mooring lines have steps of their own
-(line_dynamics.py), and the rotor load in a wind box is evaluated
-several times a step (rotor_substeps.py), so that none of these limits the step.
+Within a step, blade pitch and generator torque are exact (constant command), so is the torsion of the shaft
+(elastic/shaft.py), the states of radiation memory are exact for velocities linear in time
+(hydro/radiation.py), moving mooring lines have steps of their own (line_dynamics.py), and the rotor load in a
+wind box is evaluated several times a step (rotor_substeps.py), so that none of these limits the step.
 """
 
 from typing import NamedTuple
@@ -15,15 +15,14 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
-from fowt_env.plant.elastic.steps import correct_blades, keep_blades
+from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
+from fowt_env.plant.elastic.steps import correct_blades, correct_elastic, keep_blades, keep_elastic
+from fowt_env.plant.elastic.tower import add_modal, bend_of, carried, turned_pose
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
-from fowt_env.plant.tower.loads import add_modal, carried
-from fowt_env.plant.tower.modes import bend_of, turned_pose
-from fowt_env.plant.tower.steps import correct_elastic, keep_elastic
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) above which the lift of the blades damps the speed of a free rotor: by up to
@@ -68,27 +67,40 @@ def rates(t, x, u, model, data, dx):
 def rk4(t, x, u, dt, model, method, data):
     """Advance x in place by one classical Runge-Kutta step, blade pitch exact at every stage."""
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
-    n = integrated_states(x, model)
+    n, shaft, work, half = integrated_states(x, model), model.shaft, data.rotor, 0.5 * dt
     rates(t, x, u, model, data, k1)
+    begin_twist(shaft, work, k1)
     begin_followers(x, dt, True, model, data)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
+    s1 = smooth_of(shaft, k1)
+    advance_twist(x, u, half, s1, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
+    keep_smooth(shaft, work, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
+    s2 = smooth_of(shaft, k2)
+    advance_twist(x, u, half, s2, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
+    keep_smooth(shaft, work, k3)
     for i in range(n):
         y[i] = x[i] + dt * k3[i]
     advance_actuators(x, u, dt, model, y)
+    s3 = smooth_of(shaft, k3)
+    advance_twist(x, u, dt, s1, 2.0 * (s3 - s1), 0.0, 0.0, shaft, model, work, y)
     follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k4)
+    keep_smooth(shaft, work, k4)
     for i in range(n):
         y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     advance_actuators(x, u, dt, model, y)
+    s4, middle = smooth_of(shaft, k4), 0.5 * (s2 + s3)
+    linear, square = 4.0 * middle - 3.0 * s1 - s4, 2.0 * (s1 - 2.0 * middle + s4)
+    advance_twist(x, u, dt, s1, linear, square, 0.0, shaft, model, work, y)
     step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
@@ -99,17 +111,22 @@ def rk4(t, x, u, dt, model, method, data):
 def heun(t, x, u, dt, model, method, data):
     """Advance x in place by one step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
-    n = integrated_states(x, model)
+    n, shaft, work = integrated_states(x, model), model.shaft, data.rotor
     rates(t, x, u, model, data, k1)
+    begin_twist(shaft, work, k1)
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
     advance_actuators(x, u, dt, model, y)
+    s1 = smooth_of(shaft, k1)
+    advance_twist(x, u, dt, s1, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k2)
+    keep_smooth(shaft, work, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
     advance_actuators(x, u, dt, model, y)
+    advance_twist(x, u, dt, s1, smooth_of(shaft, k2) - s1, 0.0, 0.0, shaft, model, work, y)
     step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
@@ -138,6 +155,29 @@ def moulton(order, new, i, history):
     return (9.0 * new + 19.0 * history[0, i] - 5.0 * history[1, i] + history[2, i]) / 24.0
 
 
+@inlined_kernel
+def _twist_on(x, u, dt, order, history, shaft, model, work, y):
+    """Advance the twist by the polynomial of order - 1 through past smooth torques (bashforth)."""
+    h0, h1 = smooth_of(shaft, history[0]), smooth_of(shaft, history[1])
+    h2, h3 = smooth_of(shaft, history[2]), smooth_of(shaft, history[3])
+    d1 = h0 - h1 if order > 1 else 0.0
+    d2 = h0 - 2.0 * h1 + h2 if order > 2 else 0.0
+    d3 = h0 - 3.0 * h1 + 3.0 * h2 - h3 if order > 3 else 0.0
+    c1, c2 = d1 + d2 / 2.0 + d3 / 3.0, 0.5 * (d2 + d3)
+    advance_twist(x, u, dt, h0, c1, c2, d3 / 6.0, shaft, model, work, y)
+
+
+@inlined_kernel
+def _twist_again(x, u, dt, order, new, history, shaft, model, work, y):
+    """Advance the twist by the polynomial through new and past smooth torques (moulton)."""
+    s, h0 = smooth_of(shaft, new), smooth_of(shaft, history[0])
+    h1, h2 = smooth_of(shaft, history[1]), smooth_of(shaft, history[2])
+    d2 = s - 2.0 * h0 + h1 if order > 1 else 0.0
+    d3 = s - 3.0 * h0 + 3.0 * h1 - h2 if order > 2 else 0.0
+    c1 = s - h0 - d2 / 2.0 - d3 / 6.0
+    advance_twist(x, u, dt, h0, c1, 0.5 * d2, d3 / 6.0, shaft, model, work, y)
+
+
 @kernel
 def feathering(x, model):
     """Return whether the blades of a free rotor are pitched above FEATHERING: its speed is heavily damped."""
@@ -163,22 +203,26 @@ def adams(t, x, u, dt, model, method, data):
     keep_elastic(x, model.tower, data.elastic)
     keep_blades(x, model.blades, data.elastic)
     rates(t, x, u, model, data, history[0])
+    begin_twist(model.shaft, data.rotor, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     advance_actuators(x, u, dt, model, y)
+    _twist_on(x, u, dt, order, history, model.shaft, model, data.rotor, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
+        keep_smooth(model.shaft, data.rotor, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         advance_actuators(x, u, dt, model, y)
+        _twist_again(x, u, dt, order, new, history, model.shaft, model, data.rotor, y)
     else:
-        follow_rotor(dt, model, method.substeps, data, y)
+        follow_rotor(dt, x, model, method.substeps, data, y)
         correct_elastic(
-            dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.elastic,
-            data.stages[2], data.stages[3], y,
+            dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.rotor,
+            data.elastic, data.stages[2], data.stages[3], y,
         )  # fmt: skip
         correct_blades(dt, x, history, data.elastic, model.blades, data.rotor, y)
     attitude_rate(y, new, model.rigid_body.plane)
@@ -199,7 +243,7 @@ def bend_on(dt, x, order, history, tower, y):
     """Fill y with the deflections of the tower by Adams-Moulton, from their new velocities in y."""
     if tower is None:
         return
-    n = len(tower.count)
+    n = len(tower.beam.count)
     for i in range(tower.first, tower.first + n):
         y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
@@ -252,7 +296,7 @@ def renew_rotor(t, x, model, aero, data):
         new.mx - was.mx, new.my - was.my, new.mz - was.mz,
     )  # fmt: skip
     store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), carried(change, bend)))
-    add_modal(change, bend, model.tower, cache[LoadCache.MODAL :])
+    add_modal(change, bend, model.tower, data.rotor, cache[LoadCache.MODAL :])
     store(cache, LoadCache.ROTOR, new)
     cache[LoadCache.TORQUE] = rotor.torque
     cache[LoadCache.THRUST] = rotor.thrust
@@ -267,16 +311,19 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     """
     before, after, history, cache = data.stages[1], data.stages[4], data.history, data.cache
     rates(t, x, u, model, data, before)
+    keep_smooth(model.shaft, data.rotor, before)
     was = stored(cache, LoadCache.ROTOR)
     torque = cache[LoadCache.TORQUE]
     set_followed(x, u, dt, model.actuator, model.pitches)
     renew_loads(t, x, model, model.user, model.blades, data)
     respond(x, u, model, data, after)
+    keep_smooth(model.shaft, data.rotor, after)
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
         shift_tower(after, before, model.tower, history[k])
         shift_blades(after, before, model.blades, history[k])
+        shift_twist(after, before, model.shaft, history[k])
     shift_samples(was, torque, method.substeps, data)
 
 
@@ -285,7 +332,7 @@ def shift_tower(after, before, tower, row):
     """Add the difference of two derivatives to the rates of the deflection velocities in a row."""
     if tower is None:
         return
-    n = len(tower.count)
+    n = len(tower.beam.count)
     for i in range(tower.first + n, tower.first + 2 * n):
         row[i] += after[i] - before[i]
 
@@ -297,6 +344,15 @@ def shift_blades(after, before, blades, row):
         return
     size = BLADES * len(blades.beam.count)
     for i in range(blades.first + size, blades.first + 2 * size):
+        row[i] += after[i] - before[i]
+
+
+@kernel
+def shift_twist(after, before, shaft, row):
+    """Add the difference of two derivatives to the smooth torque and the rate of the twist in a row."""
+    if shaft is None:
+        return
+    for i in range(shaft.first, shaft.first + 2):
         row[i] += after[i] - before[i]
 
 
