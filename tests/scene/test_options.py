@@ -126,8 +126,8 @@ def test_a_level_has_its_parts_and_its_step(name):
     assert type(model.integrator) is type(INTEGRATORS[level.integrator].part)
     assert (model.mooring.table is not None) == (level.mooring == "table")
     bends = name == "elastic"
-    modes = [0 if part is None else len(part.count) for part in (model.blades and model.blades.beam, model.tower)]
-    assert modes == ([3, 4] if bends else [0, 0])
+    modes = [0 if part is None else len(part.beam.count) for part in (model.blades, model.tower)]
+    assert modes == ([3, 4] if bends else [0, 0]) and (model.shaft is not None) == bends
     assert (scene.options["dynamic_inflow"] is True) == bends
     own = level.dt or INTEGRATORS[level.integrator].dt
     assert 0.0 < scene.dt <= own if bends else scene.dt == own
@@ -150,9 +150,9 @@ def test_what_is_given_overrides_a_level(name):
 
 
 def test_what_is_given_overrides_the_bending_parts_of_a_level():
-    rigid = {"blades": "rigid", "tower": "rigid", "dynamic_inflow": False}
+    rigid = {"blades": "rigid", "tower": "rigid", "shaft": "rigid", "dynamic_inflow": False}
     scene = build_scene(wind=12.0, fidelity="elastic", **rigid)
-    assert scene.model.blades is None and scene.model.tower is None
+    assert scene.model.structure is None
     assert scene.dt == build_scene(wind=12.0).dt and scene.n_state == build_scene(wind=12.0).n_state
     assert len(build_scene(wind=12.0, fidelity="elastic", blades="modes").model.blades.beam.count) == 2
     assert build_scene(wind=12.0, fidelity="elastic", rotor="bem").rotor == "bem"
@@ -162,15 +162,21 @@ def test_what_is_given_overrides_the_bending_parts_of_a_level():
 
 def test_a_bending_level_names_what_a_turbine_lacks():
     platform = read_platform("oc3_hywind")
-    turbine = read_turbine(platform.turbine).model_copy(update={"blade_structure": None})
-    with pytest.raises(InputError, match=r"blades = 'modes2': .* has no \[blade_structure\]"):
-        build_scene(wind=12.0, fidelity="elastic", turbine=turbine)
-    assert build_scene(wind=12.0, fidelity="elastic", turbine=turbine, blades="rigid").model.tower is not None
+    whole = read_turbine(platform.turbine)
+    for lacking, option, modes in (
+        ("blade_structure", "blades", "modes2"),
+        ("shaft_torsion", "shaft", "torsion"),
+    ):
+        turbine = whole.model_copy(update={lacking: None})
+        with pytest.raises(InputError, match=rf"{option} = '{modes}': .* has no \[{lacking}\]"):
+            build_scene(wind=12.0, fidelity="elastic", turbine=turbine)
+        scene = build_scene(wind=12.0, fidelity="elastic", turbine=turbine, **{option: "rigid"})
+        assert scene.model.tower is not None and getattr(scene.model, option) is None
 
 
 def test_levels_err_as_stored_each_more_than_the_one_before():
     stored = stored_errors(["reference", "all together"])
-    for level in FIDELITIES.values():
+    for level in (level for level in FIDELITIES.values() if level.blades == "rigid"):
         dt = level.dt or INTEGRATORS[level.integrator].dt
         tabled = ", mooring by table" if level.mooring == "table" else ""
         variant = f"{level.integrator} {dt:g} s, {level.rotor}, {level.wave_loads} waves{tabled}"

@@ -272,7 +272,7 @@ def _damage(frame, channel, exponent):
     return damage_equivalent_load(frame[channel].to_numpy(), time[-1] - time[0], exponent)
 
 
-def _compared(study, machine, case, ours):
+def compare_turbulence(study, machine, case, ours):
     """Add the rows of a turbulent run, and keep its series for the plots."""
     stored = table(f"{PLACE}/{machine.name}_turbulent.csv.gz", study.folder)
     stored = stored[stored["case"] == f"{machine.name}/{case}"].set_index("channel")
@@ -308,7 +308,7 @@ def turbulence(study, machine):
     for wind in WINDS:
         case = f"turb_{wind}mps"
         study.say(f"{machine.name}, {case}, bending blades and tower")
-        _compared(study, machine, case, turbulent_run(machine, wind, 600.0, study.folder))
+        compare_turbulence(study, machine, case, turbulent_run(machine, wind, 600.0, study.folder))
 
 
 def relief(study, machine):
@@ -324,7 +324,7 @@ def relief(study, machine):
         study.say(f"{machine.name}, {case}")
         individual = case.endswith("ipc")
         frame = turbulent_run(machine, 18, 400.0, study.folder, individual, shear_exponent=SHEAR)
-        _compared(study, machine, case, frame)
+        compare_turbulence(study, machine, case, frame)
         frames.append(frame[frame[TIME] >= SETTLED - 1e-6])
     for channel, exponent in (EXPONENTS | FURTHER).items():
         there, here = (

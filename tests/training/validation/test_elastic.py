@@ -112,7 +112,7 @@ def test_turbulence_is_within_2_percent_of_deviations_and_5_percent_of_damage_at
     machine = elastic.NREL5
     frame = elastic.turbulent_run(machine, 18, 600.0)
     study = Study()
-    elastic._compared(study, machine, "turb_18mps", frame)
+    elastic.compare_turbulence(study, machine, "turb_18mps", frame)
     late = frame[frame[TIME] >= 100.0 - 1e-6]
     table = stored("nrel5mw_turbulent")
     table = table[table["case"] == "nrel5mw/turb_18mps"].set_index("channel")
