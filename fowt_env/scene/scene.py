@@ -40,7 +40,7 @@ from fowt_env.plant.state import (
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.blade_beam import blade_states
-from fowt_env.scene.options import OPTIONS, default_step, least_lag
+from fowt_env.scene.options import FIDELITIES, LEVEL_PARTS, OPTIONS, default_step, least_lag
 from fowt_env.scene.parts import airfoil_states, fastest_motion, hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
 from fowt_env.scene.tower import tower_states
@@ -286,7 +286,7 @@ class Scene:
         )
 
     def _repr_html_(self):
-        """Return the HTML for notebooks: the scene's parts and each option that is not the default."""
+        """Return the HTML for notebooks: the scene's parts and each option that is not the fidelity's."""
         rows = [
             ("platform", self.label or self.platform.name),
             ("turbine", f"{self.turbine.name}, rated {self.turbine.torque_law.rated_power / 1e6:.3g} MW"),
@@ -299,6 +299,7 @@ class Scene:
             ("states", str(self.n_state)),
         ]
         default = {name: option.default for name, option in OPTIONS.items()}
+        default |= {part: getattr(FIDELITIES[self.options["fidelity"]], part) for part in LEVEL_PARTS}
         rows += [(name, str(value)) for name, value in self.options.items() if value != default.get(name)]
         return html_table("Scene", (), rows)
 
