@@ -1,74 +1,177 @@
-"""Corrects Adams-Bashforth 4 steps for the stiffness of the tower and the damping of blades by the wind.
+"""Advances the bending of the tower exactly, and damps blades in the wind, within Adams steps.
 
-The structural force of the tower is linear in the new deflections, so its fourth difference with the new
-state is cheap to evaluate (theory.md, 6.3).
+Tower: in its own modes p the deflections follow p'' = g - w2 p - 2 d p', where g, the rest of their rates, is
+smooth. A step extrapolates g as a cubic, solves for the oscillation exactly, and gives platform and rotor the
+velocities that an impulse on the tower alone, of the difference from the Adams formula, gives them: momentum
+is kept, and the step does not depend on the frequencies of the tower.
 
-The wind damps flapping at 10 to 20 1/s, and Adams-Bashforth 4 alone is stable to 0.3 over its step. The
-damping D of a rotor at rated speed is known well enough: for the part -D v of the forces the explicit formula
-is replaced by Adams-Moulton 4, which is linear in the new velocities. With D dt as large as the actual
-damping the limit becomes 0.3 + 0.8 D dt, also where the wind damps less, and the order stays 4.
+Blades: the wind damps flapping at 10 to 20 1/s, and Adams-Bashforth 4 alone is stable to 0.3 over its step.
+The damping D of a rotor at rated speed is known well enough: for the part -D v of the forces the explicit
+formula is replaced by Adams-Moulton 4, which is linear in the new velocities. With D dt as large as the
+actual damping the limit becomes 0.3 + 0.8 D dt, also where the wind damps less, and the order stays 4.
 """
+
+from math import atan2, cos, sin
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.blades import BladeModes
 from fowt_env.plant.elastic.chain import answer
-from fowt_env.plant.elastic.tower import bend_by_modes, elastic_force
+from fowt_env.plant.elastic.oscillator import extrapolated, interpolated, swung
+from fowt_env.plant.elastic.tower import bend_by_modes
 from fowt_env.plant.state import BLADES, State
 
 IMPLICIT = 251.0 / 720.0  # factor on the fourth difference of a force: Adams-Moulton 4 less Adams-Bashforth 4
-# factor on the fourth difference of the structural force: error constant of Adams-Bashforth 4 (251/720) minus
-# that of Adams-Moulton 4 for the deflections (19/720), so that errors of velocity and position cancel
-ELASTIC_WEIGHT = 232.0 / 720.0
-# passes, each with the new force: time steps are stable to 0.7/frequency with 1 pass, 1.29 with 2
-ELASTIC_ROUNDS = 2
+ROUNDS = 2  # of the impulse on the tower, whose inertia is that at the first step
+JACOBI_SWEEPS = 8
 
 
 @kernel
-def keep_elastic(x, tower, elastic):
-    """Insert the structural forces at state x before those of past steps; no-op for a rigid tower."""
-    if tower is None:
-        return
-    for k in range(elastic.shape[0] - 1, 0, -1):
-        for i in range(elastic.shape[1]):
-            elastic[k, i] = elastic[k - 1, i]
-    elastic_force(x, tower, elastic[0])
+def begin_swing(steps, x, body, tower, blades, matrix, work, still):
+    """Find the tower's own modes with the mass of the last solution, at x, before the first step.
 
-
-@kernel
-def correct_elastic(dt, x, history, body, tower, blades, matrix, work, elastic, still, extra, y):
-    """Correct the Adams-Bashforth 4 velocities in y for the structural force of the tower.
-
-    matrix: factors left by the solve at the beginning of the step; still and extra (n_state,): scratch. No-op
-    for a rigid tower, and with bending blades, whose short steps resolve the tower.
+    Not later: a change would break the polynomials through past g. With flexibility G and stiffness L L^T
+    they are those of the symmetric L^T G L.
     """
     if tower is None:
         return
-    if blades is not None:
+    if steps > 0:
+        return
+    n, bend = len(tower.beam.count), bend_by_modes(x, tower)
+    A, W, G = work.impulse, work.from_own, work.to_own
+    v = tower.first + n
+    for j in range(n):
+        still[:] = 0.0
+        still[v + j] = 1.0  # N, on a deflection
+        answer(0.0, bend, body, tower, blades, matrix, work, still)
+        for i in range(n):
+            G[i, j] = still[v + i]
+    for i in range(n):
+        for j in range(n):
+            A[i, j] = 0.0
+            for k in range(n):
+                for m in range(n):
+                    A[i, j] += tower.root[k, i] * G[k, m] * tower.root[m, j]
+    _find_eigenvectors(A, W)
+    L, R = tower.root, tower.flexible_root
+    for i in range(n):
+        work.swing[0, i] = A[i, i]
+        for j in range(n):
+            G[i, j] = 0.0
+            for k in range(n):
+                G[i, j] += W[k, i] * L[j, k]
+    for i in range(n):
+        for j in range(n):
+            A[i, j] = 0.0
+            for k in range(n):
+                A[i, j] += G[k, i] * G[k, j] / work.swing[0, k]
+    for j in range(n):  # W to R W, column by column
+        for i in range(n):
+            still[i] = 0.0
+            for k in range(n):
+                still[i] += R[i, k] * W[k, j]
+        for i in range(n):
+            W[i, j] = still[i]
+    for i in range(n):  # damping on its own mode: 2 decay = w2 from_own^T D from_own
+        damped = 0.0
+        for j in range(n):
+            for k in range(n):
+                damped += W[j, i] * tower.beam.damping[j, k] * W[k, i]
+        work.swing[1, i] = 0.5 * work.swing[0, i] * damped
+
+
+@kernel
+def _find_eigenvectors(A, W):
+    """Turn the symmetric A (n, n) into its eigenvalues on the diagonal, with eigenvectors W: Jacobi."""
+    n = A.shape[0]
+    for i in range(n):
+        for j in range(n):
+            W[i, j] = 1.0 if i == j else 0.0
+    for _ in range(JACOBI_SWEEPS):
+        for p in range(n - 1):
+            for q in range(p + 1, n):
+                angle = 0.5 * atan2(2.0 * A[p, q], A[q, q] - A[p, p])
+                c, s = cos(angle), sin(angle)
+                for k in range(n):
+                    A[k, p], A[k, q] = c * A[k, p] - s * A[k, q], s * A[k, p] + c * A[k, q]
+                for k in range(n):
+                    A[p, k], A[q, k] = c * A[p, k] - s * A[q, k], s * A[p, k] + c * A[q, k]
+                for k in range(n):
+                    W[k, p], W[k, q] = c * W[k, p] - s * W[k, q], s * W[k, p] + c * W[k, q]
+
+
+@kernel
+def keep_swing(x, tower, work, dx):
+    """Put g, the smooth part of the rates dx at state x, in place of the rates of the deflections in dx."""
+    if tower is None:
         return
     n, q = len(tower.beam.count), tower.first
-    v = q + n
-    b, modal = extra[State.VX : State.WZ + 1], extra[v : v + n]
-    new, done = still[v : v + n], still[q:v]
-    done[:] = 0.0
-    bend = bend_by_modes(x, tower)
-    for _ in range(ELASTIC_ROUNDS):
+    for i in range(n):
+        p = rate = smooth = 0.0
+        for j in range(n):
+            p += work.to_own[i, j] * x[q + j]
+            rate += work.to_own[i, j] * x[q + n + j]
+            smooth += work.to_own[i, j] * dx[q + n + j]
+        dx[q + i] = smooth + work.swing[0, i] * p + 2.0 * work.swing[1, i] * rate
+
+
+@kernel
+def swing_on(dt, x, order, history, body, tower, blades, matrix, work, still, extra, y):
+    """Advance the tower by the g of the last `order` steps; y has the Adams-Bashforth velocities."""
+    if tower is None:
+        return
+    for i in range(tower.first, tower.first + len(tower.beam.count)):
+        c = extrapolated(order, history[0, i], history[1, i], history[2, i], history[3, i])
+        _swing_mode(i - tower.first, dt, x, c, tower, work, still)
+    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
+
+
+@kernel
+def swing_again(dt, x, order, new, history, body, tower, blades, matrix, work, still, extra, y):
+    """Advance the tower by the g at the end of the step, too; y has the Adams-Moulton velocities."""
+    if tower is None:
+        return
+    for i in range(tower.first, tower.first + len(tower.beam.count)):
+        c = interpolated(order, new[i], history[0, i], history[1, i], history[2, i])
+        _swing_mode(i - tower.first, dt, x, c, tower, work, still)
+    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
+
+
+@inlined_kernel
+def _swing_mode(i, dt, x, c, tower, work, still):
+    """Put own mode i and its rate after dt, with the coefficients c (4) of g, into still."""
+    n, q, over = len(tower.beam.count), tower.first, 1.0 / dt
+    p = rate = 0.0
+    for j in range(n):
+        p += work.to_own[i, j] * x[q + j]
+        rate += work.to_own[i, j] * x[q + n + j]
+    still[q + i], still[q + n + i] = swung(
+        p, rate, c[0], c[1] * over, c[2] * over * over, c[3] * over * over * over, dt, work.swing[0, i],
+        work.swing[1, i],
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _move_tower(x, body, tower, blades, matrix, work, still, extra, y):
+    """Give y the deflections of the own modes in still, and their velocities, by an impulse on the tower."""
+    n, q = len(tower.beam.count), tower.first
+    v, bend = q + n, bend_by_modes(x, tower)
+    for i in range(n):
+        y[q + i] = 0.0
+        for j in range(n):
+            y[q + i] += work.from_own[i, j] * still[q + j]
+    for i in range(n):
+        still[q + i] = 0.0
+        for j in range(n):
+            still[q + i] += work.from_own[i, j] * still[v + j]
+    for _ in range(ROUNDS):
+        extra[:] = 0.0
         for i in range(n):
-            y[q + i] = x[q + i] + dt / 24.0 * (
-                9.0 * y[v + i] + 19.0 * history[0, q + i] - 5.0 * history[1, q + i] + history[2, q + i]
-            )  # fmt: skip
-        elastic_force(y, tower, new)
-        for i in range(n):
-            past = 4.0 * (elastic[0, i] + elastic[2, i]) - 6.0 * elastic[1, i] - elastic[3, i]
-            force = ELASTIC_WEIGHT * (new[i] - past)
-            modal[i] = force - done[i]
-            done[i] = force
-        b[:] = 0.0
-        y[State.ROTOR_SPEED] += dt * answer(0.0, bend, body, tower, matrix, work, b, modal)
-        for i in range(6):
-            y[State.VX + i] += dt * b[i]
-        for i in range(n):
-            y[v + i] += dt * modal[i]
+            for j in range(n):
+                extra[v + i] += work.impulse[i, j] * (still[q + j] - y[v + j])
+        answer(0.0, bend, body, tower, blades, matrix, work, extra)
+        for i in range(State.VX, y.shape[0]):
+            y[i] += extra[i]
 
 
 @kernel
