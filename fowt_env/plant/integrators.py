@@ -18,7 +18,14 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
 from fowt_env.plant.elastic.oscillator import extrapolated, interpolated
 from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
-from fowt_env.plant.elastic.steps import begin_swing, damp_blades, keep_swing, swing_again, swing_on
+from fowt_env.plant.elastic.steps import (
+    begin_swing,
+    correct_blades,
+    keep_blades,
+    keep_swing,
+    swing_again,
+    swing_on,
+)
 from fowt_env.plant.elastic.tower import add_modal, bend_of, carried, turned_pose
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
@@ -181,6 +188,7 @@ def adams(t, x, u, dt, model, method, data):
             history[k, i] = history[k - 1, i]
     body, tower, blades, shaft, work = model.rigid_body, model.tower, model.blades, model.shaft, data.rotor
     matrix, still, extra = data.matrix, data.stages[2], data.stages[3]
+    keep_blades(x, blades, data.elastic)
     rates(t, x, u, model, data, history[0])
     begin_twist(shaft, work, history[0])
     begin_swing(steps, x, body, tower, blades, matrix, work, still)
@@ -212,7 +220,7 @@ def adams(t, x, u, dt, model, method, data):
         swing_again(dt, x, order, new, history, body, tower, blades, matrix, work, still, extra, y)
     else:
         follow_rotor(dt, x, model, method.substeps, data, y)
-        damp_blades(dt, history, blades, work, y)
+        correct_blades(dt, x, history, data.elastic, blades, work, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     bend_blades(dt, x, order, history, blades, y)

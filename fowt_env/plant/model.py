@@ -83,7 +83,7 @@ N_CACHE = 49
 class Data(NamedTuple):
     """Holds the variables and work arrays of one plant.
 
-    lines, counters, cache, matrix, history, samples, radiation and blades persist between calls.
+    lines, counters, cache, matrix, history, elastic, samples, radiation and blades persist between calls.
     """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
@@ -100,6 +100,7 @@ class Data(NamedTuple):
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
+    elastic: np.ndarray  # (4, n) deflections of the blades at past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data; empty without radiation memory
     # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades. With
