@@ -192,7 +192,7 @@ def adams(t, x, u, dt, model, method, data):
     rates(t, x, u, model, data, history[0])
     begin_twist(shaft, work, history[0])
     begin_swing(steps, x, body, tower, blades, matrix, work, still)
-    keep_swing(x, tower, work, history[0])
+    keep_swing(x, tower, shaft, work, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
@@ -202,13 +202,13 @@ def adams(t, x, u, dt, model, method, data):
         smooth_of(shaft, history[3]),
     )  # fmt: skip
     advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
-    swing_on(dt, x, order, history, body, tower, blades, matrix, work, still, extra, y)
+    swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
         keep_smooth(shaft, work, new)
-        keep_swing(y, tower, work, new)
+        keep_swing(y, tower, shaft, work, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         advance_actuators(x, u, dt, model, y)
@@ -217,7 +217,7 @@ def adams(t, x, u, dt, model, method, data):
             smooth_of(shaft, history[2]),
         )  # fmt: skip
         advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
-        swing_again(dt, x, order, new, history, body, tower, blades, matrix, work, still, extra, y)
+        swing_again(dt, x, order, new, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     else:
         follow_rotor(dt, x, model, method.substeps, data, y)
         correct_blades(dt, x, history, data.elastic, blades, work, y)

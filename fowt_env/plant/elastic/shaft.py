@@ -80,6 +80,23 @@ def keep_smooth(shaft, work, dx):
 
 
 @kernel
+def rate_by_twist(i, shaft, work, dx):
+    """Return the part of the rate of velocity i in dx that the acceleration of the twist causes."""
+    if shaft is None:
+        return 0.0
+    return work.twist[0, i] * dx[shaft.first + 1]
+
+
+@kernel
+def change_by_twist(i, dt, x, shaft, work, y):
+    """Return the changes that the twist causes in velocity i over a step dt from x to y, and in its integral."""
+    if shaft is None:
+        return 0.0, 0.0
+    e, q = work.twist[1, i], shaft.first
+    return e * (y[q + 1] - x[q + 1]), e * (y[q] - x[q] - dt * x[q + 1])
+
+
+@kernel
 def begin_twist(shaft, work, dx):
     """Begin a step at the last evaluation, of rates dx: keep its mobility, and as in keep_smooth."""
     if shaft is None:

@@ -19,6 +19,7 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.blades import BladeModes
 from fowt_env.plant.elastic.chain import answer
 from fowt_env.plant.elastic.oscillator import extrapolated, interpolated, swung
+from fowt_env.plant.elastic.shaft import change_by_twist, rate_by_twist
 from fowt_env.plant.elastic.tower import bend_by_modes
 from fowt_env.plant.state import BLADES, State
 
@@ -105,8 +106,8 @@ def _find_eigenvectors(A, W):
 
 
 @kernel
-def keep_swing(x, tower, work, dx):
-    """Put g, the smooth part of the rates dx at state x, in place of the rates of the deflections in dx."""
+def keep_swing(x, tower, shaft, work, dx):
+    """Put g, smooth and without the twist, of the rates dx at x, in place of the deflections' rates in dx."""
     if tower is None:
         return
     n, q = len(tower.beam.count), tower.first
@@ -115,30 +116,31 @@ def keep_swing(x, tower, work, dx):
         for j in range(n):
             p += work.to_own[i, j] * x[q + j]
             rate += work.to_own[i, j] * x[q + n + j]
-            smooth += work.to_own[i, j] * dx[q + n + j]
+            steady = dx[q + n + j] - rate_by_twist(q + n + j, shaft, work, dx)
+            smooth += work.to_own[i, j] * steady
         dx[q + i] = smooth + work.swing[0, i] * p + 2.0 * work.swing[1, i] * rate
 
 
 @kernel
-def swing_on(dt, x, order, history, body, tower, blades, matrix, work, still, extra, y):
+def swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, still, extra, y):
     """Advance the tower by the g of the last `order` steps; y has the Adams-Bashforth velocities."""
     if tower is None:
         return
     for i in range(tower.first, tower.first + len(tower.beam.count)):
         c = extrapolated(order, history[0, i], history[1, i], history[2, i], history[3, i])
         _swing_mode(i - tower.first, dt, x, c, tower, work, still)
-    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
+    _move_tower(dt, x, body, tower, blades, shaft, matrix, work, still, extra, y)
 
 
 @kernel
-def swing_again(dt, x, order, new, history, body, tower, blades, matrix, work, still, extra, y):
+def swing_again(dt, x, order, new, history, body, tower, blades, shaft, matrix, work, still, extra, y):
     """Advance the tower by the g at the end of the step, too; y has the Adams-Moulton velocities."""
     if tower is None:
         return
     for i in range(tower.first, tower.first + len(tower.beam.count)):
         c = interpolated(order, new[i], history[0, i], history[1, i], history[2, i])
         _swing_mode(i - tower.first, dt, x, c, tower, work, still)
-    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
+    _move_tower(dt, x, body, tower, blades, shaft, matrix, work, still, extra, y)
 
 
 @inlined_kernel
@@ -156,16 +158,16 @@ def _swing_mode(i, dt, x, c, tower, work, still):
 
 
 @inlined_kernel
-def _move_tower(x, body, tower, blades, matrix, work, still, extra, y):
+def _move_tower(dt, x, body, tower, blades, shaft, matrix, work, still, extra, y):
     """Give y the deflections of the own modes in still, and their velocities, by an impulse on the tower."""
     n, q = len(tower.beam.count), tower.first
     v, bend = q + n, bend_by_modes(x, tower)
     for i in range(n):
-        y[q + i] = 0.0
+        _, y[q + i] = change_by_twist(v + i, dt, x, shaft, work, y)
         for j in range(n):
             y[q + i] += work.from_own[i, j] * still[q + j]
     for i in range(n):
-        still[q + i] = 0.0
+        still[q + i], _ = change_by_twist(v + i, dt, x, shaft, work, y)
         for j in range(n):
             still[q + i] += work.from_own[i, j] * still[v + j]
     for _ in range(ROUNDS):
