@@ -89,7 +89,7 @@ def rate_by_twist(i, shaft, work, dx):
 
 @kernel
 def change_by_twist(i, dt, x, shaft, work, y):
-    """Return the changes that the twist causes in velocity i over a step dt from x to y, and in its integral."""
+    """Return the changes by the twist of velocity i, and of its integral, over a step dt from x to y."""
     if shaft is None:
         return 0.0, 0.0
     e, q = work.twist[1, i], shaft.first
