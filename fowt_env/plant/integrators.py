@@ -1,9 +1,10 @@
 """Defines the fixed-step integrators: a class, a step and a row of INTEGRATORS each.
 
-Within a step, blade pitch and generator torque are exact (constant command), the states of radiation memory
-are exact for velocities linear in time (hydro/radiation.py), moving mooring lines have steps of their own
-(line_dynamics.py), and the rotor load in a wind box is evaluated
-several times a step (rotor_substeps.py), so that none of these limits the step.
+Within a step, blade pitch and generator torque are exact (constant command), and so are the torsion of the
+shaft (elastic/shaft.py) and, with Adams methods, the bending of the tower (elastic/steps.py). The states of
+radiation memory are exact for velocities linear in time (hydro/radiation.py), moving mooring lines have steps
+of their own (line_dynamics.py), and the rotor load in a wind box is evaluated several times a step
+(rotor_substeps.py), so that none of these limits the step.
 """
 
 from typing import NamedTuple
@@ -15,15 +16,22 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
-from fowt_env.plant.elastic.steps import damp_blades
+from fowt_env.plant.elastic.oscillator import extrapolated, interpolated
+from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
+from fowt_env.plant.elastic.steps import (
+    begin_swing,
+    correct_blades,
+    keep_blades,
+    keep_swing,
+    swing_again,
+    swing_on,
+)
+from fowt_env.plant.elastic.tower import add_modal, bend_of, carried, turned_pose
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
-from fowt_env.plant.tower.loads import add_modal, carried
-from fowt_env.plant.tower.modes import bend_of, turned_pose
-from fowt_env.plant.tower.steps import correct_elastic, keep_elastic
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) above which the lift of the blades damps the speed of a free rotor: by up to
@@ -68,27 +76,40 @@ def rates(t, x, u, model, data, dx):
 def rk4(t, x, u, dt, model, method, data):
     """Advance x in place by one classical Runge-Kutta step, blade pitch exact at every stage."""
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
-    n = integrated_states(x, model)
+    n, shaft, work, half = integrated_states(x, model), model.shaft, data.rotor, 0.5 * dt
     rates(t, x, u, model, data, k1)
+    begin_twist(shaft, work, k1)
     begin_followers(x, dt, True, model, data)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
+    s1 = smooth_of(shaft, k1)
+    advance_twist(x, u, half, s1, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
+    keep_smooth(shaft, work, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
+    s2 = smooth_of(shaft, k2)
+    advance_twist(x, u, half, s2, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
+    keep_smooth(shaft, work, k3)
     for i in range(n):
         y[i] = x[i] + dt * k3[i]
     advance_actuators(x, u, dt, model, y)
+    s3 = smooth_of(shaft, k3)
+    advance_twist(x, u, dt, s1, 2.0 * (s3 - s1), 0.0, 0.0, shaft, model, work, y)
     follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k4)
+    keep_smooth(shaft, work, k4)
     for i in range(n):
         y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     advance_actuators(x, u, dt, model, y)
+    s4, middle = smooth_of(shaft, k4), 0.5 * (s2 + s3)
+    linear, square = 4.0 * middle - 3.0 * s1 - s4, 2.0 * (s1 - 2.0 * middle + s4)
+    advance_twist(x, u, dt, s1, linear, square, 0.0, shaft, model, work, y)
     step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
@@ -99,17 +120,22 @@ def rk4(t, x, u, dt, model, method, data):
 def heun(t, x, u, dt, model, method, data):
     """Advance x in place by one step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
-    n = integrated_states(x, model)
+    n, shaft, work = integrated_states(x, model), model.shaft, data.rotor
     rates(t, x, u, model, data, k1)
+    begin_twist(shaft, work, k1)
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
     advance_actuators(x, u, dt, model, y)
+    s1 = smooth_of(shaft, k1)
+    advance_twist(x, u, dt, s1, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k2)
+    keep_smooth(shaft, work, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
     advance_actuators(x, u, dt, model, y)
+    advance_twist(x, u, dt, s1, smooth_of(shaft, k2) - s1, 0.0, 0.0, shaft, model, work, y)
     step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
@@ -160,30 +186,44 @@ def adams(t, x, u, dt, model, method, data):
     for k in range(START_STEPS, 0, -1):
         for i in range(n):
             history[k, i] = history[k - 1, i]
-    keep_elastic(x, model.tower, data.elastic)
+    body, tower, blades, shaft, work = model.rigid_body, model.tower, model.blades, model.shaft, data.rotor
+    matrix, still, extra = data.matrix, data.stages[2], data.stages[3]
+    keep_blades(x, blades, data.elastic)
     rates(t, x, u, model, data, history[0])
+    begin_twist(shaft, work, history[0])
+    begin_swing(steps, x, body, tower, blades, matrix, work, still)
+    keep_swing(x, tower, shaft, work, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     advance_actuators(x, u, dt, model, y)
+    c0, c1, c2, c3 = extrapolated(
+        order, smooth_of(shaft, history[0]), smooth_of(shaft, history[1]), smooth_of(shaft, history[2]),
+        smooth_of(shaft, history[3]),
+    )  # fmt: skip
+    advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
+    swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
+        keep_smooth(shaft, work, new)
+        keep_swing(y, tower, shaft, work, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         advance_actuators(x, u, dt, model, y)
-    else:
-        follow_rotor(dt, model, method.substeps, data, y)
-        correct_elastic(
-            dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.elastic,
-            data.stages[2], data.stages[3], y,
+        c0, c1, c2, c3 = interpolated(
+            order, smooth_of(shaft, new), smooth_of(shaft, history[0]), smooth_of(shaft, history[1]),
+            smooth_of(shaft, history[2]),
         )  # fmt: skip
-        damp_blades(dt, history, model.blades, data.rotor, y)
+        advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
+        swing_again(dt, x, order, new, history, body, tower, blades, shaft, matrix, work, still, extra, y)
+    else:
+        follow_rotor(dt, x, model, method.substeps, data, y)
+        correct_blades(dt, x, history, data.elastic, blades, work, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
-    bend_on(dt, x, order, history, model.tower, y)
-    bend_blades(dt, x, order, history, model.blades, y)
+    bend_blades(dt, x, order, history, blades, y)
     step_air(x, dt, model.aero, history[0], y)
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
@@ -191,16 +231,6 @@ def adams(t, x, u, dt, model, method, data):
         x[i] = y[i]
     end_followers(x, dt, model, data)
     cache[LoadCache.STEPS] = steps + 1.0
-
-
-@kernel
-def bend_on(dt, x, order, history, tower, y):
-    """Fill y with the deflections of the tower by Adams-Moulton, from their new velocities in y."""
-    if tower is None:
-        return
-    n = len(tower.count)
-    for i in range(tower.first, tower.first + n):
-        y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
 
 @kernel
@@ -251,7 +281,7 @@ def renew_rotor(t, x, model, aero, data):
         new.mx - was.mx, new.my - was.my, new.mz - was.mz,
     )  # fmt: skip
     store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), carried(change, bend)))
-    add_modal(change, bend, model.tower, cache[LoadCache.MODAL :])
+    add_modal(change, bend, model.tower, data.rotor, cache[LoadCache.MODAL :])
     store(cache, LoadCache.ROTOR, new)
     cache[LoadCache.TORQUE] = rotor.torque
     cache[LoadCache.THRUST] = rotor.thrust
@@ -266,27 +296,33 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     """
     before, after, history, cache = data.stages[1], data.stages[4], data.history, data.cache
     rates(t, x, u, model, data, before)
+    keep_smooth(model.shaft, data.rotor, before)
     was = stored(cache, LoadCache.ROTOR)
     torque = cache[LoadCache.TORQUE]
     set_followed(x, u, dt, model.actuator, model.pitches)
     renew_loads(t, x, model, model.user, model.blades, data)
     respond(x, u, model, data, after)
+    keep_smooth(model.shaft, data.rotor, after)
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
-        shift_tower(after, before, model.tower, history[k])
+        shift_tower(after, before, model.tower, data.rotor, history[k])
         shift_blades(after, before, model.blades, history[k])
+        shift_twist(after, before, model.shaft, history[k])
     shift_samples(was, torque, method.substeps, data)
 
 
 @kernel
-def shift_tower(after, before, tower, row):
-    """Add the difference of two derivatives to the rates of the deflection velocities in a row."""
+def shift_tower(after, before, tower, work, row):
+    """Add the difference of two derivatives to the rates of the deflection velocities, and to g, in a row."""
     if tower is None:
         return
-    n = len(tower.count)
-    for i in range(tower.first + n, tower.first + 2 * n):
+    n, q = len(tower.beam.count), tower.first
+    for i in range(q + n, q + 2 * n):
         row[i] += after[i] - before[i]
+    for i in range(n):
+        for j in range(n):
+            row[q + i] += work.to_own[i, j] * (after[q + n + j] - before[q + n + j])
 
 
 @kernel
@@ -296,6 +332,15 @@ def shift_blades(after, before, blades, row):
         return
     size = BLADES * len(blades.beam.count)
     for i in range(blades.first + size, blades.first + 2 * size):
+        row[i] += after[i] - before[i]
+
+
+@kernel
+def shift_twist(after, before, shaft, row):
+    """Add the difference of two derivatives to the smooth torque and the rate of the twist in a row."""
+    if shaft is None:
+        return
+    for i in range(shaft.first, shaft.first + 2):
         row[i] += after[i] - before[i]
 
 
@@ -312,6 +357,7 @@ class Method(NamedTuple):
     part: tuple  # value of Model.integrator; its class selects the step
     step: object  # (t, x, u, dt, model, method, data): one step of x in place
     samples_rotor: bool = False  # whether the rotor load can be evaluated more than once a step
+    swings: bool = False  # whether the bending of the tower is advanced exactly
 
 
 # The limits are textbook values, except for an oscillation under ab4 (0.43 for Adams-Bashforth alone): the
@@ -327,11 +373,11 @@ INTEGRATORS = {
     ),
     "abm4": Method(
         order=4, evaluations=2, dt=0.1, decay_limit=1.285, oscillation_limit=0.0,
-        part=Adams(corrector=True), step=adams,
+        part=Adams(corrector=True), step=adams, swings=True,
     ),
     "ab4": Method(
         order=4, evaluations=1, dt=0.1, decay_limit=0.3, oscillation_limit=0.929,
-        part=Adams(corrector=False), step=adams, samples_rotor=True,
+        part=Adams(corrector=False), step=adams, samples_rotor=True, swings=True,
     ),
 }  # fmt: skip
 method_step = chosen_by_class("method", {type(m.part): m.step for m in INTEGRATORS.values()}, inlined=True)

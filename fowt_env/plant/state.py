@@ -61,6 +61,8 @@ FURTHER_BLOCKS = {  # (kind, steady) of blocks other than ("internal", "settled"
     "tower_velocity": ("velocity", "zero"),
     "blade_deflection": ("position", "solved"),
     "blade_velocity": ("velocity", "zero"),
+    "shaft_twist": ("position", "solved"),
+    "shaft_twist_rate": ("velocity", "zero"),
     "other_blade_pitches": ("internal", "solved"),
     "pitch_rate": ("internal", "zero"),
     "followed_pitch": ("internal", "solved"),
@@ -112,6 +114,12 @@ class Wrench(NamedTuple):
 
 
 NO_LOAD = Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@kernel
+def cross(ax, ay, az, bx, by, bz):
+    """Return the cross product a x b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @kernel

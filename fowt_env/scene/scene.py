@@ -12,10 +12,11 @@ from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.display import html_table
 from fowt_env.errors import InputError
+from fowt_env.plant.aero.bent_blade import place_entries
 from fowt_env.plant.aero.blade_shape import N_STATION_LOAD
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
-from fowt_env.plant.elastic.blades import rotor_scratch
+from fowt_env.plant.elastic.structure import rotor_scratch
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.hydro.excitation import excitation_scratch, position_states
 from fowt_env.plant.hydro.member_series import N_WATER
@@ -89,6 +90,8 @@ class Scene:
         internal |= {"tower_deflection": bending, "tower_velocity": bending}
         flapping = blade_states(self.model.blades) // 2
         internal |= {"blade_deflection": flapping, "blade_velocity": flapping}
+        twisting = 0 if self.model.shaft is None else 1
+        internal |= {"shaft_twist": twisting, "shaft_twist_rate": twisting}
         internal |= {"other_blade_pitches": 0 if self.model.pitches is None else BLADES - 1}
         internal |= drive_states(self.model.actuator, self.model.pitches)
         internal |= {"generator_torque": 0 if self.model.converter is None else 1}
@@ -125,7 +128,8 @@ class Scene:
     @property
     def channel_groups(self) -> tuple[str, ...]:
         """Return the names of the GROUPS of channels of this scene, in addition to the fixed channels."""
-        parts = {"tower": self.model.tower, "bending": self.model.blades, "blades": self.model.pitches}
+        model = self.model
+        parts = {"tower": model.tower, "shaft": model.shaft, "bending": model.blades, "blades": model.pitches}
         return tuple(name for name, part in parts.items() if part is not None)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
@@ -183,11 +187,11 @@ class Scene:
             cache=np.zeros(N_CACHE),
             user=np.zeros(user_data_size(len(self.loads), most)),
             history=np.zeros((4, self.n_state)),
-            elastic=np.zeros((4, bending)),
+            elastic=np.zeros((4, blade_states(self.model.blades) // 2)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
-            rotor=rotor_scratch(self.model.blades),
+            rotor=rotor_scratch(self.model.structure, self.model.tower, self.model.blades, self.n_state),
         )
 
     @property
@@ -196,7 +200,8 @@ class Scene:
         aero = self.model.aero
         if self.model.blades is None or aero is None:
             return N_BLADE_LOAD
-        return N_BLADE_LOAD + N_STATION_LOAD * len(aero.rotor.elements.radius)
+        elements = aero.rotor.elements
+        return N_BLADE_LOAD + N_STATION_LOAD * len(elements.radius) + place_entries(elements.modes)
 
     def handle(self, data: Data | None = None) -> Handle:
         """Return the model and data in the form that kernels take from Python."""
@@ -244,7 +249,8 @@ class Scene:
     def dt(self) -> float:
         """Return the default physics step (s) of the integrator; finer for fidelity, tower or lines."""
         model = self.model
-        return default_step(self.options, fastest_motion(model.tower, model.mooring, model.rigid_body))
+        parts = model.tower, model.mooring, model.rigid_body, model.structure
+        return default_step(self.options, fastest_motion(self.options, *parts))
 
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).
