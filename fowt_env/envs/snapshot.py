@@ -13,7 +13,7 @@ CARRIED = {
     "link": ("measurement", "reading", "law_reading", "command", "past", "motion", "watch", "held"),
     "data": (
         "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples",
-        "radiation", "blades", "elastic",
+        "radiation", "blades", "elastic", "slow",
     ),
 }  # fmt: skip
 

@@ -22,6 +22,7 @@ from fowt_env.plant.followers import begin_followers, end_followers, follow, int
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
+from fowt_env.plant.slow_loads import begin_slow, keep_slow
 from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
 
 START_STEPS = 3  # steps before four past derivatives exist
@@ -202,7 +203,10 @@ def adams(t, x, u, dt, model, method, data):
             history[k, i] = history[k - 1, i]
     keep_elastic(x, model.tower, data.elastic)
     keep_blades(x, model.blades, data.elastic)
+    if not method.corrector:
+        begin_slow(steps, model.blades, data)
     rates(t, x, u, model, data, history[0])
+    keep_slow(steps, model.blades, data)
     begin_twist(model.shaft, data.rotor, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
