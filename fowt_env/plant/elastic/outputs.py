@@ -122,11 +122,12 @@ def _outer_aerodynamics(number, x, turn, aero, section, loads):
         if part > 0.0:
             lever, at = bent_lever(j, turn, shape), N_STATION_LOAD * j
             normal, tangential = part * shape.loads[at], part * shape.loads[at + 1]
+            moment = part * shape.loads[at + 2]
             fx += normal * lever.nx
             fr += normal * lever.nr
             ft += tangential
-            mx += lever.r * tangential - lever.t_nr * normal
-            mr += lever.t_nx * normal - lever.x * tangential
+            mx += lever.r * tangential - lever.t_nr * normal - moment * lever.nr
+            mr += lever.t_nx * normal - lever.x * tangential + moment * lever.nx
             mt += lever.turn * normal
     fx, fz, mx, mz = (
         cosine * fx + sine * fr,

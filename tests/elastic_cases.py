@@ -1,0 +1,188 @@
+"""Turbines with elastic parts, their twins of particles, and what both say of random states in wild motion.
+
+For plain Python, in a process with NUMBA_DISABLE_JIT=1: a compiled kind of scene takes minutes, and there are
+dozens. The air's load of every station is drawn, and put in place of that of a rotor model.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+from naive import flexible_turbine
+from naive.bent_stations import air_of
+from plant_helpers import leaning, random_state
+
+from fowt_env import Load, build_scene, load_kernel
+from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.plant.advance import forget, output
+from fowt_env.plant.aero import blade_sweep
+from fowt_env.plant.aero.blade_shape import N_STATION_LOAD, StationLoad, effective_pitch
+from fowt_env.plant.state import BLADES, N_BLADE_LOAD, State
+from fowt_env.scene.blade_beam import MODES, SECTIONS, blade_beam, blade_nodes, outer_part
+from fowt_env.scene.tower import build_tower_modes, mode_shapes, shape_values
+
+TOWERS = ("rigid", "modes", "modes2")
+TORQUE = 3e4  # N m, of the generator
+WIND, SHEAR = 11.0, 0.14
+ALOFT, BELOW = np.array([3.0, -2.0, 91.0]), np.array([4.0, 3.0, -30.0])  # m, points of two loads
+FORCES = np.array([[3e5, -2e5, 1e5, 2e6, -1e6, 3e6], [-5e5, 4e5, 8e4, 1e7, 2e7, -3e6]])  # N and N m there
+
+
+@load_kernel
+def constant_load(parameters, motion, force):
+    for i in range(6):
+        force[i] = parameters[i]
+
+
+CONSTANT = [
+    Load(name, constant_load, point=point, parameters=force, axes="body")
+    for name, point, force in zip(("aloft", "below"), (ALOFT, BELOW), FORCES, strict=True)
+]
+
+
+@cache
+def descriptions(name):
+    """(platform, turbine) with tilt, cone, prebend and sweep, and centres of mass beside the plane."""
+    platform = read_platform(name)
+    turbine = read_turbine(platform.turbine)
+    if turbine.rotor.cone == 0.0:
+        platform, turbine = leaning(platform, turbine)
+        turbine = turbine.model_copy(update={"rotor": turbine.rotor.model_copy(update={"cone": 0.05})})
+    outside = np.asarray(turbine.blade.radius) - turbine.rotor.hub_radius
+    prebend = -3e-4 * outside**2 if turbine.blade.prebend is None else turbine.blade.prebend
+    blade = turbine.blade.model_copy(update={"sweep": 1e-4 * outside**2, "prebend": prebend})
+    nacelle = turbine.nacelle.model_copy(update={"cm_left": 0.7})
+    return platform, turbine.model_copy(update={"blade": blade, "nacelle": nacelle})
+
+
+def tower_particles(platform, turbine, option):
+    """flexible_turbine.Beam of a tower: ElastoDyn's elements and the mass at its top; None: rigid."""
+    count = TOWERS.index(option)
+    if count == 0:
+        return None
+    built, tower = build_tower_modes(platform, turbine, count, 0), platform.tower
+    bending, height = tower.modes, tower.top_height - tower.base_height
+    shapes, fore_aft = mode_shapes(bending, count)
+    at, n = np.append(bending.middles(), 1.0), 2 * count
+    values, slopes = (shape_values(shapes, at, k).T / height**k for k in range(2))
+    U, slope = np.zeros((n, 2, len(at))), np.zeros((n, 2, len(at)))
+    for i in range(n):
+        axis = 0 if fore_aft[i] else 1
+        U[i, axis], slope[i, axis] = values[i], slopes[i]
+    cell, S, sunk = height / bending.elements, np.zeros((n, n, len(at))), np.zeros((n, n))
+    for k in range(len(at)):
+        half = 0.5 * cell * slope[:, :, k] @ slope[:, :, k].T if k < len(at) - 1 else 0.0
+        S[:, :, k] = sunk + half
+        sunk = sunk + 2.0 * half
+    mass = np.append(cell * np.interp(bending.middles(), bending.height_fraction, bending.mass_density), 0.0)
+    mass[-1] = bending.top_mass
+    return flexible_turbine.Beam(
+        tower.base_height + height * at, mass, U, slope, S, built.stiffness, built.damping
+    )
+
+
+def blade_particles(nodes, beam):
+    """flexible_turbine.Beam of BeamNodes, with the structure of a plant's Beam."""
+    U, slope, S = nodes.shapes
+    return flexible_turbine.Beam(nodes.z, nodes.mass, U, slope, S, beam.stiffness, beam.damping)
+
+
+class Case:
+    """A kind of scene and its twin; fixed: "platform" or "rotor"."""
+
+    def __init__(self, name, blades, tower, shaft="rigid", fixed=(), wind=True, loads=CONSTANT, **options):
+        self.platform, self.turbine = descriptions(name)
+        if wind:
+            wind = {"kind": "steady", "speed": WIND, "shear_exponent": SHEAR}
+            options |= {"wind": wind, "rotor": "bem", "blade_stations": None, "tower_drag": False}
+        self.scene = build_scene(
+            self.platform, turbine=self.turbine, blades=blades, tower=tower, hydrodynamics=False,
+            mooring=False, pitch="individual", loads=loads, **{"fidelity": "reference"} | options,
+        )  # fmt: skip
+        for part in fixed:
+            self.scene = self.scene.with_model({f"rigid_body.{part}_fixed": True})
+        self.fixed, self.n = fixed, len(MODES[blades])
+        self.blocks = {block.name: block.offset for block in self.scene.blocks}
+        nodes = blade_nodes(self.turbine, MODES[blades])
+        self.beam = blade_particles(nodes, blade_beam(self.turbine, blades))
+        rotor = self.turbine.rotor
+        span = rotor.tip_radius - rotor.hub_radius
+        self.stations = [rotor.hub_radius + part * span for part in SECTIONS]
+        self.outer = [blade_particles(outer_part(nodes, z), self.beam) for z in self.stations]
+        self.tower = tower_particles(self.platform, self.turbine, tower)
+        self.channels = {channel.name: i for i, channel in enumerate(self.scene.channels)}
+
+    def random(self, rng):
+        """A state in wild motion: blades bend by some 5 % of their length, the tower by 1 %."""
+        x = random_state(rng, self.scene.n_state, tilt=0.12, speed=3.0, turning=0.3)
+        for part, sizes in (
+            ("tower", [1.0, 1.0, 0.05, 0.05]),
+            ("blade", [4.0, 1.0, 2.0][-self.n :] * BLADES),
+        ):
+            if f"{part}_deflection" in self.blocks:
+                q, v = self.blocks[f"{part}_deflection"], self.blocks[f"{part}_velocity"]
+                sizes = np.array(sizes[: v - q])
+                x[q:v] = sizes * rng.normal(size=v - q)
+                x[v : 2 * v - q] = 2.0 * sizes * rng.normal(size=v - q)
+        pitches = self.blocks["other_blade_pitches"]
+        x[pitches : pitches + 2] = rng.uniform(0.0, 0.4, 2)
+        return x
+
+    def at(self, x):
+        """What the twin says of a state without its loads."""
+        pitches = np.r_[x[State.BLADE_PITCH], x[self.blocks["other_blade_pitches"] :][:2]]
+        twin = flexible_turbine.Turbine(self.platform, self.turbine, self.tower, self.beam, pitches=pitches)
+        q, v = (
+            x[self.blocks[name] :][: BLADES * self.n].reshape(BLADES, self.n)
+            for name in ("blade_deflection", "blade_velocity")
+        )
+        return SimpleNamespace(twin=twin, path=twin.path(x, self.blocks), pitches=pitches, q=q, v=v)
+
+    def air(self, now, drawn, share=None):
+        """Air of each blade under drawn loads of its stations."""
+        e = self.scene.model.aero.rotor.elements
+        return [air_of(drawn[b], now.q[b], now.pitches[b], e.shape, e.modes, share) for b in range(BLADES)]
+
+    def acting(self, twin):
+        """The two loads of the user's."""
+        places = zip((twin.on_nacelle, twin.on_platform), (ALOFT, BELOW), FORCES, strict=True)
+        return [(carry, point, force[:3], force[3:]) for carry, point, force in places]
+
+    def evaluate(self, x, rng):
+        """What the plant says of a state under drawn loads of the stations, with a drawn added mass."""
+        scene, data, count = self.scene, self.scene.data(), len(self.scene.model.aero.rotor.elements.radius)
+        drawn, winds = rng.normal(size=(BLADES, count, 3)) * [3e4, 5e3, 2e4], np.zeros((BLADES, count, 3))
+        put_loads(drawn, winds)
+        half = rng.normal(size=(6, 6)) * np.sqrt([8e6, 8e6, 9e6, 6e10, 6e10, 9e9])
+        data.added_mass[:] = half.T @ half / 6.0
+        handle, dx, row = scene.handle(data), np.zeros_like(x), np.zeros(len(scene.channels))
+        u = np.array([TORQUE, *np.zeros(scene.n_commands - 1)])
+        forget(handle)
+        output(handle, x, u, 0.0, dx, row)
+        stored = data.blades[:, N_BLADE_LOAD:].reshape(BLADES, count, N_STATION_LOAD)
+        assert np.allclose(stored, drawn, rtol=1e-14)
+        rates = {
+            "platform": dx[State.VX : State.WX],
+            "turning": dx[State.WX : State.ROTOR_SPEED],
+            "rotor": dx[[State.ROTOR_SPEED]],
+        }
+        for name, part in (("tower", "tower"), ("blades", "blade")):
+            if f"{part}_velocity" in self.blocks:
+                v = self.blocks[f"{part}_velocity"]
+                rates[name] = dx[v : 2 * v - self.blocks[f"{part}_deflection"]]
+        return SimpleNamespace(
+            rates=rates, drawn=drawn, winds=winds, added=data.added_mass,
+            channels=lambda names: row[[self.channels[name] for name in names.split()]],
+        )  # fmt: skip
+
+
+def put_loads(drawn, winds):
+    """Let the air load stations by drawn (blades, k, 3), and put winds and pitches there into winds."""
+
+    def station_load(response, v_normal, v_tangential, j):
+        turned = effective_pitch(j, response.turn.pitch, response.shape)
+        winds[response.number, j] = v_normal, v_tangential, turned
+        return StationLoad(*(drawn[response.number, j] / 2.0), 2.0, 0.0, 0, None)
+
+    blade_sweep.station_load = station_load

@@ -1,0 +1,111 @@
+"""Energy of an elastic turbine along runs: kept, or changed by the work of air, generator and dampers.
+
+Energy and power are those of particles on their paths, the runs those of the plant as plain Python.
+"""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from elastic_cases import BLADES, Case, put_loads
+from fresh_python import fresh_python
+
+from fowt_env import Load, load_kernel
+from fowt_env.plant.advance import advance, forget
+from fowt_env.plant.state import State
+from fowt_env.plant.user_loads import Force, Motion
+
+PINS = np.array([[0.0, 0.0, -30.0], [4.0, 9.0, 2.0]])  # m, points that springs hold
+SPRING, TORQUE = 4e6, 2e4  # N/m, N m
+DURATION, STEPS = 1.0, (40, 80)  # s
+
+
+@load_kernel
+def spring(parameters, motion, force):
+    """A spring to an inertial point, the same in every direction."""
+    for i in range(3):
+        force[Force.FX + i] = parameters[0] * (parameters[1 + i] - motion[Motion.X + i])
+
+
+SPRINGS = [
+    Load(name, spring, point=pin, parameters=(SPRING, *pin))
+    for name, pin in zip(("one", "other"), PINS, strict=True)
+]
+
+
+def swinging(case):
+    """A smooth state in lively motion: the first modes alone are bent."""
+    x = np.zeros(case.scene.n_state)
+    x[: State.VX] = [0.4, -0.2, 0.0, 0.03, 0.05, 0.02, 0.7]
+    x[State.VX : State.BLADE_PITCH] = [0.5, -0.2, 0.1, 0.01, 0.02, -0.01, 0.8]
+    x[State.BLADE_PITCH] = 0.1
+    x[case.blocks["other_blade_pitches"] :][:2] = 0.2, 0.05
+    for b in range(BLADES):
+        q = case.blocks["blade_deflection"] + case.n * b
+        x[q], x[q + case.n - 1] = 2.0 + 0.4 * b, 0.3 - 0.2 * b
+    return x
+
+
+def energy_and_power(case, x, torque, drawn):
+    """(total energy, energy of motion, power of generator, dampers and air) of a state."""
+    now = case.at(x)
+    twin, path, held = now.twin, now.path, 0.0
+    for pin in PINS:
+        held += 0.5 * SPRING * np.sum((twin.point(path, twin.on_platform, pin)[0] - pin) ** 2)
+    kinetic = twin.kinetic(path)
+    power = -twin.ratio * torque * (path[6] - twin.twist(path)).first
+    for q, beam in twin.parts_that_bend(path):
+        rates = np.array([one.first for one in q])
+        power -= rates @ beam.damping @ rates
+    if twin.shaft is not None:
+        power -= twin.shaft[1] * path[-1].first ** 2
+    for b, load in enumerate([] if drawn is None else case.air(now, drawn)):
+        carry = twin.on_blade(b)
+        R, velocity = twin.frame(path, carry)[0], twin.point(path, carry, np.zeros(3))[1]
+        power += load.force @ R.T @ velocity + load.moment @ twin.motion(path, carry)[1]
+        power += load.modal @ now.v[b]
+    return float(np.squeeze(twin.potential(path).value) + held + kinetic), kinetic, float(np.squeeze(power))
+
+
+def drift(case, steps, torque=0.0, drawn=None):
+    """(largest change of energy beyond the work done, energy of swinging) of a run."""
+    handle, x, dt = case.scene.handle(), swinging(case), DURATION / steps
+    u = np.zeros(case.scene.n_commands)
+    u[0], u[1:] = torque, [x[State.BLADE_PITCH], *x[case.blocks["other_blade_pitches"] :][:2]]
+    found = [energy_and_power(case, x, torque, drawn)]
+    forget(handle)
+    for k in range(steps):
+        assert advance(handle, x, u, k, 1, dt) == 0
+        found.append(energy_and_power(case, x, torque, drawn))
+    energy, kinetic, power = np.array(found).T
+    # to the sixth order over every four steps
+    weights = np.array([7.0, 32.0, 12.0, 32.0, 7.0]) * 2.0 / 45.0 * dt
+    work = np.cumsum([power[k : k + 5] @ weights for k in range(0, steps, 4)])
+    return float(np.abs(energy[4::4] - energy[0] - work).max()), float(np.ptp(kinetic))
+
+
+def drifts(name, blades, working):
+    """[drift] of runs with each of STEPS; working: with air, generator and dampers, or with none of them."""
+    case = Case(name, blades, "rigid", wind=working, loads=SPRINGS, integrator="rk4")
+    if not working:
+        none = np.zeros((case.n, case.n))
+        case.scene = case.scene.with_model({"blades.beam.damping": none})
+        case.beam = case.beam._replace(damping=none)
+        return [drift(case, steps) for steps in STEPS]
+    count = len(case.scene.model.aero.rotor.elements.radius)
+    drawn = np.random.default_rng(4).normal(size=(BLADES, count, 3)) * [3e4, 5e3, 2e4]
+    put_loads(drawn, np.zeros_like(drawn))
+    return [drift(case, steps, TORQUE, drawn) for steps in STEPS]
+
+
+@pytest.mark.parametrize("working", [False, True])
+def test_energy_changes_by_the_work_alone_but_for_the_fourth_order_of_the_step(working):
+    """The amplitude of a free oscillation even converges with one order more."""
+    words = f"('iea15_volturnus_s', 'modes2', {working})"
+    code = f"import json, test_energy; print(json.dumps(test_energy.drifts{words}))"
+    here = Path(__file__).parent
+    found = json.loads(fresh_python(code, paths=(here, here.parents[1]), NUMBA_DISABLE_JIT="1"))
+    coarse, fine = (error for error, _ in found)
+    assert coarse < 1e-8 * found[0][1]
+    assert 3.9 < np.log2(coarse / fine) < 5.3
