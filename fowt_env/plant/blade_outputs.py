@@ -18,6 +18,7 @@ from fowt_env.plant.dynamics import stored
 from fowt_env.plant.elastic.blades import BladeModes
 from fowt_env.plant.elastic.chain import rotor_frame
 from fowt_env.plant.elastic.outputs import bearing_moment, hub_load, root_load
+from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, BladeMeasure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
@@ -186,7 +187,7 @@ def _of_bending(pose, rates, x, dx, model, blades, data):
     plane = model.rigid_body.plane
     pose = pose_by_sines(x, data.cache[LoadCache.SINES :], plane)
     bend = bend_of(x, model.tower)
-    frame, _ = rotor_frame(pose, bend, model.rigid_body.gravity, blades)
+    frame, _ = rotor_frame(pose, bend, model.rigid_body.gravity, model.structure)
     _, _, _, _, tilt, yaw = hub_load(x, frame, data.blades, blades, data.rotor)
     wrench = stored(data.cache, LoadCache.ROTOR)
     mx, my, mz = bearing_moment(bend, wrench, data.rotor, model.layout.tower_top[2])
@@ -207,6 +208,23 @@ def _coned_root(number, x, dx, frame, pitches, loads, blades, work):
 
 
 @inlined_kernel
+def _bearing_of_rigid(pose, rates, x, speed, rate, wrench, model, structure, data):
+    masses = model.layout.blade_masses
+    return bearing_moments(pose, rates, speed, rate, wrench, masses, model.rigid_body, model.layout)
+
+
+@inlined_kernel
+def _bearing_of_elastic(pose, rates, x, speed, rate, wrench, model, structure, data):
+    return bearing_moment(bend_of(x, model.tower), wrench, data.rotor, model.layout.tower_top[2])
+
+
+# -> moment (3) of nacelle and rotor on the tower top, see bearing_moments
+_bearing = chosen_by_class(
+    "structure", {type(None): _bearing_of_rigid, Structure: _bearing_of_elastic}, inlined=True
+)
+
+
+@inlined_kernel
 def _of_rigid(pose, rates, x, dx, model, blades, data):
     """Return the BladeMoments of rigid blades."""
     layout, body, loads = model.layout, model.rigid_body, data.blades
@@ -216,7 +234,7 @@ def _of_rigid(pose, rates, x, dx, model, blades, data):
     azimuth, third = x[State.AZIMUTH], 2.0 * pi / BLADES
     tilt, yaw = hub_moments(azimuth, hub, masses, layout, loads)
     wrench = stored(data.cache, LoadCache.ROTOR)
-    mx, my, mz = bearing_moments(pose, rates, speed, rate, wrench, masses, body, layout)
+    mx, my, mz = _bearing(pose, rates, x, speed, rate, wrench, model, model.structure, data)
     return BladeMoments(
         root_moments(azimuth, blade_load(0, loads), hub, masses, layout),
         root_moments(azimuth + third, blade_load(1, loads), hub, masses, layout),

@@ -14,6 +14,7 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.elastic.chain import weighed_body
 from fowt_env.plant.elastic.outputs import add_upper_load, record_bending, shaft_load
+from fowt_env.plant.elastic.shaft import generator_speed, record_twist, twist_channels
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
@@ -27,7 +28,7 @@ from fowt_env.plant.user_loads import record_user_loads, user_channels
 DEG_PER_RAD = 180.0 / pi
 RPM_PER_RAD_S = 30.0 / pi
 UNITS = {  # of output channels: factors from SI
-    **dict.fromkeys(("-", "s", "m", "m/s", "m/s^2", "N", "N-m"), 1.0),
+    **dict.fromkeys(("-", "s", "m", "m/s", "m/s^2", "rad", "rad/s", "N", "N-m"), 1.0),
     **dict.fromkeys(("deg", "deg/s", "deg/s^2"), DEG_PER_RAD),
     "rpm": RPM_PER_RAD_S,
     **dict.fromkeys(("kN", "kN-m", "kW"), 1e-3),
@@ -84,8 +85,11 @@ BENDING_CHANNELS = _channels(  # of bending blades; OoPDefl and IPDefl are TipDx
 )
 # of a flexible tower
 TOWER_CHANNELS = _channels("TTDspFA_[m] TTDspSS_[m] YawBrTAxp_[m/s^2] YawBrTAyp_[m/s^2]")
+# of a shaft that twists, as ElastoDyn's
+SHAFT_CHANNELS = _channels("Q_DrTr_[rad] QD_DrTr_[rad/s]")
 GROUPS = {
     "tower": TOWER_CHANNELS,
+    "shaft": SHAFT_CHANNELS,
     "bending": BENDING_CHANNELS,
     "blades": BLADE_CHANNELS,
 }  # of parts that a scene may have, in row order
@@ -208,7 +212,7 @@ def measure(model, data, x, dx, u, t, m):
     ax, _, _ = acceleration_at(nacelle, moving, top[0], top[1], top[2])
     m[Measure.TIME] = t
     m[Measure.ROTOR_SPEED] = x[State.ROTOR_SPEED]
-    m[Measure.GENERATOR_SPEED] = layout.gear_ratio * x[State.ROTOR_SPEED]
+    m[Measure.GENERATOR_SPEED] = layout.gear_ratio * generator_speed(x, model.shaft)
     m[Measure.BLADE_PITCH] = mean_pitch(x, model.pitches)
     m[Measure.GENERATOR_TORQUE] = torque_in_force(x, u, model.converter)
     for i in range(6):
@@ -248,6 +252,7 @@ def record(model, data, x, dx, u, t, loads, row):
     speed = x[State.ROTOR_SPEED]
     row[Out.AZIMUTH] = x[State.AZIMUTH] % (2.0 * pi)
     row[Out.ROTSPEED] = speed
+    speed = generator_speed(x, model.shaft)
     row[Out.GENSPEED] = layout.gear_ratio * speed
     row[Out.BLDPITCH1] = x[State.BLADE_PITCH]
     torque = torque_in_force(x, u, model.converter)
@@ -261,11 +266,11 @@ def record(model, data, x, dx, u, t, loads, row):
     turning = dx[State.ROTOR_SPEED] + along_shaft(moving.wx, moving.wz, tilt)
     row[Out.ROTTHRUST], row[Out.ROTTORQ] = shaft_load(
         loads.rotor.thrust - layout.rotor_mass * push, loads.rotor.torque - layout.rotor_inertia * turning,
-        pose, bend, x, body, model.blades, data.blades, data.rotor,
+        pose, bend, x, body, model.structure, model.blades, data.blades, data.rotor,
     )  # fmt: skip
     row[Out.RTFLDFXH] = loads.rotor.thrust
     row[Out.RTFLDMXH] = loads.rotor.torque
-    tower_base(pose, x, dx, loads, bend, body, layout, model.tower, model.blades, data.rotor, row)
+    tower_base(pose, x, dx, loads, bend, body, layout, model.tower, model.structure, data.rotor, row)
 
     h = loads.hydro
     row[Out.HYDROFXI], row[Out.HYDROFYI], row[Out.HYDROFZI] = to_inertial(pose, h.fx, h.fy, h.fz)
@@ -282,22 +287,25 @@ def record(model, data, x, dx, u, t, loads, row):
     record_user_loads(pose, bend, model.user, data, row[n:])
     n += user_channels(model.user)
     record_tower(bend, ax, ay, row[n:])
+    n += tower_channels(bend)
+    record_twist(x, model.shaft, row[n:])
+    n += twist_channels(model.shaft)
     record_bending(
-        pose, bend, x, dx, model.pitches, body, model.aero, model.blades, data.blades, data.rotor,
-        row[n + tower_channels(bend) :],
+        pose, bend, x, dx, model.pitches, body, model.aero, model.structure, model.blades, data.blades,
+        data.rotor, row[n:],
     )  # fmt: skip
     record_blades(nacelle, moving, x, dx, model.pitches, model, data, row)
 
 
 @inlined_kernel
-def tower_base(pose, x, dx, loads, bend, body, layout, tower, blades, work, row):
+def tower_base(pose, x, dx, loads, bend, body, layout, tower, structure, work, row):
     """Fill the tower-base loads of a row: aerodynamics and weight above it less the momentum rate there.
 
     Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
     on the lower one).
     """
-    load = carried_at_base(pose, x, dx, loads, bend, weighed_body(body, blades), layout, tower)
-    load = add_upper_load(load, bend, blades, work)
+    load = carried_at_base(pose, x, dx, loads, bend, weighed_body(body, structure), layout, tower)
+    load = add_upper_load(load, bend, structure, work)
     z = layout.base_height
     row[Out.TWRBSFXT], row[Out.TWRBSFYT], row[Out.TWRBSFZT] = load.fx, load.fy, load.fz
     row[Out.TWRBSMXT] = load.mx + z * load.fy

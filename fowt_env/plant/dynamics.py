@@ -17,8 +17,9 @@ from fowt_env.plant.blade_pitches import fill_pitch_rates
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_force
 from fowt_env.plant.elastic.blades import fill_deflection_rates
-from fowt_env.plant.elastic.chain import accelerate_all, condense_blades, weighed_body
+from fowt_env.plant.elastic.chain import accelerate_all, condense_elastic, weighed_body
 from fowt_env.plant.elastic.forces import fill_blade_forces
+from fowt_env.plant.elastic.shaft import fill_twist_rate, generator_speed
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.line_dynamics import lines_load
 from fowt_env.plant.model import LoadCache
@@ -55,7 +56,7 @@ def evaluate_loads(t, x, model, data, dx):
 
     tower = add_user_loads(aero.tower, True, bend, model.user, data)
     load = add(carried(aero.rotor.wrench, bend), tower)
-    load = add(load, gravity_load(pose, weighed_body(model.rigid_body, model.blades)))
+    load = add(load, gravity_load(pose, weighed_body(model.rigid_body, model.structure)))
     load = add_bent_weight(load, pose, x, bend, model.tower, model.rigid_body.gravity)
     load = add(load, hydro.buoyancy)
     load = add(load, hydro.strips)
@@ -67,7 +68,9 @@ def evaluate_loads(t, x, model, data, dx):
     add_modal_weight(pose, x, bend, model.tower, model.rigid_body.gravity, modal)
 
     fill_blade_forces(x, model.aero, model.pitches, model.blades, data.blades, data.rotor)
-    condense_blades(pose, x, bend, model.rigid_body, model.pitches, model.blades, data.rotor)
+    condense_elastic(
+        pose, x, bend, model.rigid_body, model.pitches, model.structure, model.blades, data.rotor
+    )
 
     cache[LoadCache.FACTORED] = 0.0
     store(cache, LoadCache.TOTAL, load)
@@ -87,7 +90,7 @@ def respond(x, u, model, data, dx):
     torque = shaft_torque(
         cache[LoadCache.TORQUE],
         torque_in_force(x, u, model.converter),
-        x[State.ROTOR_SPEED],
+        generator_speed(x, model.shaft),
         model.drivetrain,
     )
     attitude_rate_at(pose, cache[LoadCache.SINES :], dx, body.plane)
@@ -96,10 +99,11 @@ def respond(x, u, model, data, dx):
     fill_torque_rate(x, u, model.converter, dx)
     fill_tower_rates(x, cache[LoadCache.MODAL :], model.tower, dx)
     fill_deflection_rates(x, model.blades, dx)
+    fill_twist_rate(x, model.shaft, dx)
     load = stored(cache, LoadCache.TOTAL)
     accelerate_all(
-        pose, x, load, torque, data.added_mass, body, model.tower, model.blades, data.matrix, data.rotor,
-        cache, dx,
+        pose, x, load, torque, data.added_mass, body, model.structure, model.tower, model.blades, model.shaft,
+        data.matrix, data.rotor, cache, dx,
     )  # fmt: skip
 
 

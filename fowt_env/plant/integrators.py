@@ -1,9 +1,9 @@
 """Defines the fixed-step integrators: a class, a step and a row of INTEGRATORS each.
 
-Within a step, blade pitch and generator torque are exact (constant command), the states of radiation memory
-are exact for velocities linear in time (hydro/radiation.py), moving mooring lines have steps of their own
-(line_dynamics.py), and the rotor load in a wind box is evaluated
-several times a step (rotor_substeps.py), so that none of these limits the step.
+Within a step, blade pitch and generator torque are exact (constant command), so is the torsion of the shaft
+(elastic/shaft.py), the states of radiation memory are exact for velocities linear in time
+(hydro/radiation.py), moving mooring lines have steps of their own (line_dynamics.py), and the rotor load in a
+wind box is evaluated several times a step (rotor_substeps.py), so that none of these limits the step.
 """
 
 from typing import NamedTuple
@@ -15,6 +15,7 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
+from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
 from fowt_env.plant.elastic.steps import damp_blades
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
@@ -68,27 +69,40 @@ def rates(t, x, u, model, data, dx):
 def rk4(t, x, u, dt, model, method, data):
     """Advance x in place by one classical Runge-Kutta step, blade pitch exact at every stage."""
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
-    n = integrated_states(x, model)
+    n, shaft, work, half = integrated_states(x, model), model.shaft, data.rotor, 0.5 * dt
     rates(t, x, u, model, data, k1)
+    begin_twist(shaft, work, k1)
     begin_followers(x, dt, True, model, data)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
+    s1 = smooth_of(shaft, k1)
+    advance_twist(x, u, half, s1, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k2)
+    keep_smooth(shaft, work, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k2[i]
     advance_actuators(x, u, 0.5 * dt, model, y)
+    s2 = smooth_of(shaft, k2)
+    advance_twist(x, u, half, s2, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, True, dt, model, data)
     derivative(t + 0.5 * dt, y, u, model, data, k3)
+    keep_smooth(shaft, work, k3)
     for i in range(n):
         y[i] = x[i] + dt * k3[i]
     advance_actuators(x, u, dt, model, y)
+    s3 = smooth_of(shaft, k3)
+    advance_twist(x, u, dt, s1, 2.0 * (s3 - s1), 0.0, 0.0, shaft, model, work, y)
     follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k4)
+    keep_smooth(shaft, work, k4)
     for i in range(n):
         y[i] = x[i] + dt / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     advance_actuators(x, u, dt, model, y)
+    s4, middle = smooth_of(shaft, k4), 0.5 * (s2 + s3)
+    linear, square = 4.0 * middle - 3.0 * s1 - s4, 2.0 * (s1 - 2.0 * middle + s4)
+    advance_twist(x, u, dt, s1, linear, square, 0.0, shaft, model, work, y)
     step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
@@ -99,17 +113,22 @@ def rk4(t, x, u, dt, model, method, data):
 def heun(t, x, u, dt, model, method, data):
     """Advance x in place by one step of the explicit trapezoidal rule, blade pitch exact."""
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
-    n = integrated_states(x, model)
+    n, shaft, work = integrated_states(x, model), model.shaft, data.rotor
     rates(t, x, u, model, data, k1)
+    begin_twist(shaft, work, k1)
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
     advance_actuators(x, u, dt, model, y)
+    s1 = smooth_of(shaft, k1)
+    advance_twist(x, u, dt, s1, 0.0, 0.0, 0.0, shaft, model, work, y)
     follow(x, y, False, dt, model, data)
     derivative(t + dt, y, u, model, data, k2)
+    keep_smooth(shaft, work, k2)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * (k1[i] + k2[i])
     advance_actuators(x, u, dt, model, y)
+    advance_twist(x, u, dt, s1, smooth_of(shaft, k2) - s1, 0.0, 0.0, shaft, model, work, y)
     step_air(x, dt, model.aero, k1, y)
     for i in range(n):
         x[i] = y[i]
@@ -138,6 +157,29 @@ def moulton(order, new, i, history):
     return (9.0 * new + 19.0 * history[0, i] - 5.0 * history[1, i] + history[2, i]) / 24.0
 
 
+@inlined_kernel
+def _twist_on(x, u, dt, order, history, shaft, model, work, y):
+    """Advance the twist by the polynomial of order - 1 through past smooth torques (bashforth)."""
+    h0, h1 = smooth_of(shaft, history[0]), smooth_of(shaft, history[1])
+    h2, h3 = smooth_of(shaft, history[2]), smooth_of(shaft, history[3])
+    d1 = h0 - h1 if order > 1 else 0.0
+    d2 = h0 - 2.0 * h1 + h2 if order > 2 else 0.0
+    d3 = h0 - 3.0 * h1 + 3.0 * h2 - h3 if order > 3 else 0.0
+    c1, c2 = d1 + d2 / 2.0 + d3 / 3.0, 0.5 * (d2 + d3)
+    advance_twist(x, u, dt, h0, c1, c2, d3 / 6.0, shaft, model, work, y)
+
+
+@inlined_kernel
+def _twist_again(x, u, dt, order, new, history, shaft, model, work, y):
+    """Advance the twist by the polynomial through new and past smooth torques (moulton)."""
+    s, h0 = smooth_of(shaft, new), smooth_of(shaft, history[0])
+    h1, h2 = smooth_of(shaft, history[1]), smooth_of(shaft, history[2])
+    d2 = s - 2.0 * h0 + h1 if order > 1 else 0.0
+    d3 = s - 3.0 * h0 + 3.0 * h1 - h2 if order > 2 else 0.0
+    c1 = s - h0 - d2 / 2.0 - d3 / 6.0
+    advance_twist(x, u, dt, h0, c1, 0.5 * d2, d3 / 6.0, shaft, model, work, y)
+
+
 @kernel
 def feathering(x, model):
     """Return whether the blades of a free rotor are pitched above FEATHERING: its speed is heavily damped."""
@@ -162,17 +204,21 @@ def adams(t, x, u, dt, model, method, data):
             history[k, i] = history[k - 1, i]
     keep_elastic(x, model.tower, data.elastic)
     rates(t, x, u, model, data, history[0])
+    begin_twist(model.shaft, data.rotor, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     advance_actuators(x, u, dt, model, y)
+    _twist_on(x, u, dt, order, history, model.shaft, model, data.rotor, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
+        keep_smooth(model.shaft, data.rotor, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         advance_actuators(x, u, dt, model, y)
+        _twist_again(x, u, dt, order, new, history, model.shaft, model, data.rotor, y)
     else:
         follow_rotor(dt, model, method.substeps, data, y)
         correct_elastic(
@@ -266,16 +312,19 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     """
     before, after, history, cache = data.stages[1], data.stages[4], data.history, data.cache
     rates(t, x, u, model, data, before)
+    keep_smooth(model.shaft, data.rotor, before)
     was = stored(cache, LoadCache.ROTOR)
     torque = cache[LoadCache.TORQUE]
     set_followed(x, u, dt, model.actuator, model.pitches)
     renew_loads(t, x, model, model.user, model.blades, data)
     respond(x, u, model, data, after)
+    keep_smooth(model.shaft, data.rotor, after)
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
         shift_tower(after, before, model.tower, history[k])
         shift_blades(after, before, model.blades, history[k])
+        shift_twist(after, before, model.shaft, history[k])
     shift_samples(was, torque, method.substeps, data)
 
 
@@ -296,6 +345,15 @@ def shift_blades(after, before, blades, row):
         return
     size = BLADES * len(blades.beam.count)
     for i in range(blades.first + size, blades.first + 2 * size):
+        row[i] += after[i] - before[i]
+
+
+@kernel
+def shift_twist(after, before, shaft, row):
+    """Add the difference of two derivatives to the smooth torque and the rate of the twist in a row."""
+    if shaft is None:
+        return
+    for i in range(shaft.first, shaft.first + 2):
         row[i] += after[i] - before[i]
 
 

@@ -47,6 +47,8 @@ class Model(NamedTuple):
     converter: object = None  # drivetrain.TorqueLag, or None: the torque follows its command at once
     tower: object = None  # tower.modes.TowerModes, or None: a rigid tower
     blades: object = None  # elastic.blades.BladeModes, or None: rigid blades
+    shaft: object = None  # elastic.shaft.Torsion, or None: a rigid shaft
+    structure: object = None  # elastic.structure.Structure, or None: neither blades nor shaft are elastic
 
 
 class LoadCache(IntEnum):
@@ -105,4 +107,4 @@ class Data(NamedTuple):
     # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades. With
     # bending blades the loads of the stations follow (blade_shape.put_station)
     blades: np.ndarray
-    rotor: object = None  # elastic.blades.RotorScratch, or None: rigid blades
+    rotor: object = None  # elastic.structure.RotorScratch, or None without a Structure

@@ -61,6 +61,8 @@ FURTHER_BLOCKS = {  # (kind, steady) of blocks other than ("internal", "settled"
     "tower_velocity": ("velocity", "zero"),
     "blade_deflection": ("position", "solved"),
     "blade_velocity": ("velocity", "zero"),
+    "shaft_twist": ("position", "solved"),
+    "shaft_twist_rate": ("velocity", "zero"),
     "other_blade_pitches": ("internal", "solved"),
     "pitch_rate": ("internal", "zero"),
     "followed_pitch": ("internal", "solved"),

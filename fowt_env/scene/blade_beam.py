@@ -17,7 +17,6 @@ from fowt_env.plant.aero.blade_shape import blade_line
 from fowt_env.plant.elastic.beam import Beam
 from fowt_env.plant.elastic.blades import BladeModes, Point, Section
 from fowt_env.plant.state import BLADES
-from fowt_env.scene.mass import assemble, build_lower_body, nacelle_centre
 from fowt_env.scene.tower import shape_values
 
 MODES = {  # option blades: modes of each blade, from SHAPES
@@ -33,50 +32,21 @@ FINE = 20_001  # points of the sums over the span that divide a station's load
 SECTIONS = (0.25, 0.5)  # of the span, for internal loads
 
 
-def build_blade_modes(platform, turbine, option, first_state, tower, aero):
+def build_blade_modes(turbine, option, first_state, aero):
     """Return the BladeModes of option blades, with states from first_state on; None for "rigid".
 
-    tower: TowerModes, or None: rigid; aero: Aero or None. Raises: InputError for a turbine without
-    [blade_structure], or whose blades have more mass or inertia than its rotor.
+    aero: Aero or None. Raises: InputError for a turbine without [blade_structure].
     """
     beam = blade_beam(turbine, option)
     if beam is None:
         return None
-    rotor, nacelle, drivetrain = turbine.rotor, turbine.nacelle, turbine.drivetrain
-    cosine, sine = np.cos(rotor.cone), np.sin(rotor.cone)
-    hub = {
-        "mass": rotor.mass - BLADES * beam.mass,
-        "first": rotor.mass * rotor.cm_offset + BLADES * sine * beam.first,
-        "axial": rotor.inertia - BLADES * cosine**2 * beam.second,
-        "across": rotor.inertia_diameter
-        + rotor.mass * rotor.cm_offset**2
-        - BLADES * (sine**2 + 0.5 * cosine**2) * beam.second,
-    }
-    for name in ("mass", "axial"):
-        if hub[name] < 0.0:
-            raise InputError(
-                f"blades = {option!r}: the blades of the turbine {turbine.name!r} exceed rotor.mass or"
-                f" rotor.inertia by {-hub[name]:g} kg or kg m2; check [blade_structure]"
-            )
-    height = 0.0 if tower is None else tower.top_height
-    origin = np.array([0.0, 0.0, height])
-    above = assemble([(nacelle.mass, np.subtract(nacelle_centre(nacelle), origin), nacelle.inertia)])
+    rotor = turbine.rotor
     return BladeModes(
         first=int(first_state),
         beam=beam,
-        cone_cosine=float(cosine),
-        cone_sine=float(sine),
+        cone_cosine=float(np.cos(rotor.cone)),
+        cone_sine=float(np.sin(rotor.cone)),
         hub_radius=float(rotor.hub_radius),
-        **{f"hub_{name}": float(value) for name, value in hub.items()},
-        nacelle_mass=float(nacelle.mass),
-        nacelle_moment=np.array([above[1, 5], -above[0, 5], above[0, 4]]),
-        nacelle_inertia=np.ascontiguousarray(above[3:, 3:]),
-        centre=np.array([-rotor.overhang, 0.0, rotor.hub_height]) - origin,
-        tilt_cosine=float(np.cos(rotor.shaft_tilt)),
-        tilt_sine=float(np.sin(rotor.shaft_tilt)),
-        generator_coupling=float(drivetrain.gear_ratio * drivetrain.generator_inertia),
-        generator_row=float(drivetrain.gear_ratio**2 * drivetrain.generator_inertia),
-        lower=build_lower_body(platform),
         decay=_decay(beam, aero, turbine.rated_rotor_speed),
         tip=_point(shapes_at(turbine, option, [rotor.tip_radius])),
         inner=_section(turbine, option, SECTIONS[0], aero),

@@ -34,6 +34,7 @@ from fowt_env.scene.parts import (
 )
 from fowt_env.scene.plausibility import warn_of_weather
 from fowt_env.scene.scene import Scene
+from fowt_env.scene.structure import build_structure, build_torsion
 from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
@@ -101,9 +102,12 @@ def build_scene(
     next_state = first_state + sum(load.states for load in user)
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
-    tower = with_masses(tower, platform, turbine, hanging=options["blades"] == "rigid")
-    blades = build_blade_modes(platform, turbine, options["blades"], next_state, tower, aero)
+    elastic = options["blades"] != "rigid" or options["shaft"] != "rigid"
+    tower = with_masses(tower, platform, turbine, hanging=not elastic)
+    blades = build_blade_modes(turbine, options["blades"], next_state, aero)
     next_state += blade_states(blades)
+    shaft = build_torsion(turbine, options, next_state)
+    next_state += 0 if shaft is None else 2
     body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
     dt = default_step(options, fastest_motion(tower, mooring, body))
     aero = with_airfoil_step(aero, dt)
@@ -123,7 +127,7 @@ def build_scene(
         mooring = mooring._replace(dynamics=mooring.dynamics._replace(first=next_state))
     model = Model(
         rigid_body=body,
-        layout=build_layout(platform, turbine, pitches is not None, blades is not None),
+        layout=build_layout(platform, turbine, pitches is not None, elastic),
         drivetrain=build_drivetrain(turbine),
         actuator=actuator,
         generator=build_torque_limits(turbine.torque_law),
@@ -136,5 +140,7 @@ def build_scene(
         converter=converter,
         tower=tower,
         blades=blades,
+        shaft=shaft,
+        structure=build_structure(platform, turbine, tower, blades, shaft),
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

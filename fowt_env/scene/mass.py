@@ -154,10 +154,10 @@ def build_blade_masses(platform, turbine):
     )
 
 
-def build_layout(platform, turbine, individual=False, bending=False):
+def build_layout(platform, turbine, individual=False, elastic=False):
     """Return the layout part: points and masses for outputs; individual: including those of single blades.
 
-    bending: nacelle and rotor are not in the mass matrix above the tower base.
+    elastic: nacelle and rotor are not in the mass matrix above the tower base.
     """
     rotor = turbine.rotor
     hub_x, hub_z = rotor_axes(-rotor.overhang, rotor.hub_height, rotor.shaft_tilt)
@@ -167,7 +167,7 @@ def build_layout(platform, turbine, individual=False, bending=False):
         float(platform.tower.base_height),
         float(rotor.mass),
         float(rotor.inertia),
-        np.ascontiguousarray(assemble(_bodies(platform, turbine)[1 : 2 if bending else None])),
+        np.ascontiguousarray(assemble(_bodies(platform, turbine)[1 : 2 if elastic else None])),
         float(turbine.drivetrain.gear_ratio),
         float(turbine.drivetrain.generator_efficiency),
         int(rotor.blades),

@@ -181,6 +181,8 @@ OPTIONS = {
     # blade bending: none, or the modes of blade_beam.MODES ([blade_structure] of the turbine file)
     "blades": Option("rigid", ("rigid", "modes", "modes2"),
         "rigid, or with the first flapwise and edgewise bending mode of each blade, or two flapwise modes"),
+    # torsion of the shaft between generator and rotor ([shaft_torsion] of the turbine file)
+    "shaft": Option("rigid", ("rigid", "torsion"), "rigid, or twisting between generator and rotor"),
     "integrator": Option(None, (None, *INTEGRATORS), "time stepping; None: the fidelity's"),
     # of the rotor load per step; None: FIELD_SAMPLES in a wind box with an integrator that samples it, else 1
     "rotor_samples": Option(None, Range("None or a number of samples, 1 to 10", 1, 10, whole=True),

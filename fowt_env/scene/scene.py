@@ -15,7 +15,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.aero.blade_shape import N_STATION_LOAD
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
-from fowt_env.plant.elastic.blades import rotor_scratch
+from fowt_env.plant.elastic.structure import rotor_scratch
 from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.hydro.excitation import excitation_scratch, position_states
 from fowt_env.plant.hydro.member_series import N_WATER
@@ -89,6 +89,8 @@ class Scene:
         internal |= {"tower_deflection": bending, "tower_velocity": bending}
         flapping = blade_states(self.model.blades) // 2
         internal |= {"blade_deflection": flapping, "blade_velocity": flapping}
+        twisting = 0 if self.model.shaft is None else 1
+        internal |= {"shaft_twist": twisting, "shaft_twist_rate": twisting}
         internal |= {"other_blade_pitches": 0 if self.model.pitches is None else BLADES - 1}
         internal |= drive_states(self.model.actuator, self.model.pitches)
         internal |= {"generator_torque": 0 if self.model.converter is None else 1}
@@ -125,7 +127,8 @@ class Scene:
     @property
     def channel_groups(self) -> tuple[str, ...]:
         """Return the names of the GROUPS of channels of this scene, in addition to the fixed channels."""
-        parts = {"tower": self.model.tower, "bending": self.model.blades, "blades": self.model.pitches}
+        model = self.model
+        parts = {"tower": model.tower, "shaft": model.shaft, "bending": model.blades, "blades": model.pitches}
         return tuple(name for name, part in parts.items() if part is not None)
 
     def values(self, rows: np.ndarray, overwrite: bool = False) -> np.ndarray:
@@ -187,7 +190,7 @@ class Scene:
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
-            rotor=rotor_scratch(self.model.blades),
+            rotor=rotor_scratch(self.model.structure, self.model.blades, self.n_state),
         )
 
     @property

@@ -1,4 +1,4 @@
-"""Condenses three bending blades and their hub into the inertia of one body at the rotor centre.
+"""Condenses hub and bending blades into the inertia of one body at the rotor centre.
 
 A blade is a Beam whose axis is the pitch axis, with x flapwise and y edgewise at zero pitch and twist (axes j
 of ElastoDyn). Its modal accelerations are eliminated, which leaves a (6, 6) inertia and a (6,) force and
@@ -13,8 +13,8 @@ import numpy as np
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.handle import by_reference
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.beam import Beam, reduce_beam
-from fowt_env.plant.model import RigidBody
 from fowt_env.plant.state import BLADES, State
 
 
@@ -42,67 +42,17 @@ class Section(NamedTuple):
 
 @by_reference
 class BladeModes(NamedTuple):
-    """Holds three blades that bend by n modes each, and the rigid bodies between them and the tower."""
+    """Holds three blades that bend by n modes each."""
 
     first: int  # index in the state of the first of 3 n deflections; their velocities follow
     beam: Beam  # about the rotor centre
     cone_cosine: float
     cone_sine: float  # positive: blades lean upwind
     hub_radius: float  # m, from the rotor centre to a blade root along the pitch axis
-    hub_mass: float  # kg, of the rotor less its blades
-    hub_first: float  # kg m, along the shaft, downwind
-    hub_axial: float  # kg m2, about the shaft
-    hub_across: float  # kg m2, about a diameter through the rotor centre
-    # nacelle, about the tower top (flexible tower) or the body origin (rigid tower), in nacelle axes
-    nacelle_mass: float
-    nacelle_moment: np.ndarray  # (3,) kg m
-    nacelle_inertia: np.ndarray  # (3, 3) kg m2
-    centre: np.ndarray  # (3,) m, of the rotor, from the same point
-    tilt_cosine: float
-    tilt_sine: float  # of the shaft
-    generator_coupling: float  # kg m2, gear ratio times generator inertia
-    generator_row: float  # kg m2, square of the gear ratio times generator inertia
-    lower: RigidBody  # floater and straight tower
     decay: np.ndarray  # (n, n) 1/s, of the modal velocities by the wind at rated speed, see steps.py
     tip: Point
     inner: Section  # at a quarter and at half of the span
     outer: Section
-
-
-@by_reference
-class RotorScratch(NamedTuple):
-    """Holds the work arrays of a rotor with bending blades, in platform axes unless said otherwise."""
-
-    axes: np.ndarray  # (3, 3, 3) of each blade: columns j1, j2, j3
-    moment: np.ndarray  # (3,) first moment of a blade in its axes
-    block: np.ndarray  # (6,) inertia of a blade in its axes
-    coupling: np.ndarray  # (3, n, 6) X of reduce_beam, forward-eliminated
-    mass: np.ndarray  # (n, n) modal mass
-    factors: np.ndarray  # (3, n, n) L and 1/D of the modal mass
-    pull: np.ndarray  # (6,) bias of a blade in its axes
-    rest: np.ndarray  # (3, n) generalised forces less velocity terms, forward-eliminated
-    force: np.ndarray  # (3, n) generalised forces of aerodynamics and structure
-    inertia: np.ndarray  # (6, 6) of the rotor about its centre
-    bias: np.ndarray  # (6,) of the rotor: force and moment at zero accelerations, with weight
-    upper: np.ndarray  # (6, 6) of rotor, free about the shaft, and nacelle, about tower top or body origin
-    shaft: np.ndarray  # (6,) inertia times a unit rotor acceleration
-    motion: np.ndarray  # (6,) acceleration of the rotor centre
-    probe: np.ndarray  # (n, 6) and (n,) of reduce_beam, for outputs
-    probe_rest: np.ndarray
-    hub_load: np.ndarray  # (6,) inertial load and weight of the rotor about its centre
-    top_load: np.ndarray  # (6,) of rotor and nacelle about tower top or body origin
-
-
-def rotor_scratch(blades):
-    """Return the RotorScratch of BladeModes; None for rigid blades."""
-    if blades is None:
-        return None
-    n = len(blades.beam.count)
-    shapes = (
-        (3, 3, 3), 3, 6, (3, n, 6), (n, n), (3, n, n), 6, (3, n), (3, n), (6, 6), 6, (6, 6), 6, 6,
-        (n, 6), n, 6, 6,
-    )  # fmt: skip
-    return RotorScratch(*(np.zeros(shape) for shape in shapes))
 
 
 class RotorFrame(NamedTuple):
@@ -296,13 +246,13 @@ def _add_blade(number, x, ax, ay, az, bx, by, bz, wx, wy, wz, blades, work):
 
 
 @inlined_kernel
-def _add_hub(f, wx, wy, wz, bx, by, bz, blades, work):
+def _add_hub(f, wx, wy, wz, bx, by, bz, structure, work):
     """Add the hub, a body of revolution about the shaft, to inertia and bias of the rotor.
 
     w, b: angular velocity and acceleration of the rotating hub.
     """
-    m, s, across = blades.hub_mass, blades.hub_first, blades.hub_across
-    more = blades.hub_axial - across
+    m, s, across = structure.hub_mass, structure.hub_first, structure.hub_across
+    more = structure.hub_axial - across
     nx, ny, nz = f.nx, f.ny, f.nz
     sx, sy, sz = s * nx, s * ny, s * nz
     inertia, bias = work.inertia, work.bias
@@ -332,7 +282,25 @@ def _add_hub(f, wx, wy, wz, bx, by, bz, blades, work):
 
 
 @inlined_kernel
-def condense_rotor(x, frame, pitches, blades, work):
+def _no_blades(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work):
+    return
+
+
+@inlined_kernel
+def _add_blades(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work):
+    for number in range(BLADES):
+        psi = x[State.AZIMUTH] + 2.0 * pi * number / BLADES
+        fill_blade_axes(
+            psi, pitch_of(number, x, pitches), blades.cone_cosine, blades.cone_sine, frame, work.axes[number]
+        )
+        _add_blade(number, x, frame.ax, frame.ay, frame.az, bx, by, bz, wx, wy, wz, blades, work)
+
+
+_add_bending = chosen_by_class("blades", {type(None): _no_blades, BladeModes: _add_blades}, inlined=True)
+
+
+@inlined_kernel
+def condense_rotor(x, frame, pitches, structure, blades, work):
     """Fill work with inertia (6, 6) and bias (6,) of the rotor about its centre, platform axes.
 
     frame: RotorFrame. Of a unit modal acceleration of a blade nothing is left: modes are eliminated.
@@ -347,13 +315,8 @@ def condense_rotor(x, frame, pitches, blades, work):
         bias[i] = 0.0
         for j in range(6):
             inertia[i, j] = 0.0
-    for number in range(BLADES):
-        psi = x[State.AZIMUTH] + 2.0 * pi * number / BLADES
-        fill_blade_axes(
-            psi, pitch_of(number, x, pitches), blades.cone_cosine, blades.cone_sine, frame, work.axes[number]
-        )
-        _add_blade(number, x, f.ax, f.ay, f.az, bx, by, bz, wx, wy, wz, blades, work)
-    _add_hub(frame, wx, wy, wz, bx, by, bz, blades, work)
+    _add_bending(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work)
+    _add_hub(frame, wx, wy, wz, bx, by, bz, structure, work)
     for i in range(6):
         for j in range(i):
             inertia[j, i] = inertia[i, j]
@@ -370,17 +333,28 @@ def fill_deflection_rates(x, blades, dx):
 
 
 @inlined_kernel
-def fill_blade_accelerations(acceleration, blades, work, dx):
-    """Fill dx with the modal accelerations, from the acceleration (6,) of the hub, platform axes."""
+def _no_accelerations(acceleration, forced, blades, work, dx):
+    return
+
+
+@inlined_kernel
+def _accelerations(acceleration, forced, blades, work, dx):
     n = len(blades.beam.count)
     for number in range(BLADES):
         X, h, F = work.coupling[number], work.rest[number], work.factors[number]
         at = blades.first + n * (BLADES + number)
         for i in range(n - 1, -1, -1):
-            total = h[i]
+            total = forced * h[i]
             for j in range(6):
                 total -= X[i, j] * acceleration[j]
             total *= F[i, i]
             for k in range(i + 1, n):
                 total -= F[k, i] * dx[at + k]
             dx[at + i] = total
+
+
+# (acceleration, forced, blades, work, dx): modal accelerations of blades into dx, from the acceleration (6,)
+# of the hub, platform axes; forced: factor on all other forces
+fill_blade_accelerations = chosen_by_class(
+    "blades", {type(None): _no_accelerations, BladeModes: _accelerations}, inlined=True
+)

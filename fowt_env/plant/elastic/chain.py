@@ -1,8 +1,9 @@
-"""Solves the equation of motion with bending blades: platform, tower, nacelle, shaft, blades.
+"""Solves the equation of motion of a turbine with elastic parts: platform, tower, nacelle, shaft, blades.
 
-The rotor is one (6, 6) inertia with a bias (blades.py). Its speed is eliminated, the nacelle is added, then
-the modes of the tower are eliminated as in accelerations.py, and the platform remains. Weight of nacelle and
-rotor enters as an upward acceleration of their frames, so their masses are not in the other weights.
+The rotor is one (6, 6) inertia with a bias (blades.py). The speed of the generator is eliminated, the nacelle
+is added, then the modes of the tower are eliminated as in accelerations.py, and the platform remains. Weight
+of nacelle and rotor enters as an upward acceleration of their frames, so their masses are not in the other
+weights. A shaft that twists adds one unknown to this solution for a rigid shaft (shaft.py).
 """
 
 from typing import NamedTuple
@@ -18,15 +19,12 @@ from fowt_env.plant.accelerations import (
 )
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.elastic.blades import (
-    BladeModes,
-    RotorFrame,
-    condense_rotor,
-    fill_blade_accelerations,
-)
+from fowt_env.plant.elastic.blades import RotorFrame, condense_rotor, fill_blade_accelerations
+from fowt_env.plant.elastic.shaft import MOBILITY, SMOOTH, Torsion, generator_speed, torsion_torque
+from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import NO_LOAD, State
+from fowt_env.plant.state import State
 from fowt_env.plant.tower.inertia import cross, deflection_rate, masses_of, top_bias
 from fowt_env.plant.tower.modes import Bend, TowerModes, bend_of, from_nacelle, to_nacelle
 
@@ -75,10 +73,10 @@ to_nacelle_axes = chosen_by_class("bend", {type(None): _same_axes, Bend: to_nace
 
 
 @inlined_kernel
-def rotor_frame(pose, bend, gravity, blades):
+def rotor_frame(pose, bend, gravity, structure):
     """Return (RotorFrame, rotor centre from the origin of Top (3)), platform axes."""
-    top, c, s = top_of(pose, bend), blades.tilt_cosine, blades.tilt_sine
-    dx, dy, dz = to_platform(bend, blades.centre[0], blades.centre[1], blades.centre[2])
+    top, c, s = top_of(pose, bend), structure.tilt_cosine, structure.tilt_sine
+    dx, dy, dz = to_platform(bend, structure.centre[0], structure.centre[1], structure.centre[2])
     nx, ny, nz = to_platform(bend, c, 0.0, -s)
     zx, zy, zz = to_platform(bend, s, 0.0, c)
     yx, yy, yz = to_platform(bend, 0.0, 1.0, 0.0)
@@ -97,32 +95,32 @@ def rotor_frame(pose, bend, gravity, blades):
 
 
 @kernel
-def _no_rotor(pose, x, bend, body, pitches, blades, work):
+def _no_rotor(pose, x, bend, body, pitches, structure, blades, work):
     return
 
 
 @inlined_kernel
-def _condense(pose, x, bend, body, pitches, blades, work):
-    frame, _ = rotor_frame(pose, bend, body.gravity, blades)
-    condense_rotor(x, frame, pitches, blades, work)
+def _condense(pose, x, bend, body, pitches, structure, blades, work):
+    frame, _ = rotor_frame(pose, bend, body.gravity, structure)
+    condense_rotor(x, frame, pitches, structure, blades, work)
 
 
 @inlined_kernel
-def _whole(body, blades):
+def _whole(body, structure):
     return body
 
 
 @inlined_kernel
-def _below_nacelle(body, blades):
-    return blades.lower
+def _below_nacelle(body, structure):
+    return structure.lower
 
 
-# (body, blades) -> RigidBody whose weight is a load: with bending blades without nacelle and rotor
-weighed_body = chosen_by_class("blades", {type(None): _whole, BladeModes: _below_nacelle}, inlined=True)
+# (body, structure) -> RigidBody whose weight is a load: with elastic parts without nacelle and rotor
+weighed_body = chosen_by_class("structure", {type(None): _whole, Structure: _below_nacelle}, inlined=True)
 
 
-# (pose, x, bend, body, pitches, blades, work): inertia of the rotor with bending blades into work
-condense_blades = chosen_by_class("blades", {type(None): _no_rotor, BladeModes: _condense}, inlined=True)
+# (pose, x, bend, body, pitches, structure, blades, work): inertia of the rotor into work; None: nothing
+condense_elastic = chosen_by_class("structure", {type(None): _no_rotor, Structure: _condense}, inlined=True)
 
 
 @inlined_kernel
@@ -151,9 +149,9 @@ def _shift(inertia, x, y, z):
 
 
 @inlined_kernel
-def _add_nacelle(bend, blades, upper):
+def _add_nacelle(bend, structure, upper):
     """Add the nacelle to the (6, 6) inertia about the origin of Top, platform axes."""
-    s, m, tensor = blades.nacelle_moment, blades.nacelle_mass, blades.nacelle_inertia
+    s, m, tensor = structure.nacelle_moment, structure.nacelle_mass, structure.nacelle_inertia
     sx, sy, sz = to_platform(bend, s[0], s[1], s[2])
     ax, ay, az = to_platform(bend, tensor[0, 0], tensor[1, 0], tensor[2, 0])  # columns of A tensor
     bx, by, bz = to_platform(bend, tensor[0, 1], tensor[1, 1], tensor[2, 1])
@@ -188,9 +186,9 @@ def _add_nacelle(bend, blades, upper):
 
 
 @inlined_kernel
-def _nacelle_load(pose, top, bend, gravity, blades):
+def _nacelle_load(pose, top, bend, gravity, structure):
     """Return force and moment of inertia and weight of the nacelle about the origin of Top."""
-    s, m, tensor = blades.nacelle_moment, blades.nacelle_mass, blades.nacelle_inertia
+    s, m, tensor = structure.nacelle_moment, structure.nacelle_mass, structure.nacelle_inertia
     wx, wy, wz = top.wx, top.wy, top.wz
     sx, sy, sz = to_platform(bend, s[0], s[1], s[2])
     ax, ay, az = top.ax + gravity * pose.r31, top.ay + gravity * pose.r32, top.az + gravity * pose.r33
@@ -208,19 +206,49 @@ def _nacelle_load(pose, top, bend, gravity, blades):
 
 
 @inlined_kernel
-def _no_deflection(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
-    return NO_LOAD
+def _no_deflection(pose, x, bend, tower, b, modal):
+    return
 
 
 @inlined_kernel
-def _deflected(pose, x, fx, fy, mx, my, mz, bend, tower, modal):
-    subtract_modal_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
-    return deflection_rate(pose, masses_of(x, tower))
+def _deflected(pose, x, bend, tower, b, modal):
+    subtract_modal_rates(pose, x, 0.0, 0.0, 0.0, 0.0, 0.0, bend, tower, modal)
+    e = deflection_rate(pose, masses_of(x, tower))
+    b[0] -= e.fx
+    b[1] -= e.fy
+    b[2] -= e.fz
+    b[3] -= e.mx
+    b[4] -= e.my
+    b[5] -= e.mz
 
 
-# -> Wrench of the velocity terms of the deflected tower; those of the modes, with the force and moment of
-# nacelle and rotor, are subtracted from modal
-_tower_rates = chosen_by_class("tower", {type(None): _no_deflection, TowerModes: _deflected}, inlined=True)
+# (pose, x, bend, tower, b, modal): velocity terms of the deflected tower, subtracted from b and modal
+_subtract_tower = chosen_by_class("tower", {type(None): _no_deflection, TowerModes: _deflected}, inlined=True)
+
+
+@inlined_kernel
+def _from_platform(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal):
+    b[0] -= fx
+    b[1] -= fy
+    b[2] -= fz
+    b[3] -= mx + top.y * fz - top.z * fy
+    b[4] -= my + top.z * fx - top.x * fz
+    b[5] -= mz + top.x * fy - top.y * fx
+
+
+@inlined_kernel
+def _from_tower(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal):
+    _from_platform(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal)
+    rolling = bend.ca * mx - bend.sa * mz
+    for i in range(0, len(tower.count), 2):
+        modal[i] -= fx + tower.slope[i] * my
+        modal[i + 1] -= fy - tower.slope[i + 1] * rolling
+
+
+# (top, fx, fy, fz, mx, my, mz, bend, tower, b, modal): a wrench at the origin of Top, off b and modal
+_subtract_wrench = chosen_by_class(
+    "tower", {type(None): _from_platform, TowerModes: _from_tower}, inlined=True
+)
 
 
 @inlined_kernel
@@ -328,105 +356,206 @@ _modes_in_state = chosen_by_class("tower", {type(None): _no_modes, TowerModes: _
 
 
 @inlined_kernel
-def accelerate_elastic(pose, x, load, torque, added, body, tower, blades, matrix, work, cache, dx):
-    """Fill dx with the accelerations of platform, tower modes, rotor and blade modes.
-
-    load: on the whole turbine about the body origin, without the weight of nacelle and rotor. On entry dx has
-    the generalised forces on the tower deflections in place of their accelerations, and work the rotor
-    (condense_blades). matrix (6 + n, 6 + n) keeps its factors as in accelerate.
-    """
-    bend = bend_of(x, tower)
-    top = top_of(pose, bend)
-    f, centre = rotor_frame(pose, bend, body.gravity, blades)
+def _at_top(centre, push, h, fx, fy, fz, mx, my, mz):
+    """Return a wrench at the rotor centre, plus a push (rad/s2) on the inertia h, at the origin of Top."""
     cx, cy, cz = centre
-    first, n = _modes_in_state(tower)
-    b, modal = dx[State.VX : State.WZ + 1], dx[first : first + n]
-    bias, h, upper, gear = work.bias, work.shaft, work.upper, blades.generator_coupling
-    if cache[LoadCache.FACTORED] < 0.5:
-        for i in range(6):
-            h[i] = work.inertia[i, 3] * f.nx + work.inertia[i, 4] * f.ny + work.inertia[i, 5] * f.nz
-        h[3] += gear * f.nx
-        h[4] += gear * f.ny
-        h[5] += gear * f.nz
-    row = f.nx * h[3] + f.ny * h[4] + f.nz * h[5] + blades.generator_row - gear
-    known = torque - f.nx * bias[3] - f.ny * bias[4] - f.nz * bias[5]
-    known -= gear * (f.nx * f.bx + f.ny * f.by + f.nz * f.bz)
-    free = 0.0 if body.rotor_fixed else 1.0 / row
-    if cache[LoadCache.FACTORED] < 0.5:
-        for i in range(6):
-            for j in range(6):
-                upper[i, j] = work.inertia[i, j] - free * h[i] * h[j]
-        _shift(upper, cx, cy, cz)
-        _add_nacelle(bend, blades, upper)
-        for i in range(6):
-            for j in range(i + 1):
-                matrix[i, j] = blades.lower.mass_matrix[i, j] + added[i, j]
-        _add_upper(x, upper, bend, tower, matrix)
-        factor_modes(matrix, n)
-        if not body.platform_fixed:
-            factor_spd(matrix)
-        cache[LoadCache.FACTORED] = 1.0
-    spin, push = gear * x[State.ROTOR_SPEED], free * known
-    gx, gy, gz = cross(f.wx, f.wy, f.wz, f.nx, f.ny, f.nz)
-    fx, fy, fz = bias[0] + push * h[0], bias[1] + push * h[1], bias[2] + push * h[2]
-    mx, my, mz = bias[3] + push * h[3], bias[4] + push * h[4], bias[5] + push * h[5]
-    mx, my, mz = mx + spin * gx, my + spin * gy, mz + spin * gz
-    mx, my, mz = mx + cy * fz - cz * fy, my + cz * fx - cx * fz, mz + cx * fy - cy * fx
-    ex, ey, ez, kx, ky, kz = _nacelle_load(pose, top, bend, body.gravity, blades)
-    fx, fy, fz, mx, my, mz = fx + ex, fy + ey, fz + ez, mx + kx, my + ky, mz + kz
+    fx, fy, fz = fx + push * h[0], fy + push * h[1], fz + push * h[2]
+    mx, my, mz = mx + push * h[3], my + push * h[4], mz + push * h[5]
+    return fx, fy, fz, mx + cy * fz - cz * fy, my + cz * fx - cx * fz, mz + cx * fy - cy * fx
 
-    c = momentum_rate(pose, 0.0, blades.lower.mass_matrix, 0.0, None)
-    e = _tower_rates(pose, x, fx, fy, mx, my, mz, bend, tower, modal)
-    b[0] = load.fx - c.fx - e.fx - fx
-    b[1] = load.fy - c.fy - e.fy - fy
-    b[2] = load.fz - c.fz - e.fz - fz
-    b[3] = load.mx - c.mx - e.mx - mx - top.y * fz + top.z * fy
-    b[4] = load.my - c.my - e.my - my - top.z * fx + top.x * fz
-    b[5] = load.mz - c.mz - e.mz - mz - top.x * fy + top.y * fx
+
+@inlined_kernel
+def _move_nacelle(top, centre, bend, tower, work, b, modal):
+    """Return the acceleration (6) of the origin of Top without bias; that at the rotor centre into work."""
+    cx, cy, cz = centre
+    ax, ay, az, bx, by, bz = _top_motion(top, b, modal, bend, tower)
+    motion = work.motion
+    motion[0], motion[1], motion[2] = ax + by * cz - bz * cy, ay + bz * cx - bx * cz, az + bx * cy - by * cx
+    motion[3], motion[4], motion[5] = bx, by, bz
+    return ax, ay, az, bx, by, bz
+
+
+@inlined_kernel
+def _dot(a, b):
+    total = 0.0
+    for i in range(6):
+        total += a[i] * b[i]
+    return total
+
+
+@inlined_kernel
+def _solve(top, centre, fx, fy, fz, mx, my, mz, known, free, bend, body, tower, matrix, work, b, modal):
+    """Solve for the accelerations of platform and tower in place of the loads in b (6,) and modal (n,).
+
+    f, m: wrench of nacelle and rotor at the origin of Top without accelerations; known: torque (N m) on rotor
+    and generator; free: inverse of their inertia, zero if held. Fills work.motion. Returns the acceleration
+    of the generator, which is the rotor's with a rigid shaft.
+    """
+    n = modal.shape[0]
+    _subtract_wrench(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal)
     without_modes(matrix, b, modal, n)
     if body.platform_fixed:
         b[:] = 0.0
     else:
         substitute_spd(matrix, b)
     find_modes(matrix, b, modal, n)
-
-    ax, ay, az, bx, by, bz = _top_motion(top, b, modal, bend, tower)
-    load_of_top, load_of_hub, motion = work.top_load, work.hub_load, work.motion
-    for i in range(6):
-        load_of_top[i] = -(
-            upper[i, 0] * ax + upper[i, 1] * ay + upper[i, 2] * az
-            + upper[i, 3] * bx + upper[i, 4] * by + upper[i, 5] * bz
-        )  # fmt: skip
-    load_of_top[0] -= fx
-    load_of_top[1] -= fy
-    load_of_top[2] -= fz
-    load_of_top[3] -= mx
-    load_of_top[4] -= my
-    load_of_top[5] -= mz
-    motion[0], motion[1], motion[2] = ax + by * cz - bz * cy, ay + bz * cx - bx * cz, az + bx * cy - by * cx
-    motion[3], motion[4], motion[5] = bx, by, bz
-    turning = 0.0
-    for i in range(6):
-        turning += h[i] * motion[i]
-    rate = free * (known - turning)
-    dx[State.ROTOR_SPEED] = rate
-    motion[3] += rate * f.nx
-    motion[4] += rate * f.ny
-    motion[5] += rate * f.nz
-    for i in range(6):
-        total = bias[i]
-        for j in range(6):
-            total += work.inertia[i, j] * motion[j]
-        load_of_hub[i] = -total
-    fill_blade_accelerations(motion, blades, work, dx)
+    _move_nacelle(top, centre, bend, tower, work, b, modal)
+    return free * (known - _dot(work.shaft, work.motion))
 
 
 @inlined_kernel
-def _with_rigid_blades(pose, x, load, torque, added, body, tower, blades, matrix, work, cache, dx):
+def _no_twist(
+    x, top, f, centre, rate, inertia, torques, free, fresh, bend, body, structure, tower, blades, shaft,
+    matrix, work, b, modal, dx,
+):  # fmt: skip
+    return rate, 0.0
+
+
+@inlined_kernel
+def _twist(
+    x, top, f, centre, rate, inertia, torques, free, fresh, bend, body, structure, tower, blades, shaft,
+    matrix, work, b, modal, dx,
+):  # fmt: skip
+    """Add the motion by the twist to that of a rigid shaft; return accelerations of rotor and twist.
+
+    rate: of the rotor with a rigid shaft; inertia: of the rotor about the shaft, kg m2; torques: of the air
+    and of the generator, N m; fresh: whether the mass matrix has changed.
+    """
+    gear, h, bias, motion = structure.generator_coupling, work.shaft, work.bias, work.motion
+    e, state, n = work.twist[0], work.shaft_torque, modal.shape[0]
+    spun = gear * (f.nx * motion[3] + f.ny * motion[4] + f.nz * motion[5])
+    steady = torques[0] - f.nx * bias[3] - f.ny * bias[4] - f.nz * bias[5] - inertia * rate
+    steady -= _dot(h, motion) - spun
+    first, modes = _modes_in_state(tower)
+    if fresh:
+        e[:] = 0.0
+        push = -free * inertia
+        fx, fy, fz, mx, my, mz = _at_top(
+            centre, push, h, h[0], h[1], h[2], h[3] - gear * f.nx, h[4] - gear * f.ny, h[5] - gear * f.nz
+        )
+        eb, em = e[State.VX : State.WZ + 1], e[first : first + modes]
+        speed = _solve(
+            top, centre, fx, fy, fz, mx, my, mz, -inertia, free, bend, body, tower, matrix, work, eb, em
+        )
+        spun = gear * (f.nx * motion[3] + f.ny * motion[4] + f.nz * motion[5])
+        state[MOBILITY] = 1.0 / (inertia + _dot(h, motion) - spun + inertia * speed)
+        e[State.ROTOR_SPEED] = 1.0 + speed
+        _spin(f, 1.0 + speed, motion)
+        fill_blade_accelerations(motion, 0.0, blades, work, e)
+        e[shaft.first + 1] = 1.0
+    change = state[MOBILITY] * (steady - torsion_torque(x, shaft))
+    state[SMOOTH] = steady - (1.0 - e[State.ROTOR_SPEED]) * torques[1]
+    for i in range(6):
+        b[i] += e[State.VX + i] * change
+    for i in range(n):
+        modal[i] += e[first + i] * change
+    dx[shaft.first + 1] = change
+    return rate + e[State.ROTOR_SPEED] * change, change
+
+
+# -> accelerations of rotor and twist; see _twist
+_add_twist = chosen_by_class("shaft", {type(None): _no_twist, Torsion: _twist}, inlined=True)
+
+
+@inlined_kernel
+def _spin(f, rate, motion):
+    """Add an acceleration (rad/s2) about the shaft to a motion (6,)."""
+    motion[3] += rate * f.nx
+    motion[4] += rate * f.ny
+    motion[5] += rate * f.nz
+
+
+@inlined_kernel
+def accelerate_elastic(
+    pose, x, load, torque, added, body, structure, tower, blades, shaft, matrix, work, cache, dx
+):
+    """Fill dx with the accelerations of platform, tower modes, rotor, shaft and blade modes.
+
+    load: on the whole turbine about the body origin, without the weight of nacelle and rotor; torque: of air
+    and generator on the shaft. On entry dx has the generalised forces on the tower deflections in place of
+    their accelerations, and work the rotor (condense_elastic). matrix (6 + n, 6 + n) keeps its factors as in
+    accelerate.
+    """
+    bend = bend_of(x, tower)
+    top = top_of(pose, bend)
+    f, centre = rotor_frame(pose, bend, body.gravity, structure)
+    first, n = _modes_in_state(tower)
+    b, modal = dx[State.VX : State.WZ + 1], dx[first : first + n]
+    bias, h, upper, gear = work.bias, work.shaft, work.upper, structure.generator_coupling
+    fresh = cache[LoadCache.FACTORED] < 0.5
+    if fresh:
+        for i in range(6):
+            h[i] = work.inertia[i, 3] * f.nx + work.inertia[i, 4] * f.ny + work.inertia[i, 5] * f.nz
+        _spin(f, gear, h)
+    turned = f.nx * h[3] + f.ny * h[4] + f.nz * h[5]
+    free = 0.0 if body.rotor_fixed else 1.0 / (turned + structure.generator_row - gear)
+    known = torque - f.nx * bias[3] - f.ny * bias[4] - f.nz * bias[5]
+    known -= gear * (f.nx * f.bx + f.ny * f.by + f.nz * f.bz)
+    if fresh:
+        for i in range(6):
+            for j in range(6):
+                upper[i, j] = work.inertia[i, j] - free * h[i] * h[j]
+        _shift(upper, centre[0], centre[1], centre[2])
+        _add_nacelle(bend, structure, upper)
+        for i in range(6):
+            for j in range(i + 1):
+                matrix[i, j] = structure.lower.mass_matrix[i, j] + added[i, j]
+        _add_upper(x, upper, bend, tower, matrix)
+        factor_modes(matrix, n)
+        if not body.platform_fixed:
+            factor_spd(matrix)
+        cache[LoadCache.FACTORED] = 1.0
+    spin = gear * generator_speed(x, shaft)
+    gx, gy, gz = cross(f.wx, f.wy, f.wz, f.nx, f.ny, f.nz)
+    fx, fy, fz, mx, my, mz = _at_top(
+        centre, free * known, h, bias[0], bias[1], bias[2], bias[3] + spin * gx, bias[4] + spin * gy,
+        bias[5] + spin * gz,
+    )  # fmt: skip
+    ex, ey, ez, kx, ky, kz = _nacelle_load(pose, top, bend, body.gravity, structure)
+    fx, fy, fz, mx, my, mz = fx + ex, fy + ey, fz + ez, mx + kx, my + ky, mz + kz
+
+    c = momentum_rate(pose, 0.0, structure.lower.mass_matrix, 0.0, None)
+    b[0], b[1], b[2] = load.fx - c.fx, load.fy - c.fy, load.fz - c.fz
+    b[3], b[4], b[5] = load.mx - c.mx, load.my - c.my, load.mz - c.mz
+    _subtract_tower(pose, x, bend, tower, b, modal)
+    rate = _solve(top, centre, fx, fy, fz, mx, my, mz, known, free, bend, body, tower, matrix, work, b, modal)
+    inertia = turned - gear
+    torques = (cache[LoadCache.TORQUE], cache[LoadCache.TORQUE] - torque)
+    rate, change = _add_twist(
+        x, top, f, centre, rate, inertia, torques, free, fresh, bend, body, structure, tower, blades, shaft,
+        matrix, work, b, modal, dx,
+    )  # fmt: skip
+    dx[State.ROTOR_SPEED] = rate
+
+    # loads for outputs
+    ax, ay, az, bx, by, bz = _move_nacelle(top, centre, bend, tower, work, b, modal)
+    ex, ey, ez, kx, ky, kz = _at_top(
+        centre, -free * inertia * change, h, change * h[0], change * h[1], change * h[2],
+        change * (h[3] - gear * f.nx), change * (h[4] - gear * f.ny), change * (h[5] - gear * f.nz),
+    )  # fmt: skip
+    load_of_top, load_of_hub, motion = work.top_load, work.hub_load, work.motion
+    load_of_top[0], load_of_top[1], load_of_top[2] = -fx - ex, -fy - ey, -fz - ez
+    load_of_top[3], load_of_top[4], load_of_top[5] = -mx - kx, -my - ky, -mz - kz
+    for i in range(6):
+        load_of_top[i] -= (
+            upper[i, 0] * ax + upper[i, 1] * ay + upper[i, 2] * az
+            + upper[i, 3] * bx + upper[i, 4] * by + upper[i, 5] * bz
+        )  # fmt: skip
+    _spin(f, rate, motion)
+    for i in range(6):
+        load_of_hub[i] = -bias[i] - _dot(work.inertia[i], motion)
+    fill_blade_accelerations(motion, 1.0, blades, work, dx)
+
+
+@inlined_kernel
+def _with_rigid_parts(
+    pose, x, load, torque, added, body, structure, tower, blades, shaft, matrix, work, cache, dx
+):
     accelerate_turbine(pose, x, load, torque, added, body, tower, matrix, cache, dx)
 
 
-# (pose, x, load, torque, added, body, tower, blades, matrix, work, cache, dx): accelerations into dx
+# (pose, x, load, torque, added, body, structure, tower, blades, shaft, matrix, work, cache, dx):
+# accelerations into dx
 accelerate_all = chosen_by_class(
-    "blades", {type(None): _with_rigid_blades, BladeModes: accelerate_elastic}, inlined=True
+    "structure", {type(None): _with_rigid_parts, Structure: accelerate_elastic}, inlined=True
 )

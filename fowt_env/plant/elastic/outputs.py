@@ -16,6 +16,7 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.beam import reduce_beam
 from fowt_env.plant.elastic.blades import BladeModes
 from fowt_env.plant.elastic.chain import rotor_frame, to_nacelle_axes
+from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.state import BLADES, State, Wrench
 from fowt_env.plant.tower.inertia import cross
 
@@ -219,12 +220,12 @@ def bearing_moment(bend, rotor, work, height):
 
 
 @kernel
-def _no_upper(load, bend, blades, work):
+def _no_upper(load, bend, structure, work):
     return load
 
 
 @kernel
-def _with_upper(load, bend, blades, work):
+def _with_upper(load, bend, structure, work):
     h = work.top_load
     fx, fy, fz = h[0], h[1], h[2]
     x, y, z = place_of(bend)
@@ -244,37 +245,37 @@ def place_of(bend):
     return bend.x, bend.y, bend.z
 
 
-# (load, bend, blades, work) -> Wrench on the tower base plus weight and inertia of nacelle and bending rotor
-add_upper_load = chosen_by_class("blades", {type(None): _no_upper, BladeModes: _with_upper})
+# (load, bend, structure, work) -> Wrench on the tower base plus weight and inertia of nacelle and rotor
+add_upper_load = chosen_by_class("structure", {type(None): _no_upper, Structure: _with_upper})
 
 
 @inlined_kernel
-def _shaft_of_rigid(thrust, torque, pose, bend, x, body, blades, loads, work):
+def _shaft_of_rigid(thrust, torque, pose, bend, x, body, structure, blades, loads, work):
     return thrust, torque
 
 
 @inlined_kernel
-def _shaft_of_bending(thrust, torque, pose, bend, x, body, blades, loads, work):
-    frame, _ = rotor_frame(pose, bend, body.gravity, blades)
+def _shaft_of_bending(thrust, torque, pose, bend, x, body, structure, blades, loads, work):
+    frame, _ = rotor_frame(pose, bend, body.gravity, structure)
     thrust, _, _, torque, _, _ = hub_load(x, frame, loads, blades, work)
     return thrust, torque
 
 
-# (thrust, torque, pose, bend, x, body, blades, loads, work) -> thrust (N) and torque (N m) of the shaft:
-# those of the rigid rotor, given, or of bending blades
+# (thrust, torque, pose, bend, x, body, structure, blades, loads, work) -> thrust (N) and torque (N m) of the
+# shaft: those of the rigid rotor, given, or of bending blades
 shaft_load = chosen_by_class(
     "blades", {type(None): _shaft_of_rigid, BladeModes: _shaft_of_bending}, inlined=True
 )
 
 
 @inlined_kernel
-def _none_bent(pose, bend, x, dx, pitches, body, aero, blades, loads, work, row):
+def _none_bent(pose, bend, x, dx, pitches, body, aero, structure, blades, loads, work, row):
     return
 
 
 @inlined_kernel
-def _record_bent(pose, bend, x, dx, pitches, body, aero, blades, loads, work, row):
-    frame, _ = rotor_frame(pose, bend, body.gravity, blades)
+def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, blades, loads, work, row):
+    frame, _ = rotor_frame(pose, bend, body.gravity, structure)
     tip, n = blades.tip, len(blades.beam.count)
     for number in range(BLADES):
         pitch = pitch_of(number, x, pitches)
@@ -295,6 +296,6 @@ def _record_bent(pose, bend, x, dx, pitches, body, aero, blades, loads, work, ro
     row[38], row[39] = fy, fz
 
 
-# (pose, bend, x, dx, pitches, body, aero, blades, loads, work, row): channels of bending blades into row;
-# pose of the platform
+# (pose, bend, x, dx, pitches, body, aero, structure, blades, loads, work, row): channels of bending blades
+# into row; pose of the platform
 record_bending = chosen_by_class("blades", {type(None): _none_bent, BladeModes: _record_bent}, inlined=True)

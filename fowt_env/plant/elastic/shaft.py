@@ -1,0 +1,145 @@
+"""Models the torsion of the shaft between generator and rotor, and advances it exactly over a step.
+
+The twist q is the azimuth of the rotor less that of the generator, on the low-speed side, and the shaft
+carries the torque K q + C q' (ElastoDyn's DrTrDOF). With the torque T that a rigid shaft would carry, the
+mobility k of the twist and the accelerations e of all other velocities by a unit acceleration of the twist
+(chain.py),
+
+    q'' = k (T - K q - C q'),    v' = r + e q''
+
+where T and the rates r are those of the turbine with a rigid shaft, without the fast oscillation. A step
+extrapolates T as a polynomial in time, less the share of the generator torque, which is known over the step;
+solves for the oscillation exactly; and replaces the quadrature of q'' in every velocity by its exact change.
+"""
+
+from math import cos, cosh, exp, sin, sinh, sqrt
+from typing import NamedTuple
+
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.drivetrain import shaft_torque, torque_in_force
+from fowt_env.plant.state import State
+
+# entries of RotorScratch.shaft_torque: mobility k, 1/(kg m2), now and at the beginning of the step; smooth
+# torque: of the rigid shaft less the share of the generator torque, N m
+MOBILITY, MOBILITY_BEGUN, SMOOTH = 0, 1, 2
+
+
+class Torsion(NamedTuple):
+    """Holds stiffness and damping of a shaft that twists, on the low-speed side."""
+
+    first: int  # index in the state of the twist, rad; its rate follows
+    stiffness: float  # N m/rad
+    damping: float  # N m s/rad
+
+
+@kernel
+def generator_speed(x, shaft):
+    """Return the generator's speed on the low-speed side, rad/s: the rotor's with a rigid shaft."""
+    if shaft is None:
+        return x[State.ROTOR_SPEED]
+    return x[State.ROTOR_SPEED] - x[shaft.first + 1]
+
+
+@kernel
+def torsion_torque(x, shaft):
+    """Return the torque in the twisted shaft, N m."""
+    return shaft.stiffness * x[shaft.first] + shaft.damping * x[shaft.first + 1]
+
+
+@kernel
+def fill_twist_rate(x, shaft, dx):
+    """Fill dx with the rate of the twist; no-op for a rigid shaft."""
+    if shaft is None:
+        return
+    dx[shaft.first] = x[shaft.first + 1]
+
+
+@kernel
+def record_twist(x, shaft, row):
+    """Fill the channels of the group "shaft" into row; nothing with a rigid shaft."""
+    if shaft is None:
+        return
+    row[0], row[1] = x[shaft.first], x[shaft.first + 1]
+
+
+@kernel
+def twist_channels(shaft):
+    """Return the number of channels of the group "shaft"."""
+    if shaft is None:
+        return 0
+    return 2
+
+
+@inlined_kernel
+def twisted(q, rate, c0, c1, c2, c3, after, square, decay):
+    """Return (q, q') after a time, exact for q'' + 2 decay q' + square q = c0 + c1 t + c2 t2 + c3 t3."""
+    p3 = c3 / square
+    p2 = (c2 - 6.0 * decay * p3) / square
+    p1 = (c1 - 4.0 * decay * p2 - 6.0 * p3) / square
+    p0 = (c0 - 2.0 * decay * p1 - 2.0 * p2) / square
+    q, rate = q - p0, rate - p1
+    left, rest = exp(-decay * after), square - decay * decay
+    w = sqrt(abs(rest))
+    if rest > 0.0:
+        c, s = cos(w * after), sin(w * after) / w
+    else:
+        c, s = cosh(w * after), sinh(w * after) / w if w > 0.0 else after
+    p, over = p0 + after * (p1 + after * (p2 + after * p3)), rate + decay * q
+    speed = p1 + after * (2.0 * p2 + 3.0 * after * p3)
+    return p + left * (q * c + over * s), speed + left * (rate * c - (square * q + decay * rate) * s)
+
+
+@kernel
+def keep_smooth(shaft, work, dx):
+    """Put the smooth torque of the last evaluation into dx in place of the rate of the twist."""
+    if shaft is None:
+        return
+    dx[shaft.first] = work.shaft_torque[SMOOTH]
+
+
+@kernel
+def begin_twist(shaft, work, dx):
+    """Begin a step at the last evaluation, of rates dx: keep its mobility, and as in keep_smooth."""
+    if shaft is None:
+        return
+    work.twist[1] = work.twist[0]
+    work.shaft_torque[MOBILITY_BEGUN] = work.shaft_torque[MOBILITY]
+    keep_smooth(shaft, work, dx)
+
+
+@kernel
+def smooth_of(shaft, dx):
+    """Return the smooth torque that keep_smooth put into dx, N m; zero for a rigid shaft."""
+    if shaft is None:
+        return 0.0
+    return dx[shaft.first]
+
+
+@inlined_kernel
+def _no_twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
+    return
+
+
+@inlined_kernel
+def _twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
+    e, k, over = work.twist[1], work.shaft_torque[MOBILITY_BEGUN], 1.0 / after
+    # share of the generator torque that a rigid shaft would carry
+    share, speed = 1.0 - e[State.ROTOR_SPEED], generator_speed(x, shaft)
+    begun = -share * shaft_torque(0.0, torque_in_force(x, u, model.converter), speed, model.drivetrain)
+    ended = -share * shaft_torque(0.0, torque_in_force(y, u, model.converter), speed, model.drivetrain)
+    c0, c1, c2, c3 = c0 + begun, (c1 + ended - begun) * over, c2 * over * over, c3 * over * over * over
+    q, rate = twisted(
+        x[shaft.first], x[shaft.first + 1], k * c0, k * c1, k * c2, k * c3, after, k * shaft.stiffness,
+        0.5 * k * shaft.damping,
+    )  # fmt: skip
+    change = rate - y[shaft.first + 1]
+    for i in range(State.VX, y.shape[0]):
+        y[i] += e[i] * change
+    y[shaft.first] = q
+
+
+# (x, u, after, c0, c1, c2, c3, shaft, model, work, y): twist and its rate in y, a time `after` (s) from x,
+# and its share in all velocities of y, which hold the quadrature of their rates. The smooth torque (N m) is
+# c0 + c1 s + c2 s2 + c3 s3, s from 0 to 1 over the time
+advance_twist = chosen_by_class("shaft", {type(None): _no_twist, Torsion: _twist}, inlined=True)

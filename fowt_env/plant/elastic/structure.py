@@ -1,0 +1,71 @@
+"""Defines the rigid bodies of a turbine with elastic parts, and the work arrays of its equation of motion."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fowt_env.plant.compile.handle import by_reference
+from fowt_env.plant.model import RigidBody
+from fowt_env.plant.state import BLADES
+
+
+@by_reference
+class Structure(NamedTuple):
+    """Holds the rigid bodies that carry or are carried by elastic parts: floater, nacelle, hub, generator.
+
+    The hub is the rotor without its bending blades, or the whole rotor with rigid ones: a body of revolution
+    about the shaft, with its moments about the rotor centre.
+    """
+
+    lower: RigidBody  # floater and straight tower
+    # nacelle, about the tower top (flexible tower) or the body origin (rigid tower), in nacelle axes
+    nacelle_mass: float
+    nacelle_moment: np.ndarray  # (3,) kg m
+    nacelle_inertia: np.ndarray  # (3, 3) kg m2
+    centre: np.ndarray  # (3,) m, of the rotor, from the same point
+    tilt_cosine: float
+    tilt_sine: float  # of the shaft
+    hub_mass: float  # kg
+    hub_first: float  # kg m, along the shaft, downwind
+    hub_axial: float  # kg m2, about the shaft
+    hub_across: float  # kg m2, about a diameter through the rotor centre
+    generator_coupling: float  # kg m2, gear ratio times generator inertia
+    generator_row: float  # kg m2, square of the gear ratio times generator inertia
+
+
+@by_reference
+class RotorScratch(NamedTuple):
+    """Holds the work arrays of a turbine with elastic parts, in platform axes unless said otherwise."""
+
+    axes: np.ndarray  # (3, 3, 3) of each blade: columns j1, j2, j3
+    moment: np.ndarray  # (3,) first moment of a blade in its axes
+    block: np.ndarray  # (6,) inertia of a blade in its axes
+    coupling: np.ndarray  # (3, n, 6) X of reduce_beam, forward-eliminated
+    mass: np.ndarray  # (n, n) modal mass
+    factors: np.ndarray  # (3, n, n) L and 1/D of the modal mass
+    pull: np.ndarray  # (6,) bias of a blade in its axes
+    rest: np.ndarray  # (3, n) generalised forces less velocity terms, forward-eliminated
+    force: np.ndarray  # (3, n) generalised forces of aerodynamics and structure
+    inertia: np.ndarray  # (6, 6) of the rotor about its centre
+    bias: np.ndarray  # (6,) of the rotor: force and moment at zero accelerations, with weight
+    upper: np.ndarray  # (6, 6) of rotor, free about the shaft, and nacelle, about tower top or body origin
+    shaft: np.ndarray  # (6,) inertia times a unit rotor acceleration
+    motion: np.ndarray  # (6,) acceleration of the rotor centre
+    probe: np.ndarray  # (n, 6) and (n,) of reduce_beam, for outputs
+    probe_rest: np.ndarray
+    hub_load: np.ndarray  # (6,) inertial load and weight of the rotor about its centre
+    top_load: np.ndarray  # (6,) of rotor and nacelle about tower top or body origin
+    twist: np.ndarray  # (2, n_state) accelerations by a unit one of the shaft's twist: now, at the last step
+    shaft_torque: np.ndarray  # (3,) see shaft.py
+
+
+def rotor_scratch(structure, blades, n_state):
+    """Return the RotorScratch of a Structure with BladeModes or None (rigid blades); None without one."""
+    if structure is None:
+        return None
+    n = 0 if blades is None else len(blades.beam.count)
+    shapes = (
+        (3, 3, 3), 3, 6, (BLADES, n, 6), (n, n), (BLADES, n, n), 6, (BLADES, n), (BLADES, n), (6, 6), 6,
+        (6, 6), 6, 6, (n, 6), n, 6, 6, (2, n_state), 3,
+    )  # fmt: skip
+    return RotorScratch(*(np.zeros(shape) for shape in shapes))

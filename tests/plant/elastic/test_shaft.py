@@ -1,0 +1,158 @@
+"""Torsion of the shaft: two masses on a spring in closed form, conservation laws, rigid limit, outputs."""
+
+import numpy as np
+import pytest
+from plant_helpers import rates, state
+from scipy.integrate import solve_ivp
+
+from fowt_env import build_scene
+from fowt_env.analysis.campbell import campbell
+from fowt_env.errors import InputError
+from fowt_env.plant.advance import advance, output_row
+from fowt_env.plant.drivetrain import build_drivetrain
+from fowt_env.plant.elastic.shaft import twisted
+from fowt_env.plant.integrators import INTEGRATORS
+from fowt_env.plant.state import State, pose_of
+
+BARE = {"wind": None, "hydrodynamics": False, "mooring": False, "shaft": "torsion"}
+HELD = {"rigid_body.platform_fixed": True}
+TURBINES = ("oc3_hywind", "iea15_volturnus_s")
+
+
+def inertias(turbine):
+    """Inertia of rotor and generator about the low-speed shaft, kg m2, and gear ratio."""
+    drive = turbine.drivetrain
+    return turbine.rotor.inertia, drive.gear_ratio**2 * drive.generator_inertia, drive.gear_ratio
+
+
+@pytest.mark.parametrize(("square", "decay"), [(40.0, 0.5), (40.0, 6.4), (40.0, np.sqrt(40.0)), (4e4, 13.0)])
+def test_an_oscillator_under_a_cubic_load_is_exact(square, decay):
+    c = np.array([3.0, -40.0, 200.0, -300.0])
+
+    def rate(t, y):
+        return [y[1], c @ t ** np.arange(4) - square * y[0] - 2.0 * decay * y[1]]
+
+    done = solve_ivp(rate, (0.0, 0.4), [0.1, -0.7], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert twisted(0.1, -0.7, *c, 0.4, square, decay) == pytest.approx(done, rel=1e-8, abs=1e-9)
+
+
+@pytest.mark.parametrize("platform", TURBINES)
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_free_shaft_decays_as_two_masses_at_the_default_step(platform, integrator):
+    scene = build_scene(platform, integrator=integrator, **BARE)
+    twist, handle = scene.model.shaft.first, scene.with_model(HELD).handle()
+    rotor, generator, _ = inertias(scene.turbine)
+    spring, mobility = scene.turbine.shaft_torsion, 1.0 / rotor + 1.0 / generator
+    decay = 0.5 * mobility * spring.damping
+    w = np.sqrt(mobility * spring.stiffness - decay**2)
+    x = state(scene.n_state, rotor_speed=1.0)
+    x[twist] = 1e-3
+    dt, steps = scene.dt, 9
+    assert dt >= 0.05 and w * dt > 0.6
+    advance(handle, x, np.zeros(2), 0, steps, dt)
+    t = dt * steps
+    expected = 1e-3 * np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t))
+    assert x[twist] == pytest.approx(expected, rel=1e-10, abs=1e-20)
+    momentum = rotor * x[State.ROTOR_SPEED] + generator * (x[State.ROTOR_SPEED] - x[twist + 1])
+    assert momentum == pytest.approx(rotor + generator, rel=1e-13)
+
+
+@pytest.mark.parametrize("platform", TURBINES)
+def test_a_lost_generator_torque_swings_the_shaft_about_its_relief(platform):
+    scene = build_scene(platform, **BARE).with_model(HELD)
+    rotor, generator, ratio = inertias(scene.turbine)
+    spring, mobility = scene.turbine.shaft_torsion, 1.0 / rotor + 1.0 / generator
+    torque = scene.turbine.torque_law.rated_torque
+    share = rotor / (rotor + generator) * ratio * torque  # of the torque in a rigid shaft without wind
+    x, twist = state(scene.n_state, rotor_speed=1.0), scene.model.shaft.first
+    x[twist] = share / spring.stiffness
+    handle, dt = scene.handle(), scene.dt
+    advance(handle, x, np.array([torque, 0.0]), 0, 10, dt)
+    assert x[twist] == pytest.approx(share / spring.stiffness, rel=1e-12)
+    assert x[twist + 1] == pytest.approx(0.0, abs=1e-14)
+    advance(handle, x, np.zeros(2), 10, 1, dt)
+    decay = 0.5 * mobility * spring.damping
+    w = np.sqrt(mobility * spring.stiffness - decay**2)
+    swing = np.exp(-decay * dt) * (np.cos(w * dt) + decay / w * np.sin(w * dt))
+    assert x[twist] == pytest.approx(share / spring.stiffness * swing, rel=1e-9)
+
+
+def laws(scene, x):
+    """(7,) energy, J, and momentum about the inertial origin, of a free turbine without gravity."""
+    body, shaft, drive = scene.model.rigid_body, scene.model.shaft, build_drivetrain(scene.turbine)
+    pose, rotor = pose_of(x), scene.turbine.rotor.inertia
+    tilt = scene.turbine.rotor.shaft_tilt
+    n, nu = np.array([np.cos(tilt), 0.0, -np.sin(tilt)]), x[State.VX : State.WZ + 1]
+    speed = x[State.ROTOR_SPEED] - x[shaft.first + 1]
+    spin = rotor * x[State.ROTOR_SPEED] + (drive.coupling - rotor) * speed
+    energy = 0.5 * nu @ body.mass_matrix @ nu + spin * n @ nu[3:]
+    energy += 0.5 * (rotor * x[State.ROTOR_SPEED] ** 2 + (drive.inertia_row - rotor) * speed**2)
+    energy += 0.5 * shaft.stiffness * x[shaft.first] ** 2
+    p, k = np.split(body.mass_matrix @ nu, 2)
+    R, k = np.array(pose[3:12]).reshape(3, 3), k + spin * n
+    return np.array([energy, *(R @ p), *(np.cross(x[:3], R @ p) + R @ k)])
+
+
+@pytest.mark.parametrize("platform", TURBINES)
+def test_energy_and_momentum_change_by_the_damping_of_the_shaft_alone(platform):
+    scene = build_scene(platform, **BARE)
+    parts = {"rigid_body.gravity": 0.0, "structure.lower.gravity": 0.0}
+    scene, rng = scene.with_model(parts), np.random.default_rng(7)
+    shaft = scene.model.shaft
+    _, generator, ratio = inertias(scene.turbine)
+    for _ in range(5):
+        x = rng.normal(size=scene.n_state) * 0.2
+        x[shaft.first] *= 0.02
+        dx = rates(scene, x)
+        step = 1e-5
+        change = (laws(scene, x + step * dx) - laws(scene, x - step * dx)) / (2.0 * step)
+        lost = shaft.damping * x[shaft.first + 1] ** 2
+        scale = np.array([lost, *(6 * [abs(laws(scene, x)).max()])])
+        assert change / scale == pytest.approx([-1.0, *(6 * [0.0])], abs=5e-6)
+        tilt = scene.turbine.rotor.shaft_tilt
+        torque = shaft.stiffness * x[shaft.first] + shaft.damping * x[shaft.first + 1]
+        turning = np.cos(tilt) * dx[State.WX] - np.sin(tilt) * dx[State.WZ]
+        speeding = dx[State.ROTOR_SPEED] - dx[shaft.first + 1]
+        assert generator * (speeding + turning / ratio) == pytest.approx(torque, rel=1e-9)
+
+
+def test_a_stiff_shaft_is_a_rigid_one():
+    scene, rigid = build_scene("oc3_hywind", **BARE), build_scene("oc3_hywind", **BARE | {"shaft": "rigid"})
+    shaft = scene.model.shaft
+    scene = scene.with_model(shaft=shaft._replace(stiffness=1e14, damping=1e9))
+    x, u = state(rigid.n_state, rotor_speed=1.2, roll=0.05, wx=0.02, wy=0.01, vy=0.3), np.array([4e4, 0.0])
+    y = np.zeros(scene.n_state)
+    y[: rigid.n_state] = x
+    advance(rigid.handle(), x, u, 0, 50, 0.1)
+    advance(scene.handle(), y, u, 0, 50, 0.1)
+    assert y[: rigid.n_state] == pytest.approx(x, rel=1e-6, abs=1e-8)
+
+
+def test_outputs_are_of_either_side_of_the_shaft():
+    scene = build_scene("oc3_hywind", **BARE)
+    shaft, (_, _, ratio) = scene.model.shaft, inertias(scene.turbine)
+    x = state(scene.n_state, rotor_speed=1.2, roll=0.1, wx=0.02, wz=0.03)
+    x[shaft.first], x[shaft.first + 1] = 0.004, -0.01
+    row = output_row(scene.handle(), x, np.array([3e4, 0.0]), 0.0, len(scene.channels))
+    out = dict(zip((channel.name for channel in scene.channels), row, strict=True))
+    assert out["GenSpeed"] == pytest.approx(ratio * 1.21, rel=1e-14)
+    assert out["GenPwr"] == pytest.approx(0.944 * ratio * 1.21 * 3e4, rel=1e-14)
+    assert (out["Q_DrTr"], out["QD_DrTr"]) == (0.004, -0.01)
+    assert out["RotTorq"] == pytest.approx(shaft.stiffness * 0.004 - shaft.damping * 0.01, rel=1e-9)
+
+
+def test_its_frequency_is_that_of_the_campbell_diagram():
+    scene = build_scene("oc3_hywind", **BARE)
+    shaft, held = scene.model.shaft, scene.with_model(HELD)
+    x, step = np.zeros(scene.n_state), 1e-6
+    x[shaft.first] = step
+    hertz = np.sqrt(-rates(held, x)[shaft.first + 1] / step) / (2.0 * np.pi)
+    diagram = campbell(scene.platform, scene.turbine, [0.0], blades="rigid", tower="rigid")
+    assert hertz == pytest.approx(diagram.frequency["drivetrain torsion"][0], rel=1e-9)
+
+
+def test_refusals_name_key_and_remedy():
+    with pytest.raises(InputError, match=r"shaft = 'torsion'.*no \[shaft_torsion\].*allowed: 'rigid'"):
+        build_scene("oc3_hywind", turbine="liu_1_50", shaft="torsion")
+    with pytest.raises(InputError, match=r"shaft = 'torsion'.*planar = False"):
+        build_scene("oc3_hywind", shaft="torsion", planar=True)
