@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 from naive import flexible_turbine
-from naive.bent_stations import air_of
+from naive.bent_stations import air_of, air_of_row
 from plant_helpers import leaning, random_state
 
 from fowt_env import Load, build_scene, load_kernel
@@ -22,7 +22,7 @@ from fowt_env.plant.state import BLADES, N_BLADE_LOAD, State
 from fowt_env.scene.blade_beam import MODES, SECTIONS, blade_beam, blade_nodes, outer_part
 from fowt_env.scene.tower import build_tower_modes, mode_shapes, shape_values
 
-TOWERS = ("rigid", "modes", "modes2")
+BENDING = TOWERS = ("rigid", "modes", "modes2")  # options
 TORQUE = 3e4  # N m, of the generator
 WIND, SHEAR = 11.0, 0.14
 ALOFT, BELOW = np.array([3.0, -2.0, 91.0]), np.array([4.0, 3.0, -30.0])  # m, points of two loads
@@ -97,52 +97,61 @@ class Case:
             wind = {"kind": "steady", "speed": WIND, "shear_exponent": SHEAR}
             options |= {"wind": wind, "rotor": "bem", "blade_stations": None, "tower_drag": False}
         self.scene = build_scene(
-            self.platform, turbine=self.turbine, blades=blades, tower=tower, hydrodynamics=False,
+            self.platform, turbine=self.turbine, blades=blades, tower=tower, shaft=shaft, hydrodynamics=False,
             mooring=False, pitch="individual", loads=loads, **{"fidelity": "reference"} | options,
         )  # fmt: skip
         for part in fixed:
             self.scene = self.scene.with_model({f"rigid_body.{part}_fixed": True})
         self.fixed, self.n = fixed, len(MODES[blades])
         self.blocks = {block.name: block.offset for block in self.scene.blocks}
-        nodes = blade_nodes(self.turbine, MODES[blades])
-        self.beam = blade_particles(nodes, blade_beam(self.turbine, blades))
-        rotor = self.turbine.rotor
-        span = rotor.tip_radius - rotor.hub_radius
-        self.stations = [rotor.hub_radius + part * span for part in SECTIONS]
-        self.outer = [blade_particles(outer_part(nodes, z), self.beam) for z in self.stations]
+        self.beam, torsion = None, self.turbine.shaft_torsion
+        if self.n:
+            nodes, rotor = blade_nodes(self.turbine, MODES[blades]), self.turbine.rotor
+            self.beam = blade_particles(nodes, blade_beam(self.turbine, blades))
+            span = rotor.tip_radius - rotor.hub_radius
+            self.stations = [rotor.hub_radius + part * span for part in SECTIONS]
+            self.outer = [blade_particles(outer_part(nodes, z), self.beam) for z in self.stations]
+        self.shaft = None if shaft == "rigid" else (torsion.stiffness, torsion.damping)
         self.tower = tower_particles(self.platform, self.turbine, tower)
         self.channels = {channel.name: i for i, channel in enumerate(self.scene.channels)}
 
     def random(self, rng):
         """A state in wild motion: blades bend by some 5 % of their length, the tower by 1 %."""
         x = random_state(rng, self.scene.n_state, tilt=0.12, speed=3.0, turning=0.3)
-        for part, sizes in (
-            ("tower", [1.0, 1.0, 0.05, 0.05]),
-            ("blade", [4.0, 1.0, 2.0][-self.n :] * BLADES),
+        blade = {0: [], 2: [4.0, 2.0], 3: [4.0, 1.0, 2.0]}[self.n]
+        for (q, v), sizes in (
+            (self.states_of("tower"), [1.0, 1.0, 0.01, 0.01]),
+            (self.states_of("blade"), blade * BLADES),
+            (self.states_of("shaft"), [0.01]),
         ):
-            if f"{part}_deflection" in self.blocks:
-                q, v = self.blocks[f"{part}_deflection"], self.blocks[f"{part}_velocity"]
-                sizes = np.array(sizes[: v - q])
-                x[q:v] = sizes * rng.normal(size=v - q)
-                x[v : 2 * v - q] = 2.0 * sizes * rng.normal(size=v - q)
+            for i, size in enumerate(sizes[: v - q]):
+                x[q + i], x[v + i] = size * rng.normal(), 2.0 * size * rng.normal()
         pitches = self.blocks["other_blade_pitches"]
         x[pitches : pitches + 2] = rng.uniform(0.0, 0.4, 2)
         return x
 
+    def states_of(self, part):
+        """(index of the first deflection, of the first rate) of "tower", "blade" or "shaft"; 0, 0: rigid."""
+        names = ("shaft_twist", "shaft_twist_rate") if part == "shaft" else ("deflection", "velocity")
+        return tuple(self.blocks.get(name if part == "shaft" else f"{part}_{name}", 0) for name in names)
+
     def at(self, x):
         """What the twin says of a state without its loads."""
         pitches = np.r_[x[State.BLADE_PITCH], x[self.blocks["other_blade_pitches"] :][:2]]
-        twin = flexible_turbine.Turbine(self.platform, self.turbine, self.tower, self.beam, pitches=pitches)
-        q, v = (
-            x[self.blocks[name] :][: BLADES * self.n].reshape(BLADES, self.n)
-            for name in ("blade_deflection", "blade_velocity")
+        twin = flexible_turbine.Turbine(
+            self.platform, self.turbine, self.tower, self.beam, self.shaft, pitches
         )
+        q, v = (x[at:][: BLADES * self.n].reshape(BLADES, self.n) for at in self.states_of("blade"))
         return SimpleNamespace(twin=twin, path=twin.path(x, self.blocks), pitches=pitches, q=q, v=v)
 
-    def air(self, now, drawn, share=None):
-        """Air of each blade under drawn loads of its stations."""
-        e = self.scene.model.aero.rotor.elements
-        return [air_of(drawn[b], now.q[b], now.pitches[b], e.shape, e.modes, share) for b in range(BLADES)]
+    def air(self, now, found, share=None):
+        """Air of each blade: of the drawn loads of its stations, of a rigid one as the plant adds them."""
+        e, rotor = self.scene.model.aero.rotor.elements, self.turbine.rotor
+        if self.n == 0:
+            return [air_of_row(*pair, rotor.cone) for pair in zip(found.blades, now.pitches, strict=True)]
+        return [
+            air_of(found.drawn[b], now.q[b], now.pitches[b], e.shape, e.modes, share) for b in range(BLADES)
+        ]
 
     def acting(self, twin):
         """The two loads of the user's."""
@@ -160,19 +169,22 @@ class Case:
         u = np.array([TORQUE, *np.zeros(scene.n_commands - 1)])
         forget(handle)
         output(handle, x, u, 0.0, dx, row)
-        stored = data.blades[:, N_BLADE_LOAD:].reshape(BLADES, count, N_STATION_LOAD)
-        assert np.allclose(stored, drawn, rtol=1e-14)
+        if self.n:
+            stored = data.blades[:, N_BLADE_LOAD:].reshape(BLADES, count, N_STATION_LOAD)
+            assert np.allclose(stored, drawn, rtol=1e-14)
         rates = {
             "platform": dx[State.VX : State.WX],
             "turning": dx[State.WX : State.ROTOR_SPEED],
             "rotor": dx[[State.ROTOR_SPEED]],
         }
-        for name, part in (("tower", "tower"), ("blades", "blade")):
-            if f"{part}_velocity" in self.blocks:
-                v = self.blocks[f"{part}_velocity"]
-                rates[name] = dx[v : 2 * v - self.blocks[f"{part}_deflection"]]
+        for name, part, count in (
+            ("tower", "tower", 0 if self.tower is None else len(self.tower.U)),
+            ("blades", "blade", BLADES * self.n),
+            ("twist", "shaft", self.shaft is not None),
+        ):
+            rates[name] = dx[self.states_of(part)[1] :][:count]
         return SimpleNamespace(
-            rates=rates, drawn=drawn, winds=winds, added=data.added_mass,
+            rates=rates, drawn=drawn, winds=winds, added=data.added_mass, blades=data.blades,
             channels=lambda names: row[[self.channels[name] for name in names.split()]],
         )  # fmt: skip
 

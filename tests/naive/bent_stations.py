@@ -72,3 +72,14 @@ def air_of(loads, q, pitch, rest, modes, share=None):
         force, moment = force + F, moment + np.cross(place, F) + M
         modal = modal + F @ rates + M @ section.rotations
     return Air(force, moment, modal)
+
+
+def air_of_row(row, pitch, cone):
+    """Air of a plant's BladeLoad (6,), along the shaft, outwards and along the rotation; of a rigid blade."""
+    c, s, cosine, sine = np.cos(pitch), np.sin(pitch), np.cos(cone), np.sin(cone)
+    x, r = (
+        cosine * np.array([c, s, 0.0]) - [0.0, 0.0, sine],
+        sine * np.array([c, s, 0.0]) + [0.0, 0.0, cosine],
+    )
+    axes = np.column_stack([x, r, [s, -c, 0.0]])
+    return Air(axes @ row[:3], axes @ row[3:6], np.zeros(0))

@@ -2,9 +2,9 @@
 
 Every rigid body is a handful of particles of the same mass, centre and inertia (some of negative mass), tower
 and blades are rows of them, and rotor and generator turn. A path of the generalised coordinates
-c = (r, angles, azimuth, q of the tower, q of each blade, twist of the shaft) gives each particle's velocity
-and acceleration by Taylor arithmetic, and virtual power the equation of motion: no mass matrix, velocity term
-or angular velocity is written down anywhere.
+c = (r, angles, azimuth of the generator, q of the tower, q of each blade, twist of the shaft) gives each
+particle's velocity and acceleration by Taylor arithmetic, and virtual power the equation of motion: no mass
+matrix, velocity term or angular velocity is written down anywhere.
 """
 
 from typing import NamedTuple
@@ -177,6 +177,10 @@ class Turbine:
     def twist(self, c):
         return c[-1] if self.shaft is not None else Path(0.0)
 
+    def azimuth(self, c):
+        """Of the rotor."""
+        return c[6] + self.twist(c)
+
     def on_platform(self, c, point):
         for axis in range(3):
             point = turned(axis, c[3 + axis], point)
@@ -202,7 +206,7 @@ class Turbine:
         def carry(c, point):
             x, y, z = turned(2, Path(-self.pitches[b]), point)
             x, y, z = turned(1, Path(-self.cone), [x, y, z])
-            return self.on_shaft(c, [x, y, z], self.hub, c[6] + 2.0 * np.pi * b / 3.0)
+            return self.on_shaft(c, [x, y, z], self.hub, self.azimuth(c) + 2.0 * np.pi * b / 3.0)
 
         return carry
 
@@ -215,9 +219,9 @@ class Turbine:
             "nacelle": (self.nacelle[0], self.on_nacelle(c, columns(self.nacelle[1]))),
             "wheel": (
                 self.wheel[0],
-                self.on_shaft(c, rim, SPIN_CENTRE, (c[6] - self.twist(c)) * self.ratio),
+                self.on_shaft(c, rim, SPIN_CENTRE, c[6] * self.ratio),
             ),
-            "hub": (self.rotor[0], self.on_shaft(c, columns(self.rotor[1]), self.hub, c[6])),
+            "hub": (self.rotor[0], self.on_shaft(c, columns(self.rotor[1]), self.hub, self.azimuth(c))),
         }
         if self.tower is not None:
             found["tower"] = self.tower.mass, self.on_platform(c, self.tower.bent(self.of_tower(c)))
@@ -267,14 +271,17 @@ class Turbine:
                 q, v = entries(part, count)
                 place.append(q)
                 rate.append(v)
+        twist, untwisting = 0.0, 0.0
         if self.shaft is not None:
-            place.append(x[[blocks["shaft_twist"]]])
-            rate.append(x[[blocks["shaft_twist_rate"]]])
+            twist, untwisting = x[blocks["shaft_twist"]], x[blocks["shaft_twist_rate"]]
+            place.append([twist])
+            rate.append([untwisting])
         place, rate = np.concatenate(place), np.concatenate(rate)
+        place[6] -= twist
         units = self.units(place)
         rate[:3] = self.frame(units, self.on_platform)[0] @ x[7:10]
         rate[3:6] = np.linalg.solve(self.motion(units, self.on_platform)[1][:, 3:6], x[10:13])
-        rate[6] = x[13]
+        rate[6] = x[13] - untwisting
         return [Path(p, r) for p, r in zip(place, rate, strict=True)]
 
     def units(self, place):
@@ -286,7 +293,7 @@ class Turbine:
 
         torque: of the generator, on its own shaft; added: (6, 6) added mass, or None; air: Air of each blade.
         forces: [(what carries it, point, force, moment, (3,) each)] in the axes of what they act on.
-        held: coordinates whose velocity components do not change: "platform", "rotor".
+        held: what keeps its velocities: "platform", "rotor" (at the generator).
         """
         units = self.units([c.value for c in moving])
         matrix = np.zeros((self.size, self.size))
@@ -305,7 +312,7 @@ class Turbine:
             right[rows] -= beam.damping @ [one.first for one in q]
         right[6] -= self.ratio * torque
         if self.shaft is not None:
-            right[-1] += self.ratio * torque - self.shaft[1] * moving[-1].first
+            right[-1] -= self.shaft[1] * moving[-1].first
         for b, load in enumerate(air):
             forces = [*forces, (self.on_blade(b), np.zeros(3), load.force, load.moment)]
             right[7 + self.n + b * self.m :][: self.m] += load.modal
@@ -336,13 +343,14 @@ class Turbine:
         """{what: its accelerations} of a path."""
         second = np.array([float(c.second) for c in falling])
         motion, end = self.motion(falling, self.on_platform), 7 + self.n
+        twist = second[end + 3 * self.m :]
         return {
             "platform": motion[2],
             "turning": motion[3],
-            "rotor": second[6:7],
+            "rotor": second[6:7] + twist.sum(),
             "tower": second[7:end],
             "blades": second[end : end + 3 * self.m],
-            "twist": second[end + 3 * self.m :],
+            "twist": twist,
         }
 
     def point(self, falling, carry, place):

@@ -10,7 +10,7 @@ from pathlib import Path
 import elastic_cases
 import numpy as np
 import pytest
-from elastic_cases import BLADES, SHEAR, TOWERS, WIND, Case
+from elastic_cases import BENDING, BLADES, SHEAR, TOWERS, WIND, Case
 from fresh_python import fresh_python
 from naive.bent_stations import station, turning
 from naive.flexible_turbine import Path as Course
@@ -19,10 +19,12 @@ from naive.flexible_turbine import value_of
 STATES = 200  # of each platform
 PLATFORMS = ("oc3_hywind", "iea15_volturnus_s")
 KINDS = [
-    {"blades": blades, "tower": tower, "fixed": fixed}
-    for blades in ("modes", "modes2")
-    for tower in TOWERS[:1]
+    {"blades": blades, "tower": tower, "shaft": shaft, "fixed": fixed}
     for fixed in ((), ("platform",), ("rotor",))
+    for blades in BENDING
+    for tower in TOWERS[:1]
+    for shaft in ("rigid", "torsion")
+    if (blades, shaft) != ("rigid", "rigid")  # of other kernels: see test_tower_modes.py
 ]
 
 
@@ -30,16 +32,16 @@ def errors(case, rng):
     """{quantity: error over its largest value} of a random state."""
     x = case.random(rng)
     now, found = case.at(x), case.evaluate(x, rng)
-    twin, air = now.twin, case.air(now, found.drawn)
+    twin, air = now.twin, case.air(now, found)
     falling = twin.fall(now.path, elastic_cases.TORQUE, case.acting(twin), found.added, air, held=case.fixed)
     pairs = {
         what: (found.rates[what], values)
         for what, values in twin.accelerations(falling).items()
         if len(values) and not ("platform" in case.fixed and what in ("platform", "turning"))
     }
-    for b in range(BLADES):
+    for b in range(BLADES if case.n else 0):
         pairs[f"wind at blade {b}"] = found.winds[b], relative_winds(case, now, b)
-        for what, (channels, values) in blade_loads(case, now, falling, air, found.drawn, b).items():
+        for what, (channels, values) in blade_loads(case, now, falling, air, found, b).items():
             pairs[f"{what} of blade {b}"] = found.channels(channels), values
     for what, (channels, values) in shaft_and_tower(case, twin, falling, air).items():
         pairs[what] = found.channels(channels), values
@@ -64,7 +66,7 @@ def relative_winds(case, now, b):
     return np.array(rows)
 
 
-def blade_loads(case, now, falling, air, drawn, b):
+def blade_loads(case, now, falling, air, plant, b):
     """{what: (channels, values)} of a blade: root, tip, two sections."""
     twin, k, c, s = now.twin, b + 1, np.cos(now.pitches[b]), np.sin(now.pitches[b])
     coned, carry, start = (
@@ -88,7 +90,7 @@ def blade_loads(case, now, falling, air, drawn, b):
     }
     for number, z in enumerate(case.stations):
         section = getattr(case.scene.model.blades, ("inner", "outer")[number])
-        wind = case.air(now, drawn, section.outside)[b]
+        wind = case.air(now, plant, section.outside)[b]
         at, slopes = case.beam.between(now.q[b], z)
         outer = [(b, case.outer[number])]
         load = twin.section_load(falling, carry, at, [], [(carry, start, *wind[:2])], outer)
@@ -110,25 +112,27 @@ def shaft_and_tower(case, twin, falling, air):
         return twin.on_shaft(c, point, twin.hub, Course(0.0))
 
     shaft = twin.section_load(falling, on_still_rotor, start, rotor, carried)
-    c, s = np.cos(falling[6].value), np.sin(falling[6].value)
+    turn = twin.azimuth(falling).value
+    c, s = np.cos(turn), np.sin(turn)
     top, aloft = np.array([0.0, 0.0, case.platform.tower.top_height]), [*rotor, "nacelle", "wheel"]
     bearing = twin.section_load(falling, twin.on_nacelle, top, aloft, carried)
     base = np.array([0.0, 0.0, twin.base])
     carried.append(case.acting(twin)[0])
     load = twin.section_load(falling, twin.on_platform, base, [*aloft, "straight", "tower"], carried)
     acceleration = twin.frame(falling, twin.on_nacelle)[0].T @ twin.point(falling, twin.on_nacelle, top)[2]
-    return {
-        "shaft force": ("RotThrust LSShftFys LSShftFzs", shaft[:3]),
+    found = {
+        "thrust": ("RotThrust", shaft[:1]),
         "shaft moment": ("RotTorq LSSTipMys LSSTipMzs", shaft[3:]),
-        "moment of the turning shaft": (
-            "LSSTipMya LSSTipMza",
-            np.array([c * shaft[4] + s * shaft[5], c * shaft[5] - s * shaft[4]]),
-        ),
         "yaw bearing": ("YawBrMxp YawBrMyp YawBrMzp", bearing[3:]),
         "tower base force": ("TwrBsFxt TwrBsFyt TwrBsFzt", load[:3]),
         "tower base moment": ("TwrBsMxt TwrBsMyt TwrBsMzt", load[3:]),
         "nacelle": ("NcIMUTAxs NcIMUTAys", acceleration[:2]),
     }
+    if case.n:
+        across = np.array([c * shaft[4] + s * shaft[5], c * shaft[5] - s * shaft[4]])
+        found["shear force"] = "LSShftFys LSShftFzs", shaft[1:3]
+        found["moment of the turning shaft"] = "LSSTipMya LSSTipMza", across
+    return found
 
 
 def measured(name, states, seed=1):
