@@ -16,7 +16,7 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
 from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
-from fowt_env.plant.elastic.steps import damp_blades
+from fowt_env.plant.elastic.steps import correct_blades, keep_blades
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
@@ -203,6 +203,7 @@ def adams(t, x, u, dt, model, method, data):
         for i in range(n):
             history[k, i] = history[k - 1, i]
     keep_elastic(x, model.tower, data.elastic)
+    keep_blades(x, model.blades, data.elastic)
     rates(t, x, u, model, data, history[0])
     begin_twist(model.shaft, data.rotor, history[0])
     begin_followers(x, dt, False, model, data)
@@ -225,7 +226,7 @@ def adams(t, x, u, dt, model, method, data):
             dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.elastic,
             data.stages[2], data.stages[3], y,
         )  # fmt: skip
-        damp_blades(dt, history, model.blades, data.rotor, y)
+        correct_blades(dt, x, history, data.elastic, model.blades, data.rotor, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
     bend_on(dt, x, order, history, model.tower, y)

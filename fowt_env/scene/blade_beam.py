@@ -47,6 +47,7 @@ def build_blade_modes(turbine, option, first_state, aero):
         cone_cosine=float(np.cos(rotor.cone)),
         cone_sine=float(np.sin(rotor.cone)),
         hub_radius=float(rotor.hub_radius),
+        spring=np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, beam.stiffness)),
         decay=_decay(beam, aero, turbine.rated_rotor_speed),
         tip=_point(shapes_at(turbine, option, [rotor.tip_radius])),
         inner=_section(turbine, option, SECTIONS[0], aero),
@@ -55,18 +56,17 @@ def build_blade_modes(turbine, option, first_state, aero):
 
 
 def _decay(beam, aero, rotor_speed):
-    """Return the (n, n) decay rates (1/s) of modal velocities by the lift of blades at a speed (rad/s).
+    """Return the (n, n) decay rates (1/s) of modal velocities: structural, and by lift at a speed (rad/s).
 
     A section that moves downwind by v has the angle of attack, in a flow of speed times radius, smaller by
-    their quotient. Zero without wind.
+    their quotient.
     """
-    n = len(beam.count)
-    if aero is None:
-        return np.zeros((n, n))
-    e = aero.rotor.elements
-    line = 0.5 * e.air_density * LIFT_SLOPE * e.chord * e.weight * rotor_speed * e.radius
-    damping = np.einsum("j,ji,jk->ik", line, e.modes.x, e.modes.x)
-    return np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, DAMPED * damping))
+    damping = beam.damping
+    if aero is not None:
+        e = aero.rotor.elements
+        line = 0.5 * e.air_density * LIFT_SLOPE * e.chord * e.weight * rotor_speed * e.radius
+        damping = damping + DAMPED * np.einsum("j,ji,jk->ik", line, e.modes.x, e.modes.x)
+    return np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, damping))
 
 
 def _point(shapes):

@@ -186,7 +186,7 @@ class Scene:
             cache=np.zeros(N_CACHE),
             user=np.zeros(user_data_size(len(self.loads), most)),
             history=np.zeros((4, self.n_state)),
-            elastic=np.zeros((4, bending)),
+            elastic=np.zeros((4, bending + blade_states(self.model.blades) // 2)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),

@@ -46,7 +46,7 @@ def keep_elastic(x, tower, elastic):
     if tower is None:
         return
     for k in range(elastic.shape[0] - 1, 0, -1):
-        for i in range(elastic.shape[1]):
+        for i in range(len(tower.count)):
             elastic[k, i] = elastic[k - 1, i]
     begin_modal(x, tower, elastic[0])
 
@@ -57,12 +57,10 @@ def correct_elastic(dt, x, history, body, tower, blades, matrix, elastic, still,
 
     The force is linear in the new deflections and velocities, so its fourth difference with the new state is
     cheap to evaluate: theory.md, 6.3. matrix: factors left by the solve at the beginning of the step; still
-    and extra (n_state,): scratch. No-op for a rigid tower, and with bending blades, whose short steps resolve
-    the tower.
+    and extra (n_state,): scratch. No-op for a rigid tower. Bending blades and their rotor are not corrected:
+    their inertia is in matrix, and neither enters the force.
     """
     if tower is None:
-        return
-    if blades is not None:
         return
     n, q = len(tower.count), tower.first
     v = q + n
@@ -93,6 +91,6 @@ def correct_elastic(dt, x, history, body, tower, blades, matrix, elastic, still,
             y[State.VX + i] += dt * b[i]
         for i in range(n):
             y[v + i] += dt * modal[i]
-        if not body.rotor_fixed:
+        if blades is None and not body.rotor_fixed:
             turning = rotation_along_shaft(0.0, 0.0, 0.0, b, modal, bend, tower, nx, ny, nz)
             y[State.ROTOR_SPEED] -= dt * body.coupling / body.rotor_row * turning
