@@ -19,6 +19,7 @@ from fowt_env.plant.advance import forget, output
 from fowt_env.plant.aero import blade_sweep
 from fowt_env.plant.aero.blade_shape import N_STATION_LOAD, StationLoad, effective_pitch
 from fowt_env.plant.state import BLADES, N_BLADE_LOAD, State
+from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.blade_beam import MODES, SECTIONS, blade_beam, blade_nodes, outer_part
 from fowt_env.scene.tower import build_tower_modes, mode_shapes, shape_values
 
@@ -27,6 +28,9 @@ TORQUE = 3e4  # N m, of the generator
 WIND, SHEAR = 11.0, 0.14
 ALOFT, BELOW = np.array([3.0, -2.0, 91.0]), np.array([4.0, 3.0, -30.0])  # m, points of two loads
 FORCES = np.array([[3e5, -2e5, 1e5, 2e6, -1e6, 3e6], [-5e5, 4e5, 8e4, 1e7, 2e7, -3e6]])  # N and N m there
+
+PINS = np.array([[0.0, 0.0, -30.0], [4.0, 9.0, 2.0]])  # m, points that springs hold
+SPRING = 4e6  # N/m
 
 
 @load_kernel
@@ -38,6 +42,19 @@ def constant_load(parameters, motion, force):
 CONSTANT = [
     Load(name, constant_load, point=point, parameters=force, axes="body")
     for name, point, force in zip(("aloft", "below"), (ALOFT, BELOW), FORCES, strict=True)
+]
+
+
+@load_kernel
+def spring(parameters, motion, force):
+    """A spring to an inertial point, the same in every direction."""
+    for i in range(3):
+        force[Force.FX + i] = parameters[0] * (parameters[1 + i] - motion[Motion.X + i])
+
+
+SPRINGS = [
+    Load(name, spring, point=pin, parameters=(SPRING, *pin))
+    for name, pin in zip(("one", "other"), PINS, strict=True)
 ]
 
 
@@ -187,6 +204,21 @@ class Case:
             rates=rates, drawn=drawn, winds=winds, added=data.added_mass, blades=data.blades,
             channels=lambda names: row[[self.channels[name] for name in names.split()]],
         )  # fmt: skip
+
+
+def swinging(case):
+    """A smooth state in lively motion: the first modes alone are bent."""
+    x = np.zeros(case.scene.n_state)
+    x[: State.VX] = [0.4, -0.2, 0.0, 0.03, 0.05, 0.02, 0.7]
+    x[State.VX : State.BLADE_PITCH] = [0.5, -0.2, 0.1, 0.01, 0.02, -0.01, 0.8]
+    x[State.BLADE_PITCH] = 0.1
+    x[case.blocks["other_blade_pitches"] :][:2] = 0.2, 0.05
+    for b in range(BLADES):
+        q = case.states_of("blade")[0] + case.n * b
+        x[q], x[q + case.n - 1] = 2.0 + 0.4 * b, 0.3 - 0.2 * b
+    if case.shaft is not None:
+        x[case.states_of("shaft")[0]] = 0.004
+    return x
 
 
 def put_loads(drawn, winds):

@@ -9,45 +9,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from elastic_cases import BLADES, Case, put_loads
+from elastic_cases import BLADES, PINS, SPRING, SPRINGS, Case, put_loads, swinging
 from fresh_python import fresh_python
 
-from fowt_env import Load, load_kernel
 from fowt_env.plant.advance import advance, forget
 from fowt_env.plant.state import State
-from fowt_env.plant.user_loads import Force, Motion
 
-PINS = np.array([[0.0, 0.0, -30.0], [4.0, 9.0, 2.0]])  # m, points that springs hold
-SPRING, TORQUE = 4e6, 2e4  # N/m, N m
+TORQUE = 2e4  # N m
 DURATION, STEPS = 1.0, (40, 80)  # s
-
-
-@load_kernel
-def spring(parameters, motion, force):
-    """A spring to an inertial point, the same in every direction."""
-    for i in range(3):
-        force[Force.FX + i] = parameters[0] * (parameters[1 + i] - motion[Motion.X + i])
-
-
-SPRINGS = [
-    Load(name, spring, point=pin, parameters=(SPRING, *pin))
-    for name, pin in zip(("one", "other"), PINS, strict=True)
-]
-
-
-def swinging(case):
-    """A smooth state in lively motion: the first modes alone are bent."""
-    x = np.zeros(case.scene.n_state)
-    x[: State.VX] = [0.4, -0.2, 0.0, 0.03, 0.05, 0.02, 0.7]
-    x[State.VX : State.BLADE_PITCH] = [0.5, -0.2, 0.1, 0.01, 0.02, -0.01, 0.8]
-    x[State.BLADE_PITCH] = 0.1
-    x[case.blocks["other_blade_pitches"] :][:2] = 0.2, 0.05
-    for b in range(BLADES):
-        q = case.states_of("blade")[0] + case.n * b
-        x[q], x[q + case.n - 1] = 2.0 + 0.4 * b, 0.3 - 0.2 * b
-    if case.shaft is not None:
-        x[case.states_of("shaft")[0]] = 0.004
-    return x
 
 
 def energy_and_power(case, x, torque, drawn):

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from elastic_cases import BLADES, Case
+from elastic_cases import BLADES, SPRINGS, Case, swinging
 from fresh_python import fresh_python
 from plant_helpers import rates
-from test_energy import SPRINGS, swinging
 
 from fowt_env.plant.advance import advance, forget
 from fowt_env.plant.integrators import START_STEPS
