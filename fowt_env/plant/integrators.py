@@ -16,15 +16,13 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
 from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
-from fowt_env.plant.elastic.steps import correct_blades, keep_blades
+from fowt_env.plant.elastic.steps import correct_blades, correct_elastic, keep_blades, keep_elastic
+from fowt_env.plant.elastic.tower import add_modal, bend_of, carried, turned_pose
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
 from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
-from fowt_env.plant.tower.loads import add_modal, carried
-from fowt_env.plant.tower.modes import bend_of, turned_pose
-from fowt_env.plant.tower.steps import correct_elastic, keep_elastic
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) above which the lift of the blades damps the speed of a free rotor: by up to
@@ -221,9 +219,9 @@ def adams(t, x, u, dt, model, method, data):
         advance_actuators(x, u, dt, model, y)
         _twist_again(x, u, dt, order, new, history, model.shaft, model, data.rotor, y)
     else:
-        follow_rotor(dt, model, method.substeps, data, y)
+        follow_rotor(dt, x, model, method.substeps, data, y)
         correct_elastic(
-            dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.elastic,
+            dt, x, history, model.rigid_body, model.tower, data.matrix, data.rotor, data.elastic,
             data.stages[2], data.stages[3], y,
         )  # fmt: skip
         correct_blades(dt, x, history, data.elastic, model.blades, data.rotor, y)
@@ -245,7 +243,7 @@ def bend_on(dt, x, order, history, tower, y):
     """Fill y with the deflections of the tower by Adams-Moulton, from their new velocities in y."""
     if tower is None:
         return
-    n = len(tower.count)
+    n = len(tower.beam.count)
     for i in range(tower.first, tower.first + n):
         y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
@@ -298,7 +296,7 @@ def renew_rotor(t, x, model, aero, data):
         new.mx - was.mx, new.my - was.my, new.mz - was.mz,
     )  # fmt: skip
     store(cache, LoadCache.TOTAL, add(stored(cache, LoadCache.TOTAL), carried(change, bend)))
-    add_modal(change, bend, model.tower, cache[LoadCache.MODAL :])
+    add_modal(change, bend, model.tower, data.rotor, cache[LoadCache.MODAL :])
     store(cache, LoadCache.ROTOR, new)
     cache[LoadCache.TORQUE] = rotor.torque
     cache[LoadCache.THRUST] = rotor.thrust
@@ -334,7 +332,7 @@ def shift_tower(after, before, tower, row):
     """Add the difference of two derivatives to the rates of the deflection velocities in a row."""
     if tower is None:
         return
-    n = len(tower.count)
+    n = len(tower.beam.count)
     for i in range(tower.first + n, tower.first + 2 * n):
         row[i] += after[i] - before[i]
 

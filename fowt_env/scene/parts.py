@@ -349,6 +349,6 @@ def build_moorings(platform, options):
     return mooring._replace(dynamics=dynamics, friction=np.zeros_like(mooring.friction))
 
 
-def fastest_motion(tower, mooring, body):
+def fastest_motion(tower, mooring, body, structure):
     """Return the largest natural frequency (rad/s) of the structure: of its tower, or on moving lines."""
-    return max(tower_frequency(tower), line_frequency(mooring, body.mass))
+    return max(tower_frequency(tower, body, structure), line_frequency(mooring, body.mass))

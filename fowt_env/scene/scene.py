@@ -190,7 +190,7 @@ class Scene:
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
-            rotor=rotor_scratch(self.model.structure, self.model.blades, self.n_state),
+            rotor=rotor_scratch(self.model.structure, self.model.tower, self.model.blades, self.n_state),
         )
 
     @property
@@ -247,7 +247,8 @@ class Scene:
     def dt(self) -> float:
         """Return the default physics step (s) of the integrator; finer for fidelity, tower or lines."""
         model = self.model
-        return default_step(self.options, fastest_motion(model.tower, model.mooring, model.rigid_body))
+        parts = model.tower, model.mooring, model.rigid_body, model.structure
+        return default_step(self.options, fastest_motion(*parts))
 
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).
