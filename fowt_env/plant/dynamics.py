@@ -72,7 +72,7 @@ def evaluate_loads(t, x, model, data, dx):
     add_modal(aero.rotor.wrench, bend, model.tower, data.rotor, modal)
     add_modal_user_loads(bend, model.tower, model.user, data, modal)
 
-    fill_blade_forces(x, model.aero, model.pitches, model.blades, data.blades, data.rotor)
+    fill_blade_forces(x, model.aero, model.blades, data.blades, data.rotor)
     condense_elastic(
         pose, x, bend, model.rigid_body, model.pitches, model.structure, model.tower, model.blades, data.rotor
     )

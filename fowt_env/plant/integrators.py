@@ -221,8 +221,8 @@ def adams(t, x, u, dt, model, method, data):
     else:
         follow_rotor(dt, x, model, method.substeps, data, y)
         correct_elastic(
-            dt, x, history, model.rigid_body, model.tower, data.matrix, data.rotor, data.elastic,
-            data.stages[2], data.stages[3], y,
+            dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.rotor,
+            data.elastic, data.stages[2], data.stages[3], y,
         )  # fmt: skip
         correct_blades(dt, x, history, data.elastic, model.blades, data.rotor, y)
     attitude_rate(y, new, model.rigid_body.plane)

@@ -120,7 +120,7 @@ def _outer_aerodynamics(number, x, turn, aero, section, loads):
     for j in range(section.outside.shape[0]):
         part = section.outside[j]
         if part > 0.0:
-            lever, at = bent_lever(j, turn, shape), N_STATION_LOAD * j
+            lever, at = bent_lever(j, shape), N_STATION_LOAD * j
             normal, tangential = part * shape.loads[at], part * shape.loads[at + 1]
             moment = part * shape.loads[at + 2]
             fx += normal * lever.nx

@@ -1,13 +1,13 @@
-"""Corrects Adams-Bashforth 4 steps of tower and blades for their structure, and for the damping by the wind.
+"""Corrects Adams-Bashforth 4 steps for the structure of tower and blades and the damping by the wind.
 
-The structural force of the tower is linear in the new deflections, so its fourth difference with the new
-state is cheap to evaluate (theory.md, 6.3).
+Structural forces are linear in the new deflections, so their fourth differences with the new state are cheap
+to evaluate (theory.md, 6.3); the formula neglects these. For the tower they are applied to the whole turbine.
 
-The wind damps flapping at 10 to 20 1/s, edgewise modes and second flapwise modes oscillate at 6 to 13 rad/s,
-and Adams-Bashforth 4 alone is stable to 0.3 over the one, and errs in the damping of the other. The
-accelerations -S q - D v by the structure and by the wind at rated speed, of a blade on a hub at rest, are
-known well enough: S and D are constant, so the fourth differences of this part at the end of the step, which
-Adams-Bashforth 4 neglects, are linear in the new velocities. The order stays 4 whatever S and D are.
+The wind damps flapping at 10 to 20 1/s, edgewise and second flapwise modes oscillate at 6 to 13 rad/s, and
+Adams-Bashforth 4 alone is stable to 0.3 over the one, and errs in the damping of the other. The accelerations
+-S q - D v by structure and by the wind at rated speed, of a blade on a hub at rest, are known well enough: S
+and D are constant, so the fourth difference of this part is linear in the new velocities. The order stays 4
+whatever S and D are.
 """
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
@@ -37,11 +37,11 @@ def keep_elastic(x, tower, elastic):
 
 
 @kernel
-def correct_elastic(dt, x, history, body, tower, matrix, work, elastic, still, extra, y):
+def correct_elastic(dt, x, history, body, tower, blades, matrix, work, elastic, still, extra, y):
     """Correct the Adams-Bashforth 4 velocities in y for the structural force of the tower.
 
     matrix: factors left by the solve at the beginning of the step; still and extra (n_state,): scratch. No-op
-    for a rigid tower. The deflections of bending blades, whose inertia is in matrix, are not corrected.
+    for a rigid tower. Bending blades give way, but neither they nor the speed of their rotor are corrected.
     """
     if tower is None:
         return
@@ -63,7 +63,9 @@ def correct_elastic(dt, x, history, body, tower, matrix, work, elastic, still, e
             modal[i] = force - done[i]
             done[i] = force
         b[:] = 0.0
-        y[State.ROTOR_SPEED] += dt * answer(0.0, bend, body, tower, matrix, work, b, modal)
+        turning = answer(0.0, bend, body, tower, matrix, work, b, modal)
+        if blades is None:
+            y[State.ROTOR_SPEED] += dt * turning
         for i in range(6):
             y[State.VX + i] += dt * b[i]
         for i in range(n):
