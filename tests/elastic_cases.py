@@ -17,11 +17,13 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.advance import forget, output
 from fowt_env.plant.aero import blade_sweep
+from fowt_env.plant.aero.bent_blade import CHANGE, BentShape, placed
 from fowt_env.plant.aero.blade_shape import N_STATION_LOAD, StationLoad, effective_pitch
 from fowt_env.plant.state import BLADES, N_BLADE_LOAD, State
 from fowt_env.plant.user_loads import Force, Motion
-from fowt_env.scene.blade_beam import MODES, SECTIONS, blade_beam, blade_nodes, outer_part
-from fowt_env.scene.tower import build_tower_modes, mode_shapes, shape_values
+from fowt_env.scene.beam import outer_part, shape_values
+from fowt_env.scene.blade_beam import MODES, SECTIONS, blade_beam, blade_nodes
+from fowt_env.scene.tower import build_tower_modes, mode_shapes
 
 BENDING = TOWERS = ("rigid", "modes", "modes2")  # options
 TORQUE = 3e4  # N m, of the generator
@@ -73,12 +75,12 @@ def descriptions(name):
     return platform, turbine.model_copy(update={"blade": blade, "nacelle": nacelle})
 
 
-def tower_particles(platform, turbine, option):
+def tower_particles(platform, option):
     """flexible_turbine.Beam of a tower: ElastoDyn's elements and the mass at its top; None: rigid."""
     count = TOWERS.index(option)
     if count == 0:
         return None
-    built, tower = build_tower_modes(platform, turbine, count, 0), platform.tower
+    built, tower = build_tower_modes(platform, count, 0).beam, platform.tower
     bending, height = tower.modes, tower.top_height - tower.base_height
     shapes, fore_aft = mode_shapes(bending, count)
     at, n = np.append(bending.middles(), 1.0), 2 * count
@@ -129,7 +131,7 @@ class Case:
             self.stations = [rotor.hub_radius + part * span for part in SECTIONS]
             self.outer = [blade_particles(outer_part(nodes, z), self.beam) for z in self.stations]
         self.shaft = None if shaft == "rigid" else (torsion.stiffness, torsion.damping)
-        self.tower = tower_particles(self.platform, self.turbine, tower)
+        self.tower = tower_particles(self.platform, tower)
         self.channels = {channel.name: i for i, channel in enumerate(self.scene.channels)}
 
     def random(self, rng):
@@ -178,7 +180,7 @@ class Case:
     def evaluate(self, x, rng):
         """What the plant says of a state under drawn loads of the stations, with a drawn added mass."""
         scene, data, count = self.scene, self.scene.data(), len(self.scene.model.aero.rotor.elements.radius)
-        drawn, winds = rng.normal(size=(BLADES, count, 3)) * [3e4, 5e3, 2e4], np.zeros((BLADES, count, 3))
+        drawn, winds = rng.normal(size=(BLADES, count, 3)) * [3e4, 5e3, 2e4], np.zeros((BLADES, count, 4))
         put_loads(drawn, winds)
         half = rng.normal(size=(6, 6)) * np.sqrt([8e6, 8e6, 9e6, 6e10, 6e10, 9e9])
         data.added_mass[:] = half.T @ half / 6.0
@@ -187,7 +189,9 @@ class Case:
         forget(handle)
         output(handle, x, u, 0.0, dx, row)
         if self.n:
-            stored = data.blades[:, N_BLADE_LOAD:].reshape(BLADES, count, N_STATION_LOAD)
+            stored = data.blades[:, N_BLADE_LOAD:][:, : N_STATION_LOAD * count].reshape(
+                BLADES, count, N_STATION_LOAD
+            )
             assert np.allclose(stored, drawn, rtol=1e-14)
         rates = {
             "platform": dx[State.VX : State.WX],
@@ -216,17 +220,20 @@ def swinging(case):
     for b in range(BLADES):
         q = case.states_of("blade")[0] + case.n * b
         x[q], x[q + case.n - 1] = 2.0 + 0.4 * b, 0.3 - 0.2 * b
+    if case.tower is not None:
+        x[case.states_of("tower")[0] :][:2] = 0.3, -0.2
     if case.shaft is not None:
         x[case.states_of("shaft")[0]] = 0.004
     return x
 
 
 def put_loads(drawn, winds):
-    """Let the air load stations by drawn (blades, k, 3), and put winds and pitches there into winds."""
+    """Let the air load stations by drawn (blades, k, 3); put winds and pitches there into winds (.., 4)."""
 
     def station_load(response, v_normal, v_tangential, j):
         turned = effective_pitch(j, response.turn.pitch, response.shape)
-        winds[response.number, j] = v_normal, v_tangential, turned
+        change = placed(j, CHANGE, response.shape) if type(response.shape) is BentShape else 0.0
+        winds[response.number, j] = v_normal, v_tangential, turned, change
         return StationLoad(*(drawn[response.number, j] / 2.0), 2.0, 0.0, 0, None)
 
     blade_sweep.station_load = station_load

@@ -17,6 +17,7 @@ from fowt_env.plant.state import State
 
 TORQUE = 2e4  # N m
 DURATION, STEPS = 1.0, (40, 80)  # s
+BENT = ("blades", "tower")
 
 
 def energy_and_power(case, x, torque, drawn):
@@ -59,18 +60,19 @@ def drift(case, steps, torque=0.0, drawn=None):
 
 def drifts(working, shaft):
     """[drift] of runs with each of STEPS; working: with air, generator and dampers, or with none of them."""
-    case = Case("iea15_volturnus_s", "modes2", "rigid", shaft, wind=working, loads=SPRINGS, integrator="rk4")
+    case = Case("iea15_volturnus_s", "modes2", "modes", shaft, wind=working, loads=SPRINGS, integrator="rk4")
     if not working:
-        none = np.zeros((case.n, case.n))
-        case.scene = case.scene.with_model({"blades.beam.damping": none})
-        case.beam = case.beam._replace(damping=none)
+        case.scene = case.scene.with_model(
+            {f"{part}.beam.damping": 0.0 * getattr(case.scene.model, part).beam.damping for part in BENT}
+        )
+        case.beam, case.tower = (one._replace(damping=0.0 * one.damping) for one in (case.beam, case.tower))
         if case.shaft is not None:
             case.scene = case.scene.with_model({"shaft.damping": 0.0})
             case.shaft = case.shaft[0], 0.0
         return [drift(case, steps) for steps in STEPS]
     count = len(case.scene.model.aero.rotor.elements.radius)
     drawn = np.random.default_rng(4).normal(size=(BLADES, count, 3)) * [3e4, 5e3, 2e4]
-    put_loads(drawn, np.zeros_like(drawn))
+    put_loads(drawn, np.zeros((BLADES, count, 4)))
     return [drift(case, steps, TORQUE, drawn) for steps in STEPS]
 
 
