@@ -107,6 +107,12 @@ def blade_particles(nodes, beam):
     return flexible_turbine.Beam(nodes.z, nodes.mass, U, slope, S, beam.stiffness, beam.damping)
 
 
+def acting(twin):
+    """CONSTANT, as forces on a twin: the one aloft, the one below."""
+    places = zip((twin.on_nacelle, twin.on_platform), (ALOFT, BELOW), FORCES, strict=True)
+    return [(carry, point, force[:3], force[3:]) for carry, point, force in places]
+
+
 class Case:
     """A kind of scene and its twin; fixed: "platform" or "rotor"."""
 
@@ -171,11 +177,6 @@ class Case:
         return [
             air_of(found.drawn[b], now.q[b], now.pitches[b], e.shape, e.modes, share) for b in range(BLADES)
         ]
-
-    def acting(self, twin):
-        """The two loads of the user's."""
-        places = zip((twin.on_nacelle, twin.on_platform), (ALOFT, BELOW), FORCES, strict=True)
-        return [(carry, point, force[:3], force[3:]) for carry, point, force in places]
 
     def evaluate(self, x, rng):
         """What the plant says of a state under drawn loads of the stations, with a drawn added mass."""

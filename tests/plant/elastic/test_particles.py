@@ -10,7 +10,7 @@ from pathlib import Path
 import elastic_cases
 import numpy as np
 import pytest
-from elastic_cases import BENDING, BLADES, SHEAR, TOWERS, WIND, Case
+from elastic_cases import BENDING, BLADES, SHEAR, TOWERS, WIND, Case, acting
 from fresh_python import fresh_python
 from naive.bent_stations import station, turning
 from naive.flexible_turbine import Path as Course
@@ -33,7 +33,7 @@ def errors(case, rng):
     x = case.random(rng)
     now, found = case.at(x), case.evaluate(x, rng)
     twin, air = now.twin, case.air(now, found)
-    falling = twin.fall(now.path, elastic_cases.TORQUE, case.acting(twin), found.added, air, held=case.fixed)
+    falling = twin.fall(now.path, elastic_cases.TORQUE, acting(twin), found.added, air, held=case.fixed)
     pairs = {
         what: (found.rates[what], values)
         for what, values in twin.accelerations(falling).items()
@@ -121,7 +121,7 @@ def shaft_and_tower(case, twin, falling, air):
     top, aloft = np.array([0.0, 0.0, case.platform.tower.top_height]), [*rotor, "nacelle", "wheel"]
     bearing = twin.section_load(falling, twin.on_nacelle, top, aloft, carried)
     base = np.array([0.0, 0.0, twin.base])
-    carried.append(case.acting(twin)[0])
+    carried.append(acting(twin)[0])
     load = twin.section_load(falling, twin.on_platform, base, [*aloft, "straight", "tower"], carried)
     acceleration = twin.frame(falling, twin.on_nacelle)[0].T @ twin.point(falling, twin.on_nacelle, top)[2]
     found = {
