@@ -100,9 +100,7 @@ class Data(NamedTuple):
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
-    # (4, n) structural forces on the tower deflections and deflections of the blades at past steps, latest
-    # first
-    elastic: np.ndarray
+    elastic: np.ndarray  # (4, n) deflections of the blades at past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data; empty without radiation memory
     # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades. With

@@ -187,7 +187,7 @@ class Scene:
             cache=np.zeros(N_CACHE),
             user=np.zeros(user_data_size(len(self.loads), most)),
             history=np.zeros((4, self.n_state)),
-            elastic=np.zeros((4, bending + blade_states(self.model.blades) // 2)),
+            elastic=np.zeros((4, blade_states(self.model.blades) // 2)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
@@ -250,7 +250,7 @@ class Scene:
         """Return the default physics step (s) of the integrator; finer for fidelity, tower or lines."""
         model = self.model
         parts = model.tower, model.mooring, model.rigid_body, model.structure
-        return default_step(self.options, fastest_motion(*parts))
+        return default_step(self.options, fastest_motion(self.options, *parts))
 
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).
