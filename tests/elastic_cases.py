@@ -23,7 +23,7 @@ from fowt_env.plant.state import BLADES, N_BLADE_LOAD, State
 from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.beam import outer_part, shape_values
 from fowt_env.scene.blade_beam import MODES, SECTIONS, blade_beam, blade_nodes
-from fowt_env.scene.tower import build_tower_modes, mode_shapes
+from fowt_env.scene.tower import mode_shapes
 
 BENDING = TOWERS = ("rigid", "modes", "modes2")  # options
 TORQUE = 3e4  # N m, of the generator
@@ -75,12 +75,15 @@ def descriptions(name):
     return platform, turbine.model_copy(update={"blade": blade, "nacelle": nacelle})
 
 
-def tower_particles(platform, option):
-    """flexible_turbine.Beam of a tower: ElastoDyn's elements and the mass at its top; None: rigid."""
+def tower_particles(platform, option, modes):
+    """flexible_turbine.Beam of a tower: ElastoDyn's elements and the mass at its top; None: rigid.
+
+    modes: the plant's TowerModes, for stiffness and damping.
+    """
     count = TOWERS.index(option)
     if count == 0:
         return None
-    built, tower = build_tower_modes(platform, count, 0).beam, platform.tower
+    tower = platform.tower
     bending, height = tower.modes, tower.top_height - tower.base_height
     shapes, fore_aft = mode_shapes(bending, count)
     at, n = np.append(bending.middles(), 1.0), 2 * count
@@ -97,7 +100,7 @@ def tower_particles(platform, option):
     mass = np.append(cell * np.interp(bending.middles(), bending.height_fraction, bending.mass_density), 0.0)
     mass[-1] = bending.top_mass
     return flexible_turbine.Beam(
-        tower.base_height + height * at, mass, U, slope, S, built.stiffness, built.damping
+        tower.base_height + height * at, mass, U, slope, S, modes.beam.stiffness, modes.beam.damping
     )
 
 
@@ -137,7 +140,7 @@ class Case:
             self.stations = [rotor.hub_radius + part * span for part in SECTIONS]
             self.outer = [blade_particles(outer_part(nodes, z), self.beam) for z in self.stations]
         self.shaft = None if shaft == "rigid" else (torsion.stiffness, torsion.damping)
-        self.tower = tower_particles(self.platform, tower)
+        self.tower = tower_particles(self.platform, tower, self.scene.model.tower)
         self.channels = {channel.name: i for i, channel in enumerate(self.scene.channels)}
 
     def random(self, rng):
