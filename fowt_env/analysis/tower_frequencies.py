@@ -73,21 +73,22 @@ def bending(platform, turbine, count):
     """
     tower = build_tower_modes(platform, turbine, count, 0)
     gravity, height, slope = platform.environment.gravity, tower.top_height, tower.slope
-    along, across = tower.fore_aft, 1.0 - tower.fore_aft
+    along, beam = (np.arange(len(slope)) % 2 == 0).astype(float), tower.beam
+    across, first, height_moment = 1.0 - along, beam.a + beam.b, beam.e + beam.f
     top = top_mass_matrix(platform, turbine)
     moved = np.zeros((6, len(slope)))  # velocity of the top body, referred to the body origin
     moved[0], moved[1] = along * (1.0 - slope * height), across * (1.0 - slope * height)
     moved[3], moved[4] = -across * slope, along * slope
     aligned = np.outer(along, along) + np.outer(across, across)
     arm = top[0, 4] / top[0, 0] - height  # height of the top body's centre of mass above the tower top
-    hanging = tower.weight_stiffness + top[0, 0] * arm * np.outer(slope, slope) * aligned
+    hanging = beam.S0 + top[0, 0] * (tower.shortening + arm * np.outer(slope, slope) * aligned)
     inertia = top @ moved
-    inertia[0] += along * tower.first_moment
-    inertia[1] += across * tower.first_moment
-    inertia[3] -= across * tower.height_moment
-    inertia[4] += along * tower.height_moment
-    aside = gravity * (tower.first_moment + top[0, 0] * (1.0 + arm * slope))
+    inertia[0] += along * first
+    inertia[1] += across * first
+    inertia[3] -= across * height_moment
+    inertia[4] += along * height_moment
+    aside = gravity * (first + top[0, 0] * (1.0 + arm * slope))
     weight = np.zeros_like(inertia)
     weight[State.ROLL], weight[State.PLATFORM_PITCH] = across * aside, -along * aside
-    mass, stiffness = tower.mass * aligned + moved.T @ top @ moved, tower.stiffness - gravity * hanging
-    return Bending(along == 1.0, mass, stiffness, inertia, weight, tower.damping, moved)
+    mass, stiffness = beam.A + beam.B + moved.T @ top @ moved, beam.stiffness - gravity * hanging
+    return Bending(along == 1.0, mass, stiffness, inertia, weight, beam.damping, moved)

@@ -275,7 +275,9 @@ class _Steady(Evaluation):
         turned_x = np.array([[1.0, 0.0, 0.0], [0.0, cos(b), -sin(b)], [0.0, sin(b), cos(b)]])
         carried = (turned_y @ turned_x).T @ rates[State.WX : State.WZ + 1]
         relative = np.array([about_x, about_y * cos(b), -about_y * sin(b)])
-        return tower.shaft @ (carried + relative)
+        structure = self.scene.model.structure
+        shaft = np.array([structure.tilt_cosine, 0.0, -structure.tilt_sine])
+        return shaft @ (carried + relative)
 
     def set_pitch(self, blade_pitch):
         """Set the pitch (rad) of all blades, and its command."""

@@ -147,9 +147,7 @@ def read_coefficients(path):
         parts = [values.pop(name, None) for name in names]
         values[field] = None if parts[0] is None else Qtf(*parts, of_sums=field == "sum_qtf")
     source = str(arrays["source"]) if "source" in arrays else ""
-    return PotentialFlow(
-        **values, volume=math.nan, centre_of_buoyancy=(0.0, 0.0), source=source[:2000]
-    )
+    return PotentialFlow(**values, volume=math.nan, centre_of_buoyancy=(0.0, 0.0), source=source[:2000])
 
 
 def coefficient_arrays(body):

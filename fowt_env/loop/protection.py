@@ -15,10 +15,9 @@ from fowt_env.plant.channels import acceleration_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.handle import by_reference
 from fowt_env.plant.drivetrain import clamp
+from fowt_env.plant.elastic.tower import bend_of, nacelle_rates, turned_pose
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.state import BLADES, Command, State, pose_of
-from fowt_env.plant.tower.modes import bend_of, turned_pose
-from fowt_env.plant.tower.rates import nacelle_rates
 
 ROUNDING = 1e-9  # s, tolerance in comparisons of times
 
@@ -129,7 +128,7 @@ def tower_top_acceleration(x, dx, model):
     """Return the magnitude of the tower-top acceleration in the x-y plane of the nacelle, m/s2."""
     pose, top = pose_of(x), model.layout.tower_top
     bend = bend_of(x, model.tower)
-    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
+    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, x, bend, dx, model.tower)
     ax, ay, _ = acceleration_at(nacelle, moving, top[0], top[1], top[2])
     return hypot(ax, ay)
 

@@ -2,7 +2,7 @@
 
 The moments are defined as in ElastoDyn: loads of the outer part on the inner one by aerodynamics, weight and
 inertia (theory.md, 6.6). Blades are rigid, with their mass straight along the pitch axis. Kernels take pose
-and rates of the nacelle-fixed frame (nacelle_pose and nacelle_rates in tower/).
+and rates of the nacelle-fixed frame (nacelle_pose and nacelle_rates in elastic/tower.py).
 """
 
 from math import cos, pi, sin
@@ -16,15 +16,15 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import stored
 from fowt_env.plant.elastic.blades import BladeModes
-from fowt_env.plant.elastic.chain import rotor_frame
+from fowt_env.plant.elastic.chain import rotor_frame, top_of
 from fowt_env.plant.elastic.outputs import bearing_moment, hub_load, root_load
 from fowt_env.plant.elastic.structure import Structure
+from fowt_env.plant.elastic.tower import bend_of
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, BladeMeasure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
 from fowt_env.plant.state import BLADES, State, pose_by_sines
 from fowt_env.plant.tilt import across_shaft, along_shaft, in_rotor_axes, rotor_pose
-from fowt_env.plant.tower.modes import bend_of
 
 N_BLADE_CHANNELS = 2 + 2 * BLADES + 2 + 3  # of channels.BLADE_CHANNELS: pitches, roots, hub, yaw bearing
 
@@ -187,7 +187,8 @@ def _of_bending(pose, rates, x, dx, model, blades, data):
     plane = model.rigid_body.plane
     pose = pose_by_sines(x, data.cache[LoadCache.SINES :], plane)
     bend = bend_of(x, model.tower)
-    frame, _ = rotor_frame(pose, bend, model.rigid_body.gravity, model.structure)
+    top = top_of(pose, x, bend, model.tower)
+    frame, _ = rotor_frame(pose, top, bend, model.rigid_body.gravity, model.structure)
     _, _, _, _, tilt, yaw = hub_load(x, frame, data.blades, blades, data.rotor)
     wrench = stored(data.cache, LoadCache.ROTOR)
     mx, my, mz = bearing_moment(bend, wrench, data.rotor, model.layout.tower_top[2])

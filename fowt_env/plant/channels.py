@@ -15,13 +15,12 @@ from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.elastic.chain import weighed_body
 from fowt_env.plant.elastic.outputs import add_upper_load, record_bending, shaft_load
 from fowt_env.plant.elastic.shaft import generator_speed, record_twist, twist_channels
+from fowt_env.plant.elastic.tower import Twist, bend_of, nacelle_rates, turned_pose
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State, pose_by_sines, to_inertial
 from fowt_env.plant.tilt import along_shaft, rotor_pose
-from fowt_env.plant.tower.modes import bend_of, turned_pose
-from fowt_env.plant.tower.rates import Twist, nacelle_rates
 from fowt_env.plant.tower_outputs import carried_at_base, record_tower, tower_channels
 from fowt_env.plant.user_loads import record_user_loads, user_channels
 
@@ -206,7 +205,7 @@ def measure(model, data, x, dx, u, t, m):
     """Fill the measurement array m (Scene.n_measurements,) from a state, its loads in data and its rates."""
     layout, sines = model.layout, data.cache[LoadCache.SINES :]
     pose, bend = pose_by_sines(x, sines, model.rigid_body.plane), bend_of(x, model.tower)
-    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
+    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, x, bend, dx, model.tower)
     wind = wind_of(t, 0.0, 0.0, layout.hub[2], model.aero)
     top = layout.tower_top
     ax, _, _ = acceleration_at(nacelle, moving, top[0], top[1], top[2])
@@ -232,7 +231,7 @@ def record(model, data, x, dx, u, t, loads, row):
     layout = model.layout
     body, sines = model.rigid_body, data.cache[LoadCache.SINES :]
     pose, bend = pose_by_sines(x, sines, body.plane), bend_of(x, model.tower)
-    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, bend, dx, model.tower)
+    nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, x, bend, dx, model.tower)
     row[Out.TIME] = t
     for i in range(6):
         row[Out.PTFMSURGE + i] = x[State.SURGE + i]
@@ -266,7 +265,7 @@ def record(model, data, x, dx, u, t, loads, row):
     turning = dx[State.ROTOR_SPEED] + along_shaft(moving.wx, moving.wz, tilt)
     row[Out.ROTTHRUST], row[Out.ROTTORQ] = shaft_load(
         loads.rotor.thrust - layout.rotor_mass * push, loads.rotor.torque - layout.rotor_inertia * turning,
-        pose, bend, x, body, model.structure, model.blades, data.blades, data.rotor,
+        pose, bend, x, body, model.structure, model.tower, model.blades, data.blades, data.rotor,
     )  # fmt: skip
     row[Out.RTFLDFXH] = loads.rotor.thrust
     row[Out.RTFLDMXH] = loads.rotor.torque
@@ -291,8 +290,8 @@ def record(model, data, x, dx, u, t, loads, row):
     record_twist(x, model.shaft, row[n:])
     n += twist_channels(model.shaft)
     record_bending(
-        pose, bend, x, dx, model.pitches, body, model.aero, model.structure, model.blades, data.blades,
-        data.rotor, row[n:],
+        pose, bend, x, dx, model.pitches, body, model.aero, model.structure, model.tower, model.blades,
+        data.blades, data.rotor, row[n:],
     )  # fmt: skip
     record_blades(nacelle, moving, x, dx, model.pitches, model, data, row)
 
@@ -304,7 +303,7 @@ def tower_base(pose, x, dx, loads, bend, body, layout, tower, structure, work, r
     Body axes at (0, 0, base_height), quasi-static sense of OpenFAST's TwrBs (load of the upper part
     on the lower one).
     """
-    load = carried_at_base(pose, x, dx, loads, bend, weighed_body(body, structure), layout, tower)
+    load = carried_at_base(pose, x, dx, loads, bend, weighed_body(body, structure), layout, tower, work)
     load = add_upper_load(load, bend, structure, work)
     z = layout.base_height
     row[Out.TWRBSFXT], row[Out.TWRBSFYT], row[Out.TWRBSFZT] = load.fx, load.fy, load.fz

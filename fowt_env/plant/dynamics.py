@@ -10,7 +10,6 @@ function that takes the part. compile/variants.py is for parts of several classe
 
 from typing import NamedTuple
 
-from fowt_env.plant.accelerations import fill_tower_rates
 from fowt_env.plant.aero.blade_sweep import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
@@ -20,13 +19,20 @@ from fowt_env.plant.elastic.blades import fill_deflection_rates
 from fowt_env.plant.elastic.chain import accelerate_all, condense_elastic, weighed_body
 from fowt_env.plant.elastic.forces import fill_blade_forces
 from fowt_env.plant.elastic.shaft import fill_twist_rate, generator_speed
+from fowt_env.plant.elastic.tower import (
+    add_modal,
+    bend_of,
+    carried,
+    elastic_force,
+    fill_tower_rates,
+    reduce_tower,
+    turned_pose,
+)
 from fowt_env.plant.hydro.load import hydro_load, hydro_rates
 from fowt_env.plant.line_dynamics import lines_load
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate_at, gravity_load
 from fowt_env.plant.state import State, Wrench, add, fill_sines, pose_by_sines
-from fowt_env.plant.tower.loads import add_bent_weight, add_modal, add_modal_weight, begin_modal, carried
-from fowt_env.plant.tower.modes import bend_of, turned_pose
 from fowt_env.plant.user_loads import add_modal_user_loads, add_user_loads, evaluate_user_loads
 
 
@@ -47,7 +53,8 @@ def evaluate_loads(t, x, model, data, dx):
     pose, modal = pose_by_sines(x, cache[LoadCache.SINES :], plane), cache[LoadCache.MODAL :]
     bend = bend_of(x, model.tower)
     nacelle = turned_pose(pose, bend)
-    begin_modal(x, model.tower, modal)
+    elastic_force(x, model.tower, modal)
+    reduce_tower(x, pose, model.tower, data.rotor)
     aero = aero_load(t, pose, nacelle, x, model.aero, model.pitches, model.tower, data, dx)
     hydro = hydro_load(t, pose, x, model.hydro, data)
     hydro_rates(x, model.hydro, dx)
@@ -57,19 +64,17 @@ def evaluate_loads(t, x, model, data, dx):
     tower = add_user_loads(aero.tower, True, bend, model.user, data)
     load = add(carried(aero.rotor.wrench, bend), tower)
     load = add(load, gravity_load(pose, weighed_body(model.rigid_body, model.structure)))
-    load = add_bent_weight(load, pose, x, bend, model.tower, model.rigid_body.gravity)
     load = add(load, hydro.buoyancy)
     load = add(load, hydro.strips)
     load = add(load, mooring)
     load = add(load, hydro.damping)
     load = add_user_loads(load, False, bend, model.user, data)
-    add_modal(aero.rotor.wrench, bend, model.tower, modal)
+    add_modal(aero.rotor.wrench, bend, model.tower, data.rotor, modal)
     add_modal_user_loads(bend, model.tower, model.user, data, modal)
-    add_modal_weight(pose, x, bend, model.tower, model.rigid_body.gravity, modal)
 
-    fill_blade_forces(x, model.aero, model.pitches, model.blades, data.blades, data.rotor)
+    fill_blade_forces(x, model.aero, model.blades, data.blades, data.rotor)
     condense_elastic(
-        pose, x, bend, model.rigid_body, model.pitches, model.structure, model.blades, data.rotor
+        pose, x, bend, model.rigid_body, model.pitches, model.structure, model.tower, model.blades, data.rotor
     )
 
     cache[LoadCache.FACTORED] = 0.0

@@ -45,10 +45,10 @@ class Model(NamedTuple):
     user: object = None  # user_loads.UserLoads or None
     pitches: object = None  # blade_pitches.BladePitches, or None: one pitch for all blades
     converter: object = None  # drivetrain.TorqueLag, or None: the torque follows its command at once
-    tower: object = None  # tower.modes.TowerModes, or None: a rigid tower
+    tower: object = None  # elastic.tower.TowerModes, or None: a rigid tower
     blades: object = None  # elastic.blades.BladeModes, or None: rigid blades
     shaft: object = None  # elastic.shaft.Torsion, or None: a rigid shaft
-    structure: object = None  # elastic.structure.Structure, or None: neither blades nor shaft are elastic
+    structure: object = None  # elastic.structure.Structure, or None: a rigid turbine
 
 
 class LoadCache(IntEnum):
@@ -71,7 +71,7 @@ class LoadCache(IntEnum):
     ELEVATED = 35  # 1 while ELEVATION (surface at the origin) belongs to TIME
     ELEVATION = 36
     TORQUE_LIMITED = 37  # 1 in a control period whose torque command the generator could not follow
-    MODAL = 38  # tower.modes.MOST_MODES entries: generalised forces on the tower deflections
+    MODAL = 38  # elastic.tower.MOST_MODES entries: generalised forces on the tower deflections
     SINES = 42  # six entries, state.fill_sines
     FACTORED = 48  # 1 while Data.matrix holds the factors of the state's mass matrix
 
@@ -100,8 +100,7 @@ class Data(NamedTuple):
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
-    # (4, n) structural forces on the tower deflections at past steps, latest first
-    elastic: np.ndarray
+    elastic: np.ndarray  # (4, n) deflections of the blades at past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data; empty without radiation memory
     # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades. With

@@ -4,17 +4,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.accelerations import accelerate_turbine
+from fowt_env.plant.accelerations import accelerate
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.blade_pitches import advance_actuators
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.elastic.chain import answer, modes_in_state
+from fowt_env.plant.elastic.structure import Structure
+from fowt_env.plant.elastic.tower import add_modal, bend_of, carried, nacelle_pose
 from fowt_env.plant.followers import integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State, Wrench, pose_in
-from fowt_env.plant.tower.loads import carried
-from fowt_env.plant.tower.modes import bend_of, nacelle_pose
-from fowt_env.plant.tower.steps import add_tower_steps, fill_impulse
 
 BASHFORTH = (55.0 / 24.0, -59.0 / 24.0, 37.0 / 24.0, -9.0 / 24.0)  # Adams-Bashforth 4, latest first
 N_SAMPLE = 7  # entries of a sample of the rotor load: wrench and torque
@@ -66,6 +67,7 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         for i in range(integrated_states(x, model)):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
         advance_actuators(x, u, after, model, between)
+        _bend_on(after, x, model.tower, between)
         now = wind_now(t + after, model.aero.wind)
         pose = nacelle_pose(pose_in(between, model.rigid_body.plane), between, model.tower)
         aero = rotor_part(
@@ -76,6 +78,16 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         row[0], row[1], row[2] = aero.wrench.fx, aero.wrench.fy, aero.wrench.fz
         row[3], row[4], row[5] = aero.wrench.mx, aero.wrench.my, aero.wrench.mz
         row[6] = aero.torque
+
+
+@kernel
+def _bend_on(after, x, tower, between):
+    """Fill `between` with the deflections of the tower a time `after` (s) from x; no-op for a rigid tower."""
+    if tower is None:
+        return
+    n = len(tower.beam.count)
+    for i in range(tower.first, tower.first + n):
+        between[i] = x[i] + 0.5 * after * (x[n + i] + between[n + i])
 
 
 @kernel
@@ -97,8 +109,39 @@ def shift_samples(was, torque, substeps, data):
         samples[k, 6] += cache[LoadCache.TORQUE] - torque
 
 
-@kernel
-def follow_rotor(dt, model, substeps, data, y):
+@inlined_kernel
+def _push_rigid(dt, x, load, torque, model, structure, data, y):
+    extra, still, body = data.stages[3], data.stages[2], model.rigid_body
+    for i in range(still.shape[0]):
+        still[i] = 0.0  # without velocities the equation of motion has no terms but the load
+    accelerate(
+        pose_in(still, body.plane), still, load, torque, data.added_mass, body, data.matrix, data.cache, extra
+    )
+    for i in range(State.VX, State.ROTOR_SPEED + 1):
+        y[i] += dt * extra[i]
+
+
+@inlined_kernel
+def _push_elastic(dt, x, load, torque, model, structure, data, y):
+    tower, work, extra = model.tower, data.rotor, data.stages[3]
+    extra[:] = 0.0
+    bend, (first, n) = bend_of(x, tower), modes_in_state(tower)
+    b = extra[State.VX : State.WZ + 1]
+    add_modal(load, bend, tower, work, extra[first : first + n])
+    load = carried(load, bend)
+    b[0], b[1], b[2], b[3], b[4], b[5] = load.fx, load.fy, load.fz, load.mx, load.my, load.mz
+    answer(torque, bend, model.rigid_body, tower, model.blades, data.matrix, work, extra)
+    for i in range(State.VX, y.shape[0]):
+        y[i] += dt * extra[i]
+
+
+# (dt, x, load, torque, model, structure, data, y): velocities y plus those by a Wrench on the nacelle and a
+# torque on the shaft over dt, with the mass matrix of the last evaluation, at x
+_push = chosen_by_class("structure", {type(None): _push_rigid, Structure: _push_elastic}, inlined=True)
+
+
+@inlined_kernel
+def follow_rotor(dt, x, model, substeps, data, y):
     """Correct the velocities y at the end of a step for the rotor loads sampled within the step, if any.
 
     The correction is the difference between the impulses of the rotor load in short steps and in one step:
@@ -117,16 +160,4 @@ def follow_rotor(dt, model, substeps, data, y):
         my += fraction * samples[k, 4]
         mz += fraction * samples[k, 5]
         torque += fraction * samples[k, 6]
-    extra, still = data.stages[3], data.stages[2]
-    for i in range(still.shape[0]):
-        still[i] = 0.0  # without velocities the equation of motion has no terms but the load
-    body, load = model.rigid_body, Wrench(fx, fy, fz, mx, my, mz)
-    bend = bend_of(y, model.tower)
-    fill_impulse(load, y, bend, model.tower, still, extra, data.cache)
-    accelerate_turbine(
-        pose_in(still, body.plane), still, carried(load, bend), torque, data.added_mass, body, model.tower,
-        data.matrix, data.cache, extra,
-    )  # fmt: skip
-    for i in range(State.VX, State.ROTOR_SPEED + 1):
-        y[i] += dt * extra[i]
-    add_tower_steps(dt, extra, model.tower, y)
+    _push(dt, x, Wrench(fx, fy, fz, mx, my, mz), torque, model, model.structure, data, y)

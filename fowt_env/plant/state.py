@@ -117,6 +117,12 @@ NO_LOAD = Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
+def cross(ax, ay, az, bx, by, bz):
+    """Return the cross product a x b."""
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+@kernel
 def add(a, b):
     """Return the sum of two wrenches."""
     return Wrench(a.fx + b.fx, a.fy + b.fy, a.fz + b.fz, a.mx + b.mx, a.my + b.my, a.mz + b.mz)

@@ -12,9 +12,9 @@ import numpy as np
 
 from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.elastic.tower import add_modal, carried
 from fowt_env.plant.hydro.load import surface_at_origin, water_at
 from fowt_env.plant.state import State, Wrench, add, to_body, to_inertial
-from fowt_env.plant.tower.loads import add_modal, carried
 
 MOST_LOADS = 8
 
@@ -290,7 +290,7 @@ def add_modal_user_loads(bend, tower, user, data, modal):
         return
     for i in range(user.point.shape[0]):
         if user.above[i]:
-            add_modal(user_wrench(i, data.user), bend, tower, modal)
+            add_modal(user_wrench(i, data.user), bend, tower, data.rotor, modal)
 
 
 @kernel

@@ -7,17 +7,22 @@ modal coordinates q (m), and the shortening of the bent axis. All integrals are 
 elements (subroutine Coeff).
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from fowt_env.descriptions.blade_structure import SHAPES
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.blade_shape import blade_line
-from fowt_env.plant.elastic.beam import Beam
 from fowt_env.plant.elastic.blades import BladeModes, Point, Section
 from fowt_env.plant.state import BLADES
-from fowt_env.scene.tower import shape_values
+from fowt_env.scene.beam import (
+    BeamNodes,
+    Shapes,
+    integrated,
+    outer_part,
+    shape_values,
+    shapes_between,
+    summed,
+)
 
 MODES = {  # option blades: modes of each blade, from SHAPES
     "rigid": (),
@@ -47,6 +52,7 @@ def build_blade_modes(turbine, option, first_state, aero):
         cone_cosine=float(np.cos(rotor.cone)),
         cone_sine=float(np.sin(rotor.cone)),
         hub_radius=float(rotor.hub_radius),
+        spring=np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, beam.stiffness)),
         decay=_decay(beam, aero, turbine.rated_rotor_speed),
         tip=_point(shapes_at(turbine, option, [rotor.tip_radius])),
         inner=_section(turbine, option, SECTIONS[0], aero),
@@ -55,18 +61,17 @@ def build_blade_modes(turbine, option, first_state, aero):
 
 
 def _decay(beam, aero, rotor_speed):
-    """Return the (n, n) decay rates (1/s) of modal velocities by the lift of blades at a speed (rad/s).
+    """Return the (n, n) decay rates (1/s) of modal velocities: structural, and by lift at a speed (rad/s).
 
     A section that moves downwind by v has the angle of attack, in a flow of speed times radius, smaller by
-    their quotient. Zero without wind.
+    their quotient.
     """
-    n = len(beam.count)
-    if aero is None:
-        return np.zeros((n, n))
-    e = aero.rotor.elements
-    line = 0.5 * e.air_density * LIFT_SLOPE * e.chord * e.weight * rotor_speed * e.radius
-    damping = np.einsum("j,ji,jk->ik", line, e.modes.x, e.modes.x)
-    return np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, DAMPED * damping))
+    damping = beam.damping
+    if aero is not None:
+        e = aero.rotor.elements
+        line = 0.5 * e.air_density * LIFT_SLOPE * e.chord * e.weight * rotor_speed * e.radius
+        damping = damping + DAMPED * np.einsum("j,ji,jk->ik", line, e.modes.x, e.modes.x)
+    return np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, damping))
 
 
 def _point(shapes):
@@ -101,24 +106,6 @@ def _section(turbine, option, fraction, aero):
     )  # fmt: skip
 
 
-class Shapes(NamedTuple):
-    """Holds the shapes of n modes at m points of a beam, each per metre of a modal coordinate."""
-
-    U: np.ndarray  # (n, 2, m) -: deflection along x and y
-    slope: np.ndarray  # (n, 2, m) 1/m: derivative of the deflection along z
-    S: np.ndarray  # (n, n, m) 1/m: the beam is shorter by q S q / 2 up to the point
-
-
-class BeamNodes(NamedTuple):
-    """Holds the particles of a beam, from root to tip: the ends and the midpoints of the elements between."""
-
-    z: np.ndarray  # (m,) m from the beam's origin
-    outer: np.ndarray  # (m,) m, outer end of each element
-    length: np.ndarray  # (m,) m of each element, 0 at both ends
-    mass: np.ndarray  # (m,) kg
-    shapes: Shapes
-
-
 def blade_modes(turbine, modes):
     """Return the names of the modes of an option "modes" or "modes2". Raises: InputError."""
     if turbine.blade_structure is None:
@@ -148,35 +135,6 @@ def blade_beam(turbine, modes, station=None):
     return integrated(nodes, *_stiffness_and_damping(turbine, names))
 
 
-def integrated(nodes, stiffness, damping):
-    """Return the Beam of BeamNodes with (n, n) stiffness (N/m) and damping (N s/m)."""
-    m, z, (u1, u2), s = nodes.mass, nodes.z, np.swapaxes(nodes.shapes.U, 0, 1), nodes.shapes.S
-
-    def total(axes, *factors):
-        return np.ascontiguousarray(np.einsum(axes, *factors))
-
-    return Beam(
-        count=(0,) * len(u1),
-        mass=float(m.sum()),
-        first=float(m @ z),
-        second=float(m @ z**2),
-        a=u1 @ m,
-        b=u2 @ m,
-        e=u1 @ (m * z),
-        f=u2 @ (m * z),
-        A=total("k,ik,jk->ij", m, u1, u1),
-        B=total("k,ik,jk->ij", m, u2, u2),
-        C=total("k,ik,jk->ij", m, u1, u2),
-        S0=total("k,ijk->ij", m, s),
-        S1=total("k,ijk->ij", m * z, s),
-        P=total("k,ik,jlk->ijl", m, u1, s),
-        Q=total("k,ik,jlk->ijl", m, u2, s),
-        T=total("k,ijk,lnk->ijln", m, s, s),
-        stiffness=np.ascontiguousarray(stiffness),
-        damping=np.ascontiguousarray(damping),
-    )
-
-
 def blade_nodes(turbine, names=SHAPES):
     """Return the BeamNodes of one blade with the modes of these names: root, elements, tip.
 
@@ -188,28 +146,13 @@ def blade_nodes(turbine, names=SHAPES):
     twist = np.interp(x, structure.span_fraction, structure.structural_twist)
     flapwise, edgewise = [np.cos(twist), -np.sin(twist)], [np.sin(twist), np.cos(twist)]
     axes = np.array([edgewise if name.startswith("edge") else flapwise for name in names])
-    slope = _summed(curvature[:, None] * axes, length)
-    shape = _summed(slope[..., 1:-1], length)
-    shortening = _summed(np.einsum("iak,jak->ijk", slope, slope)[..., 1:-1], length)
+    slope = summed(curvature[:, None] * axes, length)
+    shape = summed(slope[..., 1:-1], length)
+    shortening = summed(np.einsum("iak,jak->ijk", slope, slope)[..., 1:-1], length)
     ends = np.concatenate([[0.0], np.full(len(x), length), [0.0]])
     z = np.concatenate([[rotor.hub_radius], lumps.radius])
     mass = np.concatenate([[0.0], lumps.mass])
     return BeamNodes(z, z + 0.5 * ends, ends, mass, Shapes(shape, slope, shortening))
-
-
-def outer_part(nodes, station):
-    """Return the BeamNodes outside of a station (m from the origin); a cut element by its outer part."""
-    inside = station - (nodes.outer - nodes.length)
-    share = np.ones_like(nodes.mass)
-    whole = nodes.length > 0.0
-    share[whole] = 1.0 - np.clip(inside[whole] / nodes.length[whole], 0.0, 1.0)
-    share[~whole] = nodes.z[~whole] >= station
-    z = np.where(share < 1.0, nodes.outer - 0.5 * share * nodes.length, nodes.z)
-
-    def moved(values):
-        return np.apply_along_axis(lambda row: np.interp(z, nodes.z, row), -1, values)
-
-    return nodes._replace(z=z, mass=share * nodes.mass, shapes=Shapes(*map(moved, nodes.shapes)))
 
 
 def shapes_at(turbine, modes, radii):
@@ -235,28 +178,6 @@ def station_bending(turbine, option):
     rotor = turbine.rotor
     line = blade_line(turbine.blade, rotor.hub_radius, rotor.tip_radius)
     return shapes_at(turbine, option, line.points[:, 2])
-
-
-def shapes_between(nodes, z):
-    """Return the Shapes of BeamNodes at distances z (m,) from the origin (shapes_at)."""
-    left = np.clip(np.searchsorted(nodes.z, z, side="right") - 1, 0, len(nodes.z) - 2)
-    weight = np.clip((z - nodes.z[left]) / (nodes.z[left + 1] - nodes.z[left]), 0.0, 1.0)
-    shape, slope, shortening = nodes.shapes
-    square = np.einsum("iak,jak->ijk", slope, slope)
-
-    def mixed(values, rates):
-        one, two = (values[..., k] + rates[..., k] * (z - nodes.z[k]) for k in (left, left + 1))
-        return (1.0 - weight) * one + weight * two
-
-    return Shapes(mixed(shape, slope), mixed(slope, np.zeros_like(slope)), mixed(shortening, square))
-
-
-def _summed(values, length):
-    """Return (..., m + 2) integrals of midpoint values (..., m) at the root, at the midpoints, at the tip."""
-    ends = np.cumsum(length * values, axis=-1)
-    root = np.zeros_like(values[..., :1])
-    middles = np.concatenate([root, ends[..., :-1]], axis=-1) + 0.5 * length * values
-    return np.concatenate([root, middles, ends[..., -1:]], axis=-1)
 
 
 def _elements(turbine, names):

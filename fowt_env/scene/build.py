@@ -17,7 +17,7 @@ from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.scene.actuators import build_actuator, build_converter, drive_states
 from fowt_env.scene.blade_beam import blade_states, build_blade_modes
 from fowt_env.scene.geometry import warn_of_geometry
-from fowt_env.scene.mass import build_layout, build_rigid_body, with_masses
+from fowt_env.scene.mass import build_layout, build_rigid_body
 from fowt_env.scene.options import checked_options, choose_parts, default_step, samples_per_step
 from fowt_env.scene.parts import (
     airfoil_states,
@@ -102,14 +102,13 @@ def build_scene(
     next_state = first_state + sum(load.states for load in user)
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
-    elastic = options["blades"] != "rigid" or options["shaft"] != "rigid"
-    tower = with_masses(tower, platform, turbine, hanging=not elastic)
     blades = build_blade_modes(turbine, options["blades"], next_state, aero)
     next_state += blade_states(blades)
     shaft = build_torsion(turbine, options, next_state)
     next_state += 0 if shaft is None else 2
     body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
-    dt = default_step(options, fastest_motion(tower, mooring, body))
+    structure = build_structure(platform, turbine, tower, blades, shaft)
+    dt = default_step(options, fastest_motion(options, tower, mooring, body, structure))
     aero = with_airfoil_step(aero, dt)
     pitches = None
     if options["pitch"] == "individual":
@@ -127,7 +126,7 @@ def build_scene(
         mooring = mooring._replace(dynamics=mooring.dynamics._replace(first=next_state))
     model = Model(
         rigid_body=body,
-        layout=build_layout(platform, turbine, pitches is not None, elastic),
+        layout=build_layout(platform, turbine, pitches is not None, structure is not None),
         drivetrain=build_drivetrain(turbine),
         actuator=actuator,
         generator=build_torque_limits(turbine.torque_law),
@@ -141,6 +140,6 @@ def build_scene(
         tower=tower,
         blades=blades,
         shaft=shaft,
-        structure=build_structure(platform, turbine, tower, blades, shaft),
+        structure=structure,
     )
     return Scene(model, platform, turbine, air.spec, sea, seed, rotor, options, air.speed, user, label)

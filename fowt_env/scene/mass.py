@@ -111,31 +111,6 @@ def _rigid_body(matrix, platform, rotor, fixed):
     )
 
 
-def with_masses(modes, platform, turbine, hanging=True):
-    """Return the TowerModes (or None) with the mass properties below and above the tower top.
-
-    Floater and straight tower are one rigid body, nacelle and rotor another, as in build_rigid_body.
-    hanging: whether the weight of nacelle and rotor is a load of the tower.
-    """
-    if modes is None:
-        return None
-    ballast, tower, *upper = _bodies(platform, turbine)
-    top = (0.0, 0.0, modes.top_height)
-    above = [(mass, np.subtract(centre, top), inertia) for mass, centre, inertia in upper]
-    matrix, tilt = assemble(above), turbine.rotor.shaft_tilt
-    moment = np.array([matrix[1, 5], -matrix[0, 5], matrix[0, 4]])
-    return modes._replace(
-        lower=np.ascontiguousarray(assemble([ballast, tower])),
-        straight=np.ascontiguousarray(assemble([tower])),
-        upper_mass=float(matrix[0, 0]),
-        upper_moment=moment,
-        upper_inertia=np.ascontiguousarray(matrix[3:, 3:]),
-        shaft=np.array([np.cos(tilt), 0.0, -np.sin(tilt)]),
-        hanging_mass=float(matrix[0, 0]) if hanging else 0.0,
-        hanging_moment=moment if hanging else np.zeros(3),
-    )
-
-
 def build_blade_masses(platform, turbine):
     """Return the BladeMasses of a turbine. Raises: InputError if the turbine file lacks them."""
     rotor = turbine.rotor

@@ -115,7 +115,7 @@ FIDELITIES = {
 # oscillation grows with a damping ratio of -0.5 % (heun) or -0.04 % (abm4)
 SLOW_GROWTH = 0.7
 LAG_MARGIN = 1.25  # ratio of the shortest lag to the limit of stability
-ELASTIC_STEP = 0.025  # s, largest default step with bending blades, whose flapping the wind damps strongly
+ELASTIC_STEP = 0.05  # s, largest default step with bending blades, whose flapping the wind damps strongly
 FIELD_SAMPLES = 3  # rotor loads per step in a wind box, whose cells the blades cross in 0.1 s
 
 

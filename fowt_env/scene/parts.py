@@ -30,6 +30,7 @@ from fowt_env.plant.hydro.morison import Current
 from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadrature
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
+from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.line_dynamics import build_line_dynamics, line_frequency
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import BLADES, N_RIGID
@@ -349,6 +350,8 @@ def build_moorings(platform, options):
     return mooring._replace(dynamics=dynamics, friction=np.zeros_like(mooring.friction))
 
 
-def fastest_motion(tower, mooring, body):
-    """Return the largest natural frequency (rad/s) of the structure: of its tower, or on moving lines."""
-    return max(tower_frequency(tower), line_frequency(mooring, body.mass))
+def fastest_motion(options, tower, mooring, body, structure):
+    """Return the largest natural frequency (rad/s) that steps resolve: of the tower, or on moving lines."""
+    swings = INTEGRATORS[options["integrator"]].swings
+    bending = 0.0 if swings else tower_frequency(tower, body, structure)
+    return max(bending, line_frequency(mooring, body.mass))

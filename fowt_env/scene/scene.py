@@ -12,6 +12,7 @@ from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.display import html_table
 from fowt_env.errors import InputError
+from fowt_env.plant.aero.bent_blade import place_entries
 from fowt_env.plant.aero.blade_shape import N_STATION_LOAD
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
@@ -186,11 +187,11 @@ class Scene:
             cache=np.zeros(N_CACHE),
             user=np.zeros(user_data_size(len(self.loads), most)),
             history=np.zeros((4, self.n_state)),
-            elastic=np.zeros((4, bending)),
+            elastic=np.zeros((4, blade_states(self.model.blades) // 2)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
-            rotor=rotor_scratch(self.model.structure, self.model.blades, self.n_state),
+            rotor=rotor_scratch(self.model.structure, self.model.tower, self.model.blades, self.n_state),
         )
 
     @property
@@ -199,7 +200,8 @@ class Scene:
         aero = self.model.aero
         if self.model.blades is None or aero is None:
             return N_BLADE_LOAD
-        return N_BLADE_LOAD + N_STATION_LOAD * len(aero.rotor.elements.radius)
+        elements = aero.rotor.elements
+        return N_BLADE_LOAD + N_STATION_LOAD * len(elements.radius) + place_entries(elements.modes)
 
     def handle(self, data: Data | None = None) -> Handle:
         """Return the model and data in the form that kernels take from Python."""
@@ -247,7 +249,8 @@ class Scene:
     def dt(self) -> float:
         """Return the default physics step (s) of the integrator; finer for fidelity, tower or lines."""
         model = self.model
-        return default_step(self.options, fastest_motion(model.tower, model.mooring, model.rigid_body))
+        parts = model.tower, model.mooring, model.rigid_body, model.structure
+        return default_step(self.options, fastest_motion(self.options, *parts))
 
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).

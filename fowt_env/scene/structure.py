@@ -10,11 +10,11 @@ from fowt_env.scene.mass import assemble, build_lower_body, nacelle_centre
 
 
 def build_structure(platform, turbine, tower, blades, shaft):
-    """Return the Structure of a turbine with BladeModes or a Torsion; None if both are None (rigid).
+    """Return the Structure of a turbine with TowerModes, BladeModes or a Torsion; None if all are None.
 
-    tower: TowerModes, or None: rigid. Raises: InputError for blades with more mass or inertia than the rotor.
+    Raises: InputError for blades with more mass or inertia than the rotor.
     """
-    if blades is None and shaft is None:
+    if tower is None and blades is None and shaft is None:
         return None
     rotor, nacelle, drivetrain = turbine.rotor, turbine.nacelle, turbine.drivetrain
     height = 0.0 if tower is None else tower.top_height

@@ -2,10 +2,11 @@
 
 import numpy as np
 
-from fowt_env.descriptions.tower_modes import POWERS
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.tower_drag import POINTS
-from fowt_env.plant.tower.modes import TowerModes
+from fowt_env.plant.elastic.tower import TowerModes
+from fowt_env.scene.beam import BeamNodes, Shapes, integrated, shape_values, summed
+from fowt_env.scene.mass import top_mass_matrix
 
 MODES = {"rigid": 0, "modes": 1, "modes2": 2}  # option tower: modes in each direction
 
@@ -28,15 +29,6 @@ def mode_shapes(modes, count):
     return shapes / shapes.sum(axis=1, keepdims=True), np.tile([True, False], count)
 
 
-def shape_values(shapes, fraction, derivative=0):
-    """Return (points, n) values of shapes, or of their derivatives, at height fractions."""
-    power, factor = POWERS.copy(), np.ones(len(POWERS))
-    for _ in range(derivative):
-        factor = factor * power
-        power = power - 1
-    return np.asarray(fraction)[:, None] ** power @ (shapes * factor).T
-
-
 def build_tower_modes(platform, turbine, count, first_state):
     """Return TowerModes with `count` modes in each direction, states from first_state on; None for count 0.
 
@@ -56,66 +48,81 @@ def build_tower_modes(platform, turbine, count, first_state):
     shapes, fore_aft = mode_shapes(bending, count)
     middle = bending.middles()
     cell = height / bending.elements
-    mass = cell * np.interp(middle, bending.height_fraction, bending.mass_density)
-    shape = shape_values(shapes, middle)
-    slope = shape_values(shapes, middle, 1) / height
     curvature = shape_values(shapes, middle, 2) / height**2
-    alike = np.equal.outer(fore_aft, fore_aft)
-    generalised = np.einsum("k,ki,kj->ij", mass, shape, shape)
     stiffness = _stiffness(bending, middle, curvature, fore_aft, cell, count)
-    # mass supported by each element: all mass above its midpoint
-    top = bending.top_mass + turbine.nacelle.mass + turbine.rotor.mass
+    nodes, generalised = _nodes(tower, shapes, fore_aft, middle, cell)
+    beam = integrated(nodes, stiffness, _damping(bending, stiffness, generalised, count))
+    slope = shape_values(shapes, [1.0], 1)[0] / height
+    shortening = np.ascontiguousarray(nodes.shapes.S[:, :, -1])
     drag_points = 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)  # points of build_tower_drag
-    above = mass[::-1].cumsum()[::-1] - 0.5 * mass + top
     return TowerModes(
         first=int(first_state),
-        fore_aft=fore_aft.astype(float),
         top_height=float(tower.top_height),
-        slope=shape_values(shapes, [1.0], 1)[0] / height,
-        first_moment=mass @ shape + bending.top_mass,
-        height_moment=(mass * (tower.base_height + height * middle)) @ shape
-        + bending.top_mass * tower.top_height,
-        mass=np.ascontiguousarray(generalised + bending.top_mass),
-        stiffness=np.ascontiguousarray(stiffness),
-        damping=np.ascontiguousarray(_damping(bending, stiffness, generalised, count)),
-        weight_stiffness=np.where(alike, np.einsum("k,ki,kj->ij", cell * above, slope, slope), 0.0),
+        slope=slope,
+        shortening=shortening,
+        beam=beam._replace(mass=0.0, first=0.0, second=0.0),
         drag_shape=np.ascontiguousarray(shape_values(shapes, drag_points)),
-        count=(0,) * len(shapes),
+        **stiffness_roots(stiffness - _softening(platform, turbine, beam, slope, shortening)),
     )
+
+
+def _nodes(tower, shapes, fore_aft, middle, cell):
+    """Return the BeamNodes of a tower, elements and the mass at the top, and (n, n) modal mass without that.
+
+    The shortening is a sum of half elements, as ElastoDyn's.
+    """
+    bending, height = tower.modes, tower.top_height - tower.base_height
+    at = np.append(middle, 1.0)
+    mass = cell * np.interp(middle, bending.height_fraction, bending.mass_density)
+    values, slope = shape_values(shapes, at).T, shape_values(shapes, at, 1).T / height
+    axes = np.column_stack([fore_aft, ~fore_aft]).astype(float)  # (n, 2)
+    U, turned = values[:, None] * axes[..., None], slope[:, None] * axes[..., None]
+    S = summed(np.einsum("iak,jak->ijk", turned, turned)[..., :-1], cell)[..., 1:]
+    length = np.append(np.full(len(middle), cell), 0.0)
+    z = tower.base_height + height * at
+    nodes = BeamNodes(z, z + 0.5 * length, length, np.append(mass, bending.top_mass), Shapes(U, turned, S))
+    return nodes, np.einsum("k,ik,jk->ij", mass, values[:, :-1], values[:, :-1])
+
+
+def _softening(platform, turbine, beam, slope, shortening):
+    """Return the (n, n) stiffness, N/m, that the weight takes from an upright tower."""
+    top, along = top_mass_matrix(platform, turbine), np.arange(len(slope)) % 2
+    arm = top[0, 4] / top[0, 0] - platform.tower.top_height  # of nacelle and rotor above the tower top
+    tilting = arm * np.outer(slope, slope) * np.equal.outer(along, along)
+    return platform.environment.gravity * (beam.S0 + top[0, 0] * (shortening + tilting))
+
+
+def stiffness_roots(stiffness):
+    """Return root and flexible_root of TowerModes for an (n, n) stiffness, that of the weight included."""
+    root = np.linalg.cholesky(stiffness)
+    return {"root": root, "flexible_root": np.ascontiguousarray(np.linalg.inv(root.T))}
 
 
 def tower_states(modes):
     """Return the number of states of TowerModes or None: deflections and their velocities."""
-    return 0 if modes is None else 2 * modes.slope.shape[0]
+    return 0 if modes is None else 2 * len(modes.beam.count)
 
 
-def tower_frequency(modes):
+def tower_frequency(modes, body, structure):
     """Return the largest natural frequency (rad/s) of TowerModes on the dry floater; 0 for None (rigid).
 
-    Straight tower and fixed rotor, without added mass and weight, which would lower the frequency.
+    Straight tower and fixed rotor, without added mass and weight, which would lower the frequency. body: the
+    RigidBody of the whole turbine.
     """
     if modes is None:
         return 0.0
-    n, along = len(modes.slope), modes.fore_aft
-    across, height, first = 1.0 - along, modes.top_height, modes.upper_moment
-    cross = np.cross(np.eye(3), first)
-    upper = np.block([[modes.upper_mass * np.eye(3), -cross], [cross, modes.upper_inertia]])
-    # velocity and angular velocity of the tower top, from six platform motions and the deflections
-    moved = np.zeros((6, 6 + n))
-    moved[:, :6] = np.eye(6)
-    moved[0, 4], moved[1, 3] = height, -height
-    moved[[0, 1], 6:] = along, across
-    moved[[3, 4], 6:] = -across * modes.slope, along * modes.slope
-    mass = moved.T @ upper @ moved
-    mass[:6, :6] += modes.lower
-    tower = np.zeros((6, n))
-    tower[0], tower[1] = along * modes.first_moment, across * modes.first_moment
-    tower[3], tower[4] = -across * modes.height_moment, along * modes.height_moment
-    mass[:6, 6:] += tower
-    mass[6:, :6] += tower.T
-    mass[6:, 6:] += modes.mass * (np.outer(along, along) + np.outer(across, across))
+    beam, n, height, slope = modes.beam, len(modes.slope), modes.top_height, modes.slope
+    along = np.arange(n) % 2 == 0
+    # velocity of the body origin as a point of the nacelle, and angular velocity
+    moved = np.hstack([np.eye(6), np.zeros((6, n))])
+    moved[0, 6:], moved[1, 6:] = along * (1.0 - slope * height), ~along * (1.0 - slope * height)
+    moved[3, 6:], moved[4, 6:] = -slope * ~along, slope * along
+    lower, coupling = structure.lower.mass_matrix, np.zeros((6, n))
+    coupling[0], coupling[1], coupling[3], coupling[4] = beam.a, beam.b, -beam.f, beam.e
+    mass = moved.T @ (body.mass_matrix - lower) @ moved
+    mass += np.block([[lower, coupling], [coupling.T, beam.A + beam.B]])
     flexibility = np.linalg.inv(mass)[6:, 6:]
-    return float(np.sqrt(np.linalg.eigvals(flexibility @ modes.stiffness).real.max()))
+    return float(np.sqrt(np.linalg.eigvals(flexibility @ beam.stiffness).real.max()))
 
 
 def _stiffness(bending, middle, curvature, fore_aft, cell, count):

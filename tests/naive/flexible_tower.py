@@ -85,7 +85,7 @@ class Tower:
     top: float  # m
     stiffness: np.ndarray
     damping: np.ndarray
-    weight_stiffness: np.ndarray
+    shortening: np.ndarray  # (k, n, n) 1/m: a lump sinks by q S q / 2; the last lump is the top
 
 
 class Turbine:
@@ -140,7 +140,15 @@ class Turbine:
         x, y, z = turned(1, a, turned(0, b, [point[0], point[1], point[2] + Path(-self.tower.top)]))
         for i in range(self.n):
             x, y = (x + c[7 + i], y) if i % 2 == 0 else (x, y + c[7 + i])
-        return self.on_platform(c, [x, y, z + self.tower.top])
+        return self.on_platform(c, [x, y, z + self.tower.top - self.sunk(c, self.tower.shortening[-1])])
+
+    def sunk(self, c, shortening):
+        """How far a lump, or (k,) of them, have sunk along the tower's axis."""
+        total = Path(0.0 * shortening[..., 0, 0])
+        for i in range(self.n):
+            for j in range(self.n):
+                total = total + c[7 + i] * c[7 + j] * (0.5 * shortening[..., i, j])
+        return total
 
     def on_shaft(self, c, point, centre, turns):
         point = turned(1, Path(-self.tilt), point)
@@ -157,24 +165,22 @@ class Turbine:
         return [
             (self.floater[0], self.on_platform(c, columns(self.floater[1]))),
             (self.straight[0], self.on_platform(c, columns(self.straight[1]))),
-            (tower.mass, self.on_platform(c, [x, y, Path(tower.height)])),
+            (tower.mass, self.on_platform(c, [x, y, Path(tower.height) - self.sunk(c, tower.shortening)])),
             (self.nacelle[0], self.on_nacelle(c, columns(self.nacelle[1]))),
             (self.rotor[0], self.on_shaft(c, columns(self.rotor[1]), self.hub, 1.0)),
             (self.wheel[0], self.on_shaft(c, columns(self.wheel[1]), SPIN_CENTRE, self.ratio)),
         ]
 
     def potential(self, c):
-        """Path of the potential energy: weight, shortening of the tower, its structure."""
+        """Path of the potential energy: weight, structure of the tower."""
         total = Path(0.0)
         for masses, (_, _, Z) in self.bodies(c):
             parts = (np.asarray(part) * masses for part in (Z.value, Z.first, Z.second))
             total = total + Path(*(np.sum(part, axis=-1, keepdims=True) for part in parts)) * self.gravity
-        upright = self.on_platform([Path(0.0)] * 3 + c[3:], [Path(0.0), Path(0.0), Path(1.0)])[2]
         for i in range(self.n):
             for j in range(self.n):
                 square = c[7 + i] * c[7 + j] * 0.5
-                fall = upright * (self.gravity * self.tower.weight_stiffness[i, j])
-                total = total + square * self.tower.stiffness[i, j] - square * fall
+                total = total + square * self.tower.stiffness[i, j]
         return total
 
     def kinetic(self, c):
@@ -249,9 +255,6 @@ class Turbine:
                 frame = self.frame(falling, True)[0]
                 force += frame @ push
                 moment += np.cross(at - foot, frame @ push) + frame @ turn
-        q = np.array([c.value for c in falling[7:]])
-        fall = 0.5 * q @ self.tower.weight_stiffness @ q  # kg m, along the tower's axis
-        moment += np.cross(-fall * R[:, 2], -self.gravity * up)
         return np.r_[R.T @ force, R.T @ moment]
 
     def carry(self, aloft):

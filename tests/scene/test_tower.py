@@ -42,38 +42,45 @@ def test_a_uniform_tower_has_the_integrals_of_its_powers(uniform):
     """Fore-aft x^2 and 3 x^3 - 2 x^2, side-side x^3 and x^2, of the height fraction x."""
     found, carried = uniform
     length = TOP - BASE
-    assert found.first == 15 and list(found.fore_aft) == [1.0, 0.0, 1.0, 0.0]
+    beam, fore_aft = found.beam, np.array([1.0, 0.0, 1.0, 0.0])
+    assert (found.first, beam.mass, beam.first, beam.second) == (15, 0.0, 0.0, 0.0)
     assert found.slope * length == pytest.approx([2.0, 3.0, 5.0, 2.0])
     means = np.array([1 / 3, 1 / 4, 3 / 4 - 2 / 3, 1 / 3])  # of the shapes
-    assert found.first_moment == pytest.approx(LINE * length * means + BEARING, rel=3e-6)
+    first = LINE * length * means + BEARING
+    assert (beam.a, beam.b) == (
+        pytest.approx(fore_aft * first, rel=3e-6),
+        pytest.approx((1.0 - fore_aft) * first, rel=3e-6),
+    )
     moments = BASE * means + length * np.array([1 / 4, 1 / 5, 3 / 5 - 2 / 4, 1 / 4])
-    assert found.height_moment == pytest.approx(LINE * length * moments + BEARING * TOP, rel=3e-6)
-    assert found.mass[0, :2] == pytest.approx(LINE * length * np.array([1 / 5, 1 / 6]) + BEARING, rel=3e-6)
-    assert found.mass[2, 2] == pytest.approx(LINE * length * (9 / 7 - 12 / 6 + 4 / 5) + BEARING, rel=3e-6)
+    assert beam.e + beam.f == pytest.approx(LINE * length * moments + BEARING * TOP, rel=3e-6)
+    assert beam.A[0, 0] == pytest.approx(LINE * length / 5 + BEARING, rel=3e-6)
+    assert beam.C[0, 1] == pytest.approx(LINE * length / 6 + BEARING, rel=3e-6)
+    assert beam.A[2, 2] == pytest.approx(LINE * length * (9 / 7 - 12 / 6 + 4 / 5) + BEARING, rel=3e-6)
     # curvatures 2, 6 x, 18 x - 4, 2 over the length squared; tuners 4 and 9
     stiffness = np.zeros((4, 4))
     stiffness[np.ix_((0, 2), (0, 2))] = [[4 * 4, 6 * 10], [6 * 10, 9 * 52]]
     stiffness[np.ix_((1, 3), (1, 3))] = [[2 * 12, 2 * 6], [2 * 6, 2 * 4]]
-    assert found.stiffness == pytest.approx(EI / length**3 * stiffness, rel=3e-6, abs=1e-3)
+    assert beam.stiffness == pytest.approx(EI / length**3 * stiffness, rel=3e-6, abs=1e-3)
     # slopes 2 x, 3 x^2, 9 x^2 - 4 x, 2 x over the length
     first = (carried + BEARING) * 4 / 3 + LINE * length * 4 * (1 / 3 - 1 / 4)
     cross = (carried + BEARING) * 3 / 2 + LINE * length * 6 * (1 / 4 - 1 / 5)
-    assert found.weight_stiffness[0, 0] * length == pytest.approx(first, rel=3e-6)
-    assert found.weight_stiffness[1, 3] * length == pytest.approx(cross, rel=3e-6)
-    assert not found.weight_stiffness[0, 1] and not found.weight_stiffness[2, 3]
+    weight = beam.S0 + carried * found.shortening
+    assert weight[0, 0] * length == pytest.approx(first, rel=3e-6)
+    assert weight[1, 3] * length == pytest.approx(cross, rel=3e-6)
+    assert not weight[0, 1] and not weight[2, 3]
 
 
 def test_structural_damping_is_of_the_bare_tower(uniform):
     """ElastoDyn's: 2 zeta K / omega, omega of the second mode without weight and without mass on the top."""
-    found, _ = uniform
+    beam = uniform[0].beam
     for i, j, ratio, part in (
         (0, 0, 0.01, 1 / 5),
         (2, 0, 0.01, 1 / 5),
         (1, 1, 0.03, 1 / 7),
         (1, 3, 0.04, 1 / 5),
     ):
-        omega = np.sqrt(found.stiffness[j, j] / (LINE * (TOP - BASE) * part))
-        assert found.damping[i, j] == pytest.approx(2.0 * ratio * found.stiffness[i, j] / omega, rel=3e-6)
+        omega = np.sqrt(beam.stiffness[j, j] / (LINE * (TOP - BASE) * part))
+        assert beam.damping[i, j] == pytest.approx(2.0 * ratio * beam.stiffness[i, j] / omega, rel=3e-6)
 
 
 def test_shapes_at_the_points_of_the_tower_drag_are_those_at_their_heights(uniform):

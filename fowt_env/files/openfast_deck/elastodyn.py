@@ -104,9 +104,7 @@ def read_elastodyn(path, folders=()):
     flexible = [what for key, what in FLEXIBLE.items() if file.flag(key, default=False)]
     notes = [row for part in (file, blade_file, tower_file) for row in differences(part)]
     shaft = _shaft(file)
-    return ElastoDyn(
-        file, values, blades, blade, tower, structure, shaft, bending, products, flexible, notes
-    )
+    return ElastoDyn(file, values, blades, blade, tower, structure, shaft, bending, products, flexible, notes)
 
 
 def _distributed(file, count_key, first, *columns):

@@ -404,8 +404,7 @@ MOORDYN = _keys(
     " AttachA AttachB UnstrLen NumSegs BA Cd CdAx CaAx kBot kB cBot cB",
     {
         OUTPUT: "Echo WriteLog WriteUnits OutSwitch dtOut DisableOutTime DisableOutput Outputs",
-        STEPS: "dtM tScheme cfl dtIC TmaxIC ICDfac CdScaleIC threshIC ICgenDynamic inertialF"
-        " inertialF_rampT",
+        STEPS: "dtM tScheme cfl dtIC TmaxIC ICDfac CdScaleIC threshIC ICgenDynamic inertialF inertialF_rampT",
         _LINE: "dF cF mc cv FricDamp",
     },
     EI=Otherwise(0, "bending stiffness of lines", "none"),

@@ -5,7 +5,7 @@ out between the tip-speed ratios FAST_ROTOR and SLOW_ROTOR (as in AeroDyn); belo
 induction, at any angle of attack.
 """
 
-from fowt_env.plant.aero.blade_shape import turn_of
+from fowt_env.plant.aero.blade_shape import place_stations, turn_of
 from fowt_env.plant.aero.blade_sweep import (
     NO_ROTOR_LOAD,
     Blade,
@@ -51,6 +51,7 @@ def rotor_load(t, pose, x, now, series, field, rotor, skew, wake, dx, counters, 
     for number in range(rotor.blades):
         motion, turn = motion_of(number, x, rotor, flow), turn_of(pitch_of(number, x, pitches))
         shape = shape_of(number, x, rotor.shape, rotor.modes, blades)
+        place_stations(turn, shape)
         airfoils = airfoil_blade(number, turn.pitch, shape, rotor, rotor.airfoils, x, dx)
         response = Solved(
             number, turn, motion, shape, induction, wind_speed, skewed, skew, wake, airfoils, x, dx, counters,

@@ -80,7 +80,7 @@ class BladeElements(NamedTuple):
     polars: Polars
     shape: object  # blade_shape.BladeShape, or None: straight blades in the rotor plane
     guess: np.ndarray  # (n, GUESSES, GUESSES) float32 rad, initial inflow angles; see first_guess
-    modes: object = None  # blade_shape.StationModes, or None: blades that do not bend
+    modes: object = None  # bent_blade.StationModes, or None: blades that do not bend
     airfoils: object = None  # unsteady_airfoil.UnsteadyAirfoils, or None: quasi-steady
     tower: object = None  # tower_influence.TowerInfluence on the wind of the blades, or None
 
@@ -624,7 +624,7 @@ def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=
         arms = first / area[:, None]
         shape = build_blade_shape(turbine, line, chosen, arms[:, :3], np.concatenate(moments))
         if bending is not None:
-            modes = build_station_modes(line, bending, chosen, arms[:, 3:])
+            modes = build_station_modes(line, bending, chosen, arms[:, 3:], shape)
         along, end = line.length[1:-1][chosen], line.length[-1]
         apart = np.hypot(shape.cone_cosine * radius + shape.cone_sine * shape.prebend, shape.sweep)
         moment = area * shape.arm_distance

@@ -13,6 +13,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.bent_blade import (
+    ACROSS,
+    ALONG,
+    ARM_R,
+    ARM_X,
+    NR,
+    NX,
+    T_NR,
+    T_NX,
+    TURN,
+    V_NORMAL,
+    V_T,
+    BentShape,
+    R,
+    StationModes,
+    T,
+    X,
+    constants,
+    place_all,
+    placed,
+)
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import Wrench
@@ -36,36 +57,6 @@ class BladeShape(NamedTuple):
 
 
 N_STATION_LOAD = 3  # entries of the loads of a station
-
-
-class StationModes(NamedTuple):
-    """Holds shapes of a blade's n bending modes at m stations, each per metre of a modal coordinate.
-
-    x: normal to the cone at zero pitch, downwind; y: against the rotation at zero pitch.
-    """
-
-    first: int  # index in the state of the first blade's first deflection, set by the scene
-    count: tuple  # n zeros: a tuple, so that n is known at compile time
-    x: np.ndarray  # (m, n)
-    y: np.ndarray
-    slope_x: np.ndarray  # (m, n) 1/m, derivatives along the pitch axis
-    slope_y: np.ndarray
-    axial: np.ndarray  # (m, n) the station moves towards the root by axial q + q S q / 2
-    shortening: np.ndarray  # (m, n, n) S, 1/m
-    load_x: np.ndarray  # (m, n) the same three for the point where the load of the station acts
-    load_y: np.ndarray
-    load_axial: np.ndarray
-    load_shortening: np.ndarray  # (m, n, n)
-
-
-class BentShape(NamedTuple):
-    """Describes one blade that bends, in a state."""
-
-    rest: BladeShape
-    modes: StationModes
-    q: np.ndarray  # (n,) m, deflections
-    v: np.ndarray  # (n,) m/s
-    loads: np.ndarray  # output: N_STATION_LOAD entries for each station, see put_station
 
 
 class OnAxis(NamedTuple):
@@ -92,19 +83,8 @@ class BentStation(NamedTuple):
     t: float
     nx: float  # normal of the blade axis, as in Station
     nr: float
-    vx: float  # m/s
-    vr: float
+    v_normal: float  # m/s
     vt: float
-
-
-class Attitude(NamedTuple):
-    """Holds the direction of a section of a bent blade, by products with the normal of the coned blade."""
-
-    lean: (
-        float  # of the blade axis: sine of its angle to the pitch axis, in the plane of shaft and pitch axis
-    )
-    across: float  # of the section's axes at zero twist, against the rotation and downwind
-    along: float
 
 
 class Plane(NamedTuple):
@@ -194,8 +174,7 @@ def _pitch_of_curved(j, blade_pitch, shape):
 
 @kernel
 def _pitch_of_bent(j, blade_pitch, shape):
-    at = bent_attitude(j, turn_of(blade_pitch), shape)
-    return atan2(at.across, at.along)
+    return atan2(placed(j, ACROSS, shape), placed(j, ALONG, shape))
 
 
 @kernel
@@ -228,92 +207,31 @@ def curved_station(j, turn, radius, shape):
 
 
 @inlined_kernel
-def attitude_of(sine, ahead, side, turn):
-    """Return the Attitude of a section of a bent blade.
-
-    sine: of the slope of prebend; ahead, side: slopes by bending, rotations of ElastoDyn about pitched axes,
-    which are components of a rotation vector to second order (SmllRotTrans), so that both together twist the
-    section, as AeroDyn sees it.
-    """
-    c, s = turn.cosine, turn.sine
-    cosine, both = sqrt(1.0 - sine * sine), 0.5 * ahead * side
-    w = sqrt(1.0 - 0.25 * (ahead * ahead + side * side))
-    level, lift = 1.0 - 0.5 * ahead * ahead, ahead * w
-    return Attitude(
-        c * (sine * level + cosine * lift) + s * (cosine * side * w - sine * both),
-        s * (1.0 - 0.5 * side * side) - c * both,
-        c * (cosine * level - sine * lift) - s * (cosine * both + sine * side * w),
-    )
-
-
-@inlined_kernel
-def bent_attitude(j, turn, shape):
-    """Return the Attitude of station j of a blade that bends."""
-    m, ahead, side = shape.modes, 0.0, 0.0
-    for i in range(len(m.count)):
-        ahead += m.slope_x[j, i] * shape.q[i]
-        side += m.slope_y[j, i] * shape.q[i]
-    return attitude_of(shape.rest.slope[j], ahead, side, turn)
-
-
-@inlined_kernel
-def bent_station(j, turn, radius, shape):
-    """Return the BentStation j of a blade that bends."""
-    rest, m, q, v = shape.rest, shape.modes, shape.q, shape.v
-    px, py, z, ahead, side = rest.prebend[j], rest.sweep[j], rest.distance[j], 0.0, 0.0
-    vx = vy = vz = back = turning_x = turning_y = 0.0
-    for i in range(len(m.count)):
-        shorter = m.axial[j, i]
-        for k in range(len(m.count)):
-            shorter += m.shortening[j, i, k] * q[k]
-        px += m.x[j, i] * q[i]
-        py += m.y[j, i] * q[i]
-        z -= 0.5 * (shorter + m.axial[j, i]) * q[i]
-        back += m.axial[j, i] * q[i]
-        ahead += m.slope_x[j, i] * q[i]
-        side += m.slope_y[j, i] * q[i]
-        vx += m.x[j, i] * v[i]
-        vy += m.y[j, i] * v[i]
-        vz -= shorter * v[i]
-        turning_x += m.slope_x[j, i] * v[i]
-        turning_y += m.slope_y[j, i] * v[i]
-    px, py = px - 0.5 * ahead * back, py - 0.5 * side * back  # rotation of prebend and sweep, second order
-    vx, vy = vx - turning_x * back, vy - turning_y * back
-    c, s, cosine, sine = turn.cosine, turn.sine, rest.cone_cosine, rest.cone_sine
-    out, flapping = c * px + s * py, c * vx + s * vy
-    lean = attitude_of(rest.slope[j], ahead, side, turn).lean
-    up = sqrt(1.0 - lean * lean)
+def _bent_station(j, turn, radius, shape):
     return BentStation(
-        cosine * out - sine * z, cosine * z + sine * out, s * px - c * py,
-        up * cosine + lean * sine, up * sine - lean * cosine,
-        cosine * flapping - sine * vz, cosine * vz + sine * flapping, s * vx - c * vy,
+        placed(j, X, shape), placed(j, R, shape), placed(j, T, shape), placed(j, NX, shape),
+        placed(j, NR, shape), placed(j, V_NORMAL, shape), placed(j, V_T, shape),
     )  # fmt: skip
 
 
 @inlined_kernel
-def bent_lever(j, turn, shape):
+def bent_lever(j, shape):
     """Return the Lever of station j of a blade that bends."""
-    rest, m, q = shape.rest, shape.modes, shape.q
-    px, py, z = rest.arm_prebend[j], rest.arm_sweep[j], rest.arm_distance[j]
-    ahead = side = back = 0.0
-    for i in range(len(m.count)):
-        shorter = 2.0 * m.load_axial[j, i]
-        for k in range(len(m.count)):
-            shorter += m.load_shortening[j, i, k] * q[k]
-        px += m.load_x[j, i] * q[i]
-        py += m.load_y[j, i] * q[i]
-        z -= 0.5 * shorter * q[i]
-        back += m.load_axial[j, i] * q[i]
-        ahead += m.slope_x[j, i] * q[i]
-        side += m.slope_y[j, i] * q[i]
-    px, py = px - 0.5 * ahead * back, py - 0.5 * side * back
-    c, s, cosine, sine = turn.cosine, turn.sine, rest.cone_cosine, rest.cone_sine
-    lean = attitude_of(rest.slope[j], ahead, side, turn).lean
-    up = sqrt(1.0 - lean * lean)
-    nx, nr = up * cosine + lean * sine, up * sine - lean * cosine
-    out = c * px + s * py
-    x, r, t = cosine * out - sine * z, cosine * z + sine * out, s * px - c * py
-    return Lever(nx, nr, x * nr - r * nx, t * nx, t * nr, x, r)
+    return Lever(
+        placed(j, NX, shape), placed(j, NR, shape), placed(j, TURN, shape), placed(j, T_NX, shape),
+        placed(j, T_NR, shape), placed(j, ARM_X, shape), placed(j, ARM_R, shape),
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _already_placed(turn, shape):
+    return
+
+
+@inlined_kernel
+def _place_bent(turn, shape):
+    modes, rest = shape.modes, shape.rest
+    place_all(turn, modes, shape.places, shape.q, shape.v, rest.cone_cosine, rest.cone_sine)
 
 
 @inlined_kernel
@@ -360,7 +278,7 @@ def _along_normal(along, out, at):
 
 @inlined_kernel
 def _along_bent_normal(along, out, at):
-    return at.nx * (along - at.vx) + at.nr * (out - at.vr)
+    return at.nx * along + at.nr * out - at.v_normal
 
 
 @inlined_kernel
@@ -379,7 +297,7 @@ def _add_to_curved(load, part, j, turn, shape):
 
 @inlined_kernel
 def _add_to_bent(load, part, j, turn, shape):
-    return _add_by_lever(load, part, bent_lever(j, turn, shape))
+    return _add_by_lever(load, part, bent_lever(j, shape))
 
 
 @inlined_kernel
@@ -414,10 +332,16 @@ def _keep_station(part, j, shape):
 effective_pitch = chosen_by_class(
     "shape", {type(None): _pitch_on_axis, BladeShape: _pitch_of_curved, BentShape: _pitch_of_bent}
 )
+# (turn, shape): positions of all stations of a blade that bends at a Turn, which the functions below read
+place_stations = chosen_by_class(
+    "shape",
+    {type(None): _already_placed, BladeShape: _already_placed, BentShape: _place_bent},
+    inlined=True,
+)
 # (j, turn, radius, shape) -> position of station j: OnAxis, Station or BentStation
 station_at = chosen_by_class(
     "shape",
-    {type(None): _station_on_axis, BladeShape: curved_station, BentShape: bent_station},
+    {type(None): _station_on_axis, BladeShape: curved_station, BentShape: _bent_station},
     inlined=True,
 )
 # (part, j, shape): StationLoad of a blade that bends into its loads: normal, tangential, pitching moment
@@ -552,14 +476,19 @@ def _parts_of_columns(columns, count):
     return *parts[:3], parts[3].reshape(-1, count, count)
 
 
-def build_station_modes(line, shapes, chosen, arms):
-    """Return the StationModes of chosen stations of a BladeLine; arms: modal_columns where loads act."""
+def build_station_modes(line, shapes, chosen, arms, shape):
+    """Return the StationModes of chosen stations of a BladeLine and their BladeShape.
+
+    arms: modal_columns where loads act.
+    """
     count = len(shapes.U)
     here = _parts_of_columns(modal_columns(line, shapes)[1:-1][chosen], count)
     slopes = (shapes.slope[:, k, 1:-1][:, chosen].T for k in range(2))
     x, y, axial, shortening = here
     parts = (x, y, *slopes, axial, shortening, *_parts_of_columns(arms, count))
-    return StationModes(0, (0,) * count, *(np.ascontiguousarray(part, dtype=np.float64) for part in parts))
+    parts = (np.ascontiguousarray(part, dtype=np.float64) for part in parts)
+    modes = StationModes(0, (0,) * count, *parts, np.zeros(0))
+    return modes._replace(table=constants(shape, modes))
 
 
 def arms_of(modes):

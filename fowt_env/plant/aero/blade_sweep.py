@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.bent_blade import BentShape, StationModes
 from fowt_env.plant.aero.blade_elements import smoothstep
 from fowt_env.plant.aero.blade_shape import (
-    BentShape,
+    N_STATION_LOAD,
     BladeLoad,
     BladeMotion,
     BladeShape,
     Plane,
-    StationModes,
     Turn,
     add_station,
     blade_motion,
@@ -95,7 +95,7 @@ class Blade(NamedTuple):
     number: int  # 0, 1, ...
     motion: BladeMotion
     turn: Turn
-    shape: object  # blade_shape.BladeShape or BentShape, or None: straight in the rotor plane
+    shape: object  # BladeShape or BentShape, or None: straight in the rotor plane
     response: object  # of station_response.py
     near: object  # RotorFlow if the tower disturbs the wind, else None
 
@@ -436,7 +436,9 @@ def _bent_by_modes(number, x, shape, modes, blades):
     n = len(modes.count)
     q = modes.first + n * number
     v = q + BLADES * n
-    return BentShape(shape, modes, x[q : q + n], x[v : v + n], blades[number, N_BLADE_LOAD:])
+    row = blades[number, N_BLADE_LOAD:]
+    m = N_STATION_LOAD * modes.x.shape[0]
+    return BentShape(shape, modes, x[q : q + n], x[v : v + n], row[:m], row[m:])
 
 
 # (number, x, shape, modes, blades) -> shape of a blade (0, 1, ...) in a state

@@ -13,10 +13,10 @@ from fowt_env.plant.aero.wake import PER_ELEMENT
 from fowt_env.plant.aero.wind import WindSeries, wind_at, wind_now
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.elastic.tower import TowerModes
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import NO_LOAD, State, Wrench
 from fowt_env.plant.tilt import rotor_pose, to_body_axes
-from fowt_env.plant.tower.modes import TowerModes
 
 
 class BemRotor(NamedTuple):

@@ -20,7 +20,7 @@ from fowt_env.plant.aero.blade_elements import (
     element_of,
     elements_key,
 )
-from fowt_env.plant.aero.blade_shape import effective_pitch, turn_of
+from fowt_env.plant.aero.blade_shape import effective_pitch, place_stations, turn_of
 from fowt_env.plant.aero.blade_sweep import (
     NO_ROTOR_LOAD,
     Blade,
@@ -183,6 +183,7 @@ def _blade(number, first, x, flow, rate, skewed, rotor, dx, pitches, blades):
     elements = rotor.elements
     shape = shape_of(number, x, elements.shape, elements.modes, blades)
     turn, induced, load = _blade_rows(number, first, x, shape, rotor, pitches)
+    place_stations(turn, shape)
     motion = motion_of(number, x, elements, flow)
     of_blade = blade_skew(skewed, rotor.skew, motion, elements)
     airfoils = airfoil_blade(number, turn.pitch, shape, elements, elements.airfoils, x, dx)

@@ -21,7 +21,7 @@ from fowt_env.plant.aero.blade_elements import (
     elements_key,
     pitching_moment,
 )
-from fowt_env.plant.aero.blade_shape import effective_pitch, turn_of
+from fowt_env.plant.aero.blade_shape import effective_pitch, place_stations, turn_of
 from fowt_env.plant.aero.blade_sweep import (
     NO_ROTOR_LOAD,
     UNKNOWN_FORCE,
@@ -172,6 +172,7 @@ def tabled_blade(number, first, x, flow, table, pitches, blades):
     elements = table.elements
     shape = shape_of(number, x, elements.shape, elements.modes, blades)
     turn, response = _blade_response(number, first, x, shape, table, pitches)
+    place_stations(turn, shape)
     near = near_tower(flow, flow.tower)
     return Blade(number, motion_of(number, x, elements, flow), turn, shape, response, near)
 

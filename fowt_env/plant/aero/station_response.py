@@ -10,11 +10,12 @@ class of the response:
 * Lagging: as Induced, with the states of dynamic inflow.
 """
 
-from math import pi, sqrt
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.plant.aero.bent_blade import CHANGE, BentShape, placed
 from fowt_env.plant.aero.blade_elements import (
     LARGEST_SPEED,
     BladeElements,
@@ -26,12 +27,10 @@ from fowt_env.plant.aero.blade_elements import (
     solve_section,
 )
 from fowt_env.plant.aero.blade_shape import (
-    BentShape,
     BladeMotion,
     BladeShape,
     StationLoad,
     Turn,
-    bent_attitude,
     effective_pitch,
 )
 from fowt_env.plant.aero.unsteady_airfoil import unsteady_load
@@ -253,11 +252,7 @@ def _same_rows(j, rows, shape):
 @inlined_kernel
 def _rows_at_station(j, rows, shape):
     """Return the Rows at the pitch that gives a section without bending the effective pitch of station j."""
-    turn, table, s = rows.turn, rows.table, shape.rest.slope[j]
-    at = bent_attitude(j, turn, shape)
-    across = sqrt(1.0 - s * s) * at.across
-    change = (across * turn.cosine - at.along * turn.sine) / (at.along * turn.cosine + across * turn.sine)
-    change -= change * change * change / 3.0  # of its tangent, a few hundredths
+    turn, table, change = rows.turn, rows.table, placed(j, CHANGE, shape)
     low, high = DENSE_START * pi / 180.0, COARSE_END * pi / 180.0 - 1e-9
     row = pitch_row(min(max(turn.pitch + change, low), high))
     i = int(row) if row > 0.0 else 0

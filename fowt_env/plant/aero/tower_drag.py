@@ -68,13 +68,13 @@ def tower_load(t, pose, now, series, field, tower):
 def bent_tower_load(t, pose, x, now, series, field, tower, modes, modal):
     """Return the drag Wrench of a flexible tower, from position and velocity of its displaced points.
 
-    modes: tower.modes.TowerModes. The generalised forces on the deflections are added to modal (n,).
+    modes: elastic.tower.TowerModes. The generalised forces on the deflections are added to modal (n,).
     """
     if tower is None:
         return NO_LOAD
     if series is None:
         return NO_LOAD
-    n = len(modes.count)
+    n = len(modes.beam.count)
     first, rate = modes.first, modes.first + n
     fx = fy = mx = my = mz = 0.0
     for i in range(tower.z.shape[0]):

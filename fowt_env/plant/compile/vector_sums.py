@@ -1,4 +1,4 @@
-"""Computes sums of products in eight lanes by vector instructions.
+"""Computes sums of products in eight lanes by vector instructions, and the square root for vector loops.
 
 LLVM may not reorder a floating-point sum, so a plain loop adds one product after another. With fastmath
 the order depends on each caller's copy, and last bits then differ from process to process. Here the
@@ -78,6 +78,15 @@ def _lane_sums(context, builder, signature, args, pairs):
 
 
 @intrinsic
+def _square_root(typing_context, value):
+    def generate(context, builder, signature, args):
+        root_of = builder.module.declare_intrinsic("llvm.sqrt", [ir.DoubleType()])
+        return builder.call(root_of, args)
+
+    return types.float64(types.float64), generate
+
+
+@intrinsic
 def _one_sum(typing_context, a, b, n):
     def generate(context, builder, signature, args):
         return _lane_sums(context, builder, signature, args, ((0, 1),))
@@ -147,6 +156,10 @@ def _advance(typing_context, x, y, factors, first, start, begin, count, old, new
 
 if numba.config.DISABLE_JIT:
 
+    def root(value):
+        """Return the square root of a number; NaN below zero."""
+        return float(np.sqrt(value))
+
     def advance_pairs(x, y, factors, first, start, begin, count, old, new):
         """Advance the states of pole pairs from x to y; see the compiled form."""
         real, imaginary = x[start : start + count].copy(), x[start + count : start + 2 * count].copy()
@@ -163,6 +176,11 @@ if numba.config.DISABLE_JIT:
         return _sums_twin((v, g, c, s), CROSSED, n)
 
 else:
+
+    @kernel
+    def root(value):
+        """Return the square root of a number, NaN below zero, by an instruction that loops can vectorise."""
+        return _square_root(value)
 
     @kernel
     def advance_pairs(x, y, factors, first, start, begin, count, old, new):

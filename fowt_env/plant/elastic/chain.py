@@ -1,32 +1,32 @@
 """Solves the equation of motion of a turbine with elastic parts: platform, tower, nacelle, shaft, blades.
 
 The rotor is one (6, 6) inertia with a bias (blades.py). The speed of the generator is eliminated, the nacelle
-is added, then the modes of the tower are eliminated as in accelerations.py, and the platform remains. Weight
-of nacelle and rotor enters as an upward acceleration of their frames, so their masses are not in the other
-weights. A shaft that twists adds one unknown to this solution for a rigid shaft (shaft.py).
+is added, then the modes of the tower are eliminated, and the platform remains. Weight of nacelle and rotor,
+and that of the bent tower, enters as an upward acceleration of their frames, so it is not in the other loads.
+A shaft that twists adds one unknown to this solution for a rigid shaft (shaft.py).
 """
 
 from typing import NamedTuple
 
-from fowt_env.plant.accelerations import (
-    accelerate_turbine,
-    factor_modes,
-    factor_spd,
-    find_modes,
-    substitute_spd,
-    subtract_modal_rates,
-    without_modes,
-)
+from fowt_env.plant.accelerations import accelerate, factor_spd, substitute_spd
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.blades import RotorFrame, condense_rotor, fill_blade_accelerations
 from fowt_env.plant.elastic.shaft import MOBILITY, SMOOTH, Torsion, generator_speed, torsion_torque
 from fowt_env.plant.elastic.structure import Structure
+from fowt_env.plant.elastic.tower import (
+    Bend,
+    TowerModes,
+    bend_of,
+    from_nacelle,
+    push_modes,
+    to_nacelle,
+    top_bias,
+    top_motion,
+)
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import State
-from fowt_env.plant.tower.inertia import cross, deflection_rate, masses_of, top_bias
-from fowt_env.plant.tower.modes import Bend, TowerModes, bend_of, from_nacelle, to_nacelle
+from fowt_env.plant.state import State, cross
 
 
 class Top(NamedTuple):
@@ -50,14 +50,14 @@ class Top(NamedTuple):
 
 
 @kernel
-def _top_of_rigid(pose, bend):
+def _top_of_rigid(pose, x, bend, tower):
     ax, ay, az = cross(pose.wx, pose.wy, pose.wz, pose.vx, pose.vy, pose.vz)
     return Top(0.0, 0.0, 0.0, ax, ay, az, 0.0, 0.0, 0.0, pose.wx, pose.wy, pose.wz)
 
 
 @kernel
-def _top_of_bent(pose, bend):
-    ax, ay, az, bx, by, bz, wx, wy, wz = top_bias(pose, bend)
+def _top_of_bent(pose, x, bend, tower):
+    ax, ay, az, bx, by, bz, wx, wy, wz = top_bias(pose, x, bend, tower)
     return Top(bend.x, bend.y, bend.z, ax, ay, az, bx, by, bz, wx, wy, wz)
 
 
@@ -66,16 +66,17 @@ def _same_axes(bend, x, y, z):
     return x, y, z
 
 
-top_of = chosen_by_class("bend", {type(None): _top_of_rigid, Bend: _top_of_bent})
+# (pose, x, bend, tower) -> Top
+top_of = chosen_by_class("tower", {type(None): _top_of_rigid, TowerModes: _top_of_bent})
 # (bend, x, y, z) -> platform components of a vector in nacelle axes
 to_platform = chosen_by_class("bend", {type(None): _same_axes, Bend: from_nacelle})
 to_nacelle_axes = chosen_by_class("bend", {type(None): _same_axes, Bend: to_nacelle})
 
 
 @inlined_kernel
-def rotor_frame(pose, bend, gravity, structure):
+def rotor_frame(pose, top, bend, gravity, structure):
     """Return (RotorFrame, rotor centre from the origin of Top (3)), platform axes."""
-    top, c, s = top_of(pose, bend), structure.tilt_cosine, structure.tilt_sine
+    c, s = structure.tilt_cosine, structure.tilt_sine
     dx, dy, dz = to_platform(bend, structure.centre[0], structure.centre[1], structure.centre[2])
     nx, ny, nz = to_platform(bend, c, 0.0, -s)
     zx, zy, zz = to_platform(bend, s, 0.0, c)
@@ -95,13 +96,13 @@ def rotor_frame(pose, bend, gravity, structure):
 
 
 @kernel
-def _no_rotor(pose, x, bend, body, pitches, structure, blades, work):
+def _nothing_elastic(pose, x, bend, body, pitches, structure, tower, blades, work):
     return
 
 
 @inlined_kernel
-def _condense(pose, x, bend, body, pitches, structure, blades, work):
-    frame, _ = rotor_frame(pose, bend, body.gravity, structure)
+def _condense(pose, x, bend, body, pitches, structure, tower, blades, work):
+    frame, _ = rotor_frame(pose, top_of(pose, x, bend, tower), bend, body.gravity, structure)
     condense_rotor(x, frame, pitches, structure, blades, work)
 
 
@@ -119,8 +120,10 @@ def _below_nacelle(body, structure):
 weighed_body = chosen_by_class("structure", {type(None): _whole, Structure: _below_nacelle}, inlined=True)
 
 
-# (pose, x, bend, body, pitches, structure, blades, work): inertia of the rotor into work; None: nothing
-condense_elastic = chosen_by_class("structure", {type(None): _no_rotor, Structure: _condense}, inlined=True)
+# (pose, x, bend, body, pitches, structure, tower, blades, work): inertia of the rotor into work; None: no-op
+condense_elastic = chosen_by_class(
+    "structure", {type(None): _nothing_elastic, Structure: _condense}, inlined=True
+)
 
 
 @inlined_kernel
@@ -206,28 +209,32 @@ def _nacelle_load(pose, top, bend, gravity, structure):
 
 
 @inlined_kernel
-def _no_deflection(pose, x, bend, tower, b, modal):
+def _no_deflection(pose, gravity, tower, work, b, modal):
     return
 
 
 @inlined_kernel
-def _deflected(pose, x, bend, tower, b, modal):
-    subtract_modal_rates(pose, x, 0.0, 0.0, 0.0, 0.0, 0.0, bend, tower, modal)
-    e = deflection_rate(pose, masses_of(x, tower))
-    b[0] -= e.fx
-    b[1] -= e.fy
-    b[2] -= e.fz
-    b[3] -= e.mx
-    b[4] -= e.my
-    b[5] -= e.mz
+def _deflected(pose, gravity, tower, work, b, modal):
+    p, c, X, g = work.tower_pull, work.tower_moment, work.tower_coupling, gravity
+    ax, ay, az = cross(pose.wx, pose.wy, pose.wz, pose.vx, pose.vy, pose.vz)
+    ax, ay, az = ax + g * pose.r31, ay + g * pose.r32, az + g * pose.r33
+    mx, my, mz = cross(c[0], c[1], c[2], ax, ay, az)
+    b[0] -= p[0]
+    b[1] -= p[1]
+    b[2] -= p[2]
+    b[3] -= p[3] + mx
+    b[4] -= p[4] + my
+    b[5] -= p[5] + mz
+    for i in range(len(tower.beam.count)):
+        modal[i] -= work.tower_rest[i] + X[i, 0] * ax + X[i, 1] * ay + X[i, 2] * az
 
 
-# (pose, x, bend, tower, b, modal): velocity terms of the deflected tower, subtracted from b and modal
+# (pose, gravity, tower, work, b, modal): velocity terms and weight of the deflected tower off b and modal
 _subtract_tower = chosen_by_class("tower", {type(None): _no_deflection, TowerModes: _deflected}, inlined=True)
 
 
 @inlined_kernel
-def _from_platform(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal):
+def _from_platform(top, fx, fy, fz, mx, my, mz, bend, tower, work, b, modal):
     b[0] -= fx
     b[1] -= fy
     b[2] -= fz
@@ -237,108 +244,81 @@ def _from_platform(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal):
 
 
 @inlined_kernel
-def _from_tower(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal):
-    _from_platform(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal)
-    rolling = bend.ca * mx - bend.sa * mz
-    for i in range(0, len(tower.count), 2):
-        modal[i] -= fx + tower.slope[i] * my
-        modal[i + 1] -= fy - tower.slope[i + 1] * rolling
+def _from_tower(top, fx, fy, fz, mx, my, mz, bend, tower, work, b, modal):
+    _from_platform(top, fx, fy, fz, mx, my, mz, bend, tower, work, b, modal)
+    push_modes(-1.0, fx, fy, fz, mx, my, mz, bend, tower, work, modal)
 
 
-# (top, fx, fy, fz, mx, my, mz, bend, tower, b, modal): a wrench at the origin of Top, off b and modal
+# (top, fx, fy, fz, mx, my, mz, bend, tower, work, b, modal): a wrench at the origin of Top off b and modal
 _subtract_wrench = chosen_by_class(
     "tower", {type(None): _from_platform, TowerModes: _from_tower}, inlined=True
 )
 
 
 @inlined_kernel
-def _only_platform(x, upper, bend, tower, matrix):
+def _only_platform(top, upper, bend, tower, work, matrix):
     for i in range(6):
         for j in range(i + 1):
             matrix[i, j] += upper[i, j]
 
 
 @inlined_kernel
-def _with_modes(x, upper, bend, tower, matrix):
-    d, n = masses_of(x, tower), len(tower.count)
-    tx, tz = bend.ca, -bend.sa  # axis about which side-side modes rotate the nacelle
-    px, py, pz = bend.x, bend.y, bend.z
+def _with_modes(top, upper, bend, tower, work, matrix):
+    X, M, c, J, s, n = (
+        work.tower_coupling, work.tower_mass, work.tower_moment, work.tower_block, work.sinking,
+        len(tower.beam.count),
+    )  # fmt: skip
     for i in range(n):
-        slope = tower.slope[i] if i % 2 == 0 else -tower.slope[i]
-        ux, uy = (0.0, slope) if i % 2 == 0 else (slope * tx, 0.0)
-        uz = 0.0 if i % 2 == 0 else slope * tz
         k = i % 2
-        fx = upper[0, k] + upper[0, 3] * ux + upper[0, 4] * uy + upper[0, 5] * uz
-        fy = upper[1, k] + upper[1, 3] * ux + upper[1, 4] * uy + upper[1, 5] * uz
-        fz = upper[2, k] + upper[2, 3] * ux + upper[2, 4] * uy + upper[2, 5] * uz
-        mx = upper[3, k] + upper[3, 3] * ux + upper[3, 4] * uy + upper[3, 5] * uz
-        my = upper[4, k] + upper[4, 3] * ux + upper[4, 4] * uy + upper[4, 5] * uz
-        mz = upper[5, k] + upper[5, 3] * ux + upper[5, 4] * uy + upper[5, 5] * uz
+        slope = tower.slope[i] if k == 0 else -tower.slope[i]
+        # rotation of the nacelle by a unit rate of the mode, whose top moves along axis k and sinks
+        rx, ry, rz = (0.0, slope, 0.0) if k == 0 else (slope * bend.ca, 0.0, -slope * bend.sa)
+        fx, fy, fz, mx, my, mz = (
+            upper[0, k] - s[i] * upper[0, 2] + upper[0, 3] * rx + upper[0, 4] * ry + upper[0, 5] * rz,
+            upper[1, k] - s[i] * upper[1, 2] + upper[1, 3] * rx + upper[1, 4] * ry + upper[1, 5] * rz,
+            upper[2, k] - s[i] * upper[2, 2] + upper[2, 3] * rx + upper[2, 4] * ry + upper[2, 5] * rz,
+            upper[3, k] - s[i] * upper[3, 2] + upper[3, 3] * rx + upper[3, 4] * ry + upper[3, 5] * rz,
+            upper[4, k] - s[i] * upper[4, 2] + upper[4, 3] * rx + upper[4, 4] * ry + upper[4, 5] * rz,
+            upper[5, k] - s[i] * upper[5, 2] + upper[5, 3] * rx + upper[5, 4] * ry + upper[5, 5] * rz,
+        )
+        row, rolling = matrix[6 + i], bend.ca * mx - bend.sa * mz
+        row[0], row[1], row[2] = X[i, 0] + fx, X[i, 1] + fy, X[i, 2] + fz
+        row[3] = X[i, 3] + mx + top.y * fz - top.z * fy
+        row[4] = X[i, 4] + my + top.z * fx - top.x * fz
+        row[5] = X[i, 5] + mz + top.x * fy - top.y * fx
         for j in range(i + 1):
-            if j % 2 == 0:
-                value = fx + tower.slope[j] * my
-            else:
-                value = fy - tower.slope[j] * (tx * mx + tz * mz)
-            matrix[6 + i, 6 + j] = value + (tower.mass[i, j] if (i + j) % 2 == 0 else 0.0)
-        over = 0.0  # integral of line mass times shape times the other direction's deflection
-        for j in range(1 - k, n, 2):
-            over += tower.mass[i, j] * x[tower.first + j]
-        row = matrix[6 + i]
-        row[0], row[1], row[2] = fx, fy, fz
-        row[3], row[4], row[5] = mx + py * fz - pz * fy, my + pz * fx - px * fz, mz + px * fy - py * fx
-        row[k] += tower.first_moment[i]
-        if k == 0:
-            row[4] += tower.height_moment[i]
-            row[5] -= over
-        else:
-            row[3] -= tower.height_moment[i]
-            row[5] += over
-    _shift(upper, px, py, pz)
+            value = fx + tower.slope[j] * my if j % 2 == 0 else fy - tower.slope[j] * rolling
+            row[6 + j] = M[i, j] + value - s[j] * fz
+    _shift(upper, top.x, top.y, top.z)
     for i in range(6):
         for j in range(i + 1):
             matrix[i, j] += upper[i, j]
-    _shift(upper, -px, -py, -pz)
-    matrix[3, 2] += d.dy
-    matrix[4, 2] -= d.dx
-    matrix[5, 0] -= d.dy
-    matrix[5, 1] += d.dx
-    matrix[3, 3] += d.gyy
-    matrix[4, 4] += d.gxx
-    matrix[5, 5] += d.gxx + d.gyy
-    matrix[4, 3] -= d.gxy
-    matrix[5, 3] -= d.ex
-    matrix[5, 4] -= d.ey
+    _shift(upper, -top.x, -top.y, -top.z)
+    matrix[3, 1] -= c[2]
+    matrix[3, 2] += c[1]
+    matrix[4, 0] += c[2]
+    matrix[4, 2] -= c[0]
+    matrix[5, 0] -= c[1]
+    matrix[5, 1] += c[0]
+    matrix[3, 3] += J[0]
+    matrix[4, 4] += J[1]
+    matrix[5, 5] += J[2]
+    matrix[4, 3] += J[3]
+    matrix[5, 3] += J[4]
+    matrix[5, 4] += J[5]
 
 
-# (x, upper, bend, tower, matrix): upper and the rows of the tower modes into matrix (lower triangle)
+# (top, upper, bend, tower, work, matrix): upper and the rows of the tower modes into matrix (lower triangle)
 _add_upper = chosen_by_class("tower", {type(None): _only_platform, TowerModes: _with_modes}, inlined=True)
 
 
 @inlined_kernel
-def _no_tower_motion(top, b, modal, bend, tower):
-    return (
-        b[0] + b[4] * top.z - b[5] * top.y, b[1] + b[5] * top.x - b[3] * top.z,
-        b[2] + b[3] * top.y - b[4] * top.x, b[3], b[4], b[5],
-    )  # fmt: skip
+def _no_tower_motion(b, modal, bend, tower, work):
+    return b[0], b[1], b[2], b[3], b[4], b[5]
 
 
-@inlined_kernel
-def _tower_motion(top, b, modal, bend, tower):
-    ax, ay, az, bx, by, bz = _no_tower_motion(top, b, modal, bend, tower)
-    for i in range(0, len(tower.count), 2):
-        rolling = tower.slope[i + 1] * modal[i + 1]
-        ax += modal[i]
-        ay += modal[i + 1]
-        bx -= rolling * bend.ca
-        by += tower.slope[i] * modal[i]
-        bz += rolling * bend.sa
-    return ax, ay, az, bx, by, bz
-
-
-# (top, b, modal, bend, tower) -> accelerations of the origin of Top and of the nacelle, without their bias
-_top_motion = chosen_by_class(
-    "tower", {type(None): _no_tower_motion, TowerModes: _tower_motion}, inlined=True
-)
+# (b, modal, bend, tower, work) -> accelerations (6) of the origin of Top and the nacelle, without their bias
+_top_motion = chosen_by_class("tower", {type(None): _no_tower_motion, TowerModes: top_motion}, inlined=True)
 
 
 @kernel
@@ -348,11 +328,48 @@ def _no_modes(tower):
 
 @kernel
 def _velocities_of(tower):
-    return tower.first + len(tower.count), len(tower.count)
+    return tower.first + len(tower.beam.count), len(tower.beam.count)
 
 
 # (tower) -> (index of the first velocity of a deflection, number of modes)
-_modes_in_state = chosen_by_class("tower", {type(None): _no_modes, TowerModes: _velocities_of})
+modes_in_state = chosen_by_class("tower", {type(None): _no_modes, TowerModes: _velocities_of})
+
+
+@inlined_kernel
+def _factor_modes(matrix, n):
+    """Eliminate the n modes from the platform's system, last mode first; only the lower triangle is used."""
+    for k in range(n - 1, -1, -1):
+        row = 6 + k
+        over = 1.0 / matrix[row, row]
+        for i in range(6 + k):
+            factor = matrix[row, i] * over
+            for j in range(i + 1):
+                matrix[i, j] -= factor * matrix[row, j]
+
+
+@inlined_kernel
+def _solve_modes(matrix, held, b, modal):
+    """Solve for b (6,) and modal (n,) in place, with the factors of _factor_modes and factor_spd."""
+    n = modal.shape[0]
+    for k in range(n - 1, -1, -1):
+        row = 6 + k
+        force = modal[k] / matrix[row, row]
+        for i in range(6):
+            b[i] -= matrix[row, i] * force
+        for i in range(k):
+            modal[i] -= matrix[row, 6 + i] * force
+    if held:
+        b[:] = 0.0
+    else:
+        substitute_spd(matrix, b)
+    for k in range(n):
+        row = 6 + k
+        total = modal[k]
+        for i in range(6):
+            total -= matrix[row, i] * b[i]
+        for i in range(k):
+            total -= matrix[row, 6 + i] * modal[i]
+        modal[k] = total / matrix[row, row]
 
 
 @inlined_kernel
@@ -368,7 +385,7 @@ def _at_top(centre, push, h, fx, fy, fz, mx, my, mz):
 def _move_nacelle(top, centre, bend, tower, work, b, modal):
     """Return the acceleration (6) of the origin of Top without bias; that at the rotor centre into work."""
     cx, cy, cz = centre
-    ax, ay, az, bx, by, bz = _top_motion(top, b, modal, bend, tower)
+    ax, ay, az, bx, by, bz = _top_motion(b, modal, bend, tower, work)
     motion = work.motion
     motion[0], motion[1], motion[2] = ax + by * cz - bz * cy, ay + bz * cx - bx * cz, az + bx * cy - by * cx
     motion[3], motion[4], motion[5] = bx, by, bz
@@ -391,16 +408,31 @@ def _solve(top, centre, fx, fy, fz, mx, my, mz, known, free, bend, body, tower, 
     and generator; free: inverse of their inertia, zero if held. Fills work.motion. Returns the acceleration
     of the generator, which is the rotor's with a rigid shaft.
     """
-    n = modal.shape[0]
-    _subtract_wrench(top, fx, fy, fz, mx, my, mz, bend, tower, b, modal)
-    without_modes(matrix, b, modal, n)
-    if body.platform_fixed:
-        b[:] = 0.0
-    else:
-        substitute_spd(matrix, b)
-    find_modes(matrix, b, modal, n)
+    _subtract_wrench(top, fx, fy, fz, mx, my, mz, bend, tower, work, b, modal)
+    _solve_modes(matrix, body.platform_fixed, b, modal)
     _move_nacelle(top, centre, bend, tower, work, b, modal)
     return free * (known - _dot(work.shaft, work.motion))
+
+
+@inlined_kernel
+def answer(torque, bend, body, tower, blades, matrix, work, out):
+    """Turn loads on platform and tower in out (n_state,), and a torque (N m), into accelerations.
+
+    Of platform, tower, rotor and blades, without terms of velocities and weight; mass and frames are those of
+    the last solution, with a rigid shaft.
+    """
+    x, y, z, cx, cy, cz, free = work.place
+    top, centre = Top(x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (cx, cy, cz)
+    fx, fy, fz, mx, my, mz = _at_top(centre, free * torque, work.shaft, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    first, n = modes_in_state(tower)
+    b, modal = out[State.VX : State.WZ + 1], out[first : first + n]
+    rate = _solve(
+        top, centre, fx, fy, fz, mx, my, mz, torque, free, bend, body, tower, matrix, work, b, modal
+    )
+    out[State.ROTOR_SPEED] = rate
+    for i in range(3):
+        work.motion[3 + i] += rate * work.axis[i]
+    fill_blade_accelerations(work.motion, 0.0, blades, work, out)
 
 
 @inlined_kernel
@@ -426,7 +458,7 @@ def _twist(
     spun = gear * (f.nx * motion[3] + f.ny * motion[4] + f.nz * motion[5])
     steady = torques[0] - f.nx * bias[3] - f.ny * bias[4] - f.nz * bias[5] - inertia * rate
     steady -= _dot(h, motion) - spun
-    first, modes = _modes_in_state(tower)
+    first, modes = modes_in_state(tower)
     if fresh:
         e[:] = 0.0
         push = -free * inertia
@@ -477,9 +509,9 @@ def accelerate_elastic(
     accelerate.
     """
     bend = bend_of(x, tower)
-    top = top_of(pose, bend)
-    f, centre = rotor_frame(pose, bend, body.gravity, structure)
-    first, n = _modes_in_state(tower)
+    top = top_of(pose, x, bend, tower)
+    f, centre = rotor_frame(pose, top, bend, body.gravity, structure)
+    first, n = modes_in_state(tower)
     b, modal = dx[State.VX : State.WZ + 1], dx[first : first + n]
     bias, h, upper, gear = work.bias, work.shaft, work.upper, structure.generator_coupling
     fresh = cache[LoadCache.FACTORED] < 0.5
@@ -500,10 +532,12 @@ def accelerate_elastic(
         for i in range(6):
             for j in range(i + 1):
                 matrix[i, j] = structure.lower.mass_matrix[i, j] + added[i, j]
-        _add_upper(x, upper, bend, tower, matrix)
-        factor_modes(matrix, n)
+        _add_upper(top, upper, bend, tower, work, matrix)
+        _factor_modes(matrix, n)
         if not body.platform_fixed:
             factor_spd(matrix)
+        work.place[:] = (top.x, top.y, top.z, centre[0], centre[1], centre[2], free)
+        work.axis[:] = (f.nx, f.ny, f.nz)
         cache[LoadCache.FACTORED] = 1.0
     spin = gear * generator_speed(x, shaft)
     gx, gy, gz = cross(f.wx, f.wy, f.wz, f.nx, f.ny, f.nz)
@@ -517,7 +551,7 @@ def accelerate_elastic(
     c = momentum_rate(pose, 0.0, structure.lower.mass_matrix, 0.0, None)
     b[0], b[1], b[2] = load.fx - c.fx, load.fy - c.fy, load.fz - c.fz
     b[3], b[4], b[5] = load.mx - c.mx, load.my - c.my, load.mz - c.mz
-    _subtract_tower(pose, x, bend, tower, b, modal)
+    _subtract_tower(pose, body.gravity, tower, work, b, modal)
     rate = _solve(top, centre, fx, fy, fz, mx, my, mz, known, free, bend, body, tower, matrix, work, b, modal)
     inertia = turned - gear
     torques = (cache[LoadCache.TORQUE], cache[LoadCache.TORQUE] - torque)
@@ -551,7 +585,7 @@ def accelerate_elastic(
 def _with_rigid_parts(
     pose, x, load, torque, added, body, structure, tower, blades, shaft, matrix, work, cache, dx
 ):
-    accelerate_turbine(pose, x, load, torque, added, body, tower, matrix, cache, dx)
+    accelerate(pose, x, load, torque, added, body, matrix, cache, dx)
 
 
 # (pose, x, load, torque, added, body, structure, tower, blades, shaft, matrix, work, cache, dx):

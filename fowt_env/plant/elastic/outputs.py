@@ -15,10 +15,9 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.beam import reduce_beam
 from fowt_env.plant.elastic.blades import BladeModes
-from fowt_env.plant.elastic.chain import rotor_frame, to_nacelle_axes
+from fowt_env.plant.elastic.chain import rotor_frame, to_nacelle_axes, top_of
 from fowt_env.plant.elastic.structure import Structure
-from fowt_env.plant.state import BLADES, State, Wrench
-from fowt_env.plant.tower.inertia import cross
+from fowt_env.plant.state import BLADES, State, Wrench, cross
 
 
 class SectionLoad(NamedTuple):
@@ -121,13 +120,14 @@ def _outer_aerodynamics(number, x, turn, aero, section, loads):
     for j in range(section.outside.shape[0]):
         part = section.outside[j]
         if part > 0.0:
-            lever, at = bent_lever(j, turn, shape), N_STATION_LOAD * j
+            lever, at = bent_lever(j, shape), N_STATION_LOAD * j
             normal, tangential = part * shape.loads[at], part * shape.loads[at + 1]
+            moment = part * shape.loads[at + 2]
             fx += normal * lever.nx
             fr += normal * lever.nr
             ft += tangential
-            mx += lever.r * tangential - lever.t_nr * normal
-            mr += lever.t_nx * normal - lever.x * tangential
+            mx += lever.r * tangential - lever.t_nr * normal - moment * lever.nr
+            mr += lever.t_nx * normal - lever.x * tangential + moment * lever.nx
             mt += lever.turn * normal
     fx, fz, mx, mz = (
         cosine * fx + sine * fr,
@@ -249,32 +249,32 @@ add_upper_load = chosen_by_class("structure", {type(None): _no_upper, Structure:
 
 
 @inlined_kernel
-def _shaft_of_rigid(thrust, torque, pose, bend, x, body, structure, blades, loads, work):
+def _shaft_of_rigid(thrust, torque, pose, bend, x, body, structure, tower, blades, loads, work):
     return thrust, torque
 
 
 @inlined_kernel
-def _shaft_of_bending(thrust, torque, pose, bend, x, body, structure, blades, loads, work):
-    frame, _ = rotor_frame(pose, bend, body.gravity, structure)
+def _shaft_of_bending(thrust, torque, pose, bend, x, body, structure, tower, blades, loads, work):
+    frame, _ = rotor_frame(pose, top_of(pose, x, bend, tower), bend, body.gravity, structure)
     thrust, _, _, torque, _, _ = hub_load(x, frame, loads, blades, work)
     return thrust, torque
 
 
-# (thrust, torque, pose, bend, x, body, structure, blades, loads, work) -> thrust (N) and torque (N m) of the
-# shaft: those of the rigid rotor, given, or of bending blades
+# (thrust, torque, pose, bend, x, body, structure, tower, blades, loads, work) -> thrust (N) and torque (N m)
+# of the shaft: those of the rigid rotor, given, or of bending blades
 shaft_load = chosen_by_class(
     "blades", {type(None): _shaft_of_rigid, BladeModes: _shaft_of_bending}, inlined=True
 )
 
 
 @inlined_kernel
-def _none_bent(pose, bend, x, dx, pitches, body, aero, structure, blades, loads, work, row):
+def _none_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row):
     return
 
 
 @inlined_kernel
-def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, blades, loads, work, row):
-    frame, _ = rotor_frame(pose, bend, body.gravity, structure)
+def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row):
+    frame, _ = rotor_frame(pose, top_of(pose, x, bend, tower), bend, body.gravity, structure)
     tip, n = blades.tip, len(blades.beam.count)
     for number in range(BLADES):
         pitch = pitch_of(number, x, pitches)
@@ -295,6 +295,6 @@ def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, blades, load
     row[38], row[39] = fy, fz
 
 
-# (pose, bend, x, dx, pitches, body, aero, structure, blades, loads, work, row): channels of bending blades
-# into row; pose of the platform
+# (pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row): channels of bending
+# blades into row; pose of the platform
 record_bending = chosen_by_class("blades", {type(None): _none_bent, BladeModes: _record_bent}, inlined=True)

@@ -55,17 +55,33 @@ class RotorScratch(NamedTuple):
     probe_rest: np.ndarray
     hub_load: np.ndarray  # (6,) inertial load and weight of the rotor about its centre
     top_load: np.ndarray  # (6,) of rotor and nacelle about tower top or body origin
+    tower_moment: np.ndarray  # (3,) of the bent tower, as moment to rest of a blade, in platform axes
+    tower_block: np.ndarray  # (6,)
+    tower_coupling: np.ndarray  # (n, 6)
+    tower_mass: np.ndarray  # (n, n)
+    tower_pull: np.ndarray  # (6,)
+    tower_rest: np.ndarray  # (n,)
+    sinking: np.ndarray  # (n,) of the tower top, per unit rate of a deflection
+    place: np.ndarray  # (7,) tower top or body origin, rotor centre from there, inverse rotor inertia
+    axis: np.ndarray  # (3,) direction of the shaft, downwind
+    # own modes of the tower, see steps.py: square of the frequency (1/s2) and decay rate (1/s); (n, n) from
+    # deflections to them and back; impulse per unit change of the deflections' velocities, kg
+    swing: np.ndarray  # (2, n)
+    to_own: np.ndarray
+    from_own: np.ndarray
+    impulse: np.ndarray
     twist: np.ndarray  # (2, n_state) accelerations by a unit one of the shaft's twist: now, at the last step
     shaft_torque: np.ndarray  # (3,) see shaft.py
 
 
-def rotor_scratch(structure, blades, n_state):
-    """Return the RotorScratch of a Structure with BladeModes or None (rigid blades); None without one."""
+def rotor_scratch(structure, tower, blades, n_state):
+    """Return the RotorScratch of a Structure with TowerModes and BladeModes or None; None without one."""
     if structure is None:
         return None
-    n = 0 if blades is None else len(blades.beam.count)
+    n, m = (0 if part is None else len(part.beam.count) for part in (blades, tower))
     shapes = (
         (3, 3, 3), 3, 6, (BLADES, n, 6), (n, n), (BLADES, n, n), 6, (BLADES, n), (BLADES, n), (6, 6), 6,
-        (6, 6), 6, 6, (n, 6), n, 6, 6, (2, n_state), 3,
+        (6, 6), 6, 6, (n, 6), n, 6, 6, 3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (2, m), (m, m),
+        (m, m), (m, m), (2, n_state), 3,
     )  # fmt: skip
     return RotorScratch(*(np.zeros(shape) for shape in shapes))

@@ -10,7 +10,7 @@ from fowt_env.analysis.campbell import campbell
 from fowt_env.errors import InputError
 from fowt_env.plant.advance import advance, output_row
 from fowt_env.plant.drivetrain import build_drivetrain
-from fowt_env.plant.elastic.shaft import twisted
+from fowt_env.plant.elastic.oscillator import swung
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.state import State, pose_of
 
@@ -33,7 +33,7 @@ def test_an_oscillator_under_a_cubic_load_is_exact(square, decay):
         return [y[1], c @ t ** np.arange(4) - square * y[0] - 2.0 * decay * y[1]]
 
     done = solve_ivp(rate, (0.0, 0.4), [0.1, -0.7], method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
-    assert twisted(0.1, -0.7, *c, 0.4, square, decay) == pytest.approx(done, rel=1e-8, abs=1e-9)
+    assert swung(0.1, -0.7, *c, 0.4, square, decay) == pytest.approx(done, rel=1e-8, abs=1e-9)
 
 
 @pytest.mark.parametrize("platform", TURBINES)
