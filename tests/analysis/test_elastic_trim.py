@@ -5,6 +5,8 @@ import pytest
 
 import fowt_env
 from fowt_env.analysis.blade_coordinates import bending_states, coordinates, placed, turned_to
+from fowt_env.analysis.equilibrium import causes_of, evaluated
+from fowt_env.analysis.statics import Evaluation
 from fowt_env.analysis.trim import AZIMUTHS, trim, trim_prescribed, without_fluctuations
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
@@ -141,6 +143,13 @@ def test_a_parked_rotor_hangs_in_static_equilibrium(elastic_scene):
         modes = len(blades) // 2
         assert np.all(x[blades[modes:]] == 0.0)
         assert np.abs(dx[blades[modes:]]).max() < 1e-8
+
+
+def test_weight_and_buoyancy_balance_with_the_weight_of_nacelle_and_rotor(elastic_scene):
+    evaluation = Evaluation(elastic_scene.with_weather(0.0, None))
+    rest = np.zeros(elastic_scene.n_state)
+    evaluation.at(rest, LoadCache.TOTAL)
+    assert causes_of(elastic_scene, evaluated(rest, evaluation.data)) == {}
 
 
 def test_initial_tip_displacements_are_those_asked_for(elastic_scene):
