@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from fowt_env.analysis.linear_model import STRUCTURAL, VELOCITIES, differentiated, settled
+from fowt_env.analysis.linear_plant import bending_names
 from fowt_env.analysis.statics import central_difference, mean_derivative
 from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key, water_key
@@ -23,7 +25,7 @@ from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import airload, blade_section, build_blade_elements, element_of
 from fowt_env.plant.compile.decorators import entry
-from fowt_env.plant.state import State
+from fowt_env.plant.state import MOTIONS, State
 
 DAMPING = 0.7  # of the rotor loop, floating and on land
 DETUNED = 0.915  # w0 over the platform's pitch frequency: 0.2 over 0.2185 rad/s of OC3-Hywind
@@ -176,7 +178,8 @@ def platform_frequency(scene, motion=State.PLATFORM_PITCH):
 
     motion: State.SURGE ... State.YAW; the mode is the one with the largest contribution of this motion.
     The stiffness follows from the accelerations after small displacements, with quasi-static deflection of a
-    flexible tower; other states (wake, radiation memory) are held constant. Results are cached per plant.
+    flexible tower, of blades and of the shaft; other states (wake, radiation memory) are held constant.
+    Results are cached per plant.
     Raises: InputError as trim, and for a motion without restoring force.
     """
     values, fractions = _MODES.get((plant_key(scene), water_key(scene)), lambda: _modes(scene))
@@ -195,6 +198,24 @@ def _modes(scene):
         speed = float(scene.turbine.rated_wind_speed)
         scene = replace(without_fluctuations(scene, speed), wind=speed, sea=None, wind_speed=speed)
     point = trim(scene)
+    tables = _slopes if scene.model.structure is None else _settled_slopes
+    kinematics, stiffness = tables(scene, point)
+    values, vectors = np.linalg.eig(kinematics @ stiffness)
+    arm = 0.5 * scene.platform.draft
+    size = np.abs(vectors) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
+    return values, size / size.sum(axis=0)
+
+
+def _settled_slopes(scene, point):
+    """Return _slopes of a turbine with bending blades or a twisting shaft."""
+    model = differentiated(scene, point, bending_names(scene))
+    model = settled(model, [name for name in model.states if name.removesuffix("_rate") in STRUCTURAL])
+    positions, speeds = (list(map(model.index, names)) for names in (MOTIONS, VELOCITIES))
+    return model.A[np.ix_(positions, speeds)], model.A[np.ix_(speeds, positions)]
+
+
+def _slopes(scene, point):
+    """Return (6, 6) derivatives of the rates of the motions by velocities, of accelerations by motions."""
     x, u = point.state.copy(), point.command.copy()
     body = scene.model.rigid_body._replace(platform_fixed=False, rotor_fixed=False)
     handle = without_fluctuations(scene, point.wind_speed).with_model(rigid_body=body).handle()
@@ -216,10 +237,7 @@ def _modes(scene):
         follows = np.linalg.solve(stiffness[6:, 6:], stiffness[6:, :6])
         stiffness = stiffness[:6, :6] - stiffness[:6, 6:] @ follows
     kinematics = np.array([rates(State.VX + i, 1e-5)[:6] for i in range(6)]).T
-    values, vectors = np.linalg.eig(kinematics @ stiffness)
-    arm = 0.5 * scene.platform.draft
-    size = np.abs(vectors) * np.array([1.0, 1.0, 1.0, arm, arm, arm])[:, None]
-    return values, size / size.sum(axis=0)
+    return kinematics, stiffness
 
 
 def floating_frequency(scene):

@@ -19,6 +19,11 @@ os.environ.pop("COLUMNS", None)
 KINDS = {
     "environment": ["tests/envs/test_env.py", "tests/envs/test_golden.py"],
     "command line": ["tests/training/cli/test_app.py", "tests/training/evaluation/test_evaluate.py"],
+    "elastic": [
+        "tests/envs/test_elastic_env.py",
+        "tests/analysis/test_elastic_trim.py",
+        "tests/analysis/test_elastic_linear.py",
+    ],
     "openfast": ["tests/training/validation/test_validate.py"],
 }
 KIND_OF = {file: kind for kind, files in KINDS.items() for file in files}
@@ -104,3 +109,11 @@ def storm_scene():
     return build_scene(
         "oc3_hywind", wind=18.0, sea=sea, seed=3, duration=60.0, wave_components=60, fidelity="reference"
     )
+
+
+@pytest.fixture(scope="session")
+def elastic_scene():
+    """The weather of storm_scene with blades, tower and shaft that bend, at the default fidelity."""
+    sea = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3}
+    settings = {"seed": 3, "duration": 60.0, "wave_components": 20}
+    return build_scene("oc3_hywind", 18.0, sea, blades="modes", tower="modes2", shaft="torsion", **settings)

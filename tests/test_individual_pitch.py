@@ -23,7 +23,7 @@ from fowt_env.plant.measurement import (
     BladeMeasurement,
     Measurement,
 )
-from fowt_env.weather.sensor_noise import draw_noise
+from fowt_env.weather.sensor_noise import draw_noise, draw_sensors
 
 CYCLE = 0.01  # rad
 TRIP = dict.fromkeys(("overpower", "acceleration", "pitch_deviation"), False) | {
@@ -225,8 +225,12 @@ def test_readings_of_blades_are_those_of_the_chain_with_noise_of_their_own(scene
     run(scene, true, initial={"BldPitch2": 10.0})
     run(scene, read, initial={"BldPitch2": 10.0}, sensors=chain)
     std = np.array([chain.sensors[name].noise if name in chain.sensors else 0.0 for name in fields])
-    noise = draw_noise(std, scene.seed, 61)
+    noise, white = draw_sensors(chain, 0.1, scene.seed, 61, True).noise, draw_noise(std, scene.seed, 61)
     np.testing.assert_array_equal(noise[:, :N_MEASUREMENTS], draw_noise(std[:N_MEASUREMENTS], scene.seed, 61))
+    for i, name in enumerate(fields):  # white noise, and the drift of strain gauges, almost constant in 6 s
+        slow = noise[:, i] - white[:, i]
+        drift = chain.sensors[name].drift if name in chain.sensors else 0.0
+        assert np.ptp(slow) <= 0.5 * drift and (slow != 0.0).all() == (drift > 0.0)
     plain = draw_noise(np.ones(len(fields)), scene.seed, 61)
     own = plain[:, N_MEASUREMENTS:].ravel()
     assert abs(np.corrcoef(plain[:, :N_MEASUREMENTS].ravel()[: own.size], own)[0, 1]) < 0.15

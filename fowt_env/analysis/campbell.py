@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from fowt_env.analysis.blade_coordinates import blade_waves
 from fowt_env.analysis.tower_frequencies import NAMES, bending
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError, unknown
@@ -228,9 +229,8 @@ def _natural_modes(machine, speed):
     shares = [weight[: machine.named, None] * np.abs(shapes[: machine.named]) ** 2]
     for k in range(m):
         mean, tilt, yaw = (size - BLADES * m + k + i * m for i in range(BLADES))
-        # a wave around the rotor: q_i = cos(w t - psi_i) runs with the rotation, q_s lags behind q_c
-        waves = [(shapes[tilt] + sign * 1j * shapes[yaw]) / 2.0 for sign in (-1.0, 1.0)]
-        shares.append(weight[mean] * np.abs([shapes[mean], *waves]) ** 2)
+        waves = blade_waves(shapes[tilt], shapes[yaw])
+        shares.append(weight[mean] * np.abs([shapes[mean], *waves.values()]) ** 2)
     shares = np.concatenate(shares)
     labels, modes = linear_sum_assignment(-shares / shares.sum(axis=0))
     found = {machine.labels[i]: values[k] for i, k in zip(labels, modes, strict=True)}

@@ -3,40 +3,43 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import pi
 from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.linalg import expm
+from scipy.optimize import linear_sum_assignment
 
+from fowt_env.analysis.blade_coordinates import blade_waves
+from fowt_env.analysis.linear_plant import (
+    CYCLIC,
+    MEASURED,
+    RECORDED,
+    TOWER,
+    TWIST_STATES,
+    WAKE,
+    Plant,
+    bending_names,
+    cyclic_names,
+    multiblade_point,
+    plant_states,
+)
 from fowt_env.analysis.statics import central_difference, named_periods, rotation_of
-from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
+from fowt_env.analysis.trim import trim, without_fluctuations
 from fowt_env.analysis.wave_excitation import fit_wave_filter, wave_force
+from fowt_env.descriptions.blade_structure import SHAPES
 from fowt_env.descriptions.checks import check_number, is_number, short
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.errors import InputError, unknown
-from fowt_env.plant.channels import FIXED_CHANNELS, N_FIXED, Out, measure, record
-from fowt_env.plant.compile.decorators import entry, inlined_kernel
-from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.dynamics import evaluate_loads, loads_of, respond
+from fowt_env.plant.channels import FIXED_CHANNELS
 from fowt_env.plant.measurement import MEASURED as FIELDS
 from fowt_env.plant.measurement import Measure, Measurement
-from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import MOTIONS, STATE_INDEX, STATES, State, pose_of
+from fowt_env.plant.state import MOTIONS, State, pose_of
 from fowt_env.scene.actuators import linear_actuator
 from fowt_env.scene.radiation_fit import linear_memory
 from fowt_env.scene.scene import check_scene
 
-# velocity steps are small because quadratic drag leaves a false damping proportional to them
-STATE_STEPS = np.array([1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-5, 1e-7, 1e-7, 1e-7, 1e-4, 1e-5])
-TOWER = ("tower_fore_aft", "tower_side_side", "tower_fore_aft_2", "tower_side_side_2")  # deflections
-TOWER_BLOCKS = {"tower_deflection": ("", 1e-3), "tower_velocity": ("_rate", 1e-5)}  # name suffixes, steps
 VELOCITIES = ("vx", "vy", "vz", "wx", "wy", "wz")
-ACTUATOR_STATES = {  # block of the scene's state vector: (name of its state in a linear model, step)
-    "pitch_rate": ("pitch_rate", 1e-5),
-    "generator_torque": ("generator_torque_in_force", 1.0),
-}
 INPUTS = ("generator_torque", "blade_pitch_command", "wind_speed")
 INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FREQUENCY_ROUNDS = 4  # iterations of a period and the added mass at that period
@@ -44,20 +47,8 @@ FREQUENCY_ROUNDS = 4  # iterations of a period and the added mass at that period
 LINEAR = ("radiation", "filtered position", "wake")
 DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
 MEMORY = "radiation_"  # prefix of the states of radiation memory
-WAKE = "wake_"  # prefix of the states of dynamic inflow, four per annulus
-WAKE_STEP = 1e-3  # m/s, of the differences
-CYCLIC = ("tilt_", "yaw_")  # prefixes of the cyclic states of individual pitch, see multiblade.py
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
 FORCE_STEPS = np.array([1e2, 1e2, 1e2, 1e4, 1e4, 1e4])  # N, N m
-MEASURED = (
-    "rotor_speed", "generator_speed", "blade_pitch", "surge", "heave", "platform_pitch",
-    "platform_pitch_rate", "nacelle_acceleration", "nacelle_velocity",
-)  # fmt: skip
-RECORDED = {  # output: column of the output row, SI
-    "power": Out.GENPWR,
-    "rotor_thrust": Out.RTFLDFXH,
-    "tower_base_moment": Out.TWRBSMYT,
-}
 
 
 # state: field of a Measurement; for velocities in body axes the rate of the position
@@ -71,12 +62,16 @@ COLUMNS = {  # state: column of the output of simulate
     **dict(zip(VELOCITIES, (f"Ptfm{kind}V{axis}i" for kind in "TR" for axis in "xyz"), strict=True)),
     "rotor_speed": "RotSpeed", "blade_pitch": "BldPitch1", "generator_torque_in_force": "GenTq",
 }  # fmt: skip
+BENDING = tuple(f"{part}{name}" for name in SHAPES for part in ("", *CYCLIC))  # of blades
+STRUCTURAL = (*TOWER, *BENDING, TWIST_STATES[0])  # deflections of the structure
 UNITS = {  # of states, inputs and outputs, SI
     **{field: measured.unit for field, measured in FIELDS.items()},
     **{name: FIELDS[field].unit for name, field in MEASURED_AS.items()},
     "pitch_rate": "rad/s", "blade_pitch_command": "rad", "power": "W", "rotor_thrust": "N",
     "tower_base_moment": "N m",
     **{name: "m" for name in TOWER}, **{f"{name}_rate": "m/s" for name in TOWER},
+    **{name: "m" for name in BENDING}, **{f"{name}_rate": "m/s" for name in BENDING},
+    **dict(zip(TWIST_STATES, ("rad", "rad/s"), strict=True)),
 }  # fmt: skip
 
 
@@ -129,7 +124,9 @@ class LinearModel:
     outputs; E (m, 6) and F (n, 6) apply to further forces on the hull (FORCES). point is the OperatingPoint.
     The first 14 states are plant.state.STATES, followed by the states that the plant has of: dynamic inflow
     (wake_1 ...), deflections of a flexible tower (TOWER) and their rates (tower_fore_aft_rate ...),
-    ACTUATOR_STATES, and radiation memory (radiation_1 ...).
+    deflections of bending blades, mean of the blades (flap_1 ...), and their rates, TWIST_STATES of a shaft,
+    ACTUATOR_STATES, cosine and sine components of the blades' states (tilt_flap_1, yaw_flap_1 ...:
+    blade_coordinates.py), and radiation memory (radiation_1 ...).
 
     All variables are deviations from the operating point, given by `equilibrium` and `equilibrium_inputs`;
     state() computes the states from measurements. Velocities (vx to wz) are those of the body origin in body
@@ -174,7 +171,9 @@ class LinearModel:
     def x0(self):
         """Return the states (m,) at the operating point."""
         names, indices, _ = plant_states(self.scene)
-        values = {name: self.point.state[each[0]] for name, each in zip(names, indices, strict=True)}
+        mean, cyclic = multiblade_point(self.scene, self.point.state)
+        values = {name: mean[each[0]] for name, each in zip(names, indices, strict=True)}
+        values |= dict(zip(cyclic_names(cyclic), np.ravel(list(cyclic.values())), strict=True))
         return np.array([values.get(name, 0.0) for name in self.states])
 
     @property
@@ -352,28 +351,6 @@ def chosen(kind, names, known):
     return names
 
 
-def plant_states(scene):
-    """Return (names, indices in the state vector, difference steps) of the states, except radiation memory.
-
-    A state of each blade has the indices of all blades, which move together.
-    """
-    rows = [(name, [int(i)], step) for name, i, step in zip(STATES, STATE_INDEX, STATE_STEPS, strict=True)]
-    pitch = STATES.index("blade_pitch")
-    rows[pitch] = ("blade_pitch", list(scene.pitch_states), STATE_STEPS[pitch])
-    for name, first, size, *_ in scene.blocks:
-        if name == "wake":
-            each = size // scene.turbine.rotor.blades
-            indices = (list(range(first + k, first + size, each)) for k in range(each))
-            rows += [(f"{WAKE}{k}", blades, WAKE_STEP) for k, blades in enumerate(indices, 1)]
-        elif name in TOWER_BLOCKS:
-            end, step = TOWER_BLOCKS[name]
-            rows += [(mode + end, [first + k], step) for k, mode in enumerate(TOWER[:size])]
-        elif name in ACTUATOR_STATES:
-            state, step = ACTUATOR_STATES[name]
-            rows.append((state, list(range(first, first + size)), step))
-    return tuple(zip(*rows, strict=True))
-
-
 class Mode(NamedTuple):
     """Holds name, period and damping of one oscillating mode."""
 
@@ -386,23 +363,27 @@ class Mode(NamedTuple):
 def modes(a, names, cm_height, arm):
     """Return the modes [Mode] of a system matrix a (n, n) with these state names, slowest first.
 
-    A mode is named by its largest motion: translations of the centre of mass (at the water line a
-    platform-pitch mode moves more in surge than in pitch), angles times arm (m), rotor speed times arm/12 s,
-    and tower deflections unscaled.
-    Modes dominated, by participation factors, by states of radiation memory, dynamic inflow, a pitch drive
-    with inertia or cyclic blade pitch are omitted.
+    A mode of the structure, by participation factors, is named by the deflection with the largest ones, each
+    name once: a wave of blade bending around the rotor is regressive or progressive (flap_1_regressive); if
+    all blades bend alike, it has the name of the bending mode. Another mode is named by its largest motion:
+    translations of the centre of mass (at the water line a platform-pitch mode moves more in surge than in
+    pitch), angles times arm (m), and rotor speed times arm/12 s.
+    Modes dominated by states of radiation memory, dynamic inflow, a pitch drive with inertia or cyclic blade
+    pitch are omitted.
     """
     values, vectors = np.linalg.eig(a)
-    result = []
     drive = DRIVE if "pitch_rate" in names else ()
-    internal = [name.startswith((MEMORY, WAKE, *CYCLIC)) or name in drive for name in names]
-    fractions = np.zeros(len(values))
-    if any(internal):
+    cyclic = tuple(f"{part}pitch" for part in CYCLIC)
+    internal = [name.startswith((MEMORY, WAKE, *cyclic)) or name in drive for name in names]
+    bent = any(name in STRUCTURAL for name in names)
+    factors = np.zeros((len(names), len(values)))
+    if any(internal) or bent:
         factors = np.abs(vectors * np.linalg.inv(vectors).T)
-        fractions = factors[internal].sum(axis=0) / factors.sum(axis=0)
-    for value, vector, fraction in zip(values, vectors.T, fractions, strict=True):
-        if value.imag <= 1e-6 or fraction > 0.5:
-            continue
+        factors /= factors.sum(axis=0)
+    kept = [k for k, value in enumerate(values) if value.imag > 1e-6 and factors[internal, k].sum() <= 0.5]
+    of_structure = _structural_modes(names, vectors[:, kept], factors[:, kept]) if bent else {}
+    result = []
+    for k, (value, vector) in enumerate(zip(values[kept], vectors[:, kept].T, strict=True)):
         part = dict(zip(names, vector, strict=True))
         participation = {
             "surge": abs(part["surge"] + cm_height * part["platform_pitch"]),
@@ -410,66 +391,33 @@ def modes(a, names, cm_height, arm):
             "heave": abs(part["heave"]),
             **{angle: arm * abs(part[angle]) for angle in MOTIONS[3:]},
             "rotor_speed": arm / 12.0 * abs(part["rotor_speed"]),
-            **{deflection: abs(part[deflection]) for deflection in TOWER if deflection in part},
         }
-        name = max(participation, key=participation.get)
+        name = of_structure.get(k, max(participation, key=participation.get))
         size = abs(value)
         result.append(Mode(name, float(2.0 * np.pi / value.imag), float(-value.real / size), float(size)))
     return sorted(result, key=lambda mode: -mode.period)
 
 
-@inlined_kernel
-def fill_response(x, u, force, model, data, dx, measurement, row):
-    """Fill state rates, measurement and output row under u and additional hull forces (6,)."""
-    evaluate_loads(0.0, x, model, data, dx)
-    for j in range(6):
-        data.cache[LoadCache.TOTAL + j] += force[j]
-        data.cache[LoadCache.HYDRO + j] += force[j]
-    respond(x, u, model, data, dx)
-    measure(model, data, x, dx, u, 0.0, measurement)
-    record(model, data, x, dx, u, 0.0, loads_of(data, dx), row)
-
-
-@entry
-def _mean_response(handle, x, u, force, azimuths, dx, measurement, row, rates, measured, recorded):
-    """Fill azimuth means of state rates, measurement and output row under u and additional hull forces."""
-    model, data = model_of(handle), data_of(handle)
-    start = x[State.AZIMUTH]
-    rates[:] = 0.0
-    measured[:] = 0.0
-    recorded[:] = 0.0
-    for i in range(azimuths):
-        x[State.AZIMUTH] = start + i * (2.0 * pi / 3.0) / azimuths
-        fill_response(x, u, force, model, data, dx, measurement, row)
-        rates += dx / azimuths
-        measured += measurement / azimuths
-        recorded += row / azimuths
-    x[State.AZIMUTH] = start
-    data.cache[LoadCache.VALID] = 0.0
-
-
-class Plant:
-    """Computes state rates and outputs of a scene without fluctuations at a state, command and hull force."""
-
-    def __init__(self, scene, n_lines):
-        self.handle = scene.handle()
-        self.columns = [*RECORDED.values(), *range(N_FIXED, N_FIXED + n_lines)]
-        self.measures = [Measure[name.upper()] for name in MEASURED]
-        names, indices, _ = plant_states(scene)
-        self.states = [each[0] for each in indices]
-        self.wake = [i for i, name in enumerate(names) if name.startswith(WAKE)]
-        self.annuli = [indices[i] for i in self.wake]  # averaged over blades, whose rates differ in shear
-        sizes = (scene.n_state, scene.n_measurements, len(scene.channels))
-        self.scratch, self.means = tuple(map(np.zeros, sizes)), tuple(map(np.zeros, sizes))
-
-    def __call__(self, x, u, force):
-        """Return the rates of plant_states followed by the outputs."""
-        _mean_response(self.handle, x, u, force, AZIMUTHS, *self.scratch, *self.means)
-        rates, measured, recorded = self.means
-        of_states = rates[self.states]
-        if self.wake:
-            of_states[self.wake] = rates[self.annuli].mean(axis=1)
-        return np.r_[of_states, measured[self.measures], recorded[self.columns]]
+def _structural_modes(names, vectors, factors):
+    """Return {column: name} of the modes dominated by tower, blades and shaft (modes)."""
+    shares = {}
+    for row, name in enumerate(names):
+        deflection, rate = name.removesuffix("_rate"), name.endswith("_rate")
+        if deflection not in STRUCTURAL:
+            continue
+        if not deflection.startswith(CYCLIC):
+            shares[deflection] = shares.get(deflection, 0.0) + factors[row]
+            continue
+        mode = deflection.removeprefix(CYCLIC[0]).removeprefix(CYCLIC[1])
+        tilt, yaw = (vectors[names.index(f"{part}{mode}{'_rate' * rate}")] for part in CYCLIC)
+        waves = {way: np.abs(wave) ** 2 for way, wave in blade_waves(tilt, yaw).items()}
+        for way, wave in waves.items():
+            label = f"{mode}_{way}"
+            shares[label] = shares.get(label, 0.0) + factors[row] * wave / sum(waves.values())
+    labels, table = list(shares), np.array(list(shares.values()))
+    columns = np.flatnonzero(table.sum(axis=0) > 0.5)
+    rows, chosen_columns = linear_sum_assignment(-table[:, columns])
+    return {int(columns[k]): labels[i] for i, k in zip(rows, chosen_columns, strict=True)}
 
 
 def check_linear(scene, known=LINEAR):
@@ -500,7 +448,8 @@ def linearize(scene, operating_point=None, *, wind=None):
     first-order force. Drag has no linear part at rest in still water, so viscous damping is absent there.
     Radiation memory is included exactly, for the convolution by the fit of the state-space option. Dynamic
     inflow has four states per annulus: wake_1 to 4 are those of the innermost station (aero/wake.py).
-    Deadband and friction of a pitch drive are omitted. blade_pitch is the collective pitch.
+    Deadband and friction of a pitch drive are omitted. blade_pitch is the collective pitch. Bending blades
+    are in multi-blade coordinates about their periodic state; variations at three per turn are omitted.
 
     Raises: InputError for a scene with other internal states, for a wind in a scene without aerodynamics, and
     for a wind together with an operating point.
@@ -512,24 +461,44 @@ def linearize(scene, operating_point=None, *, wind=None):
             raise InputError(f"wind = {short(wind)}: an operating point has a wind already; give one only")
         scene = scene.with_weather(wind=check_number("wind", wind, 0.0))
     point = trim(scene) if operating_point is None else operating_point
+    return differentiated(scene, point, bending_names(scene))
+
+
+def differentiated(scene, point, bladed, inputs=(), outputs=()):
+    """Return the LinearModel of a scene at an OperatingPoint by central differences.
+
+    bladed: states of single blades that have cyclic components; inputs: names of the cosine and sine
+    components of the pitch command, or none; outputs: MOMENTS or none.
+    """
     parts = steady_parts(scene, point)
-    x, u, force = point.state.copy(), point.command.copy(), np.zeros(6)
+    (x, bent), u, force = multiblade_point(scene, point.state), point.command.copy(), np.zeros(6)
+    cyclic = np.array([*(bent.get(name, np.zeros(2)) for name in bladed), np.zeros(2)])
 
     def plant_at(speed):
-        return Plant(without_fluctuations(scene, speed).with_model(parts), scene.n_lines)
+        return Plant(without_fluctuations(scene, speed).with_model(parts), bladed, outputs)
 
     plant = plant_at(point.wind_speed)
-    names, indices, state_steps = plant_states(scene)
+    names, indices, steps = plant_states(scene)
+    cyclic_steps = [steps[names.index(name)] for name in bladed]
 
-    def slopes(vector, entries, steps):
-        pairs = zip(entries, steps, strict=True)
-        return [central_difference(lambda: plant(x, u, force), vector, *each) for each in pairs]
+    def slope(array, index, step):
+        return central_difference(lambda: plant(x, u, force, cyclic), array, index, step)
 
-    of_states = slopes(x, indices, state_steps)
-    of_inputs = slopes(u, ([0], list(range(1, scene.n_commands))), INPUT_STEPS[:2])
-    of_inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force), point, of_inputs[0]))
-    of_forces = slopes(force, range(6), FORCE_STEPS)
-    return assembled(scene, point, (of_states, of_inputs, of_forces), names)
+    def cyclic_slopes(rows, row_steps):
+        return [
+            slope(cyclic, (k, part), step)
+            for k, step in zip(rows, row_steps, strict=True)
+            for part in range(2)
+        ]
+
+    of_states = [slope(x, each, step) for each, step in zip(indices, steps, strict=True)]
+    of_states += cyclic_slopes(range(len(bladed)), cyclic_steps)
+    of_inputs = [slope(u, 0, INPUT_STEPS[0]), slope(u, list(range(1, scene.n_commands)), INPUT_STEPS[1])]
+    of_inputs.append(wind_slope(lambda speed: plant_at(speed)(x, u, force, cyclic), point, of_inputs[0]))
+    of_inputs += cyclic_slopes([len(bladed)], INPUT_STEPS[1:2]) if inputs else []
+    of_forces = [slope(force, i, FORCE_STEPS[i]) for i in range(6)]
+    states = (*names, *cyclic_names(bladed))
+    return assembled(scene, point, (of_states, of_inputs, of_forces), states, inputs, outputs)
 
 
 def wind_slope(evaluate, point, like):
@@ -579,10 +548,20 @@ def with_memory(model, memory):
     )
 
 
+def settled(model, names):
+    """Return the LinearModel of the autonomous plant with the named states in equilibrium."""
+    gone = [model.index(name) for name in names]
+    kept = [i for i in range(len(model.states)) if i not in gone]
+    follows = np.linalg.solve(model.A[np.ix_(gone, gone)], model.A[np.ix_(gone, kept)])
+    a = model.A[np.ix_(kept, kept)] - model.A[np.ix_(kept, gone)] @ follows
+    return replace(model, A=a, states=tuple(model.states[i] for i in kept))
+
+
 def natural_periods(scene):
     """Return {motion: undamped natural period s} of the six motions about the trim, from stiffness and mass.
 
-    Tower modes of a flexible tower follow, named by TOWER. A motion without restoring (no moorings) gets inf.
+    Tower modes of a flexible tower follow, named by TOWER; blades bend and the shaft twists quasi-statically.
+    A motion without restoring (no moorings) gets inf.
     Modes are named by their largest motion, angles weighted with half the draft. With radiation memory the
     added mass is taken at the natural frequency of the motion.
     """
@@ -598,6 +577,8 @@ def natural_periods(scene):
 
 def _periods(model, omega):
     """Return {motion: undamped natural period s} with the added mass of the memory at a frequency, rad/s."""
+    quick = [name for name in model.states if name.removesuffix("_rate") in STRUCTURAL[len(TOWER) :]]
+    model = settled(model, quick)
     deflections = [name for name in TOWER if name in model.states]
     names = (*MOTIONS, *deflections)
     n = len(names)

@@ -6,6 +6,7 @@ from math import cos, pi, sin
 import numpy as np
 from scipy.optimize import brentq
 
+from fowt_env.analysis.blade_coordinates import TURN, CyclicMean, bending_states, placed
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.analysis.statics import Evaluation, central_difference, mean_derivative, with_hanging_lines
 from fowt_env.descriptions.channel_meanings import channel_meaning
@@ -20,7 +21,7 @@ from fowt_env.plant.compile.decorators import entry
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.drivetrain import build_torque_curve, generator_torque
 from fowt_env.plant.line_dynamics import rest_lines
-from fowt_env.plant.state import Command, State, pose_of
+from fowt_env.plant.state import BLADES, Command, State, pose_of
 from fowt_env.plant.tilt import rotor_pose
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.channel_names import channel_name, channel_unit
@@ -32,6 +33,7 @@ from fowt_env.weather.wind_field import steady_field
 AZIMUTHS = 12  # samples over 120 degrees, the period of three blades
 NEWTON_ROUNDS = 40
 TOLERANCE = 1e-11  # m/s2 and rad/s2 of remaining acceleration
+BENT = 1e-10  # m/s2, of the modes of blades, and rad/s2, of the twist of the shaft
 OUTER_ROUNDS = 30
 FEATHERED = 0.5 * pi
 HALVINGS = 12
@@ -41,7 +43,8 @@ DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
     int(State.ROTOR_SPEED): 1e-4,
     int(State.BLADE_PITCH): 1e-5,
 }
-DEFLECTION_STEP = 1e-3  # m, of the deflections of a flexible tower
+DEFLECTION_STEP = 1e-3  # m, of the deflections of a flexible tower and of blades
+TWIST_STEP = 1e-5  # rad, of the shaft
 PLATFORM_MODES = ("floating", "fixed")
 
 
@@ -143,17 +146,71 @@ class _Steady(Evaluation):
         self.curve = build_torque_curve(self.scene.turbine.torque_law)
         self.start = None  # equilibrium.Evaluated of the undisplaced platform
         self.slope = None  # last Jacobian of the motions
+        self.bent = bending_states(scene)  # x has the mean of the blades
+        modes = len(self.bent) // 2
+        # mean, cosine and sine components of the blades' deflections, then the twist of a shaft that twists
+        self.bending = np.zeros(3 * modes + (scene.model.shaft is not None))
+        self.bending_slope = None
+        self.cyclic = np.zeros((2 * modes, 2))
+        self.average = CyclicMean(scene, self.data, self.handle) if modes else None
 
     def rates(self):
         """Return the azimuth-averaged derivative at the current state and command, with actuators at rest."""
         rest_actuators(self.scene.model, self.x, self.u)
-        for block in self.scene.blocks:
-            if block.steady == "settled":
-                self.settle_internal(block)
-        mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+        if len(self.bending):
+            self.settle_bending()
+        else:
+            self.settled_rates()
         if fault := self.scene.first_nonfinite_load(self.data):
             raise InputError(f"no steady state found for {label(self.scene)}: {fault}")
         return self.mean
+
+    def settled_rates(self):
+        """Fill the mean derivative, with internal states in equilibrium; return as fill_mean."""
+        for block in self.scene.blocks:
+            if block.steady == "settled":
+                self.settle_internal(block)
+        return self.fill_mean()
+
+    def fill_mean(self):
+        """Fill the mean derivative at the current state; return the rates of the cyclic components."""
+        if self.average is None:
+            mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+            return self.cyclic
+        return self.average(self.x, self.cyclic, self.u, self.azimuths, self.mean)
+
+    def placed(self, azimuth):
+        """Return the state at an azimuth (rad)."""
+        return placed(self.x, azimuth, self.bent, self.cyclic)
+
+    @property
+    def azimuths(self):
+        """Return the number of azimuths that are averaged: that of the start alone for a rotor at rest."""
+        return 1 if self.x[State.ROTOR_SPEED] == 0.0 and self.average is not None else AZIMUTHS
+
+    def settle_bending(self):
+        """Set blades and shaft to their periodic state, with platform, tower and rotor fixed.
+
+        Weight bends each blade once per turn: the state has the mean and the first harmonic.
+        """
+        modes, shaft = len(self.bent) // 2, self.scene.model.shaft
+        bending, twist = np.split(self.bending, [3 * modes])
+        bending = bending.reshape(modes, 3)
+
+        def accelerations():
+            speed = self.x[State.ROTOR_SPEED]
+            self.x[self.bent[:modes]] = bending[:, :1]
+            self.cyclic[:modes] = bending[:, 1:]
+            self.cyclic[modes:] = speed * np.array([bending[:, 2], -bending[:, 1]]).T
+            if shaft is not None:
+                self.x[shaft.first] = twist[0]
+            turned = self.settled_rates()
+            found = np.column_stack([self.mean[self.bent[modes:, 0]], turned[modes:]]).ravel()
+            return found if shaft is None else np.append(found, self.mean[shaft.first + 1])
+
+        every = list(range(len(self.bending)))
+        steps = [DEFLECTION_STEP] * bending.size + [TWIST_STEP] * len(twist)
+        _, self.bending_slope = newton(accelerations, self.bending, every, steps, BENT, self.bending_slope)
 
     def settle_internal(self, block):
         """Set a block of internal states to its equilibrium, with all other states fixed.
@@ -165,7 +222,7 @@ class _Steady(Evaluation):
             return
         rows = slice(block.offset, block.offset + block.size)
         if block.name == "airfoil":  # at rest after one step of this length
-            mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+            self.fill_mean()
             self.x[rows] += STEADY * self.mean[rows]
             return
         if block.name == "radiation":  # zero for a platform at rest
@@ -174,7 +231,7 @@ class _Steady(Evaluation):
 
         def rates_at(values):
             self.x[rows] = values
-            mean_derivative(self.handle, self.x, self.u, AZIMUTHS, self.dx, self.mean)
+            self.fill_mean()
             return self.mean[rows].copy()
 
         values = self.x[rows].copy()
@@ -292,50 +349,23 @@ class _Steady(Evaluation):
 
     def jacobian(self, free):
         """Return the derivatives of the residual by the free states, from central differences."""
-        steps = [DIFFERENCE_STEPS.get(index, DEFLECTION_STEP) for index in free]
-        columns = [
-            central_difference(lambda: self.residual(free), self.x, index, step)
-            for index, step in zip(free, steps, strict=True)
-        ]
-        return np.array(columns).T
+        return jacobian(lambda: self.residual(free), self.x, free, self._steps(free))
+
+    def _steps(self, free):
+        return [DIFFERENCE_STEPS.get(index, DEFLECTION_STEP) for index in free]
 
     def settle(self, free):
-        """Solve for zero acceleration by Newton's method on the free states; return the largest residual.
+        """Solve for zero acceleration of the free states; return the largest residual."""
 
-        The Jacobian is kept while the residual falls tenfold per iteration. A step that does not lower the
-        residual is halved, because far from the solution lines become taut within metres.
-        """
-        residual = self.residual(free)
-        if self.start is None:  # at the first call the platform is undisplaced
-            self.start = evaluated(self.x, self.data)
-        size = np.max(np.abs(residual))
-        jacobian = None
-        for _ in range(NEWTON_ROUNDS):
-            if size < TOLERANCE:
-                break
-            fresh = jacobian is None
-            if fresh:
-                jacobian = self.jacobian(free)
-                if not np.isfinite(jacobian).all():
-                    break
-                self.slope = self._of_motions(jacobian)
-            # least squares: without moorings there is no restoring in surge and sway, which stay unchanged
-            change = np.linalg.lstsq(jacobian, -residual, rcond=1e-9)[0]
-            before, start = size, self.x[free].copy()
-            for _ in range(HALVINGS):
-                self.x[free] = start + change
-                residual = self.residual(free)
-                size = np.max(np.abs(residual))
-                if size < before:
-                    break
-                change *= 0.5
-            if not size < before:
-                if fresh:
-                    break  # limited by rounding
-                self.x[free] = start  # retry with a new Jacobian
-                residual, size = self.residual(free), before
-            if not size < 0.1 * before:
-                jacobian = None
+        def residual():
+            value = self.residual(free)
+            if self.start is None:  # at the first call the platform is undisplaced
+                self.start = evaluated(self.x, self.data)
+            return value
+
+        size, slope = newton(residual, self.x, free, self._steps(free), TOLERANCE)
+        if slope is not None:
+            self.slope = self._of_motions(slope)
         return size
 
     def _of_motions(self, jacobian):
@@ -358,6 +388,53 @@ class _Steady(Evaluation):
             return self._of_motions(self.jacobian(self.motions()))
 
         check_equilibrium(self.scene, rest, self.start, self.slope, fresh_slope)
+
+
+def jacobian(residual, array, entries, steps):
+    """Return the derivatives of residual() by entries of an array, from central differences."""
+    columns = [
+        central_difference(residual, array, index, step) for index, step in zip(entries, steps, strict=True)
+    ]
+    return np.array(columns).T
+
+
+def newton(residual, array, entries, steps, tolerance, slope=None):
+    """Solve residual() = 0 by Newton's method on entries of an array; return (largest residual, Jacobian).
+
+    steps: of the differences; slope: Jacobian at a state nearby, or None. The Jacobian is kept while the
+    residual falls tenfold per iteration. A step that does not lower the residual is halved, because far from
+    the solution lines become taut within metres.
+    """
+    value = residual()
+    size = np.max(np.abs(value))
+    kept = slope is not None
+    for _ in range(NEWTON_ROUNDS):
+        if size < tolerance:
+            break
+        fresh = not kept
+        if fresh:
+            there = jacobian(residual, array, entries, steps)
+            if not np.isfinite(there).all():
+                break
+            slope, kept = there, True
+        # least squares: without moorings there is no restoring in surge and sway, which stay unchanged
+        change = np.linalg.lstsq(slope, -value, rcond=1e-9)[0]
+        before, start = size, array[entries].copy()
+        for _ in range(HALVINGS):
+            array[entries] = start + change
+            value = residual()
+            size = np.max(np.abs(value))
+            if size < before:
+                break
+            change *= 0.5
+        if not size < before:
+            if fresh:
+                break  # limited by rounding
+            array[entries] = start  # retry with a new Jacobian
+            value, size = residual(), before
+        if not size < 0.1 * before:
+            kept = False
+    return size, slope
 
 
 def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
@@ -415,6 +492,8 @@ def trim_prescribed(scene, rotor_speed, blade_pitch, platform="floating"):
         remaining = steady.settle(steady.positions())
         if not remaining < 1e3 * TOLERANCE:
             raise steady.refusal()
+    else:
+        steady.rates()
     return _point(scene, steady, platform)
 
 
@@ -422,12 +501,15 @@ def _point(scene, steady, platform):
     """Return the OperatingPoint at the current state, with channels averaged over the azimuth."""
     rest_actuators(scene.model, steady.x, steady.u)
     rest_lines(scene, steady.x)
-    state, command = steady.x.copy(), steady.u.copy()
-    rows = []
-    for i in range(AZIMUTHS):
-        x = state.copy()
-        x[State.AZIMUTH] += i * (2.0 * pi / 3.0) / AZIMUTHS
-        rows.append(output_row(steady.handle, x, command, 0.0, len(scene.channels)))
+    x, command = steady.x, steady.u.copy()
+    # blades with loads of their own turn once, others are alike after a third of a turn
+    turns = 1 if scene.model.pitches is None or steady.azimuths == 1 else BLADES
+    count = turns * steady.azimuths
+    rows = [
+        output_row(steady.handle, steady.placed(azimuth), command, 0.0, len(scene.channels))
+        for azimuth in x[State.AZIMUTH] + turns * TURN * np.arange(count) / count
+    ]
+    state = steady.placed(x[State.AZIMUTH])
     row = to_units(np.mean(rows, axis=0), scene.n_lines, scene.load_names, scene.channel_groups)
     names = [channel.name for channel in scene.channels]
     values = {name: float(value) for name, value in zip(names, row, strict=True)}

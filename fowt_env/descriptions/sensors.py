@@ -21,12 +21,14 @@ MOMENTS = BladeMeasurement._fields[BladeMeasure.ROOT_OUT_OF_PLANE_1 :]
 class Sensor:
     """Describes the sensor of a field of Measurement or BladeMeasurement, in SI units.
 
-    Low pass, delay, noise and quantisation, in this order.
+    Low pass, delay, noise with drift, and quantisation, in this order.
 
     Raises: InputError naming the key, value and allowed range.
     """
 
     noise: float = 0.0  # standard deviation of white noise on each reading
+    drift: float = 0.0  # standard deviation of a slow error, a first-order Gauss-Markov process from t = 0 on
+    drift_time: float = 3600.0  # s, its correlation time; long against a run: a constant offset
     time_constant: float = 0.0  # s, of a first-order low pass; 0: none
     delay: float = 0.0  # s from measurement to reading, taken as the nearest whole number of control periods
     step: float = 0.0  # of the quantisation; 0: none
@@ -36,8 +38,9 @@ class Sensor:
     confidence: str = ""
 
     def __post_init__(self) -> None:
-        for key in ("noise", "time_constant", "step", "high_pass"):
+        for key in ("noise", "drift", "time_constant", "step", "high_pass"):
             check_number(key, getattr(self, key), 0.0, allowed=">= 0 and finite")
+        check_number("drift_time", self.drift_time, 0.0, low_open=True, allowed="> 0 and finite")
         check_number("delay", self.delay, 0.0, LONGEST_DELAY)
 
 
@@ -67,10 +70,10 @@ class SensorChain:
             if measured not in self.sensors or self.sensors[measured].integral_of is not None:
                 allowed = "must be a field that the chain measures"
                 raise InputError(f"{where}: {name}.integral_of = {measured!r}: {allowed}")
-            if sensor != replace(sensor, noise=0.0, time_constant=0.0, delay=0.0, step=0.0):
+            if sensor != replace(sensor, noise=0.0, drift=0.0, time_constant=0.0, delay=0.0, step=0.0):
                 raise InputError(
-                    f"{where}: {name}: an integral has integral_of and high_pass; noise, time_constant, delay"
-                    f" and step are those of {measured}"
+                    f"{where}: {name}: an integral has integral_of and high_pass; noise, drift,"
+                    f" time_constant, delay and step are those of {measured}"
                 )
 
     @property
@@ -107,9 +110,9 @@ def _chain(name: str, entries: dict[str, Any]) -> SensorChain:
 def sensors_of(sensors: str | SensorChain | None, turbine: Any) -> SensorChain | None:
     """Return the SensorChain of a run with a Turbine description; None for exact readings.
 
-    A built-in chain, selected by name, is scaled to the turbine: noise and quantisation of shaft speeds and
-    torque with the rated values, those of bending moments with the rated torque on the rotor shaft. A
-    SensorChain is returned unchanged. Raises: InputError as sensor_chain.
+    A built-in chain, selected by name, is scaled to the turbine: noise, drift and quantisation of shaft
+    speeds and torque with the rated values, those of bending moments with the rated torque on the rotor
+    shaft. A SensorChain is returned unchanged. Raises: InputError as sensor_chain.
     """
     chain = sensor_chain(sensors)
     if chain is None or not isinstance(sensors, str):
@@ -127,7 +130,8 @@ def sensors_of(sensors: str | SensorChain | None, turbine: Any) -> SensorChain |
     for name, factor in factors.items():
         if name in scaled:
             sensor = scaled[name]
-            scaled[name] = replace(sensor, noise=factor * sensor.noise, step=factor * sensor.step)
+            parts = {key: factor * getattr(sensor, key) for key in ("noise", "drift", "step")}
+            scaled[name] = replace(sensor, **parts)
     return replace(chain, sensors=scaled)
 
 

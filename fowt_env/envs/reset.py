@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.analysis.blade_coordinates import bending_states, turned_to
 from fowt_env.descriptions.checks import short
 from fowt_env.descriptions.sea_state import sea_of
 from fowt_env.descriptions.wind import wind_of
@@ -59,7 +60,10 @@ def moved_state(scene, state, command, offsets):
     x, u, drive = state.copy(), command.copy(), scene.turbine.pitch_drive
     for name, value in offsets.items():
         index, factor = INITIAL[name]
-        x[index] += value * factor
+        if index == State.AZIMUTH:
+            x = turned_to(x, x[index] + value * factor, bending_states(scene))
+        else:
+            x[index] += value * factor
     if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
         raise InputError(
             f"offsets['PtfmPitch'] = {offsets['PtfmPitch']:g}: leads to"

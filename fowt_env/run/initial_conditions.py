@@ -1,11 +1,12 @@
 """Computes the state and command at the beginning of a run."""
 
 from collections.abc import Mapping
-from math import cos, pi
+from math import cos, pi, sin
 from typing import Any
 
 import numpy as np
 
+from fowt_env.analysis.blade_coordinates import bending_states, turned_to
 from fowt_env.analysis.equilibrium import impossible_place
 from fowt_env.analysis.trim import trim
 from fowt_env.descriptions.checks import check_number, refusal
@@ -15,7 +16,7 @@ from fowt_env.errors import (
     unknown,
 )
 from fowt_env.plant.line_dynamics import rest_lines
-from fowt_env.plant.state import OUT_OF_PLANE, Command, State, pose_of
+from fowt_env.plant.state import BLADES, OUT_OF_PLANE, Command, State, pose_of
 from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.channel_names import channel_name
 from fowt_env.scene.scene import Scene
@@ -38,6 +39,7 @@ INITIAL = {  # channel: (state, factor to SI)
     "PtfmRVyi": (State.WY, DEGREE),
     "PtfmRVzi": (State.WZ, DEGREE),
 }
+TIPS = tuple(f"{name}{blade}" for name in ("OoPDefl", "IPDefl") for blade in ("", *range(1, BLADES + 1)))
 
 
 def initial_state(
@@ -45,11 +47,12 @@ def initial_state(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (state, command) at the beginning of a run.
 
-    initial: "trim" (or None), the floating steady state in the mean wind; "zero", all states of platform and
-    tower zero, with the rotor speed and blade pitch of that wind on a fixed platform; or a mapping of
-    absolute values of channels at the trim, or at {"start": "zero"}. Channels are named PtfmPitch or
-    PtfmPitch_[deg]; BldPitch1 sets the pitch of all blades, with individual pitch that of
-    blade 1; TTDspFA and TTDspSS bend the tower in its first modes only.
+    initial: "trim" (or None), the floating steady state in the mean wind; "zero", all states of platform,
+    tower and blade bending zero, with the rotor speed and blade pitch of that wind on a fixed platform; or
+    a mapping of absolute values of channels at the trim, or at {"start": "zero"}. Channels are named
+    PtfmPitch or PtfmPitch_[deg]; BldPitch1 sets the pitch of all blades, with individual pitch that of
+    blade 1; TTDspFA and TTDspSS bend the tower in its first modes only; OoPDefl and IPDefl of the blade tips
+    (OoPDefl1: of blade 1) bend the blades in the first flapwise and the edgewise mode only, as in ElastoDyn.
     Raises: InputError for unknown channels, values that are not numbers, and impossible positions:
     below the sea bed; with wind also out of the water, with the tower base under water, or with the rotor
     facing away from the wind.
@@ -68,17 +71,26 @@ def initial_state(
         deflections = slice(tower.first, tower.first + len(tower.slope))
         if start == "zero" or any(str(name).startswith("TTDsp") for name in values):
             x[deflections] = 0.0
-    rates = {}
+    tips = TIPS if scene.model.blades is not None else ()
+    bent = bending_states(scene)
+    if start == "zero":
+        x[bent] = 0.0
+    rates, deflected = {}, {}
     for name, value in values.items():
         key = channel_name(name)
-        if key not in known:
-            raise unknown("channel of initial", name, known)
+        if key not in known and key not in tips:
+            raise unknown("channel of initial", name, (*known, *tips))
         check_number(f"initial[{name!r}]", value)
+        if key in tips:
+            deflected[key] = value
+            continue
         index, factor = known[key]
         if scene.model.rigid_body.plane is not None and index in OUT_OF_PLANE and value != 0.0:
             raise refusal(f"initial[{name!r}]", value, "0 in a planar scene")
         if State.VX <= index <= State.WZ:
             rates[index] = value * factor
+        elif index == State.AZIMUTH:
+            x[:] = turned_to(x, value * factor, bent)
         else:
             x[index] = value * factor
     if abs(x[State.PLATFORM_PITCH]) >= 0.5 * pi:
@@ -103,10 +115,31 @@ def initial_state(
                 f" [{drive.minimum / DEGREE:g}, {drive.maximum / DEGREE:g}] deg"
             )
         u[Command.BLADE_PITCH + blade] = x[index]
+    if deflected:
+        _bend_blades(scene, x, deflected)
     rest_actuators(scene.model, x, u)
     if values:
         rest_lines(scene, x)
     return x, u
+
+
+def _bend_blades(scene, x, deflected):
+    """Set the deflections of blades whose tips have an initial displacement; rates and other modes are zero.
+
+    deflected: {channel of TIPS: m}; a displacement that is not given is zero.
+    """
+    blades = scene.model.blades
+    flap, edge = 0, len(blades.beam.count) - 1  # first flapwise, edgewise: blade_beam.MODES
+    shapes = np.array([blades.tip.x[[flap, edge]], blades.tip.y[[flap, edge]]])
+    bent = bending_states(scene)
+    for number, pitch in enumerate(scene.pitch_states):
+        keys = [[f"{name}{blade}" for blade in ("", number + 1)] for name in ("OoPDefl", "IPDefl")]
+        if not any(key in deflected for pair in keys for key in pair):
+            continue
+        out, inward = (next((deflected[key] for key in pair[::-1] if key in deflected), 0.0) for pair in keys)
+        c, s = cos(x[pitch]), sin(x[pitch])
+        x[bent[:, number]] = 0.0
+        x[bent[[flap, edge], number]] = np.linalg.solve(shapes, [c * out - s * inward, s * out + c * inward])
 
 
 def _check_position(scene, x):

@@ -3,9 +3,9 @@
 from typing import Any
 
 from fowt_env.errors import InputError
-from fowt_env.plant.channels import BLADE_CHANNELS, FIXED_CHANNELS, TOWER_CHANNELS
+from fowt_env.plant.channels import FIXED_CHANNELS, GROUPS
 
-UNITS = {channel.name: channel.unit for channel in (*FIXED_CHANNELS, *BLADE_CHANNELS, *TOWER_CHANNELS)}
+UNITS = {channel.name: channel.unit for group in (FIXED_CHANNELS, *GROUPS.values()) for channel in group}
 
 
 def channel_name(name: Any) -> Any:

@@ -1,5 +1,6 @@
 """Chains of sensors: what they are made of, and what is refused."""
 
+import numpy as np
 import pytest
 
 from fowt_env.descriptions.sensors import (
@@ -13,6 +14,7 @@ from fowt_env.descriptions.sensors import (
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.measurement import SENSOR_FIELDS
+from fowt_env.weather.sensor_noise import draw_drift
 
 
 @pytest.mark.parametrize("name", sorted(built_in_chains()))
@@ -40,7 +42,15 @@ def test_a_name_a_chain_and_nothing_at_all_are_understood():
 
 
 @pytest.mark.parametrize(
-    "key, value", [("noise", -1.0), ("time_constant", -0.1), ("delay", 101.0), ("step", "x")]
+    "key, value",
+    [
+        ("noise", -1.0),
+        ("drift", -1.0),
+        ("drift_time", 0.0),
+        ("time_constant", -0.1),
+        ("delay", 101.0),
+        ("step", "x"),
+    ],
 )
 def test_a_figure_out_of_range_is_named(key, value):
     with pytest.raises(InputError, match=f"{key} = "):
@@ -63,6 +73,17 @@ def test_a_figure_out_of_range_is_named(key, value):
 def test_a_chain_that_cannot_be_is_refused(sensors, message):
     with pytest.raises(InputError, match=message):
         SensorChain("own", sensors)
+
+
+def test_a_drift_has_its_size_and_time_and_each_field_its_own():
+    sensor, dt, n = Sensor(drift=3.0, drift_time=5.0), 0.1, 200_000
+    drift, other = (draw_drift(sensor, field, dt, 7, n) for field in (20, 21))
+    assert drift.std() == pytest.approx(3.0, rel=0.05)
+    assert np.mean(drift[:-50] * drift[50:]) / 9.0 == pytest.approx(np.exp(-1.0), abs=0.05)
+    assert abs(np.corrcoef(drift, other)[0, 1]) < 0.05
+    np.testing.assert_array_equal(drift[:300], draw_drift(sensor, 20, dt, 7, 300))
+    starts = [draw_drift(sensor, 20, dt, seed, 1)[0] for seed in range(2000)]
+    assert np.std(starts) == pytest.approx(3.0, rel=0.05)
 
 
 def test_noise_on_the_shafts_goes_with_the_rated_figures_of_the_turbine():

@@ -8,13 +8,12 @@ from fresh_python import fresh_python
 from plant_helpers import integrate, state
 
 from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel, simulate
-from fowt_env.analysis.linear_model import STATES
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.advance import RUNNING, advance, forget, observe
 from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, bashforth, build_integrator, moulton
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
-from fowt_env.plant.state import State
+from fowt_env.plant.state import STATES, State
 
 MASS = 1e6  # kg, of the body under the spring
 OSCILLATIONS = [name for name, method in INTEGRATORS.items() if method.oscillation_limit]

@@ -296,6 +296,7 @@ def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blade
         row[number], row[3 + number], row[6 + number] = c * px + s * py, c * py - s * px, pz
         row[9 + number], row[12 + number] = c * root.fx + s * root.fy, c * root.fy - s * root.fx
         row[15 + number], row[18 + number], row[21 + number] = root.fz, root.mx, root.my
+        row[40 + number], row[43 + number], row[46 + number] = px, py, root.mz
         inner = _section_load(number, x, dx, frame, pitch, blades.inner, aero, loads, blades, work)
         outer = _section_load(number, x, dx, frame, pitch, blades.outer, aero, loads, blades, work)
         row[24 + number], row[27 + number] = _bending_moments(inner, x, q, blades.inner)
@@ -304,6 +305,7 @@ def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blade
     c, s = cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH])
     row[36], row[37] = c * my + s * mz, c * mz - s * my
     row[38], row[39] = fy, fz
+    row[49], row[50] = c * fy + s * fz, c * fz - s * fy
 
 
 # (pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row): channels of bending
