@@ -182,17 +182,21 @@ class Rosco(BladedCalls):
     changes: {name in DISCON.IN: value} that replace values of DISCON.IN.
     individual: whether the controller receives blade root loads and commands the pitch of each blade; a
     Discon must be created with the same value.
+    nodding: whether Fl_Mode 2 of a Discon receives the acceleration of the nacelle, as from OpenFAST, which
+    contains the bending of the tower; else the difference of the measured platform pitch rate.
     """
 
-    def __init__(self, settings, control_dt, name="rosco", changes=None, individual=False):
+    def __init__(self, settings, control_dt, name="rosco", changes=None, individual=False, nodding=False):
         self.settings = settings
         self.changes = dict(changes or {})
         self.control_dt = check_control_dt(control_dt)
         self.name = str(name)
         self.individual = bool(individual)
         self._files = self._remove = None
-        # with a DISCON.IN of the turbine the acceleration is the difference of the measured pitch rate
-        rotation = "platform_pitch_rate" if isinstance(settings, Discon) else "platform_pitch_acceleration"
+        self.nodding = bool(nodding)
+        # sensors measure the rate of the platform's pitch, not the acceleration of the nacelle's
+        differenced = isinstance(settings, Discon) and not self.nodding
+        rotation = "platform_pitch_rate" if differenced else "nacelle_pitch_acceleration"
         motion = {0: (), 1: ("nacelle_acceleration",), 2: (rotation,)}[settings.mode]
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
         blades = BLADES_READ if self.individual else ()
@@ -201,7 +205,7 @@ class Rosco(BladedCalls):
 
     def __getstate__(self):
         """Return the settings without the running library; call prepare() and reset() on a copy."""
-        kept = ("settings", "control_dt", "name", "changes", "individual")
+        kept = ("settings", "control_dt", "name", "changes", "individual", "nodding")
         return {key: getattr(self, key) for key in kept}
 
     def __setstate__(self, state):

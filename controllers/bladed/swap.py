@@ -32,7 +32,7 @@ READINGS = {
     "hub_wind_speed": (Measure.WIND_SPEED, 1.0),
     "nacelle_direction": (Measure.YAW, 1.0),
     "tower_top_fore_aft_acceleration": (Measure.NACELLE_ACCELERATION, 1.0),
-    "nacelle_nodding_acceleration": (Measure.PLATFORM_PITCH_ACCELERATION, 1.0),
+    "nacelle_nodding_acceleration": (Measure.NACELLE_PITCH_ACCELERATION, 1.0),
     "platform_displacement_x": (Measure.SURGE, 1.0),
     "platform_displacement_y": (Measure.SWAY, 1.0),
     "platform_displacement_z": (Measure.HEAVE, 1.0),
@@ -45,7 +45,7 @@ READINGS = {
     "platform_rotation_velocity_x": (Measure.ROLL_RATE, 1.0),
     "platform_rotation_velocity_y": (Measure.PLATFORM_PITCH_RATE, 1.0),
     "platform_rotation_velocity_z": (Measure.YAW_RATE, 1.0),
-    "platform_rotation_acceleration_y": (Measure.PLATFORM_PITCH_ACCELERATION, 1.0),
+    "platform_rotation_acceleration_y": (Measure.NACELLE_PITCH_ACCELERATION, 1.0),
 }
 BLADE_READINGS = {  # of a scene with individual pitch
     record.name: BladeMeasure[record.name.upper()]

@@ -30,7 +30,7 @@ class PlantSettings:
     """Holds the settings of the simulated plant."""
 
     rotor: str | None = None  # "bem", "lookup" or "table"; None: of the task, or default of the fidelity
-    fidelity: str = "standard"  # level of build_scene: "reference", "standard" or "fast"
+    fidelity: str = "standard"  # level of build_scene: "reference", "standard", "elastic", "fast"
     dt: float | None = None  # physics step, s; None: default step of the scene's integrator
     # further options of build_scene, including `loads`
     options: Mapping[str, Any] = field(default_factory=dict)

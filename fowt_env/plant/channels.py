@@ -220,7 +220,7 @@ def measure(model, data, x, dx, u, t, m):
         m[Measure.SURGE_RATE + i] = dx[State.SURGE + i]
     m[Measure.NACELLE_ACCELERATION] = ax
     m[Measure.NACELLE_VELOCITY] = nacelle.vx + nacelle.wy * top[2] - nacelle.wz * top[1]
-    m[Measure.PLATFORM_PITCH_ACCELERATION] = dx[State.WY]
+    m[Measure.NACELLE_PITCH_ACCELERATION] = moving.wy
     m[Measure.WIND_SPEED] = wind[0]
     m[Measure.WAVE_ELEVATION] = elevation_now(t, model.hydro, data)
     measure_blades(nacelle, moving, x, dx, model.pitches, model, data, m)

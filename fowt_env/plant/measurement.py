@@ -67,8 +67,8 @@ class Measurement(NamedTuple):
         "m/s2", "downwind", "acceleration of the tower top along the platform's x", True, 1.0, 100.0)]
     nacelle_velocity: Annotated[float, Measured(
         "m/s", "downwind", "velocity of the tower top along the platform's x", True, 1.0, 100.0)]
-    platform_pitch_acceleration: Annotated[float, Measured(
-        "rad/s2", "as platform_pitch", "angular acceleration about the platform's y axis", True,
+    nacelle_pitch_acceleration: Annotated[float, Measured(
+        "rad/s2", "as platform_pitch", "angular acceleration of the nacelle about its y axis", True,
         0.5 * DEGREE, 5.0)]
     wind_speed: Annotated[float, Measured(
         "m/s", "downwind", "wind at the hub along x; rotor-averaged where the scene's wind is")]

@@ -55,8 +55,8 @@ def build_blade_modes(turbine, option, first_state, aero):
         spring=np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, beam.stiffness)),
         decay=_decay(beam, aero, turbine.rated_rotor_speed),
         tip=_point(shapes_at(turbine, option, [rotor.tip_radius])),
-        inner=_section(turbine, option, SECTIONS[0], aero),
-        outer=_section(turbine, option, SECTIONS[1], aero),
+        inner=section_at(turbine, option, SECTIONS[0], aero),
+        outer=section_at(turbine, option, SECTIONS[1], aero),
     )
 
 
@@ -86,7 +86,7 @@ def _point(shapes):
     )
 
 
-def _section(turbine, option, fraction, aero):
+def section_at(turbine, option, fraction, aero):
     """Return the Section at a fraction of a blade's span."""
     rotor = turbine.rotor
     distance = rotor.hub_radius + fraction * (rotor.tip_radius - rotor.hub_radius)

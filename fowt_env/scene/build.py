@@ -67,8 +67,9 @@ def build_scene(
               from a table per station; "table": the whole rotor as one table. None: that of the fidelity
     fidelity  "standard": every blade and station by look-up, fast wave sums, Adams-Bashforth 4 (in a box of
               wind with three rotor loads per step), within 1e-3 of "reference" and a thousand times faster;
-              "reference": everything solved exactly, Runge-Kutta 4, some 20 times real time; "fast": the
-              rotor as one table
+              "reference": everything solved exactly, Runge-Kutta 4, some 20 times real time; "elastic":
+              "standard" with bending blades and tower, torsion of the shaft and dynamic inflow, for which the
+              files must have data; "fast": the rotor as one table. An explicit option overrides a part
     loads     additional user-defined loads on platform and tower (fowt_env.Load)
     options   see OPTIONS; a platform file may set other defaults. planar: only surge, heave and platform
               pitch move; ntm and etm turbulence is reduced to its components in the plane

@@ -41,6 +41,10 @@ class Fidelity(NamedTuple):
     radiation: str
     error: float  # of a motion or tension at most, rms over its standard deviation: performance.md
     dt: float | None = None  # s, default step with this integrator; None: default of the integrator
+    blades: str = "rigid"
+    tower: str = "rigid"
+    shaft: str = "rigid"
+    dynamic_inflow: bool = False
 
 
 def least_lag(dt, integrator):
@@ -105,6 +109,12 @@ FIDELITIES = {
         rotor="lookup", wave_loads="fast", integrator="ab4", mooring="catenary",
         radiation="state_space", error=5e-4,
     ),
+    "elastic": Fidelity(
+        "standard with blades and tower that bend, a shaft that twists and a wake that lags",
+        rotor="lookup", wave_loads="fast", integrator="ab4", mooring="catenary", radiation="state_space",
+        error=5e-3, blades="modes2", tower="modes2", shaft="torsion",
+        dynamic_inflow=True,
+    ),
     "fast": Fidelity(
         "the rotor and the tensions of the lines as tables",
         rotor="table", wave_loads="fast", integrator="ab4", mooring="table", radiation="state_space",
@@ -157,7 +167,8 @@ OPTIONS = {
     "diffraction": Option(None, (None, "none", "maccamy_fuchs"),
         "correction of wave loads on a large column; None: the platform's"),
     "skewed_wake": Option(False, (False, True), "induction over the azimuth in yawed or tilted inflow"),
-    "dynamic_inflow": Option(False, (False, True), "lag of the wake behind changes of thrust"),
+    "dynamic_inflow": Option(None, (None, False, True),
+        "lag of the wake behind changes of thrust; None: the fidelity's"),
     "unsteady_airfoils": Option(False, (False, "hgm"),
         "lag of lift and drag behind the angle of attack: Beddoes-Leishman model with four states (hgm)"),
     "tower_potential": Option(False, POTENTIAL,
@@ -178,13 +189,15 @@ OPTIONS = {
     "pitch_drive": Option("file", ("file", "second_order"),
         "first-order drive of the turbine file, or its second-order one"),
     # tower bending: none, or the first one or two modes in each direction ([tower.modes] of the file)
-    "tower": Option("rigid", ("rigid", "modes", "modes2"),
-        "rigid, or with one or two bending modes in each direction"),
+    "tower": Option(None, (None, "rigid", "modes", "modes2"),
+        "rigid, or with one or two bending modes in each direction; None: the fidelity's"),
     # blade bending: none, or the modes of blade_beam.MODES ([blade_structure] of the turbine file)
-    "blades": Option("rigid", ("rigid", "modes", "modes2"),
-        "rigid, or with the first flapwise and edgewise bending mode of each blade, or two flapwise modes"),
+    "blades": Option(None, (None, "rigid", "modes", "modes2"),
+        "rigid, or with the first flapwise and edgewise bending mode of each blade, or two flapwise modes;"
+        " None: the fidelity's"),
     # torsion of the shaft between generator and rotor ([shaft_torsion] of the turbine file)
-    "shaft": Option("rigid", ("rigid", "torsion"), "rigid, or twisting between generator and rotor"),
+    "shaft": Option(None, (None, "rigid", "torsion"),
+        "rigid, or twisting between generator and rotor; None: the fidelity's"),
     "integrator": Option(None, (None, *INTEGRATORS), "time stepping; None: the fidelity's"),
     # of the rotor load per step; None: FIELD_SAMPLES in a wind box with an integrator that samples it, else 1
     "rotor_samples": Option(None, Range("None or a number of samples, 1 to 10", 1, 10, whole=True),
@@ -221,6 +234,7 @@ OPTIONS = {
 }  # fmt: skip
 # defaults of a floater other than a slender spar: linear theory is valid for the undisplaced pose only
 UNDISPLACED = {"kinematics_position": "fixed", "surface": "swl", "stretching": "none"}
+LEVEL_PARTS = ("wave_loads", "integrator", "radiation", "blades", "tower", "shaft", "dynamic_inflow")
 ARGUMENTS = ("platform", "wind", "sea", "seed", "rotor", "fidelity", "loads")  # and OPTIONS
 
 
@@ -231,6 +245,11 @@ def choose_parts(fidelity, rotor, options):
     level = FIDELITIES[fidelity]
     if rotor is not None and rotor not in tuple(ROTORS):
         raise unknown("rotor model", rotor, ROTORS)
+    options["fidelity"] = fidelity
+    options["explicit_wave_loads"] = options["wave_loads"] is not None
+    for part in LEVEL_PARTS:
+        if options[part] is None:
+            options[part] = getattr(level, part)
     # a fidelity falls back to a model that supports these options, an explicit choice is rejected
     required = [name for name in STATION_OPTIONS if options[name]]
     able = [name for name, model in ROTORS.items() if set(required) <= set(model.supports)]
@@ -238,11 +257,6 @@ def choose_parts(fidelity, rotor, options):
         lacking = " and ".join(name for name in required if name not in ROTORS[rotor].supports)
         need = " or ".join(repr(name) for name in able)
         raise InputError(f"rotor = {rotor!r}: does not support {lacking}, which needs rotor = {need}")
-    options["fidelity"] = fidelity
-    options["explicit_wave_loads"] = options["wave_loads"] is not None
-    for part in ("wave_loads", "integrator", "radiation"):
-        if options[part] is None:
-            options[part] = getattr(level, part)
     if options["mooring"] is True:
         options["mooring"] = level.mooring
     if options["blades"] != "rigid":

@@ -271,5 +271,5 @@ def test_the_feedback_of_a_deck_is_given_the_slope_of_the_platforms_pitch_rate(s
 def test_the_feedback_of_a_deck_needs_no_more_than_sensors_have():
     controller = make("rosco", read_turbine("iea15"), 0.1)
     assert "platform_pitch_rate" in controller.information
-    assert "platform_pitch_acceleration" not in controller.information
+    assert "nacelle_pitch_acceleration" not in controller.information
     assert make("rosco_float", read_turbine("iea15"), 0.1).information == controller.information

@@ -10,6 +10,7 @@ from plant_helpers import state
 import fowt_env
 from fowt_env import build_scene
 from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.load import rotor_part
 from fowt_env.plant.aero.wind import wind_now
@@ -17,7 +18,7 @@ from fowt_env.plant.events import N_COUNTERS
 from fowt_env.plant.hydro.load import BandedStrips, ExactStrips
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.state import pose_of
-from fowt_env.scene.options import FIDELITIES, ROTORS
+from fowt_env.scene.options import ELASTIC_STEP, FIDELITIES, ROTORS
 from fowt_env.training.validation.openfast_cases import box_wind
 
 ACCURACY = Path(fowt_env.__file__).resolve().parent.parent / "docs" / "figures" / "accuracy.csv"
@@ -124,10 +125,15 @@ def test_a_level_has_its_parts_and_its_step(name):
     assert scene.options["integrator"] == level.integrator
     assert type(model.integrator) is type(INTEGRATORS[level.integrator].part)
     assert (model.mooring.table is not None) == (level.mooring == "table")
-    assert scene.dt == (level.dt or INTEGRATORS[level.integrator].dt)
+    bends = name == "elastic"
+    modes = [0 if part is None else len(part.beam.count) for part in (model.blades, model.tower)]
+    assert modes == ([3, 4] if bends else [0, 0]) and (model.shaft is not None) == bends
+    assert (scene.options["dynamic_inflow"] is True) == bends
+    own = level.dt or INTEGRATORS[level.integrator].dt
+    assert 0.0 < scene.dt <= own if bends else scene.dt == own
 
 
-@pytest.mark.parametrize("name", FIDELITIES)
+@pytest.mark.parametrize("name", [name for name in FIDELITIES if name != "elastic"])
 def test_what_is_given_overrides_a_level(name):
     for rotor in ROTORS:
         assert build_scene(wind=12.0, fidelity=name, rotor=rotor).rotor == rotor
@@ -143,12 +149,41 @@ def test_what_is_given_overrides_a_level(name):
         assert (table is not None) == (mooring == "table")
 
 
+def test_what_is_given_overrides_the_bending_parts_of_a_level():
+    rigid = {"blades": "rigid", "tower": "rigid", "shaft": "rigid", "dynamic_inflow": False}
+    scene = build_scene(wind=12.0, fidelity="elastic", **rigid)
+    assert scene.model.structure is None
+    assert scene.dt == build_scene(wind=12.0).dt and scene.n_state == build_scene(wind=12.0).n_state
+    assert len(build_scene(wind=12.0, fidelity="elastic", blades="modes").model.blades.beam.count) == 2
+    assert build_scene(wind=12.0, fidelity="elastic", rotor="bem").rotor == "bem"
+    with pytest.raises(InputError, match="rotor = 'table': does not support dynamic_inflow"):
+        build_scene(wind=12.0, fidelity="elastic", rotor="table")
+
+
+def test_a_bending_level_names_what_a_turbine_lacks():
+    platform = read_platform("oc3_hywind")
+    whole = read_turbine(platform.turbine)
+    for lacking, option, modes in (
+        ("blade_structure", "blades", "modes2"),
+        ("shaft_torsion", "shaft", "torsion"),
+    ):
+        turbine = whole.model_copy(update={lacking: None})
+        with pytest.raises(InputError, match=rf"{option} = '{modes}': .* has no \[{lacking}\]"):
+            build_scene(wind=12.0, fidelity="elastic", turbine=turbine)
+        scene = build_scene(wind=12.0, fidelity="elastic", turbine=turbine, **{option: "rigid"})
+        assert scene.model.tower is not None and getattr(scene.model, option) is None
+
+
 def test_levels_err_as_stored_each_more_than_the_one_before():
-    stored = stored_errors(["reference", "all together"])
+    stored = stored_errors(["reference", "all together", "bending turbine"])
     for level in FIDELITIES.values():
         dt = level.dt or INTEGRATORS[level.integrator].dt
         tabled = ", mooring by table" if level.mooring == "table" else ""
         variant = f"{level.integrator} {dt:g} s, {level.rotor}, {level.wave_loads} waves{tabled}"
+        if level.blades != "rigid":
+            bending = ("blades", "tower", "shaft", "dynamic_inflow")
+            parts = [f"{part} by {getattr(level, part)}" for part in bending]
+            variant = ", ".join([f"{level.integrator} {ELASTIC_STEP:g} s", variant.split(", ", 1)[1], *parts])
         assert stored[level.rotor, variant] <= level.error <= 2.0 * stored[level.rotor, variant]
     errors = [level.error for level in FIDELITIES.values()]
     assert errors == sorted(errors)

@@ -93,7 +93,12 @@ class Variant:
 REFERENCE = "reference"  # axis of the runs at twice the finest step
 LARGER_STEPS = {"rk4": 0.1}  # s, largest of the sweep where it is not the default step
 TABLED = (("mooring", "table"),)
-BENDING = (("tower", "modes"),)  # another plant, with a separate reference
+# other plants, each with a separate reference
+BENDING = (("tower", "modes"),)
+ELASTIC = tuple(
+    (option, getattr(FIDELITIES["elastic"], option))
+    for option in ("blades", "tower", "shaft", "dynamic_inflow")
+)
 
 
 def step_sizes(integrator):
@@ -144,6 +149,7 @@ def variants_apart():
         *(Variant(bending, dt=dt, options=BENDING) for dt in steps),
         *(Variant(bending, "rk4", dt, "lookup", "fast", BENDING) for dt in (0.0125, 0.05, 0.1)),
         *(Variant(bending, "ab4", dt, "lookup", "fast", BENDING) for dt in multistep),
+        *(Variant("bending turbine", "ab4", dt, "lookup", "fast", ELASTIC) for dt in (0.0125, 0.025, 0.05)),
     ]
 
 
@@ -207,7 +213,7 @@ def accuracy(
         done += len(plan) - len(missing)
         references = {}
         for variant in missing:
-            plant = tuple(option for option in variant.options if option in BENDING)
+            plant = tuple(option for option in variant.options if option in BENDING + ELASTIC)
             if plant not in references:
                 progress(f"seed {seed}: reference", done, total)
                 exact = Variant(REFERENCE, dt=finest, options=plant)

@@ -20,7 +20,7 @@ RotorOption = Annotated[
 ]
 WindOption = Annotated[str, Option(help=AS_SIMULATE)]
 SeaOption = Annotated[str, Option(help=AS_SIMULATE)]
-FidelityOption = Annotated[str, Option(help="Fidelity: reference, standard or fast.")]
+FidelityOption = Annotated[str, Option(help="Fidelity: reference, standard, elastic or fast.")]
 JobsOption = Annotated[int, Option(help="Number of worker processes.")]
 EngineOption = Annotated[str, Option(help="Engine that distributes the runs: processes or ray.")]
 AddressOption = Annotated[str | None, Option(help="Address of a running Ray cluster.")]

@@ -28,7 +28,10 @@ CONTROLLER = (
     " without wind); constant: constant"
     " torque and blade pitch, variable rotor speed."
 )
-FIDELITY = "reference, standard (1000 times faster, within 0.1 %), or fast (tabulated rotor)."
+FIDELITY = (
+    "reference, standard (1000 times faster, within 0.1 %), elastic (standard with bending blades, tower and"
+    " shaft), or fast (tabulated rotor)."
+)
 INITIAL = "Initial value in OpenFAST units; repeatable."
 FAULT = "Fault, e.g. grid_loss:100; repeatable."
 PROTECTION = "Trips: none, turbine (as in the turbine file), or JSON of single trips."

@@ -58,7 +58,7 @@ def table(name, folder=None):
 def reference(case, folder=None, place=""):
     """Return a reference run as a DataFrame with the columns of simulate. Raises: InputError if absent."""
     frame = table(f"{place}/{case}.csv.gz" if place else f"{case}.csv.gz", folder)
-    thousands = [name for name in frame if "kN" in name and "[N" in COLUMNS[name]]
+    thousands = [name for name in frame if "kN" in name and "[N" in COLUMNS.get(name, "")]
     frame[thousands] *= 1e3
     return frame.rename(columns=COLUMNS)
 

@@ -9,7 +9,7 @@ import numpy as np
 from fowt_env.analysis.trim import trim
 from fowt_env.errors import unknown
 from fowt_env.scene.build import build_scene
-from fowt_env.training.validation import costs, oc4, responses, tower_modes, volturnus
+from fowt_env.training.validation import costs, elastic, oc4, responses, tower_modes, volturnus
 from fowt_env.training.validation.comparison import (
     COMBINATIONS,
     SETTLED,
@@ -115,6 +115,7 @@ GROUPS = {  # name -> (function, number of runs)
     "steps": (steps, 1),
     "turbulence": (turbulence, 2),
     "tower": (tower_modes.oc3, 1),
+    **elastic.groups(elastic.NREL5),
     "costs": (costs.cheaper_choices, 8),
 }
 PLATFORMS = {  # name -> function that returns (groups, runs)

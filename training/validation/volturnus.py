@@ -13,6 +13,7 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import RPM
 from fowt_env.scene.build import build_scene
+from fowt_env.training.validation import elastic
 from fowt_env.training.validation.blade_loads import blades
 from fowt_env.training.validation.comparison import Channel, name_and_unit
 from fowt_env.training.validation.linear_cases import linear
@@ -275,4 +276,5 @@ GROUPS = {  # name -> (function, number of runs)
     "wake": (wake, 4),
     "linear": (linear, 5),
     "memory": (memory, 8),
+    **elastic.groups(elastic.IEA15),
 }

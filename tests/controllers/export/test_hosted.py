@@ -50,7 +50,7 @@ def test_each_field_is_read_from_the_record_with_its_unit():
     assert RECORD_OF["platform_pitch"] == 1005 and RECORD_OF["platform_pitch_rate"] == 1011
     assert RECORD_OF["surge"] == PLATFORM_START and RECORD_OF["yaw_rate"] == LAST_EXTENDED == 1012
     assert RECORD_OF["yaw"] == 37 and RECORD_OF["generator_speed"] == 20
-    assert RECORD_OF["platform_pitch_acceleration"] == 83  # as ROSCO, in any host
+    assert RECORD_OF["nacelle_pitch_acceleration"] == 83  # as ROSCO, in any host
 
 
 def test_information_that_no_host_sends_is_refused_by_name():
