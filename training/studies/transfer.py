@@ -73,6 +73,7 @@ FIGURES = {  # name in the tables: metric
     "fairlead DEL": "FAIRTEN_DEL_[kN]",
 }
 MEANS = ("Wind1VelX", "RotSpeed", "GenPwr", "BldPitch1", "PtfmPitch", "PtfmSurge")  # kept with the figures
+CLOSE = 5.0  # points: the difference of a ratio that is small
 KEY = ["platform", "model", "law", "wind", "seed"]
 CHANNELS = (  # of ElastoDyn
     "Azimuth", "RotSpeed", "GenSpeed", *(f"BldPitch{k}" for k in (1, 2, 3)), "RotThrust", "RotTorq",
@@ -115,16 +116,13 @@ def models(platform):
     """Return {name: (platform here, options of build_scene)} of the models here. Raises: InputError."""
     chosen("platform", platform, SUBJECTS)
     subject = SUBJECTS[platform]
-    elastic = {"blades": "modes2", "tower": "modes2"}
+    parts = {"tower": {"tower": "modes2"}, "blades": {"blades": "modes2"}}
     if subject.shaft and "shaft" in OPTIONS:
-        elastic["shaft"] = "torsion"
-    return {
-        "rigid": (subject.plant, subject.options),
-        "elastic": (subject.plant, subject.options | elastic),
-        "tower": (subject.plant, subject.options | {"tower": "modes2"}),
-        "uniform": (subject.plant, subject.options),
-        "published": (platform, {}),
-    }
+        parts["shaft"] = {"shaft": "torsion"}
+    elastic = {key: value for part in parts.values() for key, value in part.items()}
+    changes = {"rigid": {}, **parts, "elastic": elastic, "uniform": {}}
+    found = {name: (subject.plant, subject.options | change) for name, change in changes.items()}
+    return found | {"published": (platform, {})}
 
 
 @dataclass(frozen=True)
@@ -354,17 +352,21 @@ def comparable(rows, names, laws):
     return rows[count == len(names) * len(laws)]
 
 
-def ratios(rows):
-    """Return a DataFrame (model, law) of FIGURES over those of BASELINE, %; means over winds and seeds.
+def averages(rows):
+    """Return a DataFrame (model, law) of FIGURES, means over winds and seeds with the exponents of metrics.
 
-    Means have the exponent of the metric: variances and damage are added.
+    The exponents add variances and damage.
     """
     powers = pd.Series({metric: mean_exponent(metric) for metric in FIGURES.values()})
     values = rows.set_index(["model", "law"])[list(powers.index)] ** powers
     means = values.groupby(level=[0, 1], sort=False).mean() ** (1.0 / powers)
-    base = means.xs(BASELINE, level="law")
-    result = 100.0 * means / base.reindex(means.index.get_level_values("model")).to_numpy()
-    return result.rename(columns={metric: name for name, metric in FIGURES.items()})
+    return means.rename(columns={metric: name for name, metric in FIGURES.items()})
+
+
+def ratios(means):
+    """Return a DataFrame (model, law) of averages over those of BASELINE in the same model, %."""
+    base = means.xs(BASELINE, level="law").reindex(means.index.get_level_values("model"))
+    return 100.0 * means / base.to_numpy()
 
 
 def rank_correlation(one, other):
@@ -383,33 +385,64 @@ def exchanged(one, other):
     return pairs
 
 
-def figure_table(table, figure, names):
-    """Return the Markdown table of one figure: laws, ratios and differences from OpenFAST in points."""
-    theirs = table.loc[REFERENCE, figure]
-    others = [name for name in names if name != REFERENCE]
-    head = [figure, "OpenFAST, %", *(word for name in others for word in (f"{name}, %", "points"))]
+def baseline_table(means, names):
+    """Return the Markdown table of the figures of BASELINE in each model."""
     rows = []
-    for law in theirs.index:
-        row = [f"`{law}`", f"{theirs[law]:.1f}"]
-        for name in others:
-            ours = table.loc[(name, law), figure]
-            row += [f"{ours:.1f}", f"{ours - theirs[law]:+.1f}"]
-        rows.append(row)
-    rows.append(["rank correlation", ""])
-    for name in others:
-        rows[-1] += [f"{rank_correlation(theirs, table.loc[name, figure]):.2f}", ""]
+    for figure, metric in FIGURES.items():
+        unit = metric.rstrip("]").partition("_[")[2]
+        rows.append([figure, unit, *(f"{means.loc[(name, BASELINE), figure]:.4g}" for name in names)])
+    return markdown_table([f"`{BASELINE}`", "unit", *names], rows)
+
+
+def ratio_table(table, names):
+    """Return the Markdown table of ratios, differences from REFERENCE in points, and how many are small."""
+    others, rows = names[1:], []
+    for figure in FIGURES:
+        theirs = table.loc[REFERENCE, figure]
+        for law in theirs.index.drop(BASELINE):
+            row = [figure, f"`{law}`", f"{theirs[law]:.1f}"]
+            for name in others:
+                ours = table.loc[(name, law), figure]
+                row += [f"{ours:.1f}", f"{ours - theirs[law]:+.1f}"]
+            rows.append(row)
+    heads = [cell for name in others for cell in (f"{name}, %", "points")]
+    counts = ["", f"within {CLOSE:g} points", ""]
+    for column in range(4, 3 + 2 * len(others), 2):
+        counts += ["", f"{sum(abs(float(row[column])) <= CLOSE for row in rows)} of {len(rows)}"]
+    return markdown_table(["figure", "controller", f"{REFERENCE}, %", *heads], [*rows, counts])
+
+
+def order_table(table, names):
+    """Return the Markdown table of the order in REFERENCE and of the rank correlations of other models."""
+    rows = []
+    for figure in FIGURES:
+        theirs = table.loc[REFERENCE, figure].sort_values(kind="stable")
+        found = (f"{rank_correlation(theirs, table.loc[name, figure]):.2f}" for name in names[1:])
+        rows.append([figure, ", ".join(f"`{law}`" for law in theirs.index), *found])
+    head = ["figure", f"order in {REFERENCE}, least first", *(f"rank correlation, {n}" for n in names[1:])]
     return markdown_table(head, rows)
 
 
+def exchanged_table(table, names):
+    """Return the Markdown table of the pairs of controllers that a model has in another order."""
+    rows = []
+    for figure in FIGURES:
+        theirs = table.loc[REFERENCE, figure]
+        for name in names[1:]:
+            for a, b, one, other in exchanged(theirs, table.loc[name, figure]):
+                rows.append((figure, name, f"`{a}`, `{b}`", f"{one:+.1f}", f"{other:+.1f}"))
+    head = ("figure", "model", "pair", f"gap in {REFERENCE}, points", "gap in the model, points")
+    return markdown_table(head, rows) if rows else "No pair is in another order."
+
+
 def report(rows, platform, names=None, laws=None):
-    """Return the Markdown text of a platform: a table for each figure, and the exchanged pairs.
+    """Return the Markdown text of a platform: baseline, ratios, order, and exchanged pairs.
 
     names: of models, None: those that have runs; REFERENCE is always among them.
     Raises: InputError if no wind and seed has all runs.
     """
     rows = rows[rows["platform"] == platform]
-    have = list(dict.fromkeys(rows["model"]))
-    known = [*OPENFAST, *models(platform)]
+    have, known = set(rows["model"]), [*OPENFAST, *models(platform)]
     names = [name for name in known if name in have] if names is None else [REFERENCE, *names]
     names = list(dict.fromkeys(names))
     laws = [law for law in LAWS if law in set(rows["law"])] if laws is None else list(laws)
@@ -419,22 +452,16 @@ def report(rows, platform, names=None, laws=None):
             f"platform = {platform!r}: no wind and seed has runs of every model ({', '.join(names)}) and law"
             f" ({', '.join(laws)}); choose fewer by --models and --laws (with {BASELINE!r}) or run the others"
         )
-    table = ratios(rows)
+    means = averages(rows)
+    table = ratios(means)
     weather = sorted(set(zip(rows["wind"], rows["seed"], strict=True)))
     words = "; ".join(
         f"{wind:g} m/s: seed {', '.join(str(seed) for speed, seed in weather if speed == wind)}"
         for wind in dict.fromkeys(speed for speed, _ in weather)
     )
-    parts = [f"{platform}, {words}; ratios to `{BASELINE}` in %"]
-    pairs = []
-    for figure in FIGURES:
-        parts.append(figure_table(table, figure, names))
-        theirs = table.loc[REFERENCE, figure]
-        for name in names[1:]:
-            for a, b, one, other in exchanged(theirs, table.loc[name, figure]):
-                pairs.append((figure, name, f"`{a}`, `{b}`", f"{one:+.1f}", f"{other:+.1f}"))
-    head = ("figure", "model", "pair in another order", "gap in OpenFAST, points", "gap here, points")
-    return "\n\n".join([*parts, markdown_table(head, pairs) if pairs else "No pair is in another order."])
+    parts = [f"{platform}, {words}; ratios to `{BASELINE}` in %", baseline_table(means, names)]
+    parts += [make(table, names) for make in (ratio_table, order_table, exchanged_table)]
+    return "\n\n".join(parts)
 
 
 def chosen(what, names, known):
@@ -549,9 +576,9 @@ def here(
     laws: Laws = ALL_LAWS,
     winds: Winds = ALL_WINDS,
     seeds: Seeds = ALL_SEEDS,
-    names: Annotated[str, typer.Option("--models", help="Of rigid, elastic, tower, uniform, published.")] = (
-        "rigid,elastic"
-    ),
+    names: Annotated[
+        str, typer.Option("--models", help="rigid, tower, blades, elastic, uniform, published.")
+    ] = ("rigid,elastic"),
     duration: Duration = DURATION,
     again: Annotated[bool, typer.Option(help="Repeat finished runs, after a change of the code.")] = False,
 ):
