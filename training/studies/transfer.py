@@ -96,18 +96,19 @@ class Subject:
     grid: tuple  # of the wind box: points up and height (m), to below the tower; points across and width
     elastic: dict  # settings of the deck's elastic structure
     shaft: bool  # whether the drivetrain twists in it
+    dt: float  # s, largest step of OpenFAST with which FIGURES converge
+    seconds: float  # of one core for a second of OpenFAST with this step, as measured; for the estimate
     options: dict = field(default_factory=dict)  # of build_scene
-    seconds: float = 1.0  # of one core for a second of OpenFAST's elastic run, as measured; for the estimate
 
 
 SUBJECTS = {
     "oc3_hywind": Subject(
         deck="Oc3", plant="oc3_hywind_openfast", grid=(17, 170.0, 15, 145.0), shaft=True,
-        elastic={"blades": 3, "tower": 2, "torsion": True}, seconds=0.25,
+        elastic={"blades": 3, "tower": 2, "torsion": True}, dt=0.025, seconds=0.24,
     ),
     "iea15_volturnus_s": Subject(
         deck="Volturnus", plant="iea15_volturnus_s", grid=(17, 284.0, 17, 280.0), shaft=False,
-        elastic={"blades": 3, "tower": 2}, options={"skewed_wake": True},
+        elastic={"blades": 3, "tower": 2}, dt=0.0125, seconds=0.46, options={"skewed_wake": True},
     ),
 }  # fmt: skip
 
@@ -349,7 +350,8 @@ def comparable(rows, names, laws):
     """Return the rows of those winds and seeds for which every model and law has a run."""
     rows = rows[rows["model"].isin(names) & rows["law"].isin(laws)]
     count = rows.groupby(["wind", "seed"])["law"].transform("size")
-    return rows[count == len(names) * len(laws)]
+    rows = rows[count == len(names) * len(laws)]
+    return rows.sort_values("law", key=lambda column: column.map(list(laws).index), kind="stable")
 
 
 def averages(rows):
@@ -424,15 +426,22 @@ def order_table(table, names):
 
 
 def exchanged_table(table, names):
-    """Return the Markdown table of the pairs of controllers that a model has in another order."""
-    rows = []
+    """Return the Markdown table of pairs of controllers that a model has in another order.
+
+    A pair is a tie, and counted only, where the gaps of the two models are less than CLOSE points apart.
+    """
+    rows, ties = [], dict.fromkeys(names[1:], 0)
     for figure in FIGURES:
         theirs = table.loc[REFERENCE, figure]
         for name in names[1:]:
             for a, b, one, other in exchanged(theirs, table.loc[name, figure]):
-                rows.append((figure, name, f"`{a}`, `{b}`", f"{one:+.1f}", f"{other:+.1f}"))
-    head = ("figure", "model", "pair", f"gap in {REFERENCE}, points", "gap in the model, points")
-    return markdown_table(head, rows) if rows else "No pair is in another order."
+                if abs(one - other) < CLOSE:
+                    ties[name] += 1
+                else:
+                    rows.append((figure, name, f"`{a}`, `{b}`", f"{one:+.1f}", f"{other:+.1f}"))
+    head = ("pair in another order", "model", "controllers", f"gap in {REFERENCE}, points", "in the model")
+    rows += [("ties", name, f"{count} pairs", "", "") for name, count in ties.items()]
+    return markdown_table(head, rows)
 
 
 def report(rows, platform, names=None, laws=None):
@@ -542,14 +551,16 @@ def openfast(
     seeds: Seeds = ALL_SEEDS,
     names: Annotated[str, typer.Option("--models", help=f"Of {', '.join(OPENFAST)}.")] = REFERENCE,
     duration: Duration = DURATION,
-    dt: Annotated[float, typer.Option(help="Step of OpenFAST, s.")] = 0.0125,
+    dt: Annotated[
+        float | None, typer.Option(min=0.001, help="Step of OpenFAST, s; default: of the platform.")
+    ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="Runs at the same time.")] = 1,
 ):
     """Run OpenFAST with controllers as libraries; finished runs are not repeated."""
     executable, turbsim = program("OpenFAST", executable), program("TurbSim", turbsim)
     wanted = _chosen_cases(platform, names, OPENFAST, laws, winds, seeds)
     waiting = [case for case in wanted if not case.path(folder).exists()]
-    hours = expected(waiting, folder, duration, jobs) / 3600.0
+    hours, dt = expected(waiting, folder, duration, jobs) / 3600.0, dt or SUBJECTS[platform].dt
     print(f"{len(waiting)} of {len(wanted)} runs of OpenFAST, about {hours:.1f} h with {jobs} at a time")
     for case in waiting:
         if not library_path(folder, case).exists():

@@ -1,5 +1,6 @@
 """The transfer study without OpenFAST: weather, decks, series, and tables of figures that are written out."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -11,13 +12,14 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.sea_state import joint_sea_state, sea_state_of
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.files.tables import write_table
+from fowt_env.files.tables import read_table, write_table
 from fowt_env.training.studies import transfer
 from fowt_env.training.studies.transfer import FIGURES, LAWS, Case, report
 from fowt_env.weather.waves import build_waves
 
 SEMI = "iea15_volturnus_s"
-DECKS = Path(__file__).parents[2] / "reference" / "decks"
+ROOT = Path(__file__).parents[3]
+DECKS = ROOT / "tests" / "reference" / "decks"
 CASE = Case(SEMI, "openfast", "lqr", 14.0, 2)
 BEGIN = {"PtfmSurge": 12.5, "PtfmHeave": -0.3, "PtfmPitch": 2.5, "RotSpeed": 7.56, "BldPitch1": 10.0}
 TURBINE = read_turbine(read_platform("oc3_hywind_openfast").turbine)
@@ -151,7 +153,7 @@ def stored(models=("openfast", "rigid"), laws=LAWS, factor=1.0):
 
 def test_equal_runs_have_equal_ratios_and_order():
     text = report(stored(), "oc3_hywind")
-    assert "No pair is in another order." in text
+    assert "| ties | rigid | 0 pairs |" in text
     assert "| power std | `lqr` | 130.0 | 130.0 | +0.0 |" in text
     assert "45 of 45" in text
     order = ", ".join(f"`{law}`" for law in LAWS)
@@ -163,6 +165,23 @@ def test_an_exchanged_pair_is_named_with_its_gaps():
     text = report(stored(factor=12.5 / 14.0), "oc3_hywind")  # between rosco_float, 12, and lqr, 13
     assert "| rotor speed std | rigid | `lqr`, `mpc` | -10.0 | +5.0 |" in text
     assert "0.94" in text and "36 of 45" in text
+    tie = report(stored(factor=12.8 / 14.0), "oc3_hywind")  # 12 points, of which 2 beyond lqr
+    assert "| rotor speed std | rigid | `lqr`, `mpc` | -10.0 | +2.0 |" in tie
+    slight = stored()
+    slight.loc[slight["law"] == "mpc", list(FIGURES.values())] = 13.1
+    slight.loc[(slight["law"] == "mpc") & (slight["model"] == "rigid"), list(FIGURES.values())] = 12.9
+    assert "| ties | rigid | 9 pairs |" in report(slight, "oc3_hywind")
+
+
+def test_the_page_has_the_tables_of_the_stored_figures():
+    page = (ROOT / "docs" / "results" / "transfer.md").read_text()
+    marks = re.findall(r"<!-- measured: \$STUDY table (\S+)(.*?) -->\n(.*?)(?=\n## )", page, re.S)
+    assert marks
+    for path, options, text in marks:
+        chosen = dict(re.findall(r"--(\w+) (\S+)", options))
+        names, laws = (chosen[key].split(",") if key in chosen else None for key in ("models", "laws"))
+        rows = read_table(ROOT / path)
+        assert report(rows, chosen.get("platform", "oc3_hywind"), names, laws) in text
 
 
 def test_means_over_runs_add_variances_and_damage():
