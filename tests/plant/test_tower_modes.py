@@ -15,7 +15,7 @@ from fowt_env.plant.rotor_substeps import N_SAMPLE, RotorSubsteps, follow_rotor
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.beam import BeamNodes, Shapes, integrated
-from fowt_env.scene.tower import stiffness_roots, tower_frequency
+from fowt_env.scene.tower import stiffness_roots
 
 ALOFT, BELOW = np.array([3.0, -2.0, 91.0]), np.array([4.0, 3.0, -30.0])  # m, points of two loads
 FORCES = np.array([[3e5, -2e5, 1e5, 2e6, -1e6, 3e6], [-5e5, 4e5, 8e4, 1e7, 2e7, -3e6]])  # N and N m there
@@ -255,10 +255,6 @@ def test_it_converges_with_order_four(pinned, integrator):
     end = exact(pinned, 4.0, 1)[-1]
     errors = [np.linalg.norm((swung(pinned, integrator, 4.0 / n, n) - end)[N_RIGID:]) for n in (200, 400)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.35)
-
-
-def frequency_of(model):
-    return tower_frequency(model.tower, model.rigid_body, model.structure)
 
 
 @pytest.mark.parametrize("second", [False, True])
