@@ -15,7 +15,7 @@ CARRIED = {
     "link": ("measurement", "reading", "law_reading", "command", "past", "motion", "watch", "held"),
     "data": (
         "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples",
-        "radiation", "blades", "elastic",
+        "radiation", "blades", "elastic", "slow",
     ),
     "rotor": RotorScratch._fields,  # of Data, if parts are elastic
 }  # fmt: skip

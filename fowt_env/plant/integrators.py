@@ -31,6 +31,7 @@ from fowt_env.plant.followers import begin_followers, end_followers, follow, int
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
+from fowt_env.plant.slow_loads import begin_slow, keep_slow
 from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
 
 START_STEPS = 3  # steps before four past derivatives exist
@@ -189,7 +190,10 @@ def adams(t, x, u, dt, model, method, data):
     body, tower, blades, shaft, work = model.rigid_body, model.tower, model.blades, model.shaft, data.rotor
     matrix, still, extra = data.matrix, data.stages[2], data.stages[3]
     keep_blades(x, blades, data.elastic)
+    if not method.corrector:
+        begin_slow(steps, blades, data)
     rates(t, x, u, model, data, history[0])
+    keep_slow(steps, blades, data)
     begin_twist(shaft, work, history[0])
     begin_swing(steps, x, body, tower, blades, matrix, work, still)
     keep_swing(x, tower, shaft, work, history[0])

@@ -28,6 +28,7 @@ from fowt_env.plant.line_dynamics import line_states, line_work
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, N_MEASUREMENTS
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
+from fowt_env.plant.slow_loads import N_SLOW
 from fowt_env.plant.state import (
     BLADES,
     N_BLADE_LOAD,
@@ -190,6 +191,7 @@ class Scene:
             elastic=np.zeros((4, blade_states(self.model.blades) // 2)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
+            slow=np.zeros((4, 0 if self.model.blades is None else N_SLOW)),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
             rotor=rotor_scratch(self.model.structure, self.model.tower, self.model.blades, self.n_state),
         )
