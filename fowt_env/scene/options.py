@@ -116,8 +116,8 @@ FIDELITIES = {
 SLOW_GROWTH = 0.7
 LAG_MARGIN = 1.25  # ratio of the shortest lag to the limit of stability
 # s, largest default step with bending blades: errors below 1e-3 in the deviations of root moments. Half of it
-# for a method of order 2, which feeds the lightly damped edgewise modes, and on a shaft that twists, with which
-# edgewise modes swing at 20 to 40 rad/s
+# for a method of order 2, which feeds the lightly damped edgewise modes, and on a shaft that twists, with
+# which edgewise modes swing at 20 to 40 rad/s
 ELASTIC_STEP = 0.05
 FIELD_SAMPLES = 3  # rotor loads per step in a wind box, whose cells the blades cross in 0.1 s
 
