@@ -119,6 +119,9 @@ def test_tips_and_roots_in_steady_wind_are_openfasts(elastic_scene, case):
     point = trim_prescribed(scene, speed, pitch, "fixed")
     assert point["OoPDefl1"] == pytest.approx(known["mean"]["OoPDefl1_[m]"], rel=0.01)
     assert point["IPDefl1"] == pytest.approx(known["mean"]["IPDefl1_[m]"], rel=0.01)
+    assert point["TipDxb1"] == pytest.approx(known["mean"]["TipDxb1_[m]"], rel=0.01)
+    assert point["TipDyb1"] == pytest.approx(known["mean"]["TipDyb1_[m]"], rel=0.01)
+    assert point["RootMzc1"] == pytest.approx(known["mean"]["RootMzc1_[kN-m]"], rel=0.01)
     assert point["RootMyc1"] == pytest.approx(known["mean"]["RootMyc1_[kN-m]"], rel=0.01)
     assert point["RootMxc1"] == pytest.approx(known["mean"]["RootMxc1_[kN-m]"], rel=0.01)
     names = [channel.name for channel in scene.channels]
