@@ -16,7 +16,7 @@ from fowt_env.plant.rotor_substeps import N_SAMPLE, RotorSubsteps, follow_rotor
 from fowt_env.plant.state import N_RIGID, State, pose_of
 from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.beam import BeamNodes, Shapes, integrated
-from fowt_env.scene.tower import stiffness_roots, tower_frequency
+from fowt_env.scene.tower import stiffness_roots
 
 
 @load_kernel
@@ -222,10 +222,6 @@ def test_it_converges_with_order_four(pinned, integrator):
     end = exact(pinned, 4.0, 1)[-1]
     errors = [np.linalg.norm((swung(pinned, integrator, 4.0 / n, n) - end)[N_RIGID:]) for n in (200, 400)]
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.35)
-
-
-def frequency_of(model):
-    return tower_frequency(model.tower, model.rigid_body, model.structure)
 
 
 @pytest.mark.parametrize("second", [False, True])

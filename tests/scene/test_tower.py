@@ -11,8 +11,9 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.tower_modes import TowerBending
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
+from fowt_env.scene.beam import shape_values
 from fowt_env.scene.mass import build_rigid_body, top_mass_matrix
-from fowt_env.scene.tower import build_tower_modes, modes_asked, shape_values
+from fowt_env.scene.tower import build_tower_modes, modes_asked
 
 LINE, EI, BASE, TOP, BEARING = 1000.0, 1e10, 10.0, 60.0, 5000.0
 UNIFORM = TowerBending(

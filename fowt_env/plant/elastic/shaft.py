@@ -101,7 +101,8 @@ def begin_twist(shaft, work, dx):
     """Begin a step at the last evaluation, of rates dx: keep its mobility, and as in keep_smooth."""
     if shaft is None:
         return
-    work.twist[1] = work.twist[0]
+    for i in range(work.twist.shape[1]):
+        work.twist[1, i] = work.twist[0, i]
     work.shaft_torque[MOBILITY_BEGUN] = work.shaft_torque[MOBILITY]
     keep_smooth(shaft, work, dx)
 
