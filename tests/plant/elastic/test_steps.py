@@ -40,11 +40,12 @@ def states(scene, x, u, dt, seconds, output_every=None):
     return np.array(rows), status
 
 
+KIND = {"duration": 100.0, "fidelity": "standard", "tower": "modes", "shaft": "torsion"}
+
+
 @pytest.fixture(scope="module")
 def waves():
-    return build_scene(
-        "oc3_hywind", wind=18.0, sea=SEA, seed=1, duration=100.0, blades="modes", tower="modes"
-    )
+    return build_scene("oc3_hywind", wind=18.0, sea=SEA, seed=1, blades="modes", **KIND)
 
 
 @pytest.fixture(scope="module")
@@ -56,13 +57,12 @@ def test_blades_are_corrected_for_the_fourth_differences_of_their_structure_and_
     blades, work, rng, dt = waves.model.blades, waves.data().rotor, np.random.default_rng(4), 0.05
     n, first = len(blades.beam.count), blades.first
     q, v = slice(first, first + 3 * n), slice(first + 3 * n, first + 6 * n)
-    x, y, past = rng.normal(size=waves.n_state), rng.normal(size=waves.n_state), np.zeros((4, 2 + 3 * n))
+    x, y, past = rng.normal(size=waves.n_state), rng.normal(size=waves.n_state), np.zeros((4, 3 * n))
     history, deflections = rng.normal(size=(4, waves.n_state)), rng.normal(size=(4, 3 * n))
     for row in deflections[::-1]:
         x[q] = row
         keep_blades(x, blades, past)
-    assert not past[:, :2].any()  # of the tower
-    np.testing.assert_array_equal(past[:, 2:], deflections)
+    np.testing.assert_array_equal(past, deflections)
     new = y.copy()
     correct_blades(dt, x, history, past, blades, work, new)
 
@@ -98,8 +98,8 @@ def test_loads_at_every_second_step_are_as_good_as_at_every_step(waves, moved):
     assert np.all(errors[1] < 1.5 * errors[0] + 2e-4)
 
 
-def test_the_default_step_converges_with_order_four():
-    scene = build_scene("oc3_hywind", wind=12.0, sea=None, blades="modes", tower="modes", shear_exponent=0.0)
+def test_the_default_step_converges_with_order_four(waves):
+    scene = waves.with_weather(wind=12.0, sea=None)
     x, u = start(scene, 1.2, 0.1, 40_000.0)
     ends = [states(scene, x, u, dt, 3.0)[0][-1] for dt in (0.05, 0.025, 0.0125, FINE)]
     errors = [np.abs(end - ends[-1])[: State.AZIMUTH].max() for end in ends[:-1]]
@@ -123,9 +123,8 @@ LIMITS = {
 @pytest.mark.parametrize("case", LIMITS)
 def test_the_default_step_is_stable(platform, case):
     wind, over, pitch, share, held = LIMITS[case]
-    scene = build_scene(
-        platform, wind=wind, sea=SEA, seed=1, duration=100.0, blades="modes2", tower="modes", shaft="torsion"
-    ).with_model({"rigid_body.rotor_fixed": held})
+    scene = build_scene(platform, wind=wind, sea=SEA, seed=1, blades="modes2", **KIND)
+    scene = scene.with_model({"rigid_body.rotor_fixed": held})
     speed, torque = RATED[platform]
     rows, status = states(scene, *start(scene, over * speed, pitch, share * torque), scene.dt, 60.0)
     assert status == 0
