@@ -16,7 +16,7 @@ from fowt_env import Load, build_scene, load_kernel
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.advance import forget, output
-from fowt_env.plant.aero import blade_sweep
+from fowt_env.plant.aero import bem_rotor, blade_sweep
 from fowt_env.plant.aero.bent_blade import CHANGE, BentShape, placed
 from fowt_env.plant.aero.blade_shape import N_STATION_LOAD, StationLoad, effective_pitch
 from fowt_env.plant.state import BLADES, N_BLADE_LOAD, State
@@ -27,7 +27,7 @@ from fowt_env.scene.tower import mode_shapes
 
 BENDING = TOWERS = ("rigid", "modes", "modes2")  # options
 TORQUE = 3e4  # N m, of the generator
-WIND, SHEAR = 11.0, 0.14
+WIND, SHEAR, DENSITY = 11.0, 0.14, 1.2  # m/s, -, kg/m3
 ALOFT, BELOW = np.array([3.0, -2.0, 91.0]), np.array([4.0, 3.0, -30.0])  # m, points of two loads
 FORCES = np.array([[3e5, -2e5, 1e5, 2e6, -1e6, 3e6], [-5e5, 4e5, 8e4, 1e7, 2e7, -3e6]])  # N and N m there
 
@@ -238,6 +238,13 @@ def put_loads(drawn, winds):
         turned = effective_pitch(j, response.turn.pitch, response.shape)
         change = placed(j, CHANGE, response.shape) if type(response.shape) is BentShape else 0.0
         winds[response.number, j] = v_normal, v_tangential, turned, change
-        return StationLoad(*(drawn[response.number, j] / 2.0), 2.0, 0.0, 0, None)
+        return StationLoad(*(drawn[response.number, j] / (2.0 * DENSITY)), 2.0, 0.0, 0, None)
 
     blade_sweep.station_load = station_load
+
+    # loads over the air density, which the look-up of a rotor multiplies by it
+    def add_blade(total, blade, load, factor, pitches, blades):
+        return blade_sweep.add_blade(total, blade, load, DENSITY, pitches, blades)
+
+    bem_rotor.add_blade = add_blade
+    bem_rotor.rotor_axes_load = lambda load, factor, rotor: blade_sweep.rotor_axes_load(load, DENSITY, rotor)
