@@ -444,13 +444,14 @@ def exchanged_table(table, names):
     return markdown_table(head, rows)
 
 
-def report(rows, platform, names=None, laws=None):
+def report(rows, platform, names=None, laws=None, winds=None):
     """Return the Markdown text of a platform: baseline, ratios, order, and exchanged pairs.
 
-    names: of models, None: those that have runs; REFERENCE is always among them.
+    names: of models, None: those that have runs; REFERENCE is always among them. winds: None: all.
     Raises: InputError if no wind and seed has all runs.
     """
     rows = rows[rows["platform"] == platform]
+    rows = rows if winds is None else rows[rows["wind"].isin(winds)]
     have, known = set(rows["model"]), [*OPENFAST, *models(platform)]
     names = [name for name in known if name in have] if names is None else [REFERENCE, *names]
     names = list(dict.fromkeys(names))
@@ -615,13 +616,15 @@ def table(
     platform: Platform = "oc3_hywind",
     names: Annotated[str | None, typer.Option("--models", help="Models; default: those with runs.")] = None,
     laws: Annotated[str | None, typer.Option(help="Controllers; default: those with runs.")] = None,
+    winds: Annotated[str | None, typer.Option(help="Mean winds, m/s; default: those with runs.")] = None,
     out: Annotated[Path | None, typer.Option(help="CSV of the figures of all finished runs.")] = None,
 ):
     """Print the ratios to the baseline in each code, their differences and the order of the controllers."""
     rows = read_table(source) if source.suffix == ".csv" else collected(source)
     if out is not None:
         write_table(rows.sort_values(KEY), out)
-    print(report(rows, platform, names and parse_names(names), laws and parse_names(laws)))
+    speeds = winds and parse_numbers(winds, "winds")
+    print(report(rows, platform, names and parse_names(names), laws and parse_names(laws), speeds))
 
 
 def main(arguments=None):

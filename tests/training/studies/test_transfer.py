@@ -175,13 +175,14 @@ def test_an_exchanged_pair_is_named_with_its_gaps():
 
 def test_the_page_has_the_tables_of_the_stored_figures():
     page = (ROOT / "docs" / "results" / "transfer.md").read_text()
-    marks = re.findall(r"<!-- measured: \$STUDY table (\S+)(.*?) -->\n(.*?)(?=\n## )", page, re.S)
+    marks = re.findall(r"<!-- measured: \$STUDY table (\S+)(.*?) -->\n(.*?)(?=\n##+ )", page, re.S)
     assert marks
     for path, options, text in marks:
         chosen = dict(re.findall(r"--(\w+) (\S+)", options))
         names, laws = (chosen[key].split(",") if key in chosen else None for key in ("models", "laws"))
+        winds = [float(wind) for wind in chosen["winds"].split(",")] if "winds" in chosen else None
         rows = read_table(ROOT / path)
-        assert report(rows, chosen.get("platform", "oc3_hywind"), names, laws) in text
+        assert report(rows, chosen.get("platform", "oc3_hywind"), names, laws, winds) in text
 
 
 def test_means_over_runs_add_variances_and_damage():
