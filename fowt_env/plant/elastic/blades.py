@@ -49,7 +49,7 @@ class BladeModes(NamedTuple):
     cone_cosine: float
     cone_sine: float  # positive: blades lean upwind
     hub_radius: float  # m, from the rotor centre to a blade root along the pitch axis
-    # accelerations of the modes on a hub at rest, less their signs, see steps.py
+    # accelerations of the modes, less their signs, see steps.py
     spring: np.ndarray  # (n, n) 1/s2, over the deflections, by stiffness
     decay: np.ndarray  # (n, n) 1/s, over their velocities, by structural damping and the wind at rated speed
     tip: Point

@@ -7,8 +7,8 @@ is kept, and the step does not depend on the frequencies of the tower.
 
 Blades: the wind damps flapping at 10 to 20 1/s, edgewise and second flapwise modes oscillate at 6 to 13
 rad/s, and Adams-Bashforth 4 alone is stable to 0.3 over the one, and errs in the damping of the other. The
-accelerations -S q - D v by structure and by the wind at rated speed, of a blade on a hub at rest, are known
-well enough: S and D are constant, so the fourth difference of this part, which the formula neglects, is
+accelerations -S q - D v by structure and by the wind at rated speed, on a hub that gives way by half, are
+known well enough: S and D are constant, so the fourth difference of this part, which the formula neglects, is
 linear in the new velocities. The order stays 4 whatever S and D are.
 """
 

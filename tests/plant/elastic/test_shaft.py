@@ -155,6 +155,35 @@ def test_a_stiff_shaft_is_a_rigid_one(parts):
     assert np.delete(y, [q, q + 1]) == pytest.approx(x, rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.parametrize(("tower", "step"), [("modes", 0.1), ("modes2", 0.05)])
+def test_a_tower_with_a_twisting_shaft_swings_no_further_at_the_default_step(tower, step):
+    """At 0.1 s, 1.8 over the frequency, the second modes would grow without limit within two seconds."""
+    scene = build_scene("oc3_hywind", **BARE, tower=tower)
+    x, q, far = state(scene.n_state, rotor_speed=1.2), scene.model.tower.first, []
+    x[scene.model.shaft.first] = 5e-3
+    held, n = scene.with_model(HELD).handle(), len(scene.model.tower.slope)
+    assert scene.dt == step
+    for k in range(60):
+        assert advance(held, x, np.zeros(2), k * round(0.1 / step), round(0.1 / step), step) == 0
+        far.append(np.abs(x[q : q + n]).max())
+    assert max(far[30:]) <= max(far[:30]) < 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turbine", ["nrel5mw", "iea15"])
+def test_blades_on_a_twisting_shaft_swing_no_further_at_the_default_step(turbine):
+    """Without air: at 0.05 s the NREL 5 MW would swing ten times as far after ten seconds."""
+    scene = build_scene("oc3_hywind", turbine=turbine, **BARE, blades="modes").with_model(HELD)
+    blades, x = scene.model.blades, state(scene.n_state, rotor_speed=0.8)
+    handle, u, far = scene.handle(), np.zeros(scene.n_commands), []
+    steps = round(0.5 / scene.dt)
+    assert scene.dt == 0.025
+    for k in range(28):
+        assert advance(handle, x, u, k * steps, steps, scene.dt) == 0
+        far.append(np.abs(x[blades.first : blades.first + 6]).max())
+    assert max(far[14:]) < 1.2 * max(far[:14])
+
+
 def test_a_held_rotor_holds_the_generator():
     """As ElastoDyn without its generator degree of freedom."""
     scene = build_scene("oc3_hywind", **BARE).with_model(HELD | {"rigid_body.rotor_fixed": True})
