@@ -17,7 +17,7 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.training.board.judge import inputs_of
 from fowt_env.training.evaluation.bootstrap import LEVEL, holm
-from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.leaderboard import SCORES, leaderboard, limits_text
 from fowt_env.training.evaluation.metrics import better
 from fowt_env.training.reports.metric_words import about_metric
 from fowt_env.training.reports.page_words import content_policy, table_rows
@@ -27,12 +27,14 @@ FIGURES = {  # heading: metric whose ratio to the baseline is shown
     "platform pitch": "PtfmPitch_std_[deg]",
     "travel": "blade_pitch_travel_[deg/s]",
     "energy": "GenPwr_capped_mean_[kW]",
+    "power std": "GenPwr_std_[kW]",
+    "torque travel": "torque_travel_[kN-m/s]",
     "shaft DEL": "RotTorq_DEL_[kN-m]",
     "tower DEL": "TwrBsMyt_DEL_[kN-m]",
 }
 VERSION = f"fowt_env {fowt_env.__version__}"
 LISTED = "listed"  # in the history: public seeds that were not drawn
-PER_WIND = ("rotor speed", "platform pitch", "travel")
+PER_WIND = ("rotor speed", "platform pitch", "travel", "power std", "torque travel", "shaft DEL")
 MODEL, PREVIEW = "plant_model", "wind_preview"
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet formula
 PLANT = {"rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "time"}
@@ -99,7 +101,8 @@ def board_frame(judged):
 
     Columns: regime, suite, version, rank (NaN without a score), name, author, licence, information, runs,
     failed (including lost power), tripped, ratio to the baseline and p-value for each of FIGURES, score with
-    interval, score_secret, beyond (exceeded limits), slowest_call_[s] (Python files; NaN for others).
+    interval (of the score that ranks), score_lifetime, score_winds, score_secret, beyond (exceeded limits),
+    undecided, limits (their state), slowest_call_[s] (Python files; NaN for others).
     """
     rows = []
     board = judged.board
@@ -120,11 +123,15 @@ def board_frame(judged):
                     row |= {heading: 1.0 + gap["percent"] / 100.0, f"p({heading})": gap["p"]}
                 for key, part in (("score", "mean"), ("score_low", "low"), ("score_high", "high")):
                     row[key] = (entry["score"] or {}).get(part)
+                for key in SCORES.values():
+                    row[f"score_{key}"] = ((entry["score"] or {}).get(key) or {}).get("mean")
                 row["score_secret"] = (secret.get(who, {}).get("score") or {}).get("mean")
-                row["beyond"] = "; ".join(entry["beyond"])
+                row |= {key: "; ".join(entry[key]) for key in ("beyond", "undecided")}
+                row["limits"] = limits_text(entry)
                 row["slowest_call_[s]"] = judged.slowest.get((name, who))
                 rows.append(row)
-    numbers = ["score", "score_low", "score_high", "score_secret", "slowest_call_[s]"]
+    numbers = ["score", "score_low", "score_high", *(f"score_{key}" for key in SCORES.values())]
+    numbers += ["score_secret", "slowest_call_[s]"]
     return pd.DataFrame(rows).astype(dict.fromkeys(numbers, float))
 
 
@@ -222,9 +229,11 @@ def _page(judged, frame, history):
         " the baseline's in the same wind and waves; less is better except for energy (power up to rated). In"
         " brackets: 95 % interval of the score; * significant: the p-value, after Holm's correction over the"
         ' row, is at most 0.05, and the difference <span class="better">✓ better</span> or <span'
-        ' class="worse">✗ worse</span>. Ranks: controllers within all limits, then those above a limit, then'
+        ' class="worse">✗ worse</span>. Ranks: controllers that exceed no limit, then those that do, then'
         " those with lost runs (failed, tripped, or with less than half of the reference's energy); within"
-        " each group by score, in which a lost run counts as ten times the reference's metrics. Click a"
+        " each group by score, in which a lost run counts as ten times the reference's metrics: by that of"
+        " the lifetime, or the worse of it and of the mean of the winds, as the suite says. A limit is held"
+        " if the 95 % bound of its interval is within it, exceeded if the mean is beyond it. Click a"
         " heading for the definition of its metric. Wide tables scroll sideways.</p></details>",
     ]
     for number, (heading, metric) in enumerate(FIGURES.items()):  # popovers open without a script
@@ -242,6 +251,8 @@ def _page(judged, frame, history):
             parts.append(_ranking(rows, judged))
             beyond = [pair for pair in zip(rows["name"], rows["beyond"], strict=True) if pair[1]]
             parts += _list("<p class=small>Exceeded limits of the suite:</p>", beyond)
+            undecided = [pair for pair in zip(rows["name"], rows["undecided"], strict=True) if pair[1]]
+            parts += _list("<p class=small>Limits not decided:</p>", undecided)
             parts += _per_wind(_compared(judged.public[name], suite, board))
     parts += [_submissions(judged), _history_table(history)]
     listed = "".join(f"<li>{line}</li>" for line in CANNOT)
@@ -283,7 +294,8 @@ def _ranking(rows, judged):
                 ratio_text(row[figure], metric, p <= 1.0 - LEVEL)
                 for (figure, metric), p in zip(FIGURES.items(), corrected, strict=True)
             ),
-            score, _number(row["slowest_call_[s]"], 4),
+            score, *(_number(row[f"score_{key}"]) for key in SCORES.values()), row["limits"],
+            _number(row["slowest_call_[s]"], 4),
             *([_number(row["score_secret"])] if judged.secret else []),
         ])  # fmt: skip
     explained = [
@@ -292,7 +304,7 @@ def _ranking(rows, judged):
         for number, (heading, metric) in enumerate(FIGURES.items())
     ]
     calls = f"slowest call, s (limit {judged.board.settings.call_limit:g})"
-    last = ["score", calls, *(["score, secret seeds"] if judged.secret else [])]
+    last = ["score", *SCORES, "limits", calls, *(["score, secret seeds"] if judged.secret else [])]
     return _table(["rank", "controller", "inputs", "lost runs", *explained, *last], shown, (1, 2))
 
 

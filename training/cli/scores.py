@@ -21,7 +21,10 @@ AgentsOption = Annotated[str | None, Option(help="Controllers to score; default:
 CasesOption = Annotated[str | None, Option(help="Cases to score, comma-separated; default: all.")]
 OutOption = Annotated[str | None, Option("--out", metavar="STEM", help="Write STEM.md and tables STEM*.csv.")]
 LIMIT = "Performance limit: CSV of fowt design bound; default: the package's."
-FIGURES = "rotor-speed std,platform-pitch std,blade-pitch travel,tower-base DEL"
+FIGURES = (
+    "rotor-speed std,platform-pitch std,blade-pitch travel,power std,torque travel,shaft-torque DEL,"
+    "tower-base DEL"
+)
 GUST = '{"kind": "eog", "speed": 18, "class": "B", "start": 200}'
 
 

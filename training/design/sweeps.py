@@ -23,11 +23,12 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.evaluation.metrics import PAID
 from fowt_env.training.evaluation.seeds import VALIDATION
 
 INFINITE = 1e3  # rad/s: larger generalised eigenvalues are zeros at infinity
 MODEL_SUFFIXES = (".json", ".npz")
-SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_std_[kW]", "blade_pitch_travel_[deg/s]")
+SHOWN = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", *PAID)
 KEPT = (*SHOWN, "RotSpeed_max_[rpm]", "GenPwr_mean_[kW]", "TwrBsMyt_DEL_[kN-m]")
 
 

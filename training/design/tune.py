@@ -36,8 +36,7 @@ from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.failures import penalised, with_lost_power
-from fowt_env.training.evaluation.leaderboard import EXPONENTS
-from fowt_env.training.evaluation.metrics import METRICS, better
+from fowt_env.training.evaluation.metrics import EXPONENTS, METRICS, better
 from fowt_env.training.evaluation.results_table import case_shares
 from fowt_env.training.evaluation.run_case import CONTROL_DT, OK, REFERENCE
 from fowt_env.training.evaluation.seeds import VALIDATION

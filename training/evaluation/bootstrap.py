@@ -31,10 +31,10 @@ def resample_weights(n, resamples=RESAMPLES, random_seed=RANDOM_SEED):
     return np.stack([(draws == seed).sum(axis=1) for seed in range(n)], axis=1).astype(np.float64)
 
 
-def interval(estimate, resampled, n, positive=False):
+def interval(estimate, resampled, n, positive=False, level=LEVEL):
     """Return (low, high) of the estimate (metrics,) from its resamples (resamples, metrics).
 
-    NaN below LEAST_SEEDS.
+    level: probability of the interval, the same on each side. NaN below LEAST_SEEDS.
 
     Percentile intervals are too narrow for small n: with 6 normal values their coverage is 84 %. Widening by
     the ratio of Student's to the normal interval increases the coverage to 94 % and preserves skewness.
@@ -50,17 +50,17 @@ def interval(estimate, resampled, n, positive=False):
     log = positive & (least > 0.0)
     with np.errstate(all="ignore"):  # unused logarithms, and overflow of the ends
         centre = np.where(log, np.log(estimate), estimate)
-        spread = _spread(centre, np.where(log, np.log(resampled), resampled), n)
+        spread = _spread(centre, np.where(log, np.log(resampled), resampled), n, level)
         low, high = (np.where(log, np.exp(centre + side), centre + side) for side in spread)
     return np.where(positive & (least >= 0.0), np.maximum(low, 0.0), low), high
 
 
-def _spread(estimate, resampled, n):
+def _spread(estimate, resampled, n, level=LEVEL):
     """Return the distances (2, metrics) of the interval's ends from the estimate, for n seeds."""
-    tails = [50.0 * (1.0 - LEVEL), 50.0 * (1.0 + LEVEL)]
+    tails = [50.0 * (1.0 - level), 50.0 * (1.0 + level)]
     away = _known(resampled - estimate)
     percentile = np.nanpercentile if np.isnan(away).any() else np.percentile  # nanpercentile is slow
-    return percentile(away, tails, axis=0) * _widening(n, 1.0 - LEVEL)
+    return percentile(away, tails, axis=0) * _widening(n, 1.0 - level)
 
 
 def _known(values):

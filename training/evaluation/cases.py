@@ -25,7 +25,8 @@ from fowt_env.descriptions.sensors import EXACT, sensor_chain
 from fowt_env.descriptions.wind import FORMS, checked_keys, is_wind_file, read_wind, wind_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import OPTIONS
-from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.carried import missing_part
+from fowt_env.training.evaluation.metrics import METRICS, better
 from fowt_env.training.evaluation.plant_perturbation import PlantPerturbation
 from fowt_env.training.evaluation.scaling import scaled_file, within_table
 from fowt_env.weather.wind_field import is_field
@@ -174,26 +175,63 @@ class ScoreTerm(Record):
 class Score(Record):
     """Defines a score per controller: the weighted mean of metric/baseline, divided by relative power.
 
-    Less is better. baseline: the controller whose runs without protection are the reference.
+    Less is better. baseline: the controller whose runs without protection are the reference. by: what ranks:
+    the score of lifetime means, the mean of the scores of single cases (winds), or the worse of the two.
     """
 
     baseline: str
     term: tuple[ScoreTerm, ...]
     power: str | None = None  # metric of which more is better; its ratio to the baseline's divides the mean
+    by: Literal["lifetime", "winds", "worse"] = "lifetime"
+
+
+Bound = Annotated[tuple[Positive, ...], BeforeValidator(_many)]  # one number or (least, most)
+
+
+class SetPoint(Record):
+    """Defines a set-point: the mean of a metric in each case is at most `within` of rated further from rated
+    than the reference's, which leaves rated itself in winds with lulls.
+    """
+
+    rated: Positive
+    within: Positive
 
 
 class Limits(Record):
-    """Defines limits of metrics; controllers that exceed a limit rank below those within all limits.
+    """Defines limits of metrics; controllers that exceed a limit rank below the others (limits.py).
 
     run: {metric: maximum in any run}. lifetime: {metric: maximum of the lifetime mean}. relative: {metric:
-    maximum ratio of the lifetime mean to that of the reference on the same runs}. baseline: the controller
-    whose runs without protection are the reference, as for the score.
+    maximum ratio of the lifetime mean to that of the reference on the same runs}. case: {metric: maximum of
+    the mean in each case}. case_relative: {metric: ratio of this mean to the reference's}, one number in the
+    metric's better direction or [least, most]. set_point: {metric: SetPoint}. baseline: the controller whose
+    runs without protection are the reference, as for the score.
     """
 
     run: dict[str, NonNegative] = {}
     lifetime: dict[str, NonNegative] = {}
     relative: dict[str, Positive] = {}
+    case: dict[str, NonNegative] = {}
+    case_relative: dict[str, Bound] = {}
+    set_point: dict[str, SetPoint] = {}
     baseline: str = "gspi_oc3"
+
+    @property
+    def relative_metrics(self):
+        """Return the metrics with limits relative to the reference."""
+        return list(dict.fromkeys([*self.relative, *self.case_relative, *self.set_point]))
+
+    @property
+    def metrics(self):
+        """Return the metrics with limits."""
+        return list(dict.fromkeys([*self.run, *self.lifetime, *self.case, *self.relative_metrics]))
+
+    def _problems(self):
+        for name, bound in self.case_relative.items():
+            two = len(bound) == 2 and bound[0] <= bound[1]
+            if name in METRICS and not (two or (len(bound) == 1 and better(name))):
+                one = "a number or " if better(name) else ""
+                shown = bound[0] if len(bound) == 1 else list(bound)
+                yield f"case_relative.{name} = {shown}: must be {one}[least, most]"
 
 
 class SuiteFile(Record):
@@ -217,6 +255,7 @@ class SuiteFile(Record):
     sensors: str = EXACT
     site: Site | None = None
     limits: Limits = Limits()
+    rigid_loads: bool = False  # whether scores and limits may use fatigue loads of rigid parts (carried.py)
 
 
 @dataclass(frozen=True)
@@ -244,7 +283,7 @@ class Suite:
         """Return the name of the controller of the reference runs for score and relative limits, or None."""
         if self.score is not None:
             return self.score.baseline
-        return self.limits.baseline if self.limits.relative else None
+        return self.limits.baseline if self.limits.relative_metrics else None
 
 
 def lifetime_weights(cases, site):
@@ -314,10 +353,11 @@ def _read(path, platform=None):
         problems.append("case is missing: at least one [[case]] is needed")
     score, limits = file.score, file.limits
     terms = [] if score is None else [*(term.metric for term in score.term), *filter(None, [score.power])]
-    for key, names in (("limits", [*limits.run, *limits.lifetime, *limits.relative]), ("score", terms)):
+    for key, names in (("limits", limits.metrics), ("score", terms)):
         wrong = [name for name in names if name not in METRICS]
         problems += [f"{key}: {unknown('metric', name, METRICS)}" for name in wrong]
-    if score is not None and limits.relative and limits.baseline != score.baseline:
+        problems += [] if file.rigid_loads else _rigid_loads(key, names, cases)
+    if score is not None and limits.relative_metrics and limits.baseline != score.baseline:
         names = limits.baseline, score.baseline
         problems.append("limits.baseline = {!r}: must be the baseline of the score, {!r}".format(*names))
     for case in cases:
@@ -339,6 +379,22 @@ def _read(path, platform=None):
     shared = {field.name for field in fields(Suite)} & set(SuiteFile.model_fields)
     settings = {key: getattr(file, key) for key in shared}
     return Suite(path.stem, cases=tuple(cases), weights=weights, **settings)
+
+
+def _rigid_loads(key, names, cases):
+    """Return a line per metric that is the fatigue load of a part that is rigid in a case."""
+    lines = []
+    for name in names:
+        lacking = ((case.name, missing_part(name, case)) for case in cases)
+        case, part = next((pair for pair in lacking if pair[1] is not None), ("", None))
+        if part is not None:
+            option, value, needed = part
+            allowed = " or ".join(map(repr, needed))
+            lines.append(
+                f"{key}: {name}: case {case!r} has {option} = {value!r}, which lacks this load: needs"
+                f" {option} = {allowed} (or rigid_loads = true, to count what a rigid part would have)"
+            )
+    return lines
 
 
 _kept = cached(64)(_read)  # of built-in suites and platforms

@@ -21,19 +21,24 @@ from fowt_env.training.evaluation.bootstrap import (
     resample_weights,
 )
 from fowt_env.training.evaluation.failures import BASELINES, PENALTY, known_figures, lost_counts, penalties
-from fowt_env.training.evaluation.metrics import METRICS, mean_exponent, never_negative
+from fowt_env.training.evaluation.limits import EXCEEDED, HELD, UNDECIDED, decide, limit_texts
+from fowt_env.training.evaluation.metrics import EXPONENTS, METRICS, never_negative
 from fowt_env.training.evaluation.results_table import KEY, case_shares
 from fowt_env.training.evaluation.run_case import OK, PARKED, REFERENCE, TRIPPED
 
+BY = ("lifetime", "winds", "worse")  # of a Score, in the order of the figures of _score
 POSITIVE = np.array([never_negative(name) for name in METRICS])
 SHOWN = {  # columns of a leaderboard in a notebook: {heading: metric}
     "rotor-speed std (rpm)": "RotSpeed_std_[rpm]",
     "platform-pitch std (deg)": "PtfmPitch_std_[deg]",
     "blade-pitch travel (deg/s)": "blade_pitch_travel_[deg/s]",
+    "power std (kW)": "GenPwr_std_[kW]",
+    "torque travel (kN m/s)": "torque_travel_[kN-m/s]",
+    "shaft DEL (kN m)": "RotTorq_DEL_[kN-m]",
     "tower-base DEL (kN m)": "TwrBsMyt_DEL_[kN-m]",
 }
+SCORES = {"score, lifetime": "lifetime", "score, winds": "winds"}  # of an entry's score: {heading: key}
 MOST_OF_BASELINE = 1e6  # differences above this multiple of the baseline's value have no percentage
-EXPONENTS = np.array([mean_exponent(name) for name in METRICS])
 METHOD = (
     "lifetime means: cases weighted by fraction of the lifetime, deviations averaged as squares, damage-"
     "equivalent loads by S-N exponents; percentile bootstrap over seeds, each with all its cases, widened for"
@@ -168,7 +173,7 @@ class Leaderboard(dict):
     """Holds the mapping of leaderboard(), displayed as a table in notebooks."""
 
     def _repr_html_(self):
-        """Return HTML of ranks, means of SHOWN with paired differences from the baseline, and scores."""
+        """Return HTML of ranks, means of SHOWN with paired differences from the baseline, scores, limits."""
         rows = []
         for entry in self["controllers"]:
             cells = []
@@ -178,16 +183,36 @@ class Leaderboard(dict):
                 cells.append("-" if mean is None or not np.isfinite(mean) else f"{mean:.3g}")
                 if percent is not None and np.isfinite(percent) and entry["controller"] != self["baseline"]:
                     cells[-1] += f" ({percent:+.1f} %)"
-            score = entry["score"] and entry["score"]["mean"]
+            cells += [score_text(entry["score"], key) for key in SCORES.values()]
             ended = f"{entry['runs'] - entry['lost']} of {entry['runs']}"
-            shown = "-" if score is None or not np.isfinite(score) else f"{score:.3f}"
             rank = [] if entry["rank"] is None else [entry["rank"]]
-            rows.append((*rank, entry["controller"], ended, *cells, shown))
+            rows.append((*rank, entry["controller"], ended, *cells, limits_text(entry)))
         title = f"Leaderboard, {len(self['cases'])} case(s), {len(self['seeds'])} seed(s)"
         if self["baseline"] is not None:
             title += f"; differences from {self['baseline']}"
         first = ("rank",) if any(entry["rank"] is not None for entry in self["controllers"]) else ()
-        return html_table(title, (*first, "controller", "runs ended well", *SHOWN, "score"), rows)
+        headings = (*first, "controller", "runs ended well", *SHOWN, *SCORES, "limits")
+        return html_table(title, headings, rows)
+
+
+def score_text(score, key):
+    """Return one of SCORES as "0.743 [0.721, 0.758]", in brackets if it is not valid."""
+    figure = score and score[key]
+    if not figure or figure["mean"] is None or not np.isfinite(figure["mean"]):
+        return "-"
+    text = f"{figure['mean']:.3f}"
+    if figure["low"] == figure["low"]:
+        text += f" [{figure['low']:.3f}, {figure['high']:.3f}]"
+    return text if score["valid"] else f"({text})"
+
+
+def limits_text(entry):
+    """Return the state of the limits of an entry: "held", "1 exceeded, 2 not decided", "-" without limits."""
+    if entry["held"] is None:
+        return "-"
+    states = [each["state"] for each in entry["limits"]]
+    counts = {state: states.count(state) for state in (EXCEEDED, UNDECIDED)}
+    return ", ".join(f"{count} {state}" for state, count in counts.items() if count) or HELD
 
 
 def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
@@ -205,11 +230,13 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     limits, without reference runs), cases, shares {case: share}, seeds, controllers: a list of mappings
     with rank (None without a score), controller, runs, lost, failed, tripped, lost_power, metrics {metric:
     mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent, pairs, p},
-    beyond (a text per exceeded limit), score (mean, low, high, valid, why; or None), cases {case:
+    beyond and undecided (a text per limit that is exceeded, or not decided by its interval: limits.py), held
+    (whether every limit is held; None without limits), limits (a mapping per limit and case, with its state), score (mean,
+    low, high of the ranked score, valid, why, lifetime and winds {mean, low, high}; or None), cases {case:
     runs, ..., metrics, difference}. seed_low and seed_high: range of the lifetime mean over the seeds; worst:
     maximum over all runs; percent: mean difference relative to the baseline's mean of the same runs; p: its
     two-sided p-value (not per case, nor with lost runs).
-    The list is sorted by rank: controllers within all limits, then those above a limit, then those with lost
+    The list is sorted by rank: controllers that exceed no limit, then those that do, then those with lost
     runs; within each group by score, else as in the table.
     Raises: InputError for a baseline that was not evaluated.
     """
@@ -230,7 +257,12 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
             drawn[count] = resample_weights(count)
         weights = drawn[count]
         entry = {"controller": name, **_entry(part, weights, tested=True)}
-        entry["beyond"] = [] if limits is None else _beyond(limits, part)
+        decisions = [] if limits is None else decide(limits, part, weights)
+        entry["beyond"] = limit_texts(decisions, EXCEEDED)
+        known = [each for each in decisions if np.isfinite(each.high)]
+        entry["undecided"] = limit_texts(known, UNDECIDED)
+        entry["held"] = all(each.state == HELD for each in decisions) if decisions else None
+        entry["limits"] = [each._asdict() | {"state": each.state} for each in decisions]
         entry["score"] = None if score is None else _score(score, part, weights, entry["beyond"])
         entry["cases"] = {case: _entry(part.case(i), weights) for i, case in enumerate(part.cases)}
         entries.append(entry)
@@ -241,7 +273,7 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
         baseline=baseline,
         interval={"level": LEVEL, "method": METHOD, "resamples": RESAMPLES, "least_seeds": LEAST_SEEDS},
         penalty=PENALTY,
-        unchecked=[] if limits is None or len(evaluated) < len(table) else list(limits.relative),
+        unchecked=[] if limits is None or len(evaluated) < len(table) else limits.relative_metrics,
         cases=cases,
         shares=dict(zip(cases, map(float, case_shares(evaluated, cases)), strict=True)),
         seeds=sorted({int(seed) for seed in evaluated["seed"]}),
@@ -280,42 +312,13 @@ def _entry(part, weights, tested=False):
     }
 
 
-def _beyond(limits, part):
-    """Return the exceeded Limits of runs that were not lost, as "metric = value, allowed value".
-
-    A metric missing in all runs is not checked; a metric missing in some runs exceeds its limit.
-    """
-    exceeded, one = [], np.ones((1, part.values.shape[1]))
-
-    def check(name, value, limit, what=""):
-        if not value <= limit:
-            exceeded.append(f"{name}{what} = {value:g}, allowed {limit:g}")
-
-    for name, limit in limits.run.items():
-        values = part.values[..., METRICS.index(name)][part.runs & ~part.lost]
-        if values.size:
-            check(name, values.max(), limit)
-    if part.nothing:
-        return exceeded
-    means = _means(part.values, one, part.shares)[0]
-    for name, limit in limits.lifetime.items():
-        check(name, means[METRICS.index(name)], limit, " over the lifetime")
-    there = np.isfinite(part.values) & np.isfinite(part.reference)
-    if there.any():
-        pair = (np.where(there, values, np.nan) for values in (part.values, part.reference))
-        means, base = (_means(values, one, part.shares)[0] for values in pair)
-        with np.errstate(all="ignore"):
-            ratios = means / base
-        for name, limit in limits.relative.items():
-            check(name, ratios[METRICS.index(name)], limit, f" over {limits.baseline}")
-    return exceeded
-
-
 def _score(score, part, weights, beyond):
-    """Return {"mean", "low", "high", "valid", "why"} of a controller by a Score; numbers None if undefined.
+    """Return {"mean", "low", "high", "valid", "why", "lifetime", "winds"} of a controller by a Score.
 
-    Lost runs, and metrics missing in a run but not in the reference, count as `penalties` of the reference's
-    metrics. Cases and seeds in which the reference lacks a metric are omitted.
+    lifetime, winds: {"mean", "low", "high"} of the score of lifetime means and of the mean of the scores of
+    single cases; mean, low, high: of the one that ranks (Score.by); None if undefined. Lost runs, and metrics
+    missing in a run but not in the reference, count as `penalties` of the reference's metrics. Cases and
+    seeds in which the reference lacks a metric are omitted.
     """
     named = list(dict.fromkeys([term.metric for term in score.term] + ([score.power] if score.power else [])))
     chosen = [METRICS.index(name) for name in named]
@@ -326,26 +329,39 @@ def _score(score, part, weights, beyond):
     paired = np.isfinite(scored) & np.isfinite(base)
     if not paired.any():
         why = f"no run of the reference, which is {score.baseline!r} without protection"
-        return {"mean": None, "low": None, "high": None, "valid": False, "why": why}
+        nothing = {"mean": None, "low": None, "high": None}
+        return nothing | {"valid": False, "why": why, "lifetime": nothing, "winds": nothing}
     scored, base = (np.where(paired, values, np.nan) for values in (scored, base))
     exponents = EXPONENTS[chosen]
 
-    def value(weights):
-        means = (lifetime_means(values, weights, part.shares, exponents) for values in (scored, base))
+    def total(weights, cases, shares):  # (resamples,)
+        means = (lifetime_means(values[cases], weights, shares, exponents) for values in (scored, base))
         ratio = dict(zip(named, np.divide(*means).T, strict=True))
         total = sum(term.weight * ratio[term.metric] for term in score.term)
         total = total / sum(term.weight for term in score.term)
-        return (total if score.power is None else total / ratio[score.power])[:, None]
+        return total if score.power is None else total / ratio[score.power]
+
+    used = np.flatnonzero(paired.any(axis=(1, 2)))
+
+    def value(weights):  # (resamples, 3): over the lifetime, mean of the cases, and the worse of them
+        lifetime = total(weights, slice(None), part.shares)
+        each = [total(weights, slice(case, case + 1), np.ones(1)) for case in used]
+        winds = np.mean(each, axis=0)
+        return np.stack([lifetime, winds, np.fmax(lifetime, winds)], axis=1)
 
     with np.errstate(all="ignore"):
         estimate = value(np.ones((1, weights.shape[1])))[0]
         seeds = int(paired.any(axis=(0, 2)).sum())
         positive = all(never_negative(term.metric) for term in score.term)
-        low, high = interval(estimate, value(weights), seeds, positive)
+        ends = interval(estimate, value(weights), seeds, positive)
+    figures = [
+        dict(zip(("mean", "low", "high"), map(float, three), strict=True))
+        for three in zip(estimate, *ends, strict=True)
+    ]
     why = [
         f"{count} run{'' if count == 1 else 's'} {what.replace('_', ' ')}"
         for what, count in lost_counts(part.statuses[part.runs]).items()
         if count
     ] + beyond
-    result = {"mean": float(estimate[0]), "low": float(low[0]), "high": float(high[0])}
-    return result | {"valid": not why, "why": "; ".join(why)}
+    about = {"valid": not why, "why": "; ".join(why), "lifetime": figures[0], "winds": figures[1]}
+    return figures[BY.index(score.by)] | about

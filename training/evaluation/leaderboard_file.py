@@ -60,13 +60,22 @@ class Figures(_Part):
         return lost_text({name: getattr(self, name) for name in KINDS})
 
 
+class ScoreFigures(Statistic):
+    """Holds the score that ranks, that of lifetime means, and the mean of those of single cases."""
+
+    lifetime: Statistic | None = None
+    winds: Statistic | None = None
+
+
 class LeaderboardEntry(Figures):
-    """Holds the results of a controller."""
+    """Holds the results of a controller; beyond, undecided: limits that are exceeded and not decided."""
 
     controller: str
     rank: WholeNumber | None = None
     beyond: list[str] = []
-    score: Statistic | None = None
+    undecided: list[str] = []
+    held: bool | None = None
+    score: ScoreFigures | None = None
     cases: dict[str, Figures] = {}
 
 

@@ -16,8 +16,10 @@ TIME = "Time_[s]"
 # IEC 61400-1 practice. Stud or studless chain at the fairlead: 3 (DNV-OS-E301, T-N curves; 5 is wire rope's).
 # Glass-fibre laminate of blades: 10, as in IEC 61400-1 practice.
 TOWER_EXPONENT, CHAIN_EXPONENT, BLADE_EXPONENT = 4.0, 3.0, 10.0
-BLADE_ROOTS = ("RootMyc", "RootMxc")  # channels of each blade; the metric is that of the worst blade
-HUB_LOADS = ("LSSTipMys", "LSSTipMzs", "YawBrMyp", "YawBrMzp")  # in non-rotating axes
+# channels of each blade, in axes of the cone and of the pitched blade; the metric is that of the worst blade
+BLADE_ROOTS = ("RootMyc", "RootMxc", "RootMyb", "RootMxb")
+# the shaft's bending in axes at rest and turning with it, and the yaw bearing's
+HUB_LOADS = ("LSSTipMys", "LSSTipMzs", "LSSTipMya", "LSSTipMza", "YawBrMyp", "YawBrMzp")
 BLADES = (1, 2, 3)
 # The constraints of the ATLAS Offshore contest (ARPA-E, 2019).
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
@@ -118,8 +120,12 @@ TABLE = {  # metric -> definition, in the order of columns
     "FAIRTEN_DEL_[kN]": _fatigue("worst fairlead", CHAIN_EXPONENT, " (chain)"),
     "RootMyc_DEL_[kN-m]": _fatigue("worst blade root out of the rotor plane", BLADE_EXPONENT),
     "RootMxc_DEL_[kN-m]": _fatigue("worst blade root in the rotor plane", BLADE_EXPONENT),
+    "RootMyb_DEL_[kN-m]": _fatigue("worst blade root flapwise", BLADE_EXPONENT),
+    "RootMxb_DEL_[kN-m]": _fatigue("worst blade root edgewise", BLADE_EXPONENT),
     "LSSTipMys_DEL_[kN-m]": _fatigue("hub's tilt moment, non-rotating"),
     "LSSTipMzs_DEL_[kN-m]": _fatigue("hub's yaw moment, non-rotating"),
+    "LSSTipMya_DEL_[kN-m]": _fatigue("shaft's bending moment about y, rotating"),
+    "LSSTipMza_DEL_[kN-m]": _fatigue("shaft's bending moment about z, rotating"),
     "YawBrMyp_DEL_[kN-m]": _fatigue("yaw bearing's tilt moment"),
     "YawBrMzp_DEL_[kN-m]": _fatigue("yaw bearing's yaw moment"),
     "each_blade_travel_[deg/s]": _size("mean absolute pitch rate of each blade, mean of the three"),
@@ -158,6 +164,11 @@ def mean_exponent(metric):
     individual runs, without the variation of these means with wind speed. Any other: 1.
     """
     return TABLE.get(metric, UNKNOWN).exponent
+
+
+EXPONENTS = np.array([mean_exponent(name) for name in METRICS])
+# metrics without which a deviation of the rotor speed can mislead: what the grid and the drive train pay
+PAID = ("GenPwr_std_[kW]", "torque_travel_[kN-m/s]", "RotTorq_DEL_[kN-m]")
 
 
 def metric_table():

@@ -107,7 +107,11 @@ def scaled_file(file, platform):
         changes["case"] = tuple(scaling.entry(entry) for entry in file.case)
         limits = {
             kind: {name: scaling.limit(name, value) for name, value in getattr(file.limits, kind).items()}
-            for kind in ("run", "lifetime")
+            for kind in ("run", "lifetime", "case")
+        }
+        limits["set_point"] = {
+            name: point.model_copy(update={"rated": scaling.limit(name, point.rated)})
+            for name, point in file.limits.set_point.items()
         }
         changes["limits"] = file.limits.model_copy(update=limits)
     return file.model_copy(update=changes)

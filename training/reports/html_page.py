@@ -23,6 +23,7 @@ from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.evaluate import run_file
 from fowt_env.training.evaluation.failures import known_figures, lost_counts, lost_text
+from fowt_env.training.evaluation.leaderboard import SCORES
 from fowt_env.training.evaluation.leaderboard_file import Interval, check_leaderboard
 from fowt_env.training.evaluation.metrics import better, mean_exponent
 from fowt_env.training.evaluation.results_table import KEY, WEIGHT, WORDS, case_shares, read_results
@@ -37,6 +38,7 @@ from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
 PAGE_METRICS = tuple(SHORT)  # columns of the leaderboard before "all metrics" is chosen
 PARETO_AXES = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]")  # across, up, size
+SORTS = ("rank", "score_lifetime", PARETO_AXES[0], "controller")  # the first that there is
 ALL_CASES = ""
 DISPLAY_RATE = 2.0  # Hz
 MAX_POINTS = 3000  # of one drawn series
@@ -295,6 +297,17 @@ def _metric_columns(table):
     ]
 
 
+def _score_columns():
+    """Return the columns of the two scores, as of _metric_columns."""
+    what = {"lifetime": "of lifetime means", "winds": "mean of those of the single cases"}
+    about = "Score, {}: weighted mean of the ratios of metrics to the reference's. Less is better."
+    shared = {"unit": "", "headline": True, "better": -1}
+    return [
+        {"name": f"score_{key}", "label": heading, "about": about.format(what[key]), **shared}
+        for heading, key in SCORES.items()
+    ]
+
+
 def _means(table, metrics, case):
     """Return leaderboard rows from the table alone: lifetime means of the runs that ended well."""
     rows = []
@@ -325,7 +338,8 @@ def _board_rows(board, case):
             continue
         figures, gaps = dict(part.metrics), part.difference
         if entry.score and case == ALL_CASES:
-            figures["score"] = entry.score
+            scores = {f"score_{key}": getattr(entry.score, key) for key in SCORES.values()}
+            figures |= {name: figure for name, figure in scores.items() if figure is not None}
         other = entry.controller != board.baseline
         rows.append(
             {
@@ -335,6 +349,8 @@ def _board_rows(board, case):
                 "lost_text": part.lost_text,
                 "rank": entry.rank,
                 "beyond": entry.beyond,
+                "undecided": entry.undecided,
+                "held": entry.held,
                 "values": _rounded_items({name: figure.mean for name, figure in figures.items()}),
                 "intervals": _intervals(figures),
                 "gaps": _rounded_items({name: gap.mean for name, gap in gaps.items() if other}),
@@ -402,10 +418,8 @@ def _page_data(table, board_file, manifest, runs, schedule):
         case: _means(table, names, case) if board_file is None else _board_rows(board_file, case)
         for case in [ALL_CASES, *cases]
     }
-    about = "Score of the suite: weighted mean of the ratios of metrics to the baseline's. Less is better."
-    score = {"name": "score", "label": "score", "unit": "", "headline": True, "better": -1, "about": about}
-    if any(row["values"].get("score") is not None for row in board[ALL_CASES]):
-        metrics = [score, *metrics]
+    if any(row["values"].get("score_lifetime") is not None for row in board[ALL_CASES]):
+        metrics = [*_score_columns(), *metrics]
     points = [
         [row["controller"], row["case"], str(row["seed"]), _rounded([row[name] for name in names])]
         for row in table[table["status"] == OK].to_dict("records")
@@ -431,7 +445,7 @@ def _page_data(table, board_file, manifest, runs, schedule):
         "conditions": {row["case"]: page_words.conditions_text(row) for row in conditions},
         "lost": lost,
         "metrics": metrics,
-        "sort": next(name for name in ("rank", "score", PARETO_AXES[0], "controller") if name in sortable),
+        "sort": next(name for name in SORTS if name in sortable),
         "board": board,
         "remarks": {case: _remark(table, board_file, case) for case in [ALL_CASES, *cases]},
         "pareto": list(PARETO_AXES),

@@ -7,6 +7,7 @@ SHORT = {
     "RotSpeed_std_[rpm]": "rotor-speed std",
     "PtfmPitch_std_[deg]": "platform-pitch std",
     "blade_pitch_travel_[deg/s]": "pitch travel",
+    "GenPwr_std_[kW]": "power std",
     "torque_travel_[kN-m/s]": "torque travel",
     "RotTorq_DEL_[kN-m]": "shaft-torque DEL",
     "TwrBsMyt_DEL_[kN-m]": "tower-base DEL",

@@ -2,22 +2,23 @@
 
 from fowt_env.training.evaluation.bootstrap import holm
 from fowt_env.training.evaluation.failures import KINDS, lost_text
+from fowt_env.training.evaluation.leaderboard import SCORES, limits_text, score_text
 from fowt_env.training.reports.metric_words import counted, seeds_text
 
 # printed columns: heading, metric, format, order of removal on a narrow terminal (None: kept), plot title
 PRINTED_METRICS = (
     ("rotor\nspeed\nmean\nrpm", "RotSpeed_mean_[rpm]", ".2f", 3, "rotor speed, mean (rpm)"),
     ("rotor\nspeed\nstd\nrpm", "RotSpeed_std_[rpm]", ".3f", None, "rotor speed, std (rpm)"),
-    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", None, "rotor speed above rated, max (%)"),
-    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f", 8, "power up to rated, mean (kW)"),
-    ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f", 6, "power, std (kW)"),
-    ("power\n\nmax\nkW", "GenPwr_max_[kW]", ".0f", 7, "power, max (kW)"),
+    ("over-\nspeed\nmax\n%", "overspeed_[%]", ".1f", 8, "rotor speed above rated, max (%)"),
+    ("power\nto rated\nmean\nkW", "GenPwr_capped_mean_[kW]", ".0f", 7, "power up to rated, mean (kW)"),
+    ("power\n\nstd\nkW", "GenPwr_std_[kW]", ".0f", None, "power, std (kW)"),
+    ("power\n\nmax\nkW", "GenPwr_max_[kW]", ".0f", 6, "power, max (kW)"),
     ("ptfm\npitch\nmean\ndeg", "PtfmPitch_mean_[deg]", ".2f", 5, "platform pitch, mean (deg)"),
     ("ptfm\npitch\nstd\ndeg", "PtfmPitch_std_[deg]", ".3f", None, "platform pitch, std (deg)"),
     ("ptfm\npitch\nmax\ndeg", "PtfmPitch_max_[deg]", ".2f", 4, "platform pitch, max (deg)"),
     ("blade\npitch\ntravel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", None, "pitch rate, mean (deg/s)"),
     ("torque\n\ntravel\nkNm/s", "torque_travel_[kN-m/s]", ".3f", None, "torque rate, mean (kN m/s)"),
-    ("shaft\ntorque\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", 9, "shaft torque, fatigue load (kN m)"),
+    ("shaft\n\nDEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", 9, "shaft torque, fatigue load (kN m)"),
     ("nac.\nacc.\nrms\nm/s²", "NcIMUTAxs_rms_[m/s^2]", ".3f", 2, "nacelle acceleration, rms (m/s²)"),
     ("line\ntension\nmax\nkN", "FAIRTEN_max_[kN]", ".0f", 1, "mooring tension, max (kN)"),
 )
@@ -52,13 +53,14 @@ LEADERBOARD = (
     ("rotor speed std\nrpm", "RotSpeed_std_[rpm]", ".3f", True, True),
     ("platform pitch std\ndeg", "PtfmPitch_std_[deg]", ".3f", True, True),
     ("pitch travel\ndeg/s", "blade_pitch_travel_[deg/s]", ".3f", False, True),
+    ("power std\nkW", "GenPwr_std_[kW]", ".0f", False, True),
     ("torque travel\nkN m/s", "torque_travel_[kN-m/s]", ".3f", False, True),
     ("shaft DEL\nkN m", "RotTorq_DEL_[kN-m]", ".0f", False, True),
     ("tower DEL\nkN m", "TwrBsMyt_DEL_[kN-m]", ".0f", False, True),
     ("power up to rated\nkW", "GenPwr_capped_mean_[kW]", ".0f", False, True),
     ("maximum power\nkW", "GenPwr_max_[kW]", ".0f", False, False),
 )
-# dropped one by one on a narrow terminal; pitch and torque travel are kept next to the deviations
+# dropped one by one on a narrow terminal; what the deviations cost is kept next to them
 LEADERBOARD_DROPS = ("GenPwr_max_[kW]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_capped_mean_[kW]")
 
 
@@ -84,7 +86,11 @@ def leaderboard_rows(board, width=200):
         "runs": ("runs", [_runs_text(entry) for entry in entries]),
     }
     if any(entry["score"] for entry in entries):
-        columns["score"] = "score", [_score_text(entry["score"]) for entry in entries]
+        for heading, key in SCORES.items():
+            texts = [score_text(entry["score"], key) for entry in entries]
+            columns[key] = heading.replace(", ", "\n"), texts
+    if any(entry["held"] is not None for entry in entries):
+        columns["limits"] = "limits", [limits_text(entry) for entry in entries]
     tested = [metric for _, metric, _, _, different in LEADERBOARD if different]
     adjusted = [holm([entry["difference"][metric]["p"] for metric in tested]) for entry in entries]
     stars = [{m for m, p in zip(tested, each, strict=True) if p <= 1.0 - level} for each in adjusted]
@@ -113,7 +119,15 @@ def _remarks(board, intervals):
         lines.append("no paired differences: every controller has runs that failed or lost power")
     if board["baseline"] in lost:
         lines.append(f"differences from {board['baseline']} are over the runs that the baseline did not lose")
-    lines += [f"{e['controller']} exceeds a limit: {'; '.join(e['beyond'])}" for e in entries if e["beyond"]]
+    for words, key in (("exceeds a limit", "beyond"), ("has limits not decided", "undecided")):
+        lines += [
+            f"{entry['controller']} {words}: {'; '.join(entry[key])}" for entry in entries if entry[key]
+        ]
+    suite = board.get("suite") or {}
+    if suite.get("score") and not suite.get("drawn"):
+        lines.append(
+            "seeds not drawn from a hash (--draw-seeds): for development, as a controller can recognise them"
+        )
     if board["unchecked"]:
         lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")
     return lines
@@ -136,10 +150,3 @@ def _cell(entry, metric, form, with_interval, with_difference, sure):
     if with_difference and gap["percent"] == gap["percent"]:
         text += f" {gap['percent']:+.1f}%{'*' if metric in sure else ' '}"
     return text
-
-
-def _score_text(score):
-    """Return the text of a score, in brackets if a limit is exceeded or a run was lost."""
-    if score is None or score["mean"] is None:
-        return "-"
-    return f"{score['mean']:.3f}" if score["valid"] else f"({score['mean']:.3f})"

@@ -89,6 +89,8 @@ def _sentence(entry, tested, level):
         text += f'; <span class="bad">{_lost(entry)}</span>, which are not in these means'
     if entry.beyond:
         text += f'; <span class="bad">exceeds a limit: {html.escape("; ".join(entry.beyond))}</span>'
+    if entry.undecided:
+        text += f"; not decided: {html.escape('; '.join(entry.undecided))}"
     return text + "."
 
 

@@ -39,6 +39,8 @@ SHOWN = {
     "pitch travel": "blade_pitch_travel_[deg/s]",
     "overspeed": "overspeed_[%]",
     "power std": "GenPwr_std_[kW]",
+    "torque travel": "torque_travel_[kN-m/s]",
+    "shaft-torque DEL": "RotTorq_DEL_[kN-m]",
 }
 
 

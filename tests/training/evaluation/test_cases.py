@@ -37,7 +37,8 @@ def written(tmp_path, text, head=HEAD):
 
 
 def test_the_built_in_suites_can_be_read_and_say_where_they_come_from():
-    others = {"above_rated_inflow", "faults", "ipc", "sea_states", "settling", "shifted", "steady"}
+    others = {"above_rated_elastic", "above_rated_inflow", "faults", "ipc", "sea_states", "settling"}
+    others |= {"shifted", "steady"}
     assert set(SUITES) | others == set(suite_names())
     for name in suite_names():
         suite = read_suite(name)

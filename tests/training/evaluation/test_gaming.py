@@ -1,8 +1,15 @@
-"""Ways of looking better than one is: each must end below its honest twin on the leaderboard."""
+"""Ways of looking better than one is: each ends below its honest twin on the leaderboard, or beyond a limit.
+
+The first part judges figures by the headline suite, the second runs laws (gaming_laws.py): on the rigid
+turbine, and with the mark nightly on the elastic one of the suite.
+"""
+
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
+from gaming_laws import GAMERS, TWIN, Recogniser, listed_winds
 
 from fowt_env.control import make
 from fowt_env.descriptions.turbine import read_turbine
@@ -15,6 +22,7 @@ from fowt_env.training.evaluation.failures import PENALTY, penalised, with_lost_
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS, better
 from fowt_env.training.evaluation.run_case import REFERENCE
+from fowt_env.training.evaluation.seeds import drawn_seeds
 from fowt_env.training.reports.scores import agent_scores
 
 
@@ -27,11 +35,16 @@ def few_resamples(monkeypatch):
         monkeypatch.setattr(module, name, few)
 
 
-HEADLINE = read_suite("above_rated")
+HEADLINE = read_suite("above_rated_elastic")
 SPEED, LEAN, ENERGY = "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_capped_mean_[kW]"
 TRAVEL, TORQUE, SHAFT = "blade_pitch_travel_[deg/s]", "torque_travel_[kN-m/s]", "RotTorq_DEL_[kN-m]"
+TOWER, ROOT = "TwrBsMyt_DEL_[kN-m]", "RootMyb_DEL_[kN-m]"
+POWER, PEAK, PAST = "GenPwr_mean_[kW]", "GenPwr_max_[kW]", "rotor_speed_beyond_[s]"
+HELD_SPEED, HELD_TORQUE = "RotSpeed_mean_[rpm]", "GenTq_mean_[kN-m]"
+LOADS = (SHAFT, TOWER, ROOT)
 TYPICAL = dict.fromkeys(METRICS, 1.0) | {
-    "GenPwr_mean_[kW]": 4900.0, ENERGY: 4800.0, "GenPwr_max_[kW]": 6000.0, "energy_[kWh]": 800.0, TORQUE: 0.1,
+    POWER: 4900.0, ENERGY: 4800.0, PEAK: 5700.0, "energy_[kWh]": 800.0, TORQUE: 0.1, PAST: 0.0,
+    HELD_SPEED: 12.1, HELD_TORQUE: 43.09355,
 }  # fmt: skip
 
 
@@ -43,7 +56,7 @@ def table(**controllers):
     """
     rows = []
     for case in HEADLINE.cases:
-        for seed in range(1, 7):
+        for seed in range(1, 9):
             gusty = 1.0 + 0.02 * case.wind["speed"] + 0.05 * seed
             typical = dict.fromkeys((REFERENCE, "gspi_oc3"), lambda wind, seed: {})
             for name, change in {**typical, **controllers}.items():
@@ -53,8 +66,9 @@ def table(**controllers):
                 }
                 factors = change(case.wind["speed"], seed)
                 status = factors.pop("status", "ok")
+                past = factors.pop(PAST, 0.0)
                 row = {metric: np.nan if status == "failed" else value * factors.get(metric, 1.0)
-                       for metric, value in row.items()}  # fmt: skip
+                       for metric, value in row.items()} | {PAST: past}  # fmt: skip
                 about = {"controller": name, "case": case.name, "seed": seed, "status": status, "reason": ""}
                 rows.append(
                     dict.fromkeys(COLUMNS, 0.0) | row | about | {"weight_[-]": HEADLINE.weights[case.name]}
@@ -95,7 +109,7 @@ def test_a_run_that_is_given_up_where_it_goes_badly_gains_nothing(status):
     assert ratios(runs, "gamer")["rotor-speed std"] > 0.9  # not the 0.8 of the runs that it likes
     assert scores(runs)["gamer"] > scores(runs)["gspi_oc3"] == 1.0 > scores(runs)["honest"]
     entry = entries(runs)["gamer"]  # what is shown is of the runs that it likes, and is not tested
-    assert entry["lost"] == 21 and entry["metrics"][SPEED]["mean"] < 1.3
+    assert entry["lost"] == 35 and entry["metrics"][SPEED]["mean"] < 1.3
     assert all(np.isnan(gap["p"]) for gap in entry["difference"].values())
     verdicts = agent_scores(runs, ["gspi_oc3"], agents=["gamer"])["verdict"]
     assert set(verdicts) == {"failed"}
@@ -112,7 +126,7 @@ def test_power_beyond_rated_is_no_energy():
     assert not verdicts["honest", "energy"].startswith("missed")
 
 
-@pytest.mark.parametrize("spent", [{SHAFT: 1.4}, {TORQUE: 6.0}, {TRAVEL: 1.3}, {"GenPwr_max_[kW]": 1.2}])
+@pytest.mark.parametrize("spent", [{SHAFT: 1.4}, {TORQUE: 6.0}, {TRAVEL: 1.3}, {PEAK: 1.2}])
 def test_rotor_speed_that_is_bought_with_torque_or_pitch_or_power_is_beyond_a_limit(spent):
     def buys(wind, seed):
         return {SPEED: 0.5, LEAN: 0.6} | spent
@@ -123,7 +137,7 @@ def test_rotor_speed_that_is_bought_with_torque_or_pitch_or_power_is_beyond_a_li
     assert len(beyond["gamer"]) == 1 and next(iter(spent)) in beyond["gamer"][0] and not beyond["honest"]
 
 
-CALM = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, SHAFT, "TwrBsMyt_DEL_[kN-m]", "FAIRTEN_DEL_[kN]"), 0.5)
+CALM = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, *LOADS), 0.5)
 
 
 @pytest.mark.parametrize(
@@ -147,15 +161,17 @@ def gives_up_once(wind, seed):
 
 
 def scored(runs, name):
-    """Score of a controller, with its interval, as bytes: equal where they are equal to the last bit."""
+    """Scores of a controller, with intervals, as bytes: equal where they are equal to the last bit."""
     entry = entries(runs)[name]
-    return np.array([entry["score"][key] for key in ("mean", "low", "high")]).tobytes(), entry["beyond"]
+    scores = [entry["score"], entry["score"]["lifetime"], entry["score"]["winds"]]
+    numbers = np.array([[score[key] for key in ("mean", "low", "high")] for score in scores])
+    return numbers.tobytes(), entry["beyond"], entry["undecided"], entry["held"]
 
 
 @pytest.mark.parametrize("name", ["honest", "gamer"])
 def test_a_score_is_the_same_to_the_bit_whoever_else_is_in_the_folder(name):
     """Also beside one that is five times as bad, one that fails, and one with other cases and more seeds."""
-    sandbag = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, SHAFT, "TwrBsMyt_DEL_[kN-m]"), 5.0)
+    sandbag = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, *LOADS), 5.0)
     others = {
         "sandbag": lambda wind, seed: sandbag,
         "wreck": lambda wind, seed: {"status": "failed"},
@@ -166,7 +182,7 @@ def test_a_score_is_the_same_to_the_bit_whoever_else_is_in_the_folder(name):
     expected = scored(alone, name)
     assert scored(runs, name) == expected
     more = runs[runs["controller"].isin(["sandbag", "gspi_oc3", REFERENCE])]
-    more = pd.concat([more.assign(seed=more["seed"] + 6), more.assign(case=more["case"] + "_b")])
+    more = pd.concat([more.assign(seed=more["seed"] + 8), more.assign(case=more["case"] + "_b")])
     assert scored(pd.concat([more, runs], ignore_index=True), name) == expected
     tripped = runs.copy()  # the published baseline as an entry, which is no reference
     tripped.loc[tripped["controller"] == "gspi_oc3", "status"] = "tripped"
@@ -184,14 +200,13 @@ def test_a_lost_run_counts_a_fixed_multiple_of_the_reference():
 
 # the worst ratios to the reference of runs that ended well, of laws with limit cycles and commands that swing
 JUST_ALIVE = {
-    SPEED: 1.5, LEAN: 6.7, TRAVEL: 43.0, SHAFT: 9.7, "TwrBsMyt_DEL_[kN-m]": 3.9, "FAIRTEN_DEL_[kN]": 1.1,
-    ENERGY: 0.85,
+    SPEED: 1.5, LEAN: 6.7, TRAVEL: 43.0, SHAFT: 9.7, TOWER: 3.9, ROOT: 1.1, ENERGY: 0.85,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("given_up", [{12.0}, {24.0}, {12.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0}])
 def test_giving_up_pays_for_nobody_however_bad_its_run_would_be(given_up):
-    for seeds in (1, 6):
+    for seeds in (1, 8):
         runs = table(
             endures=lambda wind, seed: dict(JUST_ALIVE),
             quits=lambda wind, seed: (
@@ -205,7 +220,7 @@ def test_giving_up_pays_for_nobody_however_bad_its_run_would_be(given_up):
 
 def test_a_reference_without_a_figure_counts_for_nobody_and_without_one_there_is_no_score():
     runs = table(honest=good, gamer=gives_up_once)
-    at = (runs["controller"] == REFERENCE) & (runs["case"] == "ntm_12") & (runs["seed"] == 1)
+    at = (runs["controller"] == REFERENCE) & (runs["case"] == "elastic_12") & (runs["seed"] == 1)
     runs.loc[at, ["status", *METRICS]] = ["failed", *[np.nan] * len(METRICS)]
     found = scores(runs)
     assert found["gamer"] == found["honest"] and ranks(runs)["gamer"] == 3  # its run is lost all the same
@@ -213,7 +228,7 @@ def test_a_reference_without_a_figure_counts_for_nobody_and_without_one_there_is
     for entry in board["controllers"]:
         assert entry["rank"] is None and entry["score"]["mean"] is None
         assert "reference" in entry["score"]["why"]
-    assert board["unchecked"] == list(HEADLINE.limits.relative)
+    assert board["unchecked"] == HEADLINE.limits.relative_metrics != []
 
 
 def test_a_lifetime_without_one_of_its_winds_has_no_figures_but_a_score():
@@ -224,8 +239,8 @@ def test_a_lifetime_without_one_of_its_winds_has_no_figures_but_a_score():
     entry = next(each for each in board["controllers"] if each["controller"] == "gamer")
     for figure in (entry["metrics"][SPEED], entry["difference"][SPEED]):
         assert np.isnan(figure["mean"])
-    assert entry["cases"]["ntm_12"]["metrics"][SPEED]["mean"] > 0.0
-    assert entry["score"]["mean"] > 1.0 and entry["score"]["why"] == "6 runs failed"
+    assert entry["cases"]["elastic_12"]["metrics"][SPEED]["mean"] > 0.0
+    assert entry["score"]["mean"] > 1.0 and entry["score"]["why"] == "8 runs failed"
 
 
 def test_what_counts_in_place_of_a_lost_run_is_worse_whatever_the_sign():
@@ -254,12 +269,111 @@ def test_a_turbine_that_stands_still_has_lost_power_unless_a_fault_took_it():
     statuses = with_lost_power(runs).groupby("controller")["status"].unique().str[0]
     assert statuses["stands"] == "lost power" and set(statuses.drop("stands")) == {"ok"}
     assert ranks(with_lost_power(runs))["stands"] == 4
-    spared = with_lost_power(runs, faulty=["ntm_12"]).groupby("case")["status"].nunique()
-    assert spared["ntm_12"] == 1 and spared["ntm_14"] == 2
+    spared = with_lost_power(runs, faulty=["elastic_12"]).groupby("case")["status"].nunique()
+    assert spared["elastic_12"] == 1 and spared["elastic_14"] == 2
     without = runs[runs["controller"] != REFERENCE]
     lost = with_lost_power(without)
-    assert (lost["status"] == "lost power").sum() == 42 and "of gspi_oc3" in lost["reason"].max()
+    assert (lost["status"] == "lost power").sum() == 56 and "of gspi_oc3" in lost["reason"].max()
     assert with_lost_power(without[without["controller"] != "gspi_oc3"])["status"].eq("ok").all()
+
+
+# ---------------------------------------------------------- laws of an audit, by the figures that they had
+
+AUDITED = {  # name: (figures over the reference's, a function of the wind and seed; limits that bar it)
+    "under by 12 %": (
+        lambda wind, seed: {ENERGY: 0.925, POWER: 0.88, HELD_TORQUE: 0.88}, [ENERGY, HELD_TORQUE],
+    ),
+    "under by 25 %": (
+        lambda wind, seed: {ENERGY: 0.76, POWER: 0.75, HELD_TORQUE: 0.75}, [ENERGY, HELD_TORQUE],
+    ),
+    "sag": (lambda wind, seed: {HELD_SPEED: 0.96, HELD_TORQUE: 1.04}, [HELD_SPEED, HELD_TORQUE]),
+    "overrate": (lambda wind, seed: {POWER: 1.05, HELD_TORQUE: 1.05}, [POWER, HELD_TORQUE]),
+    "rare wind derated": (lambda wind, seed: {ENERGY: 0.6} if wind >= 20.0 else {}, [ENERGY]),
+    "torque-heavy": (lambda wind, seed: {SPEED: 0.42, SHAFT: 1.44, TORQUE: 6.7}, [SHAFT, TORQUE]),
+    "deep torque": (lambda wind, seed: {SHAFT: 1.28, TORQUE: 5.3}, [SHAFT, TORQUE]),
+    "shifted travel": (lambda wind, seed: {TRAVEL: 3.4 if wind >= 22.0 else 0.6}, [TRAVEL]),
+    "mpc": (
+        lambda wind, seed: {
+            SHAFT: {12: 1.11, 14: 0.98, 16: 2.82, 18: 2.10, 20: 1.49, 22: 1.16, 24: 1.07}[int(wind)],
+            TRAVEL: {12: 0.73, 14: 0.83, 16: 1.05, 18: 1.20, 20: 1.44, 22: 1.68, 24: 1.93}[int(wind)],
+        },
+        [SHAFT, TRAVEL],
+    ),
+}  # fmt: skip
+
+
+OTHERS = {  # as AUDITED
+    # at 24 m/s alone, which is 2 % of the lifetime
+    "sag where nobody looks": (
+        lambda wind, seed: {HELD_SPEED: 0.99, HELD_TORQUE: 1.01} if wind == 24.0 else {},
+        [HELD_SPEED, HELD_TORQUE],
+    ),
+    "faster at less torque": (
+        lambda wind, seed: {HELD_SPEED: 1.04, HELD_TORQUE: 0.96, SHAFT: 0.8}, [HELD_SPEED, HELD_TORQUE],
+    ),
+    # the trip waits a moment: so long the rotor may be faster, and the generator at more power
+    "past the trip for a moment": (lambda wind, seed: {PAST: 0.3 if seed == 4 else 0.0}, [PAST]),
+    "power in pulses": (lambda wind, seed: {PEAK: 1.2}, [PEAK]),
+    # encoders do not see blades that dither by less than their noise; metrics are of the blades
+    "travel below the noise of encoders": (lambda wind, seed: {TRAVEL: 1.6}, [TRAVEL]),
+    # of eight, so that no interval excludes that the limit is held
+    "one bad seed": (lambda wind, seed: {SHAFT: 2.6 if seed == 3 else 0.7}, [SHAFT]),
+    # learns the wind in the spin-up that is not scored, and takes in each what is cheap there
+    "learns the wind": (
+        lambda wind, seed: {ENERGY: 0.97, TOWER: 0.6} if wind >= 16.0 else {TOWER: 1.4, LEAN: 0.4},
+        [ENERGY, TOWER],
+    ),
+    "learns during the run": (lambda wind, seed: {SPEED: 0.5, ROOT: 1.3 + 0.02 * seed}, [ROOT]),
+    # capped energy is lost in the other half
+    "torque that swings about rated": (lambda wind, seed: {ENERGY: 0.975, "GenPwr_std_[kW]": 1.5}, [ENERGY]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", [*AUDITED, *OTHERS])
+def test_what_an_engineer_would_not_sign_is_beyond_the_limits_that_say_why(name):
+    figures, barred = (AUDITED | OTHERS)[name]
+    found = entries(table(honest=good, gamer=lambda wind, seed: good(wind, seed) | figures(wind, seed)))
+    gamer, honest = found["gamer"], found["honest"]
+    assert {text.split(" over ")[0].split(",")[0].split(" = ")[0] for text in gamer["beyond"]} == set(barred)
+    assert honest["held"] and not gamer["held"] and not gamer["score"]["valid"]
+    assert honest["rank"] < found["gspi_oc3"]["rank"] < gamer["rank"]
+
+
+def test_a_limit_names_the_winds_in_which_it_is_exceeded_and_no_other():
+    figures, _ = AUDITED["mpc"]
+    shaft, travel = entries(table(gamer=figures))["gamer"]["beyond"]
+    cases = [case.name for case in HEADLINE.cases]
+    assert [case for case in cases if case in shaft] == ["elastic_16", "elastic_18", "elastic_20"]
+    assert [case for case in cases if case in travel] == ["elastic_20", "elastic_22", "elastic_24"]
+
+
+@pytest.mark.parametrize(
+    "traded",
+    [
+        # within every limit: a quarter worse where it is rare, much better where it is frequent; and reversed
+        lambda wind: 0.5 if wind < 16.0 else 1.24,
+        lambda wind: 1.24 if wind < 16.0 else 0.5,
+        lambda wind: 1.24,  # as bad as the limits allow, with a rotor that is calm
+    ],
+)
+def test_whoever_trades_winds_within_the_limits_has_the_worse_of_two_scores(traded):
+    def trades(wind, seed):
+        return dict.fromkeys((SPEED, LEAN, TRAVEL, *LOADS), traded(wind))
+
+    runs = table(honest=lambda wind, seed: dict.fromkeys((SPEED, LEAN, TRAVEL, *LOADS), 0.85), gamer=trades)
+    found = entries(runs)
+    assert found["gamer"]["held"] and found["honest"]["rank"] == 1 < found["gamer"]["rank"]
+    score = found["gamer"]["score"]
+    assert score["mean"] == max(score["lifetime"]["mean"], score["winds"]["mean"])
+    assert found["honest"]["score"]["mean"] == pytest.approx(0.85)
+
+
+def test_few_seeds_hold_no_limit_and_exceed_it_all_the_same():
+    figures, _ = AUDITED["sag"]
+    runs = table(honest=good, gamer=lambda wind, seed: good(wind, seed) | figures(wind, seed))
+    found = entries(runs[runs["seed"] <= 3])
+    assert found["honest"]["held"] is False and not found["honest"]["beyond"]
+    assert found["gamer"]["beyond"] and found["honest"]["rank"] < found["gamer"]["rank"]
 
 
 # ------------------------------------------------------------------ real runs
@@ -299,6 +413,61 @@ class LowerSetPoint:
         return self.inner.act(self._told(measurement))
 
 
+def on_rigid_turbine(suite):
+    """The suite on a turbine with rigid parts and without the blade roots, in seconds instead of minutes."""
+    terms = tuple(term for term in suite.score.term if term.metric != ROOT)
+    loads = {name: bound for name, bound in suite.limits.case_relative.items() if name != ROOT}
+    return replace(
+        suite,
+        cases=tuple(replace(case, options={"fidelity": "standard"}) for case in suite.cases),
+        score=suite.score.model_copy(update={"term": terms}),
+        limits=suite.limits.model_copy(update={"case_relative": loads}),
+    )
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(on_rigid_turbine, marks=pytest.mark.slow),
+        pytest.param(lambda suite: suite, marks=[pytest.mark.slow, pytest.mark.nightly]),
+    ],
+    ids=["rigid", "elastic"],
+)
+def played(request):
+    """Entries of the laws of GAMERS and their twin in three winds of the headline, two seeds of each."""
+    whole = request.param(HEADLINE)
+    cases = tuple(case for case in whole.cases if case.wind["speed"] in (14.0, 18.0, 22.0))
+    laws = {TWIN: TWIN} | {law.__name__: law for law in GAMERS}
+    runs = evaluate(laws, replace(whole, cases=cases), seeds=(1001, 1002))
+    board = leaderboard(runs, score=whole.score, limits=whole.limits)
+    return {entry["controller"]: entry for entry in board["controllers"]}
+
+
+@pytest.mark.parametrize("law", GAMERS)
+def test_a_law_that_games_the_score_is_beyond_a_limit_that_its_twin_is_not(played, law):
+    gamer, twin = played[law.__name__], played[TWIN]
+    assert not twin["beyond"] and twin["lost"] == 0 and twin["score"]["mean"] < 1.0
+    for metric in GAMERS[law]:
+        assert any(text.startswith(metric) for text in gamer["beyond"]), gamer["beyond"]
+    assert twin["rank"] == 1 < gamer["rank"]
+
+
+def test_who_recognises_listed_seeds_is_better_than_its_twin_on_these_and_equal_on_others():
+    suite = on_rigid_turbine(HEADLINE)
+    case = next(case for case in suite.cases if case.wind["speed"] == 18.0)
+    winds = listed_winds(case, suite.seeds[:3])
+    laws = {"gspi_oc3": "gspi_oc3", "recogniser": lambda turbine, dt: Recogniser(turbine, dt, winds)}
+
+    def score(seeds):
+        runs = evaluate(laws, [case], seeds=seeds, duration=300.0, skip=80.0, reference="gspi_oc3")
+        board = leaderboard(runs, score=suite.score)
+        return {entry["controller"]: entry["score"]["mean"] for entry in board["controllers"]}
+
+    assert score(suite.seeds[:2])["recogniser"] < 0.8
+    drawn = drawn_seeds("5" * 40, suite.name, suite.version, 2)
+    assert score(drawn)["recogniser"] == score(drawn)["gspi_oc3"] == 1.0
+
+
 def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_twin():
     case = Case("ntm_18", {"kind": "ntm", "speed": 18.0, "class": "B"}, None)
     turbine = read_turbine("nrel5mw")
@@ -306,7 +475,7 @@ def test_a_controller_that_raises_when_the_rotor_is_off_ends_below_its_honest_tw
     runs = evaluate({"gspi_oc3": "gspi_oc3", "quitter": Quitter(turbine)}, [case], **options)
     lost = runs[runs["controller"] == "quitter"]
     assert (lost["status"] == "failed").any() and "enough of this" in " ".join(lost["reason"])
-    board = leaderboard(runs, score=HEADLINE.score)
+    board = leaderboard(runs, score=on_rigid_turbine(HEADLINE).score)
     assert [entry["controller"] for entry in board["controllers"]] == ["gspi_oc3", "quitter"]
     quitter = board["controllers"][1]
     assert quitter["score"]["mean"] >= 1.0 and not quitter["score"]["valid"]
@@ -327,5 +496,5 @@ def test_a_lower_set_point_loses_energy_and_is_beyond_the_limit_of_settling():
 
 def test_limits_of_the_headline_are_of_metrics_that_there_are_and_hold_for_the_baseline():
     assert isinstance(HEADLINE.limits, Limits) and HEADLINE.limits.baseline == HEADLINE.score.baseline
-    runs = table()
-    assert not leaderboard(runs, limits=HEADLINE.limits)["controllers"][0]["beyond"]
+    entry = leaderboard(table(), limits=HEADLINE.limits)["controllers"][0]
+    assert not entry["beyond"] and not entry["undecided"] and entry["held"]

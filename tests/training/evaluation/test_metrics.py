@@ -99,19 +99,22 @@ def test_fairlead_figures_are_those_of_the_worst_line():
 
 
 def test_figures_of_single_blades_are_those_of_the_worst_blade_and_absent_without_them():
-    names = [f"{name}{i}_[kN-m]" for name in ("RootMyc", "RootMxc") for i in (1, 2, 3)]
+    names = [f"{name}{i}_[kN-m]" for name in ("RootMyc", "RootMxc", "RootMyb") for i in (1, 2, 3)]
     waves = {
         name: lambda t, a=i + 1.0: 1e3 * a * np.cos(2.0 * np.pi * t / 5.0) for i, name in enumerate(names)
     }
     waves |= {
         f"BldPitch{i}_[deg]": lambda t, i=i: 10.0 + i * np.cos(2.0 * np.pi * t / 10.0) for i in (1, 2, 3)
     }
+    waves["LSSTipMya_[kN-m]"] = lambda t: 250.0 * np.cos(2.0 * np.pi * t / 5.0)
     waves["YawBrMzp_[kN-m]"] = lambda t: 500.0 * np.cos(2.0 * np.pi * t / 5.0)
     result = metrics(synthetic_run(**waves))
     # 20 cycles of the range 2 A in 100 s, exponent m: 2 A (20/100)^(1/m)
     assert result["RootMyc_DEL_[kN-m]"] == pytest.approx(6e3 * 0.2**0.1, rel=1e-9)
     assert result["RootMxc_DEL_[kN-m]"] == pytest.approx(12e3 * 0.2**0.1, rel=1e-9)
+    assert result["RootMyb_DEL_[kN-m]"] == pytest.approx(18e3 * 0.2**0.1, rel=1e-9)
     assert result["YawBrMzp_DEL_[kN-m]"] == pytest.approx(1e3 * 0.2**0.25, rel=1e-9)
+    assert result["LSSTipMya_DEL_[kN-m]"] == pytest.approx(500.0 * 0.2**0.25, rel=1e-9)
     assert result["each_blade_travel_[deg/s]"] == pytest.approx(
         0.8, rel=1e-9
     )  # 4 A a period, A = 2 on the mean

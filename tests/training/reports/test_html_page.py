@@ -177,15 +177,18 @@ def test_a_leaderboard_file_gives_its_intervals_and_differences(copy):
     gap = {name: {"mean": -0.1, "low": -0.2, "high": -0.05, "percent": -28.6, "p": 0.004}}
     part = {"runs": 4, "failed": 0, "metrics": figure, "difference": gap}
     score = {"mean": 0.9, "low": 0.8, "high": 1.0}
-    entries = [{"controller": "calm", **part, "score": score, "cases": {"ntm_14": part}}]
+    score |= {"lifetime": dict(score), "winds": {"mean": 0.95, "low": None, "high": None}}
+    entry = {"controller": "calm", **part, "score": score, "cases": {"ntm_14": part}}
+    entries = [entry | {"held": False, "undecided": ["speed"]}]
     board = {"baseline": "busy", "interval": {"level": 0.95, "method": "bootstrap"}, "controllers": entries}
     (copy / "leaderboard.json").write_text(json.dumps(board))
     data = data_of(write_report(copy, schedule=False))
     row = data["board"][""][0]
-    assert row["intervals"] == {name: [0.2, 0.3], "score": [0.8, 1.0]}
+    assert row["intervals"] == {name: [0.2, 0.3], "score_lifetime": [0.8, 1.0]}
+    assert (row["values"]["score_winds"], row["held"], row["undecided"]) == (0.95, False, ["speed"])
     assert row["percent"] == {name: -28.6} and row["gap_intervals"] == {name: [-0.2, -0.05]}
     assert row["p"] == {name: pytest.approx(0.004)} and data["board"]["ntm_14"][0]["p"] == {}
-    assert data["baseline"] == "busy" and data["sort"] == "score"
+    assert data["baseline"] == "busy" and data["sort"] == "score_lifetime"
     assert data["board"]["ntm_18"] == []
     assert "rotor-speed std \N{MINUS SIGN}29" in (copy / "report.html").read_text(encoding="utf-8")
     (copy / "leaderboard.json").write_text('{"rows": []}')

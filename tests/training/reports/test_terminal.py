@@ -5,11 +5,15 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from fowt_env.training.board.page import FIGURES
+from fowt_env.training.cli import scores as scores_command
+from fowt_env.training.design import sweeps
 from fowt_env.training.evaluation.evaluate import COLUMNS
-from fowt_env.training.evaluation.leaderboard import leaderboard
-from fowt_env.training.evaluation.metrics import METRICS
+from fowt_env.training.evaluation.leaderboard import SHOWN, leaderboard
+from fowt_env.training.evaluation.metrics import METRICS, PAID
 from fowt_env.training.reports.evaluation_plots import evaluation_plots
 from fowt_env.training.reports.metric_words import SHORT
+from fowt_env.training.reports.scores import figures_named
 from fowt_env.training.reports.terminal import (
     LEADERBOARD,
     LEADERBOARD_DROPS,
@@ -17,8 +21,10 @@ from fowt_env.training.reports.terminal import (
     leaderboard_rows,
     summary_rows,
 )
+from fowt_env.training.studies import rosco_differences
 
 POWER = "GenPwr_max_[kW]"
+COMPARED = [figure.metric for figure in figures_named(scores_command.FIGURES.split(","))]
 
 
 def means():
@@ -94,6 +100,17 @@ def test_one_name_has_one_figure_and_one_unit_in_all_tables():
     assert SHORT[POWER] == "maximum power"
 
 
+def test_whatever_shows_the_rotor_speed_shows_what_was_paid_for_it():
+    shown = {
+        "printed": [name for _, name, *_ in PRINTED_METRICS], "leaderboard": [m for _, m, *_ in LEADERBOARD],
+        "page": SHORT, "notebook": SHOWN.values(), "board": FIGURES.values(), "scores": COMPARED,
+        "sweeps": sweeps.SHOWN, "rosco": rosco_differences.SHOWN.values(),
+    }  # fmt: skip
+    for where, metrics in shown.items():
+        assert {"RotSpeed_std_[rpm]", *PAID} <= set(metrics), where
+    assert not set(PAID) & set(LEADERBOARD_DROPS)
+
+
 def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
     for seeds, words in (([1], "seed 1:"), ([1, 2, 4], "seeds 1, 2, 4:")):
         title, _, rows, remarks = leaderboard_rows(board(seeds, x="ok"))
@@ -107,11 +124,11 @@ def test_few_seeds_have_neither_interval_nor_star_and_the_remark_says_so_once():
 def test_a_controller_that_failed_in_bad_weather_is_not_said_to_be_better_and_its_row_says_failed():
     both = board([1, 2, 3, 4, 5], x="ok", factor=0.5)
     _, headings, (_, row), _ = leaderboard_rows(both)
-    assert sum("-50.0%*" in text for text in row) == 7
+    assert sum("-50.0%*" in text for text in row) == 8
     lost = board([1, 2, 3, 4, 5], x="ok", factor=0.5, lost=5)
     _, headings, (_, row), remarks = leaderboard_rows(lost)
     assert row[headings.index("runs")] == "4/5, 1 failed"
-    assert not any("*" in text for text in row) and sum("-50.0% " in text for text in row) == 7
+    assert not any("*" in text for text in row) and sum("-50.0% " in text for text in row) == 8
     assert remarks[0] == "runs lost by x: 1 failed: not in these means; ranked last"
 
 
@@ -130,11 +147,20 @@ def test_a_narrow_terminal_loses_columns_of_the_leaderboard_in_order():
 
 def test_a_score_beyond_a_limit_stands_in_brackets_and_none_is_a_dash():
     scored = copy.deepcopy(board([1, 2]))
-    for entry, score in zip(scored["controllers"], ({"mean": 0.9, "valid": False}, None), strict=True):
-        entry["score"] = score
-    _, headings, rows, _ = leaderboard_rows(scored)
-    place = headings.index("score")
-    assert [row[place] for row in rows] == ["(0.900)", "-"]
+    nan = float("nan")
+    score = {"lifetime": {"mean": 0.9, "low": nan, "high": nan}, "valid": False}
+    score["winds"] = {"mean": 1.1, "low": 1.0, "high": 1.3}
+    limits = [{"state": state} for state in ("exceeded", "held", "not decided", "exceeded")]
+    changes = {"score": score, "held": False, "limits": limits, "undecided": ["speed = 1"]}
+    scored["controllers"][0] |= changes
+    _, headings, rows, remarks = leaderboard_rows(scored)
+    lifetime, winds, state = map(headings.index, ("score\nlifetime", "score\nwinds", "limits"))
+    assert [row[lifetime] for row in rows] == ["(0.900)", "-"]
+    assert [row[winds] for row in rows] == ["(1.100 [1.000, 1.300])", "-"]
+    assert [row[state] for row in rows] == ["2 exceeded, 1 not decided", "-"]
+    assert "pi has limits not decided: speed = 1" in remarks
+    scored["controllers"][0]["limits"] = [{"state": "held"}]
+    assert leaderboard_rows(scored)[2][0][state] == "held"
 
 
 def test_of_runs_that_all_failed_there_is_nothing_to_plot(tmp_path):

@@ -208,7 +208,7 @@ function drawTable() {
   const rows = sortedRows();
   const head = element("tr");
   head.append(headerCell("controller", "controller", "", "Click to sort by name."), headerCell("lost", "lost", "runs", "Runs that failed, tripped or lost power (less than half of the reference's energy), of all runs. Lost runs are not in these means; a score counts them as far worse than the reference."));
-  if (DATA.ranked) head.append(headerCell("rank", "rank", "", "First controllers within all limits and without lost runs, then those that exceed a limit, then those with lost runs; within each group by score, else in order of evaluation."));
+  if (DATA.ranked) head.append(headerCell("rank", "rank", "", "First controllers that exceed no limit and lost no run, then those that exceed a limit, then those with lost runs; within each group by score, else in order of evaluation. A limit is held only if the bound of its interval is within it, too; else it is not decided."));
   for (const metric of columns) head.append(headerCell(metric.name, metric.label, metric.unit, metric.about));
   hideTip();
   $("table").classList.toggle("every", $("all-columns").checked);
@@ -226,7 +226,9 @@ function drawTable() {
       lost.append(element("span", row.lost_text, "range bad"));
     }
     line.append(name, lost);
+    if (row.held) name.append(element("span", "✓ limits held", "range"));
     if (row.beyond && row.beyond.length) name.append(element("span", `beyond a limit: ${row.beyond.join("; ")}`, "range bad"));
+    if (row.undecided && row.undecided.length) name.append(element("span", `not decided: ${row.undecided.join("; ")}`, "range"));
     if (DATA.ranked) line.append(element("td", row.rank));
     for (const metric of columns) line.append(figureCell(row, metric, best[metric.name]));
     return line;
@@ -502,14 +504,14 @@ function setTheme(isDark) {
   document.documentElement.dataset.theme = isDark ? "dark" : "light";
 }
 fill($("table-case"), [ALL, ...DATA.cases], ["all cases", ...DATA.cases]);
-for (const [kind, title, names] of [["samples", "samples of a channel", Object.keys(DATA.quantiles)], ["metric", "metrics of the runs", DATA.metrics.map((m) => m.name).filter((name) => name !== "score")]]) {
+for (const [kind, title, names] of [["samples", "samples of a channel", Object.keys(DATA.quantiles)], ["metric", "metrics of the runs", DATA.metrics.map((m) => m.name).filter((name) => !name.startsWith("score_"))]]) {
   if (!names.length) continue;
   const group = document.createElement("optgroup");
   group.label = title;
   group.append(...names.map((name) => new Option(DATA.titles[name], JSON.stringify([kind, name]))));
   $("box-what").append(group);
 }
-const compared = DATA.metrics.filter((metric) => metric.name !== "score");
+const compared = DATA.metrics.filter((metric) => !metric.name.startsWith("score_"));
 fill($("wind-what"), compared.map((metric) => metric.name), compared.map((metric) => DATA.titles[metric.name] || metric.label));
 fill($("table-view"), DATA.baseline === null ? [MEANS] : [MEANS, GAPS], DATA.baseline === null ? undefined : ["means", `differences from ${DATA.baseline}`]);
 $("table-view").parentElement.hidden = $("table-view").options.length < 2;
