@@ -19,7 +19,11 @@ os.environ.pop("COLUMNS", None)
 KINDS = {
     "environment": ["tests/envs/test_env.py", "tests/envs/test_golden.py"],
     "command line": ["tests/training/cli/test_app.py", "tests/training/evaluation/test_evaluate.py"],
-    "elastic": ["tests/analysis/test_elastic_trim.py", "tests/analysis/test_elastic_linear.py"],
+    "elastic": [
+        "tests/envs/test_elastic_env.py",
+        "tests/analysis/test_elastic_trim.py",
+        "tests/analysis/test_elastic_linear.py",
+    ],
     "openfast": ["tests/training/validation/test_validate.py"],
 }
 KIND_OF = {file: kind for kind, files in KINDS.items() for file in files}

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fowt_env.analysis.campbell import BLADES, campbell
 from fowt_env.analysis.equilibrium import MOTION_LABELS, causes_of, evaluated, metacentre
 from fowt_env.analysis.statics import Evaluation, Statics, named_periods, rotation_of, statics
 from fowt_env.analysis.tower_frequencies import TowerFrequency, tower_frequencies
@@ -29,6 +30,13 @@ BANDS = {  # s, natural periods of floating turbines from tension legs and barge
 }
 
 
+class RotorFrequency(NamedTuple):
+    """Holds the undamped natural frequencies of one mode of blades or shaft on a fixed base, Hz."""
+
+    standstill: float
+    rated: float  # at the rated rotor speed, in still air, blade pitch zero
+
+
 class Check(NamedTuple):
     """Holds statics, equilibrium, natural periods and faults of a platform in still water without wind."""
 
@@ -39,15 +47,17 @@ class Check(NamedTuple):
     periods: dict[str, float] | None  # {motion: s}, undamped; inf: no restoring
     tower: dict[str, TowerFrequency]  # of the bending modes in the file; empty without an equilibrium
     faults: tuple[str, ...]  # sentences on inconsistencies
+    rotor: dict[str, RotorFrequency]  # of blades and shaft, as far as the turbine's file describes them
 
 
 def check_platform(platform, **options):
     """Return the Check of a platform: a built-in name, a path or a Platform; options: of the scene.
 
+    Blades and shaft are rigid but for their own frequencies, as their bending hardly moves the platform.
     Raises: InputError for a file that cannot be read.
     """
     with muted():  # faults are listed in the Check instead
-        scene = build_scene(platform, **options)
+        scene = build_scene(platform, **options | {"blades": "rigid", "shaft": "rigid"})
     undisplaced = statics(scene)
     faults = geometry_faults(scene.platform)
     faults |= _static_faults(scene, undisplaced)
@@ -66,8 +76,23 @@ def check_platform(platform, **options):
         faults |= _rest_faults(scene, rest) | _period_faults(periods, scene.turbine.rotor.hub_height)
     return Check(
         scene.label, scene.platform.draft, undisplaced, rest, periods, tower,
-        tuple(f"{text[0].upper()}{text[1:]}." for text in faults.values()),
+        tuple(f"{text[0].upper()}{text[1:]}." for text in faults.values()), rotor_frequencies(scene),
     )  # fmt: skip
+
+
+def rotor_frequencies(scene):
+    """Return {mode: RotorFrequency} of bending blades and a twisting shaft, with all modes of the files."""
+    turbine, modes = scene.turbine, scene.platform.tower.modes
+    parts = {
+        "blades": "rigid" if turbine.blade_structure is None else "modes2",
+        "shaft": "rigid" if turbine.shaft_torsion is None else "torsion",
+    }
+    if set(parts.values()) == {"rigid"} or turbine.rotor.blades != BLADES:
+        return {}
+    tower = "rigid" if modes is None else ("modes", "modes2")[len(modes.fore_aft) - 1]
+    found = campbell(scene.platform, turbine, [0.0, turbine.rated_rotor_speed], tower=tower, **parts)
+    modes = {mode: RotorFrequency(*map(float, values)) for mode, values in found.frequency.items()}
+    return {mode: values for mode, values in modes.items() if not mode.endswith("tower")}
 
 
 def _static_faults(scene, undisplaced):

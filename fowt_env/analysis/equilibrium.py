@@ -10,6 +10,7 @@ from fowt_env.errors import InputError, warn_once
 from fowt_env.plant.advance import CAPSIZE
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.mooring import SLACK
+from fowt_env.plant.rigid_body import gravity_load
 from fowt_env.plant.state import State, pose_of
 from fowt_env.scene.geometry import in_radians
 
@@ -132,7 +133,7 @@ def causes_of(scene, start):
     """Return {name: sentence} of the faults of the undisplaced platform."""
     model, platform = scene.model, scene.platform
     weight = model.rigid_body.mass * model.rigid_body.gravity
-    net = start.cache[LoadCache.TOTAL + 2]
+    net = _total(model, start)[2]
     causes = {}
     if model.mooring is not None:
         causes |= _mooring_causes(model.mooring, start, weight, net)
@@ -243,11 +244,22 @@ def _by_load(scene, end):
     wrenches = {name: end.cache[first : first + 6] for name, first in LOADS.items()}
     wrenches["weight"] = np.concatenate([weight, np.cross(centre, weight)])
     if scene.loads:
-        wrenches["custom loads"] = end.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6] - sum(wrenches.values())
+        wrenches["custom loads"] = _total(scene.model, end) - sum(wrenches.values())
     return {
         name: np.concatenate([to_inertial @ wrench[:3], wrench[3:] - np.cross(centre, wrench[:3])])
         for name, wrench in wrenches.items()
     }
+
+
+def _total(model, evaluated):
+    """Return the load (6,) of an Evaluated; with elastic parts the weight of nacelle and rotor is added."""
+    total = evaluated.cache[LoadCache.TOTAL : LoadCache.TOTAL + 6]
+    if model.structure is None:
+        return total
+    pose = pose_of(evaluated.x)
+    return total + np.subtract(
+        gravity_load(pose, model.rigid_body), gravity_load(pose, model.structure.lower)
+    )
 
 
 def _position(x):

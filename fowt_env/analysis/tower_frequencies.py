@@ -71,7 +71,7 @@ def bending(platform, turbine, count):
     body origin as a point of the nacelle, and angular velocity of the nacelle, per q'. Nacelle and rotor are
     one rigid body at the tower top.
     """
-    tower = build_tower_modes(platform, count, 0)
+    tower = build_tower_modes(platform, turbine, count, 0)
     gravity, height, slope = platform.environment.gravity, tower.top_height, tower.slope
     along, beam = (np.arange(len(slope)) % 2 == 0).astype(float), tower.beam
     across, first, height_moment = 1.0 - along, beam.a + beam.b, beam.e + beam.f

@@ -59,11 +59,14 @@ MEANINGS = {
     "OoPDefl": "deflection of the blade tip out of the rotor plane, downwind (TipDxc)",
     "IPDefl": "deflection of the blade tip in the rotor plane, against the rotation (TipDyc)",
     "TipDzc": "displacement of the blade tip along the pitch axis, outwards",
+    "TipDxb": "displacement of the blade tip flapwise, axes turned by the pitch",
+    "TipDyb": "displacement of the blade tip edgewise, axes turned by the pitch",
     "RootFxc": "blade-root force out of the rotor plane",
     "RootFyc": "blade-root force in the rotor plane",
     "RootFzc": "blade-root force along the pitch axis",
     "RootMxb": "blade-root moment by edgewise forces, axes turned by the pitch",
     "RootMyb": "blade-root moment by flapwise forces, axes turned by the pitch",
+    "RootMzc": "pitching moment at the blade root, about the pitch axis",
     "Spn1MLxb": "edgewise bending moment of the blade at a quarter of its span",
     "Spn1MLyb": "flapwise bending moment of the blade at a quarter of its span",
     "Spn2MLxb": "edgewise bending moment of the blade at half of its span",
@@ -72,6 +75,8 @@ MEANINGS = {
     "LSSTipMza": "bending moment of the shaft at the rotor centre about z, turning with the shaft",
     "LSShftFys": "force of the rotor on the shaft, sideways",
     "LSShftFzs": "force of the rotor on the shaft, upwards",
+    "LSShftFya": "force of the rotor on the shaft along y, turning with the shaft",
+    "LSShftFza": "force of the rotor on the shaft along z, turning with the shaft",
     "RootMxc": "blade-root moment in the rotor plane",
     "RootMyc": "blade-root moment out of the rotor plane",
     "LSSTipMys": "bending moment of the shaft at the hub about y, non-rotating",
@@ -83,6 +88,8 @@ MEANINGS = {
     "TTDspSS": "tower-top deflection, side to side",
     "YawBrTAxp": "tower-top acceleration along x of the rotated axes",
     "YawBrTAyp": "tower-top acceleration along y of the rotated axes",
+    "Q_DrTr": "twist of the shaft, azimuth of the rotor less that of the generator",
+    "QD_DrTr": "rate of the twist of the shaft",
 }
 
 
@@ -97,5 +104,5 @@ def channel_meaning(name):
     family, number = re.fullmatch(r"(.*?)(\d*)", name).groups()
     if family not in MEANINGS or not number:
         return ""
-    part = "blade" if family.startswith("Root") else "line"
+    part = "line" if family.endswith("TEN") else "blade"
     return f"{MEANINGS[family]}, {part} {number}"

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
+from fowt_env.plant.elastic.structure import RotorScratch
+
 # arrays kept between control periods: in episode.EpisodeData, its InterfaceData, and plant.model.Data
 # (stages: the first row has the wake rates while the cached loads are valid)
 CARRIED = {
@@ -13,8 +15,9 @@ CARRIED = {
     "link": ("measurement", "reading", "law_reading", "command", "past", "motion", "watch", "held"),
     "data": (
         "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples",
-        "radiation", "blades", "elastic",
+        "radiation", "blades", "elastic", "slow",
     ),
+    "rotor": RotorScratch._fields,  # of Data, if parts are elastic
 }  # fmt: skip
 
 
@@ -33,8 +36,9 @@ class Snapshot(NamedTuple):
 
 def carried(episode):
     """Return the arrays of EpisodeData in the order of CARRIED; None for arrays that the run lacks."""
-    parts = {"": episode, "link": episode.link, "data": episode.data}
-    return [getattr(parts[part], name) for part, names in CARRIED.items() for name in names]
+    data = episode.data
+    parts = {"": episode, "link": episode.link, "data": data, "rotor": data.rotor}
+    return [getattr(parts[part], name, None) for part, names in CARRIED.items() for name in names]
 
 
 def fill_carried(episode, arrays):

@@ -15,6 +15,7 @@ TIME = "Time_[s]"
 # OpenFAST's FileIDs. 3 is double precision, with start and step of the time; the others are packed (16 bits)
 WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH = 1, 2, 3, 4
 NAME_LENGTH = 10  # characters of a channel name and of a unit with brackets
+UNIT = re.compile(r"[(\[]([^()\[\]]*)[)\]]")  # in a line of units; MAP++ has square brackets
 EVEN = 1e-6  # largest deviation of a time from the even grid, as a fraction of its step
 
 
@@ -90,7 +91,7 @@ def read_out(path):
     head = next((i for i, line in enumerate(lines) if line.split()[:1] == ["Time"]), None)
     if head is None or len(lines) < head + 2:
         raise InputError(f".out file {str(path)!r}: no line begins with Time, as that of the channel names")
-    names, units = lines[head].split(), re.findall(r"\(([^()]*)\)", lines[head + 1])
+    names, units = lines[head].split(), UNIT.findall(lines[head + 1])
     if len(units) != len(names):
         raise InputError(
             f".out file {str(path)!r}: line {head + 2}: {len(units)} units of {len(names)} channels"

@@ -80,7 +80,8 @@ BENDING_CHANNELS = _channels(  # of bending blades; OoPDefl and IPDefl are TipDx
     " RootMyb1_[kN-m] RootMyb2_[kN-m] RootMyb3_[kN-m] Spn1MLxb1_[kN-m] Spn1MLxb2_[kN-m] Spn1MLxb3_[kN-m]"
     " Spn1MLyb1_[kN-m] Spn1MLyb2_[kN-m] Spn1MLyb3_[kN-m] Spn2MLxb1_[kN-m] Spn2MLxb2_[kN-m] Spn2MLxb3_[kN-m]"
     " Spn2MLyb1_[kN-m] Spn2MLyb2_[kN-m] Spn2MLyb3_[kN-m] LSSTipMya_[kN-m] LSSTipMza_[kN-m] LSShftFys_[kN]"
-    " LSShftFzs_[kN]"
+    " LSShftFzs_[kN] TipDxb1_[m] TipDxb2_[m] TipDxb3_[m] TipDyb1_[m] TipDyb2_[m] TipDyb3_[m] RootMzc1_[kN-m]"
+    " RootMzc2_[kN-m] RootMzc3_[kN-m] LSShftFya_[kN] LSShftFza_[kN]"
 )
 # of a flexible tower
 TOWER_CHANNELS = _channels("TTDspFA_[m] TTDspSS_[m] YawBrTAxp_[m/s^2] YawBrTAyp_[m/s^2]")

@@ -28,10 +28,10 @@ from fowt_env.plant.elastic.tower import (
     reduce_tower,
     turned_pose,
 )
-from fowt_env.plant.hydro.load import hydro_load, hydro_rates
-from fowt_env.plant.line_dynamics import lines_load
+from fowt_env.plant.hydro.load import hydro_rates
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate_at, gravity_load
+from fowt_env.plant.slow_loads import slow_loads
 from fowt_env.plant.state import State, Wrench, add, fill_sines, pose_by_sines
 from fowt_env.plant.user_loads import add_modal_user_loads, add_user_loads, evaluate_user_loads
 
@@ -56,9 +56,8 @@ def evaluate_loads(t, x, model, data, dx):
     elastic_force(x, model.tower, modal)
     reduce_tower(x, pose, model.tower, data.rotor)
     aero = aero_load(t, pose, nacelle, x, model.aero, model.pitches, model.tower, data, dx)
-    hydro = hydro_load(t, pose, x, model.hydro, data)
+    hydro, mooring = slow_loads(t, pose, x, model, model.blades, data)
     hydro_rates(x, model.hydro, dx)
-    mooring = lines_load(pose, x, model.mooring, data.lines, data.counters)
     evaluate_user_loads(t, pose, nacelle, bend, x, model.aero, model.hydro, model.user, data, dx)
 
     tower = add_user_loads(aero.tower, True, bend, model.user, data)

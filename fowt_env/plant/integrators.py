@@ -1,9 +1,10 @@
 """Defines the fixed-step integrators: a class, a step and a row of INTEGRATORS each.
 
-Within a step, blade pitch and generator torque are exact (constant command), so is the torsion of the shaft
-(elastic/shaft.py), the states of radiation memory are exact for velocities linear in time
-(hydro/radiation.py), moving mooring lines have steps of their own (line_dynamics.py), and the rotor load in a
-wind box is evaluated several times a step (rotor_substeps.py), so that none of these limits the step.
+Within a step, blade pitch and generator torque are exact (constant command), and so are the torsion of the
+shaft (elastic/shaft.py) and, with Adams methods, the bending of the tower (elastic/steps.py). The states of
+radiation memory are exact for velocities linear in time (hydro/radiation.py), moving mooring lines have steps
+of their own (line_dynamics.py), and the rotor load in a wind box is evaluated several times a step
+(rotor_substeps.py), so that none of these limits the step.
 """
 
 from typing import NamedTuple
@@ -15,13 +16,22 @@ from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
+from fowt_env.plant.elastic.oscillator import extrapolated, interpolated
 from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
-from fowt_env.plant.elastic.steps import correct_blades, correct_elastic, keep_blades, keep_elastic
+from fowt_env.plant.elastic.steps import (
+    begin_swing,
+    correct_blades,
+    keep_blades,
+    keep_swing,
+    swing_again,
+    swing_on,
+)
 from fowt_env.plant.elastic.tower import add_modal, bend_of, carried, turned_pose
 from fowt_env.plant.followers import begin_followers, end_followers, follow, integrated_states
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import attitude_rate
 from fowt_env.plant.rotor_substeps import build_substeps, follow_rotor, sample_rotor, shift_samples
+from fowt_env.plant.slow_loads import begin_slow, keep_slow
 from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
 
 START_STEPS = 3  # steps before four past derivatives exist
@@ -155,29 +165,6 @@ def moulton(order, new, i, history):
     return (9.0 * new + 19.0 * history[0, i] - 5.0 * history[1, i] + history[2, i]) / 24.0
 
 
-@inlined_kernel
-def _twist_on(x, u, dt, order, history, shaft, model, work, y):
-    """Advance the twist by the polynomial of order - 1 through past smooth torques (bashforth)."""
-    h0, h1 = smooth_of(shaft, history[0]), smooth_of(shaft, history[1])
-    h2, h3 = smooth_of(shaft, history[2]), smooth_of(shaft, history[3])
-    d1 = h0 - h1 if order > 1 else 0.0
-    d2 = h0 - 2.0 * h1 + h2 if order > 2 else 0.0
-    d3 = h0 - 3.0 * h1 + 3.0 * h2 - h3 if order > 3 else 0.0
-    c1, c2 = d1 + d2 / 2.0 + d3 / 3.0, 0.5 * (d2 + d3)
-    advance_twist(x, u, dt, h0, c1, c2, d3 / 6.0, shaft, model, work, y)
-
-
-@inlined_kernel
-def _twist_again(x, u, dt, order, new, history, shaft, model, work, y):
-    """Advance the twist by the polynomial through new and past smooth torques (moulton)."""
-    s, h0 = smooth_of(shaft, new), smooth_of(shaft, history[0])
-    h1, h2 = smooth_of(shaft, history[1]), smooth_of(shaft, history[2])
-    d2 = s - 2.0 * h0 + h1 if order > 1 else 0.0
-    d3 = s - 3.0 * h0 + 3.0 * h1 - h2 if order > 2 else 0.0
-    c1 = s - h0 - d2 / 2.0 - d3 / 6.0
-    advance_twist(x, u, dt, h0, c1, 0.5 * d2, d3 / 6.0, shaft, model, work, y)
-
-
 @kernel
 def feathering(x, model):
     """Return whether the blades of a free rotor are pitched above FEATHERING: its speed is heavily damped."""
@@ -200,35 +187,47 @@ def adams(t, x, u, dt, model, method, data):
     for k in range(START_STEPS, 0, -1):
         for i in range(n):
             history[k, i] = history[k - 1, i]
-    keep_elastic(x, model.tower, data.elastic)
-    keep_blades(x, model.blades, data.elastic)
+    body, tower, blades, shaft, work = model.rigid_body, model.tower, model.blades, model.shaft, data.rotor
+    matrix, still, extra = data.matrix, data.stages[2], data.stages[3]
+    keep_blades(x, blades, data.elastic)
+    if not method.corrector:
+        begin_slow(steps, blades, data)
     rates(t, x, u, model, data, history[0])
-    begin_twist(model.shaft, data.rotor, history[0])
+    keep_slow(steps, blades, data)
+    begin_twist(shaft, work, history[0])
+    begin_swing(steps, x, body, tower, blades, matrix, work, still)
+    keep_swing(x, tower, shaft, work, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     advance_actuators(x, u, dt, model, y)
-    _twist_on(x, u, dt, order, history, model.shaft, model, data.rotor, y)
+    c0, c1, c2, c3 = extrapolated(
+        order, smooth_of(shaft, history[0]), smooth_of(shaft, history[1]), smooth_of(shaft, history[2]),
+        smooth_of(shaft, history[3]),
+    )  # fmt: skip
+    advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
+    swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
-        keep_smooth(model.shaft, data.rotor, new)
+        keep_smooth(shaft, work, new)
+        keep_swing(y, tower, shaft, work, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         advance_actuators(x, u, dt, model, y)
-        _twist_again(x, u, dt, order, new, history, model.shaft, model, data.rotor, y)
+        c0, c1, c2, c3 = interpolated(
+            order, smooth_of(shaft, new), smooth_of(shaft, history[0]), smooth_of(shaft, history[1]),
+            smooth_of(shaft, history[2]),
+        )  # fmt: skip
+        advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
+        swing_again(dt, x, order, new, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     else:
         follow_rotor(dt, x, model, method.substeps, data, y)
-        correct_elastic(
-            dt, x, history, model.rigid_body, model.tower, model.blades, data.matrix, data.rotor,
-            data.elastic, data.stages[2], data.stages[3], y,
-        )  # fmt: skip
-        correct_blades(dt, x, history, data.elastic, model.blades, data.rotor, y)
+        correct_blades(dt, x, history, data.elastic, blades, work, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
-    bend_on(dt, x, order, history, model.tower, y)
-    bend_blades(dt, x, order, history, model.blades, y)
+    bend_blades(dt, x, order, history, blades, y)
     step_air(x, dt, model.aero, history[0], y)
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
@@ -236,16 +235,6 @@ def adams(t, x, u, dt, model, method, data):
         x[i] = y[i]
     end_followers(x, dt, model, data)
     cache[LoadCache.STEPS] = steps + 1.0
-
-
-@kernel
-def bend_on(dt, x, order, history, tower, y):
-    """Fill y with the deflections of the tower by Adams-Moulton, from their new velocities in y."""
-    if tower is None:
-        return
-    n = len(tower.beam.count)
-    for i in range(tower.first, tower.first + n):
-        y[i] = x[i] + dt * moulton(order, y[n + i], i, history)
 
 
 @kernel
@@ -321,20 +310,23 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]
-        shift_tower(after, before, model.tower, history[k])
+        shift_tower(after, before, model.tower, data.rotor, history[k])
         shift_blades(after, before, model.blades, history[k])
         shift_twist(after, before, model.shaft, history[k])
     shift_samples(was, torque, method.substeps, data)
 
 
 @kernel
-def shift_tower(after, before, tower, row):
-    """Add the difference of two derivatives to the rates of the deflection velocities in a row."""
+def shift_tower(after, before, tower, work, row):
+    """Add the difference of two derivatives to the rates of the deflection velocities, and to g, in a row."""
     if tower is None:
         return
-    n = len(tower.beam.count)
-    for i in range(tower.first + n, tower.first + 2 * n):
+    n, q = len(tower.beam.count), tower.first
+    for i in range(q + n, q + 2 * n):
         row[i] += after[i] - before[i]
+    for i in range(n):
+        for j in range(n):
+            row[q + i] += work.to_own[i, j] * (after[q + n + j] - before[q + n + j])
 
 
 @kernel
@@ -369,6 +361,7 @@ class Method(NamedTuple):
     part: tuple  # value of Model.integrator; its class selects the step
     step: object  # (t, x, u, dt, model, method, data): one step of x in place
     samples_rotor: bool = False  # whether the rotor load can be evaluated more than once a step
+    swings: bool = False  # whether the bending of the tower is advanced exactly
 
 
 # The limits are textbook values, except for an oscillation under ab4 (0.43 for Adams-Bashforth alone): the
@@ -384,11 +377,11 @@ INTEGRATORS = {
     ),
     "abm4": Method(
         order=4, evaluations=2, dt=0.1, decay_limit=1.285, oscillation_limit=0.0,
-        part=Adams(corrector=True), step=adams,
+        part=Adams(corrector=True), step=adams, swings=True,
     ),
     "ab4": Method(
         order=4, evaluations=1, dt=0.1, decay_limit=0.3, oscillation_limit=0.929,
-        part=Adams(corrector=False), step=adams, samples_rotor=True,
+        part=Adams(corrector=False), step=adams, samples_rotor=True, swings=True,
     ),
 }  # fmt: skip
 method_step = chosen_by_class("method", {type(m.part): m.step for m in INTEGRATORS.values()}, inlined=True)

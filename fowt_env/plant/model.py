@@ -74,16 +74,18 @@ class LoadCache(IntEnum):
     MODAL = 38  # elastic.tower.MOST_MODES entries: generalised forces on the tower deflections
     SINES = 42  # six entries, state.fill_sines
     FACTORED = 48  # 1 while Data.matrix holds the factors of the state's mass matrix
+    SLOW = 49  # 1 while the loads of water and lines are extrapolated, see slow_loads.py
 
 
-N_CACHE = 49
+N_CACHE = 50
 
 
 @by_reference
 class Data(NamedTuple):
     """Holds the variables and work arrays of one plant.
 
-    lines, counters, cache, matrix, history, elastic, samples, radiation and blades persist between calls.
+    lines, counters, cache, matrix, history, elastic, samples, radiation, slow and blades persist between
+    calls.
     """
 
     lines: np.ndarray  # (n_lines, 6) mooring warm start and results
@@ -100,11 +102,10 @@ class Data(NamedTuple):
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
-    # (4, n) structural forces on the tower deflections and deflections of the blades at past steps, latest
-    # first
-    elastic: np.ndarray
+    elastic: np.ndarray  # (4, n) deflections of the blades at past steps, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data; empty without radiation memory
+    slow: np.ndarray  # (4, slow_loads.N_SLOW) loads of water and lines at past steps, latest first
     # (blades, 6) BladeLoad of each blade, valid with the cache; empty with one pitch for all blades. With
     # bending blades the loads of the stations follow (blade_shape.put_station)
     blades: np.ndarray

@@ -67,6 +67,7 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         for i in range(integrated_states(x, model)):
             between[i] = x[i] + after * history[0, i] + bend * (history[0, i] - history[past, i])
         advance_actuators(x, u, after, model, between)
+        _bend_on(after, x, model.tower, between)
         now = wind_now(t + after, model.aero.wind)
         pose = nacelle_pose(pose_in(between, model.rigid_body.plane), between, model.tower)
         aero = rotor_part(
@@ -77,6 +78,16 @@ def sample_rotor(t, x, u, dt, model, substeps, data):
         row[0], row[1], row[2] = aero.wrench.fx, aero.wrench.fy, aero.wrench.fz
         row[3], row[4], row[5] = aero.wrench.mx, aero.wrench.my, aero.wrench.mz
         row[6] = aero.torque
+
+
+@kernel
+def _bend_on(after, x, tower, between):
+    """Fill `between` with the deflections of the tower a time `after` (s) from x; no-op for a rigid tower."""
+    if tower is None:
+        return
+    n = len(tower.beam.count)
+    for i in range(tower.first, tower.first + n):
+        between[i] = x[i] + 0.5 * after * (x[n + i] + between[n + i])
 
 
 @kernel
@@ -115,11 +126,11 @@ def _push_elastic(dt, x, load, torque, model, structure, data, y):
     tower, work, extra = model.tower, data.rotor, data.stages[3]
     extra[:] = 0.0
     bend, (first, n) = bend_of(x, tower), modes_in_state(tower)
-    b, modal = extra[State.VX : State.WZ + 1], extra[first : first + n]
-    add_modal(load, bend, tower, work, modal)
+    b = extra[State.VX : State.WZ + 1]
+    add_modal(load, bend, tower, work, extra[first : first + n])
     load = carried(load, bend)
     b[0], b[1], b[2], b[3], b[4], b[5] = load.fx, load.fy, load.fz, load.mx, load.my, load.mz
-    extra[State.ROTOR_SPEED] = answer(torque, bend, model.rigid_body, tower, data.matrix, work, b, modal)
+    answer(torque, bend, model.rigid_body, tower, model.blades, data.matrix, work, extra)
     for i in range(State.VX, y.shape[0]):
         y[i] += dt * extra[i]
 

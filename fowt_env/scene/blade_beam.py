@@ -32,6 +32,7 @@ MODES = {  # option blades: modes of each blade, from SHAPES
 
 
 LIFT_SLOPE = 2.0 * np.pi  # 1/rad
+YIELDING = 0.5 * BLADES  # blades whose reaction turns the rotor: between none and all
 DAMPED = 1.3  # factor on the damping at rated speed, for gusts and overspeed
 FINE = 20_001  # points of the sums over the span that divide a station's load
 SECTIONS = (0.25, 0.5)  # of the span, for internal loads
@@ -52,12 +53,22 @@ def build_blade_modes(turbine, option, first_state, aero):
         cone_cosine=float(np.cos(rotor.cone)),
         cone_sine=float(np.sin(rotor.cone)),
         hub_radius=float(rotor.hub_radius),
-        spring=np.ascontiguousarray(np.linalg.solve(beam.A + beam.B, beam.stiffness)),
+        spring=_spring(beam, rotor.inertia),
         decay=_decay(beam, aero, turbine.rated_rotor_speed),
         tip=_point(shapes_at(turbine, option, [rotor.tip_radius])),
         inner=section_at(turbine, option, SECTIONS[0], aero),
         outer=section_at(turbine, option, SECTIONS[1], aero),
     )
+
+
+def _spring(beam, inertia):
+    """Return the (n, n) accelerations (1/s2) per deflection by stiffness, of a hub that gives way by half.
+
+    A rotor of this inertia (kg m2) turns with the reaction of three blades in phase, and not at all out of
+    phase. With a hub at rest, motions in phase would be unstable at 0.05 s where the wind hardly damps them.
+    """
+    turning = YIELDING * np.outer(beam.f, beam.f) / inertia
+    return np.ascontiguousarray(np.linalg.solve(beam.A + beam.B - turning, beam.stiffness))
 
 
 def _decay(beam, aero, rotor_speed):

@@ -101,7 +101,7 @@ def build_scene(
     aero = None if air.series is None else build_aero(platform, turbine, air, rotor, options)
     first_state = N_RIGID + wake_states(aero) + airfoil_states(aero)
     next_state = first_state + sum(load.states for load in user)
-    tower = build_tower_modes(platform, modes_asked(options), next_state)
+    tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
     blades = build_blade_modes(turbine, options["blades"], next_state, aero)
     next_state += blade_states(blades)
@@ -109,7 +109,7 @@ def build_scene(
     next_state += 0 if shaft is None else 2
     body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
     structure = build_structure(platform, turbine, tower, blades, shaft)
-    dt = default_step(options, fastest_motion(tower, mooring, body, structure))
+    dt = default_step(options, fastest_motion(options, tower, mooring, body, structure))
     aero = with_airfoil_step(aero, dt)
     pitches = None
     if options["pitch"] == "individual":

@@ -30,6 +30,7 @@ from fowt_env.plant.hydro.morison import Current
 from fowt_env.plant.hydro.strip_quadrature import STILL_REFINEMENT, build_quadrature
 from fowt_env.plant.hydro.strips import build_strips
 from fowt_env.plant.hydro.wave_bands import build_band_diffraction, build_wave_bands, can_use_bands
+from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.line_dynamics import build_line_dynamics, line_frequency
 from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import BLADES, N_RIGID
@@ -349,6 +350,11 @@ def build_moorings(platform, options):
     return mooring._replace(dynamics=dynamics, friction=np.zeros_like(mooring.friction))
 
 
-def fastest_motion(tower, mooring, body, structure):
-    """Return the largest natural frequency (rad/s) of the structure: of its tower, or on moving lines."""
-    return max(tower_frequency(tower, body, structure), line_frequency(mooring, body.mass))
+def fastest_motion(options, tower, mooring, body, structure):
+    """Return the largest natural frequency (rad/s) that steps resolve: of the tower, or on moving lines."""
+    share = 1.0
+    if INTEGRATORS[options["integrator"]].swings:
+        # exact, but coupled by extrapolation to a shaft that twists: stable up to the limit itself, twice
+        # what a default step is allowed
+        share = 0.0 if options["shaft"] == "rigid" else 0.5
+    return max(share * tower_frequency(tower, body, structure), line_frequency(mooring, body.mass))

@@ -28,6 +28,7 @@ from fowt_env.plant.line_dynamics import line_states, line_work
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, N_MEASUREMENTS
 from fowt_env.plant.model import N_CACHE, Data
 from fowt_env.plant.rotor_substeps import N_SAMPLE
+from fowt_env.plant.slow_loads import N_SLOW
 from fowt_env.plant.state import (
     BLADES,
     N_BLADE_LOAD,
@@ -187,9 +188,10 @@ class Scene:
             cache=np.zeros(N_CACHE),
             user=np.zeros(user_data_size(len(self.loads), most)),
             history=np.zeros((4, self.n_state)),
-            elastic=np.zeros((4, bending + blade_states(self.model.blades) // 2)),
+            elastic=np.zeros((4, blade_states(self.model.blades) // 2)),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
+            slow=np.zeros((4, 0 if self.model.blades is None else N_SLOW)),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
             rotor=rotor_scratch(self.model.structure, self.model.tower, self.model.blades, self.n_state),
         )
@@ -250,7 +252,7 @@ class Scene:
         """Return the default physics step (s) of the integrator; finer for fidelity, tower or lines."""
         model = self.model
         parts = model.tower, model.mooring, model.rigid_body, model.structure
-        return default_step(self.options, fastest_motion(*parts))
+        return default_step(self.options, fastest_motion(self.options, *parts))
 
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).

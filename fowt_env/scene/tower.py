@@ -6,6 +6,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.aero.tower_drag import POINTS
 from fowt_env.plant.elastic.tower import TowerModes
 from fowt_env.scene.beam import BeamNodes, Shapes, integrated, shape_values, summed
+from fowt_env.scene.mass import top_mass_matrix
 
 MODES = {"rigid": 0, "modes": 1, "modes2": 2}  # option tower: modes in each direction
 
@@ -28,7 +29,7 @@ def mode_shapes(modes, count):
     return shapes / shapes.sum(axis=1, keepdims=True), np.tile([True, False], count)
 
 
-def build_tower_modes(platform, count, first_state):
+def build_tower_modes(platform, turbine, count, first_state):
     """Return TowerModes with `count` modes in each direction, states from first_state on; None for count 0.
 
     Raises: InputError if the platform file lacks the modes.
@@ -51,14 +52,17 @@ def build_tower_modes(platform, count, first_state):
     stiffness = _stiffness(bending, middle, curvature, fore_aft, cell, count)
     nodes, generalised = _nodes(tower, shapes, fore_aft, middle, cell)
     beam = integrated(nodes, stiffness, _damping(bending, stiffness, generalised, count))
+    slope = shape_values(shapes, [1.0], 1)[0] / height
+    shortening = np.ascontiguousarray(nodes.shapes.S[:, :, -1])
     drag_points = 0.5 * (np.polynomial.legendre.leggauss(POINTS)[0] + 1.0)  # points of build_tower_drag
     return TowerModes(
         first=int(first_state),
         top_height=float(tower.top_height),
-        slope=shape_values(shapes, [1.0], 1)[0] / height,
-        shortening=np.ascontiguousarray(nodes.shapes.S[:, :, -1]),
+        slope=slope,
+        shortening=shortening,
         beam=beam._replace(mass=0.0, first=0.0, second=0.0),
         drag_shape=np.ascontiguousarray(shape_values(shapes, drag_points)),
+        **stiffness_roots(stiffness - _softening(platform, turbine, beam, slope, shortening)),
     )
 
 
@@ -78,6 +82,20 @@ def _nodes(tower, shapes, fore_aft, middle, cell):
     z = tower.base_height + height * at
     nodes = BeamNodes(z, z + 0.5 * length, length, np.append(mass, bending.top_mass), Shapes(U, turned, S))
     return nodes, np.einsum("k,ik,jk->ij", mass, values[:, :-1], values[:, :-1])
+
+
+def _softening(platform, turbine, beam, slope, shortening):
+    """Return the (n, n) stiffness, N/m, that the weight takes from an upright tower."""
+    top, along = top_mass_matrix(platform, turbine), np.arange(len(slope)) % 2
+    arm = top[0, 4] / top[0, 0] - platform.tower.top_height  # of nacelle and rotor above the tower top
+    tilting = arm * np.outer(slope, slope) * np.equal.outer(along, along)
+    return platform.environment.gravity * (beam.S0 + top[0, 0] * (shortening + tilting))
+
+
+def stiffness_roots(stiffness):
+    """Return root and flexible_root of TowerModes for an (n, n) stiffness, that of the weight included."""
+    root = np.linalg.cholesky(stiffness)
+    return {"root": root, "flexible_root": np.ascontiguousarray(np.linalg.inv(root.T))}
 
 
 def tower_states(modes):

@@ -19,6 +19,7 @@ from fowt_env.visual.rendering import (
     MOTIONS,
     RGB_COLOURS,
     TIGHT,
+    TIPS,
     TRACES,
     WINDOW,
     YELLOW,
@@ -99,7 +100,8 @@ class _Track:
         missing = [name for name in channels if name not in columns]
         if missing or len(frame) < 2:
             raise InputError(f"run {label!r}: needs at least two rows and the channels {', '.join(channels)}")
-        self.values = {name: frame[columns[name]].to_numpy(dtype=float) for name in channels}
+        tips = [name for name in columns if name.startswith(TIPS)]
+        self.values = {name: frame[columns[name]].to_numpy(dtype=float) for name in (*channels, *tips)}
         self.values["Azimuth"] = np.unwrap(self.values["Azimuth"], period=360.0)
         self.time = self.values["Time"]
 

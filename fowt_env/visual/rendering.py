@@ -33,6 +33,7 @@ LEAST_BLADE = 0.0055, 0.0022  # of the picture's height: smallest half width of 
 FIRST_WINDOWS = (15.0, 30.0, WINDOW)  # s shown at the start of a run
 ANGLES = ("PtfmRoll", "PtfmPitch", "PtfmYaw")
 ACTION_NAMES = {2: ("torque", "blade pitch"), 4: ("torque", "blade 1", "blade 2", "blade 3")}
+TIPS = ("OoPDefl", "IPDefl")  # of each blade that bends, m
 MOTIONS = ("PtfmSurge", "PtfmSway", "PtfmHeave", *ANGLES)
 
 INK, SOFT, FAINT, CARD, PAGE = (30, 38, 50), (110, 120, 134), (224, 229, 235), (255,) * 3, (240, 243, 247)
@@ -369,24 +370,30 @@ class TurbinePanel(_SideView):
         turn, pitch = radians(row["Azimuth"]), radians(row["BldPitch1"])
         least = self.inner[1] * np.array(LEAST_BLADE)
         for number in range(rotor.blades):
-            blade = hub + self._blade(turn + 2.0 * pi * number / rotor.blades, pitch)
+            tip = [row.get(f"{name}{number + 1}", 0.0) for name in TIPS]
+            blade = hub + self._blade(turn + 2.0 * pi * number / rotor.blades, pitch, tip)
             outline = self._thick(self.pixels(pose.inertial(blade)), least)
             pygame.draw.polygon(canvas, (250, 251, 252), outline)
             pygame.draw.lines(canvas, (70, 84, 102), True, outline, SAMPLING - 1)
         centre = self.pixels(pose.inertial(hub))[0]
         pygame.draw.circle(canvas, (200, 206, 214), centre, max(3.0, 0.035 * radius * self.scale))
 
-    def _blade(self, azimuth, pitch):
-        """Return the outline (n, 3) of a blade about the hub in body axes."""
-        blade = self.scene.turbine.blade
+    def _blade(self, azimuth, pitch, tip):
+        """Return the outline (n, 3) of a blade about the hub in body axes.
+
+        tip: displacement (m) downwind and against the rotation, to which the blade bends as a parabola.
+        """
+        blade, rotor = self.scene.turbine.blade, self.scene.turbine.rotor
         e_r = np.array([0.0, -sin(azimuth), cos(azimuth)])
         e_t = np.array([0.0, -cos(azimuth), -sin(azimuth)])  # direction of rotation
         angle = pitch + blade.twist
         chord = np.outer(np.cos(angle), e_t) - np.outer(np.sin(angle), [1.0, 0.0, 0.0])  # to the leading edge
-        axis = np.outer(blade.radius, e_r)
+        radius = np.append(blade.radius, rotor.tip_radius)
+        bent = np.clip((radius - rotor.hub_radius) / (rotor.tip_radius - rotor.hub_radius), 0.0, None) ** 2
+        axis = np.outer(radius, e_r) + np.outer(bent, [tip[0], 0.0, 0.0] - tip[1] * e_t)
+        axis, end = axis[:-1], axis[-1]
         width = blade.chord[:, None] * chord
-        tip = self.scene.turbine.rotor.tip_radius * e_r
-        return np.vstack([axis + 0.3 * width, tip, (axis - 0.7 * width)[::-1]])
+        return np.vstack([axis + 0.3 * width, end, (axis - 0.7 * width)[::-1]])
 
     @staticmethod
     def _thick(outline, least):

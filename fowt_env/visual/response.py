@@ -41,6 +41,9 @@ SCHEDULE = (
     ("thrust (kN)", "RotThrust_[kN]"),
     ("generator torque (kN m)", "GenTq_[kN-m]"),
     ("platform pitch (deg)", "PtfmPitch_[deg]"),
+    ("tip deflection (m)", "OoPDefl1_[m]"),  # of bending blades, here and below
+    ("root flap moment (kN m)", "RootMyb1_[kN-m]"),
+    ("root edge moment (kN m)", "RootMxb1_[kN-m]"),
 )
 MOTION_CHANNELS = (
     ("surge (m/m)", "PtfmSurge_[m]"),

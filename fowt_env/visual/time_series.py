@@ -36,6 +36,9 @@ PANELS = (
     ("platform pitch\n(deg)", "PtfmPitch_[deg]"),
     ("surge\n(m)", "PtfmSurge_[m]"),
     ("fairlead\ntension (kN)", "FAIRTEN1_[kN]"),
+    ("tip deflection\n(m)", "OoPDefl1_[m]"),  # of bending blades, here and below
+    ("root flap\nmoment (kN m)", "RootMyb1_[kN-m]"),
+    ("root edge\nmoment (kN m)", "RootMxb1_[kN-m]"),
 )
 MARKED = {  # channel: horizontal lines (text, rating) in the panel
     "RotSpeed_[rpm]": (("rated", RATED_SPEED), ("trip", OVERSPEED)),
@@ -48,6 +51,8 @@ SPECTRA = (
     ("platform pitch", "PtfmPitch_[deg]", "deg"),
     ("rotor speed", "RotSpeed_[rpm]", "rpm"),
     ("tower-base moment", "TwrBsMyt_[kN-m]", "(kN m)"),
+    ("blade-root flap moment", "RootMyb1_[kN-m]", "(kN m)"),
+    ("blade-root edge moment", "RootMxb1_[kN-m]", "(kN m)"),
 )
 
 

@@ -47,6 +47,16 @@ def test_metacentric_height_is_that_of_the_waterplane(oc3, platform):
     assert still.metacentric_height == pytest.approx([wanted, wanted], rel=1e-5)
 
 
+def test_frequencies_of_blades_and_shaft_are_told_at_rest_and_at_rated_speed(oc3, turbine):
+    flap, torsion = oc3.rotor["first flapwise, collective"], oc3.rotor["drivetrain torsion"]
+    assert flap.standstill == pytest.approx(0.7, abs=0.02)  # NREL/TP-500-38060, Table 9-1: 0.6993 Hz
+    assert flap.rated > 1.05 * flap.standstill  # stiffened by the rotation
+    ends = oc3.rotor["first edgewise, progressive"].rated - oc3.rotor["first edgewise, regressive"].rated
+    assert ends == pytest.approx(turbine.rated_rotor_speed / pi, rel=0.03)
+    assert torsion.rated > 3.0 and not any("tower" in mode for mode in oc3.rotor)
+    assert check_platform("oc3_hywind", blades="modes", shaft="torsion").periods == oc3.periods
+
+
 def test_periods_are_those_of_the_linear_model(oc3):
     known = natural_periods(fowt_env.build_scene("oc3_hywind", fidelity="reference"))
     for motion, period in known.items():  # the linear model's rotor is free to turn, which roll feels

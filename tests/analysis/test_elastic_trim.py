@@ -5,6 +5,8 @@ import pytest
 
 import fowt_env
 from fowt_env.analysis.blade_coordinates import bending_states, coordinates, placed, turned_to
+from fowt_env.analysis.equilibrium import causes_of, evaluated
+from fowt_env.analysis.statics import Evaluation
 from fowt_env.analysis.trim import AZIMUTHS, trim, trim_prescribed, without_fluctuations
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
@@ -117,6 +119,9 @@ def test_tips_and_roots_in_steady_wind_are_openfasts(elastic_scene, case):
     point = trim_prescribed(scene, speed, pitch, "fixed")
     assert point["OoPDefl1"] == pytest.approx(known["mean"]["OoPDefl1_[m]"], rel=0.01)
     assert point["IPDefl1"] == pytest.approx(known["mean"]["IPDefl1_[m]"], rel=0.01)
+    assert point["TipDxb1"] == pytest.approx(known["mean"]["TipDxb1_[m]"], rel=0.01)
+    assert point["TipDyb1"] == pytest.approx(known["mean"]["TipDyb1_[m]"], rel=0.01)
+    assert point["RootMzc1"] == pytest.approx(known["mean"]["RootMzc1_[kN-m]"], rel=0.01)
     assert point["RootMyc1"] == pytest.approx(known["mean"]["RootMyc1_[kN-m]"], rel=0.01)
     assert point["RootMxc1"] == pytest.approx(known["mean"]["RootMxc1_[kN-m]"], rel=0.01)
     names = [channel.name for channel in scene.channels]
@@ -141,6 +146,13 @@ def test_a_parked_rotor_hangs_in_static_equilibrium(elastic_scene):
         modes = len(blades) // 2
         assert np.all(x[blades[modes:]] == 0.0)
         assert np.abs(dx[blades[modes:]]).max() < 1e-8
+
+
+def test_weight_and_buoyancy_balance_with_the_weight_of_nacelle_and_rotor(elastic_scene):
+    evaluation = Evaluation(elastic_scene.with_weather(0.0, None))
+    rest = np.zeros(elastic_scene.n_state)
+    evaluation.at(rest, LoadCache.TOTAL)
+    assert causes_of(elastic_scene, evaluated(rest, evaluation.data)) == {}
 
 
 def test_initial_tip_displacements_are_those_asked_for(elastic_scene):

@@ -98,9 +98,7 @@ def test_a_wrong_value_is_named_with_what_is_allowed(tmp_path, old, new, words):
 def test_the_mass_of_the_blades_is_needed(tmp_path):
     path = written(tmp_path)
     path.write_text(re.sub(r"(?m)^blade_(mass|first|second).*$", "", path.read_text()))
-    with pytest.raises(
-        InputError, match=r"rotor.blade_mass: is missing; \[blade_structure\] needs"
-    ):
+    with pytest.raises(InputError, match=r"rotor.blade_mass: is missing; \[blade_structure\] needs"):
         read_turbine(path)
 
 

@@ -15,6 +15,7 @@ from fowt_env.registration import OTHER_PLATFORMS
 
 pytestmark = pytest.mark.installation
 
+
 @pytest.mark.parametrize(
     ("imports", "loaded"),
     [

@@ -8,7 +8,7 @@ import fowt_env
 from fowt_env.descriptions.wind import wind_of
 from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
-from fowt_env.files.openfast import read_outb, write_outb
+from fowt_env.files.openfast import read_out, read_outb, write_outb
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.training.evaluation.metrics import damage_equivalent_load
@@ -250,6 +250,14 @@ def test_a_packed_file_without_scale_is_refused(run, tmp_path, change):
     path.write_bytes(broken)
     with pytest.raises(InputError, match="no slope zero"):
         read_outb(path)
+
+
+def test_units_in_square_brackets_are_read_as_map_writes_them(tmp_path):
+    path = tmp_path / "model.out"
+    path.write_text("head\n\nTime\tRotSpeed\tT[1]\n(s)\t(rpm)\t[N]\n0.0\t12.1\t9.0E5\n0.1\t12.2\t9.1E5\n")
+    frame = read_out(path)
+    assert list(frame.columns) == ["Time_[s]", "RotSpeed_[rpm]", "T[1]_[N]"]
+    assert frame["T[1]_[N]"].tolist() == [9e5, 9.1e5]
 
 
 @pytest.mark.parametrize("path", ["none.outb", ".", "a" * 300, "a\0b"])

@@ -14,10 +14,10 @@ from fowt_env.errors import InputError
 from fowt_env.plant import blade_outputs
 from fowt_env.plant.advance import observe, output, output_row
 from fowt_env.plant.channels import BLADE_CHANNELS
+from fowt_env.plant.elastic.tower import Twist
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import N_RIGID, State, Wrench, pose_of
-from fowt_env.plant.tower.rates import Twist
 from fowt_env.scene.mass import build_layout, build_rigid_body
 
 GRAVITY = 9.80665

@@ -144,6 +144,16 @@ def test_lines_without_properties_are_refused():
         build_scene("liu_1_50", mooring="dynamic")
 
 
+def test_substeps_resolve_the_swing_of_a_line_by_the_tension_of_its_last_segment():
+    mooring = volturnus()
+    dynamics, x = mooring.dynamics, state_of(mooring)
+    last = N_RIGID + np.array([18, 37, 56])
+    for swing, count in ((3.9, 2), (7.9, 4), (8.1, 5)):  # rad/s, of a mass between two such segments
+        tension = 0.25 * swing**2 * dynamics.mass[0] * dynamics.length[0]
+        x[last] = FAIRLEAD - [0.0, 0.0, dynamics.length[0] + tension / dynamics.stiffness[0]]
+        assert lines._substeps(0, 0.1, tuple(FAIRLEAD), x, dynamics) == count
+
+
 def test_stiff_lines_shorten_the_step_of_a_light_platform():
     """The barge's eight lines hold 5450 t: 7.6 rad/s on their last segments."""
     barge = build_scene("nrel5mw_iti_barge", mooring="dynamic")

@@ -11,8 +11,9 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.tower_modes import TowerBending
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
+from fowt_env.scene.beam import shape_values
 from fowt_env.scene.mass import build_rigid_body, top_mass_matrix
-from fowt_env.scene.tower import build_tower_modes, modes_asked, shape_values
+from fowt_env.scene.tower import build_tower_modes, modes_asked
 
 LINE, EI, BASE, TOP, BEARING = 1000.0, 1e10, 10.0, 60.0, 5000.0
 UNIFORM = TowerBending(
@@ -35,7 +36,7 @@ def uniform():
     """(TowerModes of a uniform tower with two modes each way, mass of nacelle and rotor)."""
     platform = with_modes(read_platform("oc3_hywind"), UNIFORM, base_height=BASE, top_height=TOP)
     turbine = read_turbine("nrel5mw")
-    return build_tower_modes(platform, 2, 15), turbine.nacelle.mass + turbine.rotor.mass
+    return build_tower_modes(platform, turbine, 2, 15), turbine.nacelle.mass + turbine.rotor.mass
 
 
 def test_a_uniform_tower_has_the_integrals_of_its_powers(uniform):
@@ -86,7 +87,7 @@ def test_structural_damping_is_of_the_bare_tower(uniform):
 def test_shapes_at_the_points_of_the_tower_drag_are_those_at_their_heights(uniform):
     scene = build_scene("oc3_hywind", wind=0.0, rotor="table", fidelity="reference")
     tower = scene.platform.tower
-    found = build_tower_modes(scene.platform, 1, 15)
+    found = build_tower_modes(scene.platform, scene.turbine, 1, 15)
     fraction = (scene.model.aero.tower.z - tower.base_height) / (tower.top_height - tower.base_height)
     shape = np.array(tower.modes.fore_aft[0])
     wanted = sum(a * fraction ** (k + 2) for k, a in enumerate(shape)) / shape.sum()
@@ -178,13 +179,13 @@ def test_an_option_that_cannot_be_is_refused(options, words):
 
 def test_a_tower_without_the_modes_asked_for_is_refused():
     platform = read_platform("oc3_hywind")
-    modes = platform.tower.modes
+    turbine, modes = read_turbine(platform.turbine), platform.tower.modes
     first = modes.model_copy(update={name: getattr(modes, name)[:1] for name in ("fore_aft", "side_side")})
     for changed, count, words in (
         (None, 1, ("'modes'", "no [tower.modes]", "allowed: 'rigid'")),
         (first, 2, ("'modes2'", "first modes alone", "allowed: 'rigid', 'modes'")),
     ):
         with pytest.raises(InputError) as caught:
-            build_tower_modes(with_modes(platform, changed), count, 15)
+            build_tower_modes(with_modes(platform, changed), turbine, count, 15)
         assert all(word in str(caught.value) for word in words)
-    assert build_tower_modes(with_modes(platform, None), 0, 15) is None
+    assert build_tower_modes(with_modes(platform, None), turbine, 0, 15) is None

@@ -82,9 +82,10 @@ def test_the_drawn_sea_is_the_sum_of_the_scene_s_components(scene):
 def test_the_first_blade_points_up_at_azimuth_zero_and_feathers_with_blade_pitch(scene):
     panel = TurbinePanel(rendering.load_pygame(), scene, (300, 300))
     radius, overhang = scene.turbine.rotor.tip_radius, len(scene.turbine.blade.radius)
-    assert panel._blade(0.0, 0.0)[overhang] == pytest.approx([0.0, 0.0, radius])
-    assert panel._blade(0.5 * pi, 0.0)[overhang] == pytest.approx([0.0, -radius, 0.0], abs=1e-9)
-    flat, feathered = (np.ptp(panel._blade(0.0, angle)[:, 0]) for angle in (0.0, 0.5 * pi))
+    rest = 0.0, 0.0
+    assert panel._blade(0.0, 0.0, rest)[overhang] == pytest.approx([0.0, 0.0, radius])
+    assert panel._blade(0.5 * pi, 0.0, rest)[overhang] == pytest.approx([0.0, -radius, 0.0], abs=1e-9)
+    flat, feathered = (np.ptp(panel._blade(0.0, angle, rest)[:, 0]) for angle in (0.0, 0.5 * pi))
     assert feathered > 3.0 * flat
 
 
@@ -386,6 +387,15 @@ def test_a_hull_without_a_shape_is_a_box_of_its_draft():
     for x, inside in ((0.9 * half, True), (1.15 * half, False)):
         red, green, blue = pixel(view, (x, 0.0, 0.25 * potential.draft))
         assert (red > 2 * blue) == inside
+
+
+def test_a_blade_bends_downwind_and_against_the_rotation_to_its_tip_and_not_at_the_root(scene):
+    panel = TurbinePanel(rendering.load_pygame(), scene, (300, 300))
+    straight, bent = panel._blade(0.0, 0.0, (0.0, 0.0)), panel._blade(0.0, 0.0, (4.0, 1.0))
+    stations = len(scene.turbine.blade.radius)
+    moved = bent - straight  # with blade 1 up the rotation is towards negative y
+    assert moved[stations] == pytest.approx([4.0, 1.0, 0.0])
+    assert 0.7 < moved[stations // 2, 0] < 1.6 and abs(moved[0]).max() < 0.02
 
 
 def test_the_agent_s_bars_show_its_action_and_the_reward_changes_the_picture():

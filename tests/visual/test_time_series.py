@@ -28,6 +28,9 @@ def run(shift=0.0, n=6001):
             "PtfmPitch_[deg]": 2.0 + np.sin(2.0 * np.pi * t / 30.0 + shift),
             "PtfmSurge_[m]": 12.0 + np.sin(0.05 * t + shift),
             "FAIRTEN1_[kN]": 900.0 + 10.0 * np.sin(0.05 * t),
+            "OoPDefl1_[m]": 3.0 + np.sin(1.26 * t + shift),
+            "RootMyb1_[kN-m]": 6000.0 + 900.0 * np.sin(1.26 * t + shift),
+            "RootMxb1_[kN-m]": 600.0 + 3500.0 * np.cos(1.26 * t + shift),
         }
     )
 

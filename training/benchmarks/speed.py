@@ -120,6 +120,12 @@ TIMED_SCENES = {
     "BEM rotor, fast waves": TimedScene(options={"rotor": "bem"}),
     "bending tower": TimedScene(options={"tower": "modes"}),
     "bending tower, second modes": TimedScene(options={"tower": "modes2"}),
+    "bending blades, tower and shaft": TimedScene(
+        options={"blades": "modes", "tower": "modes", "shaft": "torsion"}
+    ),
+    "bending blades, tower and shaft, second modes": TimedScene(
+        options={"blades": "modes2", "tower": "modes2", "shaft": "torsion"}
+    ),
     "a pitch for each blade": TimedScene(options={"pitch": "individual"}),
     "still water, wind": TimedScene(sea=None, absent="waves"),
     "no wind, waves": TimedScene(None, absent="wind, rotor, tower drag"),

@@ -13,6 +13,8 @@ from fowt_env.training.cli.console import EXIT_STOPPED, command, out
 from fowt_env.training.cli.options import OptionOption
 from fowt_env.training.cli.tables import print_table
 
+SPEEDS = ("at rest", "at rated speed")  # of a check.RotorFrequency
+
 
 @command()
 def check(
@@ -74,6 +76,8 @@ def _rows(result):
     rows += [(f"natural period, {motion}", period, "s") for motion, period in (result.periods or {}).items()]
     for mode, values in result.tower.items():
         rows += [(f"tower, {mode}, {base}", value, "Hz") for base, value in values._asdict().items()]
+    for mode, values in result.rotor.items():
+        rows += [(f"{mode}, {speed}", value, "Hz") for speed, value in zip(SPEEDS, values, strict=True)]
     return [row for row in rows if not np.isnan(row[1])]
 
 
@@ -84,6 +88,7 @@ def _plain(result):
     still = {name: np.asarray(value).tolist() for name, value in result.statics._asdict().items()}
     tower = {mode: values._asdict() for mode, values in result.tower.items()}
     rest = {"rest": result.rest, "natural_periods": result.periods, "tower_frequencies": tower}
+    rest["rotor_frequencies"] = {mode: values._asdict() for mode, values in result.rotor.items()}
     return finite(
         {"platform": result.label, "draft": result.draft, **still, **rest, "faults": list(result.faults)}
     )

@@ -231,11 +231,11 @@ def leaderboard(table, baseline=None, score=None, cases=None, limits=None):
     with rank (None without a score), controller, runs, lost, failed, tripped, lost_power, metrics {metric:
     mean, low, high, seed_low, seed_high, worst}, difference {metric: mean, low, high, percent, pairs, p},
     beyond and undecided (a text per limit that is exceeded, or not decided by its interval: limits.py), held
-    (whether every limit is held; None without limits), limits (a mapping per limit and case, with its state),
-    score (mean, low, high of the ranked score, valid, why, lifetime and winds {mean, low, high}; or None),
-    cases {case: runs, ..., metrics, difference}. seed_low and seed_high: range of the lifetime mean over the
-    seeds; worst: maximum over all runs; percent: mean difference relative to the baseline's mean of the same
-    runs; p: its two-sided p-value (not per case, nor with lost runs).
+    (whether every limit is held; None without limits), limits (a mapping per limit and case, with its
+    state), score (mean, low, high of the ranked score, valid, why, lifetime and winds {mean, low, high}; or
+    None), cases {case: runs, ..., metrics, difference}. seed_low and seed_high: range of the lifetime mean
+    over the seeds; worst: maximum over all runs; percent: mean difference relative to the baseline's mean of
+    the same runs; p: its two-sided p-value (not per case, nor with lost runs).
     The list is sorted by rank: controllers that exceed no limit, then those that do, then those with lost
     runs; within each group by score, else as in the table.
     Raises: InputError for a baseline that was not evaluated.

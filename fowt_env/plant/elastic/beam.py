@@ -48,21 +48,25 @@ def reduce_beam(q, v, wx, wy, wz, beam, c, J, X, M, bias, h):
     """
     n = len(beam.count)
     cx = cy = px = py = pz = oz = gxx = gxy = gyy = gxz = gyz = 0.0
-    hxx = hxy = hxz = hyx = hyy = hyz = hzx = hzy = hzz = 0.0
+    gx = gy = hxx = hxy = hxz = hyx = hyy = hyz = hzx = hzy = hzz = 0.0
     cz, gzz = beam.first, beam.second
     for i in range(n):
         pqq = qqq = tqq = s0q = s1q = xu1 = xu2 = yu1 = yu2 = xw = yw = 0.0
         wp = wq = pv = qv = tvv = v12 = v21 = s0v = 0.0
         for j in range(n):
-            pij = qij = tij = pji = qji = tijv = 0.0
+            pij = qij = tij = pji = qji = tjv = pjv = qjv = 0.0
             for k in range(n):
                 pij += beam.P[i, j, k] * q[k]  # U1_i w_j, where w = S q
                 qij += beam.Q[i, j, k] * q[k]
                 pji += beam.P[j, i, k] * q[k]
                 qji += beam.Q[j, i, k] * q[k]
+                pjv += beam.P[i, j, k] * v[k]
+                qjv += beam.Q[i, j, k] * v[k]
+                tjk = 0.0
                 for m in range(n):
-                    tij += beam.T[i, k, j, m] * q[k] * q[m]  # w_i w_j
-                    tijv += beam.T[i, j, k, m] * v[k] * v[m]
+                    tjk += beam.T[i, m, j, k] * q[m]  # w_i S_jk
+                tij += tjk * q[k]  # w_i w_j
+                tjv += tjk * v[k]
             M[i, j] = beam.A[i, j] + beam.B[i, j] + tij
             pqq += pij * q[j]
             qqq += qij * q[j]
@@ -73,7 +77,9 @@ def reduce_beam(q, v, wx, wy, wz, beam, c, J, X, M, bias, h):
             qv += qji * v[j]
             wp += pij * v[j]
             wq += qij * v[j]
-            tvv += tijv * q[j]
+            tvv += tjv * v[j]
+            gx += q[i] * pjv * v[j]
+            gy += q[i] * qjv * v[j]
             s0q += beam.S0[i, j] * q[j]
             s1q += beam.S1[i, j] * q[j]
             s0v += beam.S0[i, j] * v[j]
@@ -123,12 +129,7 @@ def reduce_beam(q, v, wx, wy, wz, beam, c, J, X, M, bias, h):
     kx = J[0] * wx + J[3] * wy + J[4] * wz
     ky = J[3] * wx + J[1] * wy + J[5] * wz
     kz = J[4] * wx + J[5] * wy + J[2] * wz
-    trace, gx, gy = hxx + hyy + hzz, 0.0, 0.0
-    for i in range(n):
-        for j in range(n):
-            for k in range(n):
-                gx += beam.P[i, j, k] * q[i] * v[j] * v[k]
-                gy += beam.Q[i, j, k] * q[i] * v[j] * v[k]
+    trace = hxx + hyy + hzz
     bias[3] = wy * kz - wz * ky + 2.0 * (trace * wx - hxx * wx - hxy * wy - hxz * wz) - gy
     bias[4] = wz * kx - wx * kz + 2.0 * (trace * wy - hyx * wx - hyy * wy - hyz * wz) + gx
     bias[5] = wx * ky - wy * kx + 2.0 * (trace * wz - hzx * wx - hzy * wy - hzz * wz)

@@ -49,7 +49,7 @@ class BladeModes(NamedTuple):
     cone_cosine: float
     cone_sine: float  # positive: blades lean upwind
     hub_radius: float  # m, from the rotor centre to a blade root along the pitch axis
-    # accelerations of the modes on a hub at rest, less their signs, see steps.py
+    # accelerations of the modes, less their signs, see steps.py
     spring: np.ndarray  # (n, n) 1/s2, over the deflections, by stiffness
     decay: np.ndarray  # (n, n) 1/s, over their velocities, by structural damping and the wind at rated speed
     tip: Point
@@ -114,7 +114,8 @@ def reduce_blade(number, x, wx, wy, wz, blades, work):
         E[0, 0] * wx + E[1, 0] * wy + E[2, 0] * wz,
         E[0, 1] * wx + E[1, 1] * wy + E[2, 1] * wz,
         E[0, 2] * wx + E[1, 2] * wy + E[2, 2] * wz,
-        beam, work.moment, work.block, work.coupling[number], work.mass, work.pull, work.rest[number],
+        beam, work.moment[number], work.block[number], work.own[number], work.mass, work.pull[number],
+        work.rest[number],
     )  # fmt: skip
 
 
@@ -126,18 +127,19 @@ def _add_blade(number, x, ax, ay, az, bx, by, bz, wx, wy, wz, blades, work):
     """
     reduce_blade(number, x, wx, wy, wz, blades, work)
     m, n = blades.beam.mass, len(blades.beam.count)
-    E, X, h, M = work.axes[number], work.coupling[number], work.rest[number], work.mass
+    E, h, M = work.axes[number], work.rest[number], work.mass
+    own, X = work.own[number], work.coupling[number]
     inertia, bias, force, factors = work.inertia, work.bias, work.force[number], work.factors[number]
     e11, e12, e13, e21, e22, e23, e31, e32, e33 = (
         E[0, 0], E[0, 1], E[0, 2], E[1, 0], E[1, 1], E[1, 2], E[2, 0], E[2, 1], E[2, 2],
     )  # fmt: skip
-    c1, c2, c3 = work.moment[0], work.moment[1], work.moment[2]
+    c1, c2, c3 = work.moment[number, 0], work.moment[number, 1], work.moment[number, 2]
     cx, cy, cz = (
         e11 * c1 + e12 * c2 + e13 * c3,
         e21 * c1 + e22 * c2 + e23 * c3,
         e31 * c1 + e32 * c2 + e33 * c3,
     )
-    J = work.block
+    J = work.block[number]
     xx, yy, zz, xy, xz, yz = J[0], J[1], J[2], J[3], J[4], J[5]
     t11, t12, t13 = (
         e11 * xx + e12 * xy + e13 * xz,
@@ -157,7 +159,7 @@ def _add_blade(number, x, ax, ay, az, bx, by, bz, wx, wy, wz, blades, work):
     jxx, jyx = t11 * e11 + t12 * e12 + t13 * e13, t21 * e11 + t22 * e12 + t23 * e13
     jyy, jzx = t21 * e21 + t22 * e22 + t23 * e23, t31 * e11 + t32 * e12 + t33 * e13
     jzy, jzz = t31 * e21 + t32 * e22 + t33 * e23, t31 * e31 + t32 * e32 + t33 * e33
-    p = work.pull
+    p = work.pull[number]
     f1, f2, f3, m1, m2, m3 = p[0], p[1], p[2], p[3], p[4], p[5]
     bias[0] += e11 * f1 + e12 * f2 + e13 * f3 + m * ax + by * cz - bz * cy
     bias[1] += e21 * f1 + e22 * f2 + e23 * f3 + m * ay + bz * cx - bx * cz
@@ -181,7 +183,7 @@ def _add_blade(number, x, ax, ay, az, bx, by, bz, wx, wy, wz, blades, work):
     inertia[5, 4] += jzy
     inertia[5, 5] += jzz
     for i in range(n):
-        l1, l2, l3, k1, k2, k3 = X[i, 0], X[i, 1], X[i, 2], X[i, 3], X[i, 4], X[i, 5]
+        l1, l2, l3, k1, k2, k3 = own[i, 0], own[i, 1], own[i, 2], own[i, 3], own[i, 4], own[i, 5]
         x0, x1, x2 = (
             e11 * l1 + e12 * l2 + e13 * l3,
             e21 * l1 + e22 * l2 + e23 * l3,

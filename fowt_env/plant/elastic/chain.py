@@ -415,18 +415,24 @@ def _solve(top, centre, fx, fy, fz, mx, my, mz, known, free, bend, body, tower, 
 
 
 @inlined_kernel
-def answer(torque, bend, body, tower, matrix, work, b, modal):
-    """Return the rotor's acceleration by a torque (N m) on the shaft and loads in b and modal.
+def answer(torque, bend, body, tower, blades, matrix, work, out):
+    """Turn loads on platform and tower in out (n_state,), and a torque (N m), into accelerations.
 
-    Fills b (6,) and modal (n,) with their accelerations, and work.motion with that of the hub, without terms
-    of velocities and weight; mass and frames are those of the last solution, with a rigid shaft.
+    Of platform, tower, rotor and blades, without terms of velocities and weight; mass and frames are those of
+    the last solution, with a rigid shaft.
     """
     x, y, z, cx, cy, cz, free = work.place
     top, centre = Top(x, y, z, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (cx, cy, cz)
     fx, fy, fz, mx, my, mz = _at_top(centre, free * torque, work.shaft, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    return _solve(
+    first, n = modes_in_state(tower)
+    b, modal = out[State.VX : State.WZ + 1], out[first : first + n]
+    rate = _solve(
         top, centre, fx, fy, fz, mx, my, mz, torque, free, bend, body, tower, matrix, work, b, modal
     )
+    out[State.ROTOR_SPEED] = rate
+    for i in range(3):
+        work.motion[3 + i] += rate * work.axis[i]
+    fill_blade_accelerations(work.motion, 0.0, blades, work, out)
 
 
 @inlined_kernel
@@ -531,6 +537,7 @@ def accelerate_elastic(
         if not body.platform_fixed:
             factor_spd(matrix)
         work.place[:] = (top.x, top.y, top.z, centre[0], centre[1], centre[2], free)
+        work.axis[:] = (f.nx, f.ny, f.nz)
         cache[LoadCache.FACTORED] = 1.0
     spin = gear * generator_speed(x, shaft)
     gx, gy, gz = cross(f.wx, f.wy, f.wz, f.nx, f.ny, f.nz)

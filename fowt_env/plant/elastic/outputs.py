@@ -32,23 +32,33 @@ class SectionLoad(NamedTuple):
 
 
 @inlined_kernel
-def _inertial_load(number, x, dx, frame, beam, blades, work):
+def _reduce_outer(number, x, frame, beam, blades, work):
+    """Reduce the outer part of a blade into the last rows of work."""
+    f, E, n, speed = frame, work.axes[number], len(beam.count), x[State.ROTOR_SPEED]
+    ux, uy, uz = _turned(E, f.wx + speed * f.nx, f.wy + speed * f.ny, f.wz + speed * f.nz)
+    q = blades.first + n * number
+    v = q + BLADES * n
+    reduce_beam(
+        x[q : q + n], x[v : v + n], ux, uy, uz, beam, work.moment[BLADES], work.block[BLADES],
+        work.own[BLADES], work.mass, work.pull[BLADES], work.probe_rest,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _inertial_load(number, reduced, x, dx, frame, beam, blades, work):
     """Return the SectionLoad of weight and inertia of a Beam about the rotor centre, pitched axes.
 
-    beam: of the whole blade or of its outer part. dx: rates, of the last solution of the chain.
+    beam: of the whole blade or of its outer part, in the rows `reduced` of work (number or BLADES). dx:
+    rates, of the last solution of the chain.
     """
     f, E, A, n = frame, work.axes[number], work.motion, len(beam.count)
     speed = x[State.ROTOR_SPEED]
-    wx, wy, wz = f.wx + speed * f.nx, f.wy + speed * f.ny, f.wz + speed * f.nz
     bx = f.bx + speed * (f.wy * f.nz - f.wz * f.ny) + A[3]
     by = f.by + speed * (f.wz * f.nx - f.wx * f.nz) + A[4]
     bz = f.bz + speed * (f.wx * f.ny - f.wy * f.nx) + A[5]
     ax, ay, az = f.ax + A[0], f.ay + A[1], f.az + A[2]
-    q = blades.first + n * number
-    v = q + BLADES * n
-    c, J, X, p = work.moment, work.block, work.probe, work.pull
-    ux, uy, uz = _turned(E, wx, wy, wz)
-    reduce_beam(x[q : q + n], x[v : v + n], ux, uy, uz, beam, c, J, X, work.mass, p, work.probe_rest)
+    v = blades.first + n * (BLADES + number)
+    c, J, X, p = work.moment[reduced], work.block[reduced], work.own[reduced], work.pull[reduced]
     ax, ay, az = _turned(E, ax, ay, az)
     bx, by, bz = _turned(E, bx, by, bz)
     m = beam.mass
@@ -104,7 +114,7 @@ def _about(load, x, y, z):
 @inlined_kernel
 def root_load(number, x, dx, frame, pitch, loads, blades, work):
     """Return the SectionLoad of the root of a blade (0, 1, 2), pitched axes."""
-    load = _inertial_load(number, x, dx, frame, blades.beam, blades, work)
+    load = _inertial_load(number, number, x, dx, frame, blades.beam, blades, work)
     return _about(_with_aerodynamics(load, loads[number], pitch, blades), 0.0, 0.0, blades.hub_radius)
 
 
@@ -143,7 +153,8 @@ def _outer_aerodynamics(number, x, turn, aero, section, loads):
 def _section_load(number, x, dx, frame, pitch, section, aero, loads, blades, work):
     """Return the SectionLoad at a Section of a blade, about its displaced centre."""
     turn, n = turn_of(pitch), len(section.beam.count)
-    inertial = _inertial_load(number, x, dx, frame, section.beam, blades, work)
+    _reduce_outer(number, x, frame, section.beam, blades, work)
+    inertial = _inertial_load(number, BLADES, x, dx, frame, section.beam, blades, work)
     wind = _outer_aerodynamics(number, x, turn, aero, section, loads)
     load = SectionLoad(
         inertial.fx + wind.fx, inertial.fy + wind.fy, inertial.fz + wind.fz,
@@ -285,6 +296,7 @@ def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blade
         row[number], row[3 + number], row[6 + number] = c * px + s * py, c * py - s * px, pz
         row[9 + number], row[12 + number] = c * root.fx + s * root.fy, c * root.fy - s * root.fx
         row[15 + number], row[18 + number], row[21 + number] = root.fz, root.mx, root.my
+        row[40 + number], row[43 + number], row[46 + number] = px, py, root.mz
         inner = _section_load(number, x, dx, frame, pitch, blades.inner, aero, loads, blades, work)
         outer = _section_load(number, x, dx, frame, pitch, blades.outer, aero, loads, blades, work)
         row[24 + number], row[27 + number] = _bending_moments(inner, x, q, blades.inner)
@@ -293,6 +305,7 @@ def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blade
     c, s = cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH])
     row[36], row[37] = c * my + s * mz, c * mz - s * my
     row[38], row[39] = fy, fz
+    row[49], row[50] = c * fy + s * fz, c * fz - s * fy
 
 
 # (pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row): channels of bending

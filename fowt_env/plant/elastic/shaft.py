@@ -12,12 +12,12 @@ extrapolates T as a polynomial in time, less the share of the generator torque, 
 solves for the oscillation exactly; and replaces the quadrature of q'' in every velocity by its exact change.
 """
 
-from math import cos, cosh, exp, sin, sinh, sqrt
 from typing import NamedTuple
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import shaft_torque, torque_in_force
+from fowt_env.plant.elastic.oscillator import swung
 from fowt_env.plant.state import State
 
 # entries of RotorScratch.shaft_torque: mobility k, 1/(kg m2), now and at the beginning of the step; smooth
@@ -71,31 +71,29 @@ def twist_channels(shaft):
     return 2
 
 
-@inlined_kernel
-def twisted(q, rate, c0, c1, c2, c3, after, square, decay):
-    """Return (q, q') after a time, exact for q'' + 2 decay q' + square q = c0 + c1 t + c2 t2 + c3 t3."""
-    p3 = c3 / square
-    p2 = (c2 - 6.0 * decay * p3) / square
-    p1 = (c1 - 4.0 * decay * p2 - 6.0 * p3) / square
-    p0 = (c0 - 2.0 * decay * p1 - 2.0 * p2) / square
-    q, rate = q - p0, rate - p1
-    left, rest = exp(-decay * after), square - decay * decay
-    w = sqrt(abs(rest))
-    if rest > 0.0:
-        c, s = cos(w * after), sin(w * after) / w
-    else:
-        c, s = cosh(w * after), sinh(w * after) / w if w > 0.0 else after
-    p, over = p0 + after * (p1 + after * (p2 + after * p3)), rate + decay * q
-    speed = p1 + after * (2.0 * p2 + 3.0 * after * p3)
-    return p + left * (q * c + over * s), speed + left * (rate * c - (square * q + decay * rate) * s)
-
-
 @kernel
 def keep_smooth(shaft, work, dx):
     """Put the smooth torque of the last evaluation into dx in place of the rate of the twist."""
     if shaft is None:
         return
     dx[shaft.first] = work.shaft_torque[SMOOTH]
+
+
+@kernel
+def rate_by_twist(i, shaft, work, dx):
+    """Return the part of the rate of velocity i in dx that the acceleration of the twist causes."""
+    if shaft is None:
+        return 0.0
+    return work.twist[0, i] * dx[shaft.first + 1]
+
+
+@kernel
+def change_by_twist(i, dt, x, shaft, work, y):
+    """Return the changes by the twist of velocity i, and of its integral, over a step dt from x to y."""
+    if shaft is None:
+        return 0.0, 0.0
+    e, q = work.twist[1, i], shaft.first
+    return e * (y[q + 1] - x[q + 1]), e * (y[q] - x[q] - dt * x[q + 1])
 
 
 @kernel
@@ -130,7 +128,7 @@ def _twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
     begun = -share * shaft_torque(0.0, torque_in_force(x, u, model.converter), speed, model.drivetrain)
     ended = -share * shaft_torque(0.0, torque_in_force(y, u, model.converter), speed, model.drivetrain)
     c0, c1, c2, c3 = c0 + begun, (c1 + ended - begun) * over, c2 * over * over, c3 * over * over * over
-    q, rate = twisted(
+    q, rate = swung(
         x[shaft.first], x[shaft.first + 1], k * c0, k * c1, k * c2, k * c3, after, k * shaft.stiffness,
         0.5 * k * shaft.damping,
     )  # fmt: skip

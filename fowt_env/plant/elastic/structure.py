@@ -38,12 +38,14 @@ class RotorScratch(NamedTuple):
     """Holds the work arrays of a turbine with elastic parts, in platform axes unless said otherwise."""
 
     axes: np.ndarray  # (3, 3, 3) of each blade: columns j1, j2, j3
-    moment: np.ndarray  # (3,) first moment of a blade in its axes
-    block: np.ndarray  # (6,) inertia of a blade in its axes
-    coupling: np.ndarray  # (3, n, 6) X of reduce_beam, forward-eliminated
+    # of each blade in its axes, and last of a part of one, for outputs (reduce_beam)
+    moment: np.ndarray  # (4, 3) first moment
+    block: np.ndarray  # (4, 6) inertia
+    own: np.ndarray  # (4, n, 6) X
+    pull: np.ndarray  # (4, 6) bias
+    coupling: np.ndarray  # (3, n, 6) X in platform axes, forward-eliminated
     mass: np.ndarray  # (n, n) modal mass
     factors: np.ndarray  # (3, n, n) L and 1/D of the modal mass
-    pull: np.ndarray  # (6,) bias of a blade in its axes
     rest: np.ndarray  # (3, n) generalised forces less velocity terms, forward-eliminated
     force: np.ndarray  # (3, n) generalised forces of aerodynamics and structure
     inertia: np.ndarray  # (6, 6) of the rotor about its centre
@@ -51,8 +53,7 @@ class RotorScratch(NamedTuple):
     upper: np.ndarray  # (6, 6) of rotor, free about the shaft, and nacelle, about tower top or body origin
     shaft: np.ndarray  # (6,) inertia times a unit rotor acceleration
     motion: np.ndarray  # (6,) acceleration of the rotor centre
-    probe: np.ndarray  # (n, 6) and (n,) of reduce_beam, for outputs
-    probe_rest: np.ndarray
+    probe_rest: np.ndarray  # (n,) of reduce_beam, for outputs
     hub_load: np.ndarray  # (6,) inertial load and weight of the rotor about its centre
     top_load: np.ndarray  # (6,) of rotor and nacelle about tower top or body origin
     tower_moment: np.ndarray  # (3,) of the bent tower, as moment to rest of a blade, in platform axes
@@ -62,9 +63,14 @@ class RotorScratch(NamedTuple):
     tower_pull: np.ndarray  # (6,)
     tower_rest: np.ndarray  # (n,)
     sinking: np.ndarray  # (n,) of the tower top, per unit rate of a deflection
-    place: (
-        np.ndarray
-    )  # (7,) tower top or body origin, rotor centre from there, inverse inertia of the free rotor
+    place: np.ndarray  # (7,) tower top or body origin, rotor centre from there, inverse rotor inertia
+    axis: np.ndarray  # (3,) direction of the shaft, downwind
+    # own modes of the tower, see steps.py: square of the frequency (1/s2) and decay rate (1/s); (n, n) from
+    # deflections to them and back; impulse per unit change of the deflections' velocities, kg
+    swing: np.ndarray  # (2, n)
+    to_own: np.ndarray
+    from_own: np.ndarray
+    impulse: np.ndarray
     twist: np.ndarray  # (2, n_state) accelerations by a unit one of the shaft's twist: now, at the last step
     shaft_torque: np.ndarray  # (3,) see shaft.py
 
@@ -75,8 +81,9 @@ def rotor_scratch(structure, tower, blades, n_state):
         return None
     n, m = (0 if part is None else len(part.beam.count) for part in (blades, tower))
     shapes = (
-        (3, 3, 3), 3, 6, (BLADES, n, 6), (n, n), (BLADES, n, n), 6, (BLADES, n), (BLADES, n), (6, 6), 6,
-        (6, 6), 6, 6, (n, 6), n, 6, 6, 3, 6, (m, 6), (m, m), 6, m, m, 7, (2, n_state),
-        3,
+        (3, 3, 3), (BLADES + 1, 3), (BLADES + 1, 6), (BLADES + 1, n, 6), (BLADES + 1, 6), (BLADES, n, 6),
+        (n, n), (BLADES, n, n), (BLADES, n), (BLADES, n), (6, 6), 6,
+        (6, 6), 6, 6, n, 6, 6, 3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (2, m), (m, m),
+        (m, m), (m, m), (2, n_state), 3,
     )  # fmt: skip
     return RotorScratch(*(np.zeros(shape) for shape in shapes))

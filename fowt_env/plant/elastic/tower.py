@@ -30,6 +30,8 @@ class TowerModes(NamedTuple):
     shortening: np.ndarray  # (n, n) 1/m, S of the top
     beam: Beam  # about the body origin, without the straight tower: mass, first and second are zero
     drag_shape: np.ndarray  # (points, n) shapes at the points of tower_drag.TowerDrag
+    root: np.ndarray  # (n, n) L of the stiffness L L^T
+    flexible_root: np.ndarray  # (n, n) inverse of L^T
 
 
 class Bend(NamedTuple):

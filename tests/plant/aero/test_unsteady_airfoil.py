@@ -15,11 +15,15 @@ from fowt_env.plant.aero.section_inflow import build_dynamic_sections, dynamic_s
 from fowt_env.plant.aero.unsteady_airfoil import (
     PER_STATION,
     STEADY,
+    AirfoilBlade,
     airfoil_dynamics,
     build_unsteady_airfoils,
     linear_range,
     n_airfoil_states,
+    separation_at,
+    step_airfoils,
     unsteady_coefficients,
+    unsteady_load,
 )
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.events import N_COUNTERS
@@ -89,6 +93,36 @@ def test_lift_follows_a_step_of_the_angle_late_and_a_slow_or_stalled_flow_at_onc
     assert 0.02 < late[1] < 0.3 and late[40] < 0.95 and late[-1] == pytest.approx(1.0, abs=2e-3)
     assert after(np.radians(46.0), 30.0)[1:] == pytest.approx(np.ones(399), abs=1e-9)
     assert after(0.02, 0.005)[1:] == pytest.approx(np.ones(399), abs=1e-9)
+
+
+def test_in_a_slow_or_stalled_flow_the_states_have_the_values_of_the_angle_after_a_step():
+    foil, part = NAMES.index("NACA64_A17"), build_unsteady_airfoils(ELEMENTS, 0, 0.01)
+    A1, A2 = part.constants[foil, 2:4]
+    for alpha, speed in ((np.radians(46.0), 30.0), (0.06, 0.005)):
+        x, dx = np.array([0.3, -0.2, 0.1, 0.6]), np.zeros(PER_STATION)
+        unsteady_coefficients(alpha, speed, 3.0, foil, 0, part, ELEMENTS.polars, x, dx)
+        separation, _ = separation_at(alpha, foil, part, ELEMENTS.polars)
+        assert x + part.dt * dx == pytest.approx([A1 * alpha, A2 * alpha, alpha, separation], abs=1e-12)
+
+
+def test_each_station_of_each_blade_has_states_of_its_own():
+    part, count = build_unsteady_airfoils(ELEMENTS, N_RIGID, 0.1), len(ELEMENTS.radius)
+    elements = ELEMENTS._replace(airfoils=part)
+    x = np.zeros(N_RIGID + n_airfoil_states(elements))
+    for number in range(3):
+        rates = np.zeros_like(x)
+        blade = AirfoilBlade(part, number, 0.1, None, elements, x, rates)
+        for j in range(count):
+            rates[:] = 0.0
+            unsteady_load(0.0, 0.0, 1.0, 9.0, 50.0, j, blade)
+            own = N_RIGID + PER_STATION * (count * number + j) + np.arange(PER_STATION)
+            if part.constants[elements.foil[j], 0] != 0.0:  # not a cylinder
+                assert rates[own[:3]].all()
+                rates[own] = 0.0
+            assert not rates.any()
+    y = np.full_like(x, 5.0)
+    step_airfoils(x + 1.0, 0.1, part, elements, np.arange(len(x), dtype=float), y)
+    assert y == pytest.approx(np.r_[np.full(N_RIGID, 5.0), 1.0 + 0.1 * np.arange(N_RIGID, len(x))])
 
 
 # OpenFAST v5.0.0 (git 2895884d), UA_Mod 4, BDF2, 0.005 s: IEA 15 MW with straight blades, no tilt and cone,

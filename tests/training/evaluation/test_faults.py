@@ -34,9 +34,7 @@ def test_a_parked_turbine_idles_and_is_run_once_for_all_controllers():
 def test_a_stop_has_the_time_to_standstill_of_its_rows():
     row = row_of(Case("stop", 16.0, fault=Fault(kind="emergency_stop", time=10.0), trip=None))
     scene = fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="standard")
-    frame = fowt_env.simulate(
-        scene, "pi", duration=60.0, faults={"kind": "emergency_stop", "time": 10.0}
-    )
+    frame = fowt_env.simulate(scene, "pi", duration=60.0, faults={"kind": "emergency_stop", "time": 10.0})
     fast = frame["Time_[s]"][frame["RotSpeed_[rpm]"].abs() > 1.21]
     assert row["status"] == "ok" and row["standstill_time_[s]"] == pytest.approx(fast.iloc[-1] - 10.0)
     assert np.isnan(row_of(STEADY)["standstill_time_[s]"])
@@ -79,6 +77,5 @@ def test_the_reason_names_the_trip_and_its_limit():
     assert row["status"] == "ok" and 10.0 < row["stopped_[s]"] < 13.0
     at = row["stopped_[s]"]
     assert (
-        row["reason"]
-        == f"pitch deviation trip at {at:.1f} s: a blade pitch more than 4 deg from its command"
+        row["reason"] == f"pitch deviation trip at {at:.1f} s: a blade pitch more than 4 deg from its command"
     )

@@ -1,6 +1,5 @@
 """Boxes of wind that are kept: made once, and again where their file is broken."""
 
-
 import numpy as np
 import pytest
 

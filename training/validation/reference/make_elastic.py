@@ -22,7 +22,7 @@ from fowt_env.training.evaluation.metrics import damage_equivalent_load
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from make import six_digits, sources, write
 from make_openfast import HERE, INPUTS, run
-from openfast_decks import MOTIONS, OPENFAST, Oc3, Oc4, Volturnus, filled
+from openfast_decks import MOTIONS, OPENFAST, TURBSIM, Oc3, Oc4, Volturnus, filled
 
 PLACE = HERE / "elastic"
 CHANNELS = (
@@ -349,22 +349,6 @@ class Reduction:
         self.series("lines/[!o]*", (*moved, *TENSIONS), (BEGIN, 500.0), 0.1, MOORED, 5)
         self.series("lines/oc3*", (*moved, *TENSIONS), (BEGIN, 500.0), 0.1, MOORED, 5)
         self.series("lines/oc4*", (*moved, *FORCES), (BEGIN, 400.0), 0.1, MOORED, 4)
-
-
-TURBSIM = """
-- run; Echo False; RandSeed1; RandSeed2 RANLUX; WrBHHTP False; WrFHHTP False; WrADHH False; WrADFF True;
-WrBLFF False; WrADTWR False; WrHAWCFF False; WrFMTFF False; WrACT False; ScaleIEC 0;
--; - turbine; NumGrid_Z 3; NumGrid_Y 3; TimeStep 0.05; AnalysisTime 660; UsableTime ALL; HubHt 90;
-GridHeight 20; GridWidth 20; VFlowAng 0; HFlowAng 0;
--; - weather; TurbModel IECKAI; UserFile unused; IECstandard 1-ED3; IECturbc B; IEC_WindType NTM;
-ETMc default; WindProfileType PL; ProfileFile unused; RefHt 90; URef; ZJetMax default; PLExp 0.0; Z0 default;
--; - not of IEC; Latitude default; RICH_NO 0.05; UStar default; ZI default; PC_UW default; PC_UV default;
-PC_VW default;
--; - coherence; SCMod1 default; SCMod2 default; SCMod3 default; InCDec1 default; InCDec2 default;
-InCDec3 default; CohExp default;
--; - events; CTEventPath unused; CTEventFile Random; Randomize True; DistScl 1; CTLy 0.5; CTLz 0.5;
-CTStartTime 30
-"""
 
 
 def winds(program, runs):

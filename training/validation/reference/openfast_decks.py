@@ -73,11 +73,11 @@ WaveElevyi 0; NWaveKin 0; WaveKinxi 0; WaveKinyi 0; WaveKinzi 0;
 - channels; "Wave1Elev"; END
 """
 INFLOW = """
-- steady wind (kind 1) or the uniform one of a file (kind 2); Echo False; WindType 1; PropagationDir 0;
-VFlowAng 0; VelInterpCubic False; NWindVel 1; WindVxiList 0; WindVyiList 0; WindVziList 150;
+- steady wind (kind 1), uniform wind of a file (kind 2) or a box (kind 3); Echo False; WindType 1;
+PropagationDir 0; VFlowAng 0; VelInterpCubic False; NWindVel 1; WindVxiList 0; WindVyiList 0; WindVziList 150;
 - steady; HWindSpeed 0; RefHt 150; PLExp 0;
 - uniform; Filename_Uni "wind.wnd"; RefHt_Uni 150; RefLength 241.94;
-- boxes; FileName_BTS "unused";
+- a TurbSim box (kind 3); FileName_BTS "unused";
 - boxes; FilenameRoot "unused"; TowerFile False;
 - boxes; FileName_u "unused"; FileName_v "unused"; FileName_w "unused"; nx 64; ny 32; nz 32; dx 16; dy 3;
 dz 3; RefHt_Hawc 150;
@@ -87,6 +87,20 @@ dz 3; RefHt_Hawc 150;
 FocalDistanceZ 0; RotorApexOffsetPos 0 0 0; URefLid 17; MeasurementInterval 0.25; LidRadialVel False;
 ConsiderHubMotion 1;
 - output; SumPrint False; OutList; "Wind1VelX"; END
+"""
+TURBSIM = """
+- run; Echo False; RandSeed1; RandSeed2 RANLUX; WrBHHTP False; WrFHHTP False; WrADHH False; WrADFF True;
+WrBLFF False; WrADTWR False; WrHAWCFF False; WrFMTFF False; WrACT False; ScaleIEC 0;
+-; - turbine; NumGrid_Z 3; NumGrid_Y 3; TimeStep 0.05; AnalysisTime 660; UsableTime ALL; HubHt 90;
+GridHeight 20; GridWidth 20; VFlowAng 0; HFlowAng 0;
+-; - weather; TurbModel IECKAI; UserFile unused; IECstandard 1-ED3; IECturbc B; IEC_WindType NTM;
+ETMc default; WindProfileType PL; ProfileFile unused; RefHt 90; URef; ZJetMax default; PLExp 0.0; Z0 default;
+-; - not of IEC; Latitude default; RICH_NO 0.05; UStar default; ZI default; PC_UW default; PC_UV default;
+PC_VW default;
+-; - coherence; SCMod1 default; SCMod2 default; SCMod3 default; InCDec1 default; InCDec2 default;
+InCDec3 default; CohExp default;
+-; - events; CTEventPath unused; CTEventFile Random; Randomize True; DistScl 1; CTLy 0.5; CTLz 0.5;
+CTStartTime 30
 """
 FLOATING = """
 Echo False;
@@ -310,8 +324,10 @@ class Deck:
             text = re.sub(r"^\S+(\s+NumCoords)", r"0\1", polar.read_text(), flags=re.M)
             text = put(text, InterpOrd=self.interpolation)
             (folder / "Airfoils" / polar.name).write_text(text)
-        wind, kind = case.get("wind") or 0.0, 1
-        if not isinstance(wind, (int, float)):
+        wind, kind, box = case.get("wind") or 0.0, 1, "unused"
+        if isinstance(wind, Path):
+            wind, kind, box = 0.0, 3, wind
+        elif not isinstance(wind, (int, float)):
             rows, shear = hub_wind.to_numpy() if wind == "hub_wind" else wind, case.get("shear", 0)
             lines = [f"{time:.4f} {speed:.6f} 0 0 0 {shear} 0 0" for time, speed in rows]
             head = "! time speed direction vertical shear shear shear gust"
@@ -320,7 +336,7 @@ class Deck:
         text = filled(
             INFLOW, WindType=kind, HWindSpeed=wind, PLExp=case.get("shear", 0.0), RefHt=self.hub,
             RefHt_Uni=self.hub, RefLength=self.diameter, WindVziList=self.hub, RefHt_Hawc=self.hub,
-            PropagationDir=case.get("direction", 0),
+            PropagationDir=case.get("direction", 0), FileName_BTS=f'"{box}"',
         )  # fmt: skip
         (folder / "IW.dat").write_text(f"v5\n-\n{text}")
 

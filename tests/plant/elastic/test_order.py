@@ -1,0 +1,77 @@
+"""Order of the default step of bending blades and tower, from an exact past; by runs in plain Python."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from elastic_cases import BLADES, SPRINGS, Case, swinging
+from fresh_python import fresh_python
+from plant_helpers import rates
+
+from fowt_env.plant.advance import advance, forget
+from fowt_env.plant.elastic.steps import begin_swing, keep_swing
+from fowt_env.plant.integrators import START_STEPS
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.state import State
+
+DURATION, FINE, STEPS = 1.0, 0.0025, (100, 200)
+
+
+def case_of(integrator):
+    return Case("iea15_volturnus_s", "modes2", "modes2", wind=False, loads=SPRINGS, integrator=integrator)
+
+
+def commands(x, case):
+    pitches = x[case.blocks["other_blade_pitches"] :][: BLADES - 1]
+    return np.array([0.0, x[State.BLADE_PITCH], *pitches])
+
+
+def exact(case, times):
+    """States at multiples of FINE."""
+    x, handle, found, done = swinging(case), case.scene.handle(), [], 0
+    u = commands(x, case)
+    forget(handle)
+    for time in times:
+        step = round(time / FINE)
+        assert advance(handle, x, u, done, step - done, FINE) == 0
+        done = step
+        found.append(x.copy())
+    return found
+
+
+def swung(case, start, steps):
+    """State after steps, of which the first START_STEPS are given: (START_STEPS + 1, n_state)."""
+    data, dt, u = case.scene.data(), DURATION / steps, commands(start[0], case)
+    handle, (q, v) = case.scene.handle(data), case.states_of("blade")
+    model = case.scene.model
+    for k, x in enumerate(start[:-1]):
+        dx = rates(case.scene, x, u, k * dt, handle)
+        begin_swing(
+            k, x, model.rigid_body, model.tower, model.blades, data.matrix, data.rotor, data.stages[2]
+        )
+        keep_swing(x, model.tower, model.shaft, data.rotor, dx)
+        data.history[START_STEPS - 1 - k] = dx
+        data.elastic[START_STEPS - 1 - k] = x[q:v]
+    forget(handle)
+    data.cache[LoadCache.STEPS] = START_STEPS
+    x = start[-1].copy()
+    assert advance(handle, x, u, START_STEPS, steps - START_STEPS, dt) == 0
+    return x
+
+
+def errors():
+    """Of the default integrator, of all velocities and of the blades, with each of STEPS."""
+    fine, coarse = case_of("rk4"), case_of("ab4")
+    end, found = exact(fine, [DURATION])[0], []
+    for steps in STEPS:
+        start = exact(fine, [k * DURATION / steps for k in range(START_STEPS + 1)])
+        found.append(float(np.linalg.norm((swung(coarse, start, steps) - end)[State.VX : -2])))
+    return found
+
+
+def test_it_converges_with_order_four():
+    code = "import json, test_order; print(json.dumps(test_order.errors()))"
+    here = Path(__file__).parent
+    found = json.loads(fresh_python(code, paths=(here, here.parents[1]), NUMBA_DISABLE_JIT="1"))
+    assert np.log2(found[0] / found[1]) == pytest.approx(4.0, abs=0.35)
