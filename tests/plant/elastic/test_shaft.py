@@ -22,6 +22,7 @@ BARE = {"wind": None, "hydrodynamics": False, "mooring": False, "shaft": "torsio
 HELD = {"rigid_body.platform_fixed": True}
 ELASTIC = Path(__file__).parents[3] / "training/validation/reference/elastic"
 TURBINES = ("oc3_hywind", "iea15_volturnus_s")
+NIGHTLY = (pytest.mark.slow, pytest.mark.nightly)
 
 
 def inertias(turbine):
@@ -42,7 +43,10 @@ def test_an_oscillator_under_a_cubic_load_is_exact(square, decay):
 
 
 @pytest.mark.parametrize("platform", TURBINES)
-@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize(
+    "integrator",
+    [pytest.param(name, marks=() if name in ("rk4", "ab4") else NIGHTLY) for name in INTEGRATORS],
+)
 def test_a_free_shaft_decays_as_two_masses_at_the_default_step(platform, integrator):
     scene = build_scene(platform, integrator=integrator, **BARE)
     twist, handle = scene.model.shaft.first, scene.with_model(HELD).handle()
@@ -123,11 +127,11 @@ def test_energy_and_momentum_change_by_the_damping_of_the_shaft_alone(platform):
 
 PARTS = [
     {},
-    {"pitch": "individual"},
-    {"tower": "modes2"},
-    {"tower": "modes", "pitch": "individual"},
-    {"blades": "modes"},
-    {"blades": "modes", "tower": "modes"},
+    pytest.param({"pitch": "individual"}, marks=NIGHTLY),
+    pytest.param({"tower": "modes2"}, marks=NIGHTLY),
+    pytest.param({"tower": "modes", "pitch": "individual"}, marks=NIGHTLY),
+    pytest.param({"blades": "modes"}, marks=NIGHTLY),
+    pytest.param({"blades": "modes", "tower": "modes"}, marks=pytest.mark.slow),
 ]
 
 
@@ -170,7 +174,7 @@ def test_a_tower_with_a_twisting_shaft_swings_no_further_at_the_default_step(tow
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turbine", ["nrel5mw", "iea15"])
+@pytest.mark.parametrize("turbine", ["nrel5mw", pytest.param("iea15", marks=pytest.mark.nightly)])
 def test_blades_on_a_twisting_shaft_swing_no_further_at_the_default_step(turbine):
     """Without air: at 0.05 s the NREL 5 MW would swing ten times as far after ten seconds."""
     scene = build_scene("oc3_hywind", turbine=turbine, **BARE, blades="modes").with_model(HELD)

@@ -122,7 +122,9 @@ LIMITS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("platform", RATED)
+@pytest.mark.parametrize(
+    "platform", ["oc3_hywind", pytest.param("iea15_volturnus_s", marks=pytest.mark.nightly)]
+)
 @pytest.mark.parametrize("case", LIMITS)
 def test_the_default_step_is_stable(platform, case):
     wind, over, pitch, share, held = LIMITS[case]
