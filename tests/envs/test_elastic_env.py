@@ -64,6 +64,7 @@ def test_offsets_of_the_azimuth_turn_the_bent_blades(env):
     assert turned["OoPDefl1"] == pytest.approx(start["OoPDefl2"], rel=1e-9)
 
 
+@pytest.mark.nightly
 def test_a_vector_environment_steps_as_single_ones(env):
     together = FowtVectorEnv(num_envs=2, **WEATHER, **ELASTIC)
     first, _ = together.reset(seed=3)

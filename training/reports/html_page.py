@@ -276,6 +276,7 @@ def _schedule(chosen, about, say):
     panels = [
         {"label": label, "values": _rounded([point[channel.partition("_[")[0]] for point in points])}
         for label, channel in SCHEDULE
+        if channel in points[0]
     ]
     return {"platform": platform, "wind": list(SCHEDULE_WINDS), "panels": panels}
 
