@@ -66,7 +66,7 @@ BLADES_READ = (
     "azimuth", "blade_pitch_1", "blade_pitch_2", "blade_pitch_3", "root_out_of_plane_1",
     "root_out_of_plane_2", "root_out_of_plane_3",
 )  # fmt: skip
-OUT_NAME = "rosco"  # root name of log files at higher logging levels
+OUT_NAME = "rosco.out"  # log files are rosco.RO.dbg ...: ROSCO replaces the extension, and needs one
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
 
 

@@ -155,6 +155,16 @@ def test_an_entry_of_its_deck_can_be_changed_and_an_unknown_one_is_named(scene):
         Rosco(RoscoSettings(), 0.1, changes={"PC_GS_PK": 1.0}).prepare(scene)
 
 
+@needs_library
+def test_its_log_has_the_name_of_the_controller_and_roscos_extension(scene, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    logged = Rosco(RoscoSettings(), 0.1, changes={"LoggingLevel": 1})
+    logged.prepare(scene)
+    logged.reset(RATED)
+    answers(logged, [123.0, 123.0])
+    assert [path.name for path in tmp_path.iterdir()] == ["rosco.RO.dbg"]
+
+
 def test_without_the_library_the_message_says_what_to_install(scene, monkeypatch):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(InputError, match="pip install --no-deps rosco"):

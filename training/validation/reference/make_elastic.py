@@ -49,6 +49,8 @@ NAMES = {Volturnus: "iea15", Oc3: "nrel5mw"}
 GAUGES = {Volturnus: "13, 25", Oc3: "5, 9"}  # blade nodes of Spn1 and Spn2, of 50 and 17
 BENT = {Volturnus: (4.0, 2.0), Oc3: (2.0, 1.0)}  # m, tip deflections at the start of free decays
 TORQUE = {Volturnus: 20.4e6, Oc3: 43093.55}  # N m at the generator: balances steady 12 m/s nearly
+# ROSCO at every time step: ServoDyn extrapolates what it sends (README of elastic/)
+SHEARED = dict(shear=0.2, t=400, control_dt="0.0125")
 STEP = {Volturnus: 0.002, Oc3: 0.005}  # s, with constant torque: torsion of the IEA 15 MW is at 31 Hz
 
 
@@ -110,8 +112,8 @@ CASES = {
     for case, settings in _turbine_cases(deck).items()
 }
 CASES |= {
-    "iea15/turb_18mps_shear": _turbulent(Volturnus, 18, shear=0.2, t=400),
-    "iea15/turb_18mps_shear_ipc": _turbulent(Volturnus, 18, shear=0.2, individual=True, t=400),
+    "iea15/turb_18mps_shear": _turbulent(Volturnus, 18, **SHEARED),
+    "iea15/turb_18mps_shear_ipc": _turbulent(Volturnus, 18, **SHEARED, individual=True),
     "iea15/check_18mps": _turbulent(Volturnus, 18, t=60),
     "iea15/check_18mps_fine": _turbulent(Volturnus, 18, t=60, dt=0.00625),
 }
@@ -170,6 +172,7 @@ TURBULENT = (
     " torsion of the drivetrain in the NREL 5 MW; dt 0.0125 s; IEA 15 MW: ROSCO 2.10.6 every 0.025 s, NREL 5"
     " MW: DISCON of OC3-Hywind every 0.0125 s; platform starts at zero"
 )
+EACH_STEP = "; turb_18mps_shear*: ROSCO every 0.0125 s"
 MOORED = "components of waves_hs7.5_tp10, no wind, rotor at rest, rigid, dt 0.025 s; starts at zero"
 TURNS, HARMONICS = 8, 6  # last whole turns of a steady run; harmonics fitted, of which three are stored
 BEGIN = 100.0  # s, start-up omitted from runs in waves or turbulence
@@ -340,10 +343,11 @@ class Reduction:
         self.series("*/decay_r*", DECAYING, (0.0, 12.0), 0.04, DECAY)
         self.series("*/torque_loss*", TWISTED, (18.0, 26.0), 0.02, LOSS, 6)
         for name in NAMES.values():
-            words = f"{TURBULENT}; from 100 s, 20 Hz; DEL_10Hz of every second row"
+            every = EACH_STEP if name == "iea15" else ""
+            words = f"{TURBULENT}{every}; from 100 s, 20 Hz; DEL_10Hz of every second row"
             self.table(f"{name}_turbulent", f"{name}/turb_*", lambda n, f: statistics(f), words)
             self.series(f"{name}/turb_*mps", SERIES, (BEGIN, 600.0), 0.1, TURBULENT, 4)
-        self.series("iea15/turb_18mps_shear*", SERIES, (BEGIN, 400.0), 0.1, TURBULENT, 4)
+        self.series("iea15/turb_18mps_shear*", SERIES, (BEGIN, 400.0), 0.1, TURBULENT + EACH_STEP, 4)
         self.table("lines", "lines/*", lambda n, f: statistics(f), f"{MOORED}; from 100 s, 20 Hz")
         moved = ("PtfmSurge", "PtfmHeave", "PtfmPitch")
         self.series("lines/[!o]*", (*moved, *TENSIONS), (BEGIN, 500.0), 0.1, MOORED, 5)
