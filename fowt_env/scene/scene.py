@@ -73,6 +73,7 @@ class Scene:
     loads: tuple[Load, ...] = ()  # user-defined loads
     label: str = ""  # name or path of the platform, as specified
     trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint}
+    steps: dict = field(default_factory=dict, init=False, repr=False)  # {time step, s: Scene of with_step}
 
     @property
     def n_lines(self) -> int:
@@ -258,18 +259,24 @@ class Scene:
         """Return this scene for the time step dt (s).
 
         A radiation convolution and unsteady airfoils hold for one step only, and lags of dynamic inflow are
-        limited by the step.
+        limited by the step. The same step gives the same scene: further runs find its trim.
         """
-        hydro, parts = self.model.hydro, {}
+        hydro, aero, parts = self.model.hydro, self.model.aero, {}
         memory = None if hydro is None else hydro.radiation
         adapted = memory_for_step(memory, self.platform.potential_flow, dt, self.options["planar"])
         if adapted is not memory:
             parts["hydro.radiation"] = adapted
-        if wake_states(self.model.aero):
-            parts["aero.rotor.wake.least"] = least_lag(dt, self.options["integrator"])
-        if airfoil_states(self.model.aero):
+        if wake_states(aero) and aero.rotor.wake.least != (
+            least := least_lag(dt, self.options["integrator"])
+        ):
+            parts["aero.rotor.wake.least"] = least
+        if airfoil_states(aero) and aero.rotor.elements.airfoils.dt != dt:
             parts["aero.rotor.elements.airfoils.dt"] = float(dt)
-        return self.with_model(parts) if parts else self
+        if not parts:
+            return self
+        if dt not in self.steps:
+            self.steps[dt] = self.with_model(parts)
+        return self.steps[dt]
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
         """Return a copy with some parts of the model replaced (same types: no recompilation).
