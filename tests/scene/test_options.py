@@ -101,6 +101,13 @@ def test_the_wake_lags_no_less_than_the_step_follows():
     assert scene.with_step(0.05).model.aero.rotor.wake.least == pytest.approx(1.25 * 0.05 / 0.3)
 
 
+@pytest.mark.parametrize("option", [{"dynamic_inflow": True}, {"unsteady_airfoils": "hgm"}], ids=str)
+def test_a_step_gives_one_scene_so_that_its_trim_is_computed_once(option):
+    scene = build_scene(wind=8.0, fidelity="standard", **option)
+    assert scene.with_step(scene.dt) is scene
+    assert scene.with_step(0.05) is scene.with_step(0.05) is not scene
+
+
 @pytest.mark.parametrize("name", ROTORS)
 def test_a_box_of_wind_is_met_by_the_blades_or_averaged(name):
     scene = build_scene(wind=box_wind(), rotor=name, duration=100.0, fidelity="reference")
