@@ -170,7 +170,7 @@ def test_a_run_in_step_with_the_clock_takes_its_time():
         begin = time.perf_counter()
         client.states(answer)
         took = time.perf_counter() - begin
-    assert took > 0.24  # 20 periods of 12.5 ms; longer where other work holds the processor
+    assert took > 0.2  # 20 periods of 12.5 ms, of which the first may begin before this client reads
     assert set(client.end["send_delay_[ms]"]) == {"p50", "p99", "p99.9", "max", "std", "share_below_1_ms"}
 
 
