@@ -111,6 +111,7 @@ def test_a_run_in_steady_wind_stays_at_the_periodic_state(elastic_scene):
         assert run[1:3] == pytest.approx(first, abs=0.01 * np.hypot(*first))
 
 
+@pytest.mark.installation
 @pytest.mark.parametrize("case", ["steady_12mps_2modes"])
 def test_tips_and_roots_in_steady_wind_are_openfasts(elastic_scene, case):
     known = table("elastic/steady.csv.gz").set_index(["case", "channel"]).loc[f"nrel5mw/{case}"]
