@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 from fowt_env.analysis.linear_model import STRUCTURAL, VELOCITIES, differentiated, settled
 from fowt_env.analysis.linear_plant import bending_names
 from fowt_env.analysis.statics import central_difference, mean_derivative
-from fowt_env.analysis.trim import AZIMUTHS, trim, without_fluctuations
-from fowt_env.analysis.trim_cache import plant_key, water_key
+from fowt_env.analysis.trim import AZIMUTHS, trim, water_key, without_fluctuations
+from fowt_env.analysis.trim_cache import plant_key
 from fowt_env.caches import Cache
 from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.turbine import PitchGains

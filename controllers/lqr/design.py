@@ -19,8 +19,8 @@ from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize, sampled
 from fowt_env.analysis.reduced_model import residualised, with_pitch_lag
-from fowt_env.analysis.trim import without_fluctuations
-from fowt_env.analysis.trim_cache import plant_key, water_key
+from fowt_env.analysis.trim import water_key, without_fluctuations
+from fowt_env.analysis.trim_cache import plant_key
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.caches import Cache, cached
 from fowt_env.controllers.settings import NOT_NEGATIVE, POSITIVE, Settings

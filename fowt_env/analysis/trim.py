@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from fowt_env.analysis.blade_coordinates import TURN, CyclicMean, bending_states, placed
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated, label, unbalanced
 from fowt_env.analysis.statics import Evaluation, central_difference, mean_derivative, with_hanging_lines
+from fowt_env.caches import Cache
 from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.display import html_table
 from fowt_env.errors import InputError, unknown
@@ -46,6 +47,7 @@ DIFFERENCE_STEPS = {  # of the differences, m, rad and rad/s
 DEFLECTION_STEP = 1e-3  # m, of the deflections of a flexible tower and of blades
 TWIST_STEP = 1e-5  # rad, of the shaft
 PLATFORM_MODES = ("floating", "fixed")
+_TRIMS = Cache(1024)  # (plant, mean weather, platform mode) -> OperatingPoint
 
 
 class OperatingPoint(Mapping):
@@ -449,9 +451,22 @@ def trim(scene: Scene, platform: str = "floating") -> OperatingPoint:
     impossible (keel in the sea bed, tower base under water). Warns once of an implausible equilibrium.
     """
     check_scene(scene)
-    if platform not in scene.trims:
-        scene.trims[platform] = _trim(scene, platform)
-    return scene.trims[platform].copy()
+    key = (scene.plant, _mean_weather(scene), platform)
+    return _TRIMS.get(key, lambda: _trim(scene, platform)).copy()
+
+
+def _mean_weather(scene):
+    """Return what a trim depends on besides the plant, which a box of wind makes another: not the seed."""
+    aero = scene.model.aero
+    wind = None if aero is None else aero.wind.shear_exponent
+    return scene.wind_speed, wind, water_key(scene)
+
+
+def water_key(scene):
+    """Return the weather kind and strip nodes, which, besides the plant, affect the last bits of a trim."""
+    hydro = scene.model.hydro
+    quadrature = None if hydro is None else getattr(hydro.strips, "quadrature", None)
+    return scene.weather_kind, None if quadrature is None else quadrature.table.shape
 
 
 def _steady(scene, platform, rotor_fixed):

@@ -5,7 +5,7 @@ import pickle
 from dataclasses import replace
 from math import floor
 
-from fowt_env.analysis.trim import trim
+from fowt_env.analysis.trim import trim, water_key
 from fowt_env.caches import Cache
 from fowt_env.descriptions.records import Record
 from fowt_env.plant.line_dynamics import rest_lines
@@ -21,13 +21,6 @@ def plant_key(scene):
     loads = tuple(load.key() for load in scene.loads)
     parts = (_values(scene.platform), _values(scene.turbine), scene.rotor, options, loads)
     return hashlib.sha256(pickle.dumps(parts)).hexdigest()
-
-
-def water_key(scene):
-    """Return the weather kind and strip nodes, which, besides the plant, affect the last bits of a trim."""
-    hydro = scene.model.hydro
-    quadrature = None if hydro is None else getattr(hydro.strips, "quadrature", None)
-    return scene.weather_kind, None if quadrature is None else quadrature.table.shape
 
 
 def _values(part):

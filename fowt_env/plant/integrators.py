@@ -10,13 +10,20 @@ of their own (line_dynamics.py), and the rotor load in a wind box is evaluated s
 from typing import NamedTuple
 
 from fowt_env.errors import unknown
+from fowt_env.plant.adams import bashforth, moulton
 from fowt_env.plant.aero.load import rotor_part, step_air
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_jump, set_followed
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
-from fowt_env.plant.elastic.oscillator import extrapolated, interpolated
+from fowt_env.plant.elastic.in_phase import (
+    keep_twist,
+    keep_twist_after,
+    shift_means,
+    twist_again,
+    twist_on,
+)
 from fowt_env.plant.elastic.shaft import advance_twist, begin_twist, keep_smooth, smooth_of
 from fowt_env.plant.elastic.steps import (
     begin_swing,
@@ -79,7 +86,8 @@ def rk4(t, x, u, dt, model, method, data):
     k1, k2, k3, k4, y = data.stages[0], data.stages[1], data.stages[2], data.stages[3], data.stages[4]
     n, shaft, work, half = integrated_states(x, model), model.shaft, data.rotor, 0.5 * dt
     rates(t, x, u, model, data, k1)
-    begin_twist(shaft, work, k1)
+    begin_twist(shaft, work)
+    keep_smooth(shaft, work, k1)
     begin_followers(x, dt, True, model, data)
     for i in range(n):
         y[i] = x[i] + 0.5 * dt * k1[i]
@@ -123,7 +131,8 @@ def heun(t, x, u, dt, model, method, data):
     k1, k2, y = data.stages[0], data.stages[1], data.stages[4]
     n, shaft, work = integrated_states(x, model), model.shaft, data.rotor
     rates(t, x, u, model, data, k1)
-    begin_twist(shaft, work, k1)
+    begin_twist(shaft, work)
+    keep_smooth(shaft, work, k1)
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * k1[i]
@@ -141,28 +150,6 @@ def heun(t, x, u, dt, model, method, data):
     for i in range(n):
         x[i] = y[i]
     end_followers(x, dt, model, data)
-
-
-@kernel
-def bashforth(order, i, history):
-    """Return the Adams-Bashforth combination of the latest derivatives of state i, history latest first."""
-    if order == 1:
-        return history[0, i]
-    if order == 2:
-        return 1.5 * history[0, i] - 0.5 * history[1, i]
-    if order == 3:
-        return (23.0 * history[0, i] - 16.0 * history[1, i] + 5.0 * history[2, i]) / 12.0
-    return (55.0 * history[0, i] - 59.0 * history[1, i] + 37.0 * history[2, i] - 9.0 * history[3, i]) / 24.0
-
-
-@kernel
-def moulton(order, new, i, history):
-    """Return the Adams-Moulton combination of a derivative at the end of the step and the latest ones."""
-    if order == 1:
-        return 0.5 * (new + history[0, i])
-    if order == 2:
-        return (5.0 * new + 8.0 * history[0, i] - history[1, i]) / 12.0
-    return (9.0 * new + 19.0 * history[0, i] - 5.0 * history[1, i] + history[2, i]) / 24.0
 
 
 @kernel
@@ -194,40 +181,33 @@ def adams(t, x, u, dt, model, method, data):
         begin_slow(steps, blades, data)
     rates(t, x, u, model, data, history[0])
     keep_slow(steps, blades, data)
-    begin_twist(shaft, work, history[0])
+    begin_twist(shaft, work)
+    keep_twist(x, blades, shaft, data.elastic, work, history[0])
     begin_swing(steps, x, body, tower, blades, matrix, work, still)
     keep_swing(x, tower, shaft, work, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     advance_actuators(x, u, dt, model, y)
-    c0, c1, c2, c3 = extrapolated(
-        order, smooth_of(shaft, history[0]), smooth_of(shaft, history[1]), smooth_of(shaft, history[2]),
-        smooth_of(shaft, history[3]),
-    )  # fmt: skip
-    advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
+    twist_on(steps, dt, x, u, order, history, data.elastic, blades, shaft, model, work, y)
     swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
-        keep_smooth(shaft, work, new)
+        keep_twist_after(y, blades, shaft, work, new)
         keep_swing(y, tower, shaft, work, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         advance_actuators(x, u, dt, model, y)
-        c0, c1, c2, c3 = interpolated(
-            order, smooth_of(shaft, new), smooth_of(shaft, history[0]), smooth_of(shaft, history[1]),
-            smooth_of(shaft, history[2]),
-        )  # fmt: skip
-        advance_twist(x, u, dt, c0, c1, c2, c3, shaft, model, work, y)
+        twist_again(dt, x, u, order, new, history, blades, shaft, model, work, y)
         swing_again(dt, x, order, new, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     else:
         follow_rotor(dt, x, model, method.substeps, data, y)
-        correct_blades(dt, x, history, data.elastic, blades, work, y)
+        correct_blades(dt, x, history, data.elastic, blades, shaft, work, y)
     attitude_rate(y, new, model.rigid_body.plane)
     new[State.AZIMUTH] = y[State.ROTOR_SPEED]
-    bend_blades(dt, x, order, history, blades, y)
+    bend_blades(dt, x, order, history, blades, shaft, work, y)
     step_air(x, dt, model.aero, history[0], y)
     for i in range(State.VX):
         x[i] += dt * moulton(order, new[i], i, history)
@@ -238,13 +218,17 @@ def adams(t, x, u, dt, model, method, data):
 
 
 @kernel
-def bend_blades(dt, x, order, history, blades, y):
-    """Fill y with the deflections of the blades by Adams-Moulton, from their new velocities in y."""
+def bend_blades(dt, x, order, history, blades, shaft, work, y):
+    """Fill y with the deflections of the blades by Adams-Moulton, from their new velocities in y.
+
+    On a shaft that twists, their means are shifted to those of in_phase.py.
+    """
     if blades is None:
         return
     size = BLADES * len(blades.beam.count)
     for i in range(blades.first, blades.first + size):
         y[i] = x[i] + dt * moulton(order, y[size + i], i, history)
+    shift_means(blades, shaft, work, y)
 
 
 @inlined_kernel
@@ -300,13 +284,13 @@ def set_pitch_and_history(t, x, u, dt, model, method, data):
     """
     before, after, history, cache = data.stages[1], data.stages[4], data.history, data.cache
     rates(t, x, u, model, data, before)
-    keep_smooth(model.shaft, data.rotor, before)
+    keep_twist_after(x, model.blades, model.shaft, data.rotor, before)
     was = stored(cache, LoadCache.ROTOR)
     torque = cache[LoadCache.TORQUE]
     set_followed(x, u, dt, model.actuator, model.pitches)
     renew_loads(t, x, model, model.user, model.blades, data)
     respond(x, u, model, data, after)
-    keep_smooth(model.shaft, data.rotor, after)
+    keep_twist_after(x, model.blades, model.shaft, data.rotor, after)
     for k in range(START_STEPS):
         for i in range(State.VX, State.ROTOR_SPEED + 1):
             history[k, i] += after[i] - before[i]

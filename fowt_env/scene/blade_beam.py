@@ -32,17 +32,18 @@ MODES = {  # option blades: modes of each blade, from SHAPES
 
 
 LIFT_SLOPE = 2.0 * np.pi  # 1/rad
-YIELDING = 0.5 * BLADES  # blades whose reaction turns the rotor: between none and all
-DAMPED = 1.3  # factor on the damping at rated speed, for gusts and overspeed
+YIELDING = 0.5 * BLADES  # blades whose reaction turns the rotor of a rigid shaft: between none and all
+DAMPED = 1.6  # factor on the damping at rated speed, for gusts and overspeed
 FINE = 20_001  # points of the sums over the span that divide a station's load
 SECTIONS = (0.25, 0.5)  # of the span, for internal loads
 
 
-def build_blade_modes(turbine, option, first_state, aero):
-    """Return the BladeModes of option blades, with states from first_state on; None for "rigid".
+def build_blade_modes(turbine, options, first_state, aero):
+    """Return the BladeModes of a scene's options, with states from first_state on; None for rigid blades.
 
     aero: Aero or None. Raises: InputError for a turbine without [blade_structure].
     """
+    option = options["blades"]
     beam = blade_beam(turbine, option)
     if beam is None:
         return None
@@ -53,7 +54,7 @@ def build_blade_modes(turbine, option, first_state, aero):
         cone_cosine=float(np.cos(rotor.cone)),
         cone_sine=float(np.sin(rotor.cone)),
         hub_radius=float(rotor.hub_radius),
-        spring=_spring(beam, rotor.inertia),
+        spring=_spring(beam, rotor.inertia, YIELDING if options["shaft"] == "rigid" else 0.0),
         decay=_decay(beam, aero, turbine.rated_rotor_speed),
         tip=_point(shapes_at(turbine, option, [rotor.tip_radius])),
         inner=section_at(turbine, option, SECTIONS[0], aero),
@@ -61,13 +62,14 @@ def build_blade_modes(turbine, option, first_state, aero):
     )
 
 
-def _spring(beam, inertia):
-    """Return the (n, n) accelerations (1/s2) per deflection by stiffness, of a hub that gives way by half.
+def _spring(beam, inertia, yielding):
+    """Return the (n, n) accelerations (1/s2) per deflection by stiffness, of a hub that gives way.
 
     A rotor of this inertia (kg m2) turns with the reaction of three blades in phase, and not at all out of
-    phase. With a hub at rest, motions in phase would be unstable at 0.05 s where the wind hardly damps them.
+    phase. With a hub at rest, motions in phase would be unstable at 0.05 s where the wind hardly damps them,
+    and on a shaft that twists they are exact (in_phase.py).
     """
-    turning = YIELDING * np.outer(beam.f, beam.f) / inertia
+    turning = yielding * np.outer(beam.f, beam.f) / inertia
     return np.ascontiguousarray(np.linalg.solve(beam.A + beam.B - turning, beam.stiffness))
 
 
@@ -180,6 +182,14 @@ def shapes_at(turbine, modes, radii):
 def blade_states(blades):
     """Return the number of states of BladeModes or None: deflections and their velocities."""
     return 0 if blades is None else 2 * BLADES * len(blades.beam.count)
+
+
+def kept_states(blades, shaft):
+    """Return the number of quantities of BladeModes or None that steps keep: deflections, then those of a
+    Torsion or None, its twist and what the generator torque accelerates it by.
+    """
+    deflections = blade_states(blades) // 2
+    return deflections + (2 if deflections and shaft is not None else 0)
 
 
 def station_bending(turbine, option):

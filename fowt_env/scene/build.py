@@ -103,7 +103,7 @@ def build_scene(
     next_state = first_state + sum(load.states for load in user)
     tower = build_tower_modes(platform, turbine, modes_asked(options), next_state)
     next_state += tower_states(tower)
-    blades = build_blade_modes(turbine, options["blades"], next_state, aero)
+    blades = build_blade_modes(turbine, options, next_state, aero)
     next_state += blade_states(blades)
     shaft = build_torsion(turbine, options, next_state)
     next_state += 0 if shaft is None else 2

@@ -40,7 +40,7 @@ from fowt_env.plant.state import (
 )
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
-from fowt_env.scene.blade_beam import blade_states
+from fowt_env.scene.blade_beam import blade_states, kept_states
 from fowt_env.scene.options import FIDELITIES, LEVEL_PARTS, OPTIONS, default_step, least_lag
 from fowt_env.scene.parts import airfoil_states, fastest_motion, hydro_in_waves, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
@@ -72,7 +72,7 @@ class Scene:
     wind_speed: float | None  # mean hub wind for a trim; None without aerodynamics
     loads: tuple[Load, ...] = ()  # user-defined loads
     label: str = ""  # name or path of the platform, as specified
-    trims: dict = field(default_factory=dict, init=False, repr=False)  # {platform mode: OperatingPoint}
+    plant: object = field(default_factory=object, repr=False)  # the same for the same model but for weather
     steps: dict = field(default_factory=dict, init=False, repr=False)  # {time step, s: Scene of with_step}
 
     @property
@@ -168,7 +168,7 @@ class Scene:
 
     def data(self) -> Data:
         """Return new scratch arrays for one plant of this scene."""
-        hydro, bending = self.model.hydro, tower_states(self.model.tower) // 2
+        model, hydro, bending = self.model, self.model.hydro, tower_states(self.model.tower) // 2
         strips = None if hydro is None else hydro.strips
         members = None if hydro is None else hydro.members
         most = max((load.states for load in self.loads), default=0)
@@ -189,12 +189,12 @@ class Scene:
             cache=np.zeros(N_CACHE),
             user=np.zeros(user_data_size(len(self.loads), most)),
             history=np.zeros((4, self.n_state)),
-            elastic=np.zeros((4, blade_states(self.model.blades) // 2)),
+            elastic=np.zeros((4, kept_states(model.blades, model.shaft))),
             samples=np.zeros((4 * rotor_samples(self.model.integrator), N_SAMPLE)),
             radiation=memory_data(hydro),
             slow=np.zeros((4, 0 if self.model.blades is None else N_SLOW)),
             blades=np.zeros((0 if self.model.pitches is None else BLADES, self._n_blade_load)),
-            rotor=rotor_scratch(self.model.structure, self.model.tower, self.model.blades, self.n_state),
+            rotor=rotor_scratch(model.structure, model.tower, model.blades, model.shaft, self.n_state),
         )
 
     @property
@@ -246,7 +246,10 @@ class Scene:
         if aero is not None:
             aero = aero._replace(wind=air.series, field=air.field)
         model = self.model._replace(aero=aero, hydro=hydro)
-        return replace(self, model=model, wind=air.spec, sea=sea, seed=seed, wind_speed=air.speed)
+        weather = {"wind": air.spec, "sea": sea, "seed": seed, "wind_speed": air.speed}
+        # trims depend on the profile of a box of wind
+        plant = self.plant if air.field is None else object()
+        return replace(self, model=model, plant=plant, **weather)
 
     @property
     def dt(self) -> float:
@@ -259,7 +262,8 @@ class Scene:
         """Return this scene for the time step dt (s).
 
         A radiation convolution and unsteady airfoils hold for one step only, and lags of dynamic inflow are
-        limited by the step. The same step gives the same scene: further runs find its trim.
+        limited by the step. The same step gives the same scene and, in other weather, the same plant: further
+        runs find its trim.
         """
         hydro, aero, parts = self.model.hydro, self.model.aero, {}
         memory = None if hydro is None else hydro.radiation
@@ -275,7 +279,7 @@ class Scene:
         if not parts:
             return self
         if dt not in self.steps:
-            self.steps[dt] = self.with_model(parts)
+            self.steps[dt] = replace(self.with_model(parts), plant=(self.plant, dt))
         return self.steps[dt]
 
     def with_model(self, parts: Mapping[str, Any] | None = None, **slots: Any) -> "Scene":
@@ -286,7 +290,7 @@ class Scene:
         model = self.model
         for path, part in {**(parts or {}), **slots}.items():
             model = _replaced(model, path.split("."), part)
-        return replace(self, model=model)
+        return replace(self, model=model, plant=object())
 
     def __repr__(self):
         return (

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import fowt_env
 from fowt_env import errors
+from fowt_env.analysis import trim as trim_module
 from fowt_env.analysis.equilibrium import check_equilibrium, evaluated
 from fowt_env.analysis.trim import AZIMUTHS, mean_derivative, trim, without_fluctuations
 from fowt_env.descriptions.builtin import names
@@ -128,6 +129,23 @@ def test_rotor_stands_in_still_air_and_is_feathered_in_a_gale(storm_scene):
     calm_air, gale = (trim(storm_scene.with_weather(wind), platform="fixed") for wind in (0.0, 40.0))
     assert calm_air["RotSpeed"] == 0.0 and calm_air["BldPitch1"] == 0.0
     assert gale["RotSpeed"] == 0.0 and gale["BldPitch1"] == pytest.approx(90.0, rel=1e-12)
+
+
+def test_weather_of_the_same_mean_has_the_same_trim_which_is_computed_once(storm_scene, monkeypatch):
+    computed, compute = [], trim_module._trim
+    monkeypatch.setattr(trim_module, "_trim", lambda *a: computed.append(a) or compute(*a))
+    plant = storm_scene.with_model({})
+    seeds = [plant.with_weather("ntm:18:B", seed=seed) for seed in (1, 2)]
+    first, second = (trim(scene, platform="fixed") for scene in seeds)
+    assert len(computed) == 1
+    alone = compute(seeds[1], "fixed")
+    assert np.array_equal(second.state, alone.state) and second.data == alone.data
+    first.state[:] = 0.0
+    for other in (seeds[0].with_weather(17.0), seeds[0].with_model({"structure": None})):
+        trim(other, platform="fixed")
+    trim(seeds[0])
+    assert len(computed) == 4
+    assert np.array_equal(trim(seeds[0], platform="fixed").state, alone.state)
 
 
 def test_a_scene_without_fluctuations_keeps_its_types(storm_scene):

@@ -9,8 +9,9 @@ from plant_helpers import integrate, state
 
 from fowt_env import Force, Load, Motion, build_scene, linearize, load_kernel, simulate
 from fowt_env.descriptions.turbine import read_turbine
+from fowt_env.plant.adams import bashforth, moulton
 from fowt_env.plant.advance import RUNNING, advance, forget, observe
-from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, bashforth, build_integrator, moulton
+from fowt_env.plant.integrators import INTEGRATORS, START_STEPS, build_integrator
 from fowt_env.plant.measurement import N_MEASUREMENTS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import STATES, State

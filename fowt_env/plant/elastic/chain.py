@@ -12,7 +12,7 @@ from fowt_env.plant.accelerations import accelerate, factor_spd, substitute_spd
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.blades import RotorFrame, condense_rotor, fill_blade_accelerations
-from fowt_env.plant.elastic.shaft import MOBILITY, SMOOTH, Torsion, generator_speed, torsion_torque
+from fowt_env.plant.elastic.shaft import MOBILITY, SHARE, SMOOTH, Torsion, generator_speed, torsion_torque
 from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.elastic.tower import (
     Bend,
@@ -476,7 +476,8 @@ def _twist(
         fill_blade_accelerations(motion, 0.0, blades, work, e)
         e[shaft.first + 1] = 1.0
     change = state[MOBILITY] * (steady - torsion_torque(x, shaft))
-    state[SMOOTH] = steady - (1.0 - e[State.ROTOR_SPEED]) * torques[1]
+    state[SHARE] = (1.0 - e[State.ROTOR_SPEED]) * torques[1]
+    state[SMOOTH] = steady - state[SHARE]
     for i in range(6):
         b[i] += e[State.VX + i] * change
     for i in range(n):

@@ -22,26 +22,3 @@ def swung(q, rate, c0, c1, c2, c3, after, square, decay):
     p, over = p0 + after * (p1 + after * (p2 + after * p3)), rate + decay * q
     speed = p1 + after * (2.0 * p2 + 3.0 * after * p3)
     return p + left * (q * c + over * s), speed + left * (rate * c - (square * q + decay * rate) * s)
-
-
-@inlined_kernel
-def extrapolated(order, h0, h1, h2, h3):
-    """Return (c0, c1, c2, c3) of the cubic in s, 0 to 1 over a step, through `order` past values.
-
-    Its integral over the step is that of Adams-Bashforth.
-    """
-    d1 = h0 - h1 if order > 1 else 0.0
-    d2 = h0 - 2.0 * h1 + h2 if order > 2 else 0.0
-    d3 = h0 - 3.0 * h1 + 3.0 * h2 - h3 if order > 3 else 0.0
-    return h0, d1 + 0.5 * d2 + d3 / 3.0, 0.5 * (d2 + d3), d3 / 6.0
-
-
-@inlined_kernel
-def interpolated(order, new, h0, h1, h2):
-    """Return (c0, c1, c2, c3) of the cubic through a value at the end of the step and `order` past ones.
-
-    Its integral over the step is that of Adams-Moulton.
-    """
-    d2 = new - 2.0 * h0 + h1 if order > 1 else 0.0
-    d3 = new - 3.0 * h0 + 3.0 * h1 - h2 if order > 2 else 0.0
-    return h0, new - h0 - 0.5 * d2 - d3 / 6.0, 0.5 * d2, d3 / 6.0

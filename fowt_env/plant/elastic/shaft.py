@@ -20,9 +20,9 @@ from fowt_env.plant.drivetrain import shaft_torque, torque_in_force
 from fowt_env.plant.elastic.oscillator import swung
 from fowt_env.plant.state import State
 
-# entries of RotorScratch.shaft_torque: mobility k, 1/(kg m2), now and at the beginning of the step; smooth
-# torque: of the rigid shaft less the share of the generator torque, N m
-MOBILITY, MOBILITY_BEGUN, SMOOTH = 0, 1, 2
+# entries of RotorScratch.shaft_torque: mobility k, 1/(kg m2), now and at the beginning of the step; torque of
+# a rigid shaft, N m, by all but the generator, which is smooth, and by the generator
+MOBILITY, MOBILITY_BEGUN, SMOOTH, SHARE = 0, 1, 2, 3
 
 
 class Torsion(NamedTuple):
@@ -97,14 +97,13 @@ def change_by_twist(i, dt, x, shaft, work, y):
 
 
 @kernel
-def begin_twist(shaft, work, dx):
-    """Begin a step at the last evaluation, of rates dx: keep its mobility, and as in keep_smooth."""
+def begin_twist(shaft, work):
+    """Keep mobility and accelerations of the twist at the last evaluation, at which a step begins."""
     if shaft is None:
         return
     for i in range(work.twist.shape[1]):
         work.twist[1, i] = work.twist[0, i]
     work.shaft_torque[MOBILITY_BEGUN] = work.shaft_torque[MOBILITY]
-    keep_smooth(shaft, work, dx)
 
 
 @kernel
@@ -116,6 +115,15 @@ def smooth_of(shaft, dx):
 
 
 @inlined_kernel
+def share_over(x, u, shaft, model, work, y):
+    """Return the generator's share of the torque in a rigid shaft, N m, at the beginning x and the end y."""
+    share, speed = 1.0 - work.twist[1, State.ROTOR_SPEED], generator_speed(x, shaft)
+    begun = -share * shaft_torque(0.0, torque_in_force(x, u, model.converter), speed, model.drivetrain)
+    ended = -share * shaft_torque(0.0, torque_in_force(y, u, model.converter), speed, model.drivetrain)
+    return begun, ended
+
+
+@inlined_kernel
 def _no_twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
     return
 
@@ -123,10 +131,7 @@ def _no_twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
 @inlined_kernel
 def _twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
     e, k, over = work.twist[1], work.shaft_torque[MOBILITY_BEGUN], 1.0 / after
-    # share of the generator torque that a rigid shaft would carry
-    share, speed = 1.0 - e[State.ROTOR_SPEED], generator_speed(x, shaft)
-    begun = -share * shaft_torque(0.0, torque_in_force(x, u, model.converter), speed, model.drivetrain)
-    ended = -share * shaft_torque(0.0, torque_in_force(y, u, model.converter), speed, model.drivetrain)
+    begun, ended = share_over(x, u, shaft, model, work, y)
     c0, c1, c2, c3 = c0 + begun, (c1 + ended - begun) * over, c2 * over * over, c3 * over * over * over
     q, rate = swung(
         x[shaft.first], x[shaft.first + 1], k * c0, k * c1, k * c2, k * c3, after, k * shaft.stiffness,

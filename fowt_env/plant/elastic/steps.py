@@ -9,16 +9,19 @@ Blades: the wind damps flapping at 10 to 20 1/s, edgewise and second flapwise mo
 rad/s, and Adams-Bashforth 4 alone is stable to 0.3 over the one, and errs in the damping of the other. The
 accelerations -S q - D v by structure and by the wind at rated speed, on a hub that gives way by half, are
 known well enough: S and D are constant, so the fourth difference of this part, which the formula neglects, is
-linear in the new velocities. The order stays 4 whatever S and D are.
+linear in the new velocities. The order stays 4 whatever S and D are. On a shaft that twists, bending in phase
+is exact (in_phase.py), and the correction, for a hub at rest, is that of the differences between blades.
 """
 
 from math import atan2, cos, sin
 
+from fowt_env.plant.adams import extrapolated, interpolated
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.blades import BladeModes
 from fowt_env.plant.elastic.chain import answer
-from fowt_env.plant.elastic.oscillator import extrapolated, interpolated, swung
+from fowt_env.plant.elastic.in_phase import note_means, restore_means
+from fowt_env.plant.elastic.oscillator import swung
 from fowt_env.plant.elastic.shaft import change_by_twist, rate_by_twist
 from fowt_env.plant.elastic.tower import bend_by_modes
 from fowt_env.plant.state import BLADES, State
@@ -199,12 +202,12 @@ keep_blades = chosen_by_class("blades", {type(None): _no_deflections, BladeModes
 
 
 @kernel
-def _nothing_to_correct(dt, x, history, past, blades, work, y):
+def _nothing_to_correct(dt, x, history, past, blades, shaft, work, y):
     return
 
 
 @inlined_kernel
-def _correct(dt, x, history, past, blades, work, y):
+def _correct(dt, x, history, past, blades, shaft, work, y):
     n, a, b = len(blades.beam.count), work.mass, work.probe_rest
     size = BLADES * n
     pull, drag = ELASTIC_WEIGHT * dt, IMPLICIT * dt
@@ -217,6 +220,7 @@ def _correct(dt, x, history, past, blades, work, y):
             a[k, i] /= a[i, i]
             for j in range(i + 1, n):
                 a[k, j] -= a[k, i] * a[i, j]
+    note_means(blades, shaft, work, y)
     for number in range(BLADES):
         q, at = blades.first + n * number, n * number
         for i in range(n):
@@ -238,10 +242,12 @@ def _correct(dt, x, history, past, blades, work, y):
                 b[i] -= a[i, j] * b[j]
             b[i] /= a[i, i]
             y[size + q + i] = b[i]
+    restore_means(blades, shaft, work, y)
 
 
-# (dt, x, history, past, blades, work, y): velocities of the deflections in y, by Adams-Bashforth 4 from x,
-# corrected; history of the derivatives of four steps and past of keep_blades, latest first
+# (dt, x, history, past, blades, shaft, work, y): velocities of the deflections in y, by Adams-Bashforth 4
+# from x, corrected, but not their means on a shaft that twists; history of the derivatives of four steps and
+# past of keep_blades, latest first
 correct_blades = chosen_by_class(
     "blades", {type(None): _nothing_to_correct, BladeModes: _correct}, inlined=True
 )

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.compile.handle import by_reference
+from fowt_env.plant.elastic.in_phase import N_IN_PHASE
 from fowt_env.plant.model import RigidBody
 from fowt_env.plant.state import BLADES
 
@@ -72,18 +73,27 @@ class RotorScratch(NamedTuple):
     from_own: np.ndarray
     impulse: np.ndarray
     twist: np.ndarray  # (2, n_state) accelerations by a unit one of the shaft's twist: now, at the last step
-    shaft_torque: np.ndarray  # (3,) see shaft.py
+    shaft_torque: np.ndarray  # (4,) see shaft.py
+    # of blades on a shaft that twists, see in_phase.py; else empty
+    in_phase: np.ndarray  # (in_phase.N_ROW, 1 + n)
+    in_phase_matrix: np.ndarray  # (2, 1 + n, 1 + n)
+    found: np.ndarray  # (4 + n,)
+    propagator: np.ndarray  # (2, 2 + 2 n, 6 + 6 n)
+    propagated: np.ndarray  # (2, 6 + 6 n) what it is applied to, and the result
+    offset: np.ndarray  # (n,) m, of exact mean deflections from those by Adams-Moulton
 
 
-def rotor_scratch(structure, tower, blades, n_state):
-    """Return the RotorScratch of a Structure with TowerModes and BladeModes or None; None without one."""
+def rotor_scratch(structure, tower, blades, shaft, n_state):
+    """Return the RotorScratch of a Structure with its elastic parts or None; None without one."""
     if structure is None:
         return None
     n, m = (0 if part is None else len(part.beam.count) for part in (blades, tower))
+    z = 0 if blades is None or shaft is None else 1 + n
     shapes = (
         (3, 3, 3), (BLADES + 1, 3), (BLADES + 1, 6), (BLADES + 1, n, 6), (BLADES + 1, 6), (BLADES, n, 6),
         (n, n), (BLADES, n, n), (BLADES, n), (BLADES, n), (6, 6), 6,
         (6, 6), 6, 6, n, 6, 6, 3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (2, m), (m, m),
-        (m, m), (m, m), (2, n_state), 3,
+        (m, m), (m, m), (2, n_state), 4,
+        (N_IN_PHASE, z), (2, z, z), z and 3 + z, (2, 2 * z, 6 * z), (2, 6 * z), z and n,
     )  # fmt: skip
     return RotorScratch(*(np.zeros(shape) for shape in shapes))
