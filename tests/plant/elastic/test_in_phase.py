@@ -1,14 +1,23 @@
-"""Steps of the twist with blades in phase: the propagator, against a matrix exponential."""
+"""Steps of the twist with blades in phase: propagator, momentum, lost torque; runs in plain Python."""
 
+import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fresh_python import fresh_python
+from plant_helpers import rates
 from scipy.linalg import expm
 
+from fowt_env import build_scene
+from fowt_env.plant.advance import advance, forget
 from fowt_env.plant.elastic.in_phase import N_IN_PHASE, fill_propagator
+from fowt_env.plant.state import BLADES, State
 
 FACTORIALS = (1.0, 1.0, 2.0, 6.0)
+HELD = {"rigid_body.platform_fixed": True}
+WEIGHTLESS = {"rigid_body.gravity": 0.0, "structure.lower.gravity": 0.0}
 
 
 def exact(A, B, dt):
@@ -31,11 +40,78 @@ def test_the_propagator_is_exact_for_soft_and_stiff_shafts(stiffness):
     turn = rng.normal(size=(n, n)) + 2.0 * np.eye(n)
     A = turn @ np.diag([stiffness, 150.0, 45.0, 20.0]) @ np.linalg.inv(turn)
     B = turn @ np.diag([0.5 * np.sqrt(stiffness), 1.0, 12.0, 8.0]) @ np.linalg.inv(turn)
-    work = SimpleNamespace(
-        in_phase_matrix=np.array([A, B]),
-        propagator=np.zeros((2, 2 * n, 6 * n)),
-        in_phase=np.zeros((N_IN_PHASE, n)),
-    )
+    work = SimpleNamespace(in_phase_matrix=np.array([A, B]), in_phase=np.zeros((N_IN_PHASE, n)))
+    work.propagator = np.zeros((2, 2 * n, 6 * n))
     getattr(fill_propagator, "py_func", fill_propagator)(dt, work)
     wanted = exact(A, B, dt)
     assert work.propagator[0] == pytest.approx(wanted, rel=1e-9, abs=1e-12 * np.abs(wanted).max())
+
+
+def bare(integrator):
+    """A turbine with bending blades and a twisting shaft, without air or water, its nacelle held."""
+    options = {"fidelity": "standard", "hydrodynamics": False, "mooring": False, "integrator": integrator}
+    return build_scene("oc3_hywind", blades="modes2", shaft="torsion", **options).with_model(HELD)
+
+
+def in_phase(scene, values):
+    """Rotor, twist and the modes of the blades in phase of velocities or their rates."""
+    blades, shaft = scene.model.blades, scene.model.shaft
+    n = len(blades.beam.count)
+    modes = values[blades.first + BLADES * n :][: BLADES * n].reshape(BLADES, n).sum(axis=0)
+    return np.r_[values[State.ROTOR_SPEED], values[shaft.first + 1], modes]
+
+
+def pitched(scene, pitch):
+    """A state at rest, and its command."""
+    x, u = np.zeros(scene.n_state), np.r_[0.0, np.full(BLADES, pitch)]
+    x[list(scene.pitch_states)] = pitch
+    return x, u
+
+
+def momentum_change(integrator):
+    """Change of the momentum about the shaft in two seconds of swings, over its largest part."""
+    scene, rng = bare(integrator).with_model(WEIGHTLESS), np.random.default_rng(5)
+    x, u = pitched(scene, 0.3)
+    swinging = [scene.model.shaft.first, *range(scene.model.blades.first, scene.model.shaft.first + 1)]
+    found = []
+    for _ in range(12):
+        x[swinging] = 1e-5 * rng.normal(size=len(swinging))
+        found.append(in_phase(scene, rates(scene, x, u)))
+    weights = np.linalg.svd(np.array(found) / np.abs(found).max(axis=0))[2][-1] / np.abs(found).max(axis=0)
+    x[scene.model.shaft.first] = 1e-5
+    before, most, handle = weights @ in_phase(scene, x), 0.0, scene.handle()
+    forget(handle)
+    for step in range(40):
+        assert advance(handle, x, u, step, 1, 0.05) == 0
+        most = max(most, np.abs(weights * in_phase(scene, x)).max())
+    return abs(weights @ in_phase(scene, x) - before) / most
+
+
+def swing_after_lost_torque(integrator, dt):
+    """Twist and its rate a second after a lost generator torque."""
+    scene = bare(integrator)
+    (x, u), shaft = pitched(scene, 0.1), scene.model.shaft
+    handle = scene.handle()
+    forget(handle)
+    u[0] = 2e4
+    assert advance(handle, x, u, 0, round(0.5 / dt), dt) == 0
+    u[0] = 0.0
+    assert advance(handle, x, u, round(0.5 / dt), round(1.0 / dt), dt) == 0
+    return x[[shaft.first, shaft.first + 1]].tolist()
+
+
+def in_plain_python(call):
+    code = f"import json, test_in_phase; print(json.dumps(test_in_phase.{call}))"
+    here = Path(__file__).parent
+    return json.loads(fresh_python(code, paths=(here, here.parents[1]), NUMBA_DISABLE_JIT="1"))
+
+
+@pytest.mark.parametrize("integrator", ["ab4", "abm4"])
+def test_momentum_about_the_shaft_is_kept(integrator):
+    assert in_plain_python(f"momentum_change({integrator!r})") < 1e-7
+
+
+def test_a_lost_torque_swings_the_shaft_as_in_short_steps():
+    found = in_plain_python("swing_after_lost_torque('ab4', 0.05)")
+    wanted = in_plain_python("swing_after_lost_torque('rk4', 0.005)")
+    assert found == pytest.approx(wanted, rel=1e-3)  # 2e-4; a torque that is extrapolated errs by a tenth
