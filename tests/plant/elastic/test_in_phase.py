@@ -114,4 +114,4 @@ def test_momentum_about_the_shaft_is_kept(integrator):
 def test_a_lost_torque_swings_the_shaft_as_in_short_steps():
     found = in_plain_python("swing_after_lost_torque('ab4', 0.05)")
     wanted = in_plain_python("swing_after_lost_torque('rk4', 0.005)")
-    assert found == pytest.approx(wanted, rel=1e-3)  # 2e-4; a torque that is extrapolated errs by a tenth
+    assert found == pytest.approx(wanted, rel=1e-3)  # 2e-4; an extrapolated torque errs by a third
