@@ -106,6 +106,14 @@ def in_plain_python(call):
     return json.loads(fresh_python(code, paths=(here, here.parents[1]), NUMBA_DISABLE_JIT="1"))
 
 
+@pytest.mark.parametrize("platform", ["oc3_hywind", "iea15_volturnus_s"])
+def test_a_held_rotor_on_a_tower_with_second_modes_has_shorter_steps(platform):
+    """Feathered in 50 m/s, blades of either turbine would swing without limit at 0.05 s."""
+    scene = build_scene(platform, blades="modes2", tower="modes2", shaft="torsion", fidelity="standard")
+    assert scene.dt == 0.05
+    assert scene.with_model({"rigid_body.rotor_fixed": True}).dt == 0.025
+
+
 @pytest.mark.parametrize("integrator", ["ab4", "abm4"])
 def test_momentum_about_the_shaft_is_kept(integrator):
     assert in_plain_python(f"momentum_change({integrator!r})") < 1e-7
