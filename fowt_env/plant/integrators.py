@@ -345,7 +345,7 @@ class Method(NamedTuple):
     part: tuple  # value of Model.integrator; its class selects the step
     step: object  # (t, x, u, dt, model, method, data): one step of x in place
     samples_rotor: bool = False  # whether the rotor load can be evaluated more than once a step
-    swings: bool = False  # whether the bending of the tower is advanced exactly
+    swings: bool = False  # whether bending of the tower, and blades in phase on a twisting shaft, are exact
 
 
 # The limits are textbook values, except for an oscillation under ab4 (0.43 for Adams-Bashforth alone): the

@@ -102,7 +102,7 @@ class Data(NamedTuple):
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first
-    elastic: np.ndarray  # (4, n) deflections of the blades at past steps, latest first
+    elastic: np.ndarray  # (4, n) past deflections of the blades, scene.blade_beam.kept_states, latest first
     samples: np.ndarray  # (4 samples, 7) rotor loads within past steps, latest first
     radiation: np.ndarray  # hydro.radiation.memory_data; empty without radiation memory
     slow: np.ndarray  # (4, slow_loads.N_SLOW) loads of water and lines at past steps, latest first

@@ -112,7 +112,7 @@ FIDELITIES = {
     "elastic": Fidelity(
         "standard with blades and tower that bend, a shaft that twists and a wake that lags",
         rotor="lookup", wave_loads="fast", integrator="ab4", mooring="catenary", radiation="state_space",
-        error=5e-3, blades="modes2", tower="modes2", shaft="torsion",
+        error=5e-4, blades="modes2", tower="modes2", shaft="torsion",
         dynamic_inflow=True,
     ),
     "fast": Fidelity(
