@@ -17,6 +17,7 @@ BESIDE = ("controllers", "training")
 LEFT_OUT = ("training.studies*", "training.validation.reference*")
 
 
+
 class BuildWithBridge(build_py):
     """Builds the library that runs a controller in Python behind the Bladed interface, where it can."""
 
