@@ -29,15 +29,15 @@ class MPCSettings(Settings):
     }
 
     speed: float = 1.0  # price of rotor speed
-    platform_pitch: float = 0.8
-    surge: float = 0.35
-    shaft: float = 0.3  # torque of the shaft
-    power: float = 0.1
+    platform_pitch: float = 1.2
+    surge: float = 0.7
+    shaft: float = 0.15  # torque of the shaft
+    power: float = 0.05
     travel: float = 1.0  # limit of blade-pitch travel, over that of gspi_oc3
-    shaft_near_rated: float = 0.035  # deviation of shaft torque by lulls at the lowest design wind, of rated
+    shaft_near_rated: float = 0.025  # deviation of shaft torque by lulls at the lowest design wind, of rated
     speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
     torque_rate: float = 0.1  # cost of (torque rate / 5 % of rated a second)^2
-    schedule_time: float = 240.7  # s, time constant of the operating wind
+    schedule_time: float = 300.0  # s, time constant of the operating wind
     horizon: float = 30.0  # s
     preview_time: float = 10.0  # s, look-ahead time of laws with preview
     speed_limit: float = 1.15  # of rated, soft
