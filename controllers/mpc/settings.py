@@ -34,7 +34,7 @@ class MPCSettings(Settings):
     shaft: float = 0.15  # torque of the shaft
     power: float = 0.05
     travel: float = 1.0  # limit of blade-pitch travel, over that of gspi_oc3
-    shaft_near_rated: float = 0.025  # deviation of shaft torque by lulls at the lowest design wind, of rated
+    shaft_near_rated: float = 0.022  # deviation of shaft torque by lulls at the lowest design wind, of rated
     speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
     torque_rate: float = 0.1  # cost of (torque rate / 5 % of rated a second)^2
     schedule_time: float = 300.0  # s, time constant of the operating wind
