@@ -11,7 +11,7 @@ PRICES = ("speed", "platform_pitch", "surge", "shaft", "power", "speed_integral"
 class MPCSettings(Settings):
     """Holds the prices of deviations over those of gspi_oc3 (weights.py), horizon and limits of MPC.
 
-    The default prices are results of `fowt design tune mpc --aim scores`.
+    The aim of the default prices is that of `fowt design tune mpc --aim scores`.
 
     Raises: InputError naming the key, value and allowed range.
     """
@@ -33,7 +33,7 @@ class MPCSettings(Settings):
     surge: float = 0.7
     shaft: float = 0.15  # torque of the shaft
     power: float = 0.05
-    travel: float = 1.0  # limit of blade-pitch travel, over that of gspi_oc3
+    travel: float = 1.0  # limit, not a price, of blade-pitch travel, over that of gspi_oc3
     shaft_near_rated: float = 0.022  # deviation of shaft torque by lulls at the lowest design wind, of rated
     speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
     torque_rate: float = 0.1  # cost of (torque rate / 5 % of rated a second)^2

@@ -1,14 +1,14 @@
 """Computes the weights of MPC's cost at each wind: those of the least sum of ratios to gspi_oc3.
 
 On the linear loop of controllers/lqr/optimum.py with Kalman filter, standard deviations are s_i and those of
-gspi_oc3 b_i. MPCSettings has the prices c_i of sum(c_i s_i/b_i), which is convex in the loop. Its minimum is
-that of the quadratic cost sum(w_i s_i^2) with w_i = c_i/(s_i b_i), found by iteration (iteratively reweighted
-least squares: Daubechies et al., Comm. Pure Appl. Math. 63, 2010). Hence no wind is without a price, whatever
-its fraction of the lifetime.
+gspi_oc3 b_i. MPCSettings has the prices c_i of sum(c_i s_i/b_i), which is convex in the loop, and the limit
+of blade-pitch travel, whose price follows from it. The minimum is that of the quadratic cost sum(w_i s_i^2)
+with w_i = c_i/(s_i b_i), found by iteration (iteratively reweighted least squares: Daubechies et al., Comm.
+Pure Appl. Math. 63, 2010). Hence no wind is without a price, whatever its fraction of the lifetime.
 
 The linear loop has no lulls, in which the torque must follow the available power. Near rated wind the
-variance shaft_near_rated^2 is therefore added to both variances of the shaft torque, and where the linear
-model of gspi_oc3 is unstable, its deviations at the next higher wind are used.
+variance shaft_near_rated^2 is therefore added to both variances of the shaft torque, the price of travel is
+that of the next higher wind, and so are the deviations of gspi_oc3 where its linear model is unstable.
 """
 
 import numpy as np
@@ -21,16 +21,15 @@ PRICED = {  # field of Deviations -> its price in MPCSettings
 }  # fmt: skip
 TRAVEL = "travel"
 CHEAPEST, DEAREST = 0.1, 10.0  # range of the price of pitch travel
-STEP = 1.0  # exponent of
 SHAFT_NOISE = 1e-3  # of rated torque, smallest deviation of shaft torque: direct drives have almost none
-TOLERANCE = 0.02  # of the weights, relative
+TOLERANCE = 0.02  # of the ratios, relative
 ROUNDS = 30
 
 
 def weights_over(models, settings, turbine, dt):
-    """Return {wind: weights (N_COST,) of the squared terms, per second} of DesignModels, ascending in wind.
+    """Return {wind: weights (N_COST,) of the squared terms, per second} from lowest_design_wind on.
 
-    Only winds from lowest_design_wind on have weights. dt: control period, s.
+    models: DesignModels in ascending order of wind; dt: control period, s.
     """
     found, base, ratios = {}, None, None
     for model in reversed(models):  # from strong wind, where the linear model holds, down to rated
@@ -69,7 +68,7 @@ def _weights(loop, base, settings, start):
         reached = _deviations(reached, wind, settings, loop.turbine)
         ratios = {name: value / base[name] for name, value in reached.items()}
         excess = ratios[TRAVEL] / settings.travel if limited else 1.0
-        price = min(max(price * excess**STEP, CHEAPEST), DEAREST)
+        price = min(max(price * excess, CHEAPEST), DEAREST)
         changes = [excess, *(ratios[name] / before[name] for name in prices)]
         if all(abs(change - 1.0) < TOLERANCE for change in changes):
             break

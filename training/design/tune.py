@@ -103,9 +103,9 @@ _LQR = {
     "torque_rate": (0.03, 2.0), "schedule_time": (60.0, 250.0),
 }  # fmt: skip
 _MPC = {
-    "platform_pitch": (0.5, 1.5), "surge": (0.25, 1.2), "shaft": (0.15, 0.8), "power": (0.03, 0.8),
-    "pitch_travel": (0.6, 1.5), "shaft_near_rated": (0.03, 0.1), "torque_rate": (0.01, 0.3),
-    "schedule_time": (60.0, 250.0),
+    "platform_pitch": (0.5, 2.0), "surge": (0.25, 1.5), "shaft": (0.08, 0.5), "power": (0.02, 0.5),
+    "travel": (0.8, 1.2), "shaft_near_rated": (0.01, 0.06), "torque_rate": (0.02, 0.5),
+    "schedule_time": (100.0, 400.0),
 }  # fmt: skip
 
 
