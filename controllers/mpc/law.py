@@ -171,7 +171,7 @@ class MPC:
 
         def make():  # returned with the inputs, so that their ids stay valid
             lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
-            weights = weights_over(models, self.settings, self.turbine, self.control_dt)
+            weights = weights_over(models, self.settings, self.estimator.turbine, self.control_dt)
             same = (self.turbine, self.table, self.period)
             pairs = [(m, m if m.wind >= lowest.wind else lowest) for m in models]
             wind_models = [wind_model(m, other, weights[other.wind], *same) for m, other in pairs]

@@ -15,12 +15,14 @@ import numpy as np
 
 from fowt_env.controllers.lqr.design import equivalent_wind, lowest_design_wind
 from fowt_env.controllers.lqr.optimum import GAUSSIAN_MEAN, NEAR_RATED, NO_LULLS, SampledLoop
+from fowt_env.descriptions.units import DEGREE
 
 PRICED = {  # field of Deviations -> its price in MPCSettings
     "speed": "speed", "lean": "platform_pitch", "surge": "surge", "shaft": "shaft", "power": "power",
 }  # fmt: skip
 TRAVEL = "travel"
 CHEAPEST, DEAREST = 0.1, 10.0  # range of the price of pitch travel
+UNKNOWN = {TRAVEL: 0.14 * DEGREE, "surge": 1.0}  # rad/s, m: if gspi_oc3 is unstable in the strongest wind
 SHAFT_NOISE = 1e-3  # of rated torque, smallest deviation of shaft torque: direct drives have almost none
 TOLERANCE = 0.02  # of the ratios, relative
 ROUNDS = 30
@@ -31,7 +33,7 @@ def weights_over(models, settings, turbine, dt):
 
     models: DesignModels in ascending order of wind; dt: control period, s.
     """
-    found, base, ratios = {}, None, None
+    found, base, ratios = {}, UNKNOWN, None
     for model in reversed(models):  # from strong wind, where the linear model holds, down to rated
         if model.wind >= lowest_design_wind(turbine):
             loop = SampledLoop(model, turbine, dt)
@@ -40,7 +42,7 @@ def weights_over(models, settings, turbine, dt):
     return found
 
 
-def _deviations(deviations, wind, settings, turbine, instead=None):
+def _deviations(deviations, wind, settings, turbine, instead=UNKNOWN):
     """Return {field: deviation} of PRICED with that of lulls; instead: values for those that are infinite."""
     lowest = equivalent_wind(turbine, lowest_design_wind(turbine))
     fade = np.interp(equivalent_wind(turbine, wind), (lowest, NO_LULLS), (1.0, 0.0))

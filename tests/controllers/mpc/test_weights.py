@@ -41,7 +41,10 @@ def test_pitch_travel_is_that_of_the_limit_in_each_wind(models):
 
 
 def test_no_other_weights_have_a_smaller_sum_of_ratios(models):
-    """Against a general minimiser over all weights, at 18 m/s with the price of travel that was found."""
+    """Against a general minimiser over all weights, at 18 m/s with the price of travel that was found.
+
+    The weight of travel is on the rate of the command, not of the blades, and costs some 0.2 %.
+    """
     settings = MPCSettings(speed_integral=1e-9, torque_rate=1e-6)
     loop, ours = of_wind(models, 18.0), weights_over(models, settings, TURBINE, 0.1)[18.0]
     prices = [asdict(settings)[name] for name in PRICED.values()]
@@ -58,8 +61,9 @@ def test_no_other_weights_have_a_smaller_sum_of_ratios(models):
         return ours * factors
 
     least = minimize(total, np.zeros(6), method="Nelder-Mead", options={"maxfev": 150})
-    assert total(np.zeros(6)) < 1.002 * least.fun
-    assert total([1.0, 0.0, 0.0, 0.0, 0.0, 0.0]) > 1.002 * total(np.zeros(6))
+    assert total(np.zeros(6)) < 1.005 * least.fun
+    for change in (-1.0, 1.0):
+        assert total([change, 0.0, 0.0, 0.0, 0.0, 0.0]) > 1.001 * total(np.zeros(6))
 
 
 def test_the_shaft_is_cheap_near_rated_wind_alone(models):
