@@ -32,7 +32,9 @@ from fowt_env.controllers.lqr.design import (
 from fowt_env.controllers.pi import PISettings, schedule_gain
 from fowt_env.descriptions.units import DEGREE
 
-SPEED, LEAN, BLADE = (PLANT.index(name) for name in ("rotor_speed", "platform_pitch", "blade_pitch"))
+SURGE, SPEED, LEAN, BLADE = (
+    PLANT.index(name) for name in ("surge", "rotor_speed", "platform_pitch", "blade_pitch")
+)
 TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2  # after the plant, in the states fed back
 ESTIMATED = [*range(N_PLANT), *range(N_PLANT + 3, N_FEEDBACK)]  # feedback states estimated by the filter
 OF_FILTER = [*range(N_PLANT), *range(WIND, MOMENT)]  # indices of ESTIMATED in the filter's states
@@ -61,6 +63,12 @@ class Deviations:
     power: float  # of rated
     torque: float  # of the generator, of rated
     shaft: float  # torque of the shaft, of rated
+    surge: float  # m
+
+
+def generator_inertia(turbine, torque):
+    """Return the generator inertia over a generator torque (N m), both on the low-speed shaft, s2."""
+    return turbine.drivetrain.gear_ratio * turbine.drivetrain.generator_inertia / torque
 
 
 def stationary_covariance(a, q):
@@ -111,13 +119,12 @@ class SampledLoop:
             "power": (eye[SPEED] / rated + eye[TORQUE], none),
             "torque": (eye[TORQUE], none),
             "shaft": (eye[TORQUE] + self._inertia * acceleration, none),
+            "surge": (eye[SURGE], none),
         }
 
     @property
     def _inertia(self):
-        """Return the generator inertia over rated torque, both on the low-speed shaft, s2."""
-        drive = self.turbine.drivetrain
-        return drive.gear_ratio * drive.generator_inertia / self.model.torque
+        return generator_inertia(self.turbine, self.model.torque)
 
     def gain(self, weights, integral, torque_rate):
         """Return the optimal gain K (2, N_FEEDBACK): inputs are -K x.
@@ -203,16 +210,16 @@ class SampledLoop:
         a[n], a[n + 1] = filtered, integral
         q[:n, :n] = self.noise
         if np.abs(np.linalg.eigvals(a)).max() >= 1.0:
-            return Deviations(speed, lean, float("inf"), power, 0.0, SHAFT_CEILING)
+            return Deviations(speed, lean, float("inf"), power, 0.0, SHAFT_CEILING, float("inf"))
         x = stationary_covariance(a, q)
         eye = np.eye(n + 2)
         acceleration = self.model.B[SPEED, 1] * command
         acceleration[:n] += self.model.A[SPEED, :n]
-        rows = (eye[SPEED], eye[LEAN], a[BLADE] - eye[BLADE], acceleration)
+        rows = (eye[SPEED], eye[LEAN], a[BLADE] - eye[BLADE], acceleration, eye[SURGE])
         std = [sqrt(row @ x @ row) for row in rows]
         travel, shaft = GAUSSIAN_MEAN / dt * std[2], self._inertia * std[3]
         return Deviations(
-            min(std[0], speed), min(std[1], lean), travel, min(std[0] / rated, power), 0.0, shaft
+            min(std[0], speed), min(std[1], lean), travel, min(std[0] / rated, power), 0.0, shaft, std[4]
         )
 
 

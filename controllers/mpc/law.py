@@ -19,11 +19,12 @@ from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator, limits_of, speed_integral
 from fowt_env.controllers.mpc.ahead import LearntShare
-from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, SPEED, TORQUE, WindModel, cost_rows, wind_model
+from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, N_COST, SPEED, TORQUE, WindModel, wind_model
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
+from fowt_env.controllers.mpc.weights import weights_over
 from fowt_env.descriptions.nrel5mw import RATED_WIND
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
@@ -76,7 +77,13 @@ def observe(estimator, estimated, measurement, command, p, memory):
 
 
 @entry
-def move(estimated, p, memory, curve, command):
+def lowest_torque(estimated, p, curve):
+    """Return the lower limit of torque, N m: that of the settings, or of the turbine's curve in a lull."""
+    return min(p[Entry.TORQUE_LOW], generator_torque(p[Entry.GEAR_RATIO] * estimated[ROTOR], 0.0, curve))
+
+
+@entry
+def move(estimated, p, memory, curve, low_torque, command):
     """Integrate the command with the rates in force, within limits.
 
     If both the present and the operating wind are low, torque follows the turbine's curve at minimum pitch.
@@ -86,7 +93,7 @@ def move(estimated, p, memory, curve, command):
     pitch = before + dt * memory[Memory.PITCH_RATE]
     command[1] = clamp(pitch, p[Entry.PITCH_MINIMUM], p[Entry.PITCH_MAXIMUM])
     torque = command[0] + dt * memory[Memory.TORQUE_RATE]
-    torque = clamp(torque, p[Entry.TORQUE_LOW], p[Entry.TORQUE_HIGH])
+    torque = clamp(torque, low_torque, p[Entry.TORQUE_HIGH])
     low, high = p[Entry.CURVE_BELOW], p[Entry.PLAN_ABOVE]
     wind = max(memory[Memory.OPERATING_WIND], estimated[ESTIMATED_WIND + 1])
     blend = clamp((wind - low) / (high - low), 0.0, 1.0)
@@ -128,7 +135,6 @@ class MPC:
         self.estimator = WindEstimator(turbine, self.control_dt)
         self.curve = build_torque_curve(turbine.torque_law)
         self.grid = grid_of(self.settings, self.period)
-        self.rows = cost_rows(turbine.rated_rotor_speed)
         self.parameters = self._parameters()
         self.table = self.program = None
         self.unsolved = 0
@@ -165,8 +171,10 @@ class MPC:
 
         def make():  # returned with the inputs, so that their ids stay valid
             lowest = next(m for m in models if m.wind >= lowest_design_wind(self.turbine))
-            same = (self.settings, self.turbine, self.table, self.period)
-            wind_models = [wind_model(m, m if m.wind >= lowest.wind else lowest, *same) for m in models]
+            weights = weights_over(models, self.settings, self.estimator.turbine, self.control_dt)
+            same = (self.turbine, self.table, self.period)
+            pairs = [(m, m if m.wind >= lowest.wind else lowest) for m in models]
+            wind_models = [wind_model(m, other, weights[other.wind], *same) for m, other in pairs]
             rows = WindModel(*(np.array(rows) for rows in zip(*wind_models, strict=True)))
             return models, self.table, (models[0].wind, rows)
 
@@ -199,9 +207,10 @@ class MPC:
         estimated = self.estimator.memory
         observe(self.estimator.parameters, estimated, values, self.command, self.parameters, self.memory)
         if self.calls % self.every == 0:
+            self.low_torque = lowest_torque(estimated, self.parameters, self.curve)
             self._replan(self._ahead(measurement))
         self.calls += 1
-        move(estimated, self.parameters, self.memory, self.curve, self.command)
+        move(estimated, self.parameters, self.memory, self.curve, self.low_torque, self.command)
         return float(self.command[0]), float(self.command[1])
 
     @property
@@ -255,10 +264,11 @@ class MPC:
         x[INTEGRAL] = self.memory[Memory.INTEGRAL]
         x[FILTER:] = estimated[ESTIMATED_WIND:MOMENT]
         x[FILTER : FILTER + 2] -= wind
-        references, end = np.zeros(len(self.rows)), np.zeros(N_FEEDBACK)
+        references, end = np.zeros(N_COST), np.zeros(N_FEEDBACK)
         references[0] = end[SPEED] = rated - model.trim[SPEED]
         rate = turbine.torque_law.max_torque_rate / torque
-        torques = self.parameters[[Entry.TORQUE_LOW, Entry.TORQUE_HIGH]] / torque - model.trim[TORQUE]
+        torques = np.array([self.low_torque, self.parameters[Entry.TORQUE_HIGH]])
+        torques = torques / torque - model.trim[TORQUE]
         pitches = np.array([drive.minimum, drive.maximum]) - model.trim[COMMAND]
         speeds = (-rated, settings.speed_limit * rated - model.trim[SPEED])
         limits = np.array([-rate, rate, -drive.rate_limit, drive.rate_limit, *torques, *pitches, *speeds])
@@ -270,8 +280,8 @@ class MPC:
         if len(ahead) and self.exact:  # only the plan, not the feedback, responds to the previewed wind
             gain[:, FILTER : FILTER + 2] = 0.0
         kept = newton_step(
-            model, gain, wind, self.table, self.nonlinear, self.rows, references, end, ahead, limits, units,
-            self.grid, old, work, step,
+            model, gain, wind, self.table, self.nonlinear, references, end, ahead, limits, units, self.grid,
+            old, work, step,
         )  # fmt: skip
         if self.constrained and not kept:
             if self.program is None:

@@ -14,21 +14,19 @@ from fowt_env.controllers.lqr.design import (
     N_FEEDBACK,
     N_PLANT,
     PLANT,
-    equivalent_wind,
     feedback_plant,
     sampled,
 )
+from fowt_env.controllers.lqr.optimum import generator_inertia
 from fowt_env.controllers.mpc.rotor_table import rotor_loads
-from fowt_env.descriptions.units import DEGREE
 from fowt_env.plant.compile.decorators import entry
 
-SURGE_RATE, SPEED, LEAN, LEAN_RATE, BLADE = (
-    PLANT.index(name) for name in ("vx", "rotor_speed", "platform_pitch", "wy", "blade_pitch")
+SURGE, SURGE_RATE, SPEED, LEAN, LEAN_RATE, BLADE = (
+    PLANT.index(name) for name in ("surge", "vx", "rotor_speed", "platform_pitch", "wy", "blade_pitch")
 )
 TORQUE, COMMAND, INTEGRAL = N_PLANT, N_PLANT + 1, N_PLANT + 2
 FILTER, WIND = N_PLANT + 3, N_PLANT + 4
-WEIGHT_WIND = 18.0  # m/s of the NREL 5 MW turbine, wind at which the weights of the settings apply
-N_COST = 8  # squared terms: speed, platform pitch and rate, torque, power, integral, rates of both commands
+N_COST = 8  # squared terms: speed, platform pitch, surge, shaft, power, integral, rates of both commands
 
 
 class WindModel(NamedTuple):
@@ -42,38 +40,24 @@ class WindModel(NamedTuple):
     G: np.ndarray  # (n, 2) input of nonlinear thrust (N) and torque (N m), constant over a period
     K: np.ndarray  # (2, n) LQ gain
     P: np.ndarray  # (n, n) cost to go
+    rows: np.ndarray  # (N_COST, n) of states in the squared terms; rows of the two rates are zero
     weights: np.ndarray  # (N_COST,) of the squared terms over a period
 
 
-def cost_rows(rated_speed):
-    """Return the rows (N_COST, n) of states in the squared terms; rows of the two rates are zero."""
+def cost_rows(a, rated_speed, inertia):
+    """Return the rows (N_COST, n) of states in the squared terms; rows of the two rates are zero.
+
+    Shaft torque: that of the generator and of its acceleration, by a of feedback_plant; inertia: of
+    generator_inertia. Shaft torque and power are over their rated values.
+    """
     rows = np.zeros((N_COST, N_FEEDBACK))
-    for row, state in enumerate((SPEED, LEAN, LEAN_RATE, TORQUE)):
+    for row, state in enumerate((SPEED, LEAN, SURGE)):
         rows[row, state] = 1.0
+    rows[3] = inertia * a[SPEED]
+    rows[3, TORQUE] += 1.0
     rows[4, SPEED], rows[4, TORQUE] = 1.0 / rated_speed, 1.0
     rows[5, INTEGRAL] = 1.0
     return rows
-
-
-def cost_weights(settings, wind, rated_speed, period):
-    """Return the weights (N_COST,) of the squared terms over a period (s) at an equivalent_wind, m/s."""
-    s, ratio = settings, wind / WEIGHT_WIND
-    below = ratio < 1.0
-    pitch_rate = s.pitch_rate * ratio ** (s.pitch_rate_growth if below else s.pitch_rate_growth_above)
-    power = s.power * ratio ** (s.power_growth if below else s.power_growth_above)
-    per_second = np.array(
-        [
-            s.speed / (0.05 * rated_speed) ** 2,
-            s.platform_pitch / DEGREE**2,
-            s.platform_pitch_rate / (0.1 * DEGREE) ** 2,
-            s.torque * ratio**s.torque_growth / 0.05**2,
-            power / 0.05**2,
-            s.speed_integral / (0.5 * rated_speed) ** 2,
-            s.torque_rate / 0.05**2,
-            pitch_rate / (0.2 * DEGREE) ** 2,
-        ]
-    )
-    return period * per_second
 
 
 @entry
@@ -81,8 +65,11 @@ def _loads_at(wind, rotor_speed, blade_pitch, table, loads):
     rotor_loads(wind, rotor_speed, blade_pitch, table, loads)
 
 
-def wind_model(model, feedback, settings, turbine, table, period):
-    """Return the WindModel of a DesignModel, with gain and cost to go of the DesignModel `feedback`."""
+def wind_model(model, feedback, weights, turbine, table, period):
+    """Return the WindModel of a DesignModel, with cost, gain and cost to go of the DesignModel `feedback`.
+
+    weights: (N_COST,) of the squared terms, per second; period: s.
+    """
     rated, law = turbine.rated_rotor_speed, turbine.torque_law
     a, b = _plant(model, turbine)
     loads = np.empty(8)
@@ -93,12 +80,13 @@ def wind_model(model, feedback, settings, turbine, table, period):
     g[moved, 0] = a[moved, WIND] / loads[1]
     g[SPEED, 1] = a[SPEED, WIND] / loads[5]
     motion = a[SPEED, moved] / a[SPEED, WIND]
-    weights = cost_weights(settings, equivalent_wind(turbine, feedback.wind), rated, period)
-    k, p = lq(*_plant(feedback, turbine), weights, rated, period)
+    weights, plant = period * weights, _plant(feedback, turbine)
+    rows = cost_rows(plant[0], rated, generator_inertia(turbine, law.rated_torque))
+    k, p = lq(*plant, rows, weights, period)
     ad, bd = sampled(a, b, period)
     _, gd = sampled(a, g, period)
     trim = np.array([*model.trim, model.torque / law.rated_torque, model.pitch])
-    parts = (trim, loads, motion, ad, bd, gd, k, p, weights)
+    parts = (trim, loads, motion, ad, bd, gd, k, p, rows, weights)
     return WindModel(*(np.ascontiguousarray(part) for part in parts))
 
 
@@ -109,10 +97,9 @@ def _plant(model, turbine):
     return a, b
 
 
-def lq(a, b, weights, rated_speed, period):
-    """Return (K, P) of the discrete LQ problem with squared terms of cost_rows at each period's start."""
+def lq(a, b, rows, weights, period):
+    """Return (K, P) of the discrete LQ problem with weighted squares of rows at each period's start."""
     ad, bd = sampled(a, b, period)
-    rows = cost_rows(rated_speed)
     q, r = rows.T @ (weights[:, None] * rows), np.diag(weights[-2:])
     p = solve_discrete_are(ad, bd, q, r)
     return np.linalg.solve(r + bd.T @ p @ bd, bd.T @ p @ ad), p

@@ -141,7 +141,7 @@ def _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed):
 
 
 @kernel
-def _condense(model, rows, references, end, grid, moves, work, gain):
+def _condense(model, references, end, grid, moves, work, gain):
     """Fill H and g from the squared deviations from references and the cost to go about the state `end`."""
     n, width = N_FEEDBACK, len(moves)
     h, g, x, s = work.H, work.g, work.states, work.slopes
@@ -159,7 +159,7 @@ def _condense(model, rows, references, end, grid, moves, work, gain):
             for c in range(used):
                 y[c] = 0.0
             for j in range(n):
-                factor = rows[q, j] if rate < 0 else -gain[rate, j]
+                factor = model.rows[q, j] if rate < 0 else -gain[rate, j]
                 if factor != 0.0:
                     value += factor * x[k, j]
                     for c in range(used):
@@ -225,7 +225,7 @@ def _limit(limits, units, grid, moves, work, gain):
 
 @entry
 def newton_step(
-    model, gain, wind, table, nonlinear, rows, references, end, ahead, limits, units, grid, moves, work, step
+    model, gain, wind, table, nonlinear, references, end, ahead, limits, units, grid, moves, work, step
 ):
     """Fill work about the plan `moves`, and step (moves,) with the optimal change without limits.
 
@@ -233,7 +233,7 @@ def newton_step(
     """
     closed = model.A - model.B @ gain
     _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed)
-    _condense(model, rows, references, end, grid, moves, work, gain)
+    _condense(model, references, end, grid, moves, work, gain)
     _limit(limits, units, grid, moves, work, gain)
     step[:] = np.linalg.solve(work.H, -work.g)
     kept = True

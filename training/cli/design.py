@@ -363,6 +363,7 @@ def tune_command(
     platform: shared.PlatformOption = "oc3_hywind",
     seeds: shared.ValidationSeeds = "1001,1002",
     preview: Annotated[str, Option(help="Wind preview: exact, or the name of a lidar.")] = "exact",
+    aim: Annotated[str, Option(help="Aim: motions or scores, see below.")] = "motions",
     jobs: shared.JobsOption = 1,
     engine: shared.EngineOption = "processes",
     address: shared.AddressOption = None,
@@ -376,9 +377,12 @@ def tune_command(
     Examples:
     fowt design tune pi_tuned  # three factors on the published gains, 40 settings tried
     fowt design tune rosco_float --jobs 2 --keep  # write the result to controllers/tuned.toml
+    fowt design tune mpc --aim scores --keep  # for both scores of the suite
 
-    Cost: mean lifetime ratio of rotor-speed and platform-pitch deviation to gspi_oc3's, and penalties for
-    exceeded limits of the suite, for energy below 99.5 % and for failed or tripped runs.
+    Cost: the aim, and penalties for exceeded limits of the suite, for energy below 99.5 % and for failed or
+    tripped runs. Aims: motions, the mean lifetime ratio of rotor-speed and platform-pitch deviation to
+    gspi_oc3's; scores, the mean of the suite's two scores, with limits of pitch travel, shaft torque,
+    power and rotor-speed deviation in each wind.
     """
     from fowt_env.training.design.tune import tune, write_tuned
     from fowt_env.training.evaluation.engines import session
@@ -389,6 +393,7 @@ def tune_command(
     settings = {"suite": suite, "seeds": numbers, "jobs": jobs, "engine": engine, "address": address}
     settings |= {} if platform == "oc3_hywind" else {"platform": platform}
     settings |= {} if preview == "exact" else {"preview": preview}
+    settings |= {} if aim == "motions" else {"aim": aim}
     with progress_bar(f"tuning {name}", budget) as update, session(engine, jobs, address):
 
         def report(number, row):

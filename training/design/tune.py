@@ -3,9 +3,10 @@
     fowt design tune rosco_float --budget 40 --out results/tune
 
 Settings are evaluated on the cases of a suite with validation seeds (1000 and above, never used for scoring).
-The cost is the mean of the lifetime deviations of rotor speed and platform pitch over those of gspi_oc3 on
-the same runs, plus PENALTY times the relative excess over the suite's limits, in each wind, and over LIMITS,
-plus LOST times the fraction of lost runs. The current settings come first, then up to half of the budget
+The cost is the aim over gspi_oc3 on the same runs, plus PENALTY times the relative excess over the suite's
+limits, in each wind, and over LIMITS, plus LOST times the fraction of lost runs. The aim "motions" is the
+mean of the lifetime deviations of rotor speed and platform pitch; "scores" is the mean of the suite's two
+scores, and EACH limits each wind. The current settings come first, then up to half of the budget
 in a Sobol sequence, then the Nelder-Mead method from the best. OUT/tune_NAME.csv is written after each.
 """
 
@@ -36,7 +37,7 @@ from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.failures import penalised, with_lost_power
-from fowt_env.training.evaluation.leaderboard import decisions
+from fowt_env.training.evaluation.leaderboard import decisions, leaderboard
 from fowt_env.training.evaluation.metrics import EXPONENTS, METRICS, better
 from fowt_env.training.evaluation.results_table import case_shares
 from fowt_env.training.evaluation.run_case import CONTROL_DT, OK, REFERENCE
@@ -52,6 +53,11 @@ FIGURES = {
 }  # fmt: skip
 # ratios to the baseline, stricter than the suite's: an optimum at a limit exceeds it on other seeds
 LIMITS = {"blade_pitch_travel_[deg/s]": 0.98, "RotTorq_DEL_[kN-m]": 1.05, "GenPwr_capped_mean_[kW]": 0.995}
+EACH = {  # of each wind
+    "blade_pitch_travel_[deg/s]": (1.2,), "RotTorq_DEL_[kN-m]": (1.2,), "GenPwr_std_[kW]": (1.05,),
+    "RotSpeed_std_[rpm]": (1.0,),
+}  # fmt: skip
+MOTIONS, SCORES = "motions", "scores"  # aims of a search
 PENALTY = 10.0  # 1 % above a limit costs as much as 10 % of the deviations
 LOST = 5.0
 FIRST_STEP = 0.12  # size of the initial simplex in the unit cube
@@ -97,10 +103,9 @@ _LQR = {
     "torque_rate": (0.03, 2.0), "schedule_time": (60.0, 250.0),
 }  # fmt: skip
 _MPC = {
-    "platform_pitch": (0.5, 6.0), "platform_pitch_rate": (0.05, 1.0), "power": (0.05, 1.5),
-    "torque": (0.03, 1.0),
-    "pitch_rate": (2.0, 20.0), "pitch_rate_growth": (0.0, 6.0), "pitch_rate_growth_above": (-3.0, 2.0),
-    "torque_rate": (0.2, 5.0), "schedule_time": (60.0, 250.0),
+    "platform_pitch": (0.5, 2.0), "surge": (0.25, 1.5), "shaft": (0.08, 0.5), "power": (0.02, 0.5),
+    "travel": (0.8, 1.2), "shaft_near_rated": (0.01, 0.06), "torque_rate": (0.02, 0.5),
+    "schedule_time": (100.0, 400.0),
 }  # fmt: skip
 
 
@@ -148,12 +153,14 @@ def spaces():
 class Objective:
     """Computes the cost of controllers on the cases of a suite with some validation seeds."""
 
-    def __init__(self, suite=SUITE, seeds=SEEDS, platform=None, **engine):
+    def __init__(self, suite=SUITE, seeds=SEEDS, platform=None, aim=MOTIONS, **engine):
         if any(seed < VALIDATION.start for seed in seeds):
             raise InputError(
                 f"seeds = {list(seeds)}: must be {VALIDATION.start} or more, which are not used for scoring"
             )
-        self.suite, self.seeds, self.engine = read_suite(suite, platform), tuple(seeds), engine
+        if aim not in (MOTIONS, SCORES):
+            raise unknown("aim", aim, (MOTIONS, SCORES))
+        self.suite, self.seeds, self.engine, self.aim = read_suite(suite, platform), tuple(seeds), engine, aim
         self.turbine = build_scene(self.suite.cases[0].platform).turbine
         self.base = evaluate(BASELINE, self.suite, seeds=self.seeds, reference=BASELINE, **engine)
 
@@ -170,14 +177,22 @@ class Objective:
         lost = float((runs["status"] != OK).mean())
         limits = self.suite.limits
         others = {name: limit for name, limit in limits.relative.items() if name not in LIMITS}
-        limits = limits.model_copy(update={"relative": others})
+        each = limits.case_relative | (EACH if self.aim == SCORES else {})
+        limits = limits.model_copy(update={"relative": others, "case_relative": each})
         beyond = [-better(name) * (ratio[name] / limit - 1.0) for name, limit in LIMITS.items()]
         beyond += [each.excess for each in decisions(made, "candidate", limits)]
         excess = sum(max(0.0, each) for each in beyond)
-        cost = float(np.mean([ratio[name] for name in AIMS])) + PENALTY * excess + LOST * lost
+        aims = [ratio[name] for name in AIMS] if self.aim == MOTIONS else self._scores(made)
+        cost = float(np.mean(aims)) + PENALTY * excess + LOST * lost
         result = {"cost": cost if np.isfinite(cost) else 2.0 * LOST}
         result |= {key: float(ratio[name]) for key, name in FIGURES.items()}
         return result | {"lost": lost, "beyond": float(excess)}
+
+    def _scores(self, table):
+        """Return the suite's scores of the candidate: of the lifetime, and mean of the winds."""
+        entries = leaderboard(table, score=self.suite.score)["controllers"]
+        (entry,) = (each for each in entries if each["controller"] == "candidate")
+        return [entry["score"][key]["mean"] for key in ("lifetime", "winds")]
 
     def _means(self, runs):
         """Return a Series of the lifetime means of METRICS over the runs of one controller."""
@@ -237,11 +252,12 @@ def write_tuned(name, settings, figures, budget, objective, path=TUNED):
     import tomllib
 
     stored = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    seeds = list(objective.get("seeds", SEEDS))
+    seeds, aim = list(objective.get("seeds", SEEDS)), objective.get("aim", MOTIONS)
     stored[name] = {
         "settings": {key: float(f"{value:.4g}") for key, value in settings.items()},
         "figures": {key: round(value, 4) for key, value in figures.items()},
-        "search": {"suite": objective.get("suite", SUITE), "seeds": seeds, "budget": budget},
+        "search": {"suite": objective.get("suite", SUITE), "seeds": seeds, "budget": budget}
+        | ({} if aim == MOTIONS else {"aim": aim}),
     }
     lines = [
         "# Settings optimised by `fowt design tune NAME`. Ratios are to gspi_oc3 on the seeds searched.",

@@ -64,8 +64,11 @@ def test_without_a_share_the_law_is_that_without_a_preview(gusty, monkeypatch):
 def test_an_exact_preview_earns_its_share(gusty):
     scene = gusty
     blind, seer = make("mpc", scene.turbine, 0.1), MPC(scene.turbine, 0.1, PREVIEW, preview=True, exact=False)
-    std = [simulate(scene, one, duration=130.0)["RotSpeed_[rpm]"].iloc[600:].std() for one in (blind, seer)]
-    assert std[1] < 0.9 * std[0]
+    unseen, seen = (simulate(scene, one, duration=130.0).iloc[600:] for one in (blind, seer))
+    for channel in ("RotSpeed_[rpm]", "PtfmPitch_[deg]"):
+        assert seen[channel].std() < 0.95 * unseen[channel].std()
+    travel = [run["BldPitch1_[deg]"].diff().abs().mean() for run in (unseen, seen)]
+    assert travel[1] < 0.85 * travel[0]
 
 
 def test_a_preview_that_is_off_for_good_ends_with_the_commands_of_the_true_one(gusty):
@@ -80,5 +83,5 @@ def test_a_preview_that_is_off_for_good_ends_with_the_commands_of_the_true_one(g
     for preview in ("exact", high):
         law = MPC(gusty.turbine, 0.1, settings, preview=True)
         runs.append(simulate(gusty, law, duration=130.0, preview=preview).iloc[-100:])
-    for channel, within in (("BldPitch1_[deg]", 0.02), ("GenTq_[kN-m]", 0.02), ("RotSpeed_[rpm]", 0.005)):
+    for channel, within in (("BldPitch1_[deg]", 0.02), ("GenTq_[kN-m]", 0.02), ("RotSpeed_[rpm]", 0.02)):
         assert runs[1][channel].to_numpy() == pytest.approx(runs[0][channel].to_numpy(), abs=within)

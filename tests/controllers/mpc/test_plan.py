@@ -7,6 +7,7 @@ from scipy.optimize import minimize
 
 from fowt_env import build_scene
 from fowt_env.controllers.lqr.design import N_FEEDBACK, design_models
+from fowt_env.controllers.lqr.optimum import generator_inertia
 from fowt_env.controllers.mpc.law import PERIOD
 from fowt_env.controllers.mpc.model import (
     FILTER,
@@ -15,6 +16,7 @@ from fowt_env.controllers.mpc.model import (
     SURGE_RATE,
     WIND,
     _loads_at,
+    _plant,
     cost_rows,
     lq,
     wind_model,
@@ -22,6 +24,7 @@ from fowt_env.controllers.mpc.model import (
 from fowt_env.controllers.mpc.plan import LIMITED, RATED_BLOCKS, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import MPCSettings
+from fowt_env.controllers.mpc.weights import weights_over
 from fowt_env.descriptions.turbine import read_turbine
 
 TURBINE = read_turbine("nrel5mw")
@@ -37,7 +40,8 @@ def model():
     table = rotor_table(TURBINE, 1.225)
     models = design_models(build_scene("oc3_hywind", wind=14.0, fidelity="standard"))
     (one,) = (m for m in models if m.wind == 14.0)
-    return wind_model(one, one, SETTINGS, TURBINE, table, PERIOD), table
+    weights = weights_over(models, SETTINGS, TURBINE, 0.1)[14.0]
+    return wind_model(one, one, weights, TURBINE, table, PERIOD), table
 
 
 def state(seed, size=1.0):
@@ -59,9 +63,9 @@ def solved(model, table, x, moves, nonlinear, ahead=NOWHERE, limits=WIDE):
     grid, work = grid_of(SETTINGS, PERIOD), None
     work = work_of(grid)
     work.states[0] = x
-    step, rows = np.zeros_like(moves), cost_rows(TURBINE.rated_rotor_speed)
+    step = np.zeros_like(moves)
     kept = newton_step(
-        model, gain_of(model, ahead), 14.0, table, nonlinear, rows, np.zeros(8), np.zeros(N_FEEDBACK), ahead,
+        model, gain_of(model, ahead), 14.0, table, nonlinear, np.zeros(8), np.zeros(N_FEEDBACK), ahead,
         limits, UNITS, grid, moves, work, step,
     )  # fmt: skip
     return step, kept, work
@@ -69,9 +73,8 @@ def solved(model, table, x, moves, nonlinear, ahead=NOWHERE, limits=WIDE):
 
 def plain_cost(model, table, x, moves, nonlinear, ahead):
     """Cost of a plan by simulating it, one array at a time."""
-    rated = TURBINE.rated_rotor_speed
     grid, gain = grid_of(SETTINGS, PERIOD), gain_of(model, ahead)
-    rows, total, loads = cost_rows(rated)[:6], 0.0, np.empty(8)
+    rows, total, loads = model.rows[:6], 0.0, np.empty(8)
     for k, block in enumerate(grid.block_of):
         if k < len(ahead):
             x = x.copy()
@@ -101,8 +104,7 @@ def test_without_limits_and_with_linear_loads_the_plan_is_the_lq_feedback(model)
 
 def test_the_feedback_is_that_of_the_riccati_equation(model):
     wind, _ = model
-    rows = cost_rows(TURBINE.rated_rotor_speed)
-    q, r = rows.T @ np.diag(wind.weights) @ rows, np.diag(wind.weights[6:])
+    q, r = wind.rows.T @ np.diag(wind.weights) @ wind.rows, np.diag(wind.weights[6:])
     p = solve_discrete_are(wind.A, wind.B, q, r)
     assert wind.P == pytest.approx(p, rel=1e-6)
     assert wind.K == pytest.approx(
@@ -173,15 +175,13 @@ def test_a_plan_one_period_on_keeps_its_moves():
 
 
 def test_the_feedback_holds_for_any_period():
-    (one,) = (
-        m for m in design_models(build_scene("oc3_hywind", wind=14.0, fidelity="standard")) if m.wind == 18
-    )
-    from fowt_env.controllers.mpc.model import _plant, cost_weights
-
+    models = design_models(build_scene("oc3_hywind", wind=14.0, fidelity="standard"))
+    (one,) = (m for m in models if m.wind == 18)
+    weights = weights_over(models, SETTINGS, TURBINE, 0.1)[18.0]
     a, b = _plant(one, TURBINE)
+    rows = cost_rows(a, TURBINE.rated_rotor_speed, generator_inertia(TURBINE, one.torque))
     rates = []
     for period in (0.1, 0.5):
-        weights = cost_weights(SETTINGS, 18.0, TURBINE.rated_rotor_speed, period)
-        gain, _ = lq(a, b, weights, TURBINE.rated_rotor_speed, period)
+        gain, _ = lq(a, b, rows, period * weights, period)
         rates.append(np.linalg.eigvals(a - b @ gain).real.max())
     assert rates[0] == pytest.approx(rates[1], rel=0.1)

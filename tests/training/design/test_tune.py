@@ -82,6 +82,41 @@ def test_the_cost_is_the_mean_of_the_lifetime_ratios_of_the_leaderboard(suite):
     assert found["cost"] == pytest.approx(aims + PENALTY * found["beyond"]) and found["lost"] == 0.0
 
 
+SCORE = """
+[score]
+baseline = "gspi_oc3"
+power = "GenPwr_capped_mean_[kW]"
+
+[[score.term]]
+metric = "RotSpeed_std_[rpm]"
+weight = 1.0
+
+[[score.term]]
+metric = "blade_pitch_travel_[deg/s]"
+weight = 1.0
+"""
+
+
+def test_the_aim_scores_is_the_mean_of_both_scores_of_the_leaderboard(tmp_path, monkeypatch):
+    path = tmp_path / "scored.toml"
+    path.write_text(SUITE + SCORE)
+    monkeypatch.setattr(module, "LIMITS", {})
+    objective = Objective(path, seeds=(1001,), aim="scores")
+    found = objective("pi_unscheduled")
+    runs = [objective.base, evaluate("pi_unscheduled", objective.suite, seeds=(1001,), reference=False)]
+    entries = leaderboard(pd.concat(runs), score=objective.suite.score)["controllers"]
+    (score,) = (one["score"] for one in entries if one["controller"] == "pi_unscheduled")
+    both = [score[key]["mean"] for key in ("lifetime", "winds")]
+    assert both[0] != pytest.approx(both[1], rel=1e-3)
+    assert found["cost"] == pytest.approx(np.mean(both) + PENALTY * found["beyond"])
+    table = pd.concat(runs).pivot(index="case", columns="controller")
+    beyond = 0.0
+    for metric, (most,) in module.EACH.items():
+        ratio = table[metric]["pi_unscheduled"] / table[metric]["reference"]
+        beyond += (ratio / most - 1.0).clip(lower=0.0)[np.isfinite(ratio)].sum()
+    assert found["beyond"] == pytest.approx(beyond) and beyond > 0.0
+
+
 def test_what_trips_costs_more_than_what_does_not(suite):
     objective = Objective(suite, seeds=(1001,))
     found = objective(Idle())
@@ -141,6 +176,8 @@ def test_the_search_starts_from_the_settings_of_now_and_takes_the_cheapest(monke
     assert held["other"]["settings"] == {"x": 1.0}
     assert held["pi_tuned"]["settings"]["KP"] == pytest.approx(settings["KP"], rel=1e-3)
     assert held["pi_tuned"]["search"] == {"suite": "above_rated", "seeds": [1001, 1002], "budget": 60}
+    write_tuned("pi_tuned", settings, figures, 60, {"aim": "scores"}, path)
+    assert tomllib.loads(path.read_text())["pi_tuned"]["search"]["aim"] == "scores"
 
 
 def test_what_cannot_be_searched_is_refused(suite):
@@ -150,3 +187,5 @@ def test_what_cannot_be_searched_is_refused(suite):
         tune("pi_tuned", 2)
     with pytest.raises(InputError, match="1000 or more"):
         tune("pi_tuned", suite=suite, seeds=(1,))
+    with pytest.raises(InputError, match="unknown aim 'loads'"):
+        Objective(suite, aim="loads")
