@@ -8,6 +8,7 @@ from fowt_env.control.information import (
     foreseen,
     hidden,
     known_scene,
+    lidar_of,
     mask,
     preview_leads,
 )
@@ -48,6 +49,7 @@ __all__ = [
     "foreseen",
     "hidden",
     "known_scene",
+    "lidar_of",
     "make",
     "mask",
     "preview_leads",
