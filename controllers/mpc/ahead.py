@@ -1,19 +1,19 @@
 """Predicts the rotor-averaged wind from its estimate at the rotor and from the raw readings of a lidar.
 
-The estimate is the better anemometer for some seconds, the lidar for later ones. The prediction of the wind
-tau ahead is the linear combination of least mean square error (Wiener) of the estimates of the last seconds
-and of the readings of all gates of the last seconds,
+The estimate is the better anemometer for some seconds, the lidar for later ones. The prediction of the wind v
+is the linear combination of least mean square error (Wiener) of the estimates e and of the readings g of all
+gates of the last seconds,
 
-w(tau) = c_e e + c_g g,    [c_e c_g] = E[v(tau) [e g]] E[[e g] [e g]^T]^-1,
+w(tau) = E[v(t + tau) s^T] (E[s s^T] + D)^-1 s,    s = (e(t - ages), g(t - ages)),
 
 with covariances from the spectra that simulate the lidar (fowt_env/weather/lidar_gates.py): rotor and beams
-in Kaimal turbulence, its evolution, probe volumes, shots that are held, folded and lost. They depend on
-turbine, lidar and mean wind, and are computed in prepare() without any draw of weather. All signals may share
-an unknown mean, so that an offset of the mean wind has no influence.
+in Kaimal turbulence that evolves, probe volumes, shots that are held, folded and lost. They depend on rotor,
+lidar and mean wind alone, and no weather is drawn. All signals share an unknown mean, so that an offset of
+the mean wind has no influence.
 
-A reading without new shots is replaced by its own prediction from the estimates and the readings before it.
-A prediction from predictions is the conditional mean (tower property): with a lidar that has been blind for a
-while the result is that of the estimates alone, and the change is gradual.
+The spectra account for single lost shots. The diagonal D has the additional doubt about readings without a
+new shot for longer: it grows with time, so that a lidar that goes blind loses its influence gradually, and
+the prediction becomes that from the estimates alone.
 """
 
 from typing import NamedTuple
@@ -24,195 +24,188 @@ from fowt_env.caches import Cache
 from fowt_env.descriptions.iec import length_scale, ntm_sigma
 from fowt_env.weather.lidar import TUNING_CLASS, blocked_share, sampling
 from fowt_env.weather.lidar_gates import (
+    FREQUENCIES,
     channel_shares,
     group_count,
     interpolated,
+    mean_age,
     represented,
     travel_distances,
-    FREQUENCIES,
 )
-from fowt_env.weather.turbulence import kaimal_spectrum
+from fowt_env.weather.turbulence import LENGTH_RATIO, kaimal_spectrum
 
 BINS = np.arange(1, 1025) / 512.0  # Hz
-WINDS = np.array([6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 24.0, 28.0])  # m/s, mean winds of a design
+WINDS = np.array([6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 24.0, 28.0])  # m/s, mean winds of the design
 MEMORY = 16.0  # s, age of the oldest values used
 ESTIMATES = np.array([0.0, 1.0, 2.0, 4.0, 8.0, MEMORY])  # s, ages of the estimates used
-STEP = 1.0  # s between the ages of the readings used
+STEP = 2.0  # s between the ages of the readings used
 MEAN_DOUBT = 3.0  # m/s, deviation of the mean from the operating wind
-LIDAR_DOUBT = 0.15  # m/s, lasting difference of all gates from the estimate
-# error of the Kalman estimate: it is late, and it errs slowly (OC3-Hywind, sensors "standard", 12 to 24 m/s)
+LIDAR_DOUBT = 0.15  # m/s, deviation of the mean of all gates from that of the estimate
+# error of lqr's estimate of the wind (OC3-Hywind, sensors "standard", 12 to 24 m/s)
 LATE = 0.4  # s
 SLOW_ERROR, SLOW_TIME = 0.12, 6.0  # m/s, s
 FAST_ERROR = 0.04  # m/s, white
-HALF = 0.5  # fraction of the expected fresh shots from which a reading counts in full
+GAP = 2.0  # scans without a new shot, after which a reading is doubted
+STALE = 0.7  # m/s per s of a longer gap, deviation of such a reading
+UNKNOWN = 20.0  # m/s, deviation of values before the start of a run, and the largest one
 
 
 class Fusion(NamedTuple):
-    """Holds coefficients over WINDS; features are estimates, then gates, each from the newest to the oldest."""
+    """Holds covariances and coefficients of the signals s over WINDS.
 
-    ahead: np.ndarray  # (winds, times, features) of the wind at the look-ahead times
-    reading: np.ndarray  # (winds, gates, features) of each gate's reading, from all features but the newest
+    Signals are the estimates, then the readings gate by gate, the newest values first.
+    """
 
-
-class Ages(NamedTuple):
-    """Holds the ages of values used, in periods."""
-
-    estimates: np.ndarray
-    readings: np.ndarray
-
-
-def ages_of(period):
-    """Return the Ages for a time between plans (s)."""
-    step = max(1, round(STEP / period))
-    return Ages(np.rint(ESTIMATES / period).astype(int), np.arange(0, round(MEMORY / period) + 1, step))
+    signals: np.ndarray  # (winds, signals, signals)
+    ahead: np.ndarray  # (winds, times, signals) covariances with the wind at the look-ahead times
+    weights: np.ndarray  # (winds, times, signals) of the signals in this wind, without D
+    scan: float  # s
+    age: float  # s, mean age of a reading
 
 
 class Covariances(NamedTuple):
-    """Holds covariances over a lag (s) on a grid of periods, index 0 at lag -(n - 1)/2."""
+    """Holds covariances over a lag, of wind v, its estimate e and readings g."""
 
-    rotor: np.ndarray  # (n,)
+    rotor: np.ndarray  # (n,) E[v(t + lag) v(t)]
+    estimate: np.ndarray  # (n,) E[v(t + lag) e(t)]
     cross: np.ndarray  # (gates, n) E[g(t + lag) v(t)]
+    mixed: np.ndarray  # (gates, n) E[g(t + lag) e(t)]
     gates: np.ndarray  # (gates, gates, n) E[g_i(t + lag) g_j(t)]
 
 
 def covariances(lidar, blocked, speed, height, radius, lags):
-    """Return the Covariances of rotor-averaged wind and raw readings at lags (n,) s in a mean wind (m/s)."""
+    """Return the Covariances at increasing lags (n,) s in a mean wind (m/s), without doubts of the means."""
     sigma = ntm_sigma(speed, TUNING_CLASS)
     shares = channel_shares(lidar, speed, sigma, height, radius)
     gates, groups = len(lidar.distances), group_count(lidar)
     own = shares.own.reshape(FREQUENCIES.size, gates, groups, gates, groups)
-    same = np.einsum("fiqjq->fij", own) / groups**2
+    same = np.einsum("fiqjq->fij", own) / groups**2  # of the same beams at two gates
     other = own.mean(axis=(2, 4)) - same
-    width = BINS[0]
-    power = width * kaimal_spectrum(BINS, speed, sigma, 8.1 * length_scale(height))
-    same, other = (power[:, None, None] * interpolated(part, BINS) for part in (same, other))
-    cross = power[:, None] * interpolated(shares.cross.reshape(-1, gates, groups).mean(axis=2), BINS)
-    rotor = power * interpolated(shares.rotor, BINS)
-    hold = sampling(lidar, blocked, BINS)
-    turned = np.exp(2j * np.pi * np.multiply.outer(BINS, travel_distances(lidar) / speed))  # not advanced
-    cross = cross * turned * hold[:, None]
-    same, other = (part * turned[:, :, None] * turned.conj()[:, None, :] for part in (same, other))
+    cross = shares.cross.reshape(-1, gates, groups).mean(axis=2)
+    point = BINS[0] * kaimal_spectrum(BINS, speed, sigma, LENGTH_RATIO[0] * length_scale(height))
+    rotor = point * interpolated(shares.rotor, BINS)
+    # channels are advanced to the rotor, readings are not
+    hold, omega = sampling(lidar, blocked, BINS), 2.0 * np.pi * BINS
+    early = np.exp(1j * np.multiply.outer(omega, travel_distances(lidar) / speed))
+    cross = (point * hold)[:, None] * early * interpolated(cross, BINS)
+    pair = point[:, None, None] * early[:, :, None] * early.conj()[:, None, :]
+    same, other = (pair * interpolated(part, BINS) for part in (same, other))
     passed = np.abs(hold) ** 2
-    # values of one beam are held together: what this folds has the covariance between its gates
+    # the values of a beam at two gates are held together: what this folds is as coherent as the values
     folded = ((1.0 - passed)[:, None, None] * same).sum(axis=0).real
-    spread = passed / passed.sum()
-    both = passed[:, None, None] * (same + other) + spread[:, None, None] * folded
-    wave = np.exp(2j * np.pi * np.multiply.outer(lags, BINS))
+    held = passed[:, None, None] * (same + other + folded / passed.sum())
+    wave = np.exp(1j * np.multiply.outer(lags, omega))
+    known, cross = (wave @ rotor).real, (wave @ cross).real.T
     return Covariances(
-        (wave @ rotor).real,
-        (wave @ cross).real.T,
-        np.moveaxis((wave @ both.reshape(BINS.size, -1)).real.reshape(lags.size, gates, gates), 0, 2),
+        known,
+        np.interp(lags + LATE, lags, known),
+        cross,
+        np.array([np.interp(lags + LATE, lags, row) for row in cross]),
+        (wave @ held.reshape(BINS.size, -1)).real.T.reshape(gates, gates, lags.size),
     )
 
 
-def coefficients(lidar, blocked, speed, height, radius, period, count):
-    """Return (ahead (count, features), reading (gates, features)) of a Fusion at one mean wind, m/s."""
-    ages, gates = ages_of(period), len(lidar.distances)
-    reach = int(ages.readings[-1]) + count + 1
-    lags = period * np.arange(-reach, reach + 1)
-    known = covariances(lidar, blocked, speed, height, radius, lags)
-    late = covariances_late(known, lags)
-    e, r = ages.estimates, ages.readings
-    n, m = e.size, r.size
-    total = np.empty((n + gates * m, n + gates * m))
+def ages_of(period):
+    """Return the ages of the estimates (n,) and readings (m,) used, in periods (s each)."""
+    step = max(1, round(STEP / period))
+    return np.rint(ESTIMATES / period).astype(int), np.arange(0, round(MEMORY / period) + 1, step)
+
+
+def covariances_of_signals(lidar, blocked, speed, height, radius, period, count):
+    """Return (signals, ahead) of a Fusion at one mean wind, m/s."""
+    (e, r), times = ages_of(period), np.arange(count)
+    gates, n = len(lidar.distances), e.size
+    zero = int(max(e[-1], r[-1])) + count  # index of lag 0
+    known = covariances(lidar, blocked, speed, height, radius, period * np.arange(-zero, zero + 1))
+    total = np.empty((n + gates * r.size, n + gates * r.size))
     apart = e[None, :] - e[:, None]
-    total[:n, :n] = known.rotor[reach + apart] + SLOW_ERROR**2 * np.exp(-period * np.abs(apart) / SLOW_TIME)
-    total[:n, :n] += FAST_ERROR**2 * np.eye(n)
-    mixed = late[1][:, reach + e[:, None] - r[None, :]]  # (gates, n, m) E[g(t - r) e(t - e)]
-    total[:n, n:] = np.moveaxis(mixed, 0, 1).reshape(n, gates * m)
+    error = SLOW_ERROR**2 * np.exp(-period * np.abs(apart) / SLOW_TIME) + FAST_ERROR**2 * np.eye(n)
+    total[:n, :n] = known.rotor[zero + apart] + error
+    mixed = known.mixed[:, zero + e[:, None] - r]  # (gates, n, m)
+    total[:n, n:] = np.moveaxis(mixed, 0, 1).reshape(n, -1)
     total[n:, :n] = total[:n, n:].T
-    pair = known.gates[:, :, reach + r[None, :] - r[:, None]]  # lag of g_i(t - r_i) after g_j(t - r_j)
-    total[n:, n:] = np.moveaxis(pair, 1, 2).reshape(gates * m, gates * m) + LIDAR_DOUBT**2
-    times = np.arange(count)
-    target = np.empty((count, n + gates * m))
-    target[:, :n] = late[0][reach + times[:, None] + e[None, :]]
-    target[:, n:] = np.moveaxis(
-        known.cross[:, reach - times[:, None] - r[None, :]], 0, 1
-    ).reshape(count, gates * m)
-    total += MEAN_DOUBT**2
-    target += MEAN_DOUBT**2
-    newest = np.zeros(n + gates * m, dtype=bool)
-    newest[n::m] = True
-    ahead = np.linalg.solve(total, target.T).T
-    old = ~newest
-    reading = np.zeros((gates, n + gates * m))
-    reading[:, old] = np.linalg.solve(total[np.ix_(old, old)], total[np.ix_(old, newest)]).T
-    return ahead, reading
+    pairs = known.gates[:, :, zero + r - r[:, None]]  # (gates, gates, m, m)
+    total[n:, n:] = np.moveaxis(pairs, 1, 2).reshape(gates * r.size, -1) + LIDAR_DOUBT**2
+    with_wind = np.empty((count, len(total)))
+    with_wind[:, :n] = known.estimate[zero + times[:, None] + e]
+    with_wind[:, n:] = np.moveaxis(known.cross[:, zero - times[:, None] - r], 0, 1).reshape(count, -1)
+    return total + MEAN_DOUBT**2, with_wind + MEAN_DOUBT**2
 
 
-def covariances_late(known, lags):
-    """Return (E[v(t + lag) e(t)], E[g(t + lag) e(t)]) for an estimate e(t) of v(t - LATE)."""
-    rotor = np.interp(lags + LATE, lags, known.rotor)
-    return rotor, np.array([np.interp(lags + LATE, lags, row) for row in known.cross])
-
-
-_FUSIONS = Cache(16)  # lidar, turbine's size, blocked share, period, count -> Fusion
+_FUSIONS = Cache(16)  # lidar, blocked share, size of the rotor, period, count -> Fusion
 
 
 def fusion(scene, lidar, period, count):
-    """Return the Fusion of a Lidar on a scene's turbine for `count` look-ahead times, a period (s) apart."""
-    turbine, lidar = scene.turbine, represented(lidar)
-    rotor = turbine.rotor
-    blocked = blocked_share(lidar, rotor, turbine.blade)
-    key = (lidar, blocked, rotor.hub_height, rotor.tip_radius, period, count)
+    """Return the Fusion of a Lidar on a scene's turbine for `count` look-ahead times a period (s) apart."""
+    rotor, lidar = scene.turbine.rotor, represented(lidar)
+    blocked = blocked_share(lidar, rotor, scene.turbine.blade)
+    site = (rotor.hub_height, rotor.tip_radius, period, count)
 
     def make():
-        site = (rotor.hub_height, rotor.tip_radius, period, count)
-        found = [coefficients(lidar, blocked, speed, *site) for speed in WINDS]
-        return Fusion(*(np.array(part) for part in zip(*found, strict=True)))
+        made = zip(*(covariances_of_signals(lidar, blocked, wind, *site) for wind in WINDS), strict=True)
+        signals, ahead = (np.array(part) for part in made)
+        weights = np.linalg.solve(signals, ahead.swapaxes(1, 2)).swapaxes(1, 2)
+        return Fusion(signals, ahead, weights, lidar.scan_period, mean_age(lidar, blocked))
 
-    return _FUSIONS.get(key, make), blocked
+    return _FUSIONS.get((lidar, blocked, *site), make)
 
 
 class Foresight:
-    """Predicts the wind online by a Fusion: keeps the estimates and readings of the last MEMORY seconds.
+    """Predicts the wind by a Fusion, from the estimates and readings of the last MEMORY seconds.
 
-    blocked: expected fraction of lost shots; forgetting: factor per period of the lidar's mean difference
-    from the estimate, which is removed.
+    gates: number of gates; forgetting: factor per period (s) of the mean difference of each gate from the
+    estimate, which is removed.
     """
 
-    def __init__(self, made, blocked, period, forgetting):
-        self.fusion, self.forgetting = made, forgetting
-        self.expected = 1.0 - blocked
-        ages = ages_of(period)
-        self.ages = ages
-        self.estimates = np.zeros(ages.readings[-1] + 1)  # m/s, newest first, as the following
-        self.readings = np.zeros((made.reading.shape[1], ages.readings[-1] + 1))
-        self.bias = np.zeros(len(self.readings))
+    def __init__(self, made, gates, period, forgetting):
+        self.fusion, self.period, self.forgetting = made, period, forgetting
+        self.ages = ages_of(period)
+        kept = int(self.ages[1][-1]) + 1
+        # rows: estimate, gates; newest first, m/s
+        self.values, self.doubts = np.zeros((1 + gates, kept)), np.full((1 + gates, kept), UNKNOWN)
+        self.late = made.age / period
+        self.moving = np.zeros(int(self.late) + 2)  # m/s, newest first
+        self.offset, self.gap = np.zeros(gates), np.zeros(gates)
         self.started = False
 
-    def foresee(self, wind, estimate, speeds, fresh):
-        """Return the expected wind (times,) m/s; called once per period.
+    def foresee(self, wind, estimate, moving, reading):
+        """Return the expected wind (times,), m/s; called once per period.
 
-        wind: mean, m/s; estimate: at the rotor, m/s; speeds, fresh (gates,): readings, without the nacelle's
-        motion, and fractions of fresh shots.
+        wind: mean, m/s; estimate: at the rotor, m/s; moving: velocity of the nacelle downwind, m/s; reading:
+        LidarReading.
         """
-        trust = np.clip(np.asarray(fresh) / (HALF * self.expected), 0.0, 1.0)
-        low, part = _between(wind)
         if not self.started:
             self.started = True
-            self.estimates[:] = estimate
-            self.readings[:] = (trust * speeds + (1.0 - trust) * estimate)[:, None]
-        self.estimates[1:] = self.estimates[:-1].copy()
-        self.readings[:, 1:] = self.readings[:, :-1].copy()
-        self.estimates[0] = estimate
-        features = self._features(wind)
-        expected = wind + _mixed(self.fusion.reading, low, part) @ features
-        self.bias += trust * (1.0 - self.forgetting) * (estimate - speeds - self.bias)
-        self.readings[:, 0] = trust * (speeds + self.bias) + (1.0 - trust) * expected
-        return wind + _mixed(self.fusion.ahead, low, part) @ self._features(wind)
+            self.values[:], self.moving[:] = estimate, moving
+        for past in (self.values, self.doubts, self.moving):
+            past[..., 1:] = past[..., :-1].copy()
+        self.moving[0] = moving
+        whole, part = int(self.late), self.late - int(self.late)
+        speeds = reading.speed + (1.0 - part) * self.moving[whole] + part * self.moving[whole + 1]
+        fresh = np.array(reading.fresh) > 0.0
+        self.gap = np.where(fresh, 0.0, self.gap + self.period)
+        self.offset += fresh * (1.0 - self.forgetting) * (estimate - speeds - self.offset)
+        self.values[:, 0] = estimate, *(speeds + self.offset)
+        doubts = STALE * np.maximum(self.gap - GAP * self.fusion.scan, 0.0)
+        self.doubts[:, 0] = 0.0, *np.minimum(doubts, UNKNOWN)
+        return self._expected(wind)
 
-    def _features(self, wind):
+    def _expected(self, wind):
         e, r = self.ages
-        return np.concatenate([self.estimates[e], self.readings[:, r].ravel()]) - wind
+        signals, doubts = (np.r_[part[0, e], part[1:, r].ravel()] for part in (self.values, self.doubts))
+        low, share = _between(wind)
+        if not doubts.any():
+            weights = (1.0 - share) * self.fusion.weights[low] + share * self.fusion.weights[low + 1]
+            return wind + weights @ (signals - wind)
+        made, more = self.fusion, np.diag(doubts**2)
+        parts = [
+            made.ahead[i] @ np.linalg.solve(made.signals[i] + more, signals - wind) for i in (low, low + 1)
+        ]
+        return wind + (1.0 - share) * parts[0] + share * parts[1]
 
 
 def _between(wind):
-    """Return (index, fraction) of a mean wind within WINDS, linear in the travel time."""
-    position = np.interp(-1.0 / wind if wind > WINDS[0] else -1.0 / WINDS[0], -1.0 / WINDS, np.arange(WINDS.size))
+    """Return (index, fraction) of a mean wind within WINDS, linear in the travel time and limited to them."""
+    position = np.interp(-1.0 / max(wind, WINDS[0]), -1.0 / WINDS, np.arange(WINDS.size))
     low = min(int(position), WINDS.size - 2)
     return low, position - low
-
-
-def _mixed(values, low, part):
-    return (1.0 - part) * values[low] + part * values[low + 1]

@@ -2,9 +2,9 @@
 
 Every period the law predicts a horizon of half a minute: platform and waves by the linear models of
 controllers/lqr/design.py, rotor loads by a coefficient table, the wind by its filter. An exact preview
-replaces the predicted wind, the readings of a lidar improve the prediction (ahead.py). One Newton step (plan.py)
-improves the plan of torque and blade-pitch rates; if this step violates a limit, OSQP computes the step. The
-rates are constant until the next period. An integral of the speed error removes the offset.
+replaces the predicted wind, the readings of a lidar improve the prediction (ahead.py). One Newton step
+(plan.py) improves the plan of torque and blade-pitch rates; if this step violates a limit, OSQP computes the
+step. The rates are constant until the next period. An integral of the speed error removes the offset.
 """
 
 from enum import IntEnum
@@ -13,17 +13,28 @@ from math import exp
 import numpy as np
 
 from fowt_env.caches import Cache
-from fowt_env.control import check_control_dt
+from fowt_env.control import USUAL_LIDAR, check_control_dt
 from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, design_models, lowest_design_wind
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator, limits_of, speed_integral
 from fowt_env.controllers.mpc.ahead import Foresight, fusion
-from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, LEAN_RATE, SPEED, SURGE_RATE, TORQUE, WindModel, cost_rows, wind_model
+from fowt_env.controllers.mpc.model import (
+    COMMAND,
+    INTEGRAL,
+    LEAN_RATE,
+    SPEED,
+    SURGE_RATE,
+    TORQUE,
+    WindModel,
+    cost_rows,
+    wind_model,
+)
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
+from fowt_env.descriptions.lidar import read_lidar
 from fowt_env.descriptions.nrel5mw import RATED_WIND
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
@@ -132,7 +143,7 @@ class MPC:
         self.grid = grid_of(self.settings, self.period)
         self.rows = cost_rows(turbine.rated_rotor_speed)
         self.parameters = self._parameters()
-        self.table = self.program = None
+        self.table = self.program = self.made = None
         self.unsolved = 0
 
     @property
@@ -174,7 +185,9 @@ class MPC:
 
         self.first_wind, self.models = _MODELS.get(known, make)[2]
         if self.lidar:
-            self.made = fusion(scene, scene.lidar, self.period, round(LIDAR_TIME / self.period))
+            lidar = read_lidar(scene.lidar or USUAL_LIDAR)
+            self.gates = len(lidar.distances)
+            self.made = fusion(scene, lidar, self.period, round(LIDAR_TIME / self.period))
 
     def reset(self, measurement):
         """Start at the trim with the measured pitch (or, at minimum pitch, rotor speed) and an empty plan.
@@ -194,7 +207,7 @@ class MPC:
         self.command = np.array([torque, pitch])
         self.plan = np.zeros(2 * len(self.grid.ends))
         self.work = work_of(self.grid)
-        self.foresight = Foresight(*self.made, self.period, self._slow) if self.lidar else None
+        self.foresight = Foresight(self.made, self.gates, self.period, self._slow) if self.lidar else None
         self.calls = self.unsolved = 0
 
     def act(self, measurement):
@@ -210,7 +223,7 @@ class MPC:
 
     @property
     def _slow(self):
-        """Return the forgetting factor per period of the preview's statistics."""
+        """Return the forgetting factor per period of the mean difference of preview or lidar."""
         return exp(-self.period / self.settings.schedule_time)
 
     def _ahead(self, measurement):
@@ -220,10 +233,9 @@ class MPC:
         now = self.estimator.memory[ESTIMATED_WIND + 1]
         model, wind = self._model()
         if self.lidar:
-            reading = measurement.lidar
             moving = -model.motion @ self.estimator.memory[[SURGE_RATE, LEAN_RATE]]
-            speeds = np.array(reading.speed) + moving
-            expected = self.foresight.foresee(self.memory[Memory.OPERATING_WIND], now, speeds, reading.fresh)
+            mean = self.memory[Memory.OPERATING_WIND]
+            expected = self.foresight.foresee(mean, now, moving, measurement.lidar)
         else:
             seen, decay = np.array(measurement.wind_preview, dtype=np.float64), self._slow
             bias = decay * self.memory[Memory.BIAS] + (1.0 - decay) * (now - seen[0])

@@ -3,6 +3,7 @@
 from fowt_env.control.information import (
     EXACT,
     PRIVILEGED_INPUTS,
+    USUAL_LIDAR,
     check_pitches,
     declares_blades,
     foreseen,
@@ -41,6 +42,7 @@ __all__ = [
     "FunctionController",
     "MeasurementView",
     "PRIVILEGED_INPUTS",
+    "USUAL_LIDAR",
     "call_law",
     "catalogue",
     "check_control_dt",

@@ -284,7 +284,9 @@ def _lacking(error):
     of_blades = isinstance(getattr(error, "obj", None), BladeMeasurement)
     if not isinstance(error, AttributeError) or not of_blades and not isinstance(error.obj, Measurement):
         return ""
-    known = BladeMeasurement._fields if of_blades else (*Measurement._fields, "wind_preview", "blades")
+    known = (
+        BladeMeasurement._fields if of_blades else (*Measurement._fields, "wind_preview", "lidar", "blades")
+    )
     what = "measurement.blades has" if of_blades else "a measurement has"
     if not of_blades and error.name in BladeMeasurement._fields:
         return f"{what} no {error.name!r}: it is measurement.blades.{error.name}"

@@ -196,14 +196,17 @@ def view_of(controller: Any, leads: int | None = None) -> Callable[[Sequence[flo
 
 
 def whole_view(values: Sequence[float], wind: Sequence[float] = ()) -> MeasurementView:
-    """Return a view of measured values and of the wind preview (m/s) without hidden fields."""
-    everything = (*Measurement._fields, *BladeMeasurement._fields, "wind_preview")
+    """Return a view of measured values and of the wind preview (m/s) without hidden fields.
+
+    wind: the wind preview, or speeds and then freshness of a lidar.
+    """
+    everything = (*Measurement._fields, *BladeMeasurement._fields, "wind_preview", "lidar")
     rest = values[N_MEASUREMENTS:]
     return view_class("", everything, len(wind)).take([*values[:N_MEASUREMENTS], *wind, *rest])
 
 
 def with_wind_ahead(measurement: Measurement, wind: Sequence[float]) -> MeasurementView:
-    """Return a view of a measurement with a wind preview (m/s), without hidden fields."""
+    """Return a view of a measurement with the wind of whole_view, without hidden fields."""
     return whole_view([*measurement, *values_of_blades(measurement)], wind)
 
 

@@ -448,7 +448,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         controller = named_baseline(deepcopy(self.baseline), turbine, self.control_dt)
         leads = preview_leads(controller)
         if "lidar" in controller.information:
-            raise InputError(f"baseline {controller.name!r}: reads a lidar, which needs a run of the baseline")
+            raise InputError(f"baseline {controller.name!r}: reads a lidar, which an ordered stop has not")
         controller.prepare(known_scene(self.design_scene, controller))
         controller.reset(self.measurement(leads))
         run = self._episode

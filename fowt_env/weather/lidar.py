@@ -398,10 +398,10 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
         seed = None
     value = _filtered(start, seen, period, lidar, blocked, tuned, seed)
     distances = np.array(lidar.distances[tuned.first :])
-    scans = 0.5 + blocked / (1.0 - blocked)  # mean age of a value
+    age = lidar.scan_period * (0.5 + blocked / (1.0 - blocked))  # mean, of a value
     motion = Motion(
         tuned.corner,
-        (distances - distances[0]) / speed + scans * lidar.scan_period,
+        (distances - distances[0]) / speed + age,
         np.full(distances.size, 1.0 / distances.size),
         tuned.horizon - times,
     )
@@ -512,7 +512,9 @@ def _filtered(time, value, period, lidar, blocked, tuned, seed):
         frequency = np.arange(1, count // 2 + 1) / (count * step)
         variance = 2.0 * np.abs(np.fft.rfft(value)[1:] / count) ** 2
         spectrum = np.zeros(count // 2 + 1, dtype=np.complex128)
-        spectrum[1:] = gaussian(held_noise(lidar, blocked, frequency, variance), count, seed, LIDAR_STREAM + 1)
+        spectrum[1:] = gaussian(
+            held_noise(lidar, blocked, frequency, variance), count, seed, LIDAR_STREAM + 1
+        )
         folded = np.fft.irfft(spectrum, count)
     margin = 0 if period is not None else int(SETTLING / step)
     value, folded = np.pad(value, margin, mode="edge"), np.pad(folded, margin)

@@ -161,6 +161,11 @@ def interpolated(values, frequency):
     return (1.0 - part) * values[low] + part * values[low + 1]
 
 
+def mean_age(lidar, blocked):
+    """Return the mean age of the values in a reading, s; blocked: fraction of lost shots."""
+    return lidar.scan_period * (0.5 + blocked / (1.0 - blocked))
+
+
 def lidar_gates(scene, preset="four_beam_pulsed", seed=None):
     """Return the Gates of a lidar in a scene's weather. Arguments as lidar_preview. Raises: InputError."""
     described, (speed, _, _, blocked) = placed(scene, preset)
@@ -188,8 +193,7 @@ def lidar_gates(scene, preset="four_beam_pulsed", seed=None):
         for gate, delay in enumerate(delays):
             row = seen[gate * groups + group]
             value[gate] += np.interp(taken + delay, start, row, period=period) / groups
-    age = scan * (0.5 + blocked / (1.0 - blocked)) if lidar.scan_period else 0.0
-    motion = Motion(np.inf, np.array([age]), np.ones(1), np.zeros(2 * gates))
+    motion = Motion(np.inf, np.array([mean_age(lidar, blocked)]), np.ones(1), np.zeros(2 * gates))
     return Gates(described, Preview(time, np.vstack([value, np.tile(fresh, (gates, 1))]), motion))
 
 
@@ -243,7 +247,7 @@ def _in_box(scene, lidar, seed):
     Raises: InputError if too few points remain.
     """
     box, p = scene.wind, points(lidar)
-    hub, speed, radius = scene.turbine.rotor.hub_height, box.speed, scene.turbine.rotor.tip_radius
+    hub, speed = scene.turbine.rotor.hub_height, box.speed
     height = hub + p.z
     inside = (np.abs(p.y) <= box.y[-1]) & (height >= box.z[0]) & (height <= box.z[-1])
     weights, count = channel_weights(lidar) * inside, box.velocity.shape[0]
