@@ -35,7 +35,7 @@ from fowt_env.weather.lidar_gates import (
 from fowt_env.weather.turbulence import LENGTH_RATIO, kaimal_spectrum
 
 BINS = np.arange(1, 1025) / 512.0  # Hz
-WINDS = np.array([6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 24.0, 28.0])  # m/s, mean winds of the design
+WINDS = np.array([6.0, 8.0, *range(10, 20), *range(20, 29, 2)])  # m/s, mean winds of the design
 MEMORY = 16.0  # s, age of the oldest values used
 ESTIMATES = np.array([0.0, 1.0, 2.0, 4.0, 8.0, MEMORY])  # s, ages of the estimates used
 STEP = 2.0  # s between the ages of the readings used
