@@ -1,5 +1,7 @@
 """The wind predicted from estimate and lidar: drawn weather beside the design, blindness, motion, the law."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -94,11 +96,11 @@ def errors(weather, lost):
     return np.sqrt(np.mean(squares, axis=0)), made
 
 
-def expected_error(made, used):
-    """RMS error (COUNT,) m/s by the covariances of a Fusion, from the first `used` signals, at SPEED."""
-    at = list(module.WINDS).index(SPEED)
+def expected_error(made, used, lidar=SMALL, speed=SPEED):
+    """RMS error (COUNT,) m/s by the covariances of a Fusion, from the first `used` signals."""
+    at = list(module.WINDS).index(speed)
     signals, with_wind = made.signals[at][:used, :used], made.ahead[at][:, :used]
-    variance = covariances(SMALL, 0.37, SPEED, HUB, RADIUS, np.array([0.0, 1.0])).rotor[0]
+    variance = covariances(lidar, 0.37, speed, HUB, RADIUS, np.array([0.0, 1.0])).rotor[0]
     explained = (with_wind * np.linalg.solve(signals, with_wind.T).T).sum(axis=1)
     return np.sqrt(variance + module.MEAN_DOUBT**2 - explained)
 
@@ -178,6 +180,24 @@ def test_ages_reach_as_far_at_every_period(period):
     assert estimates[0] == readings[0] == 0
     assert estimates[-1] * period == pytest.approx(module.MEMORY, abs=0.5 * period)
     assert module.MEMORY - 2.0 * module.STEP < readings[-1] * period <= module.MEMORY + 0.5 * period
+
+
+@pytest.mark.slow
+def test_the_page_has_the_errors_of_the_shipped_lidars():
+    page = (Path(__file__).parents[3] / "docs" / "explanation" / "linear-design.md").read_text(
+        encoding="utf-8"
+    )
+    scene, ahead = drawn(1), [2, 6, 12, 20]
+    lidars = [read_lidar(name) for name in ("four_beam_pulsed", "circular_cw")]
+    made = [fusion(scene, lidar, PERIOD, COUNT) for lidar in lidars]
+    for speed in (12.0, 18.0, 24.0):
+        alone = expected_error(made[0], len(module.ESTIMATES), lidars[0], speed)[ahead]
+        four, circle = (
+            expected_error(*pair, speed)[ahead] for pair in zip(made, (None, None), lidars, strict=True)
+        )
+        cells = " | ".join(f"{x:.2f} / {y:.2f}" for x, y in zip(four, circle, strict=True))
+        assert f"| {speed:g} m/s | estimate alone | {' | '.join(f'{x:.2f}' for x in alone)} |\n" in page
+        assert f"| | with four beams / circular lidar | {cells} |\n" in page
 
 
 # ---- the law
