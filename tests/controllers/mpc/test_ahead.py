@@ -72,6 +72,18 @@ def test_drawn_readings_have_the_covariances_of_the_design(weather):
     assert np.abs(found(far, near) - known.gates[1, 0]).max() < 0.15 * variance
 
 
+def test_values_that_are_held_have_the_variance_of_the_wind_in_the_beam():
+    """One beam, three shots of ten lost: what holding takes from each frequency it folds into others."""
+    lidar = Lidar(**SMALL.model_dump() | {"azimuth": (15.0,), "elevation": (5.0,)})
+    lags = np.array([0.0, 1.0])
+    free, held = (
+        covariances(Lidar(**lidar.model_dump() | {"scan_period": scan}), blocked, SPEED, HUB, RADIUS, lags)
+        for scan, blocked in ((0.0, 0.0), (2.0, 0.3))
+    )
+    np.testing.assert_allclose(held.gates[:, :, 0], free.gates[:, :, 0], rtol=1e-9)
+    assert held.gates[0, 0, 1] < 0.99 * held.gates[0, 0, 0]
+
+
 def predictions(made, wind, readings, fresh, gates=2):
     """(n, COUNT) m/s of a Foresight that is given an estimate with the errors that it assumes."""
     law, rng, slow, rows = Foresight(made, gates, PERIOD, FORGETTING), np.random.default_rng(3), 0.0, []
