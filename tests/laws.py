@@ -48,14 +48,17 @@ def remember(parameters, memory, measurement, command):
 
 
 class Recorder(CompiledController):
-    """A compiled law that keeps what it reads. cycle: rad, of one that commands the pitch of each blade."""
+    """A compiled law that keeps what it reads.
+
+    cycle: rad, of one that commands the pitch of each blade; leads: number of values of a lidar.
+    """
 
     kernel = staticmethod(remember)
 
-    def __init__(self, information, preview_times=(), calls=60, cycle=None):
+    def __init__(self, information, preview_times=(), calls=60, cycle=None, leads=None):
         self.information, self.preview_times = tuple(information), tuple(preview_times)
         self.individual = cycle is not None
-        commands, leads = 4 if self.individual else 2, len(self.preview_times)
+        commands, leads = 4 if self.individual else 2, leads or len(self.preview_times)
         size = N_MEASUREMENTS + leads + N_BLADE_MEASUREMENTS * self.individual
         parameters = [size, commands, leads, TORQUE, PITCH, cycle or 0.0]
         super().__init__("recorder", parameters, 1 + calls * (size + commands))

@@ -22,6 +22,7 @@ from fowt_env.control import (
     view_of,
 )
 from fowt_env.controllers import CONTROLLERS
+from fowt_env.descriptions.lidar import Lidar, read_lidar
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.sensors import Sensor, SensorChain, built_in_chains
 from fowt_env.errors import ControllerError, InputError, SimulationStopped
@@ -35,6 +36,7 @@ from fowt_env.plant.measurement import (
     Measurement,
     measurement_rows,
 )
+from fowt_env.weather.lidar_gates import Gates, lidar_gates
 from fowt_env.weather.preview import Motion, Preview, exact_preview, rotor_wind_series
 from fowt_env.weather.sensor_noise import draw_noise
 
@@ -380,6 +382,74 @@ def test_a_preview_that_cannot_be_used_is_refused(gust_scene, preview, message):
 def test_times_and_the_declaration_of_a_preview_go_together(gust_scene, information, times, message):
     with pytest.raises(InputError, match=message):
         run(gust_scene, Recorder(information, times))
+
+
+def swaying(lidar):
+    """Gates of a lidar in 15 m/s, three shots of four fresh, that the nacelle's motion gets into."""
+    count = len(lidar.distances)
+    values = np.repeat([15.0, 0.75], count)[:, None] * np.ones(2)
+    motion = Motion(np.inf, np.array([0.37]), np.ones(1), np.zeros(2 * count))
+    return Gates(lidar, Preview(np.array([0.0, 60.0]), values, motion))
+
+
+def test_a_lidar_is_read_gate_by_gate_and_the_nacelle_s_motion_gets_into_its_speeds_alone(gust_scene):
+    lidar = Lidar(**read_lidar("four_beam_pulsed").model_dump() | {"distances": (90.0, 150.0, 200.0)})
+
+    class Reader(Watcher):
+        def act(self, measurement):
+            reading = measurement.lidar
+            assert np.array_equal(measurement._ahead, [*reading.speed, *reading.fresh])
+            return super().act(measurement)
+
+        def prepare(self, scene):
+            self.known = scene
+
+    law = Reader(("nacelle_velocity", "lidar"))
+    run(gust_scene, law, preview=swaying(lidar), duration=20.0)
+    rows = np.array(law.rows)
+    assert law.known.lidar is lidar and rows.shape[1] == N_MEASUREMENTS + 6
+    velocity = rows[:, Measure.NACELLE_VELOCITY]
+    late = np.interp(rows[:, 0] - 0.37, rows[:, 0], velocity)
+    for gate in range(3):
+        np.testing.assert_allclose(rows[:, N_MEASUREMENTS + gate], 15.0 - late, rtol=0.0, atol=1e-12)
+    assert np.ptp(late) > 0.1 and np.ptp(rows[:, N_MEASUREMENTS + 3 :] - 0.75) < 1e-12
+
+
+def test_a_lidar_by_name_or_file_and_the_usual_one_where_none_is_given(gust_scene, tmp_path):
+    path = tmp_path / "short.toml"
+    path.write_text("azimuth = [0.0]\nelevation = [0.0]\ndistances = [60.0, 120.0]\nscan_period = 1.0\n")
+    seen = {}
+    for preview in ("exact", "four_beam_pulsed", "circular_cw", str(path)):
+        law = Watcher(("lidar",))
+        run(gust_scene, law, preview=preview, duration=2.0)
+        seen[preview] = np.array(law.rows)[:, N_MEASUREMENTS:]
+    assert [rows.shape[1] for rows in seen.values()] == [20, 20, 2, 4]
+    assert np.array_equal(seen["exact"], seen["four_beam_pulsed"])
+    series = lidar_gates(gust_scene, str(path)).series
+    own, count = seen[str(path)].T, len(seen["exact"])
+    np.testing.assert_allclose(own[2:], series.values[2:, :count], atol=1e-12)
+    np.testing.assert_allclose(own[:2], series.values[:2, :count], atol=0.2)  # without the nacelle's motion
+
+
+def test_a_compiled_law_reads_speeds_and_freshness_after_the_measurement(gust_scene):
+    lidar = Lidar(**read_lidar("circular_cw").model_dump() | {"distances": (100.0,)})
+    law = Recorder(("rotor_speed", "lidar"), leads=2)
+    run(gust_scene, law, preview=swaying(lidar))
+    seen = law.seen()[:, N_MEASUREMENTS : N_MEASUREMENTS + 2]
+    assert seen[:, 1] == pytest.approx(0.75) and np.all(np.abs(seen[:, 0] - 15.0) < 1.0)
+
+
+def test_the_lidar_is_hidden_unless_declared_and_goes_with_no_preview(gust_scene):
+    curious = Watcher(("rotor_speed",))
+    curious.act = lambda measurement: measurement.lidar
+    with pytest.raises(ControllerError, match="reads 'lidar'.*add 'lidar' to its attribute information"):
+        run(gust_scene, curious)
+    with pytest.raises(InputError, match="declares 'wind_preview' and 'lidar'"):
+        run(gust_scene, Watcher(("wind_preview", "lidar"), (1.0,)))
+    with pytest.raises(InputError, match="preview = 7: must be a lidar"):
+        run(gust_scene, Watcher(("lidar",)), preview=7)
+    with pytest.raises(InputError, match="unknown lidar 'four_beam'"):
+        run(gust_scene, Watcher(("lidar",)), preview="four_beam")
 
 
 def test_in_still_air_there_is_nothing_to_look_ahead_at():

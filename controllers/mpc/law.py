@@ -2,9 +2,9 @@
 
 Every period the law predicts a horizon of half a minute: platform and waves by the linear models of
 controllers/lqr/design.py, rotor loads by a coefficient table, the wind by its filter. An exact preview
-replaces the predicted wind, other previews correct the prediction (ahead.py). One Newton step (plan.py)
-improves the plan of torque and blade-pitch rates; if this step violates a limit, OSQP computes the step. The
-rates are constant until the next period. An integral of the speed error removes the offset.
+replaces the predicted wind, the readings of a lidar improve the prediction (ahead.py). One Newton step
+(plan.py) improves the plan of torque and blade-pitch rates; if this step violates a limit, OSQP computes the
+step. The rates are constant until the next period. An integral of the speed error removes the offset.
 """
 
 from enum import IntEnum
@@ -13,18 +13,29 @@ from math import exp
 import numpy as np
 
 from fowt_env.caches import Cache
-from fowt_env.control import check_control_dt
+from fowt_env.control import USUAL_LIDAR, check_control_dt
 from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, design_models, lowest_design_wind
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
 from fowt_env.controllers.lqr.estimator import ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator, limits_of, speed_integral
-from fowt_env.controllers.mpc.ahead import LearntShare
-from fowt_env.controllers.mpc.model import COMMAND, INTEGRAL, N_COST, SPEED, TORQUE, WindModel, wind_model
+from fowt_env.controllers.mpc.ahead import Foresight, fusion
+from fowt_env.controllers.mpc.model import (
+    COMMAND,
+    INTEGRAL,
+    LEAN_RATE,
+    N_COST,
+    SPEED,
+    SURGE_RATE,
+    TORQUE,
+    WindModel,
+    wind_model,
+)
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
 from fowt_env.controllers.mpc.weights import weights_over
+from fowt_env.descriptions.lidar import read_lidar
 from fowt_env.descriptions.nrel5mw import RATED_WIND
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
@@ -105,14 +116,14 @@ def move(estimated, p, memory, curve, low_torque, command):
     command[0] = rate_limit(command[0], torque, dt * p[Entry.TORQUE_RATE_LIMIT])
 
 
-LIDAR_HORIZON = 3.0  # s, usable look-ahead time at 24 m/s of four beams measuring 160 m ahead of the rotor
+LIDAR_TIME = 20.0  # s, longest look-ahead time of the wind predicted with a lidar
 _MODELS = Cache(16)  # inputs -> (design models, table, (first wind, WindModel of all winds))
 
 
 class MPC:
     """Implements model predictive control with MPCSettings; call prepare(scene) before reset.
 
-    preview: use a wind preview. exact: the preview is exact; another preview corrects the predicted wind.
+    preview: use an exact wind preview. lidar: predict the wind from the readings of a lidar, too.
     nonlinear: rotor loads from the table, else linear about the operating wind. constrained: plans satisfy
     limits; applied commands always do.
     Attribute unsolved: number of plans since reset without a solution of OSQP, replaced by LQ feedback.
@@ -120,23 +131,25 @@ class MPC:
 
     def __init__(
         self, turbine, control_dt, settings=None, name="mpc", preview=False, nonlinear=True, constrained=True,
-        exact=True,
+        lidar=False,
     ):  # fmt: skip
         self.name, self.turbine, self.control_dt = name, turbine, check_control_dt(control_dt)
         self.settings = MPCSettings() if settings is None else settings
-        self.nonlinear, self.constrained, self.exact = nonlinear, constrained, exact
+        self.nonlinear, self.constrained, self.lidar = nonlinear, constrained, lidar
         self.information = LQR.information
         self.every = max(1, round(PERIOD / self.control_dt))
         self.preview_times = ()
         if preview:
             self.information = (*LQR.information, "wind_preview")
-            periods = int(self.settings.preview_time / self.period + 1e-9)  # within the range of a lidar
+            periods = int(self.settings.preview_time / self.period + 1e-9)
             self.preview_times = tuple(self.period * i for i in range(periods + 1))
+        if lidar:
+            self.information = (*LQR.information, "lidar")
         self.estimator = WindEstimator(turbine, self.control_dt)
         self.curve = build_torque_curve(turbine.torque_law)
         self.grid = grid_of(self.settings, self.period)
         self.parameters = self._parameters()
-        self.table = self.program = None
+        self.table = self.program = self.made = None
         self.unsolved = 0
 
     @property
@@ -179,6 +192,10 @@ class MPC:
             return models, self.table, (models[0].wind, rows)
 
         self.first_wind, self.models = _MODELS.get(known, make)[2]
+        if self.lidar:
+            lidar = read_lidar(scene.lidar or USUAL_LIDAR)
+            self.gates = len(lidar.distances)
+            self.made = fusion(scene, lidar, self.period, round(LIDAR_TIME / self.period))
 
     def reset(self, measurement):
         """Start at the trim with the measured pitch (or, at minimum pitch, rotor speed) and an empty plan.
@@ -198,7 +215,7 @@ class MPC:
         self.command = np.array([torque, pitch])
         self.plan = np.zeros(2 * len(self.grid.ends))
         self.work = work_of(self.grid)
-        self.share = LearntShare(len(self.preview_times), self._slow) if self.preview_times else None
+        self.foresight = Foresight(self.made, self.gates, self.period, self._slow) if self.lidar else None
         self.calls = self.unsolved = 0
 
     def act(self, measurement):
@@ -215,32 +232,28 @@ class MPC:
 
     @property
     def _slow(self):
-        """Return the forgetting factor per period of the preview's statistics."""
+        """Return the forgetting factor per period of the mean difference of preview or lidar."""
         return exp(-self.period / self.settings.schedule_time)
 
     def _ahead(self, measurement):
-        """Return previewed states (n, 2) of the wind filter minus the operating wind; n = 0: no preview."""
-        if not self.preview_times:
+        """Return expected states (n, 2) of the wind filter minus the operating wind; n = 0: no preview."""
+        if not self.preview_times and not self.lidar:
             return np.zeros((0, 2))
-        seen, estimated = np.array(measurement.wind_preview, dtype=np.float64), self.estimator.memory
-        now, decay = estimated[ESTIMATED_WIND + 1], self._slow
-        bias = decay * self.memory[Memory.BIAS] + (1.0 - decay) * (now - seen[0])
-        self.memory[Memory.BIAS] = bias
+        now = self.estimator.memory[ESTIMATED_WIND + 1]
         model, wind = self._model()
-        a = model.A[FILTER : FILTER + 2, FILTER : FILTER + 2]
-        if self.exact:
-            ahead = seen + bias - wind
-            ahead = np.r_[ahead, (a[0, 0] + a[1, 1]) * ahead[-1] - a[0, 0] * a[1, 1] * ahead[-2]]
-            # the first filter state follows from each pair of successive winds
-            return np.column_stack([(ahead[1:] - a[1, 1] * ahead[:-1]) / a[1, 0], ahead[:-1]])
-        ahead = np.empty((len(seen), 2))
-        ahead[0] = estimated[ESTIMATED_WIND : ESTIMATED_WIND + 2] - wind
-        for k in range(1, len(seen)):
-            ahead[k] = a @ ahead[k - 1]
-        expected = wind + ahead[:, 1]
-        differing = seen + bias - expected
-        # the correction applies to both states, as for a lasting change of wind
-        return ahead + (self.share.learn(now, expected, differing) * differing)[:, None]
+        if self.lidar:
+            moving = -model.motion @ self.estimator.memory[[SURGE_RATE, LEAN_RATE]]
+            mean = self.memory[Memory.OPERATING_WIND]
+            expected = self.foresight.foresee(mean, now, moving, measurement.lidar)
+        else:
+            seen, decay = np.array(measurement.wind_preview, dtype=np.float64), self._slow
+            bias = decay * self.memory[Memory.BIAS] + (1.0 - decay) * (now - seen[0])
+            self.memory[Memory.BIAS] = bias
+            expected = seen + bias
+        ahead, a = expected - wind, model.A[FILTER : FILTER + 2, FILTER : FILTER + 2]
+        ahead = np.r_[ahead, (a[0, 0] + a[1, 1]) * ahead[-1] - a[0, 0] * a[1, 1] * ahead[-2]]
+        # the first filter state follows from each pair of successive winds
+        return np.column_stack([(ahead[1:] - a[1, 1] * ahead[:-1]) / a[1, 0], ahead[:-1]])
 
     def _model(self):
         """Return (WindModel, wind m/s) at the operating wind, limited to the range of the models."""
@@ -277,7 +290,7 @@ class MPC:
         shifted(self.plan, self.grid, old)
         step = np.zeros_like(old)
         gain = model.K.copy()
-        if len(ahead) and self.exact:  # only the plan, not the feedback, responds to the previewed wind
+        if len(ahead):  # only the plan, not the feedback, responds to the previewed wind
             gain[:, FILTER : FILTER + 2] = 0.0
         kept = newton_step(
             model, gain, wind, self.table, self.nonlinear, references, end, ahead, limits, units, self.grid,
@@ -312,9 +325,8 @@ def mpc_preview(turbine, control_dt):
 
 
 def mpc_lidar(turbine, control_dt):
-    """Apply mpc with predicted wind corrected by a preview of 3 s with errors, as of a nacelle lidar."""
-    settings = MPCSettings(preview_time=LIDAR_HORIZON)
-    return MPC(turbine, control_dt, settings, "mpc_lidar", preview=True, exact=False)
+    """Apply mpc with the wind predicted from the estimate and from the raw readings of a nacelle lidar."""
+    return MPC(turbine, control_dt, name="mpc_lidar", lidar=True)
 
 
 def lq_preview(turbine, control_dt):

@@ -8,19 +8,22 @@ import numpy as np
 
 from fowt_env.analysis.trim import without_fluctuations
 from fowt_env.caches import cached
-from fowt_env.descriptions.lidar import lidars
+from fowt_env.descriptions.lidar import Lidar, lidars, read_lidar
 from fowt_env.errors import ControllerError, InputError, unknown
 from fowt_env.loop.sensing import GIVEN, HIDDEN
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, N_MEASUREMENTS, BladeMeasurement, Measurement
 from fowt_env.weather.lidar import lidar_preview
+from fowt_env.weather.lidar_gates import Gates
 from fowt_env.weather.preview import Preview, check_times, exact_preview
 from fowt_env.weather.wind_field import profile_field
 
 PRIVILEGED_INPUTS = {  # information that a controller may declare in addition to Measurement fields
     "wind_preview": "the rotor-averaged wind, some seconds before it arrives",
+    "lidar": "what a nacelle lidar measures at each of its distances, shot by shot",
     "plant_model": "the equations of the plant: trims, linear models or performance tables of the scene",
 }
 EXACT = "exact"  # value of the arguments preview and sensors
+USUAL_LIDAR = "four_beam_pulsed"  # read by a controller that declares "lidar", unless preview names another
 
 
 def declares_blades(controller: Any) -> bool:
@@ -96,6 +99,10 @@ def preview_leads(controller: Any) -> tuple[float, ...]:
     """
     times = tuple(getattr(controller, "preview_times", ()))
     declared = "wind_preview" in controller.information
+    if times and "lidar" in controller.information:
+        raise InputError(
+            f"controller {controller.name!r}: declares 'wind_preview' and 'lidar': one run has one of them"
+        )
     if not times and not declared:
         return ()
     if not times:
@@ -146,11 +153,28 @@ def foreseen(scene: Any, leads: tuple[float, ...], preview: Any, duration: float
     return Preview(time, values, result[2] if len(result) > 2 else None)
 
 
-class Known:
-    """Holds the turbine alone, for controllers that do not declare "plant_model"."""
+def lidar_of(controller: Any, preview: Any) -> Lidar | None:
+    """Return the Lidar that a controller reads, from the argument preview of simulate.
 
-    def __init__(self, turbine: Any, controller: str) -> None:
-        self.turbine = turbine
+    None if the controller does not declare "lidar". Raises: InputError for anything but a lidar or EXACT.
+    """
+    if "lidar" not in controller.information:
+        return None
+    if isinstance(preview, str | Lidar):
+        return read_lidar(USUAL_LIDAR if preview == EXACT else preview)
+    if isinstance(preview, Gates):
+        return preview.lidar
+    raise InputError(
+        f"preview = {preview!r}: must be a lidar (a name, a file, a Lidar or Gates), because controller"
+        f" {controller.name!r} declares 'lidar'"
+    )
+
+
+class Known:
+    """Holds turbine and lidar alone, for controllers that do not declare "plant_model"."""
+
+    def __init__(self, turbine: Any, controller: str, lidar: Lidar | None = None) -> None:
+        self.turbine, self.lidar = turbine, lidar
         self._controller = controller
 
     def __getattr__(self, name):
@@ -165,14 +189,17 @@ class Known:
         )
 
 
-def known_scene(scene: Any, controller: Any) -> Any:
+def known_scene(scene: Any, controller: Any, preview: Any = EXACT) -> Any:
     """Return the scene for prepare(): the plant in steady rated wind and still water, or the turbine alone.
+
+    Its field lidar is the Lidar of the argument preview of simulate, if the controller declares "lidar".
 
     The seed is 0, so the scene contains nothing of the run's weather. A wind box, whose mean over time
     depends on the seed, is replaced by the power law of the site.
     """
     if "plant_model" not in controller.information:
-        return Known(scene.turbine, controller.name)
+        return Known(scene.turbine, controller.name, lidar_of(controller, preview))
+    scene = replace(scene, lidar=lidar_of(controller, preview))
     aero, turbine = scene.model.aero, scene.turbine
     if aero is None:
         return replace(without_fluctuations(scene), sea=None, seed=0)

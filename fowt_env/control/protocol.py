@@ -16,6 +16,9 @@ set on a function too, as f.information = ("wind_speed",). Optional attributes o
   scene has the attribute `turbine` alone;
 - preview_times (s, increasing), required by "wind_preview": look-ahead times of the rotor-averaged wind in
   `measurement.wind_preview`, or after the N_MEASUREMENTS entries of a compiled law's array;
+- "lidar" in information: raw readings of a nacelle lidar in `measurement.lidar` (a LidarReading), or its
+  speeds and then its freshness in the place of the wind preview in a compiled law's array. The scene of
+  prepare has the Lidar as its attribute `lidar`;
 - declared = False: a field of information that a sensor chain or scene does not have is NaN, not an error;
 - finish(), called once at the end of a run, also of a failed one; after it the text console_output, what the
   controller has printed, is kept in attrs["controller_output"] of the run's table;
@@ -119,7 +122,8 @@ class CompiledController:
         """
         blades = values_of_blades(measurement)
         values = np.array([*measurement, *wind_ahead(measurement), *blades], dtype=np.float64)
-        leads, shown = len(self.preview_times), mask(self.name, tuple(self.information))
+        leads = len(wind_ahead(measurement)) if "lidar" in self.information else len(self.preview_times)
+        shown = mask(self.name, tuple(self.information))
         if not blades and declares_blades(self):
             raise InputError(
                 f"controller {self.name!r}: declares fields of single blades, which the measurement lacks"
@@ -280,7 +284,9 @@ def _lacking(error):
     of_blades = isinstance(getattr(error, "obj", None), BladeMeasurement)
     if not isinstance(error, AttributeError) or not of_blades and not isinstance(error.obj, Measurement):
         return ""
-    known = BladeMeasurement._fields if of_blades else (*Measurement._fields, "wind_preview", "blades")
+    known = (
+        BladeMeasurement._fields if of_blades else (*Measurement._fields, "wind_preview", "lidar", "blades")
+    )
     what = "measurement.blades has" if of_blades else "a measurement has"
     if not of_blades and error.name in BladeMeasurement._fields:
         return f"{what} no {error.name!r}: it is measurement.blades.{error.name}"

@@ -3,11 +3,22 @@
 import operator
 from collections.abc import Callable, Sequence
 from math import nan
-from typing import Any
+from typing import Any, NamedTuple
 
 from fowt_env.caches import cached
 from fowt_env.errors import ControllerError
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasurement, Measurement
+
+
+class LidarReading(NamedTuple):
+    """Holds what a nacelle lidar measures at its distances, from the nearest to the farthest.
+
+    speed: wind speed at each distance, m/s, the mean over the beams of their last successful shots; without a
+    new shot the value stays. fresh: fraction of beams whose latest shot succeeded, from 0 to 1.
+    """
+
+    speed: tuple[float, ...]
+    fresh: tuple[float, ...]
 
 
 class MeasurementView(Measurement):
@@ -21,7 +32,8 @@ class MeasurementView(Measurement):
     _hidden: frozenset[str] = frozenset()
     _indices: tuple[int, ...] = ()  # of the hidden fields
     _foresees = False
-    _leads = 0  # number of preview_times
+    _ranges = False  # whether the controller reads a lidar
+    _leads = 0  # number of values after the Measurement: preview_times, or speeds and freshness of a lidar
     _blade_class: type
     _ahead: tuple[float, ...] = ()
     _blades: "BladeView | None" = None
@@ -34,7 +46,7 @@ class MeasurementView(Measurement):
 
     @classmethod
     def of(cls, measurement: Any) -> "MeasurementView":
-        """Return the view of a Measurement, with its wind preview and blade measurements."""
+        """Return the view of a Measurement, with its wind preview or lidar and blade measurements."""
         return cls._taken(measurement, wind_ahead(measurement), values_of_blades(measurement))
 
     @classmethod
@@ -54,6 +66,14 @@ class MeasurementView(Measurement):
         if not self._foresees:
             self._refuse("wind_preview")
         return self._ahead
+
+    @property
+    def lidar(self) -> LidarReading:
+        """Return the LidarReading of a controller that declares "lidar"."""
+        if not self._ranges:
+            self._refuse("lidar")
+        gates = len(self._ahead) // 2
+        return LidarReading(self._ahead[:gates], self._ahead[gates:])
 
     @property
     def blades(self) -> "BladeView":
@@ -144,11 +164,12 @@ def _hiding(name, fields, information):
 
 @cached(256)
 def view_class(name, information, leads):
-    """Return the subclass of MeasurementView for a controller's name, information and preview count."""
+    """Return the subclass of MeasurementView for a controller's name, information and number of _leads."""
     members = _hiding(name, Measurement._fields, information)
     members |= {
         "_indices": tuple(i for i, field in enumerate(Measurement._fields) if field in members["_hidden"]),
         "_foresees": "wind_preview" in information,
+        "_ranges": "lidar" in information,
         "_leads": leads,
         "_blade_class": type("BladeView", (BladeView,), _hiding(name, BladeMeasurement._fields, information)),
     }
@@ -165,25 +186,32 @@ def _blades_again(name, information, values, time):
     return view_class(name, information, 0)._blade_class.take(values, time)
 
 
-def view_of(controller: Any) -> Callable[[Sequence[float]], MeasurementView]:
-    """Return the function that makes the view of a controller from an array of readings."""
-    return view_class(controller.name, tuple(controller.information), len(controller.preview_times)).take
+def view_of(controller: Any, leads: int | None = None) -> Callable[[Sequence[float]], MeasurementView]:
+    """Return the function that makes the view of a controller from an array of readings.
+
+    leads: number of values of wind preview or lidar in the array; None: that of the preview_times.
+    """
+    leads = len(controller.preview_times) if leads is None else leads
+    return view_class(controller.name, tuple(controller.information), leads).take
 
 
 def whole_view(values: Sequence[float], wind: Sequence[float] = ()) -> MeasurementView:
-    """Return a view of measured values and of the wind preview (m/s) without hidden fields."""
-    everything = (*Measurement._fields, *BladeMeasurement._fields, "wind_preview")
+    """Return a view of measured values and of the wind preview (m/s) without hidden fields.
+
+    wind: the wind preview, or speeds and then freshness of a lidar.
+    """
+    everything = (*Measurement._fields, *BladeMeasurement._fields, "wind_preview", "lidar")
     rest = values[N_MEASUREMENTS:]
     return view_class("", everything, len(wind)).take([*values[:N_MEASUREMENTS], *wind, *rest])
 
 
 def with_wind_ahead(measurement: Measurement, wind: Sequence[float]) -> MeasurementView:
-    """Return a view of a measurement with a wind preview (m/s), without hidden fields."""
+    """Return a view of a measurement with the wind of whole_view, without hidden fields."""
     return whole_view([*measurement, *values_of_blades(measurement)], wind)
 
 
 def wind_ahead(measurement: Any) -> tuple[float, ...]:
-    """Return the wind preview of a measurement; () without one."""
+    """Return the wind preview, or speeds and freshness of the lidar, of a measurement; () without one."""
     return getattr(measurement, "_ahead", ())
 
 

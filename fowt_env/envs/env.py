@@ -70,7 +70,7 @@ from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import Measurement
 from fowt_env.plant.state import N_COMMANDS, State
-from fowt_env.run.interface import guard_of, wind_ahead_of
+from fowt_env.run.interface import guard_of, law_wind_ahead, wind_ahead_of
 from fowt_env.run.outcome import run_frame, stop_facts, trip_name
 from fowt_env.run.simulation import check_duration, steps_in
 from fowt_env.scene.build import build_scene
@@ -358,11 +358,19 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             sensors = draw_sensors(self._sensors, scales, self.control_dt, scene.seed, readings)
         preview, observed, read = self._interface.preview, None, None
         if self._baseline is not None:
-            leads = preview_leads(self._baseline)
-            read = self._wind_ahead(scene, leads, EXACT if preview is None else preview)
+            period = (self._per_control * self.dt, self.task.duration)
+            read = law_wind_ahead(scene, self._baseline, self._given_preview, *period)
         if preview is not None and self.task.wind_preview:
             observed = self._wind_ahead(scene, self.task.wind_preview, preview)
         return Interface(control_dt, sensors, self._hidden, read, guard), observed
+
+    @property
+    def _given_preview(self):
+        """Return the argument preview of simulate for the baseline."""
+        return EXACT if self._interface.preview is None else self._interface.preview
+
+    def _known_scene(self, controller):
+        return known_scene(self.design_scene, controller, self._given_preview)
 
     def _wind_ahead(self, scene, leads, preview):
         """Return the WindAhead of an episode at look-ahead times (s)."""
@@ -439,6 +447,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         turbine = self.design_scene.turbine
         controller = named_baseline(deepcopy(self.baseline), turbine, self.control_dt)
         leads = preview_leads(controller)
+        if "lidar" in controller.information:
+            raise InputError(f"baseline {controller.name!r}: reads a lidar, which an ordered stop has not")
         controller.prepare(known_scene(self.design_scene, controller))
         controller.reset(self.measurement(leads))
         run = self._episode
@@ -466,7 +476,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _baseline_reading(self):
         """Return the readings at the present control instant as the baseline's view."""
-        return view_of(self._baseline)(self._episode.link.law_reading.tolist())
+        values = self._episode.link.law_reading.tolist()
+        return view_of(self._baseline, self._config.interface.ahead.values.shape[0])(values)
 
     def step(self, action: npt.ArrayLike) -> StepResult:
         """Advance one control period; return (observation, reward, terminated, truncated, info)."""
@@ -628,7 +639,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         config = self._config._replace(model=scene.model)
         interface, ahead = self._connect(scene, guard)
         if self._baseline is not None:
-            self._baseline.prepare(known_scene(self.design_scene, self._baseline))
+            self._baseline.prepare(self._known_scene(self._baseline))
             config = config._replace(parameters=self._baseline.parameters)
         if self._estimator is not None:
             self._estimator.prepare(known_scene(self.design_scene, self._estimator))

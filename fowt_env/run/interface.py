@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from fowt_env.control import foreseen, hidden, preview_leads
+from fowt_env.control import foreseen, hidden, lidar_of, preview_leads
 from fowt_env.descriptions.faults import BLADE_FAULTS, STOP_FAULTS, Fault
 from fowt_env.descriptions.protection import Protection
 from fowt_env.descriptions.sensors import SensorChain
@@ -17,6 +17,7 @@ from fowt_env.loop.sensing import WindAhead, no_wind_ahead
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
 from fowt_env.plant.state import BLADES
 from fowt_env.scene.scene import Scene
+from fowt_env.weather.lidar_gates import Gates, lidar_gates
 from fowt_env.weather.preview import Motion
 from fowt_env.weather.sensor_noise import draw_sensors
 
@@ -107,9 +108,25 @@ def build_interface(
         control_dt,
         draw_sensors(chain, control_dt, scene.seed, periods + 1, individual),
         hidden(controller, available, individual),
-        wind_ahead_of(scene, preview_leads(controller), preview, control_dt, control_dt * periods),
+        law_wind_ahead(scene, controller, preview, control_dt, control_dt * periods),
         guard,
     )
+
+
+def law_wind_ahead(scene, controller, preview, control_dt, duration) -> WindAhead:
+    """Return the WindAhead of a controller from the argument preview of simulate: preview or lidar.
+
+    The rows of a lidar are speeds and freshness of its gates.
+    """
+    leads, lidar = preview_leads(controller), lidar_of(controller, preview)
+    if lidar is None:
+        return wind_ahead_of(scene, leads, preview, control_dt, duration)
+    seen = preview.series if isinstance(preview, Gates) else lidar_gates(scene, lidar).series
+    taps, weight = np.zeros((0, 0)), np.zeros(3)
+    if seen.motion is not None:
+        taps, weight = nacelle_motion(seen.motion, control_dt)
+        taps[len(taps) // 2 :] = 0.0  # motion does not change the freshness
+    return WindAhead(seen.time, seen.values, taps, weight)
 
 
 def wind_ahead_of(scene, leads, preview, control_dt, duration) -> WindAhead:

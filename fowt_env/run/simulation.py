@@ -193,7 +193,7 @@ def build_run(
         controller = make(controller, scene.turbine, control_dt)
         check_pitches(controller, scene.model.pitches is not None)
         with _controller_errors():
-            controller.prepare(known_scene(scene if nominal is None else nominal, controller))
+            controller.prepare(known_scene(scene if nominal is None else nominal, controller, preview))
     x, u = initial_state(scene, initial)
     if without_controller:
         scene = scene.with_model({"rigid_body.rotor_fixed": True})
@@ -331,7 +331,7 @@ class Run:
         self.link = interface_data(interface, len(x), len(u), scene.n_measurements)
         self.link.command[:] = u
         self.linked = Handle(interface, self.link)
-        self.view = view_of(controller)
+        self.view = view_of(controller, interface.ahead.values.shape[0])
         self.rows = np.empty((schedule.last // schedule.per_output + 1, len(scene.channels)))
         self.filled = 0
         period = schedule.per_control * schedule.dt

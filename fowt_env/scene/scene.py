@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from fowt_env.descriptions.checks import check_whole_number, short
+from fowt_env.descriptions.lidar import Lidar
 from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.display import html_table
@@ -73,6 +74,7 @@ class Scene:
     loads: tuple[Load, ...] = ()  # user-defined loads
     label: str = ""  # name or path of the platform, as specified
     plant: object = field(default_factory=object, repr=False)  # the same for the same model but for weather
+    lidar: Lidar | None = None  # on the nacelle; set in the scene for a controller's prepare() alone
     steps: dict = field(default_factory=dict, init=False, repr=False)  # {time step, s: Scene of with_step}
 
     @property

@@ -72,6 +72,8 @@ class Points(NamedTuple):
     weight: np.ndarray  # sum 1
     across: np.ndarray  # factor of v in the estimate of u
     up: np.ndarray  # factor of w in the estimate of u
+    beam: np.ndarray  # index
+    gate: np.ndarray  # index of the distance
 
 
 class Shares(NamedTuple):
@@ -122,16 +124,17 @@ def points(lidar, first=0):
     parts = []
     distances = lidar.distances[first:]
     slopes = np.stack(directions(lidar), axis=1)
-    for slope_y, slope_z in slopes:
+    for beam, (slope_y, slope_z) in enumerate(slopes):
         stretch = np.sqrt(1.0 + slope_y**2 + slope_z**2)  # range over distance along the wind
-        for distance in distances:
+        for gate, distance in enumerate(distances):
             offset, weight = beam_weights(lidar, distance * stretch)
             along = distance + offset / stretch
             position = (slope_y * along, slope_z * along + lidar.above_shaft)
             weight = weight / (len(slopes) * len(distances))
             cross = np.outer([-slope_y, -slope_z], np.ones(along.size))
             upwind = along - (lidar.behind_rotor or 0.0)
-            parts.append([upwind, along - distance, *position, weight, *cross])
+            index = np.multiply.outer([beam, gate], np.ones(along.size, dtype=int))
+            parts.append([upwind, along - distance, *position, weight, *cross, *index])
     return Points(*np.concatenate(parts, axis=1))
 
 
@@ -316,7 +319,7 @@ def lidar_horizon(scene, preset="four_beam_pulsed"):
 
     preset: as in lidar_preview. Raises: InputError for a scene without wind.
     """
-    lidar, site = _placed(scene, preset)
+    lidar, site = placed(scene, preset)
     return tuning(lidar, len(lidar.distances) - 1, *site).horizon
 
 
@@ -326,7 +329,7 @@ def lidar_tuning(scene, preset="four_beam_pulsed", ahead=0.0):
     The filter averages all distances with a sufficient preview time. preset: as in lidar_preview.
     Raises: InputError for a longer time than that of the farthest distance, and for a scene without wind.
     """
-    lidar, site = _placed(scene, preset)
+    lidar, site = placed(scene, preset)
     last = len(lidar.distances) - 1
     horizon = tuning(lidar, last, *site).horizon
     if ahead > horizon:
@@ -338,7 +341,7 @@ def lidar_tuning(scene, preset="four_beam_pulsed", ahead=0.0):
     return tuning(lidar, first, *site)
 
 
-def _placed(scene, preset):
+def placed(scene, preset):
     """Return (Lidar, further arguments of tuning) of a lidar in a scene. Raises: InputError."""
     lidar = read_lidar(preset)
     if scene.model.aero is None:
@@ -354,16 +357,16 @@ def _placed(scene, preset):
             f"lidar {lidar.name!r}: the blades of {scene.turbine.name!r} block {100.0 * blocked:.0f} %"
             " of the shots: must be at most 90 %; change behind_rotor or above_shaft"
         )
-    return lidar, (speed, rotor.hub_height, _radius(scene), blocked)
+    return lidar, (speed, rotor.hub_height, disc_radius(scene), blocked)
 
 
-def _radius(scene):
+def disc_radius(scene):
     """Return the radius (m) of the rotor average; 0 if the wind of a point is uniform over the disc."""
-    drawn = _drawn(scene)
+    drawn = drawn_of(scene)
     return 0.0 if drawn is not None and drawn["average"] == "point" else scene.turbine.rotor.tip_radius
 
 
-def _drawn(scene):
+def drawn_of(scene):
     """Return the arguments of turbulence() for a scene; None for a wind that is not drawn from spectra."""
     if isinstance(scene.wind, WindBox):
         return None
@@ -383,43 +386,51 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
     wind, and for a scene without wind.
     """
     times = check_times(times)
-    lidar, (speed, _, _, blocked) = _placed(scene, preset)
+    lidar, (speed, _, _, blocked) = placed(scene, preset)
     tuned = lidar_tuning(scene, lidar, times[-1] if times.size else 0.0)
     seed = scene.seed if seed is None else check_whole_number("seed", seed, 0)
     if isinstance(scene.wind, WindBox):
         start, seen, period = _in_box(scene, lidar, tuned, seed)
-    elif _drawn(scene) is not None:
+    elif drawn_of(scene) is not None:
         start, seen, period = _in_turbulence(scene, lidar, tuned, seed)
     else:
         start, seen, period = _uniform(scene, lidar, tuned)
         seed = None
     value = _filtered(start, seen, period, lidar, blocked, tuned, seed)
     distances = np.array(lidar.distances[tuned.first :])
-    scans = 0.5 + blocked / (1.0 - blocked)  # mean age of a value
+    age = lidar.scan_period * (0.5 + blocked / (1.0 - blocked))  # mean, of a value
     motion = Motion(
         tuned.corner,
-        (distances - distances[0]) / speed + scans * lidar.scan_period,
+        (distances - distances[0]) / speed + age,
         np.full(distances.size, 1.0 / distances.size),
         tuned.horizon - times,
     )
     return series_ahead(scene, start, value, period, times)._replace(motion=motion)
 
 
-def _profile_factor(scene, lidar, tuned):
-    """Return the factor on the rotor's series that accounts for the power law at the measured points."""
-    series, p = scene.model.aero.wind, points(lidar, tuned.first)
-    height = np.maximum(series.reference_height + p.z, LOWEST_HEIGHT)
-    seen = p.weight @ (height / series.reference_height) ** series.shear_exponent
+def profile_factor(scene, z, weight):
+    """Return the factor (...) on the rotor's series that accounts for the power law at measured points.
+
+    z (n,): heights of the points above the hub, m; weight (..., n), sum 1.
+    """
+    series = scene.model.aero.wind
+    height = np.maximum(series.reference_height + z, LOWEST_HEIGHT)
+    seen = weight @ (height / series.reference_height) ** series.shear_exponent
     return 1.0 + seen - series.rotor_factor
+
+
+def _profile_factor(scene, lidar, tuned):
+    p = points(lidar, tuned.first)
+    return profile_factor(scene, p.z, p.weight)
 
 
 def _in_turbulence(scene, lidar, tuned, seed):
     """Return the lidar's unfiltered (time, wind, period) at the rotor, in a wind drawn from spectra."""
     start, wind, period = rotor_wind_series(scene)
-    drawn, count = _drawn(scene), wind.size - 1
+    drawn, count = drawn_of(scene), wind.size - 1
     frequency = np.arange(1, count // 2 + 1) / period
     wind_at = (drawn["speed"], drawn["sigma"], drawn["height"])
-    ratios = shares(lidar, tuned.first, *wind_at, _radius(scene))
+    ratios = shares(lidar, tuned.first, *wind_at, disc_radius(scene))
     rotor, cross, auto = (at_frequencies(values, frequency) for values in ratios)
     point = amplitudes(*wind_at, 2.0 * scene.turbine.rotor.tip_radius, count, period / count, "point")[:3, 1:]
     variance = 0.5 * point**2
@@ -427,11 +438,11 @@ def _in_turbulence(scene, lidar, tuned, seed):
     rest = np.maximum((auto * variance).sum(axis=0) - np.abs(cross) ** 2 / rotor * variance[0], 0.0)
     spectrum = np.fft.rfft(wind[:-1])
     spectrum[0] *= _profile_factor(scene, lidar, tuned)
-    spectrum[1:] = cross / rotor * spectrum[1:] + _noise(rest, count, seed, LIDAR_STREAM)
+    spectrum[1:] = cross / rotor * spectrum[1:] + gaussian(rest, count, seed, LIDAR_STREAM)
     return start[:-1], np.fft.irfft(spectrum, count), period
 
 
-def _noise(variance, count, seed, stream):
+def gaussian(variance, count, seed, stream):
     """Return Gaussian Fourier coefficients (n,) of a series of `count` values with a variance per bin."""
     drawn = component_generator(seed, stream).normal(size=(2, variance.size))
     return 0.5 * count * np.sqrt(variance) * (drawn[0] + 1j * drawn[1])
@@ -457,7 +468,7 @@ def _in_box(scene, lidar, tuned, seed):
     weight = p.weight * inside / p.weight[inside].sum()
     seen = np.zeros(box.velocity.shape[0])
     columns = (p.late / speed, p.y, height, weight, p.across, p.up)
-    _look(box.field(), *(np.ascontiguousarray(column[inside]) for column in columns), seen)
+    look(box.field(), *(np.ascontiguousarray(column[inside]) for column in columns), seen)
     count, radius = seen.size, scene.turbine.rotor.tip_radius
     frequency = np.arange(1, count // 2 + 1) / (count * box.dt)
     sigma = ntm_sigma(speed, TUNING_CLASS)
@@ -466,13 +477,13 @@ def _in_box(scene, lidar, tuned, seed):
     kept = np.where(frozen > 1e-12, evolved / np.maximum(frozen, 1e-12), 0.0)
     spectrum = np.fft.rfft(seen)
     variance = 2.0 * np.abs(spectrum[1:] / count) ** 2
-    spectrum[1:] = kept * spectrum[1:] + _noise((1.0 - kept**2) * variance, count, seed, LIDAR_STREAM)
+    spectrum[1:] = kept * spectrum[1:] + gaussian((1.0 - kept**2) * variance, count, seed, LIDAR_STREAM)
     time = np.arange(count) * box.dt - box.shift
     return time, np.fft.irfft(spectrum, count), count * box.dt if box.periodic else None
 
 
 @kernel
-def _look(field, late, y, z, weight, across, up, seen):
+def look(field, late, y, z, weight, across, up, seen):
     """Fill seen (n_time,) with the lidar's estimate of u at the rotor, from points of a box (see Points)."""
     for i in range(seen.shape[0]):
         t = i / field.rate - field.shift
@@ -501,7 +512,9 @@ def _filtered(time, value, period, lidar, blocked, tuned, seed):
         frequency = np.arange(1, count // 2 + 1) / (count * step)
         variance = 2.0 * np.abs(np.fft.rfft(value)[1:] / count) ** 2
         spectrum = np.zeros(count // 2 + 1, dtype=np.complex128)
-        spectrum[1:] = _noise(held_noise(lidar, blocked, frequency, variance), count, seed, LIDAR_STREAM + 1)
+        spectrum[1:] = gaussian(
+            held_noise(lidar, blocked, frequency, variance), count, seed, LIDAR_STREAM + 1
+        )
         folded = np.fft.irfft(spectrum, count)
     margin = 0 if period is not None else int(SETTLING / step)
     value, folded = np.pad(value, margin, mode="edge"), np.pad(folded, margin)

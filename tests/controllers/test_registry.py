@@ -9,10 +9,11 @@ import pytest
 from naive.turbine import turbine
 
 from fowt_env import build_scene
-from fowt_env.control import PRIVILEGED_INPUTS, whole_view, with_wind_ahead
+from fowt_env.control import PRIVILEGED_INPUTS, USUAL_LIDAR, whole_view, with_wind_ahead
 from fowt_env.controllers import CONTROLLERS, CheckedController, information, make
 from fowt_env.controllers.constant import Constant
 from fowt_env.controllers.policy.controller import shipped_agents
+from fowt_env.descriptions.lidar import read_lidar
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
 
@@ -23,6 +24,7 @@ RATED = QUIET._replace(
 
 
 BLADES = BladeMeasurement._make([0.0, 0.2, 0.2, 0.2, 6e6, 5e6, 4e6, *[0.0] * 7])
+GATES = len(read_lidar(USUAL_LIDAR).distances)
 # not part of the package: tests of them are skipped without the library
 ROSCO = {"rosco", "rosco_float", "rosco_ipc"}
 OSQP = {"lq_preview", "mpc", "mpc_lidar", "mpc_preview"}
@@ -60,6 +62,8 @@ def ahead(controller, measurement, wind=18.0):
     """The measurement with a steady wind at all times that the controller looks ahead, and with blades."""
     if controller.individual:
         return whole_view([*measurement, *BLADES._replace(azimuth=measurement.time)])
+    if "lidar" in controller.information:
+        return with_wind_ahead(measurement, [wind] * GATES + [0.75] * GATES)
     return with_wind_ahead(measurement, [wind] * len(controller.preview_times))
 
 

@@ -16,6 +16,7 @@ from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 from fowt_env.training.evaluation.case_environment import environment_settings
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.run_case import Run, run_metrics, scored
+from fowt_env.weather.lidar_gates import lidar_gates
 
 STILL = {"task": "steady", "wind": 16.0, "duration": 20.0, "fidelity": "fast"}
 RUNAWAY = {"kind": "pitch_runaway", "time": 0.0, "towards": "fine"}
@@ -141,6 +142,19 @@ def test_the_wind_ahead_of_observation_and_baseline_is_that_of_simulate(preview)
         hub = FowtEnv(task, fidelity="fast")
         hub.reset(seed=1)
         assert np.abs(hub.view().ahead - ahead[0]).max() < 1e-9  # rotor-averaged wind is that at the hub
+
+
+def test_the_baseline_reads_the_lidar_that_it_would_in_simulate():
+    law = Recorder(("rotor_speed", "lidar"), leads=2)
+    env = FowtEnv(
+        **STILL | {"wind": LIDAR["wind"]}, action_mode="residual", baseline=law, preview="circular_cw"
+    )
+    env.reset(seed=1)
+    env.step(np.zeros(2))
+    read = env._baseline.seen()[:2, N_MEASUREMENTS : N_MEASUREMENTS + 2]
+    wanted = lidar_gates(env.scene, "circular_cw").series.values[:, :2].T
+    np.testing.assert_allclose(read[:, 1], wanted[: len(read), 1], atol=1e-12)
+    np.testing.assert_allclose(read[:, 0], wanted[: len(read), 0], atol=0.1)  # without the nacelle's motion
 
 
 SLOW = {"kind": "ntm", "speed": 8.0, "class": "B"}

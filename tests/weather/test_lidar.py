@@ -342,7 +342,7 @@ def test_weights_along_the_beam_that_are_one_sided_shift_the_phase_as_in_a_box()
     wave = np.sin(2.0 * np.pi * np.arange(400) / 40.0)  # 0.05 Hz
     scene = in_box(18.0 + wave[:, None, None] + np.zeros((1, 4, 4)), grid)
     p, seen = points(lidar), np.zeros(400)
-    lidar_module._look(scene.wind.field(), p.late / SPEED, p.y, 90.0 + p.z, p.weight, p.across, p.up, seen)
+    lidar_module.look(scene.wind.field(), p.late / SPEED, p.y, 90.0 + p.z, p.weight, p.across, p.up, seen)
     gain = np.fft.rfft(seen)[10] / np.fft.rfft(wave)[10]
     cross = at_frequencies(shares(lidar, 0, SPEED, SIGMA, HUB, RADIUS, evolves=False).cross, np.array([0.05]))
     assert np.angle(gain) > 0.05

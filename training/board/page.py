@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 import fowt_env
-from fowt_env.control import PRIVILEGED_INPUTS
+from fowt_env.control import EXACT, PRIVILEGED_INPUTS, USUAL_LIDAR
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table, write_table
@@ -35,7 +35,7 @@ FIGURES = {  # heading: metric whose ratio to the baseline is shown
 VERSION = f"fowt_env {fowt_env.__version__}"
 LISTED = "listed"  # in the history: public seeds that were not drawn
 PER_WIND = ("rotor speed", "platform pitch", "travel", "power std", "torque travel", "shaft DEL")
-MODEL, PREVIEW = "plant_model", "wind_preview"
+MODEL, PREVIEW, LIDAR = "plant_model", "wind_preview", "lidar"
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # first characters of a spreadsheet formula
 PLANT = {"rotor_speed", "generator_speed", "blade_pitch", "generator_torque", "time"}
 CANNOT = (
@@ -92,7 +92,8 @@ def information_class(submission, turbine):
     words = ["rotor and blades" if used - set(PRIVILEGED_INPUTS) <= PLANT else "sensors"]
     words += ["exact weather"] if used & {"wind_speed", "wave_elevation"} else []
     words += ["plant model"] if MODEL in used else []
-    words += ["exact preview" if preview == "exact" else f"lidar {preview}"] if PREVIEW in used else []
+    words += ["exact preview" if preview == EXACT else f"lidar {preview}"] if PREVIEW in used else []
+    words += [f"lidar {USUAL_LIDAR if preview == EXACT else preview}, raw"] if LIDAR in used else []
     return " + ".join(words)
 
 

@@ -87,9 +87,11 @@ def _controllers():
     rows = []
     for name, factory in CONTROLLERS.items():
         summary, needs = factory.__doc__.splitlines()[0], information(name)
-        ahead, blades = "wind_preview" in needs, "azimuth" in needs
+        preview, lidar, blades = (key in needs for key in ("wind_preview", "lidar", "azimuth"))
+        ahead = preview or lidar
         motion = not {"nacelle_velocity", "nacelle_acceleration"}.isdisjoint(needs)
-        extra = "wind preview" if ahead else "blade loads" if blades else "motion" if motion else ""
+        extra = "blade loads" if blades else "motion" if motion else ""
+        extra = "lidar" if lidar else "wind preview" if preview else extra
         last = any(mark in summary for mark in LAST) or name == "constant"
         rows.append((last, ahead, blades, (name, summary, extra, ", ".join(needs))))
     return [row[-1] for row in sorted(rows, key=lambda row: row[:-1])]

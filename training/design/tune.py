@@ -23,7 +23,7 @@ from scipy.stats import qmc
 from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
 from fowt_env.controllers.lqr.design import LQGSettings
 from fowt_env.controllers.lqr.law import LQR
-from fowt_env.controllers.mpc.law import LIDAR_HORIZON, MPC
+from fowt_env.controllers.mpc.law import MPC
 from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.controllers.rosco import Rosco, RoscoSettings
@@ -127,8 +127,7 @@ def spaces():
         return ranges, {key: getattr(record, key) for key in ranges}
 
     def lidar(settings, turbine, dt):
-        changed = MPCSettings(preview_time=LIDAR_HORIZON, **settings)
-        return MPC(turbine, dt, changed, "mpc_lidar", preview=True, exact=False)
+        return MPC(turbine, dt, MPCSettings(**settings), "mpc_lidar", lidar=True)
 
     def feedback(settings, turbine, dt):
         return FloatingFeedback(PISettings.published(turbine), FeedbackSettings(**settings), dt)

@@ -54,9 +54,11 @@ def limit_for(information, moves_torque, bound, preview_times=()):
     moves_torque   whether it uses the generator torque above rated wind
     preview_times  preview times of the wind, s; () with "wind_preview": the longest of the table
     Preview is assumed exact. The next longer preview time of the table is used, with the same sensors or else
-    with all states measured (limits differ by less than 1 %).
+    with all states measured (limits differ by less than 1 %). None applies to a lidar.
     """
     used, limits = set(information) - FREE, list(bound["information"].unique())
+    if "lidar" in used:
+        return None  # the table has no limit with a lidar
     ahead = "wind_preview" in used
     if ahead:
         used -= {"wind_preview", "wind_speed"}  # the preview begins with the present wind

@@ -10,7 +10,7 @@ pytest.importorskip("osqp", reason='OSQP is not installed: pip install "fowt-env
 from fowt_env import build_scene, simulate  # noqa: E402
 from fowt_env.controllers import make  # noqa: E402
 from fowt_env.controllers.mpc import solver  # noqa: E402
-from fowt_env.controllers.mpc.law import LIDAR_HORIZON, MPC, PERIOD, Memory  # noqa: E402
+from fowt_env.controllers.mpc.law import MPC, PERIOD, Memory  # noqa: E402
 from fowt_env.controllers.mpc.model import COMMAND, SPEED, TORQUE  # noqa: E402
 from fowt_env.controllers.mpc.plan import LIMITED, RATED_BLOCKS  # noqa: E402
 from fowt_env.controllers.mpc.settings import MPCSettings  # noqa: E402
@@ -155,12 +155,6 @@ def test_the_wind_ahead_is_used():
     assert "wind_preview" in seer.information and "wind_preview" not in blind.information
     seen, unseen = (simulate(scene, one, duration=110.0)["RotSpeed_[rpm]"].std() for one in (seer, blind))
     assert seen < 0.6 * unseen
-
-
-@pytest.mark.parametrize("control_dt", [0.05, 0.1, 0.3, 0.4, 1.0])
-def test_no_wind_is_asked_for_that_the_lidar_cannot_foresee(control_dt, turbine):
-    times = make("mpc_lidar", turbine, control_dt).preview_times
-    assert times[-1] <= LIDAR_HORIZON + 1e-9 < times[-1] + times[1]
 
 
 def test_bad_settings_and_a_missing_prepare_are_named(turbine):

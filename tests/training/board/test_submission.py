@@ -5,11 +5,13 @@ import io
 import stat
 
 import pytest
+from naive.turbine import turbine
 
 from fowt_env.controllers.policy.controller import AGENTS
 from fowt_env.errors import InputError
 from fowt_env.training.board.folder import Board, new_board, read_seeds, write_secret_seeds
 from fowt_env.training.board.isolated import LARGEST_FOLDER, digest_of
+from fowt_env.training.board.page import information_class
 from fowt_env.training.board.submission import read_submission
 
 CARD = {
@@ -178,3 +180,16 @@ def test_a_policy_file_tells_its_inputs_itself(tmp_path):
     (folder / "p.npz").write_bytes(b"no arrays")
     with pytest.raises(InputError, match="controller"):
         read_submission(folder)
+
+
+@pytest.mark.parametrize(
+    ("information", "preview", "words"),
+    [
+        (["generator_speed", "lidar"], "circular_cw", "rotor and blades + lidar circular_cw, raw"),
+        (["generator_speed", "lidar"], "exact", "rotor and blades + lidar four_beam_pulsed, raw"),
+        (["platform_pitch", "plant_model"], "exact", "sensors + plant model"),
+    ],
+)
+def test_the_information_class_names_the_lidar_that_is_read_raw(tmp_path, information, preview, words):
+    found = read_submission(write(tmp_path / "a", information=information, preview=preview))
+    assert information_class(found, turbine()) == words

@@ -71,7 +71,8 @@ def test_a_controller_is_held_against_the_limit_of_what_it_knows_and_moves():
     assert (
         limit_for(("generator_speed", "wind_preview"), False, fronts, (9.0,)) == "speed_preview_11_pitch_only"
     )
-    # none of the table sees as far, or has its kind
+    # none of the table sees as far, or has its kind, or a lidar
+    assert limit_for((*FIVE, "lidar"), True, fronts) is None
     assert limit_for(ahead, True, fronts, (20.0,)) is None
     assert limit_for((*ahead, "surge"), True, fronts) is None
     everything = pd.concat([fronts, fronts.assign(information="full_preview_11")])
