@@ -25,7 +25,7 @@ from fowt_env.training.rl import callbacks, train
 from fowt_env.training.rl.train import (
     Training,
     baseline_figures,
-    decision_env,
+    inner_env,
     make_envs,
     resolve,
     validation_episodes,
@@ -209,7 +209,7 @@ def test_validation_repeats_the_same_episodes_bit_for_bit():
         validation.reset()
         for action in actions:
             validation.step(action)
-        found.append(decision_env(validation).base.figures())
+        found.append(inner_env(validation).figures())
     assert found[0].keys() == found[1].keys()
     for name, values in found[0].items():
         assert np.array_equal(values, found[1][name], equal_nan=True)
