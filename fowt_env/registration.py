@@ -35,10 +35,10 @@ EASY = {
     "action_mode": "residual",
     "baseline": "pi",
     "duration": 300.0,
-    # reached slowly only: the low pass lets a decision of 0.5 s through by a tenth
-    "residual_torque": 0.15,
-    "residual_pitch": 3.0,
-    "decisions": {"hold": 5, "smoothing": 5.0, "history": 1, "washout": 60.0},
+    # reached slowly: the low pass lets 6 % of a decision of 0.5 s through
+    "residual_torque": 0.25,
+    "residual_pitch": 5.0,
+    "decisions": {"hold": 5, "smoothing": 8.0, "history": 1, "washout": 60.0},
     "observation": (*TURBINE, "previous_action"),
     "normalise": TURBINE,
     **SCORE,

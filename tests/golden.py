@@ -14,8 +14,10 @@ from fowt_env.envs.env import REWARD_KEYS
 from fowt_env.files.atomic import replacing
 
 FOLDER = Path(__file__).parent / "reference" / "golden"
-ENVIRONMENTS = ("fowt_env/OC3Hywind-v1",)
+ENVIRONMENTS = ("fowt_env/OC3Hywind-v1", "fowt_env/OC3Hywind-v2")
 TASKS = ("above_rated", "full_range", "steady")  # every task that a name stands for
+LADDER = ("fowt_env/OC3HywindEasy-v0",)
+CASES = [(name, task) for name in ENVIRONMENTS for task in TASKS] + [(name, "above_rated") for name in LADDER]
 SEED = 7
 STEPS = 100  # control periods; the first rows show the start, the last the physics added up
 EVERY = 10  # rows are stored at step 0, 10, 20, ...
@@ -38,8 +40,10 @@ def trajectory(name, task, **options):
     """DataFrame of step, reward, the terms that are paid for and the observation, every EVERY steps."""
     env = gymnasium.make(name, task=task, **options)
     observation, info = env.reset(seed=SEED)
-    weights = env.unwrapped.task.weights
-    paid = [key for key in REWARD_KEYS if weights.get(key.removeprefix("reward/"), 0.0) > 0.0]
+    keys, weights = env.unwrapped.term_keys, env.unwrapped.task.weights
+    if keys is REWARD_KEYS:
+        keys = [key for key in keys if weights.get(key.removeprefix("reward/"), 0.0) > 0.0]
+    paid = list(keys)
     rows = [_row(0, 0.0, observation, info, paid)]
     for step, action in enumerate(actions(), 1):
         observation, reward, terminated, truncated, info = env.step(action)
@@ -58,12 +62,11 @@ def _row(step, reward, observation, info, paid):
 def write():
     """Paths of the files written anew."""
     paths = []
-    for name in ENVIRONMENTS:
-        for task in TASKS:
-            path = path_of(name, task)
-            with replacing(path) as temporary:
-                trajectory(name, task).to_csv(temporary, index=False, float_format="%.9g")
-            paths.append(path)
+    for name, task in CASES:
+        path = path_of(name, task)
+        with replacing(path) as temporary:
+            trajectory(name, task).to_csv(temporary, index=False, float_format="%.9g")
+        paths.append(path)
     return paths
 
 

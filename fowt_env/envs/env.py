@@ -211,6 +211,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._agent = (decisions, settings.episode.normalise, reward == REWARD)
         self.term_keys = GOAL_KEYS if reward == REWARD else REWARD_KEYS
         task = self.task = adapted_task(task_of(task, turbine), settings)
+        if reward == REWARD and task.shutdown is not None:
+            raise InputError(f"reward = {REWARD!r}: is of operation: task {task.name!r} has a shutdown")
         self.action_mode, self.baseline = control.action_mode, control.baseline
         control_dt = control.control_dt
         steps_in("duration", task.duration, control_dt, "control_dt")

@@ -2,11 +2,11 @@
 
     python -m fowt_env.training.studies.acceptance --out runs/acceptance
 
-Each seed is `PPO("MlpPolicy", gymnasium.make(NAME), seed=seed).learn(STEPS)` in a process of its own. At 0, 25,
-50, 75 and 100 % of the steps the deterministic policy runs the validation episodes of the task; the policy of the
-end then runs the suite above_rated. The folder has curve_SEED.csv (returns of the training episodes),
-validation.csv, scores.csv, policy_SEED.npz and curve.png; the last lines say whether the acceptance is met:
-validation return above that of zero action in every seed, and score below 0.9 in all but one.
+Each seed is PPO("MlpPolicy", gymnasium.make(NAME), seed=seed).learn(STEPS) in a process of its own. At 0,
+25, 50, 75 and 100 % of the steps the deterministic policy runs the validation episodes of the task; that of
+the end then runs the suite above_rated. The folder has curve_SEED.csv (returns of the training episodes),
+validation.csv, scores.csv, policy_SEED.npz, curve.png and verdict.json. The acceptance is met with a
+validation reward above that of zero action in every seed, and a score below 0.9 in all but one at most.
 """
 
 import json
@@ -120,6 +120,9 @@ def main(
     out.mkdir(parents=True, exist_ok=True)
     zero = returns(name, lambda seen: np.zeros((len(seen), *gymnasium.make(name).action_space.shape))).mean()
     print(f"zero action: {zero:.4f} a decision", flush=True)
+    env = gymnasium.make(name)  # compiles once what every process loads
+    env.reset(seed=0)
+    env.step(env.action_space.sample())
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
         each = list(pool.map(partial(trained, name=name, steps=steps, folder=out), range(seeds)))
     table = pd.DataFrame([row for rows in each for row in rows])
