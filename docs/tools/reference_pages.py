@@ -163,7 +163,9 @@ def goals_and_costs():
         unit, factor = units[name]
         usual = ", ".join(f"{factor * value:.3g}" for value in goals.USUAL[name][[0, 1, 3, 6]])
         rows.append((f"`reward/{name}`", f"{weight:.3f}", goals.GOALS[name], f"{usual} {unit}"))
-    rows += [(f"`cost/{name}`", "-", text, "-") for name, text in goals.COSTS.items()]
+    rows += [
+        (f"`cost/{name}`", "-", text.format_map(vars(goals)), "-") for name, text in goals.COSTS.items()
+    ]
     head = ("key of info", "weight", "meaning", "usual deviation at 12, 14, 18, 24 m/s")
     return markdown(head, rows)
 
@@ -375,8 +377,8 @@ def integrators():
 
 TABLES = {
     "reference/environment.md": (
-        environments, tasks, offsets, actions, actuators, observation, channels, blades, reward, meanings,
-        terminations, options, events,
+        environments, ladder, tasks, offsets, actions, actuators, observation, channels, blades,
+        goals_and_costs, reward, meanings, terminations, options, events,
     ),
     "reference/controllers.md": (measurements, blade_measurements),
     "explanation/theory.md": (loads, integrators),

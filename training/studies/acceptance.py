@@ -70,6 +70,7 @@ def trained(seed, name, steps, folder):
     """Train one seed; write its curve and policy and return the rows of its validations."""
     import torch
     from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.monitor import Monitor
 
     from fowt_env.training.rl.export import export_policy
@@ -77,13 +78,25 @@ def trained(seed, name, steps, folder):
     torch.set_num_threads(1)
     env = Monitor(gymnasium.make(name))
     model, rows, began = PPO("MlpPolicy", env, seed=seed), [], time.perf_counter()
-    for part in range(PARTS + 1):
-        if part:
-            model.learn(steps // PARTS, reset_num_timesteps=part == 1)
+
+    def validate():
         values = returns(name, lambda seen: model.predict(seen, deterministic=True)[0])
-        rows.append({"seed": seed, "steps": model.num_timesteps, "reward": values.mean()})
-        rows[-1] |= {"seconds": time.perf_counter() - began}
-        print(f"seed {seed}: {rows[-1]['steps']} steps, {rows[-1]['reward']:.4f} a decision", flush=True)
+        row = {"seed": seed, "steps": model.num_timesteps, "reward": values.mean()}
+        rows.append(row | {"seconds": time.perf_counter() - began})
+        print(f"seed {seed}: {row['steps']} steps, {row['reward']:.4f} a decision", flush=True)
+
+    class Validate(BaseCallback):
+        """Validates before the first decision and after each part of the training but the last."""
+
+        def _on_step(self):
+            return True
+
+        def _on_rollout_start(self):
+            if len(rows) < PARTS and self.num_timesteps >= len(rows) * steps / PARTS:
+                validate()
+
+    model.learn(steps, callback=Validate())
+    validate()
     lengths = env.get_episode_lengths()
     curve = {"steps": np.cumsum(lengths), "return": env.get_episode_rewards(), "length": lengths}
     write_table(pd.DataFrame(curve), folder / f"curve_{seed}.csv")
