@@ -143,7 +143,8 @@ def ladder():
             (
                 f"`{name}`",
                 f"`{settings['task']}`",
-                f"{settings['action_mode']}" + (f" on `{settings['baseline']}`" if "baseline" in settings else ""),
+                f"{settings['action_mode']}"
+                + (f" on `{settings['baseline']}`" if "baseline" in settings else ""),
                 reach,
                 f"{decisions['hold'] / 10:g} s, low pass {decisions['smoothing']:g} s"
                 + (f", washout {decisions['washout']:g} s" if "washout" in decisions else ""),
@@ -156,16 +157,18 @@ def ladder():
 
 def goals_and_costs():
     """Goals of the reward "score" with weights and usual deviations, and costs."""
-    units = {"rotor_speed": ("% of rated", 100.0), "platform_pitch": ("deg", 1.0 / DEGREE),
-             "pitch_travel": ("deg/s", 1.0 / DEGREE), "shaft": ("% of rated", 100.0)}
+    units = {
+        "rotor_speed": ("% of rated", 100.0),
+        "platform_pitch": ("deg", 1.0 / DEGREE),
+        "pitch_travel": ("deg/s", 1.0 / DEGREE),
+        "shaft": ("% of rated", 100.0),
+    }
     rows = []
     for name, weight in zip(goals.GOALS, goals.WEIGHTS, strict=True):
         unit, factor = units[name]
         usual = ", ".join(f"{factor * value:.3g}" for value in goals.USUAL[name][[0, 1, 3, 6]])
         rows.append((f"`reward/{name}`", f"{weight:.3f}", goals.GOALS[name], f"{usual} {unit}"))
-    rows += [
-        (f"`cost/{name}`", "-", text.format_map(vars(goals)), "-") for name, text in goals.COSTS.items()
-    ]
+    rows += [(f"`cost/{name}`", "-", text.format_map(vars(goals)), "-") for name, text in goals.COSTS.items()]
     head = ("key of info", "weight", "meaning", "usual deviation at 12, 14, 18, 24 m/s")
     return markdown(head, rows)
 

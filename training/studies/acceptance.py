@@ -1,4 +1,4 @@
-"""Trains stable-baselines3's PPO with default settings on a task of the ladder, several seeds side by side.
+"""Trains an algorithm with its default settings on a task of the ladder, several seeds side by side.
 
     python -m fowt_env.training.studies.acceptance --out runs/acceptance
 
@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import gymnasium
 import numpy as np
@@ -24,9 +24,9 @@ import pandas as pd
 import typer
 
 import fowt_env  # noqa: F401 # registers the environments
-from fowt_env.envs import FowtVectorEnv
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
+from fowt_env.registration import STEPS
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.leaderboard import leaderboard
@@ -41,14 +41,29 @@ LAWS = ("pi", "lqr", "mpc")
 
 
 def returns(name, policy, winds=WINDS, first=FIRST_SEED):
-    """Return the rewards of a decision (episodes,), means over validation episodes of an environment.
+    """Return the mean rewards of a decision (episodes,) in validation episodes of an environment.
 
-    policy: function of observations (n, size) that returns actions (n, actions).
+    policy: function of observations (n, size) that returns actions (n, actions). After an early end a decision
+    counts 0.
     """
-    settings = gymnasium.spec(name).kwargs
-    env = FowtVectorEnv(len(winds), autoreset_mode="Disabled", threads=1, **settings)
+    options = episodes(winds, first)
+    env: Any = gymnasium.make_vec(name, len(options), autoreset_mode="Disabled", threads=1)
+    observations, _ = env.reset(seed=0, options=options)
+    total, running = np.zeros(len(options)), np.ones(len(options), dtype=bool)
+    while running.any():
+        observations, rewards, terminated, truncated, _ = env.step(policy(observations))
+        total += np.where(running, rewards, 0.0)
+        running &= ~(terminated | truncated)
+        again = terminated | truncated
+        if again.any() and running.any():  # what ended goes on with an episode that does not count
+            observations, _ = env.reset(options={"reset_mask": again})
+    return total / STEPS
+
+
+def episodes(winds=WINDS, first=FIRST_SEED):
+    """Return the options of reset of the validation episodes, one for each mean wind (m/s)."""
     seeds = seeds_for("validation", first, len(winds))
-    options = [
+    return [
         {
             "wind": {"kind": "ntm", "speed": wind, "class": "B", "sigma": "drawn"},
             "weather_seed": seed,
@@ -56,28 +71,21 @@ def returns(name, policy, winds=WINDS, first=FIRST_SEED):
         }
         for wind, seed in zip(winds, seeds, strict=True)
     ]
-    observations, _ = env.reset(seed=0, options=options)
-    total, running, steps = np.zeros(len(winds)), np.ones(len(winds), dtype=bool), 0
-    while running.all():
-        observations, rewards, terminated, truncated, _ = env.step(policy(observations))
-        total += rewards
-        steps += 1
-        running &= ~(terminated | truncated)
-    return total / steps
 
 
-def trained(seed, name, steps, folder):
+def trained(seed, name, steps, folder, algo="ppo"):
     """Train one seed; write its curve and policy and return the rows of its validations."""
     import torch
-    from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.monitor import Monitor
 
     from fowt_env.training.rl.export import export_policy
+    from fowt_env.training.rl.train import make_algorithm
 
     torch.set_num_threads(1)
     env = Monitor(gymnasium.make(name))
-    model, rows, began = PPO("MlpPolicy", env, seed=seed), [], time.perf_counter()
+    model = make_algorithm(algo)("MlpPolicy", env, seed=seed)
+    rows, began = [], time.perf_counter()
 
     def validate():
         values = returns(name, lambda seen: model.predict(seen, deterministic=True)[0])
@@ -100,7 +108,7 @@ def trained(seed, name, steps, folder):
     lengths = env.get_episode_lengths()
     curve = {"steps": np.cumsum(lengths), "return": env.get_episode_rewards(), "length": lengths}
     write_table(pd.DataFrame(curve), folder / f"curve_{seed}.csv")
-    about = {"algo": "ppo", "name": name, "seed": seed, "steps": model.num_timesteps}
+    about = {"algo": algo, "name": name, "seed": seed, "steps": model.num_timesteps}
     if env.unwrapped.action_space.shape == (2,):
         export_policy(model, env.unwrapped, folder / f"policy_{seed}.npz", about)
     return rows
@@ -124,6 +132,7 @@ def main(
     name: Annotated[str, typer.Option(help="Name of the environment.")] = EASY,
     steps: Annotated[int, typer.Option(help="Decisions of a training.")] = 100_000,
     seeds: Annotated[int, typer.Option(help="Number of seeds: 0, 1, ...")] = 5,
+    algo: Annotated[str, typer.Option(help="ppo, sac or tqc of stable-baselines3.")] = "ppo",
     jobs: Annotated[int, typer.Option(help="Processes side by side.")] = 5,
     purpose: Annotated[
         str, typer.Option(help=f"Seeds of the suite: {', '.join(PURPOSES)} or suite.")
@@ -137,7 +146,7 @@ def main(
     env.reset(seed=0)
     env.step(env.action_space.sample())
     with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        each = list(pool.map(partial(trained, name=name, steps=steps, folder=out), range(seeds)))
+        each = list(pool.map(partial(trained, name=name, steps=steps, folder=out, algo=algo), range(seeds)))
     table = pd.DataFrame([row for rows in each for row in rows])
     write_table(table, out / "validation.csv")
     plot(table, zero, name, out / "curve.png")
