@@ -43,8 +43,8 @@ LAWS = ("pi", "lqr", "mpc")
 def returns(name, policy, winds=WINDS, first=FIRST_SEED):
     """Return the mean rewards of a decision (episodes,) in validation episodes of an environment.
 
-    policy: function of observations (n, size) that returns actions (n, actions). After an early end a decision
-    counts 0.
+    policy: function of observations (n, size) that returns actions (n, actions). After an early end decisions
+    count 0.
     """
     options = episodes(winds, first)
     env: Any = gymnasium.make_vec(name, len(options), autoreset_mode="Disabled", threads=1)
