@@ -42,7 +42,7 @@ from fowt_env.plant.advance import (
 from fowt_env.plant.events import EVENTS
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.measurement import HEAD, BladeMeasurement, Measurement, measurement_rows
-from fowt_env.registration import ENTRY_POINT, ENTRY_POINTS, ENVIRONMENTS, LADDER, OBJECTIVES, STEPS
+from fowt_env.registration import ENTRY_POINT, ENVIRONMENTS, LADDER, OBJECTIVES, STEPS
 from fowt_env.scene.loads import LOADS
 from fowt_env.training.cli.app import app
 
@@ -152,7 +152,7 @@ def ladder():
             )
         )
     head = ("name", "task", "actions", "largest additions", "decisions", "more")
-    return markdown(head, rows) + f"\nAn episode has {STEPS} decisions.\n"
+    return markdown(head, rows) + f"\n\nAn episode has {STEPS} decisions."
 
 
 def goals_and_costs():

@@ -281,6 +281,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._agent[0]
 
     @property
+    def physics_steps(self) -> int:
+        """Return the number of physics steps in a step."""
+        return self._per_control * (1 if self.decisions is None else self.decisions.hold)
+
+    @property
     def features(self) -> DecisionMap | None:
         """Return the compiled decisions with mean, scale and bound of the features; None as decisions."""
         return self._config.decisions

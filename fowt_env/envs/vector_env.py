@@ -45,6 +45,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                      sea, platform, turbine, task and reward may differ, rotor and options rarely.
                      Domain randomisation, with fowt_env.training.rl.randomisation.randomised:
                      gymnasium.make_vec(name, n, per_env=randomised({"plants": 8}, n, seed))
+    max_episode_steps
+                     largest number of steps of an episode, as gymnasium.make_vec passes it; None: duration only
     settings         common settings of all environments, see FowtEnv
 
     One environment of the batch gives the same bits as a FowtEnv with its seed and its actions, whatever
@@ -70,6 +72,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         per_env: list[dict[str, Any]] | None = None,
+        max_episode_steps: int | None = None,
         **settings: Any,
     ) -> None:
         self.num_envs = _count("num_envs", num_envs, 10**6)
@@ -99,6 +102,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self._info_keys = (*first.term_keys, "time")  # float64 entries of every step's infos
         self._info_masks = tuple(f"_{key}" for key in self._info_keys)
         self._last = np.array([env._last for env in self.envs])
+        if max_episode_steps is not None:
+            steps = _count("max_episode_steps", max_episode_steps, 10**9)
+            self._last = np.minimum(self._last, [steps * env.physics_steps for env in self.envs])
         self._dt = np.array([env.dt for env in self.envs])
         self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
         self._protected = first.is_protected

@@ -41,3 +41,10 @@ def test_every_rung_runs_alone_and_in_a_batch_with_the_same_bits(name):
         assert 0.0 <= reward <= 1.0 and info["cost"] >= 0.0 and not truncated
         if terminated:
             break
+
+
+def test_a_batch_made_by_name_ends_episodes_at_the_number_of_steps():
+    env = gymnasium.make_vec("fowt_env/OC3HywindEasy-v0", num_envs=2, duration=10.0, max_episode_steps=3)
+    env.reset(seed=0)
+    ends = [env.step(np.zeros((2, 2)))[3].tolist() for _ in range(3)]
+    assert ends == [[False, False], [False, False], [True, True]]
