@@ -46,7 +46,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                      Domain randomisation, with fowt_env.training.rl.randomisation.randomised:
                      gymnasium.make_vec(name, n, per_env=randomised({"plants": 8}, n, seed))
     max_episode_steps
-                     largest number of steps of an episode, as gymnasium.make_vec passes it; None: duration only
+                     largest number of steps of an episode, as gymnasium.make_vec passes; None: the duration
     settings         common settings of all environments, see FowtEnv
 
     One environment of the batch gives the same bits as a FowtEnv with its seed and its actions, whatever
