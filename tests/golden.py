@@ -1,9 +1,10 @@
 """The stored trajectory of each registered environment, and the command that makes it anew.
 
-`python tests/golden.py` (in the folder of the checkout) rewrites tests/reference/golden/*.csv. Do that only
-together with a new version of the environment's name, see CONTRIBUTING.md.
+`python tests/golden.py NAME...` (in the folder of the checkout) rewrites tests/reference/golden/*.csv of these
+names. Do that only together with a new version of the environment's name, see CONTRIBUTING.md.
 """
 
+import sys
 from pathlib import Path
 
 import gymnasium
@@ -59,10 +60,10 @@ def _row(step, reward, observation, info, paid):
     return {"step": step, "reward": float(reward), **terms, **seen}
 
 
-def write():
-    """Paths of the files written anew."""
+def write(names):
+    """Paths of the files of names, written anew."""
     paths = []
-    for name, task in CASES:
+    for name, task in (case for case in CASES if case[0] in names):
         path = path_of(name, task)
         with replacing(path) as temporary:
             trajectory(name, task).to_csv(temporary, index=False, float_format="%.9g")
@@ -71,5 +72,5 @@ def write():
 
 
 if __name__ == "__main__":
-    for written in write():
+    for written in write(sys.argv[1:]):
         print(written)
