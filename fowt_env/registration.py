@@ -72,6 +72,7 @@ LADDER = {  # tasks for agents, of rising difficulty
 }
 OBJECTIVES = {"fowt_env/OC3HywindObjectives-v0": EASY}  # a vector of rewards, for MO-Gymnasium
 STEPS = 600  # decisions of an episode of the ladder
+SOLVED = {"fowt_env/OC3HywindEasy-v0": 0.70}  # reward of a decision; pi earns 0.67, lqr 0.74
 ENTRY_POINTS = {  # of names with others than the usual two
     "fowt_env/OC3HywindUnknown-v0": (
         "fowt_env.training.rl.randomisation:unknown_plant",
@@ -87,6 +88,7 @@ def register_environments():
         if name not in registry:
             entry_point, of_vectors = ENTRY_POINTS.get(name, (ENTRY_POINT, VECTOR_ENTRY_POINT))
             more = {} if name in ENVIRONMENTS else {"max_episode_steps": STEPS}
+            more |= {"reward_threshold": STEPS * SOLVED[name]} if name in SOLVED else {}
             # the checker of Gymnasium expects a number as the reward
             more |= {"disable_env_checker": True} if name in OBJECTIVES else {}
             register(name, entry_point, vector_entry_point=of_vectors, kwargs=settings, **more)

@@ -1,7 +1,7 @@
 """The stored trajectory of each registered environment, and the command that makes it anew.
 
-`python tests/golden.py NAME...` (in the folder of the checkout) rewrites tests/reference/golden/*.csv of these
-names. Do that only together with a new version of the environment's name, see CONTRIBUTING.md.
+`python tests/golden.py NAME...` (in the folder of the checkout) rewrites the files of these names in
+tests/reference/golden. Do that only together with a new version of a name, see CONTRIBUTING.md.
 """
 
 import sys

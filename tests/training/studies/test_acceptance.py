@@ -12,7 +12,7 @@ from fowt_env.training.rl.train import make_algorithm
 from fowt_env.training.studies.acceptance import EASY, returns, trained
 
 STEPS = 8192
-BAND = (0.71, 0.75)  # of the reward of a decision of PPO after STEPS; 0.672 of zero action
+BAND = (0.69, 0.75)  # of the reward of a decision of PPO after STEPS; zero action earns 0.674
 
 
 def zero():
