@@ -37,7 +37,6 @@ WINDS = (12.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s, of the validati
 FIRST_SEED = 200  # index of the validation seed of the first episode
 PARTS = 4  # a validation after each of these parts of a training
 SCORE = 0.9  # to be reached on the suite
-LAWS = ("pi", "lqr", "mpc")
 
 
 def returns(name, policy, winds=WINDS, first=FIRST_SEED):
