@@ -24,7 +24,7 @@ def score(env, steps=200):
     return total / steps, info
 
 
-NAME = "fowt_env:fowt_env/OC3Hywind-v1"  # with the module that registers it
+NAME = "fowt_env:fowt_env/OC3Hywind-v2"  # with the module that registers it
 mean, info = score(gymnasium.make(NAME, task="above_rated"))
 print(f"built-in weights      {mean:.3f}")
 for key, value in info.items():

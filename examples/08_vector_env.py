@@ -7,7 +7,7 @@ import numpy as np
 
 N = 16
 STEPS = 500
-envs = gymnasium.make_vec("fowt_env:fowt_env/OC3Hywind-v1", num_envs=N, task="above_rated")
+envs = gymnasium.make_vec("fowt_env:fowt_env/OC3Hywind-v2", num_envs=N, task="above_rated")
 observations, infos = envs.reset(seed=1)  # seeds 1, 2, ... N
 print("wind speeds:", np.round(infos["wind_speed"], 1))
 

@@ -17,7 +17,7 @@ import numpy as np
 FOLDER = Path("results/examples/video")
 
 env = gymnasium.make(
-    "fowt_env:fowt_env/OC3Hywind-v1",
+    "fowt_env:fowt_env/OC3Hywind-v2",
     task="above_rated",
     action_mode="residual",  # the PI steers, the action adds to it: zero is the PI alone
     wind={"kind": "eog", "speed": 18.0, "start": 5.0},  # extreme operating gust

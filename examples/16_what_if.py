@@ -47,7 +47,7 @@ def looked_ahead(env):
 
 
 if __name__ == "__main__":
-    env = gymnasium.make("fowt_env:fowt_env/OC3Hywind-v1", **SETTINGS)
+    env = gymnasium.make("fowt_env:fowt_env/OC3Hywind-v2", reward=None, **SETTINGS)  # weighted terms
     env.reset(seed=3)
     saved = env.unwrapped.get_state()
     one = run_on(env.unwrapped, FUTURES[1], AHEAD)[0]

@@ -12,6 +12,7 @@ import pandas as pd
 
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.errors import InputError, unknown
+from fowt_env.registration import EASY
 
 WIND, SEA = {"kind": "ntm", "speed": 18.0}, {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0}
 
@@ -34,7 +35,8 @@ def _stepped(name, **settings):
     def run(platform):
         from fowt_env import envs
 
-        environment = getattr(envs, name)(task="above_rated", platform=platform, **settings)
+        given = {"task": "above_rated", "platform": platform, "reward": "score"} | settings
+        environment = getattr(envs, name)(**given)
         environment.reset(seed=0)
         environment.step(np.zeros(environment.action_space.shape, dtype=np.float32))
         environment.close()
@@ -53,6 +55,7 @@ RUNS = "runs in turbulence and a random sea at fidelity"
 KINDS: dict[str, tuple[str, Callable[[str], object]]] = {  # name: (summary, function that runs it)
     "standard": (f"{RUNS} standard", _simulated("standard", wind=WIND, sea=SEA)),
     "environment": ("reset and step of the Gymnasium environment", _stepped("FowtEnv")),
+    "easy": ("reset and step of the easiest task for agents", _stepped("FowtEnv", **EASY)),
     "vector": ("reset and step of the vector environment", _stepped("FowtVectorEnv", num_envs=2)),
     "steady": (
         "runs in a steady wind and still water at fidelity standard",

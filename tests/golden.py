@@ -1,9 +1,10 @@
 """The stored trajectory of each registered environment, and the command that makes it anew.
 
-`python tests/golden.py` (in the folder of the checkout) rewrites tests/reference/golden/*.csv. Do that only
-together with a new version of the environment's name, see CONTRIBUTING.md.
+`python tests/golden.py NAME...` (in the folder of the checkout) rewrites the files of these names in
+tests/reference/golden. Do that only together with a new version of a name, see CONTRIBUTING.md.
 """
 
+import sys
 from pathlib import Path
 
 import gymnasium
@@ -14,8 +15,10 @@ from fowt_env.envs.env import REWARD_KEYS
 from fowt_env.files.atomic import replacing
 
 FOLDER = Path(__file__).parent / "reference" / "golden"
-ENVIRONMENTS = ("fowt_env/OC3Hywind-v1",)
+ENVIRONMENTS = ("fowt_env/OC3Hywind-v1", "fowt_env/OC3Hywind-v2")
 TASKS = ("above_rated", "full_range", "steady")  # every task that a name stands for
+LADDER = ("fowt_env/OC3HywindEasy-v0",)
+CASES = [(name, task) for name in ENVIRONMENTS for task in TASKS] + [(name, "above_rated") for name in LADDER]
 SEED = 7
 STEPS = 100  # control periods; the first rows show the start, the last the physics added up
 EVERY = 10  # rows are stored at step 0, 10, 20, ...
@@ -38,8 +41,10 @@ def trajectory(name, task, **options):
     """DataFrame of step, reward, the terms that are paid for and the observation, every EVERY steps."""
     env = gymnasium.make(name, task=task, **options)
     observation, info = env.reset(seed=SEED)
-    weights = env.unwrapped.task.weights
-    paid = [key for key in REWARD_KEYS if weights.get(key.removeprefix("reward/"), 0.0) > 0.0]
+    keys, weights = env.unwrapped.term_keys, env.unwrapped.task.weights
+    if keys is REWARD_KEYS:
+        keys = [key for key in keys if weights.get(key.removeprefix("reward/"), 0.0) > 0.0]
+    paid = list(keys)
     rows = [_row(0, 0.0, observation, info, paid)]
     for step, action in enumerate(actions(), 1):
         observation, reward, terminated, truncated, info = env.step(action)
@@ -55,18 +60,17 @@ def _row(step, reward, observation, info, paid):
     return {"step": step, "reward": float(reward), **terms, **seen}
 
 
-def write():
-    """Paths of the files written anew."""
+def write(names):
+    """Paths of the files of names, written anew."""
     paths = []
-    for name in ENVIRONMENTS:
-        for task in TASKS:
-            path = path_of(name, task)
-            with replacing(path) as temporary:
-                trajectory(name, task).to_csv(temporary, index=False, float_format="%.9g")
-            paths.append(path)
+    for name, task in (case for case in CASES if case[0] in names):
+        path = path_of(name, task)
+        with replacing(path) as temporary:
+            trajectory(name, task).to_csv(temporary, index=False, float_format="%.9g")
+        paths.append(path)
     return paths
 
 
 if __name__ == "__main__":
-    for written in write():
+    for written in write(sys.argv[1:]):
         print(written)

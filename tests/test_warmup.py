@@ -78,7 +78,7 @@ def test_after_it_the_same_kinds_compile_nothing(tmp_path):
         "    wind = {'kind': 'ntm', 'speed': 18.0, 'class': 'B'}\n"
         "    scene = fowt_env.build_scene('oc3_hywind', wind=wind, sea=sea, fidelity='standard')\n"
         "    fowt_env.simulate(scene, 'pi', duration=1.0)\n"
-        "    env = gymnasium.make('fowt_env:fowt_env/OC3Hywind-v1', task='above_rated')\n"
+        "    env = gymnasium.make('fowt_env:fowt_env/OC3Hywind-v2', task='above_rated')\n"
         "    env.reset(seed=1)\n"
         "    env.step(env.action_space.sample())\n"
         "print(said)\n"

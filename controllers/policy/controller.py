@@ -89,7 +89,7 @@ class PolicyController:
             wind = wind_entry(chosen, self._mode, observed)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
-        self._decisions = Decisions(1, len(observed), chosen, control_dt, wind)
+        self._decisions = Decisions(len(observed), chosen, control_dt, wind)
         if self.network.mean.shape != (self._decisions.size,):
             raise InputError(
                 f"{where}: {self.network.mean.size} inputs: its observation has {self._decisions.size}"
@@ -171,12 +171,12 @@ class PolicyController:
             fill_signals(values, 0.0, self._accepted, estimate, 0.0, ahead[self._agent_leads], self._signals)
             fill_observation(self._signals, self._observation_map, self._observation)
             if self._calls == 0:
-                decisions.restart(0, self._observation, self._accepted)
+                decisions.restart(self._observation, self._accepted)
             else:
-                decisions.append(self._observation[None])
+                decisions.append(self._observation)
             self._decision = self.network(decisions.features())
         self._calls += 1
-        self._accepted[:] = np.clip(decisions.smooth(self._decision)[0], -1.0, 1.0)
+        self._accepted[:] = np.clip(decisions.smooth(self._decision), -1.0, 1.0)
         command = self._u.copy()
         hide_command(self._hidden, False, None, command)
         reading = values if self._hidden is None else values + self._hidden

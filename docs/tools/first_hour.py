@@ -30,14 +30,14 @@ plot_run(df).savefig("first.png")
 ENVIRONMENT = """
 import gymnasium
 import fowt_env
-env = gymnasium.make("fowt_env/OC3Hywind-v1", task="above_rated")
+env = gymnasium.make("fowt_env/OC3Hywind-v2", task="above_rated")
 env.reset(seed=1)
 env.step(env.action_space.sample())
 """
 VECTOR = """
 import gymnasium
 import fowt_env
-envs = gymnasium.make_vec("fowt_env/OC3Hywind-v1", num_envs=8)
+envs = gymnasium.make_vec("fowt_env/OC3Hywind-v2", num_envs=8)
 envs.reset(seed=1)
 envs.step(envs.action_space.sample())
 """

@@ -22,7 +22,7 @@ from fowt_env.controllers.bladed.swap import BLADE_READINGS, READINGS, Swap
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.descriptions.units import DEGREE, RPM
-from fowt_env.envs import rewards
+from fowt_env.envs import goals, rewards
 from fowt_env.envs.actions import TRACKING_DAMPING, TRACKING_FREQUENCY
 from fowt_env.envs.observations import BLADE_CHANNELS, KNOWN, STANDARD, STOP_CHANNELS, entries
 from fowt_env.envs.tables import action_table, observation_table
@@ -42,7 +42,7 @@ from fowt_env.plant.advance import (
 from fowt_env.plant.events import EVENTS
 from fowt_env.plant.integrators import INTEGRATORS
 from fowt_env.plant.measurement import HEAD, BladeMeasurement, Measurement, measurement_rows
-from fowt_env.registration import ENTRY_POINT, ENVIRONMENTS, OTHER_PLATFORMS
+from fowt_env.registration import ENTRY_POINT, ENVIRONMENTS, LADDER, OBJECTIVES, STEPS
 from fowt_env.scene.loads import LOADS
 from fowt_env.training.cli.app import app
 
@@ -118,10 +118,59 @@ def _drawn(task, of):
 
 
 def environments():
-    """Registered names."""
-    rows = [(f"`{name}`", "`oc3_hywind`", f"`{at}`") for name, at in ENVIRONMENTS.items()]
-    rows += [(f"`{name}`", f"`{platform}`", f"`{ENTRY_POINT}`") for name, platform in OTHER_PLATFORMS.items()]
-    return markdown(("name", "platform", "class"), rows)
+    """Registered names, the older version of a name behind the newest."""
+    rows = []
+    for name, settings in ENVIRONMENTS.items():
+        reward = "goals in [0, 1]" if settings.get("reward") else "weighted terms"
+        rows.append((f"`{name}`", f"`{settings.get('platform', 'oc3_hywind')}`", reward, f"`{ENTRY_POINT}`"))
+    return markdown(("name", "platform", "reward", "class"), rows)
+
+
+def ladder():
+    """Settings of the names for agents."""
+    rows = []
+    for name, settings in (LADDER | OBJECTIVES).items():
+        reach = "-"
+        if "residual_pitch" in settings:
+            torque = f"{100.0 * settings['residual_torque']:g} % of torque"
+            reach = f"{settings['residual_pitch']:g} deg, {torque}"
+        decisions = settings["decisions"]
+        more = [f"{key} {settings[key]}" for key in ("sensors", "protection", "preview") if key in settings]
+        more += [fault["kind"] + " of " + fault["field"] for fault in settings.get("faults", ())]
+        more += ["unknown plant"] if "Unknown" in name else []
+        more += ["vector of rewards"] if name in OBJECTIVES else []
+        rows.append(
+            (
+                f"`{name}`",
+                f"`{settings['task']}`",
+                f"{settings['action_mode']}"
+                + (f" on `{settings['baseline']}`" if "baseline" in settings else ""),
+                reach,
+                f"{decisions['hold'] / 10:g} s, low pass {decisions['smoothing']:g} s"
+                + (f", washout {decisions['washout']:g} s" if "washout" in decisions else ""),
+                ", ".join(more) or "-",
+            )
+        )
+    head = ("name", "task", "actions", "largest additions", "decisions", "more")
+    return markdown(head, rows) + f"\n\nAn episode has {STEPS} decisions."
+
+
+def goals_and_costs():
+    """Goals of the reward "score" with weights and usual deviations, and costs."""
+    units = {
+        "rotor_speed": ("% of rated", 100.0),
+        "platform_pitch": ("deg", 1.0 / DEGREE),
+        "pitch_travel": ("deg/s", 1.0 / DEGREE),
+        "shaft": ("% of rated", 100.0),
+    }
+    rows = []
+    for name, weight in zip(goals.GOALS, goals.WEIGHTS, strict=True):
+        unit, factor = units[name]
+        usual = ", ".join(f"{factor * value:.3g}" for value in goals.USUAL[name][[0, 1, 3, 6]])
+        rows.append((f"`reward/{name}`", f"{weight:.3f}", goals.GOALS[name], f"{usual} {unit}"))
+    rows += [(f"`cost/{name}`", "-", text.format_map(vars(goals)), "-") for name, text in goals.COSTS.items()]
+    head = ("key of info", "weight", "meaning", "usual deviation at 12, 14, 18, 24 m/s")
+    return markdown(head, rows)
 
 
 def tasks():
@@ -331,8 +380,8 @@ def integrators():
 
 TABLES = {
     "reference/environment.md": (
-        environments, tasks, offsets, actions, actuators, observation, channels, blades, reward, meanings,
-        terminations, options, events,
+        environments, ladder, tasks, offsets, actions, actuators, observation, channels, blades,
+        goals_and_costs, reward, meanings, terminations, options, events,
     ),
     "reference/controllers.md": (measurements, blade_measurements),
     "explanation/theory.md": (loads, integrators),

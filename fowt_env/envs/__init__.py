@@ -1,6 +1,7 @@
 """Provides the Gymnasium environments of fowt_env with their tasks and Markdown tables."""
 
 from fowt_env.envs.env import FowtEnv
+from fowt_env.envs.objectives import FowtObjectivesEnv
 from fowt_env.envs.safety import SafetyCosts, SafetyLayer
 from fowt_env.envs.settings import (
     ControlSettings,
@@ -18,6 +19,7 @@ __all__ = [
     "ControlSettings",
     "EpisodeSettings",
     "FowtEnv",
+    "FowtObjectivesEnv",
     "FowtVectorEnv",
     "InterfaceSettings",
     "PlantSettings",

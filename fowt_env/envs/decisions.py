@@ -5,12 +5,13 @@ washout: a high-pass filter, which bounds the sum of the additions and removes a
 authority: the decisions are weighted by the recent standard deviation of the estimated wind, with weight 0
 below a threshold, so that the baseline alone controls the operating point in steady wind.
 
-Training environments and the exported policy use the same numpy code, so that an agent is scored with the
-decisions and features of its training.
+Environments and the exported policy use the same kernels, so that an agent is scored with the decisions and
+features of its training.
 """
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, inf, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from fowt_env.descriptions.checks import check_number, check_whole_number, is_nu
 from fowt_env.envs.actions import ActionMode
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.errors import InputError
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.drivetrain import clamp
 
 WIND_CHANNEL = "estimated_wind"  # its standard deviation determines authority
 
@@ -74,7 +77,75 @@ def wind_entry(settings, mode, observed):
     )
 
 
-MEAN, VARIANCE = 2 * N_ACTIONS, 2 * N_ACTIONS + 1  # columns in the memory of Decisions
+class DecisionMap(NamedTuple):
+    """Holds the constants of the compiled decisions."""
+
+    hold: int  # control periods
+    fraction: float  # of a step that the low pass follows in a control period
+    shaped: bool  # whether washout or authority act
+    passing: float  # of a step that the low pass of the washout follows in a control period
+    lasting: float  # of a step that the mean of the estimated wind follows in a decision
+    wind: int  # entry of the estimated wind in an observation; -1: authority is always 1
+    wind_scale: float  # m/s per unit of this entry
+    wind_centre: float  # m/s
+    weak: float  # m/s, standard deviations between which authority rises from 0 to 1
+    strong: float
+    mean: np.ndarray  # (size,) of the features, subtracted
+    scale: np.ndarray  # (size,) of the features, divided by
+    bound: float  # of the features; inf: none
+
+
+class DecisionData(NamedTuple):
+    """Holds the variables of the decisions of one environment."""
+
+    observations: np.ndarray  # (history + 1, channels) float32 at decision instants, newest first
+    seen: np.ndarray  # (channels,) float32, present observation
+    smoothed: np.ndarray  # (actions,) low pass of the decisions
+    lasting: np.ndarray  # (actions,) low pass of the actions, which the washout subtracts
+    wind: np.ndarray  # (2,) mean (m/s) and variance of the estimated wind
+    decision: np.ndarray  # (actions,) in force
+    terms: np.ndarray  # (terms,) scratch: sums of the reward terms over the decision
+
+
+def build_decision_map(settings, control_dt, channels, wind=None, scaling=None):
+    """Return the DecisionMap of DecisionSettings; wind: result of wind_entry.
+
+    scaling: (mean, scale, bound) of the features, arrays (size,) and a number; None: unscaled.
+    """
+    if (wind is None) != (settings.authority is None):
+        raise ValueError("wind: must be the result of wind_entry for these settings")
+    index, wind_scale, centre = (-1, 1.0, 0.0) if wind is None else wind
+    weak, strong = settings.authority or (0.0, 1.0)
+    size = (settings.history + 1) * channels
+    mean, scale, bound = (np.zeros(size), np.ones(size), inf) if scaling is None else scaling
+    return DecisionMap(
+        hold=settings.hold,
+        fraction=_fraction(control_dt, settings.smoothing),
+        shaped=settings.washout > 0.0 or wind is not None,
+        passing=_fraction(control_dt, settings.washout) if settings.washout else 0.0,
+        lasting=_fraction(control_dt * settings.hold, settings.authority_time),
+        wind=int(index),
+        wind_scale=float(wind_scale),
+        wind_centre=float(centre),
+        weak=float(weak),
+        strong=float(strong),
+        mean=np.asarray(mean, dtype=np.float64),
+        scale=np.asarray(scale, dtype=np.float64),
+        bound=float(bound),
+    )
+
+
+def decision_data(history, channels, actions, terms=0):
+    """Return DecisionData of zeros."""
+    return DecisionData(
+        np.zeros((history + 1, channels), dtype=np.float32),
+        np.zeros(channels, dtype=np.float32),
+        np.zeros(actions),
+        np.zeros(actions),
+        np.zeros(2),
+        np.zeros(actions),
+        np.zeros(terms),
+    )
 
 
 def _fraction(step, time_constant):
@@ -82,94 +153,109 @@ def _fraction(step, time_constant):
     return 1.0 if time_constant == 0.0 else 1.0 - exp(-step / time_constant)
 
 
-class Decisions:
-    """Holds the observation history and computes the smoothed actions of n environments.
+@kernel
+def estimated_wind(data, decisions):
+    """Return the estimated wind, m/s, of the present observation."""
+    return decisions.wind_centre + decisions.wind_scale * np.float64(data.seen[decisions.wind])
 
-    observations (n, history + 1, channels) float32: observations at decision instants, newest first.
-    action (n, 2): present actions, in [-1, 1].
-    wind: result of wind_entry for the settings.
+
+@kernel
+def start_decisions(action, decisions, data):
+    """Fill the history with the present observation, and start the filters from the action in force."""
+    for i in range(data.observations.shape[0]):
+        for k in range(data.seen.shape[0]):
+            data.observations[i, k] = data.seen[k]
+    for i in range(action.shape[0]):
+        data.smoothed[i] = action[i]
+        data.lasting[i] = 0.0
+    data.wind[0] = estimated_wind(data, decisions) if decisions.wind >= 0 else 0.0
+    data.wind[1] = 0.0
+
+
+@kernel
+def shift_history(decisions, data):
+    """Append the present observation, at a new decision instant."""
+    for i in range(data.observations.shape[0] - 1, 0, -1):
+        for k in range(data.seen.shape[0]):
+            data.observations[i, k] = data.observations[i - 1, k]
+    for k in range(data.seen.shape[0]):
+        data.observations[0, k] = data.seen[k]
+    if decisions.wind >= 0:
+        deviation = estimated_wind(data, decisions) - data.wind[0]
+        data.wind[0] += decisions.lasting * deviation
+        data.wind[1] += decisions.lasting * (deviation * deviation - data.wind[1])
+
+
+@kernel
+def authority_of(decisions, data):
+    """Return the weight of the decisions, in [0, 1]."""
+    if decisions.wind < 0:
+        return 1.0
+    return clamp((sqrt(data.wind[1]) - decisions.weak) / (decisions.strong - decisions.weak), 0.0, 1.0)
+
+
+@kernel
+def smooth_decision(decision, decisions, data, action):
+    """Fill the action (actions,) of the next control period from the decision in force."""
+    counted = authority_of(decisions, data)
+    for i in range(action.shape[0]):
+        data.smoothed[i] += decisions.fraction * (decision[i] - data.smoothed[i])
+        if decisions.shaped:
+            # filter the clipped action: the limit of the low pass then bounds the sum of all applied actions
+            action[i] = clamp(counted * data.smoothed[i] - data.lasting[i], -1.0, 1.0)
+            data.lasting[i] += decisions.passing * action[i]
+        else:
+            action[i] = data.smoothed[i]
+
+
+@kernel
+def fill_features(decisions, data, features):
+    """Fill features (size,) float32: newest observation, then the change over each earlier interval.
+
+    Changes represent the rates directly; with lagged observations scaled to unit variance, rates would
+    be small differences of nearly equal numbers.
+    """
+    channels, bound = data.seen.shape[0], decisions.bound
+    for i in range(data.observations.shape[0]):
+        for k in range(channels):
+            value = (
+                data.observations[i, k] if i == 0 else data.observations[i - 1, k] - data.observations[i, k]
+            )
+            entry = i * channels + k
+            scaled = (np.float64(value) - decisions.mean[entry]) / decisions.scale[entry]
+            features[entry] = np.float32(clamp(scaled, -bound, bound))
+
+
+class Decisions:
+    """Computes the smoothed actions and the features of one agent outside an environment.
+
+    As the environments do, by the same kernels. wind: result of wind_entry for the settings. constants, data:
+    the DecisionMap and DecisionData.
     """
 
-    def __init__(self, n, channels, settings, control_dt, wind=None):
+    def __init__(self, channels, settings, control_dt, wind=None):
         self.settings = settings
-        self.observations = np.zeros((n, settings.history + 1, channels), dtype=np.float32)
-        self.action = np.zeros((n, N_ACTIONS))
-        self.fraction = _fraction(control_dt, settings.smoothing)
-        if (wind is None) != (settings.authority is None):
-            raise ValueError("wind: must be the result of wind_entry for these settings")
-        self.wind = wind
-        self.shaped = settings.washout > 0.0 or wind is not None
-        self.passing = _fraction(control_dt, settings.washout) if settings.washout else 0.0
-        self.lasting = _fraction(control_dt * settings.hold, settings.authority_time)
-        # columns, used with washout or authority: smoothed decision (2), low pass of the action (2), mean
-        # and variance of the estimated wind
-        self.memory = np.zeros((n, 2 * N_ACTIONS + 2))
+        self.size = (settings.history + 1) * channels
+        self.constants = build_decision_map(settings, control_dt, channels, wind)
+        self.data = decision_data(settings.history, channels, N_ACTIONS)
+        self._action, self._features = np.zeros(N_ACTIONS), np.zeros(self.size, dtype=np.float32)
 
-    @property
-    def size(self):
-        """Return the number of features."""
-        return self.observations.shape[1] * self.observations.shape[2]
+    def restart(self, observation, action):
+        """Fill the history with one observation and start from the action in force."""
+        self.data.seen[:] = observation
+        start_decisions(np.asarray(action, dtype=np.float64), self.constants, self.data)
 
-    def restart(self, rows, observations, actions):
-        """Reset the history of some rows to one observation and their actions to those in force."""
-        self.observations[rows] = np.asarray(observations, dtype=np.float32)[..., None, :]
-        self.action[rows] = actions
-        self.memory[rows] = 0.0
-        self.memory[rows, :N_ACTIONS] = actions
-        if self.wind is not None:
-            self.memory[rows, MEAN] = self._estimated_wind()[rows]
-
-    def append(self, observations):
-        """Append the observations (n, channels) of a new decision instant."""
-        self.observations[:, 1:] = self.observations[:, :-1].copy()
-        self.observations[:, 0] = observations
-        if self.wind is not None:
-            deviation = self._estimated_wind() - self.memory[:, MEAN]
-            self.memory[:, MEAN] += self.lasting * deviation
-            self.memory[:, VARIANCE] += self.lasting * (deviation**2 - self.memory[:, VARIANCE])
-
-    def _estimated_wind(self):
-        """Return the estimated wind (n,), m/s, of the newest observations."""
-        index, scale, centre = self.wind
-        return centre + scale * self.observations[:, 0, index].astype(np.float64)
-
-    def authority(self):
-        """Return the weights (n,) of the decisions, in [0, 1]."""
-        if self.wind is None:
-            return np.ones(len(self.action))
-        low, high = self.settings.authority
-        return np.clip((np.sqrt(self.memory[:, VARIANCE]) - low) / (high - low), 0.0, 1.0)
+    def append(self, observation):
+        """Append the observation of a new decision instant."""
+        self.data.seen[:] = observation
+        shift_history(self.constants, self.data)
 
     def features(self):
-        """Return features (n, size) float32: newest observation, then the change over each earlier interval.
-
-        Changes represent the rates directly; with lagged observations scaled to unit variance, rates would
-        be small differences of nearly equal numbers.
-        """
-        return features_of(self.observations)
-
-    def last_features(self, row, observation):
-        """Return the features (size,) of a row for a next observation, without storing the observation."""
-        newest = np.asarray(observation, dtype=np.float32)[None]
-        observations = np.concatenate([newest, self.observations[row, :-1]])
-        return features_of(observations[None])[0]
+        """Return the features (size,) float32."""
+        fill_features(self.constants, self.data, self._features)
+        return self._features.copy()
 
     def smooth(self, decision):
-        """Return the smoothed actions (n, 2) of the next control period."""
-        if not self.shaped:
-            self.action += self.fraction * (decision - self.action)
-            return self.action
-        smoothed, lasting = self.memory[:, :N_ACTIONS], self.memory[:, N_ACTIONS:MEAN]
-        smoothed += self.fraction * (decision - smoothed)
-        counted = self.authority()[:, None] * smoothed
-        # filter the clipped action: the limit of the low pass then bounds the sum of all applied actions
-        self.action[:] = np.clip(counted - lasting, -1.0, 1.0)
-        lasting += self.passing * self.action
-        return self.action
-
-
-def features_of(observations):
-    """Return features (n, features) of observations (n, instants, channels), see Decisions.features."""
-    changes = observations[:, :-1] - observations[:, 1:]
-    n = len(observations)
-    return np.concatenate([observations[:, 0], changes.reshape(n, -1)], axis=1)
+        """Return the smoothed action (2,) of the next control period."""
+        smooth_decision(np.asarray(decision, dtype=np.float64), self.constants, self.data, self._action)
+        return self._action.copy()

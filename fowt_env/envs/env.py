@@ -31,10 +31,13 @@ from fowt_env.envs.assembly import (
     adapted_task,
     allocate_episode,
     build_config,
+    check_decisions,
     check_shown,
+    feature_bounds,
     named_baseline,
     nominal_parts,
 )
+from fowt_env.envs.decisions import DecisionMap, DecisionSettings
 from fowt_env.envs.episode import (
     BAD_ACTION,
     RUNNING,
@@ -47,6 +50,8 @@ from fowt_env.envs.episode import (
     start_episode,
 )
 from fowt_env.envs.external_baseline import ExternalBaseline
+from fowt_env.envs.goals import KEYS as GOAL_KEYS
+from fowt_env.envs.goals import REWARD, usual_deviations
 from fowt_env.envs.observations import ESTIMATE_CHANNELS, entries
 from fowt_env.envs.reset import Start, kept_if_refused, moved_state, with_options
 from fowt_env.envs.rewards import REWARD_TERMS, Reference, check_own_reward, paid
@@ -69,7 +74,7 @@ from fowt_env.plant.advance import STOP_REASONS, TRIPPED, output
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import Measurement
-from fowt_env.plant.state import N_COMMANDS, State
+from fowt_env.plant.state import N_COMMANDS, Command, State
 from fowt_env.run.interface import guard_of, law_wind_ahead, wind_ahead_of
 from fowt_env.run.outcome import run_frame, stop_facts, trip_name
 from fowt_env.run.simulation import check_duration, steps_in
@@ -199,8 +204,15 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.render_size = render_size
         turbine = turbine_of(platform, options.get("turbine"))
         reward = settings.episode.reward
+        if isinstance(reward, str) and reward != REWARD:
+            raise unknown("reward", reward, (REWARD,))
         self._custom_reward = check_own_reward("reward", reward) if callable(reward) else None
+        decisions = check_decisions(control.decisions)
+        self._agent = (decisions, settings.episode.normalise, reward == REWARD)
+        self.term_keys = GOAL_KEYS if reward == REWARD else REWARD_KEYS
         task = self.task = adapted_task(task_of(task, turbine), settings)
+        if reward == REWARD and task.shutdown is not None:
+            raise InputError(f"reward = {REWARD!r}: is of operation: task {task.name!r} has a shutdown")
         self.action_mode, self.baseline = control.action_mode, control.baseline
         control_dt = control.control_dt
         steps_in("duration", task.duration, control_dt, "control_dt")
@@ -244,8 +256,12 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._last = per_control * steps_in("duration", task.duration, control_dt, "control_dt")
         self._key = plant_key(self.scene)
         self._build(mode, per_control)
+        if decisions is not None:
+            steps_in("duration", task.duration, control_dt * decisions.hold, "the period of a decision")
+            if isinstance(self._baseline, ExternalBaseline):
+                raise InputError(f"baseline = {self._baseline.name!r}: is not compiled: needs decisions=None")
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (n_actions(mode),), np.float32)
-        low, high = self._config.observation_map.low, self._config.observation_map.high
+        low, high = feature_bounds(self._config)
         self.observation_space = gymnasium.spaces.Box(low.astype(np.float32), high.astype(np.float32))
         self._running, self._closed = False, False
         self._end = ""  # why the last episode ended, and when
@@ -256,7 +272,23 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._kind = (
             self._key, self.action_mode, baseline, *observed, self.dt, self.control_dt, self._last,
             (nominal_key, self._sensors, self._limits, repr(self._interface.preview), self._interface.record),
+            repr(self._agent),
         )  # fmt: skip
+
+    @property
+    def decisions(self) -> DecisionSettings | None:
+        """Return the settings of the decisions; None if a step is one control period."""
+        return self._agent[0]
+
+    @property
+    def physics_steps(self) -> int:
+        """Return the number of physics steps in a step."""
+        return self._per_control * (1 if self.decisions is None else self.decisions.hold)
+
+    @property
+    def features(self) -> DecisionMap | None:
+        """Return the compiled decisions with mean, scale and bound of the features; None as decisions."""
+        return self._config.decisions
 
     @property
     def individual(self) -> bool:
@@ -333,7 +365,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self._faults = draw_faults(self._interface.faults, np.random.default_rng(0))
         interface, ahead = self._connect(scene, self._guard(scene, self._faults))
         timing = (self.dt, per_control, self.control_dt)
-        self._config = build_config(scene, task, mode, observed, timing, laws, interface, ahead)
+        self._config = build_config(scene, task, mode, observed, timing, laws, interface, ahead, self._agent)
         periods = self._last // per_control + 1 if self._interface.record else 0
         self._episode = allocate_episode(scene, self._config, laws, periods)
         self._handle = None
@@ -409,6 +441,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         find = cached_trim if episode.exact_start else interpolated_trim
         state, command = find(scene, self._key, scene.wind_speed)
         reference = Reference(float(state[State.PLATFORM_PITCH]), float(state[State.ROTOR_SPEED]))
+        if self._config.goals is not None:
+            torque, turbine = float(command[Command.GENERATOR_TORQUE]), scene.turbine
+            power = torque * reference.rotor_speed * turbine.drivetrain.gear_ratio
+            usual = usual_deviations(turbine, scene.wind_speed)
+            reference = Reference(*reference[:3], torque, power, *usual)
         state, command = moved_state(scene, state, command, episode.offsets)
         guard = self._guard(scene, episode.faults)
         return Start(episode, scene, self._nominal_in(scene), state, command, reference, guard)
@@ -512,6 +549,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if not self._running:
             raise self._not_running()
+        if self._episode.decided is not None:
+            raise InputError("step_physical: advances one control period: needs decisions=None")
         command = np.empty(self._episode.u.shape)
         if len(blade_pitch) not in (1, command.size - 1):
             many = "one" if command.size == N_COMMANDS else f"one, or {command.size - 1}"
@@ -527,7 +566,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """Return what step returns, from the status and reward of a control period."""
         run = self._episode
         step = int(run.counts[STEP])
-        info = dict(zip(REWARD_KEYS, run.terms.tolist(), strict=True))
+        info = dict(zip(self.term_keys, run.terms.tolist(), strict=True))
         info["time"] = step * self.dt
         info |= {key: int(run.counts[entry]) for key, entry in SHOWN_COUNTS.items()}
         if self._limits is not None:
@@ -715,6 +754,11 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         return run_frame(
             self.scene, run.rows[:filled].copy(), run.data.counters, run.link.watch, self.control_dt
         )
+
+    @property
+    def rows(self) -> np.ndarray | None:
+        """Return the stored output rows (control periods + 1, n_channels), SI; None without record=True."""
+        return self._episode.rows
 
     @property
     def last_action(self) -> np.ndarray:

@@ -10,6 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.envs.actions import ActionMap, accept, action_of, command_of
+from fowt_env.envs.decisions import (
+    DecisionData,
+    DecisionMap,
+    fill_features,
+    shift_history,
+    smooth_decision,
+    start_decisions,
+)
+from fowt_env.envs.goals import Goals, fill_goals
 from fowt_env.envs.observations import ObservationMap, fill_observation, fill_signals
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.loop.interface import Interface, InterfaceData
@@ -49,12 +58,14 @@ class EpisodeConfig(NamedTuple):
     estimator: np.ndarray | None  # parameters of the estimator's law
     observation_map: ObservationMap
     scales: Scales
-    weights: np.ndarray  # (N_TERMS,)
+    goals: Goals | None  # of a bounded reward; None: the terms of rewards.REWARD_TERMS
+    weights: np.ndarray  # (terms,)
     overspeed: float  # rad/s, above which the episode ends
     dt: float  # s
     per_control: int  # physics steps in a control period
     interface: Interface  # sensors, guard and preview between plant and controllers
     ahead: WindAhead | None  # wind preview of the observation; None: exact wind at the hub
+    decisions: DecisionMap | None  # None: an action is that of one control period
 
 
 @by_reference
@@ -70,13 +81,14 @@ class EpisodeData(NamedTuple):
     link: InterfaceData  # measurement, readings, command
     ahead: np.ndarray  # (leads,) wind ahead in the observation, m/s
     motion: np.ndarray | None  # memory of the lidar of the preview; None as EpisodeConfig.ahead
-    observation: np.ndarray  # (n,) float32
+    observation: np.ndarray  # (n,) float32; with decisions their features
+    decided: DecisionData | None  # None: as EpisodeConfig.decisions
     # int64: physics steps done, control periods with a clipped action, control periods with limited torque
     counts: np.ndarray
     reference: np.ndarray  # rewards.Reference of the episode
     previous_measurement: np.ndarray  # (n_measurements,) scratch from here on: one control period ago
     signals: np.ndarray  # inputs of the observation map
-    terms: np.ndarray  # (N_TERMS,) of the last period
+    terms: np.ndarray  # (terms,) of the last period; with decisions the mean over the last decision
     rows: np.ndarray | None  # (control periods + 1, n_channels) output rows so far, SI; None: not stored
 
 
@@ -125,7 +137,25 @@ def write_observation(config, episode):
         episode.link.reading, episode.x[State.AZIMUTH], episode.action, episode.estimate, since,
         episode.ahead, episode.signals,
     )  # fmt: skip
-    fill_observation(episode.signals, config.observation_map, episode.observation)
+    show_observation(episode.decided, config.observation_map, episode)
+
+
+@kernel
+def show_observation(decided, observation_map, episode):
+    """Fill the observation, or that of the present instant from which the features of a decision follow."""
+    if decided is None:
+        fill_observation(episode.signals, observation_map, episode.observation)
+        return
+    fill_observation(episode.signals, observation_map, decided.seen)
+
+
+@kernel
+def begin_history(decisions, decided, episode):
+    """Start the decisions from the present observation and the action in force."""
+    if decisions is None:
+        return
+    start_decisions(episode.action, decisions, decided)
+    fill_features(decisions, decided, episode.observation)
 
 
 @kernel
@@ -155,13 +185,16 @@ def start_episode(handle):
     copy_into(episode.previous_measurement, episode.link.measurement)
     action_of(episode.u, episode.x[State.ROTOR_SPEED], config.actions, episode.action)
     write_observation(config, episode)
+    begin_history(config.decisions, episode.decided, episode)
     return status
 
 
 @entry
 def rewrite_observation(handle):
     """Fill the observation again after the start of an estimator."""
-    write_observation(model_of(handle), data_of(handle))
+    config, episode = model_of(handle), data_of(handle)
+    write_observation(config, episode)
+    begin_history(config.decisions, episode.decided, episode)
 
 
 @kernel
@@ -203,37 +236,83 @@ def advance_period(config, episode, estimator_law):
         status = OVERSPEED
     update_estimate(estimator_law, config, episode)
     write_observation(config, episode)
-    fill_terms(
-        link.measurement, episode.previous_measurement, episode.reference, status != RUNNING,
-        config.scales, episode.terms,
-    )  # fmt: skip
+    rate_period(config.goals, status != RUNNING, config.scales, episode)
     return status, weighted_sum(config.weights, episode.terms)
+
+
+@kernel
+def rate_period(goals, failed, scales, episode):
+    """Fill the reward terms of the past control period."""
+    m, previous = episode.link.measurement, episode.previous_measurement
+    if goals is None:
+        fill_terms(m, previous, episode.reference, failed, scales, episode.terms)
+        return
+    fill_goals(m, previous, episode.reference, failed, goals, episode.terms)
+
+
+@kernel
+def act_for_period(config, episode, baseline_law, estimator_law):
+    """Advance one control period under episode.action. Returns (status, reward)."""
+    model, link, interface = config.model, episode.link, config.interface
+    if is_stopping(interface.guard, link):
+        stop_turbine(episode.x, interface.guard, link)
+    else:
+        show_command(episode.u, interface, config.actions.individual, model.pitches, link)
+        command_of(
+            episode.action, config.actions, baseline_law, config.parameters, episode.memory,
+            link.law_reading, link.command,
+        )  # fmt: skip
+    apply_period(config, episode)
+    return advance_period(config, episode, estimator_law)
+
+
+@kernel
+def act_for_decision(decisions, decided, config, episode, baseline_law, estimator_law, action):
+    """Advance one control period under an action, or the control periods of a decision.
+
+    Returns (status, reward), BAD_ACTION as act. The reward and the terms of a decision are means over its
+    control periods; those after the end of the episode count 0.
+    """
+    if decisions is None:
+        saturated = accept(action, episode.action)
+        if saturated < 0:
+            return BAD_ACTION, 0.0
+        episode.counts[SATURATED] += saturated
+        return act_for_period(config, episode, baseline_law, estimator_law)
+    saturated = accept(action, decided.decision)
+    if saturated < 0:
+        return BAD_ACTION, 0.0
+    episode.counts[SATURATED] += saturated
+    status, total, terms = RUNNING, 0.0, decided.terms
+    for i in range(terms.shape[0]):
+        terms[i] = 0.0
+    for _ in range(decisions.hold):
+        smooth_decision(decided.decision, decisions, decided, episode.action)
+        status, reward = act_for_period(config, episode, baseline_law, estimator_law)
+        total += reward
+        for i in range(terms.shape[0]):
+            terms[i] += episode.terms[i]
+        if status != RUNNING:
+            break
+    for i in range(terms.shape[0]):
+        episode.terms[i] = terms[i] / decisions.hold
+    shift_history(decisions, decided)
+    fill_features(decisions, decided, episode.observation)
+    return status, total / decisions.hold
 
 
 @entry
 def act(handle, baseline_law, estimator_law, action):
-    """Advance one control period under an action (actions,) in [-1, 1]. Returns (status, reward).
+    """Advance one control period or decision under an action (actions,) in [-1, 1]. Returns (status, reward).
 
     baseline_law, estimator_law: Handles whose data is the control kernel, or None; passing the kernel
     directly from Python takes ten times as long. With the status BAD_ACTION nothing is changed. While the
     guard stops the turbine, the action is ignored.
     """
     config, episode = model_of(handle), data_of(handle)
-    model, link, interface = config.model, episode.link, config.interface
-    saturated = accept(action, episode.action)
-    if saturated < 0:
-        return BAD_ACTION, 0.0
-    episode.counts[SATURATED] += saturated
-    if is_stopping(interface.guard, link):
-        stop_turbine(episode.x, interface.guard, link)
-    else:
-        show_command(episode.u, interface, config.actions.individual, model.pitches, link)
-        command_of(
-            episode.action, config.actions, baseline_law.data, config.parameters, episode.memory,
-            link.law_reading, link.command,
-        )  # fmt: skip
-    apply_period(config, episode)
-    return advance_period(config, episode, estimator_law.data)
+    return act_for_decision(
+        config.decisions, episode.decided, config, episode, baseline_law.data, estimator_law.data, action
+    )
 
 
 @entry

@@ -42,6 +42,12 @@ class Reference(NamedTuple):
     platform_pitch: float  # rad
     rotor_speed: float  # rad/s
     shutdown: float = inf  # s, time of the stop signal
+    generator_torque: float = 0.0  # N m; from here on for goals.py
+    power: float = 0.0  # W
+    usual_rotor_speed: float = 1.0  # goals.usual_deviations
+    usual_platform_pitch: float = 1.0
+    usual_pitch_travel: float = 1.0
+    usual_shaft: float = 1.0
 
 
 class RewardTerm(NamedTuple):
@@ -156,6 +162,18 @@ def tower_top_term(acceleration):
 def travel_term(previous, after, max_increment):
     """Return minus the travel in one control period as a fraction of the largest possible travel."""
     return 0.0 - unit_fraction(abs(after - previous) / max_increment)
+
+
+@kernel
+def pitch_moved(previous, m):
+    """Return the travel of the blade pitch, rad; with individual pitch the mean over the blades."""
+    if m.shape[0] == N_MEASUREMENTS:
+        return abs(m[Measure.BLADE_PITCH] - previous[Measure.BLADE_PITCH])
+    total = 0.0
+    for blade in range(BLADES):
+        i = N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + blade
+        total += abs(m[i] - previous[i])
+    return total / BLADES
 
 
 @kernel

@@ -17,7 +17,11 @@ class EpisodeSettings:
     observation: Sequence[str] | None = None  # channel names; "default" stands for the task's channels
     # {term: weight} to replace single weights, or a function (info) or (info, measurement) that returns the
     # reward: info of the step, with each named term, and Measurement at the end of the step (true motions)
-    reward: Mapping[str, float] | Callable[..., float] | None = None
+    # "score": goals in [0, 1] that rank controllers as the score of suites does (goals.py)
+    reward: Mapping[str, float] | Callable[..., float] | str | None = None
+    # {entry of the observation: (centre, scale, change)}, SI: with decisions the features are
+    # (value - centre) / scale, and the change between two decisions / change; None: as the table of channels
+    normalise: Mapping[str, Sequence[float]] | None = None
     duration: float | None = None  # s
     weather_duration: float | None = None  # s of random wind and sea; None: 600, or the duration if longer
     wind: Any = None  # as in build_scene; ranges are allowed
@@ -42,7 +46,13 @@ class ControlSettings:
 
     action_mode: str = "direct"  # "direct", "setpoint", "residual" or "individual"
     baseline: Any = "pi"  # controller (name or object) that the residual mode adds to
+    # largest additions of the residual mode: fraction of rated torque, deg of blade pitch; None: of the task
+    residual_torque: float | None = None
+    residual_pitch: float | None = None
     control_dt: float = 0.1  # s between actions, a multiple of dt
+    # DecisionSettings or a mapping of its fields: a step is then a decision, held for several control
+    # periods, smoothed, with a history in the observation; None: a step is one control period
+    decisions: Any = None
     # {"platform": ..., "turbine": ...}: plant that baseline and estimator are designed on; None: the true one
     nominal_plant: Mapping[str, Any] | None = None
 

@@ -17,6 +17,7 @@ CARRIED = {
         "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples",
         "radiation", "blades", "elastic", "slow",
     ),
+    "decided": ("observations", "seen", "smoothed", "lasting", "wind", "decision"),
     "rotor": RotorScratch._fields,  # of Data, if parts are elastic
 }  # fmt: skip
 
@@ -37,7 +38,9 @@ class Snapshot(NamedTuple):
 def carried(episode):
     """Return the arrays of EpisodeData in the order of CARRIED; None for arrays that the run lacks."""
     data = episode.data
-    parts = {"": episode, "link": episode.link, "data": data, "rotor": data.rotor}
+    parts = {
+        "": episode, "link": episode.link, "data": data, "decided": episode.decided, "rotor": data.rotor,
+    }  # fmt: skip
     return [getattr(parts[part], name, None) for part, names in CARRIED.items() for name in names]
 
 

@@ -14,18 +14,15 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from fowt_env.descriptions.checks import short
-from fowt_env.envs.env import CLOSED, REWARD_KEYS, FowtEnv
+from fowt_env.envs.env import CLOSED, FowtEnv
 from fowt_env.envs.episode import N_COUNTS, RUNNING, SHOWN_COUNTS, STEP
 from fowt_env.envs.episode_batch import act_all, act_all_parallel, thread_limit
 from fowt_env.envs.external_baseline import ExternalBaseline
 from fowt_env.envs.reset import kept_if_refused
-from fowt_env.envs.rewards import N_TERMS
 from fowt_env.envs.snapshot import Snapshot
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.compile.handle import Handle
 
-INFO_KEYS = (*REWARD_KEYS, "time")  # float64 entries of every step's infos
-INFO_MASKS = tuple(f"_{key}" for key in INFO_KEYS)
 # attributes that a copy rebuilds: compiled ones, and arrays filled from those of the single environments
 COMPILED = (
     "_baseline_law", "_estimator_law", "_observations", "_counts", "_terms", "_handles", "_listed",
@@ -48,6 +45,8 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                      sea, platform, turbine, task and reward may differ, rotor and options rarely.
                      Domain randomisation, with fowt_env.training.rl.randomisation.randomised:
                      gymnasium.make_vec(name, n, per_env=randomised({"plants": 8}, n, seed))
+    max_episode_steps
+                     largest number of steps of an episode, as gymnasium.make_vec passes; None: the duration
     settings         common settings of all environments, see FowtEnv
 
     One environment of the batch gives the same bits as a FowtEnv with its seed and its actions, whatever
@@ -73,6 +72,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         per_env: list[dict[str, Any]] | None = None,
+        max_episode_steps: int | None = None,
         **settings: Any,
     ) -> None:
         self.num_envs = _count("num_envs", num_envs, 10**6)
@@ -99,7 +99,12 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         self._share_rows()
         self._statuses = np.full(num_envs, RUNNING, dtype=np.int64)
         self._rewards = np.zeros(num_envs)
+        self._info_keys = (*first.term_keys, "time")  # float64 entries of every step's infos
+        self._info_masks = tuple(f"_{key}" for key in self._info_keys)
         self._last = np.array([env._last for env in self.envs])
+        if max_episode_steps is not None:
+            steps = _count("max_episode_steps", max_episode_steps, 10**9)
+            self._last = np.minimum(self._last, [steps * env.physics_steps for env in self.envs])
         self._dt = np.array([env.dt for env in self.envs])
         self._ended = np.zeros(num_envs, dtype=bool)  # waiting for the reset of the next step
         self._protected = first.is_protected
@@ -132,7 +137,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         n = self.num_envs
         self._observations = np.zeros((n, *self.single_observation_space.shape), dtype=np.float32)
         self._counts = np.zeros((n, N_COUNTS), dtype=np.int64)
-        self._terms = np.zeros((n, N_TERMS))
+        self._terms = np.zeros((n, len(self.envs[0].term_keys)))
         for i, env in enumerate(self.envs):
             env._episode = env._episode._replace(
                 observation=self._observations[i], counts=self._counts[i], terms=self._terms[i]
@@ -290,18 +295,18 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
         """Add the step infos of the shown environments to infos, in the format of _add_info."""
         if not shown.any():
             return infos
-        columns = np.empty((len(INFO_KEYS), self.num_envs))
-        columns[:N_TERMS] = self._terms.T
-        np.multiply(self._counts[:, STEP], self._dt, out=columns[N_TERMS])
+        columns = np.empty((len(self._info_keys), self.num_envs))
+        columns[:-1] = self._terms.T
+        np.multiply(self._counts[:, STEP], self._dt, out=columns[-1])
         counts = {key: self._counts[:, entry].copy() for key, entry in SHOWN_COUNTS.items()}
         if not shown.all():
             columns[:, ~shown] = 0.0
             for values in counts.values():
                 values[~shown] = 0
-        masks = np.empty((len(INFO_KEYS), self.num_envs), dtype=bool)
+        masks = np.empty(columns.shape, dtype=bool)
         masks[:] = shown  # separate rows, because a reset changes some of them
-        infos.update(zip(INFO_KEYS, columns, strict=True))
-        infos.update(zip(INFO_MASKS, masks, strict=True))
+        infos.update(zip(self._info_keys, columns, strict=True))
+        infos.update(zip(self._info_masks, masks, strict=True))
         if self._protected:
             counts["stopping"] = np.array([env.is_stopping for env in self.envs]) & shown
         for key, values in counts.items():
@@ -322,7 +327,7 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
 
     def last_info(self, i: int) -> dict[str, Any]:
         """Return the info of the last step of one environment, as FowtEnv.step returns it."""
-        info = dict(zip(REWARD_KEYS, self._terms[i].tolist(), strict=True))
+        info = dict(zip(self.envs[i].term_keys, self._terms[i].tolist(), strict=True))
         info["time"] = float(self._counts[i, STEP] * self._dt[i])
         info |= {key: int(self._counts[i, entry]) for key, entry in SHOWN_COUNTS.items()}
         if self._protected:
@@ -352,6 +357,16 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
             env.set_state(snapshot)
             self._ended[i] = not snapshot.running
             self._renew(i)
+
+    @property
+    def observations(self) -> np.ndarray:
+        """Return a copy of the present observations (num_envs, n)."""
+        return self._observations.copy()
+
+    @property
+    def terms(self) -> np.ndarray:
+        """Return a copy of the reward terms (num_envs, terms) of the last step, before weighting."""
+        return self._terms.copy()
 
     def close_extras(self, **kwargs: Any) -> None:
         """Close the environments; reset and step then raise ClosedEnvironmentError."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from golden import ENVIRONMENTS, TASKS, path_of, trajectory
+from golden import CASES, ENVIRONMENTS, path_of, trajectory
 
 from fowt_env import registration
 
@@ -33,8 +33,7 @@ def compare(name, task, stored, now):
         )  # fmt: skip
 
 
-@pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.parametrize(("name", "task"), CASES)
 def test_an_environment_does_what_its_name_stands_for(name, task):
     compare(name, task, pd.read_csv(path_of(name, task)), trajectory(name, task))
 
@@ -47,4 +46,5 @@ def test_a_thousandth_more_drag_does_not_pass(platform):
 
 
 def test_every_registered_environment_has_a_stored_trajectory():
-    assert set(ENVIRONMENTS) == set(registration.ENVIRONMENTS)
+    of_oc3 = {name for name, settings in registration.ENVIRONMENTS.items() if "platform" not in settings}
+    assert set(ENVIRONMENTS) == of_oc3

@@ -11,7 +11,7 @@ from episodes import NAME
 from fresh_python import ROOT, fresh_python
 
 from fowt_env.descriptions.platform import platform_names
-from fowt_env.registration import OTHER_PLATFORMS
+from fowt_env.registration import ENVIRONMENTS, LADDER, STEPS
 
 pytestmark = pytest.mark.installation
 
@@ -37,11 +37,25 @@ def test_a_name_with_the_module_needs_no_import():
     assert fresh_python(code) == NAME
 
 
-@pytest.mark.parametrize(("name", "platform"), OTHER_PLATFORMS.items())
-def test_names_of_other_platforms_make_environments_of_them(name, platform):
+@pytest.mark.parametrize(("name", "settings"), ENVIRONMENTS.items())
+def test_names_make_environments_of_their_platform_and_reward(name, settings):
     spec = gymnasium.spec(name)
-    assert spec.kwargs == {"platform": platform} and platform in platform_names()
+    assert spec.kwargs == settings and settings.get("platform", "oc3_hywind") in platform_names()
+    newest = max(other for other in ENVIRONMENTS if other.startswith(name[:-1]))
+    assert (settings.get("reward") == "score") == (name == newest)
     assert gymnasium.spec(NAME).entry_point == spec.entry_point
+
+
+@pytest.mark.parametrize("name", LADDER)
+def test_names_of_the_ladder_say_how_many_steps_an_episode_has(name):
+    spec = gymnasium.spec(name)
+    period = 0.1 * spec.kwargs["decisions"]["hold"]
+    assert spec.max_episode_steps == STEPS == round(spec.kwargs["duration"] / period)
+
+
+def test_gymnasium_warns_of_the_older_version_of_a_name():
+    with pytest.warns(DeprecationWarning, match="OC3Hywind-v1 is out of date.*`v2`"):
+        gymnasium.make("fowt_env/OC3Hywind-v1", wind=18.0)
 
 
 def test_python_starts_without_a_line_of_this_project():

@@ -67,7 +67,6 @@ def subject(kind, n, settings, decisions):
     """Return (VecEnv, control periods per step, FowtVectorEnv inside or None) of a named kind."""
     from stable_baselines3.common.vec_env import SubprocVecEnv
 
-    from fowt_env.training.rl.decision_env import DecisionVecEnv
     from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     if kind == "SubprocVecEnv":
@@ -77,10 +76,10 @@ def subject(kind, n, settings, decisions):
         return SubprocVecEnv([first.twin] * n, start_method="fork"), 1, None
     if kind == "SyncVectorEnv":
         return sync_env(n, settings), 1, None
-    env = native = FowtSB3VecEnv(n, threads=1, **settings)
     hold = 1
     if kind.endswith("decisions"):
-        env, hold = DecisionVecEnv(native, decisions), decisions.hold
+        settings, hold = settings | {"decisions": decisions}, decisions.hold
+    env = native = FowtSB3VecEnv(n, threads=1, **settings)
     return (nothing_env(env), hold, None) if kind.startswith("torch alone") else (env, hold, native.env)
 
 

@@ -8,9 +8,14 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback, EvalCallback
 
 from fowt_env.files.tables import write_table
-from fowt_env.training.rl.train import decision_env, validation_score
+from fowt_env.training.rl.train import inner_env, validation_score
 
 REPORT_EVERY = 1.0  # s
+POINTS = 200  # rows of the curve over a run
+PARTS = 4  # validations of a run at least, beside that before its first decision
+
+
+EPISODE = (("return", "r"), ("length", "l"))  # of the curve: name, key in stable-baselines3's buffer
 
 
 class Stopped(Exception):
@@ -21,10 +26,17 @@ class Validation(EvalCallback):
     """Validates a train.Training: ratios to the reference, a row of the table, the best policy."""
 
     def __init__(self, training, env):
-        every = max(1, training.settings["validation"]["every"] // training.env.num_envs)
+        steps, given = training.settings["steps"], training.settings["validation"].get("every")
+        quarter = -(-steps // PARTS)
+        every = max(1, min(given or quarter, quarter) // training.env.num_envs)
         super().__init__(env, n_eval_episodes=env.num_envs, eval_freq=every, deterministic=True, verbose=0)
         self.training = training
         self.best = float("inf")
+
+    def _on_training_start(self):
+        super()._on_training_start()
+        if not self.training.rows:
+            self.now()
 
     def now(self):
         """Validate the current policy, leaving the interval of validations unchanged."""
@@ -39,7 +51,7 @@ class Validation(EvalCallback):
         going = super()._on_step()
         if not due:
             return going
-        metrics = decision_env(self.eval_env).base.figures()
+        metrics = inner_env(self.eval_env).figures()
         row = {"decisions": self.num_timesteps, "seconds": training.checkpointing.seconds()}
         row |= {"reward": self.last_mean_reward}
         row |= validation_score(metrics, training.reference, training.kinds)
@@ -51,6 +63,35 @@ class Validation(EvalCallback):
             self.best = row["score"]
             training.export("best.npz")
         return going
+
+
+class Curve(BaseCallback):
+    """Records returns and reward terms of the training episodes over a run, also for TensorBoard."""
+
+    def __init__(self, training):
+        super().__init__()
+        self.training = training
+        self.sums, self.count = {}, 0
+
+    def _on_step(self):
+        for name, value in inner_env(self.training_env).terms.items():
+            self.sums[name] = self.sums.get(name, 0.0) + value
+        self.count += 1
+        return True
+
+    def _on_rollout_end(self):
+        training, rows = self.training, self.training.curve
+        last = rows[-1]["decisions"] if rows else 0
+        if self.num_timesteps - last < training.settings["steps"] / POINTS:
+            return
+        terms = {name: value / self.count for name, value in self.sums.items()}
+        self.sums, self.count = {}, 0
+        episodes = self.model.ep_info_buffer
+        means = {name: np.mean([e[key] for e in episodes]) if episodes else np.nan for name, key in EPISODE}
+        rows.append({"decisions": self.num_timesteps, **means, **terms})
+        for name, value in terms.items():
+            self.logger.record(name, value)
+        write_table(pd.DataFrame(rows), training.folder / "curve.csv")
 
 
 class CheckpointCallback(BaseCallback):

@@ -11,6 +11,7 @@ from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 
 ACTIVATION_NAMES = {"Tanh": "tanh", "ReLU": "relu"}
+UNCLIPPED = 1e9  # clip of features that are not clipped
 
 
 def layers_of(model):
@@ -31,25 +32,29 @@ def layers_of(model):
     return linear, ACTIVATION_NAMES[names.pop()] if names else "tanh", squash
 
 
-def export_policy(model, normalisation, single, decisions, path, about):
+def export_policy(model, single, path, about, normalisation=None):
     """Write the deterministic policy of a model as a .npz without pickled objects; return the path.
 
-    normalisation, single, decisions: VecNormalize, a FowtEnv and DecisionSettings of the training; about:
-    dict of text and numbers on the origin of the model.
+    single: a FowtEnv of the training with decisions, in the mode residual, direct or setpoint; normalisation:
+    VecNormalize of the training, None without; about: dict of text and numbers on the origin of the model.
     """
     linear, activation, squash = layers_of(model)
-    task = single.task
-    statistics = normalisation.obs_rms
+    task, decisions, features = single.task, single.decisions, single.features
+    mean, scale, clip = features.mean, features.scale, features.bound
+    if normalisation is not None:  # of what the environment has scaled
+        statistics = normalisation.obs_rms
+        mean = mean + scale * statistics.mean
+        scale = scale * np.sqrt(statistics.var + normalisation.epsilon)
+        clip = normalisation.clip_obs
     settings = {
         "format": FORMAT, "activation": activation, "squash": squash, "layers": len(linear),
-        "clip_observation": float(normalisation.clip_obs), "control_dt": single.control_dt,
+        "clip_observation": float(min(clip, UNCLIPPED)), "control_dt": single.control_dt,
         "decisions": asdict(decisions), "action_mode": single.action_mode, "baseline": single.baseline,
         "observation": list(task.observation), "wind_preview": list(task.wind_preview),
         "blade_pitch": list(task.blade_pitch), "setpoint": list(task.setpoint),
         "residual_torque": task.residual_torque, "residual_pitch": task.residual_pitch, "about": about,
     }  # fmt: skip
-    arrays = {"settings": np.array(json.dumps(settings)), "mean": statistics.mean}
-    arrays["scale"] = np.sqrt(statistics.var + normalisation.epsilon)
+    arrays = {"settings": np.array(json.dumps(settings)), "mean": mean, "scale": scale}
     for i, layer in enumerate(linear):
         arrays |= {f"{kind}_{i}": getattr(layer, kind).detach().cpu().numpy() for kind in ("weight", "bias")}
     with replacing(path) as temporary, temporary.open("wb") as file:
@@ -63,7 +68,6 @@ def export_run(folder, path):
     Raises: InputError if the folder contains no checkpoint.
     """
     from fowt_env.envs import FowtEnv
-    from fowt_env.envs.decisions import DecisionSettings
     from fowt_env.training.rl.train import Training, environment_settings, make_algorithm
 
     run = Training(None, folder, resume=True, trusted=True)
@@ -74,7 +78,4 @@ def export_run(folder, path):
     with (checkpoint / "normalisation.pkl").open("rb") as file:
         normalisation = pickle.load(file)
     about = {key: settings[key] for key in ("algo", "name", "seed")} | {"steps": int(model.num_timesteps)}
-    decisions = DecisionSettings(**settings["decisions"])
-    return export_policy(
-        model, normalisation, FowtEnv(**environment_settings(settings)), decisions, path, about
-    )
+    return export_policy(model, FowtEnv(**environment_settings(settings)), path, about, normalisation)

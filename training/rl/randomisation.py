@@ -9,6 +9,7 @@ sea and initial state are drawn in every episode, as without randomisation. Cont
 import numpy as np
 
 from fowt_env.descriptions.checks import check_whole_number, is_number
+from fowt_env.envs import FowtEnv, FowtVectorEnv
 from fowt_env.envs.sensors import check_sensors
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.evaluation.plant_perturbation import PLANT, PLATFORM, plant_settings
@@ -77,3 +78,22 @@ def randomised(spec, n, seed):
         plant = plant_settings({name: value for name, value in drawn.items() if name in PLANT})
         settings.append(plant | {"sensors": check_sensors(sensors), "nominal_plant": {"platform": PLATFORM}})
     return [settings[i % len(settings)] for i in range(n)]
+
+
+PLANTS = 8  # of an environment of unknown plants
+
+
+def unknown_plant(plant=0, **settings):
+    """Return a FowtEnv with the settings and the plant of a seed; its controllers know the nominal plant."""
+    return FowtEnv(**settings, **_of_plants(1, plant)[0])
+
+
+def unknown_plants(num_envs=1, plant=0, **settings):
+    """Return a FowtVectorEnv of num_envs environments, with PLANTS different plants of a seed at most."""
+    return FowtVectorEnv(num_envs, per_env=_of_plants(num_envs, plant), **settings)
+
+
+def _of_plants(n, seed):
+    """Return n dicts of settings with drawn plants, without their sensors."""
+    drawn = randomised({"plants": min(PLANTS, n), "noise": None, "delay": None}, n, seed)
+    return [{name: value for name, value in each.items() if name != "sensors"} for each in drawn]

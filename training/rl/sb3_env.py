@@ -62,6 +62,20 @@ class FowtSB3VecEnv(VecEnv):
             infos[i]["TimeLimit.truncated"] = bool(truncations[i])
         return observations, rewards.astype(np.float32), dones, infos
 
+    def get_state(self):
+        """Return the picklable state of the episodes."""
+        return self.env.get_state()
+
+    def set_state(self, state):
+        """Restore a state of get_state; return the observations at that state."""
+        self.env.set_state(list(state))
+        return self.env.observations
+
+    @property
+    def terms(self):
+        """Return {term: mean over the environments} of the reward of the last step, before weighting."""
+        return dict(zip(self.env.envs[0].term_keys, self.env.terms.mean(axis=0).tolist(), strict=True))
+
     def close(self):
         """Close all environments."""
         self.env.close()

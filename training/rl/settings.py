@@ -30,7 +30,7 @@ Switch = Annotated[bool, Field(strict=True)]
 TASK_FIELDS = ("residual_pitch", "residual_torque", "blade_pitch", "setpoint")
 OF_TRAINING = ("num_envs", "randomise", *TASK_FIELDS)  # keys of environment in addition to those of FowtEnv
 FORMS = (  # compound settings of the environment: key, types, description
-    ("reward", dict, "a table of weights"),
+    ("reward", (dict, str), "a table of weights, or score"),
     ("randomise", dict, "a table"),
     ("observation", (str, list), "the name of an observation set, or a list of channels"),
 )
@@ -66,7 +66,7 @@ class Validation(Record):
     winds: Annotated[list[Positive], Field(min_length=1)]  # m/s
     first: Whole
     seeds: PositiveInteger
-    every: PositiveInteger  # decisions
+    every: PositiveInteger | None = None  # decisions, at most a quarter of the run; None: a quarter
     skip: NonNegative = 60.0  # s
     reference: Literal[tuple(CONTROLLERS)] = REFERENCE  # metrics are ratios to this controller's
     sigma: Literal[NTM_SIGMAS] = "90%"  # turbulence level, as for the ntm wind

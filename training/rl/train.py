@@ -5,7 +5,8 @@
 
 A run folder contains settings.yml and versions.json; checkpoints/step_N (model, normalisation, environments,
 replay buffer, random states); validation.csv with a row per validation; best.npz, the policy with the best
-validation score, and last.npz; learning_curve.png; and TensorBoard files.
+validation score, and last.npz; curve.csv with returns and reward terms of the training; learning_curve.png;
+and TensorBoard files.
 
 A resumed run is bit-identical to an uninterrupted run on the same machine with the same number of torch
 threads: checkpoints contain parameters, optimiser, environments in mid-episode, normalisation, replay buffer
@@ -32,10 +33,11 @@ import numpy as np
 from fowt_env.descriptions.checks import check_whole_number
 from fowt_env.descriptions.platform import turbine_of
 from fowt_env.descriptions.sea_state import joint_sea_state
-from fowt_env.envs.decisions import DecisionSettings
+from fowt_env.envs.observations import BLADE_CHANNELS, N_ACTIONS
 from fowt_env.envs.tasks import SITE, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import process_lives, remove_leftovers, replacing
+from fowt_env.registration import LADDER
 from fowt_env.training.evaluation.locks import locked
 from fowt_env.training.evaluation.seeds import TRAINING, seeds_for
 from fowt_env.training.rl.checkpoint_signature import is_own, seal
@@ -49,6 +51,8 @@ from fowt_env.training.rl.settings import (
 )
 
 SETTINGS_FOLDER = Path(__file__).parent  # contains the YAML file of each algorithm
+ZOO = SETTINGS_FOLDER / "zoo"  # the same for the ladder's names, in the format of rl-baselines3-zoo
+NAMESPACE = "fowt_env/"
 ALGORITHMS = ("ppo", "sac", "tqc")
 # standard sensors of a turbine: drivetrain, blade pitch, motion of nacelle and platform
 MEASURED = (
@@ -91,6 +95,8 @@ GUST_START = 120.0  # s
 def resolve(algo, task, seed, steps, changes=None):
     """Return all settings of a run (dict): those of training/rl/ALGO.yml for the task, with changes.
 
+    task: also a name of the ladder without namespace, "OC3HywindEasy-v0", with the settings of zoo/ALGO.yml.
+
     changes: {dotted key: value}, such as {"environment.action_mode": "direct"}.
     Raises: InputError for unknown names and keys, and numbers out of range.
     """
@@ -100,12 +106,15 @@ def resolve(algo, task, seed, steps, changes=None):
         raise unknown("algorithm", algo, ALGORITHMS)
     with (SETTINGS_FOLDER / f"{algo}.yml").open(encoding="utf-8") as file:
         table = yaml.safe_load(file)
+    with (ZOO / f"{algo}.yml").open(encoding="utf-8") as file:
+        zoo = yaml.safe_load(file)
     tasks = [name for name in table if not name.startswith("_")]
-    if task not in tasks:
-        raise unknown(f"task of training/rl/{algo}.yml", task, tasks)
+    ladder = [name.removeprefix(NAMESPACE) for name in zoo]
+    if task not in tasks + ladder:
+        raise unknown(f"task of training/rl/{algo}.yml and training/rl/zoo/{algo}.yml", task, tasks + ladder)
     check_whole_number("seed", seed, 0)
     check_whole_number("steps", steps, 1)
-    settings = deepcopy(table[task])
+    settings = deepcopy(table[task]) if task in tasks else of_ladder(task, zoo[NAMESPACE + task])
     for key, value in (changes or {}).items():
         *sections, last = key.split(".")
         if (sections or [last])[0] not in SECTIONS:
@@ -119,8 +128,27 @@ def resolve(algo, task, seed, steps, changes=None):
     return check_settings({"algo": algo, "name": task, "seed": seed, "steps": steps} | settings)
 
 
+def of_ladder(name, entry):
+    """Return the settings of a run on a name of the ladder (fowt_env/registration.py).
+
+    entry: that of the name in a file of rl-baselines3-zoo; the environment is that of the registered name.
+    """
+    environment = json.loads(json.dumps(LADDER[NAMESPACE + name]))  # lists, as in a file
+    entry = {key: value for key, value in entry.items() if key not in ("n_timesteps", "policy")}
+    normalise = entry.pop("normalize", False)
+    return {
+        "task": environment.pop("task"),
+        "decisions": environment.pop("decisions"),
+        "environment": environment | {"num_envs": entry.pop("n_envs", 1)},
+        "algorithm": entry,
+        "normalise": {"norm_obs": normalise, "norm_reward": normalise},
+        "validation": {"winds": [12, 14, 16, 18, 20, 22, 24], "first": 100, "seeds": 1},
+        "checkpoint_minutes": 5.0,
+    }
+
+
 def environment_settings(settings):
-    """Return the FowtEnv settings of a run: task with action ranges and weather seeds, information set."""
+    """Return the FowtEnv settings of a run: task with action ranges and weather seeds, inputs, decisions."""
     section = {k: v for k, v in settings["environment"].items() if k not in ("num_envs", "randomise")}
     task = task_of(settings["task"], turbine_of(section["platform"]) if "platform" in section else None)
     reach = {name: section.pop(name) for name in TASK_FIELDS if name in section}
@@ -131,7 +159,7 @@ def environment_settings(settings):
         if chosen not in OBSERVATIONS:
             raise unknown("observation set", chosen, OBSERVATIONS)
         chosen = OBSERVATIONS[chosen]
-    return {"task": task, "observation": chosen} | section
+    return {"task": task, "observation": chosen, "decisions": settings["decisions"]} | section
 
 
 def make_algorithm(name):
@@ -187,24 +215,33 @@ def validation_episodes(settings):
     return episodes, kinds
 
 
+def _check_collective(single):
+    """Raise InputError for a FowtEnv whose agent commands or observes single blades: files cannot hold it."""
+    of_blades = [entry.name for entry in single.observed if entry.name in BLADE_CHANNELS]
+    if single.action_space.shape != (N_ACTIONS,) or of_blades:
+        seen = ", ".join(of_blades) or "no individual blades"
+        raise InputError(
+            f"environment: action_mode = {single.action_mode!r}, observation of {seen}: agents are trained"
+            " only with collective pitch; use FowtEnv directly"
+        )
+
+
 def make_envs(settings):
     """Return (training VecNormalize, validation VecNormalize); plants are randomised for training only."""
     from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
 
-    from fowt_env.training.rl.decision_env import DecisionVecEnv
     from fowt_env.training.rl.randomisation import randomised
     from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
 
     chosen = environment_settings(settings)
-    decisions = DecisionSettings(**settings["decisions"])
     normalise = {"gamma": settings["algorithm"].get("gamma", 0.99)} | settings["normalise"]
     n = settings["environment"].get("num_envs", 1)
     plants = settings["environment"].get("randomise")
     per_env = None if not plants else randomised(plants, n, settings["seed"])
     base = FowtSB3VecEnv(n, threads=1, per_env=per_env, **chosen)
+    _check_collective(base.env.envs[0])
     env, validation = (
-        VecNormalize(VecMonitor(DecisionVecEnv(inner, decisions)), **normalise)
-        for inner in (base, validation_env(settings, chosen))
+        VecNormalize(VecMonitor(inner), **normalise) for inner in (base, validation_env(settings, chosen))
     )
     validation.training = validation.norm_reward = False
     return env, validation
@@ -215,7 +252,7 @@ def validation_env(settings, chosen):
 
     The validation sensors of the settings alternate over the episodes of each wind.
     """
-    from fowt_env.training.rl.decision_env import ValidationVecEnv
+    from fowt_env.training.rl.validation_env import ValidationVecEnv
 
     validation = settings["validation"]
     episodes, kinds = validation_episodes(settings)
@@ -229,9 +266,9 @@ def validation_env(settings, chosen):
     return ValidationVecEnv(episodes, validation.get("skip", 60.0), threads=1, per_env=per_env, **chosen)
 
 
-def decision_env(env):
-    """Return the DecisionVecEnv inside the wrappers of env."""
-    while type(env).__name__ != "DecisionVecEnv":
+def inner_env(env):
+    """Return the FowtSB3VecEnv inside the wrappers of env."""
+    while hasattr(env, "venv"):
         env = env.venv
     return env
 
@@ -247,7 +284,7 @@ def baseline_figures(settings, reference=None):
     env = validation_env(settings, chosen)
     env.reset()
     nothing = np.zeros((env.num_envs, 2))
-    while not env._over.all():
+    while not env.over:
         env.step(nothing)
     return env.figures()
 
@@ -305,7 +342,7 @@ class Training:
         if resume:
             stored = read_settings(self.settings_path)
             self.settings = stored if settings is None else stored | {"steps": settings["steps"]}
-        self.stop, self.rows = False, []
+        self.stop, self.rows, self.curve = False, [], []
 
     def _check_folder(self):
         """Raise InputError unless the run can start or continue in the folder."""
@@ -374,7 +411,7 @@ class Training:
         """Train the rest of the run; return whether the end was reached."""
         from stable_baselines3.common.logger import configure
 
-        from fowt_env.training.rl.callbacks import CheckpointCallback, Stopped, Validation
+        from fowt_env.training.rl.callbacks import CheckpointCallback, Curve, Stopped, Validation
 
         model, steps = self.model, self.settings["steps"]
         self.reference_name = self.settings["validation"].get("reference", REFERENCE)
@@ -391,7 +428,7 @@ class Training:
         with self._signals():
             if left > 0:
                 try:
-                    listeners = [self.evaluation, self.checkpointing]
+                    listeners = [self.evaluation, Curve(self), self.checkpointing]
                     model.learn(left, callback=listeners, reset_num_timesteps=state is None)
                 except Stopped:
                     finished = False
@@ -466,7 +503,7 @@ class Training:
             model.save_replay_buffer(folder / "replay_buffer.pkl")
         monitor = env.venv
         state = {
-            "environments": decision_env(env).get_state(),
+            "environments": inner_env(env).get_state(),
             "monitor": [deepcopy(getattr(monitor, name)) for name in MONITORED],
             "returns": env.returns.copy(),
             "original": (deepcopy(env.old_obs), deepcopy(env.old_reward)),
@@ -477,6 +514,7 @@ class Training:
             "evaluation_calls": self.evaluation.n_calls,
             "best": self.evaluation.best,
             "rows": self.rows,
+            "curve": self.curve,
             "seconds": self.checkpointing.seconds(),
             "episodes": list(model.ep_info_buffer),
         }
@@ -495,7 +533,7 @@ class Training:
         for name in ("obs_rms", "ret_rms"):
             setattr(env, name, getattr(stored, name))
         env.venv.reset()
-        decision_env(env).set_state(state["environments"])
+        inner_env(env).set_state(state["environments"])
         monitor = env.venv
         for name, value in zip(MONITORED, state["monitor"], strict=True):
             setattr(monitor, name, value)
@@ -511,7 +549,7 @@ class Training:
         model.action_space.np_random.bit_generator.state = state["action_space"]
         random.setstate(state["random"])
         np.random.set_state(state["numpy"])
-        self.rows = state["rows"]
+        self.rows, self.curve = state["rows"], state["curve"]
         return model, state
 
     def best(self):
@@ -524,9 +562,8 @@ class Training:
 
         about = {key: self.settings[key] for key in ("algo", "name", "seed")}
         about["steps"] = int(self.model.num_timesteps)
-        inner = decision_env(self.env)
-        single = inner.base.env.envs[0]
-        return export_policy(self.model, self.env, single, inner.settings, self.folder / name, about)
+        single = inner_env(self.env).env.envs[0]
+        return export_policy(self.model, single, self.folder / name, about, self.env)
 
     def plot(self):
         """Plot the learning curve; return the path, or None before the first validation."""
@@ -534,7 +571,8 @@ class Training:
 
         if not self.rows:
             return None
-        return plot_learning_curve(self.folder.name, self.rows, self.folder / "learning_curve.png")
+        path = self.folder / "learning_curve.png"
+        return plot_learning_curve(self.folder.name, self.rows, self.curve, path)
 
 
 def _schedules(settings):

@@ -43,18 +43,18 @@ class Trained:
         s = self.settings
         settings = DecisionSettings(**s["decisions"])
         wind = wind_entry(settings, ACTION_MODES[s["action_mode"]], env.unwrapped.observed)
-        self.decisions = Decisions(1, len(observation), settings, s["control_dt"], wind)
-        self.decisions.restart(0, observation, env.unwrapped.last_action)
+        self.decisions = Decisions(len(observation), settings, s["control_dt"], wind)
+        self.decisions.restart(observation, env.unwrapped.last_action)
         self.periods = 0
 
     def act(self, observation):
         """Return the action of the coming control period."""
         if self.periods % self.decisions.settings.hold == 0:
             if self.periods:
-                self.decisions.append(observation[None])
+                self.decisions.append(observation)
             self.decision = self.network(self.decisions.features())
         self.periods += 1
-        return self.decisions.smooth(self.decision)[0]
+        return self.decisions.smooth(self.decision)
 
 
 class Careless:

@@ -77,7 +77,7 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
     mode, baseline, estimated, shaping, tmp_path
 ):
     from fowt_env.envs.actions import ACTION_MODES
-    from fowt_env.envs.decisions import Decisions, DecisionSettings, wind_entry
+    from fowt_env.envs.decisions import Decisions, DecisionSettings, authority_of, wind_entry
 
     chosen = {"hold": 3, "smoothing": 0.4, "history": 2} | shaping
     names = ("rotor_speed", "platform_pitch_rate", "previous_action", *estimated, "wind_preview")
@@ -92,21 +92,23 @@ def test_the_controller_commands_what_the_environment_would_do_with_its_decision
     observation, _ = env.reset(seed=1)
     settings = DecisionSettings(**chosen)
     wind = wind_entry(settings, ACTION_MODES[mode], env.observed)
-    decisions = Decisions(1, len(observation), settings, 0.1, wind)
+    decisions = Decisions(len(observation), settings, 0.1, wind)
     agent = make(f"policy:{path}", TURBINE, 0.1)
     agent.prepare(env.scene)
     agent.reset(env.measurement(agent.preview_times))
-    decisions.restart(0, observation, env.view().action)
+    decisions.restart(observation, env.view().action)
     for period in range(120):
         if period % 3 == 0:
             if period:
-                decisions.append(observation[None])
+                decisions.append(observation)
             decision = network(decisions.features())
         command = agent.act(env.measurement(agent.preview_times))
-        observation, _, terminated, _, _ = env.step(decisions.smooth(decision)[0])
+        action = decisions.smooth(decision)
+        observation, _, terminated, _, _ = env.step(action)
         assert command == pytest.approx(tuple(env.view().command), rel=1e-9, abs=1e-9)
         assert not terminated
-    assert np.any(decisions.action != 0.0) and (not shaping or 0.0 < decisions.authority()[0])
+    assert np.any(action != 0.0)
+    assert not shaping or 0.0 < authority_of(decisions.constants, decisions.data)
 
 
 def test_a_policy_whose_authority_has_no_estimated_wind_is_refused(tmp_path):

@@ -12,7 +12,6 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from fowt_env.controllers.policy.controller import read_policy
 from fowt_env.envs import FowtEnv
-from fowt_env.envs.decisions import Decisions, DecisionSettings
 from fowt_env.training.rl.export import export_policy
 
 pytestmark = pytest.mark.installation
@@ -28,9 +27,8 @@ class Shape(gymnasium.Env):
 
 @pytest.mark.parametrize("algorithm", [PPO, SAC])
 def test_an_exported_network_answers_as_stable_baselines3_does_before_any_training(algorithm, tmp_path):
-    single, settings = FowtEnv("steady"), DecisionSettings(hold=2, history=2)
-    size = single.observation_space.shape[0]
-    width = Decisions(1, size, settings, single.control_dt).features().shape[1]
+    single = FowtEnv("steady", decisions={"hold": 2, "history": 2})
+    width = single.observation_space.shape[0]
     normalised = VecNormalize(DummyVecEnv([lambda: Shape(width)]))
     rng = np.random.default_rng(3)
     normalised.obs_rms.update(2.0 + 3.0 * rng.normal(size=(500, width)))
@@ -38,7 +36,7 @@ def test_an_exported_network_answers_as_stable_baselines3_does_before_any_traini
     with torch.no_grad():  # PPO starts with answers near zero
         for parameter in model.policy.parameters():
             parameter.add_(0.1 * torch.randn_like(parameter))
-    path = export_policy(model, normalised, single, settings, tmp_path / "policy.npz", {})
+    path = export_policy(model, single, tmp_path / "policy.npz", {}, normalised)
     features = (2.0 + 6.0 * rng.normal(size=(300, width))).astype(np.float32)
     expected, _ = model.predict(normalised.normalize_obs(features), deterministic=True)
     answers = read_policy(path)[1](features)

@@ -11,7 +11,7 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.plant_perturbation import PLANT, plant_settings
 from fowt_env.training.rl.randomisation import SENSORS, distributions, draw, randomised
-from fowt_env.training.rl.train import decision_env, make_envs, resolve
+from fowt_env.training.rl.train import inner_env, make_envs, resolve
 
 
 def test_each_factor_reaches_its_figure():
@@ -65,7 +65,7 @@ def test_the_plain_task_is_not_randomised_and_the_robust_one_is():
 
 
 def environments(env):
-    return decision_env(env).base.env.envs
+    return inner_env(env).env.envs
 
 
 def test_on_drawn_plants_baseline_and_estimator_are_those_of_the_plant_in_the_files():

@@ -5,6 +5,7 @@ import random
 import shlex
 import tomllib
 
+import gymnasium
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,12 +21,16 @@ from fowt_env.controllers import information
 from fowt_env.controllers.policy.controller import AGENTS, shipped_agents
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.errors import InputError
+from fowt_env.registration import LADDER
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.rl import callbacks, train
+from fowt_env.training.rl.settings import check_algorithm
 from fowt_env.training.rl.train import (
     Training,
     baseline_figures,
-    decision_env,
+    environment_settings,
+    inner_env,
+    make_algorithm,
     make_envs,
     resolve,
     validation_episodes,
@@ -80,9 +85,14 @@ def test_a_run_leaves_settings_versions_checkpoint_policies_table_and_plot(tmp_p
     assert json.loads((folder / "versions.json").read_text())["stable-baselines3"]
     checkpoint = folder / "checkpoints" / f"step_{run.model.num_timesteps}"
     assert [p.name for p in (folder / "checkpoints").iterdir()] == [checkpoint.name]
-    for name in ("best.npz", "last.npz", "validation.csv", "learning_curve.png"):
+    for name in ("best.npz", "last.npz", "validation.csv", "learning_curve.png", "curve.csv"):
         assert (folder / name).stat().st_size > 100
-    assert [row["decisions"] for row in run.rows] == [64, 128, run.model.num_timesteps]  # and at the end
+    assert [row["decisions"] for row in run.rows] == [0, 40, 80, 120, 160]
+    curve = pd.read_csv(folder / "curve.csv")
+    assert curve["decisions"].tolist() == [32, 64, 96, 128, 160] and curve["length"].iloc[-1] == 24.0
+    assert np.isnan(curve["return"].iloc[0])  # no episode has ended yet
+    paid = curve["reward/rotor_speed"]
+    assert np.all((paid > 0.0) & (paid <= 1.0)) and np.isfinite(curve["return"].iloc[-1])
     assert all(np.isfinite(row["score"]) for row in run.rows) and run.best() in run.rows
     assert any((folder / "tensorboard").iterdir())
 
@@ -141,7 +151,7 @@ def test_a_resumed_run_that_cannot_be_built_keeps_its_settings(tmp_path, monkeyp
 
 
 def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resumed_run(tmp_path, monkeypatch):
-    scores, networks, runs = [2.0, 1.0, 3.0], [], []
+    scores, networks, runs = [2.5, 2.0, 1.0, 3.0, 2.7], [], []
     real = callbacks.validation_score
 
     def scored_otherwise(figures, reference, kinds):
@@ -153,7 +163,7 @@ def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resume
     runs.append(Training(small("ppo", steps=192), tmp_path / "run"))
 
     def report(done, total, text):
-        runs[0].stop = len(networks) == 2
+        runs[0].stop = len(networks) == 3
 
     assert not runs[0].run(report)
     runs.append(Training(None, tmp_path / "run", resume=True))
@@ -169,7 +179,7 @@ def test_the_policy_that_is_kept_is_that_of_the_best_validation_also_in_a_resume
         there = [stored[f"{layer}.{kind}"] for kind in ("weight", "bias") for layer in layers]
         return all(torch.equal(a, b) for a, b in zip(kept, there, strict=True))
 
-    assert [same(stored) for stored in networks] == [False, True, False]
+    assert [same(stored) for stored in networks] == [False, False, True, False, False]
 
 
 def test_a_checkpoint_of_others_or_a_changed_one_is_resumed_only_where_it_is_trusted(tmp_path, monkeypatch):
@@ -209,7 +219,7 @@ def test_validation_repeats_the_same_episodes_bit_for_bit():
         validation.reset()
         for action in actions:
             validation.step(action)
-        found.append(decision_env(validation).base.figures())
+        found.append(inner_env(validation).figures())
     assert found[0].keys() == found[1].keys()
     for name, values in found[0].items():
         assert np.array_equal(values, found[1][name], equal_nan=True)
@@ -385,3 +395,17 @@ def test_every_shipped_agent_has_a_card_and_is_small():
             card
         )
         assert tuple(card["information"]) == information(f"policy:{name}")
+
+
+@pytest.mark.parametrize("algo", ["ppo", "sac", "tqc"])
+@pytest.mark.parametrize("name", LADDER)
+def test_the_ladder_is_trained_in_its_environments_with_settings_of_the_zoo_s_file(algo, name):
+    settings = resolve(algo, name.removeprefix("fowt_env/"), 0, 1000)
+    check_algorithm(make_algorithm(algo), algo, settings["algorithm"])
+    made, spec = environment_settings(settings), gymnasium.spec(name).kwargs
+    assert made["task"].residual_pitch == spec.get("residual_pitch", 2.0)
+    for key in ("action_mode", "reward", "duration", "decisions"):
+        assert made[key] == spec[key]
+    assert list(made["observation"]) == list(spec["observation"])
+    assert {key: tuple(value) for key, value in made["normalise"].items()} == spec["normalise"]
+    assert settings["environment"]["num_envs"] > 1 and not settings["normalise"]["norm_obs"]

@@ -1,0 +1,58 @@
+"""Tabulates what controllers earn on the ladder of tasks: `python -m fowt_env.training.studies.ladder`.
+
+Rewards of a decision, means over the validation episodes of acceptance.py: of zero action, and of controllers
+in the place of the agent, with the sensors, faults and plant of the task.
+"""
+
+from functools import partial
+from typing import Annotated
+
+import numpy as np
+import typer
+
+import fowt_env  # noqa: F401 # registers the environments
+from fowt_env.envs import FowtEnv
+from fowt_env.files.markdown import markdown_table
+from fowt_env.registration import LADDER
+from fowt_env.training.rl.randomisation import unknown_plant
+from fowt_env.training.studies.acceptance import episodes, returns
+
+LAWS = ("pi", "lqr", "mpc")
+AGENT = ("action_mode", "decisions", "normalise", "observation", "residual_torque", "residual_pitch")
+
+
+def earned(name, law):
+    """Return the mean reward of a control period of a controller on the validation episodes of a task."""
+    settings = {key: value for key, value in LADDER[name].items() if key not in AGENT}
+    settings |= {"action_mode": "residual", "baseline": law}
+    env = unknown_plant(**settings) if "Unknown" in name else FowtEnv(**settings)
+    totals = []
+    for options in episodes():
+        env.reset(seed=0, options=options)
+        rewards, ended = [], False
+        while not ended:
+            _, reward, terminated, truncated, _ = env.step((0.0, 0.0))
+            rewards.append(reward)
+            ended = terminated or truncated
+        totals.append(sum(rewards) * env.control_dt / env.task.duration)  # an early end forfeits the rest
+    return float(np.mean(totals))
+
+
+def main(
+    names: Annotated[list[str] | None, typer.Argument(help="Names of environments; default: all.")] = None,
+    laws: Annotated[str, typer.Option(help="Controllers, comma-separated.")] = ",".join(LAWS),
+):
+    """Print the table."""
+    rows = []
+    for name in names or LADDER:
+        zero = returns(name, lambda seen: np.zeros((len(seen), 2))).mean()
+        values = (zero, *map(partial(earned, name), laws.split(",")))
+        rows.append((f"`{name.partition('/')[2]}`", *(f"{value:.3f}" for value in values)))
+        print(rows[-1], flush=True)
+    print(
+        markdown_table(("task", "zero action", *(f"`{law}`" for law in laws.split(","))), rows, aligned=True)
+    )
+
+
+if __name__ == "__main__":
+    typer.run(main)
