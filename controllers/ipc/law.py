@@ -37,7 +37,7 @@ TILT_NOTCHES = 3  # at most, in addition at 3P
 COEFFICIENTS = 5  # of a notch: b0, b1, b2, a1, a2
 NYQUIST_SHARE = 0.9  # of the Nyquist frequency, upper limit of notch frequencies
 BELOW_PLATFORM = 0.25  # of the slowest platform frequency: corner of the yaw moment of ipc_floating
-CONSTRAINED_BOUND = 0.1  # of the largest root moment in steady wind, bound of ipc_constrained
+CONSTRAINED_BOUND = 0.14  # of the largest root moment in steady wind, bound of ipc_constrained
 
 
 @dataclass(frozen=True)
@@ -285,7 +285,7 @@ def ipc(turbine, control_dt):
 
 
 def ipc_constrained(turbine, control_dt):
-    """Apply ipc to hub moments above a bound: most of the load reduction for half of the pitch travel."""
+    """Apply ipc to hub moments above a bound: most of its load reduction for a third of its travel."""
     settings = IPCSettings(bound=CONSTRAINED_BOUND)
     return IPC(PISettings.published(turbine), settings, control_dt, "ipc_constrained")
 

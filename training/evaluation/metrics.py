@@ -16,11 +16,14 @@ TIME = "Time_[s]"
 # IEC 61400-1 practice. Stud or studless chain at the fairlead: 3 (DNV-OS-E301, T-N curves; 5 is wire rope's).
 # Glass-fibre laminate of blades: 10, as in IEC 61400-1 practice.
 TOWER_EXPONENT, CHAIN_EXPONENT, BLADE_EXPONENT = 4.0, 3.0, 10.0
+# Life exponent of ball bearings, ISO 281, for the pitch bearings as in NREL/TP-500-42362.
+BEARING_EXPONENT = 3.0
 # channels of each blade, in axes of the cone and of the pitched blade; the metric is that of the worst blade
 BLADE_ROOTS = ("RootMyc", "RootMxc", "RootMyb", "RootMxb")
 # the shaft's bending in axes at rest and turning with it, and the yaw bearing's
 HUB_LOADS = ("LSSTipMys", "LSSTipMzs", "LSSTipMya", "LSSTipMza", "YawBrMyp", "YawBrMzp")
 BLADES = (1, 2, 3)
+BEARING = (("BldPitch", "deg"), ("RootMyc", "kN-m"), ("RootMxc", "kN-m"))  # channels of a pitch bearing
 # The constraints of the ATLAS Offshore contest (ARPA-E, 2019).
 BLADE_PITCH_RATE_LIMIT = 10.0  # deg/s
 TOWER_TOP_ACCELERATION_LIMIT = 3.3  # m/s2
@@ -129,6 +132,12 @@ TABLE = {  # metric -> definition, in the order of columns
     "YawBrMyp_DEL_[kN-m]": _fatigue("yaw bearing's tilt moment"),
     "YawBrMzp_DEL_[kN-m]": _fatigue("yaw bearing's yaw moment"),
     "each_blade_travel_[deg/s]": _size("mean absolute pitch rate of each blade, mean of the three"),
+    "PitchBrg_DEL_[kN-m]": Metric(
+        "pitch bearing: moment with the same rolling damage at 1 deg/s, worst blade",
+        -1,
+        True,
+        BEARING_EXPONENT,
+    ),
     "PtfmSway_std_[m]": _deviation("standard deviation of the platform's sway"),
     "blade_pitch_rate_beyond_[s]": _size("time with a blade-pitch rate above 10 deg/s"),
     "blade_pitch_rate_violations_[-]": _size("exceedances of 10 deg/s by the blade-pitch rate"),
@@ -202,6 +211,18 @@ def damage_equivalent_load(values, duration, exponent):
     return float((damage / duration) ** (1.0 / exponent))
 
 
+def pitch_bearing_load(time, blade_pitch, out_of_plane, in_plane):
+    """Return the bending moment (kN m) of a pitch bearing that at 1 deg/s has the same rolling damage.
+
+    (sum M^3 |step of the blade pitch| / duration)^(1/3), M the resultant of the root moments (kN m), pitch in
+    deg: the damage of a ball bearing grows with its travel and the cube of its load. Any NaN gives NaN.
+    """
+    moment = np.hypot(out_of_plane, in_plane)
+    damage = 0.5 * (moment[1:] ** BEARING_EXPONENT + moment[:-1] ** BEARING_EXPONENT)
+    total = np.sum(damage * np.abs(np.diff(blade_pitch))) / (time[-1] - time[0])
+    return float(total ** (1.0 / BEARING_EXPONENT))
+
+
 def beyond(time, value, limit):
     """Return (time in s of evenly spaced values above a limit, number of upcrossings); NaN if any is NaN."""
     if len(value) < 2 or not np.isfinite(value).all():
@@ -271,6 +292,11 @@ def metrics(
         result[f"{name}_DEL_[kN-m]"] = float(worst)
     blades = [travel(time, kept[f"BldPitch{i}_[deg]"].to_numpy()) for i in BLADES]
     result["each_blade_travel_[deg/s]"] = float(np.mean(blades))
+    worn = [
+        pitch_bearing_load(time, *(kept[f"{name}{i}_[{unit}]"].to_numpy() for name, unit in BEARING))
+        for i in BLADES
+    ]
+    result["PitchBrg_DEL_[kN-m]"] = float(np.max(worn))
     result["PtfmSway_std_[m]"] = float(np.std(kept["PtfmSway_[m]"]))
     speed = kept["RotSpeed_[rpm]"].to_numpy()
     result |= _violations(time, speed, accelerations, blade_pitch, rated_speed_rpm)

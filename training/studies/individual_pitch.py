@@ -1,7 +1,7 @@
 """Computes load reduction and pitch travel of individual pitch control, and its effect on platform motion.
 
 Runs the suite `ipc` with the controllers of NAMES and with `ipc` limited to BOUNDS. Prints metrics relative
-to the same law with collective pitch (means over winds and seeds, with the exponents of their S-N curves),
+to the same law with collective pitch (lifetime means over winds and seeds),
 and the fractions of load reduction and of added travel of `ipc` that remain at each bound.
 """
 
@@ -23,11 +23,11 @@ NAMES = {  # controller -> same law with collective pitch
     "pi": "pi", "ipc": "pi", "ipc_constrained": "pi", "ipc_floating": "pi",
     "rosco": "rosco", "rosco_ipc": "rosco",
 }  # fmt: skip
-BOUNDS = (0.05, 0.1, 0.15, 0.2, 0.3)  # of IPCSettings
-TRAVEL, ROOT = "each_blade_travel_[deg/s]", "RootMyc_DEL_[kN-m]"
+BOUNDS = (0.05, 0.1, 0.14, 0.2, 0.3)  # of IPCSettings
+TRAVEL, ROOT, WEIGHT = "each_blade_travel_[deg/s]", "RootMyb_DEL_[kN-m]", "weight_[-]"
 SHOWN = {
-    "root out of plane": ROOT, "root in plane": "RootMxc_DEL_[kN-m]",
-    "hub tilt": "LSSTipMys_DEL_[kN-m]", "hub yaw": "LSSTipMzs_DEL_[kN-m]",
+    "root flapwise": ROOT, "root edgewise": "RootMxb_DEL_[kN-m]",
+    "shaft bending": "LSSTipMya_DEL_[kN-m]", "pitch bearing": "PitchBrg_DEL_[kN-m]",
     "bearing tilt": "YawBrMyp_DEL_[kN-m]", "bearing yaw": "YawBrMzp_DEL_[kN-m]",
     "tower base": "TwrBsMyt_DEL_[kN-m]", "platform pitch": "PtfmPitch_std_[deg]",
     "platform yaw": "PtfmYaw_std_[deg]", "platform roll": "PtfmRoll_std_[deg]",
@@ -36,7 +36,7 @@ SHOWN = {
 
 
 def means(table):
-    """Return a DataFrame of the means of SHOWN and TRAVEL over the runs of each controller.
+    """Return a DataFrame of the lifetime means of SHOWN and TRAVEL over the runs of each controller.
 
     Raises: ValueError if a run failed or tripped.
     """
@@ -46,8 +46,10 @@ def means(table):
         raise ValueError(f"runs that were not completed:\n{bad}")
     metrics = [*SHOWN.values(), TRAVEL]
     powers = pd.Series({metric: mean_exponent(metric) for metric in metrics})
-    values = table.set_index("controller")[metrics] ** powers
-    return values.groupby("controller", sort=False).mean() ** (1.0 / powers)
+    shares = table.set_index("controller")[WEIGHT]
+    values = (table.set_index("controller")[metrics] ** powers).mul(shares, axis=0)
+    total = shares.groupby("controller", sort=False).sum()
+    return values.groupby("controller", sort=False).sum().div(total, axis=0) ** (1.0 / powers)
 
 
 def ratios(figures):

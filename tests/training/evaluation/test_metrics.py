@@ -98,6 +98,16 @@ def test_fairlead_figures_are_those_of_the_worst_line():
     assert result["FAIRTEN_max_[kN]"] == 900.0
 
 
+def test_the_load_of_a_pitch_bearing_counts_travel_once_and_the_resultant_moment_cubed():
+    flat = dict.fromkeys((f"RootMyc{i}_[kN-m]" for i in (1, 2)), lambda t: 3e3 + 0.0 * t)
+    flat |= dict.fromkeys((f"RootMxc{i}_[kN-m]" for i in (1, 2)), lambda t: -4e3 + 0.0 * t)
+    other = {"RootMyc3_[kN-m]": lambda t: 1e3 + 0.0 * t, "RootMxc3_[kN-m]": lambda t: 0.0 * t}
+    turning = {f"BldPitch{i}_[deg]": lambda t, i=i: 2.0 * i * np.abs(t % 10.0 - 5.0) for i in (1, 2, 3)}
+    result = metrics(synthetic_run(**flat, **other, **turning))  # 2, 4 and 6 deg/s
+    assert result["PitchBrg_DEL_[kN-m]"] == pytest.approx(5e3 * 4.0 ** (1.0 / 3.0), rel=1e-9)
+    assert mean_exponent("PitchBrg_DEL_[kN-m]") == 3.0
+
+
 def test_figures_of_single_blades_are_those_of_the_worst_blade_and_absent_without_them():
     names = [f"{name}{i}_[kN-m]" for name in ("RootMyc", "RootMxc", "RootMyb") for i in (1, 2, 3)]
     waves = {
@@ -120,6 +130,7 @@ def test_figures_of_single_blades_are_those_of_the_worst_blade_and_absent_withou
     )  # 4 A a period, A = 2 on the mean
     assert np.isnan(metrics(synthetic_run())["RootMyc_DEL_[kN-m]"])
     assert np.isnan(metrics(synthetic_run())["each_blade_travel_[deg/s]"])
+    assert np.isnan(metrics(synthetic_run())["PitchBrg_DEL_[kN-m]"])
     assert mean_exponent("RootMxc_DEL_[kN-m]") == 10.0 and mean_exponent("YawBrMzp_DEL_[kN-m]") == 4.0
 
 

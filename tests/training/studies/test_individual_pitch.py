@@ -3,27 +3,40 @@
 import pandas as pd
 import pytest
 
-from fowt_env.training.studies.individual_pitch import NAMES, ROOT, SHOWN, TRAVEL, means, ratios, trade_off
+from fowt_env.training.studies.individual_pitch import (
+    NAMES,
+    ROOT,
+    SHOWN,
+    TRAVEL,
+    WEIGHT,
+    means,
+    ratios,
+    trade_off,
+)
 
 
 def table(**roots):
-    """Two runs of each controller, with once and twice the given root load; more load, less travel."""
+    """Two runs of each controller, with once and twice a root load and a share; more load, less travel."""
     rows = []
     for name, root in roots.items():
         for seed in (1, 2):
             row = {"controller": name, "case": "a", "seed": seed, "status": "ok", "reason": ""}
-            row |= dict.fromkeys(SHOWN.values(), 3.0) | {ROOT: root * seed, TRAVEL: 2.0 - 0.1 * root}
+            row |= dict.fromkeys(SHOWN.values(), 3.0) | {
+                ROOT: root * seed,
+                TRAVEL: 2.0 - 0.1 * root,
+                WEIGHT: float(seed),
+            }
             rows.append(row)
     return pd.DataFrame(rows)
 
 
 def test_damage_adds_up_and_each_is_compared_with_its_own_law():
     figures = means(table(**{name: 10.0 + i for i, name in enumerate(NAMES)}))
-    assert figures.loc["pi", ROOT] == pytest.approx(10.0 * (0.5 * (1.0 + 2.0**10)) ** 0.1)
+    assert figures.loc["pi", ROOT] == pytest.approx(10.0 * ((1.0 + 2.0 * 2.0**10) / 3.0) ** 0.1)
     found = ratios(figures)
-    assert found.loc["ipc", "root out of plane"] == pytest.approx(1.1)
-    assert found.loc["rosco_ipc", "root out of plane"] == pytest.approx(15.0 / 14.0)
-    assert found.loc["rosco", "root out of plane"] == 1.0
+    assert found.loc["ipc", "root flapwise"] == pytest.approx(1.1)
+    assert found.loc["rosco_ipc", "root flapwise"] == pytest.approx(15.0 / 14.0)
+    assert found.loc["rosco", "root flapwise"] == 1.0
     assert found.loc["ipc", "travel"] == pytest.approx(0.9)
 
 
