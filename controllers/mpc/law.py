@@ -32,7 +32,7 @@ from fowt_env.controllers.mpc.model import (
 )
 from fowt_env.controllers.mpc.plan import FILTER, grid_of, newton_step, shifted, work_of
 from fowt_env.controllers.mpc.rotor_table import rotor_table
-from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
+from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
 from fowt_env.controllers.mpc.weights import weights_over
 from fowt_env.descriptions.lidar import read_lidar
@@ -321,7 +321,7 @@ def mpc(turbine, control_dt):
 
 def mpc_preview(turbine, control_dt):
     """Apply mpc with a preview of the rotor-averaged wind of the next seconds."""
-    return MPC(turbine, control_dt, PREVIEW, "mpc_preview", preview=True)
+    return MPC(turbine, control_dt, name="mpc_preview", preview=True)
 
 
 def mpc_lidar(turbine, control_dt):
@@ -331,4 +331,4 @@ def mpc_lidar(turbine, control_dt):
 
 def lq_preview(turbine, control_dt):
     """Apply linear-quadratic preview control: mpc_preview with linear loads and without limits."""
-    return MPC(turbine, control_dt, PREVIEW, "lq_preview", preview=True, nonlinear=False, constrained=False)
+    return MPC(turbine, control_dt, None, "lq_preview", preview=True, nonlinear=False, constrained=False)

@@ -43,6 +43,3 @@ class MPCSettings(Settings):
     speed_limit: float = 1.15  # of rated, soft
     torque_low: float = 0.75  # of rated; in lulls that of the torque curve, if less
     torque_high: float = 1.05  # of rated
-
-
-PREVIEW = MPCSettings()

@@ -24,7 +24,7 @@ from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFee
 from fowt_env.controllers.lqr.design import LQGSettings
 from fowt_env.controllers.lqr.law import LQR
 from fowt_env.controllers.mpc.law import MPC
-from fowt_env.controllers.mpc.settings import PREVIEW, MPCSettings
+from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.controllers.pi import PI, PISettings
 from fowt_env.controllers.rosco import Rosco, RoscoSettings
 from fowt_env.controllers.tuned import TUNED, tuned
@@ -126,8 +126,11 @@ def spaces():
     def of(record, ranges):
         return ranges, {key: getattr(record, key) for key in ranges}
 
-    def lidar(settings, turbine, dt):
-        return MPC(turbine, dt, MPCSettings(**settings), "mpc_lidar", lidar=True)
+    def predictive(name, **ahead):
+        def law(settings, turbine, dt):
+            return MPC(turbine, dt, MPCSettings(**settings), name, **ahead)
+
+        return Space(*of(MPCSettings(), _MPC), law)
 
     def feedback(settings, turbine, dt):
         return FloatingFeedback(PISettings.published(turbine), FeedbackSettings(**settings), dt)
@@ -135,12 +138,9 @@ def spaces():
     return {
         "floating_feedback": Space(_FEEDBACK, tuned("floating_feedback"), feedback),
         "lqr": Space(*of(LQGSettings(), _LQR), lambda s, t, dt: LQR(t, dt, LQGSettings(**s))),
-        "mpc": Space(*of(MPCSettings(), _MPC), lambda s, t, dt: MPC(t, dt, MPCSettings(**s))),
-        "mpc_lidar": Space(*of(MPCSettings(), _MPC), lidar),
-        "mpc_preview": Space(
-            *of(PREVIEW, _MPC),
-            lambda s, t, dt: MPC(t, dt, PREVIEW.changed(**s), "mpc_preview", preview=True),
-        ),
+        "mpc": predictive("mpc"),
+        "mpc_lidar": predictive("mpc_lidar", lidar=True),
+        "mpc_preview": predictive("mpc_preview", preview=True),
         "pi_tuned": Space(_FACTORS, tuned("pi_tuned"), _pi),
         "rosco_float": Space(
             _ROSCO, tuned("rosco_float"),

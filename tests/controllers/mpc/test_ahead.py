@@ -13,7 +13,7 @@ from fowt_env.controllers import make  # noqa: E402
 from fowt_env.controllers.mpc import ahead as module  # noqa: E402
 from fowt_env.controllers.mpc.ahead import Foresight, ages_of, covariances, fusion  # noqa: E402
 from fowt_env.controllers.mpc.law import MPC  # noqa: E402
-from fowt_env.controllers.mpc.settings import PREVIEW  # noqa: E402
+from fowt_env.controllers.mpc.settings import MPCSettings  # noqa: E402
 from fowt_env.descriptions.lidar import Lidar, read_lidar  # noqa: E402
 from fowt_env.weather.lidar import blocked_share  # noqa: E402
 from fowt_env.weather.lidar_gates import Gates, lidar_gates  # noqa: E402
@@ -247,7 +247,7 @@ def test_a_controller_prepared_by_hand_has_the_usual_lidar(gusty):
 
 def test_a_preview_that_is_off_for_good_ends_with_the_commands_of_the_true_one(gusty):
     """1 m/s too high, for 12 schedule times; without the integral of the speed, which would hide it."""
-    settings = PREVIEW.changed(preview_time=3.0, schedule_time=10.0, speed_integral=1e-6)
+    settings = MPCSettings(preview_time=3.0, schedule_time=10.0, speed_integral=1e-6)
 
     def high(scene, leads):
         true = exact_preview(scene, leads)
