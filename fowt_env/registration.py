@@ -53,7 +53,7 @@ SENSOR_FAULTS = (  # each at a time, and of a size, drawn for the episode
     {"kind": "sensor_bias", "field": "platform_pitch", "time": (30.0, 270.0), "value": (-0.03, 0.03)},
     {"kind": "sensor_freeze", "field": "nacelle_velocity", "time": (30.0, 270.0)},
 )
-AHEAD = (2.0, 4.0, 6.0, 8.0)  # s
+AHEAD = (2.0, 3.5, 5.0)  # s; 5.5 s is the horizon of the lidar at 24 m/s
 LADDER = {  # tasks for agents, of rising difficulty
     "fowt_env/OC3HywindEasy-v0": EASY,
     "fowt_env/OC3HywindMedium-v0": MEDIUM,
@@ -63,7 +63,7 @@ LADDER = {  # tasks for agents, of rising difficulty
     "fowt_env/OC3HywindLidar-v0": MEDIUM
     | {
         "task": "above_rated",
-        "preview": "four_beam_pulsed",
+        "preview": "circular_cw",
         "wind_preview": AHEAD,
         "observation": (*TURBINE, "previous_action", "wind_preview"),
         "normalise": TURBINE | {f"wind_preview_{lead:g}s": (17.0, 4.0, 1.0) for lead in AHEAD},

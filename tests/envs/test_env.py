@@ -41,13 +41,22 @@ OF_BLADES = ("default", "azimuth", "previous_action", *BLADE_CHANNELS)
     [
         *({"id": NAME, "task": task} for task in TASKS),
         {"id": EASY},
-        *(pytest.param({"id": name}, marks=pytest.mark.slow) for name in (*ENVIRONMENTS, *LADDER)),
         *(EVERY_CHANNEL | {"action_mode": mode} for mode in ("direct", "setpoint", "residual")),
         QUICK | ON_LQR,
         INDIVIDUAL | {"observation": OF_BLADES, "sensors": {"noise": 0.01, "delay": 1}},
     ],
 )
 def test_gymnasium_and_sb3_checkers_find_nothing(settings):
+    check(settings)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*ENVIRONMENTS, *LADDER])
+def test_the_checkers_find_nothing_in_any_name(name):
+    check({"id": name})
+
+
+def check(settings):
     from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
     with warnings.catch_warnings():
