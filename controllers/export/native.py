@@ -238,23 +238,23 @@ def _policy(code, policy, fields):
         start.append(f"{name}_start(BASELINE, memory + {baseline_at}, reading)")
         baseline.append(f"{name}_step(BASELINE, memory + {baseline_at}, reading, command)")
     code.enums |= entries
-    wind = (-1, 1.0, 0.0) if decisions.wind is None else decisions.wind
-    low, high = (0.0, 1.0) if chosen.authority is None else chosen.authority
+    shape = decisions.constants
     sizes = [size, *(len(bias) for bias in network.biases)]
     layers = zip(network.weights, network.biases, strict=True)
     weights = np.concatenate([np.append(weight.ravel(), bias) for weight, bias in layers])
     code.enums |= {f"POLICY_{mode.name}": int(mode) for mode in ActionMode}
     code.enums |= {
-        "POLICY_CHANNELS": channels, "POLICY_INSTANTS": instants, "POLICY_WIND_ENTRY": int(wind[0]),
+        "POLICY_CHANNELS": channels, "POLICY_INSTANTS": instants, "POLICY_WIND_ENTRY": shape.wind,
         "POLICY_HOLD": chosen.hold, "POLICY_LAYERS": len(network.weights), "POLICY_WIDEST": max(sizes),
-        "POLICY_TANH": int(network.activation is np.tanh), "POLICY_SHAPED": int(decisions.shaped),
+        "POLICY_TANH": int(network.activation is np.tanh), "POLICY_SHAPED": int(shape.shaped),
         "POLICY_SQUASH_TANH": int(settings["squash"] == "tanh"), "POLICY_MODE": int(policy._mode),
         "POLICY_FIRST_ACTION": len(fields), "POLICY_ESTIMATES": len(fields) + 2,
     }  # fmt: skip
     code.macros |= {
-        "POLICY_WIND_SCALE": wind[1], "POLICY_WIND_CENTRE": wind[2], "POLICY_LASTING": decisions.lasting,
-        "POLICY_FRACTION": decisions.fraction, "POLICY_PASSING": decisions.passing,
-        "POLICY_AUTHORITY_LOW": low, "POLICY_AUTHORITY_RANGE": high - low, "POLICY_CLIP": network.clip,
+        "POLICY_WIND_SCALE": shape.wind_scale, "POLICY_WIND_CENTRE": shape.wind_centre,
+        "POLICY_LASTING": shape.lasting,
+        "POLICY_FRACTION": shape.fraction, "POLICY_PASSING": shape.passing,
+        "POLICY_AUTHORITY_LOW": shape.weak, "POLICY_AUTHORITY_RANGE": shape.strong - shape.weak, "POLICY_CLIP": network.clip,
         "POLICY_ACTION_LOW": actions.low, "POLICY_ACTION_HIGH": actions.high,
         "POLICY_PITCH_LOW": actions.pitch_low, "POLICY_PITCH_HIGH": actions.pitch_high,
         "POLICY_RESIDUAL_TORQUE": actions.residual_torque, "POLICY_RESIDUAL_PITCH": actions.residual_pitch,
