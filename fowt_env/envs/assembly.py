@@ -34,8 +34,9 @@ def adapted_task(task: Task, settings: Settings) -> Task:
     changes = {name: value for name, value in replaced.items() if value is not None}
     if episode.observation is not None:
         changes["observation"] = check_channels("observation", episode.observation, default=task.observation)
-    if isinstance(episode.reward, Mapping):
-        changes["weights"] = task.weights | check_weights("reward", episode.reward)
+    weights = episode.reward
+    if weights is not None and not isinstance(weights, str) and not callable(weights):
+        changes["weights"] = task.weights | check_weights("reward", weights)
     return replace(task, **changes)
 
 
