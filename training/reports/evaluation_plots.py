@@ -10,6 +10,7 @@ from fowt_env.errors import InputError
 from fowt_env.files.tables import read_table
 from fowt_env.training.design.linear_bound import efficient
 from fowt_env.training.evaluation.failures import known_figures, lost_text
+from fowt_env.training.evaluation.metrics import mean_exponent
 from fowt_env.training.evaluation.results import file_name, run_file
 from fowt_env.training.evaluation.run_case import OK, REFERENCE
 from fowt_env.training.reports.metric_words import counted
@@ -93,6 +94,57 @@ def plot_evaluation(table, metrics, path=None, title=None):
         heading.append(f"{lost} of {len(table)} runs were lost and are left out")
     handles = panels[0].get_legend_handles_labels()[0]
     head(figure, "; ".join(heading), handles, [texts[name] for name in controllers])
+    return save_figure(figure, path)
+
+
+TRADE = {  # what a controller gives and takes, a column each: {theme: {metric: title}}
+    "motions": {"RotSpeed_std_[rpm]": "rotor speed", "PtfmPitch_std_[deg]": "platform pitch"},
+    "fatigue loads": {"RotTorq_DEL_[kN-m]": "shaft torque", "TwrBsMyt_DEL_[kN-m]": "tower base"},
+    "power and pitch drive": {
+        "GenPwr_std_[kW]": "power deviation",
+        "blade_pitch_travel_[deg/s]": "blade-pitch travel",
+    },
+}
+
+
+def plot_trade(table, baseline, path=None, title=None):
+    """Plot motions, loads, power and pitch travel of each controller over those of the baseline, per case.
+
+    table: as of plot_evaluation. Each ratio is of means over the seeds that both controllers finished, with
+    the exponents of mean_exponent. Raises: InputError if no controller shares a case with the baseline.
+    """
+    cases = list(dict.fromkeys(table["case"]))
+    good = table[table["status"] == OK].set_index(["controller", "case", "seed"])
+    others = [name for name in dict.fromkeys(table["controller"]) if name != baseline]
+    base = good.xs(baseline) if baseline in good.index.get_level_values(0) else good.iloc[:0]
+    figure = new_figure(12.5, 5.6)
+    panels = figure.subplots(2, len(TRADE), sharex=True, squeeze=False)
+    drawn = False
+    for column, (theme, metrics) in enumerate(TRADE.items()):
+        for axes, metric in zip(panels[:, column], metrics, strict=True):
+            style_axes(axes)
+            axes.axhline(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)))
+            power = mean_exponent(metric)
+            for index, name in enumerate(others):
+                if name not in good.index.get_level_values(0):
+                    continue
+                own = good.xs(name)[metric]
+                both = own.index.intersection(base.index)
+                means = [(values.loc[both] ** power).groupby("case").mean() for values in (own, base[metric])]
+                ratio = (means[0] / means[1]).reindex(cases) ** (1.0 / power)
+                drawn = drawn or bool(np.isfinite(ratio).any())
+                axes.plot(
+                    np.arange(len(cases)), ratio, color=COLOURS[index % len(COLOURS)], linewidth=1.4,
+                    marker=MARKS[index % len(MARKS)], markersize=4, label=name,
+                )  # fmt: skip
+            axes.set_title(f"{theme}: {metrics[metric]}", fontsize=9, color=INK, loc="left")
+            axes.set_xticks(np.arange(len(cases)), cases, fontsize=8, rotation=30)
+    if not drawn:
+        raise InputError(f"nothing to plot: no controller shares a case with the baseline {baseline!r}")
+    names = short_names(others)
+    handles = panels[0, 0].get_legend_handles_labels()[0]
+    text = f"ratios to {baseline}, means over seeds"
+    head(figure, f"{title}: {text}" if title else text, handles, [names[name] for name in others])
     return save_figure(figure, path)
 
 
@@ -279,7 +331,8 @@ def _label_marks(figure, axes, names, points, areas, positions, ratios):
 def evaluation_plots(table, board, folder):
     """Plot the results of a folder from its table and leaderboard; return the paths.
 
-    pareto.png: rotor-speed against platform-pitch deviation; metrics.png: the controllers over all cases;
+    pareto.png: rotor-speed against platform-pitch deviation; trade.png (several controllers and cases, and a
+    baseline): motions, loads and power over the baseline's; metrics.png: the controllers over all cases;
     boxes.png, timeseries_CASE.png and spectra_CASE.png: quartiles, series and spectra of the first seed of
     each case that succeeded.
     """
@@ -290,6 +343,11 @@ def evaluation_plots(table, board, folder):
         return []
     paths = [folder / "pareto.png", folder / "metrics.png"]
     plot_pareto(board, paths[0], order=table["controller"].unique())
+    baseline = board.get("baseline")
+    several = good["controller"].nunique() > 1 and good["case"].nunique() > 1
+    if several and baseline in set(good["controller"]):
+        paths.append(folder / "trade.png")
+        plot_trade(table, baseline, paths[-1])
     names = [name for _, name, *_ in PRINTED_METRICS]
     plot_evaluation(table, names, paths[1], "Mean over seeds, with their range")
     boxes = {}

@@ -154,7 +154,7 @@ def test_evaluate_writes_table_runs_and_plots(tmp_path):
     pictures = sorted(path.name for path in tmp_path.glob("*.png"))
     assert pictures == [
         "boxes.png", "metrics.png", "pareto.png", "spectra_ntm_18.png", "spectra_steady_16.png",
-        "timeseries_ntm_18.png", "timeseries_steady_16.png",
+        "timeseries_ntm_18.png", "timeseries_steady_16.png", "trade.png",
     ]  # fmt: skip
     assert all(path.stat().st_size > 10_000 for path in tmp_path.glob("*.png"))
     assert len(list((tmp_path / "runs").rglob("*.parquet"))) == 4

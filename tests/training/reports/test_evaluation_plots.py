@@ -32,6 +32,28 @@ def test_runs_of_one_figure_are_drawn_although_their_mean_is_rounded(status):
     assert np.isfinite(mark) == (status == "ok")
 
 
+def test_the_trade_is_of_runs_that_both_finished_with_damage_averaged_by_its_exponent(tmp_path):
+    metrics = [metric for column in evaluation_plots.TRADE.values() for metric in column]
+    rows = []
+    for name, factor in (("a", 1.0), ("b", 0.5)):
+        for case in ("x", "y"):
+            for seed in (1, 2):
+                row = {"controller": name, "case": case, "seed": seed, "status": "ok"}
+                rows.append(row | dict.fromkeys(metrics, factor * seed))
+    table = pd.DataFrame(rows)
+    lost = (table["controller"] == "b") & (table["case"] == "y") & (table["seed"] == 2)
+    table.loc[lost, "status"] = "tripped"
+    unequal = (table["controller"] == "b") & (table["case"] == "x") & (table["seed"] == 2)
+    table.loc[unequal, metrics] = 2.0
+    figure = evaluation_plots.plot_trade(table, "a", tmp_path / "trade.png")
+    drawn = {axes.get_title(loc="left"): axes.lines[1].get_ydata() for axes in figure.axes}
+    damage = ((0.5**4 + 2.0**4) / (1.0 + 2.0**4)) ** 0.25
+    np.testing.assert_allclose(drawn["fatigue loads: shaft torque"], [damage, 0.5])
+    np.testing.assert_allclose(drawn["power and pitch drive: blade-pitch travel"], [2.5 / 3.0, 0.5])
+    with pytest.raises(InputError, match="shares a case with the baseline 'c'"):
+        evaluation_plots.plot_trade(table, "c")
+
+
 def pareto_board(controllers):
     figure = dict.fromkeys(("low", "high", "seed_low", "seed_high"), np.nan)
     entries = []
