@@ -116,7 +116,7 @@ def plot_trade(table, baseline, path=None, title=None):
     cases = list(dict.fromkeys(table["case"]))
     good = table[table["status"] == OK].set_index(["controller", "case", "seed"])
     others = [name for name in dict.fromkeys(table["controller"]) if name != baseline]
-    base = good.xs(baseline) if baseline in good.index.get_level_values(0) else good.iloc[:0]
+    base = good.xs(baseline) if baseline in good.index else good.iloc[:0].droplevel(0)
     figure = new_figure(12.5, 5.6)
     panels = figure.subplots(2, len(TRADE), sharex=True, squeeze=False)
     drawn = False
@@ -126,7 +126,7 @@ def plot_trade(table, baseline, path=None, title=None):
             axes.axhline(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)))
             power = mean_exponent(metric)
             for index, name in enumerate(others):
-                if name not in good.index.get_level_values(0):
+                if name not in good.index:
                     continue
                 own = good.xs(name)[metric]
                 both = own.index.intersection(base.index)
