@@ -46,14 +46,14 @@ def test_a_run_ends_goes_on_and_its_checkpoint_becomes_a_policy_on_request_only(
     assert (tmp_path / "p.npz").stat().st_size == pytest.approx((folder / "last.npz").stat().st_size, abs=50)
 
 
-def test_a_run_is_validated_at_its_end_and_the_command_that_it_prints_works(tmp_path, monkeypatch):
+def test_a_run_is_validated_by_quarters_and_the_command_that_it_prints_works(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(cli_train, "LINE_EVERY", 0.0)
     monkeypatch.setattr(callbacks, "REPORT_EVERY", 0.0)
     done = train("run of mine", 64, "--set", "validation.every=1000000")
     assert done.exit_code == 0, done.output
     table = pd.read_csv(tmp_path / "run of mine" / "validation.csv")
-    assert list(table["decisions"]) == [64]
+    assert list(table["decisions"]) == [0, 16, 32, 48, 64]
     said = " ".join(done.output.split())
     assert "scoring the reference lqr" in said and "decisions/s" in said and " left" in said
     assert "return -" not in said and "created the folder run of mine" in said
