@@ -22,13 +22,12 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.descriptions.iec import length_scale, ntm_sigma
-from fowt_env.weather.lidar import TUNING_CLASS, blocked_share, sampling
+from fowt_env.weather.lidar import TUNING_CLASS, blocked_share, mean_age, sampling
 from fowt_env.weather.lidar_gates import (
     FREQUENCIES,
     channel_shares,
     group_count,
     interpolated,
-    mean_age,
     represented,
     travel_distances,
 )

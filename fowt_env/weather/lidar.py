@@ -375,6 +375,11 @@ def drawn_of(scene):
     return drawn_turbulence(scene.wind, **size, seed=scene.seed, duration=duration)
 
 
+def mean_age(lidar, blocked):
+    """Return the mean age of the values in a reading, s; blocked: fraction of lost shots."""
+    return lidar.scan_period * (0.5 + blocked / (1.0 - blocked))
+
+
 def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
     """Return the Preview of the rotor-averaged wind at times (k,) s ahead, estimated by a nacelle lidar.
 
@@ -398,10 +403,9 @@ def lidar_preview(scene, times, preset="four_beam_pulsed", seed=None):
         seed = None
     value = _filtered(start, seen, period, lidar, blocked, tuned, seed)
     distances = np.array(lidar.distances[tuned.first :])
-    age = lidar.scan_period * (0.5 + blocked / (1.0 - blocked))  # mean, of a value
     motion = Motion(
         tuned.corner,
-        (distances - distances[0]) / speed + age,
+        (distances - distances[0]) / speed + mean_age(lidar, blocked),
         np.full(distances.size, 1.0 / distances.size),
         tuned.horizon - times,
     )
@@ -438,11 +442,11 @@ def _in_turbulence(scene, lidar, tuned, seed):
     rest = np.maximum((auto * variance).sum(axis=0) - np.abs(cross) ** 2 / rotor * variance[0], 0.0)
     spectrum = np.fft.rfft(wind[:-1])
     spectrum[0] *= _profile_factor(scene, lidar, tuned)
-    spectrum[1:] = cross / rotor * spectrum[1:] + gaussian(rest, count, seed, LIDAR_STREAM)
+    spectrum[1:] = cross / rotor * spectrum[1:] + _gaussian(rest, count, seed, LIDAR_STREAM)
     return start[:-1], np.fft.irfft(spectrum, count), period
 
 
-def gaussian(variance, count, seed, stream):
+def _gaussian(variance, count, seed, stream):
     """Return Gaussian Fourier coefficients (n,) of a series of `count` values with a variance per bin."""
     drawn = component_generator(seed, stream).normal(size=(2, variance.size))
     return 0.5 * count * np.sqrt(variance) * (drawn[0] + 1j * drawn[1])
@@ -477,7 +481,7 @@ def _in_box(scene, lidar, tuned, seed):
     kept = np.where(frozen > 1e-12, evolved / np.maximum(frozen, 1e-12), 0.0)
     spectrum = np.fft.rfft(seen)
     variance = 2.0 * np.abs(spectrum[1:] / count) ** 2
-    spectrum[1:] = kept * spectrum[1:] + gaussian((1.0 - kept**2) * variance, count, seed, LIDAR_STREAM)
+    spectrum[1:] = kept * spectrum[1:] + _gaussian((1.0 - kept**2) * variance, count, seed, LIDAR_STREAM)
     time = np.arange(count) * box.dt - box.shift
     return time, np.fft.irfft(spectrum, count), count * box.dt if box.periodic else None
 
@@ -512,7 +516,7 @@ def _filtered(time, value, period, lidar, blocked, tuned, seed):
         frequency = np.arange(1, count // 2 + 1) / (count * step)
         variance = 2.0 * np.abs(np.fft.rfft(value)[1:] / count) ** 2
         spectrum = np.zeros(count // 2 + 1, dtype=np.complex128)
-        spectrum[1:] = gaussian(
+        spectrum[1:] = _gaussian(
             held_noise(lidar, blocked, frequency, variance), count, seed, LIDAR_STREAM + 1
         )
         folded = np.fft.irfft(spectrum, count)

@@ -29,6 +29,7 @@ from fowt_env.weather.lidar import (
     drawn_of,
     evolution,
     look,
+    mean_age,
     placed,
     points,
     profile_factor,
@@ -159,11 +160,6 @@ def interpolated(values, frequency):
     low, part = position_in(frequency)
     part = part.reshape(-1, *(1,) * (values.ndim - 1))
     return (1.0 - part) * values[low] + part * values[low + 1]
-
-
-def mean_age(lidar, blocked):
-    """Return the mean age of the values in a reading, s; blocked: fraction of lost shots."""
-    return lidar.scan_period * (0.5 + blocked / (1.0 - blocked))
 
 
 def lidar_gates(scene, preset="four_beam_pulsed", seed=None):
