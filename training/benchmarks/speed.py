@@ -7,7 +7,6 @@ kernel measured in the same minute to compare machines.
 import os
 import platform
 import re
-import subprocess
 import tempfile
 import time
 from dataclasses import dataclass, field
@@ -19,7 +18,6 @@ import numba
 import numpy as np
 import pandas as pd
 
-import fowt_env
 from fowt_env.control import EXACT
 from fowt_env.controllers import make
 from fowt_env.descriptions.platform import read_platform
@@ -48,6 +46,7 @@ from fowt_env.run.interface import build_interface
 from fowt_env.run.simulation import HeldCommand, simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.training.benchmarks.compile_time import session
+from fowt_env.training.evaluation.provenance import code_commit
 
 PLATFORM = "oc3_hywind"
 CALIBRATION_STEPS = 10_000_000
@@ -362,16 +361,7 @@ def start_times(fidelity="standard"):
 
 def header():
     """Return lines (list of str) with machine, versions, commit and date of a measurement."""
-    root, cpus = Path(fowt_env.__file__).resolve().parents[1], Path("/proc/cpuinfo")
-
-    def git(*words):
-        try:
-            words = ["git", "-C", str(root), *words]
-            return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
-        except OSError:  # no git on this machine
-            return ""
-
-    commit = git("rev-parse", "HEAD") + (" with changes" if git("status", "--porcelain") else "")
+    cpus = Path("/proc/cpuinfo")
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     named = re.search(r"^model name\s*: *(.*)", cpus.read_text() if cpus.is_file() else "", re.M)
     processor = named[1] if named else platform.processor() or platform.machine()
@@ -379,7 +369,7 @@ def header():
         f"date: {datetime.now(UTC):%Y-%m-%d %H:%M} UTC",
         f"machine: {processor}, {os.cpu_count()} cores, {platform.system()}, load {load:.2f}",
         f"versions: Python {platform.python_version()}, numba {numba.__version__}, numpy {np.__version__}",
-        f"commit: {commit or 'unknown'}",
+        f"commit: {code_commit() or 'unknown'}",
         f"calibration: {calibration():.2f} ms for {CALIBRATION_STEPS:g} dependent multiply-adds",
     ]
 

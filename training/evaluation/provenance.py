@@ -4,6 +4,7 @@ import hashlib
 import importlib
 import inspect
 import platform as machine
+import subprocess
 import sys
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -151,6 +152,19 @@ def _package_of(path):
         return None
     part = installed.relative_to(PACKAGE).parts[0]
     return part if part in ("controllers", "training", "visual") else "simulator"
+
+
+def code_commit():
+    """Return the git commit of this code, with " with changes" if files differ; "" if it is no checkout."""
+
+    def git(*words):
+        words = ["git", "-C", str(PACKAGE.parent), *words]
+        return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
+
+    try:
+        return git("rev-parse", "HEAD") + (" with changes" if git("status", "--porcelain") else "")
+    except OSError:  # no git on this machine
+        return ""
 
 
 def versions():

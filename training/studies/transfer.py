@@ -3,11 +3,12 @@
     STUDY = python -m fowt_env.training.studies.transfer
     STUDY openfast DECKS OPENFAST TURBSIM FOLDER    runs OpenFAST with every controller as a library
     STUDY here FOLDER                               runs the models of this package in the same wind and waves
-    STUDY table FOLDER --out figures.csv            writes and prints the figures of finished runs
-    STUDY table figures.csv                         prints them from the file
+    STUDY table FOLDER --out figures.csv            adds the figures of finished runs to the file
+    STUDY table figures.csv                         prints the tables of the file
 
-A finished run is not repeated: both commands continue where they stopped. A run of OpenFAST is kept as a
-series of CHANNELS, so that its figures can be computed anew without OpenFAST.
+A finished run is not repeated: both commands continue where they stopped, and with --done figures.csv where
+the runs of another machine stopped. A run of OpenFAST is kept as a series of CHANNELS, so that its figures
+can be computed anew without OpenFAST.
 
 Both codes have one wind, a TurbSim box sampled at every blade station (`uniform`: its rotor average), and one
 sea, the same components. Controllers are those of `fowt export`, designed for the published platform; here
@@ -45,6 +46,7 @@ from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import OPTIONS
 from fowt_env.training.evaluation.metrics import TIME, mean_exponent, turbine_metrics
+from fowt_env.training.evaluation.provenance import code_commit
 from fowt_env.training.evaluation.run_case import CONTROL_DT
 from fowt_env.training.validation.reference import openfast_decks
 from fowt_env.weather.waves import jonswap
@@ -75,6 +77,7 @@ FIGURES = {  # name in the tables: metric
 MEANS = ("Wind1VelX", "RotSpeed", "GenPwr", "BldPitch1", "PtfmPitch", "PtfmSurge")  # kept with the figures
 CLOSE = 5.0  # points: the difference of a ratio that is small
 KEY = ["platform", "model", "law", "wind", "seed"]
+COMMIT = "commit"  # column of the figures: of the code of law and models; empty: not recorded
 CHANNELS = (  # of ElastoDyn
     "Azimuth", "RotSpeed", "GenSpeed", *(f"BldPitch{k}" for k in (1, 2, 3)), "RotThrust", "RotTorq",
     *openfast_decks.MOTIONS, "NcIMUTAxs", "NcIMUTAys", "TTDspFA", "TTDspSS", "TwrBsMyt", "TwrBsMxt",
@@ -253,7 +256,7 @@ def named(frame):
     return kept.assign(**{f"FAIRTEN{line}_[kN]": 1e-3 * frame[column] for column, line in tensions.items()})
 
 
-def run_openfast(case, folder, decks, program, duration, dt, begin):
+def run_openfast(case, folder, decks, program, duration, dt, begin, commit):
     """Run OpenFAST in a case and keep its series. Raises: RuntimeError with the end of its messages."""
     path, library = case.path(folder), library_path(folder, case)
     place = path.with_suffix("")
@@ -265,7 +268,8 @@ def run_openfast(case, folder, decks, program, duration, dt, begin):
     seconds, text = time.perf_counter() - began, done.stdout + done.stderr
     if done.returncode or "terminated normally" not in text:
         raise RuntimeError(f"OpenFAST failed: {text.strip()[-1000:]}")
-    keep_series(path, named(read_series(place / "model.out")), seconds=seconds, duration=duration, dt=dt)
+    about = {"seconds": seconds, "duration": duration, "dt": dt, COMMIT: commit}
+    keep_series(path, named(read_series(place / "model.out")), **about)
     shutil.rmtree(place)
 
 
@@ -338,12 +342,38 @@ def collected(folder):
             turbine = read_turbine(read_platform(SUBJECTS[platform].plant).turbine)
             frame, about = kept_series(path)
             values = figures_of(frame, turbine) | {"duration_[s]": about["duration"]}
+            values[COMMIT] = about.get(COMMIT, "")
         else:
             values = read_table(path).iloc[0].to_dict()
         rows.append(dict(zip(KEY, (platform, model, law, wind, seed), strict=True)) | values)
     if not rows:
         raise InputError(f"folder = {str(folder)!r}: has no finished run; run `openfast` and `here` first")
     return pd.DataFrame(rows)
+
+
+def merged(old, new):
+    """Return the rows of two DataFrames of runs in the order of KEY; of a run in both, the row of `new`."""
+    rows = pd.concat([old, new], ignore_index=True).drop_duplicates(KEY, keep="last")
+    return rows.sort_values(KEY, ignore_index=True)
+
+
+def finished(path):
+    """Return the set of Cases of a CSV of figures, none without a path. Raises: InputError."""
+    if path is None:
+        return set()
+    rows = read_table(path)
+    if missing := [name for name in KEY if name not in rows]:
+        raise InputError(f"done = {str(path)!r}: is no CSV of `table --out`: it has no {', '.join(missing)}")
+    return {Case(*key) for key in rows[KEY].itertuples(index=False, name=None)}
+
+
+def check_decks(platform, decks):
+    """Check that the files of a platform's deck are there. Raises: InputError with those that are not."""
+    deck = getattr(openfast_decks, SUBJECTS[platform].deck)(decks)
+    # the library of a law takes the place of the deck's own controller, which is source
+    needed = [path for path in deck.inputs({"wind": "box", "control": True}) if path.suffix != ".f90"]
+    if lost := [str(path.relative_to(decks)) for path in needed if not path.exists()]:
+        raise InputError(f"decks = {str(decks)!r}: lacks {', '.join(lost)}; NOTICE has the sources of decks")
 
 
 def comparable(rows, names, laws):
@@ -530,6 +560,9 @@ Laws = Annotated[str, typer.Option(help="Controllers, comma-separated.")]
 Winds = Annotated[str, typer.Option(help="Mean winds in m/s, comma-separated, in the order of the runs.")]
 Seeds = Annotated[str, typer.Option(help="Seeds of wind and waves, comma-separated.")]
 Duration = Annotated[float, typer.Option(help="Length of a run, s.")]
+Done = Annotated[
+    Path | None, typer.Option(help="CSV of `table --out`: runs whose figures it has are not repeated.")
+]
 
 
 def _chosen_cases(platform, names, known, laws, winds, seeds):
@@ -556,22 +589,24 @@ def openfast(
         float | None, typer.Option(min=0.001, help="Step of OpenFAST, s; default: of the platform.")
     ] = None,
     jobs: Annotated[int, typer.Option(min=1, help="Runs at the same time.")] = 1,
+    done: Done = None,
 ):
     """Run OpenFAST with controllers as libraries; finished runs are not repeated."""
     executable, turbsim = program("OpenFAST", executable), program("TurbSim", turbsim)
-    wanted = _chosen_cases(platform, names, OPENFAST, laws, winds, seeds)
-    waiting = [case for case in wanted if not case.path(folder).exists()]
+    wanted, known = _chosen_cases(platform, names, OPENFAST, laws, winds, seeds), finished(done)
+    check_decks(platform, decks)
+    waiting = [case for case in wanted if case not in known and not case.path(folder).exists()]
     hours, dt = expected(waiting, folder, duration, jobs) / 3600.0, dt or SUBJECTS[platform].dt
     print(f"{len(waiting)} of {len(wanted)} runs of OpenFAST, about {hours:.1f} h with {jobs} at a time")
-    for case in waiting:
-        if not library_path(folder, case).exists():
-            library_path(folder, case).parent.mkdir(parents=True, exist_ok=True)
-            export_library(case.law, library_path(folder, case), platform, CONTROL_DT)
+    commit = code_commit()
+    for path, law in {library_path(folder, case): case.law for case in waiting}.items():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        export_library(law, path, platform, CONTROL_DT)  # anew: one of an earlier call may be of other code
     starts = {wind: start(platform, wind) for wind in dict.fromkeys(case.wind for case in waiting)}
 
     def work(case):
         make_box(turbsim, folder, *case.weather, duration)
-        run_openfast(case, folder, decks, executable, duration, dt, starts[case.wind])
+        run_openfast(case, folder, decks, executable, duration, dt, starts[case.wind], commit)
 
     # the boxes first where runs are at the same time, so that no two make the same
     if jobs > 1:
@@ -593,16 +628,18 @@ def here(
     ] = ("rigid,elastic"),
     duration: Duration = DURATION,
     again: Annotated[bool, typer.Option(help="Repeat finished runs, after a change of the code.")] = False,
+    done: Done = None,
 ):
     """Run the models of this package in the wind boxes that `openfast` made."""
     wanted = _chosen_cases(platform, names, models(platform), laws, winds, seeds)
-    wanted = [case for case in wanted if box_path(folder, *case.weather).exists()]
-    waiting = [case for case in wanted if again or not case.path(folder).exists()]
+    wanted, known = [case for case in wanted if box_path(folder, *case.weather).exists()], finished(done)
+    waiting = [case for case in wanted if again or case not in known and not case.path(folder).exists()]
     print(f"{len(waiting)} of {len(wanted)} runs here, about 10 s each: weather that has its wind box")
-    turbine = read_turbine(read_platform(SUBJECTS[platform].plant).turbine)
+    turbine, commit = read_turbine(read_platform(SUBJECTS[platform].plant).turbine), code_commit()
 
     def work(case):
         row = {"duration_[s]": duration} | figures_of(run_here(case, folder, duration), turbine)
+        row[COMMIT] = commit
         case.path(folder).parent.mkdir(parents=True, exist_ok=True)
         write_table(pd.DataFrame([row]), case.path(folder))
 
@@ -617,12 +654,16 @@ def table(
     names: Annotated[str | None, typer.Option("--models", help="Models; default: those with runs.")] = None,
     laws: Annotated[str | None, typer.Option(help="Controllers; default: those with runs.")] = None,
     winds: Annotated[str | None, typer.Option(help="Mean winds, m/s; default: those with runs.")] = None,
-    out: Annotated[Path | None, typer.Option(help="CSV of the figures of all finished runs.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="CSV to which the figures of all finished runs are added; its other runs stay."),
+    ] = None,
 ):
     """Print the ratios to the baseline in each code, their differences and the order of the controllers."""
     rows = read_table(source) if source.suffix == ".csv" else collected(source)
     if out is not None:
-        write_table(rows.sort_values(KEY), out)
+        rows = merged(read_table(out), rows) if out.exists() else rows.sort_values(KEY)
+        write_table(rows, out)
     speeds = winds and parse_numbers(winds, "winds")
     print(report(rows, platform, names and parse_names(names), laws and parse_names(laws), speeds))
 
