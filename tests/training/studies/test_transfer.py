@@ -138,6 +138,47 @@ def test_the_runs_of_a_folder_are_collected_by_their_names(tmp_path):
         transfer.collected(tmp_path / "empty")
 
 
+def test_a_table_adds_runs_to_a_file_and_keeps_those_of_another_machine(tmp_path):
+    """Runs in both are those of the folder; runs without a commit stay without one."""
+    theirs, ours = tmp_path / "theirs.csv", tmp_path / "runs"
+    write_table(stored(), theirs)
+    for law, wind in (("gspi_oc3", 18.0), ("gspi_oc3", 22.0)):
+        case = Case("oc3_hywind", "openfast", law, wind, 1)
+        transfer.keep_series(case.path(ours), transfer.named(output()), duration=300.0, commit="abc")
+    transfer.table(ours, names="rigid", winds="14", out=theirs)
+    rows = read_table(theirs).set_index(["model", "law", "wind"])
+    assert len(rows) == len(stored()) + 1
+    assert list(rows["commit"].dropna().index) == [("openfast", "gspi_oc3", wind) for wind in (18.0, 22.0)]
+    assert rows.loc[("openfast", "gspi_oc3", 18.0), "RotSpeed_std_[rpm]"] == pytest.approx(0.1414, abs=1e-3)
+    assert rows.loc[("rigid", "mpc", 18.0), "RotSpeed_std_[rpm]"] == 14.0
+
+
+def test_runs_whose_figures_are_stored_are_not_repeated(decks, tmp_path, monkeypatch, capsys):
+    done = tmp_path / "figures.csv"
+    write_table(pd.DataFrame([dict(zip(transfer.KEY, (SEMI, "openfast", "pi", 14, 2), strict=True))]), done)
+    ran = []
+    monkeypatch.setattr(transfer, "start", lambda *_: BEGIN)
+    monkeypatch.setattr(transfer, "make_box", lambda *_: None)
+    monkeypatch.setattr(transfer, "export_library", lambda law, path, *_: ran.append((law, path.name)))
+    monkeypatch.setattr(transfer, "run_openfast", lambda case, *_: ran.append(case))
+    options = {"platform": SEMI, "laws": "pi,lqr", "winds": "14", "seeds": "2,3", "done": done}
+    arguments = decks, "true", "true", tmp_path / "runs"
+    lost = next(decks.rglob("*ServoDyn.dat"))
+    lost.rename(lost.with_suffix(".old"))
+    with pytest.raises(InputError, match=r"lacks .*ServoDyn.dat; NOTICE"):
+        transfer.openfast(*arguments, **options)
+    lost.with_suffix(".old").rename(lost)
+    assert not ran
+    transfer.openfast(*arguments, **options)
+    assert "3 of 4 runs" in capsys.readouterr().out
+    libraries, runs = ran[:2], ran[2:]
+    assert libraries == [("lqr", "liblqr.so"), ("pi", "libpi.so")]  # one each, whatever the weather
+    assert {(case.law, case.seed) for case in runs} == {("lqr", 2), ("pi", 3), ("lqr", 3)}
+    write_table(pd.DataFrame({"law": ["pi"]}), done)
+    with pytest.raises(InputError, match="it has no platform, model, wind, seed"):
+        transfer.openfast(*arguments, **options)
+
+
 def stored(models=("openfast", "rigid"), laws=LAWS, factor=1.0):
     """Rows of two winds; law k has 10 + k in OpenFAST, and here the same but for `factor` on `mpc`."""
     rows = []
