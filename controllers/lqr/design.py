@@ -76,8 +76,8 @@ class LQGSettings(Settings):
     travel_near_rated: float = 0.2418  # deg/s
     power: float = 1.0  # deviation of power, over that of gspi_oc3
     torque: float = 0.08  # deviation of generator torque, of rated
-    shaft: float = 1.346  # deviation of shaft torque, over that of gspi_oc3
-    shaft_near_rated: float = 0.07849  # of rated torque
+    shaft: float = 0.6  # deviation of shaft torque, over that of gspi_oc3
+    shaft_near_rated: float = 0.06  # of rated torque
     speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
     torque_rate: float = 0.0474  # cost of (torque rate / 5 % of rated a second)^2
     schedule_time: float = 144.1  # s, over which the operating wind follows the estimate

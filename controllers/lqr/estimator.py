@@ -33,7 +33,8 @@ class Head(IntEnum):
     TORQUE_HIGH = 13
     HANDOVER_LOW = 14
     HANDOVER_HIGH = 15
-    CURVE = 16
+    POWER_HIGH = 16  # of torque and rotor speed
+    CURVE = 17
 
 
 BLOCKS = Head.CURVE + len(TorqueCurve._fields)

@@ -49,6 +49,7 @@ from fowt_env.plant.measurement import Measure
 
 HANDOVER = (0.01745, 0.05236)  # rad of pitch command: torque from the curve below, from feedback above
 TORQUE_RANGE = (0.5, 1.1)  # of rated, for the feedback's torque
+POWER_LIMIT = 1.15  # of rated, for the product of the feedback's torque and the estimated rotor speed
 INTEGRAL_LIMIT = 1.0  # rad, of the speed integral
 FORGETTING = 0.1  # 1/s, decay rate of the speed integral at minimum pitch
 
@@ -95,6 +96,8 @@ def lqr_law(p, memory, measurement, command):
     pitch = clamp(pitch + dt * rate, p[Head.PITCH_MINIMUM], p[Head.PITCH_MAXIMUM])
     target = torque + dt * p[Head.RATED_TORQUE] * feed_back(p, low, fraction, memory, 0)
     target = clamp(target, p[Head.TORQUE_LOW], p[Head.TORQUE_HIGH])
+    if target * memory[ROTOR] > p[Head.POWER_HIGH]:
+        target = p[Head.POWER_HIGH] / memory[ROTOR]
     by_curve = generator_torque(p[Head.GEAR_RATIO] * memory[ROTOR], pitch, curve_at(p, Head.CURVE))
     blend = clamp((pitch - p[Head.HANDOVER_LOW]) / (p[Head.HANDOVER_HIGH] - p[Head.HANDOVER_LOW]), 0.0, 1.0)
     target = blend * target + (1.0 - blend) * by_curve
@@ -187,6 +190,7 @@ class LQR(CompiledController):
             Head.TORQUE_HIGH: min(TORQUE_RANGE[1] * law.rated_torque, law.max_torque),
             Head.HANDOVER_LOW: HANDOVER[0],
             Head.HANDOVER_HIGH: HANDOVER[1],
+            Head.POWER_HIGH: POWER_LIMIT * law.rated_torque * turbine.rated_rotor_speed,
         }
         self.parameters = np.concatenate([[*values.values(), *build_torque_curve(law)], np.ravel(table)])
         self.prepared = True

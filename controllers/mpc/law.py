@@ -64,6 +64,7 @@ class Entry(IntEnum):
     DECAY = 10
     CURVE_BELOW = 11  # m/s
     PLAN_ABOVE = 12
+    POWER_HIGH = 13  # of torque and rotor speed, W
 
 
 class Memory(IntEnum):
@@ -105,6 +106,8 @@ def move(estimated, p, memory, curve, low_torque, command):
     command[1] = clamp(pitch, p[Entry.PITCH_MINIMUM], p[Entry.PITCH_MAXIMUM])
     torque = command[0] + dt * memory[Memory.TORQUE_RATE]
     torque = clamp(torque, low_torque, p[Entry.TORQUE_HIGH])
+    if torque * estimated[ROTOR] > p[Entry.POWER_HIGH]:
+        torque = p[Entry.POWER_HIGH] / estimated[ROTOR]
     low, high = p[Entry.CURVE_BELOW], p[Entry.PLAN_ABOVE]
     wind = max(memory[Memory.OPERATING_WIND], estimated[ESTIMATED_WIND + 1])
     blend = clamp((wind - low) / (high - low), 0.0, 1.0)
@@ -166,6 +169,7 @@ class MPC:
             Entry.DECAY: exp(-self.control_dt / settings.schedule_time),
             Entry.CURVE_BELOW: CURVE_WINDS[0] + (turbine.rated_wind_speed - RATED_WIND),
             Entry.PLAN_ABOVE: CURVE_WINDS[1] + (turbine.rated_wind_speed - RATED_WIND),
+            Entry.POWER_HIGH: settings.power_limit * law.rated_torque * turbine.rated_rotor_speed,
         }
         return np.array([values[entry] for entry in Entry], dtype=np.float64)
 
@@ -284,8 +288,10 @@ class MPC:
         torques = torques / torque - model.trim[TORQUE]
         pitches = np.array([drive.minimum, drive.maximum]) - model.trim[COMMAND]
         speeds = (-rated, settings.speed_limit * rated - model.trim[SPEED])
-        limits = np.array([-rate, rate, -drive.rate_limit, drive.rate_limit, *torques, *pitches, *speeds])
-        units = np.array([0.05, 0.2 * DEGREE, 0.05, DEGREE, 0.05 * rated])
+        powers = (0.0, settings.power_limit * rated)
+        rates = (-rate, rate, -drive.rate_limit, drive.rate_limit)
+        limits = np.array([*rates, *torques, *pitches, *speeds, *powers])
+        units = np.array([0.05, 0.2 * DEGREE, 0.05, DEGREE, 0.05 * rated, 0.05 * rated])
         old = np.zeros_like(self.plan)
         shifted(self.plan, self.grid, old)
         step = np.zeros_like(old)

@@ -21,7 +21,8 @@ BLADE = SPEED + 1
 FIRST_BLOCKS = 4  # number of blocks of one period; later blocks grow
 GROWTH = 1.5  # ratio of the lengths of successive blocks
 RATED_BLOCKS = 4  # number of blocks with rate limits at their start
-LIMITED = (TORQUE, COMMAND, SPEED)  # states with limits at the end of each block
+LIMITED = (TORQUE, COMMAND, SPEED)  # states with limits at the end of each block, as has the power
+BLOCK_ROWS = len(LIMITED) + 1
 
 
 class Limit(IntEnum):
@@ -32,6 +33,7 @@ class Limit(IntEnum):
     TORQUE = 4  # rated torques, less the trim
     PITCH = 6  # rad, less the trim
     SPEED = 8  # rad/s, less the trim
+    POWER = 10  # of generator torque and rotor speed, rated torques times rad/s
 
 
 class Grid(NamedTuple):
@@ -71,7 +73,7 @@ def grid_of(settings, period):
 def work_of(grid):
     """Return the Work arrays for a Grid."""
     steps, moves = len(grid.block_of), 2 * len(grid.ends)
-    rows = 2 * RATED_BLOCKS + len(LIMITED) * len(grid.ends)
+    rows = 2 * RATED_BLOCKS + BLOCK_ROWS * len(grid.ends)
     shapes = (
         (steps + 1, N_FEEDBACK), (steps + 1, N_FEEDBACK, moves), (moves, moves), moves, (rows, moves), rows,
         rows, 8, 2, (2, 3), (2, moves), moves,
@@ -193,8 +195,11 @@ def _condense(model, references, end, grid, moves, work, gain):
 
 
 @kernel
-def _limit(limits, units, grid, moves, work, gain):
-    """Fill C, low and high: permitted change of each limited quantity from the plan, in its unit."""
+def _limit(limits, units, trim, grid, moves, work, gain):
+    """Fill C, low and high: permitted change of each limited quantity from the plan, in its unit.
+
+    The power is linearised about the predicted torque and rotor speed.
+    """
     n, width = N_FEEDBACK, len(moves)
     row = 0
     for block in range(RATED_BLOCKS):
@@ -221,6 +226,14 @@ def _limit(limits, units, grid, moves, work, gain):
             work.low[row] = (limits[4 + 2 * j] - work.states[k, state]) / unit
             work.high[row] = (limits[5 + 2 * j] - work.states[k, state]) / unit
             row += 1
+        torque, speed = trim[TORQUE] + work.states[k, TORQUE], trim[SPEED] + work.states[k, SPEED]
+        unit = units[2 + len(LIMITED)]
+        for c in range(width):
+            change = speed * work.slopes[k, TORQUE, c] + torque * work.slopes[k, SPEED, c]
+            work.C[row, c] = change / unit
+        work.low[row] = (limits[Limit.POWER] - torque * speed) / unit
+        work.high[row] = (limits[Limit.POWER + 1] - torque * speed) / unit
+        row += 1
 
 
 @entry
@@ -234,7 +247,7 @@ def newton_step(
     closed = model.A - model.B @ gain
     _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed)
     _condense(model, references, end, grid, moves, work, gain)
-    _limit(limits, units, grid, moves, work, gain)
+    _limit(limits, units, model.trim, grid, moves, work, gain)
     step[:] = np.linalg.solve(work.H, -work.g)
     kept = True
     for row in range(len(work.low)):

@@ -24,6 +24,7 @@ class MPCSettings(Settings):
         "horizon": {"low": 5.0, "high": 120.0},
         "preview_time": {"low": 1.0, "high": 60.0},
         "speed_limit": {"low": 1.02, "high": 1.3},
+        "power_limit": {"low": 1.02, "high": 1.5},
         "torque_low": {"low": 0.0, "high": 1.0},
         "torque_high": {"low": 1.0, "high": 1.5},
     }
@@ -31,15 +32,16 @@ class MPCSettings(Settings):
     speed: float = 1.0  # price of rotor speed
     platform_pitch: float = 1.2
     surge: float = 0.7
-    shaft: float = 0.15  # torque of the shaft
+    shaft: float = 0.18  # torque of the shaft
     power: float = 0.05
-    travel: float = 1.0  # limit, not a price, of blade-pitch travel, over that of gspi_oc3
-    shaft_near_rated: float = 0.022  # deviation of shaft torque by lulls at the lowest design wind, of rated
+    travel: float = 0.97  # limit, not a price, of blade-pitch travel, over that of gspi_oc3
+    shaft_near_rated: float = 0.018  # deviation of shaft torque by lulls at the lowest design wind, of rated
     speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
     torque_rate: float = 0.1  # cost of (torque rate / 5 % of rated a second)^2
     schedule_time: float = 300.0  # s, time constant of the operating wind
     horizon: float = 30.0  # s
     preview_time: float = 10.0  # s, look-ahead time of laws with preview
     speed_limit: float = 1.15  # of rated, soft
+    power_limit: float = 1.15  # of torque and rotor speed, of rated; soft in the plan
     torque_low: float = 0.75  # of rated; in lulls that of the torque curve, if less
     torque_high: float = 1.05  # of rated

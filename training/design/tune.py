@@ -99,7 +99,7 @@ def _pi(settings, turbine, control_dt):
 
 _LQR = {
     "share": (0.0, 0.9), "share_growth": (-0.04, 0.04), "travel": (0.85, 1.05), "travel_cap": (0.11, 0.18),
-    "travel_near_rated": (0.15, 0.35), "shaft": (0.7, 1.5), "shaft_near_rated": (0.03, 0.12),
+    "travel_near_rated": (0.15, 0.35), "shaft": (0.4, 1.5), "shaft_near_rated": (0.03, 0.12),
     "torque_rate": (0.03, 2.0), "schedule_time": (60.0, 250.0),
 }  # fmt: skip
 _MPC = {

@@ -53,6 +53,8 @@ static void lqr_step(const double *p, double *m, const double *reading, double *
     pitch = clamp(pitch + dt * rate, p[LQR_PITCH_MINIMUM], p[LQR_PITCH_MAXIMUM]);
     target = torque + dt * p[LQR_RATED_TORQUE] * feed_back(p, low, fraction, m, 0);
     target = clamp(target, p[LQR_TORQUE_LOW], p[LQR_TORQUE_HIGH]);
+    if (target * m[LQR_ROTOR] > p[LQR_POWER_HIGH])
+        target = p[LQR_POWER_HIGH] / m[LQR_ROTOR];
     by_curve = curve_torque(ratio * m[LQR_ROTOR], pitch, p + LQR_CURVE);
     blend = (pitch - p[LQR_HANDOVER_LOW]) / (p[LQR_HANDOVER_HIGH] - p[LQR_HANDOVER_LOW]);
     blend = clamp(blend, 0.0, 1.0);

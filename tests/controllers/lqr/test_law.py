@@ -6,7 +6,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.caches import clear_caches
 from fowt_env.controllers.lqr.design import LQGSettings, design_models
-from fowt_env.controllers.lqr.law import LQR
+from fowt_env.controllers.lqr.law import LQR, POWER_LIMIT
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import named_cases
 from fowt_env.training.evaluation.metrics import metrics
@@ -26,6 +26,14 @@ def test_lqr_stays_at_the_steady_state(wind):
     frame = simulate(build_scene("oc3_hywind", wind=wind, fidelity="standard"), "lqr", duration=120.0)
     assert frame["RotSpeed_[rpm]"].std() < 0.05
     assert frame["PtfmPitch_[deg]"].std() < 0.1
+
+
+def test_power_is_limited_in_an_extreme_gust():
+    """Torque falls while the rotor turns faster than at the limit of power; its speed is an estimate."""
+    gust = {"kind": "eog", "speed": 18.0, "start": 60.0}
+    frame = simulate(build_scene("oc3_hywind", wind=gust, fidelity="standard"), "lqr", duration=120.0)
+    assert frame["RotSpeed_[rpm]"].max() / 12.1 > POWER_LIMIT + 0.02
+    assert frame["GenPwr_[kW]"].max() < 1.01 * POWER_LIMIT * 5000.0
 
 
 def test_bad_settings_are_named(turbine):

@@ -12,7 +12,7 @@ from fowt_env.controllers import make  # noqa: E402
 from fowt_env.controllers.mpc import solver  # noqa: E402
 from fowt_env.controllers.mpc.law import MPC, PERIOD, Memory  # noqa: E402
 from fowt_env.controllers.mpc.model import COMMAND, SPEED, TORQUE  # noqa: E402
-from fowt_env.controllers.mpc.plan import LIMITED, RATED_BLOCKS  # noqa: E402
+from fowt_env.controllers.mpc.plan import BLOCK_ROWS, RATED_BLOCKS  # noqa: E402
 from fowt_env.controllers.mpc.settings import MPCSettings  # noqa: E402
 from fowt_env.controllers.mpc.solver import Program  # noqa: E402
 from fowt_env.descriptions.units import DEGREE  # noqa: E402
@@ -70,6 +70,9 @@ def test_limits_hold_in_an_extreme_gust():
         found[constrained] = simulate(scene, controller, duration=120.0)
         assert controller.unsolved == 0
     frame = found[True]
+    for one in found.values():  # of the estimated rotor speed, which is some 0.5 % off
+        assert 1.15 < one["RotSpeed_[rpm]"].max() / 12.1
+        assert one["GenPwr_[kW]"].max() < 1.16 * 5000.0
     torque, pitch = 1e3 * frame["GenTq_[kN-m]"], np.radians(frame["BldPitch1_[deg]"])
     assert 0.75 * 43093.55 - 1e-3 <= torque.min() and torque.max() <= 1.05 * 43093.55 + 1e-3
     assert torque.diff().abs().max() <= 0.1 * 15000.0 + 1e-3
@@ -87,7 +90,7 @@ def test_the_plan_has_the_turbines_limits_less_the_trim():
     trim, work = law._model()[0].trim, law.work
     assert trim[TORQUE] < 0.95
     for block, k in enumerate(law.grid.ends):
-        first = 2 * RATED_BLOCKS + len(LIMITED) * block
+        first = 2 * RATED_BLOCKS + BLOCK_ROWS * block
         for place, (state, unit) in enumerate(((TORQUE, 0.05), (COMMAND, DEGREE), (SPEED, 0.05 * 1.267109))):
             base = trim[state] + work.states[k, state]
             low, high = (unit * bound[first + place] + base for bound in (work.low, work.high))

@@ -14,6 +14,7 @@ from fowt_env.controllers.mpc.model import (
     LEAN_RATE,
     SPEED,
     SURGE_RATE,
+    TORQUE,
     WIND,
     _loads_at,
     _plant,
@@ -21,7 +22,15 @@ from fowt_env.controllers.mpc.model import (
     lq,
     wind_model,
 )
-from fowt_env.controllers.mpc.plan import LIMITED, RATED_BLOCKS, grid_of, newton_step, shifted, work_of
+from fowt_env.controllers.mpc.plan import (
+    BLOCK_ROWS,
+    LIMITED,
+    RATED_BLOCKS,
+    grid_of,
+    newton_step,
+    shifted,
+    work_of,
+)
 from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.controllers.mpc.weights import weights_over
@@ -29,8 +38,8 @@ from fowt_env.descriptions.turbine import read_turbine
 
 TURBINE = read_turbine("nrel5mw")
 SETTINGS = MPCSettings(horizon=10.0)
-WIDE = np.tile([-1e9, 1e9], 5)
-UNITS = np.array([0.05, 0.0035, 0.05, 0.0175, 0.063])
+WIDE = np.tile([-1e9, 1e9], 6)
+UNITS = np.array([0.05, 0.0035, 0.05, 0.0175, 0.063, 0.063])
 NOWHERE = np.zeros((0, 2))
 
 
@@ -151,15 +160,21 @@ def test_limited_quantities_are_those_of_the_prediction(model):
     """Rows of the program: what a change of plan does to the rates and to torque, pitch command and speed."""
     wind, table = model
     x, grid = state(7), grid_of(SETTINGS, PERIOD)
-    limits = np.array([-0.3, 0.3, -0.14, 0.14, -0.5, 0.1, -0.15, 1.4, -1.2, 0.19])
+    limits = np.array([-0.3, 0.3, -0.14, 0.14, -0.5, 0.1, -0.15, 1.4, -1.2, 0.19, 0.0, 1.45])
     moves = np.zeros(2 * len(grid.ends))
     _, _, work = solved(wind, table, x, moves, False, limits=limits)
     _, _, later = solved(wind, table, x, moves + 1e-3, False, limits=limits)
-    assert work.low - work.C @ np.full_like(moves, 1e-3) == pytest.approx(later.low, rel=1e-9, abs=1e-9)
-    row = 2 * RATED_BLOCKS + len(LIMITED) * (len(grid.ends) - 1)
+    linear = np.ones(len(work.low), dtype=bool)
+    linear[2 * RATED_BLOCKS + len(LIMITED) :: BLOCK_ROWS] = False  # the power, which is a product
+    for which, within in ((linear, 1e-9), (~linear, 1e-3)):
+        moved = (work.low - work.C @ np.full_like(moves, 1e-3))[which]
+        assert moved == pytest.approx(later.low[which], rel=within, abs=within)
+    row = 2 * RATED_BLOCKS + BLOCK_ROWS * (len(grid.ends) - 1)
     for place, name in enumerate(LIMITED):
         reached = work.states[-1, name]
         assert work.high[row + place] == pytest.approx((limits[5 + 2 * place] - reached) / UNITS[2 + place])
+    power = (wind.trim[[TORQUE, SPEED]] + work.states[-1, [TORQUE, SPEED]]).prod()
+    assert work.high[row + len(LIMITED)] == pytest.approx((1.45 - power) / UNITS[-1])
     first = -(wind.K @ x)
     assert work.low[:2] == pytest.approx((limits[[0, 2]] - first) / UNITS[:2])
 
