@@ -30,7 +30,7 @@ def test_lqr_stays_at_the_steady_state(wind):
 
 def test_power_is_limited_in_an_extreme_gust():
     """Torque falls while the rotor turns faster than at the limit of power; its speed is an estimate."""
-    gust = {"kind": "eog", "speed": 18.0, "start": 60.0}
+    gust = {"kind": "eog", "speed": 24.0, "start": 60.0, "class": "A"}
     frame = simulate(build_scene("oc3_hywind", wind=gust, fidelity="standard"), "lqr", duration=120.0)
     assert frame["RotSpeed_[rpm]"].max() / 12.1 > POWER_LIMIT + 0.02
     assert frame["GenPwr_[kW]"].max() < 1.01 * POWER_LIMIT * 5000.0

@@ -62,7 +62,7 @@ def test_it_betters_the_baseline_at_no_more_pitch_travel_on_a_validation_seed():
 def test_limits_hold_in_an_extreme_gust():
     """Commands within range and rate, to rounding; the soft speed limit is passed by less than without it."""
     scene = steady({"kind": "eog", "speed": 18.0, "start": 60.0})
-    settings = MPCSettings(speed_limit=1.1)
+    settings = MPCSettings(speed_limit=1.1, power_limit=1.08)
     turbine = scene.turbine
     found = {}
     for constrained in (True, False):
@@ -70,9 +70,8 @@ def test_limits_hold_in_an_extreme_gust():
         found[constrained] = simulate(scene, controller, duration=120.0)
         assert controller.unsolved == 0
     frame = found[True]
-    for one in found.values():  # of the estimated rotor speed, which is some 0.5 % off
-        assert 1.15 < one["RotSpeed_[rpm]"].max() / 12.1
-        assert one["GenPwr_[kW]"].max() < 1.16 * 5000.0
+    for one in found.values():  # power by the estimated rotor speed
+        assert one["GenPwr_[kW]"].max() < 1.01 * 1.08 * 5000.0
     torque, pitch = 1e3 * frame["GenTq_[kN-m]"], np.radians(frame["BldPitch1_[deg]"])
     assert 0.75 * 43093.55 - 1e-3 <= torque.min() and torque.max() <= 1.05 * 43093.55 + 1e-3
     assert torque.diff().abs().max() <= 0.1 * 15000.0 + 1e-3
