@@ -22,7 +22,6 @@ from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.files.markdown import markdown_table
 from fowt_env.files.tables import read_table, write_table
-from fowt_env.training.cli.arguments import parse_names
 from fowt_env.training.evaluation.cases import mean_speed, read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.leaderboard import leaderboard, score_text
@@ -114,10 +113,10 @@ def main(
     out: Annotated[str, typer.Option(help="CSV file of all runs, which is continued.")] = "robust_order.csv",
 ):
     """Print the score of each controller under each variation, its order and the rank correlation."""
-    names, laws = parse_names(variations) or list(VARIATIONS), parse_names(controllers)
+    names, laws = [name for name in variations.split(",") if name] or list(VARIATIONS), controllers.split(",")
     if unknown := [name for name in names if name not in VARIATIONS]:
         raise InputError(f"variations = {unknown}: must be of {list(VARIATIONS)}")
-    chosen, numbers = tuple(float(wind) for wind in parse_names(winds)), parse_whole_numbers(seeds, "seeds")
+    chosen, numbers = tuple(float(wind) for wind in winds.split(",")), parse_whole_numbers(seeds, "seeds")
     known = read_table(out) if Path(out).exists() else pd.DataFrame({"variation": [], "controller": []})
     rows, nominal = [], None
     for name in [UNCHANGED, *(name for name in names if name != UNCHANGED)]:
