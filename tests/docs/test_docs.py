@@ -129,16 +129,25 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
     },
     "rotor speed of mpc": {
         README: r"\| `mpc` \| (\S+) %",
+        CONTROLLERS: r"\| `mpc` \| (\S+) %",
+    },
+    "rotor speed of mpc on the rigid turbine": {
         CONTROLLERS: r"\| `mpc` \| [^|]+ \| \S+ (\S+) %",
         AGENTS: r"`mpc` alone is at (\S+) % in rotor speed",
     },
     "score of mpc": {
-        README: r"\| `mpc` \| .* \*\*(\S+) ",
-        CONTROLLERS: r"\| `mpc` \| .* \*\*(\S+) ",
+        README: r"\| `mpc` \| -.*\*\*(\d\S+) ",
+        CONTROLLERS: r"\| `mpc` \| -.*\*\*(\d\S+) ",
+    },
+    "score of mpc on the rigid turbine": {
+        README: r"the rigid turbine.* `mpc` (\S+),",
+        CONTROLLERS: r"\| `mpc` \| five.* \*\*(\S+) ",
+        AGENTS: r"\| `mpc` \|.* (\S+) \|",
     },
     "score of the agent": {
-        README: r"\| `policy:ppo_lqr` .* \| (\S+) \[",
+        README: r"`policy:ppo_lqr` \(RL\) (\d\S+\d)",
         CONTROLLERS: r"\| `policy:ppo_lqr` .* \| (\S+) \[",
+        AGENTS: r"\| `ppo_lqr`, seeds 0, 1, 2 .*\| (\S+), \S+, \S+ \|",
     },
 }
 
