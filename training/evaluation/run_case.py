@@ -63,9 +63,10 @@ class Run:
         return self.label, self.case.name, self.seed
 
 
-def scored(run):
+def scored(run, measure=None):
     """Return (row, time series or None) of one run; a failed run has a reason instead of metrics.
 
+    measure: what is measured of a run, in place of `run_metrics` and with its arguments.
     If the turbine's protection ends the run, the row has the metrics until then, the time and the reason.
     Raises: InputError for settings that no controller could use.
     """
@@ -104,7 +105,7 @@ def scored(run):
                 nominal=nominal,
                 **settings,
             )
-        return frame, run_metrics(frame, case, nominal, run.skip)
+        return frame, (measure or run_metrics)(frame, case, nominal, run.skip)
 
     # an error of the controller fails this run, not the evaluation
     outcome, error = attempt(work, run.time_limit)
