@@ -15,37 +15,51 @@ FORMAT = 1  # of the files; increased when read_box generates different boxes
 ARRAYS, NUMBERS = ("velocity", "y", "z"), ("dt", "speed", "periodic", "shift")
 
 
-def cached_box(spec, platform, seed, options):
-    """Return the WindBox of a specification for a platform's turbine, from the user's cache if available.
+def cached_box(spec, platform, seed, options, folder=None):
+    """Return the WindBox of a specification for a platform's turbine, from a folder of boxes if it is there.
 
-    Only generated boxes (kind "mann") are cached; files and arrays are read directly.
+    Only generated boxes (kind "mann") are kept; files and arrays are read directly. folder: None for that of
+    the user's cache.
     """
+    if isinstance(spec, WindBox) or spec["kind"] != "mann":
+        return new_box(spec, platform, seed, options)
+    folder = _folder() if folder is None else folder
+    if folder is None:
+        return new_box(spec, platform, seed, options)
+    path = box_path(spec, platform, seed, options, folder)
+    # a damaged file can raise any exception: the box is then generated again
+    with suppress(Exception), path.open("rb") as content, np.load(content, allow_pickle=False) as file:
+        values = {key: file[key] for key in ARRAYS}
+        return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
+    box = new_box(spec, platform, seed, options)
+    with suppress(OSError), replacing(path) as temporary:  # e.g. no space on the disk
+        np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})
+    return box
+
+
+def new_box(spec, platform, seed, options):
+    """Return the WindBox of a specification for a platform's turbine, read or generated."""
+    return read_box(spec, **_arguments(platform, seed, options))
+
+
+def box_path(spec, platform, seed, options, folder):
+    """Return the path of the file in which cached_box keeps a generated box, named after what it depends on."""
+    text = json.dumps([FORMAT, spec, _arguments(platform, seed, options)], sort_keys=True)
+    return folder / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npz"
+
+
+def _arguments(platform, seed, options):
+    """Return the arguments of read_box for a platform's turbine."""
     description = platform if isinstance(platform, Platform) else read_platform(platform)
     rotor = turbine_of(description, options.get("turbine")).rotor
     shear = options.get("shear_exponent")
-    arguments = {
+    return {
         "hub_height": rotor.hub_height,
         "rotor_diameter": 2.0 * rotor.tip_radius,
         "shear_exponent": description.environment.shear_exponent if shear is None else shear,
         "seed": seed,
         "duration": options["duration"],
     }
-    if isinstance(spec, WindBox) or spec["kind"] != "mann":
-        return read_box(spec, **arguments)
-    folder = _folder()
-    if folder is None:
-        return read_box(spec, **arguments)
-    text = json.dumps([FORMAT, spec, arguments], sort_keys=True)
-    name = hashlib.sha256(text.encode()).hexdigest()[:24]
-    path = folder / f"{name}.npz"
-    # a damaged file can raise any exception: the box is then generated again
-    with suppress(Exception), path.open("rb") as content, np.load(content, allow_pickle=False) as file:
-        values = {key: file[key] for key in ARRAYS}
-        return WindBox(**values, **{key: file[key].item() for key in NUMBERS})
-    box = read_box(spec, **arguments)
-    with suppress(OSError), replacing(path) as temporary:  # e.g. no space on the disk
-        np.savez(temporary, **{key: getattr(box, key) for key in (*ARRAYS, *NUMBERS)})
-    return box
 
 
 def _folder():

@@ -1,0 +1,446 @@
+"""Expands the design load cases of cases.toml for a site, a platform and controllers into single runs.
+
+Each condition (wind, sea, directions, fault) has one name, and its seeds are the same for every controller.
+Hours per year are those of the site: production and idling by the probability of their winds, repair by the
+availability, events by their number per year.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from itertools import product
+from math import pi
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+
+from fowt_env.descriptions.checks import check_number, parse_names
+from fowt_env.descriptions.faults import Fault
+from fowt_env.descriptions.files import read_toml
+from fowt_env.descriptions.platform import read_platform, turbine_of
+from fowt_env.descriptions.records import NonNegative, Positive, Record, bounded, checked_record, validate
+from fowt_env.errors import InputError, unknown
+from fowt_env.scene.options import FIDELITIES
+from fowt_env.training.evaluation.cases import WIND_KINDS, Case, check_sensors
+from fowt_env.training.evaluation.run_case import CONTROL_DT, PARKED
+from fowt_env.training.loads.records import ANALYSES, CHARACTERISTICS, HOUR, SAFETY_CLASSES, LoadCase
+from fowt_env.training.loads.site import HOUR_FACTOR, YEAR, Climate, climate_of, read_site
+
+TABLE = Path(__file__).parent / "cases.toml"
+SPEEDS = ("bins", "idle", "rated", "rated_out", "range", "extreme_50", "extreme_1")
+SEAS = ("scatter", "normal", "severe", "extreme_50", "extreme_1")
+TURBULENT = ("ntm", "etm", "ewm")
+GUSTS = ("eog", "ecd", "edc", "ews")
+TURNED = (*TURBULENT, "nwp")  # kinds of wind that can blow at an angle to the rotor
+RATED_STEP = 2.0  # m/s about rated wind
+IDLE_WIDTH = 5.0  # m/s, of the bin of winds above cut-out; the last bin is open
+CELL = 10.0  # m, at most, between the points of a box of wind
+POINTS = (16, 32)  # least and most of them in each direction
+BOX_STEP = (0.2, 2.0)  # s, least and most between the slices of a box
+Angles = tuple[bounded(ge=-180, le=180), ...]
+
+
+class Factor(Record):
+    """Defines a partial safety factor for loads."""
+
+    value: Positive
+    source: str
+
+
+class CaseEntry(Record):
+    """Defines a design load case: one [[case]] of cases.toml, which explains the keys."""
+
+    dlc: str
+    description: str
+    source: str
+    left_out: str = ""  # what cannot be run, and why; without a wind all of the case
+    wind: Literal[(*TURBULENT, *GUSTS, "nwp")] | None = None
+    variants: tuple[dict[str, Any], ...] = ({},)  # further keys of the wind
+    speeds: Literal[SPEEDS] | None = None
+    sea: Literal[SEAS] | None = None
+    yaw_errors: Angles | Literal["site"] = (0.0,)
+    misalignments: Angles | Literal["site", "extreme"] = (0.0,)
+    parked: Annotated[bool, Field(strict=True)] = False
+    individual: Annotated[bool, Field(strict=True)] = False  # blades pitch on their own
+    length: Positive | Literal["hours"] = "hours"  # s
+    at: NonNegative | None = None  # s after the transient, start of a gust
+    faults: tuple[dict[str, Any], ...] = ()
+    events: Literal["start", "stop", "fault"] | None = None
+    analysis: Literal[ANALYSES] | None = None
+    safety: Literal[SAFETY_CLASSES] | None = None
+    factor: str | None = None  # name of a factor; None: that of the safety class
+    characteristic: Literal[CHARACTERISTICS] = "largest"
+    runs_of: str | None = None  # number of the design load case whose runs these are
+
+    def _problems(self):
+        if self.wind is None:
+            if not self.left_out:
+                yield f"wind is missing: {self.dlc} needs it, or left_out"
+            return
+        for key in ("speeds", "sea", "analysis", "safety"):
+            if getattr(self, key) is None:
+                yield f"{key} is missing: {self.dlc} needs it"
+        if self.wind in GUSTS and self.at is None:
+            yield f"at is missing: the start of the {self.wind} in s after the transient"
+        if self.wind in GUSTS and self.yaw_errors not in ((0.0,), "site"):
+            yield f"yaw_errors: a {self.wind} blows along the rotor axis"
+        for number, fault in enumerate(self.faults, 1):
+            keys = {key: value for key, value in fault.items() if key != "after"}
+            if not isinstance(fault.get("after"), int | float):
+                yield f"faults.{number}.after is missing: s after the transient"
+            for problem in validate(Fault, {**keys, "time": 0.0})[1]:
+                yield f"faults.{number}.{problem}"
+
+
+class CasesFile(Record):
+    """Defines the content of cases.toml."""
+
+    version: int
+    source: str
+    factor: dict[str, Factor]
+    case: tuple[CaseEntry, ...]
+
+    def _problems(self):
+        numbers = [entry.dlc for entry in self.case]
+        for dlc, count in Counter(numbers).items():
+            if count > 1:
+                yield f"case {dlc!r}: defined twice"
+        for entry in self.case:
+            name = entry.factor or entry.safety
+            if entry.wind is not None and name not in self.factor:
+                yield f"case {entry.dlc}: {unknown('factor', name, self.factor)}"
+            if entry.runs_of is not None and entry.runs_of not in numbers:
+                yield f"case {entry.dlc}: runs_of = {entry.runs_of!r}: is not a case of this file"
+
+
+class Bin(NamedTuple):
+    """Holds a class of mean winds: the wind that is run, its edges and its probability."""
+
+    speed: float  # m/s
+    edges: tuple[float, float] | None
+    probability: float
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Holds the runs of a load table with what is left out of it.
+
+    cases: LoadCases; several may share one run, whose key they have. left_out: (number, description, reason).
+    """
+
+    cases: tuple[LoadCase, ...]
+    left_out: tuple[tuple[str, str, str], ...]
+    remarks: tuple[str, ...]
+    source: str
+
+    @property
+    def runs(self):
+        """Return {key: LoadCase} of the different runs, in order."""
+        found = {}
+        for case in self.cases:
+            found.setdefault(case.key, case)
+        return found
+
+    @property
+    def hours(self):
+        """Return the simulated time of all runs, h, with their transients."""
+        return sum(case.duration for case in self.runs.values()) / HOUR
+
+    def counts(self):
+        """Return [(dlc, description, conditions, runs, simulated h)] by design load case, without sharing."""
+        rows = []
+        for dlc in dict.fromkeys(case.dlc for case in self.cases):
+            mine = [case for case in self.cases if case.dlc == dlc]
+            hours = sum(case.duration for case in mine) / HOUR
+            rows.append((dlc, mine[0].description, len({case.name for case in mine}), len(mine), hours))
+        return rows
+
+
+def read_cases(path=TABLE):
+    """Return the CasesFile of a file of load cases. Raises: InputError with a line per wrong entry."""
+    return checked_record(CasesFile, read_toml(path, "load case"), f"load case file {str(path)!r}")
+
+
+def expanded(
+    platform,
+    site,
+    controllers=("pi",),
+    *,
+    dlc=None,
+    seeds=6,
+    hours=1.0,
+    wind="full-field",
+    fidelity="standard",
+    sensors="standard",
+    table=TABLE,
+    first_seed=1,
+):
+    """Return the Matrix of a load table.
+
+    platform     name or path of a platform file
+    site         name, path or SiteFile (site.read_site)
+    controllers  labels
+    dlc          numbers of design load cases, None: all
+    seeds        realisations of wind and sea of each condition
+    hours        length of a run that is not an event
+    wind         "full-field" or "rotor-averaged" turbulence
+    fidelity     of build_scene; sensors: name of the chain
+    Raises: InputError naming the key, its value and what is allowed.
+    """
+    file, site = read_cases(table), read_site(site)
+    entries = _chosen(file.case, dlc)
+    if wind not in WIND_KINDS:
+        raise unknown("wind", wind, WIND_KINDS)
+    if fidelity not in FIDELITIES:
+        raise unknown("fidelity", fidelity, FIDELITIES)
+    sensors = check_sensors(sensors)
+    check_number("hours", hours, 0.05, 24.0, allowed="a number in [0.05, 24]")
+    if isinstance(seeds, bool) or not isinstance(seeds, int) or not 1 <= seeds <= 1000:
+        raise InputError(f"seeds = {seeds!r}: must be a whole number in [1, 1000]")
+    description = read_platform(platform)
+    turbine = turbine_of(description)
+    settings = _Settings(
+        platform, climate_of(site, turbine), turbine, tuple(controllers),
+        tuple(range(first_seed, first_seed + seeds)), hours, wind == "full-field", fidelity, sensors, file,
+    )  # fmt: skip
+    cases, left_out = [], []
+    for entry in entries:
+        if entry.left_out:
+            left_out.append((entry.dlc, entry.description, entry.left_out))
+        if entry.wind is not None:
+            cases += settings.cases(entry)
+    depth = description.environment.water_depth
+    remarks = []
+    if site.water_depth is not None and abs(depth - site.water_depth) > 0.1 * depth:
+        remarks.append(
+            f"the site is {site.water_depth:g} m deep and the platform is moored in {depth:g} m, in which the"
+            " waves are computed"
+        )
+    return Matrix(tuple(cases), tuple(left_out), tuple(remarks), file.source)
+
+
+def _chosen(entries, dlc):
+    """Return the CaseEntries of numbers (a list or "1.2,6.1"; None: all). Raises: InputError."""
+    if dlc is None:
+        return entries
+    numbers = parse_names(dlc) if isinstance(dlc, str) else list(dlc)
+    known = {entry.dlc: entry for entry in entries}
+    for number in numbers:
+        if number not in known:
+            raise unknown("design load case", number, known)
+    if not numbers:
+        raise InputError("dlc: at least one design load case is needed")
+    return [entry for entry in entries if entry.dlc in numbers]
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """Holds what all cases of a table share, and expands one entry of the table."""
+
+    platform: Any
+    climate: Climate
+    turbine: Any
+    controllers: tuple
+    seeds: tuple
+    hours: float
+    full_field: bool
+    fidelity: str
+    sensors: str
+    file: CasesFile
+
+    def cases(self, entry):
+        """Return the LoadCases of a CaseEntry."""
+        site = self.climate.site
+        design = site.design
+        factor = self.file.factor[entry.factor or entry.safety]
+        skip = design.transient
+        length = self.hours * HOUR if entry.length == "hours" else entry.length
+        yaws = design.yaw_errors if entry.yaw_errors == "site" else entry.yaw_errors
+        faults = entry.faults or (None,)
+        angles = self._misalignments(entry)
+        bins = self._bins(entry)
+        shared = len(yaws) * len(faults) * len(entry.variants) * len(self.seeds)
+        found = []
+        for each, variant, fault, yaw, (angle, likely) in product(bins, entry.variants, faults, yaws, angles):
+            for sea in self._seas(entry, each.speed):
+                Hs, Tp, share = sea
+                year = self._hours_per_year(entry, length) * each.probability * share * likely / shared
+                name = self._name(entry, each.speed, variant, fault, yaw, angle, Hs, Tp)
+                for order, seed in enumerate(self.seeds):
+                    case = self._case(entry, name, each.speed, variant, fault, yaw, angle, (Hs, Tp), order)
+                    found += [
+                        LoadCase(
+                            entry.dlc, name, entry.description, case, label, seed, skip + length, skip,
+                            entry.analysis, entry.safety, factor.value, factor.source, entry.source,
+                            entry.characteristic, each.speed, each.edges, Hs, Tp, yaw,
+                            _wrapped(yaw + angle), yaw, year,
+                        )
+                        for label in ((PARKED,) if entry.parked else self.controllers)
+                    ]  # fmt: skip
+        return found
+
+    def _bins(self, entry):
+        """Return the Bins of an entry; probabilities of single winds are those of the winds about them."""
+        climate, turbine = self.climate, self.turbine
+        low, high, rated = turbine.cut_in_wind_speed, turbine.cut_out_wind_speed, turbine.rated_wind_speed
+        if entry.speeds in ("extreme_50", "extreme_1"):
+            wind = climate.extreme(50 if entry.speeds == "extreme_50" else 1)[0]
+            return [Bin(round(wind * (HOUR_FACTOR if self.hours >= 1.0 else 1.0), 3), None, 0.0)]
+        if entry.speeds == "bins":
+            count = int(np.ceil((high - low) / climate.site.design.bin_width - 1e-9))
+            edges = np.linspace(low, high, count + 1)
+            return [self._bin(a, b, 0.5 * (a + b)) for a, b in zip(edges, edges[1:], strict=False)]
+        if entry.speeds == "idle":
+            bins = [self._bin(0.0, low), self._bin(high, high + IDLE_WIDTH)]
+            return [*bins, self._bin(high + IDLE_WIDTH, np.inf)]
+        speeds = {
+            "rated": (rated - RATED_STEP, rated, rated + RATED_STEP),
+            "rated_out": (rated - RATED_STEP, rated + RATED_STEP, high),
+            "range": (low, rated, high),
+        }[entry.speeds]
+        edges = [low, *(0.5 * (a + b) for a, b in zip(speeds, speeds[1:], strict=False)), high]
+        shares = np.diff(climate.below(np.array(edges)))
+        shares /= shares.sum()
+        return [Bin(round(float(v), 3), None, float(p)) for v, p in zip(speeds, shares, strict=True)]
+
+    def _bin(self, low, high, speed=None):
+        """Return the Bin between two winds; speed None: the mean wind in it."""
+        below = [float(self.climate.below(low)), 1.0 if high == np.inf else float(self.climate.below(high))]
+        probability = below[1] - below[0]
+        if speed is None:
+            quantiles = below[0] + probability * (np.arange(200) + 0.5) / 200
+            speed = float(np.mean(self.climate.wind_at(quantiles)))
+        return Bin(round(float(speed), 3), (float(low), float(high)), probability)
+
+    def _seas(self, entry, speed):
+        """Return [(Hs, Tp, probability)] of a wind."""
+        if entry.sea == "scatter":
+            seas = self.climate.seas(speed)
+        elif entry.sea in ("extreme_50", "extreme_1"):
+            seas = [(*self.climate.extreme(50 if entry.sea == "extreme_50" else 1)[1:3], 1.0)]
+        else:
+            expected = entry.sea == "normal"
+            seas = [(*(self.climate.expected_sea if expected else self.climate.severe_sea)(speed), 1.0)]
+        return [(round(float(Hs), 3), round(float(Tp), 3), share) for Hs, Tp, share in seas]
+
+    def _misalignments(self, entry):
+        """Return [(misalignment, probability)] of an entry."""
+        site = self.climate.site
+        if entry.misalignments == "site":
+            return [(each.misalignment, each.probability) for each in site.direction]
+        angles = entry.misalignments
+        if angles == "extreme":
+            angles = site.design.extreme_misalignments
+        return [(angle, 1.0 / len(angles)) for angle in angles]
+
+    def _hours_per_year(self, entry, length):
+        """Return the hours per year of all runs of an entry; of extreme conditions none."""
+        design = self.climate.site.design
+        if entry.events is not None:
+            return design.events.get(entry.events, 0.0) * length / HOUR
+        if entry.speeds == "idle":
+            return YEAR
+        if entry.speeds != "bins" or entry.sea not in ("scatter", "normal") or entry.wind != "ntm":
+            return 0.0
+        return YEAR * ((1.0 - design.availability) if entry.parked else design.availability)
+
+    def _name(self, entry, speed, variant, fault, yaw, angle, Hs, Tp):
+        """Return the name of a condition: plain, so that it is the name of a file."""
+        parts = [f"dlc{entry.runs_of or entry.dlc}", f"u{speed:g}"]
+        for key, value in variant.items():
+            parts.append(str(value) if isinstance(value, str) else f"{key}{value:+g}")
+        if fault is not None:
+            texts = [
+                str(fault["kind"]),
+                *(str(fault[key]) for key in ("towards", "field", "line") if key in fault),
+            ]
+            parts.append("-".join(texts))
+        parts += [f"h{Hs:g}", f"t{Tp:g}"]
+        parts += [f"{word}{value:+g}" for word, value in (("yaw", yaw), ("mis", angle)) if value]
+        return "_".join(parts).replace("+", "p").replace(" ", "_")
+
+    def _case(self, entry, name, speed, variant, fault, yaw, angle, sea, order):
+        """Return the Case of a condition; order: number of the seed, which shifts the azimuth of an event."""
+        site = self.climate.site
+        start = site.design.transient
+        third = 2.0 * pi / 3.0 / self.turbine.rated_rotor_speed
+        late = round(third * order / len(self.seeds) / CONTROL_DT) * CONTROL_DT
+        Hs, Tp = sea
+        heading = _wrapped(yaw + angle)
+        options = {"fidelity": self.fidelity}
+        if site.shear_exponent is not None:
+            options["shear_exponent"] = site.shear_exponent
+        if entry.individual:
+            options["pitch"] = "individual"
+        if current := self._current(entry, heading):
+            options["current"] = current
+        event = None
+        if fault is not None:
+            keys = {key: value for key, value in fault.items() if key != "after"}
+            event = Fault(**keys, time=round(start + fault["after"] + late, 6))
+        return Case(
+            name,
+            self._wind(entry, speed, variant, yaw, None if entry.at is None else start + entry.at + late),
+            {"kind": "jonswap", "Hs": Hs, "Tp": Tp, "heading": heading},
+            self.platform,
+            options,
+            fault=event,
+            parked=entry.parked,
+            trip=None,
+            protection=None if entry.parked else "turbine",
+            sensors=self.sensors,
+        )
+
+    def _wind(self, entry, speed, variant, yaw, start):
+        """Return the wind of build_scene for an entry at a mean speed."""
+        about = self.climate.site.wind
+        if entry.wind == "nwp":
+            return {"kind": "steady", "speed": speed, "direction": yaw, **variant}
+        if entry.wind in GUSTS:
+            keys = {"kind": entry.wind, "speed": speed, "start": round(start, 6), **variant}
+            keys |= {} if entry.wind == "ecd" else {"class": about.turbulence_class}
+            return keys | ({"turbine_class": about.turbine_class} if entry.wind == "eog" else {})
+        if self.full_field:
+            diameter = 2.0 * self.turbine.rotor.tip_radius
+            points = int(np.clip(np.ceil(1.2 * diameter / CELL) + 1, *POINTS))
+            cell = 1.2 * diameter / (points - 1)
+            return {
+                "kind": "mann", "model": entry.wind, "speed": speed, "class": about.turbulence_class,
+                "turbine_class": about.turbine_class, "direction": yaw, "points": points,
+                "dt": round(float(np.clip(cell / speed, *BOX_STEP)), 2), **variant,
+            }  # fmt: skip
+        keys = {"kind": entry.wind, "speed": speed, "direction": yaw, **variant}
+        if entry.wind == "ewm":
+            return keys | {"turbulent": True, "recurrence": 50 if entry.speeds == "extreme_50" else 1}
+        keys["class"] = about.turbulence_class
+        return keys | ({"turbine_class": about.turbine_class} if entry.wind == "etm" else {})
+
+    def _current(self, entry, heading):
+        """Return the current of an entry as an option of build_scene, along the waves; {} without one."""
+        site = self.climate.site
+        speed = 0.0 if site.current is None else site.current.speed
+        if entry.sea in ("extreme_50", "extreme_1"):
+            speed = self.climate.extreme(50 if entry.sea == "extreme_50" else 1)[3]
+        if speed == 0.0:
+            return {}
+        exponent = {} if site.current is None else {"exponent": site.current.exponent}
+        return {"speed": speed, "heading": heading, **exponent}
+
+
+def _wrapped(angle):
+    """Return an angle (deg) in (-180, 180]."""
+    return 180.0 - (180.0 - angle) % 360.0
+
+
+def matched(matrix, controllers):
+    """Return the LoadCases of a Matrix with the runs of parked turbines repeated for each controller.
+
+    A parked turbine has one run, which belongs in the table of every controller.
+    """
+    return [
+        replace(case, controller=label) if case.controller == PARKED else case
+        for label in controllers
+        for case in matrix.cases
+        if case.controller in (label, PARKED)
+    ]
