@@ -43,7 +43,7 @@ def new_box(spec, platform, seed, options):
 
 
 def box_path(spec, platform, seed, options, folder):
-    """Return the path of the file in which cached_box keeps a generated box, named after what it depends on."""
+    """Return the path of the file in which cached_box keeps a generated box: a hash of its arguments."""
     text = json.dumps([FORMAT, spec, _arguments(platform, seed, options)], sort_keys=True)
     return folder / f"{hashlib.sha256(text.encode()).hexdigest()[:24]}.npz"
 

@@ -22,7 +22,7 @@ from fowt_env.descriptions.platform import read_platform, turbine_of
 from fowt_env.descriptions.records import NonNegative, Positive, Record, bounded, checked_record, validate
 from fowt_env.errors import InputError, unknown
 from fowt_env.scene.options import FIDELITIES
-from fowt_env.training.evaluation.cases import WIND_KINDS, Case, check_sensors
+from fowt_env.training.evaluation.cases import TRIP, WIND_KINDS, Case, check_sensors
 from fowt_env.training.evaluation.run_case import CONTROL_DT, PARKED
 from fowt_env.training.loads.records import ANALYSES, CHARACTERISTICS, HOUR, SAFETY_CLASSES, LoadCase
 from fowt_env.training.loads.site import HOUR_FACTOR, YEAR, Climate, climate_of, read_site
@@ -387,8 +387,9 @@ class _Settings:
             options,
             fault=event,
             parked=entry.parked,
-            trip=None,
-            protection=None if entry.parked else "turbine",
+            # without a fault the overspeed trip alone: another would end the production that is studied
+            trip=TRIP if event is None else None,
+            protection=None if event is None or entry.parked else "turbine",
             sensors=self.sensors,
         )
 

@@ -2,7 +2,7 @@
 
     manifest.json                            settings: versions, sources, site, cases, controllers
     runs/<controller>/<name>_seed<n>.zip     one finished run (records.py)
-    boxes/                                   boxes of wind of the runs that are left, removed when they are done
+    boxes/                                   boxes of wind of the runs that are left, then removed
 
 Runs in the same box of wind follow each other, and processes on one machine share its file. Time series are
 reduced to statistics where they are made.
@@ -68,10 +68,12 @@ def simulated(task, here=None):
     began = time.monotonic()
     load = task.case
     run = Run(
-        load.controller, task.controller, _with_box(load, task.boxes), load.seed, load.duration, load.skip, {},
-        None, task.time_limit,
+        load.controller, task.controller, _with_box(load, task.boxes), load.seed, load.duration, load.skip,
+        {}, None, task.time_limit,
     )  # fmt: skip
-    row, _ = scored(run, lambda frame, case, nominal, skip: {"statistics": run_statistics(frame, nominal, skip)})
+    row, _ = scored(
+        run, lambda frame, case, nominal, skip: {"statistics": run_statistics(frame, nominal, skip)}
+    )
     keys = ("status", "reason", "events", "warning")
     finished = FinishedRun(
         *load.key, *(row[key] for key in keys[:2]), row.get("stopped_[s]", float("nan")),
@@ -240,7 +242,9 @@ def _prepared(folder, matrix, controllers, about, retry_failed):
         if file.exists():
             finished = read_run(file)
             if finished.key != key:
-                raise InputError(f"{str(file)!r} contains the run {', '.join(map(str, finished.key))}: remove it")
+                raise InputError(
+                    f"{str(file)!r} contains the run {', '.join(map(str, finished.key))}: remove it"
+                )
             if not (retry_failed and finished.status == FAILED):
                 done[key] = finished.status
     write_json(settings, path)
@@ -255,9 +259,7 @@ def _settings(matrix, controllers, about):
         load.name: described(load.case) | {"duration": load.duration, "skip": load.skip} for load in runs
     }
     used = {load.controller for load in runs}
-    codes = {
-        label: provenance.controller_code(each) for label, each in controllers.items() if label in used
-    }
+    codes = {label: provenance.controller_code(each) for label, each in controllers.items() if label in used}
     settings = {
         "format": FORMAT,
         "fowt_env": fowt_env.__version__,
@@ -309,7 +311,9 @@ def _compare(folder, old, new):
         raise _refused(folder, f"was made with {gap[0]}, not {gap[1]}")
     for key in sorted({*old["about"], *new["about"]}):
         if old["about"].get(key) != new["about"].get(key):
-            raise _refused(folder, f"was made with {key} {old['about'].get(key)}, not {new['about'].get(key)}")
+            raise _refused(
+                folder, f"was made with {key} {old['about'].get(key)}, not {new['about'].get(key)}"
+            )
     for name, case in new["cases"].items():
         before = old["cases"].get(name, case)
         for key in sorted({*before, *case}):
@@ -322,8 +326,8 @@ def _compare(folder, old, new):
         if old["controllers"].get(label, code) != code:
             runs = run_path(folder, (label, "x", 0)).parent
             raise InputError(
-                f"load table {str(folder)!r}: controller {label!r} or its code has changed since its runs there;"
-                f" remove {str(runs)!r} to run them again, or choose another folder"
+                f"load table {str(folder)!r}: controller {label!r} or its code has changed since its runs"
+                f" there; remove {str(runs)!r} to run them again, or choose another folder"
             )
 
 
@@ -346,11 +350,11 @@ def finished_runs(matrix, folder):
 
 
 def expected_seconds(matrix, controllers, jobs=1):
-    """Return (s of wall clock that a Matrix takes, {label: simulated s per s}, s per box of wind), measured.
+    """Return (s of wall clock of a Matrix, {label: simulated s per s}, s per box of wind), measured.
 
-    A run of SAMPLE s of each controller and of the parked turbine is timed, with its statistics, after a first
-    run that loads or compiles the kernels; and a box of wind of BOX_SAMPLE s, from which the time of the
-    others follows in proportion to their points.
+    A run of SAMPLE s of each controller and of the parked turbine is timed, with its statistics, after a
+    first run that loads or compiles the kernels; and a box of wind of BOX_SAMPLE s, from which the time of
+    the others follows in proportion to their points.
     """
     runs = list(matrix.runs.values())
     rates, total = {}, 0.0
@@ -369,7 +373,8 @@ def expected_seconds(matrix, controllers, jobs=1):
         box = new_box(example.case.wind, example.case.platform, example.seed, options)
         per_point = (time.perf_counter() - began) / box.velocity.size
         points = [
-            load.duration / load.case.wind["dt"] * load.case.wind["points"] ** 2 * 3 for load in boxes.values()
+            load.duration / load.case.wind["dt"] * load.case.wind["points"] ** 2 * 3
+            for load in boxes.values()
         ]
         per_box = per_point * float(np.mean(points)) * np.sqrt(2.0)  # lengths are powers of two
         total += per_box * len(boxes)
