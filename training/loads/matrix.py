@@ -6,7 +6,7 @@ availability, events by their number per year.
 """
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from math import pi
 from pathlib import Path
@@ -432,16 +432,3 @@ class _Settings:
 def _wrapped(angle):
     """Return an angle (deg) in (-180, 180]."""
     return 180.0 - (180.0 - angle) % 360.0
-
-
-def matched(matrix, controllers):
-    """Return the LoadCases of a Matrix with the runs of parked turbines repeated for each controller.
-
-    A parked turbine has one run, which belongs in the table of every controller.
-    """
-    return [
-        replace(case, controller=label) if case.controller == PARKED else case
-        for label in controllers
-        for case in matrix.cases
-        if case.controller in (label, PARKED)
-    ]

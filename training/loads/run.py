@@ -68,7 +68,7 @@ def simulated(task, here=None):
     began = time.monotonic()
     load = task.case
     run = Run(
-        load.controller, task.controller, _with_box(load, task.boxes), load.seed, load.duration, load.skip,
+        load.controller, task.controller, with_box(load, task.boxes), load.seed, load.duration, load.skip,
         {}, None, task.time_limit,
     )  # fmt: skip
     row, _ = scored(
@@ -87,7 +87,7 @@ def _weather(load):
     return {"duration": load.duration, **load.case.options}
 
 
-def _with_box(load, folder):
+def with_box(load, folder):
     """Return the Case of a LoadCase with its box of wind, made once by all processes that share a folder."""
     case = load.case
     options = _weather(load)
@@ -386,7 +386,7 @@ def _timed(load, controller):
     fault = load.case.fault
     early = None if fault is None else fault.model_copy(update={"time": 0.5 * SAMPLE})
     short = replace(load, case=replace(load.case, fault=early), duration=SAMPLE, skip=0.1 * SAMPLE)
-    task = Task(replace(short, case=_with_box(short, None)), controller, None, TIME_LIMIT)
+    task = Task(replace(short, case=with_box(short, None)), controller, None, TIME_LIMIT)
     for _ in range(2):
         began = time.perf_counter()
         simulated(task)
