@@ -76,6 +76,7 @@ def loads_command(
     from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.loads.matrix import expanded
     from fowt_env.training.loads.run import check_controllers, expected_seconds, run_matrix
+    from fowt_env.training.loads.site import read_site
 
     output(plot_site, "--plot-site")
     folder = Path(out_folder)
@@ -107,9 +108,7 @@ def loads_command(
     _print_expected(matrix, seconds, rates, per_box, jobs)
     if dry_run:
         return
-    about = {
-        "site": _site_text(site), "hours": hours, "wind": wind, "fidelity": fidelity, "sensors": sensors,
-    }  # fmt: skip
+    about = {"site": read_site(site).model_dump(mode="json")}
     finished = 0
     with progress_bar("running") as update:
 
@@ -142,13 +141,6 @@ def _imported(deck, folder):
         err.print(f"[yellow]deck: {escape(str(contradiction))}: {escape(str(consequence))}[/yellow]")
     note(f"imported {deck} into {folder}; what differs from the deck is in report.md there")
     return str(folder / "platform.toml")
-
-
-def _site_text(site):
-    """Return what identifies a site in the manifest: its content, without the place of a file."""
-    from fowt_env.training.loads.site import read_site
-
-    return read_site(site).model_dump(mode="json")
 
 
 def _plot_site(platform, site, path):

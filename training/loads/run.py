@@ -149,7 +149,7 @@ def run_matrix(
     """Run what is not finished of a Matrix in a folder, and return Counter of the statuses of its runs.
 
     controllers   {label: name or object} with the labels of the matrix
-    about         further settings that may not change within a folder, as plain values
+    about         what else is to stand in the manifest, as plain values: the site
     jobs, engine, address   as in training.evaluation.evaluate
     time_limit    s of wall clock after which a run fails; None: no limit
     retry_failed  whether failed runs are repeated
@@ -309,11 +309,6 @@ def _compare(folder, old, new):
                            f"was made by fowt_env {old[key]}, not {new[key]}")  # fmt: skip
     if gap := provenance.version_gap(old["versions"], new["versions"]):
         raise _refused(folder, f"was made with {gap[0]}, not {gap[1]}")
-    for key in sorted({*old["about"], *new["about"]}):
-        if old["about"].get(key) != new["about"].get(key):
-            raise _refused(
-                folder, f"was made with {key} {old['about'].get(key)}, not {new['about'].get(key)}"
-            )
     for name, case in new["cases"].items():
         before = old["cases"].get(name, case)
         for key in sorted({*before, *case}):

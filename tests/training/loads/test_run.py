@@ -95,9 +95,11 @@ def test_a_folder_of_other_settings_is_refused(table, change, message):
         run_matrix(quick("pi", **change), {"pi": "pi"}, table[0])
 
 
-def test_a_folder_of_another_site_or_other_sources_is_refused(table, monkeypatch):
-    with pytest.raises(InputError, match="was made with site None, not mine"):
-        run_matrix(quick("pi"), {"pi": "pi"}, table[0], about={"site": "mine"})
+def test_a_folder_of_other_sources_or_another_platform_is_refused(table, monkeypatch):
+    monkeypatch.setattr(run, "_digest", lambda platform: "other")
+    with pytest.raises(InputError, match="was made with another version of the platform file"):
+        run_matrix(quick("pi"), {"pi": "pi"}, table[0])
+    monkeypatch.undo()
     monkeypatch.setattr(run.provenance, "plant_code", lambda start: "other")
     with pytest.raises(InputError, match="was made with another version of the sources"):
         run_matrix(quick("pi"), {"pi": "pi"}, table[0])
