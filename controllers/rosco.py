@@ -232,8 +232,8 @@ class Rosco(BladedCalls):
             for key in ("SU_Mode", "SU_StartTime", "SU_RotorSpeedThresh", *STARTS):
                 if key not in self.settings.values:
                     raise InputError(
-                        f"faults: start_up: DISCON.IN {str(self.settings.path)!r} has no {key}: must be a file"
-                        " of ROSCO 2.10 or later, or by = 'supervisor'"
+                        f"faults: start_up: DISCON.IN {str(self.settings.path)!r} has no {key}: must be a"
+                        " file of ROSCO 2.10 or later, or by = 'supervisor'"
                     )
 
     def prepare(self, scene):
@@ -248,7 +248,8 @@ class Rosco(BladedCalls):
         turbine, density = scene.turbine, scene.platform.environment.air_density
         self._turbine = turbine
         if isinstance(self.settings, Discon):
-            text, table = self.settings.texts(self.changes | self._start_up, lambda: rotor_table(turbine, density))
+            changes = self.changes | self._start_up
+            text, table = self.settings.texts(changes, lambda: rotor_table(turbine, density))
         else:
             computed = rotor_table(turbine, density)
             values = deck(with_gains(scene), density, computed, self.settings)

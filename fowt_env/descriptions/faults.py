@@ -48,7 +48,8 @@ KINDS = tuple(FAULTS)
 BLADE_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "blades" in fault.keys)
 SENSOR_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "field" in fault.keys)
 PLATFORM_FAULTS = ("line_loss", "flooded_compartment")
-NEEDED = ("towards", "offset", "field", "value", "line", "mass", "point")  # required by the kinds of fault that have these keys
+# required by the kinds of fault that have these keys
+NEEDED = ("towards", "offset", "field", "value", "line", "mass", "point")
 Blade = Annotated[int, Field(ge=1, le=3, strict=True)]
 
 

@@ -303,7 +303,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def is_stopping(self) -> bool:
-        """Return whether a trip or a fault stops the turbine, or it starts up, so that actions are ignored."""
+        """Return whether the turbine is being stopped or started, so that actions are ignored."""
         if not self.is_protected:
             return False
         watch = self._episode.link.watch

@@ -27,6 +27,7 @@ ROUNDING = 1e-9  # s, tolerance in comparisons of times
 # pitch towards fine; the rotor has the speed at which the law, once reset, takes over; the law commands, with
 # a torque of at most the torque curve of fine pitch
 PRODUCTION, PARKED, RUN_UP, READY, LOADING = 0, 1, 2, 3, 4
+LONGEST_LOADING = 60.0  # s: a load stage in ROSCO's example of a start-up
 
 
 class Trip(IntEnum):
@@ -100,8 +101,9 @@ class Watch(IntEnum):
     TARGET = 9  # rad, of each blade: pitch command of a stop or a start-up
 
 
-N_WATCH = Watch.TARGET + BLADES + 1
-START = N_WATCH - 1  # stage of the start-up
+# further entries: stage of the start-up, and the time (s) of its stage READY; infinite: not yet
+START, CONNECTED = Watch.TARGET + BLADES, Watch.TARGET + BLADES + 1
+N_WATCH = CONNECTED + 1
 
 
 @by_reference
@@ -127,6 +129,7 @@ def new_watch(guard):
     """Return the initial InterfaceData.watch of a run, with neither trip nor stop."""
     watch = np.zeros(N_WATCH)
     watch[START] = PRODUCTION if isinf(guard.start) else PARKED
+    watch[CONNECTED] = inf
     watch[Watch.TRIPPED_AT] = inf
     watch[Watch.STOP] = Stop.NONE
     watch[Watch.SINCE : Watch.SINCE + len(Trip)] = inf
@@ -270,12 +273,13 @@ def watch_turbine(t, x, model, guard, link):
 def watch_start(t, x, model, guard, measurement, watch):
     """Advance the stage of a start-up at a control instant.
 
-    It ends at the speed of region 3, or once the blades are at fine pitch, where the torque law follows the
-    rotor speed.
+    It ends at the speed of region 3, once the blades are at fine pitch, where the torque law follows the
+    rotor speed, or LONGEST_LOADING after the connection, for controllers that hold another speed.
     """
     if watch[START] == LOADING:
-        fast = measurement[Measure.GENERATOR_SPEED] >= guard.curve.region3_start_speed
-        if fast or measurement[Measure.BLADE_PITCH] < guard.curve.region3_min_pitch:
+        done = measurement[Measure.GENERATOR_SPEED] >= guard.curve.region3_start_speed
+        done = done or t - watch[CONNECTED] >= LONGEST_LOADING - ROUNDING
+        if done or measurement[Measure.BLADE_PITCH] < guard.curve.region3_min_pitch:
             watch[START] = PRODUCTION
     elif watch[START] < RUN_UP:
         for blade in range(BLADES):
@@ -285,6 +289,7 @@ def watch_start(t, x, model, guard, measurement, watch):
             watch[START] = RUN_UP
     elif x[State.ROTOR_SPEED] >= guard.connect_speed:
         watch[START] = READY  # until LOADING, when the controller has been reset
+        watch[CONNECTED] = min(watch[CONNECTED], t)
 
 
 @kernel

@@ -52,8 +52,8 @@ def rollout(handle, x, u, law, parameters, memory, linked, schedule, first, end,
     linked      Handle of the run's Interface and InterfaceData
     out         (k, n_channels) output rows, SI
     Returns (status, step reached, rows written). x (n_state,), u, memory and the InterfaceData are updated.
-    While the guard stops or starts the turbine, the law is not called. With schedule.external, begin_command has begun
-    the period of `first`, and no other control instant may lie before end.
+    While the guard stops or starts the turbine, the law is not called. With schedule.external, begin_command
+    has begun the period of `first`, and no other control instant may lie before end.
     """
     model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
     dt, rows = schedule.dt, 0

@@ -141,8 +141,8 @@ def _flood(scene, fault):
     if not -scene.platform.environment.water_depth <= z <= base:
         depth = scene.platform.environment.water_depth
         raise InputError(
-            f"{where}: point = {list(fault.point)}: z must be in [{-depth:g}, {base:g}] m, from the sea bed to"
-            " the base of the tower"
+            f"{where}: point = {list(fault.point)}: z must be in [{-depth:g}, {base:g}] m, from the sea bed"
+            " to the base of the tower"
         )
     if scene.model.rigid_body.plane is not None and y != 0.0:
         raise InputError(f"{where}: point = {list(fault.point)}: y must be 0 in a planar scene")

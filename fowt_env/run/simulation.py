@@ -240,10 +240,10 @@ def simulate(
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
-    initial     "trim" (None): the steady state in the mean wind; "zero": platform and tower at zero; "parked":
-                the steady state with the rotor at rest and feathered blades (None with a start_up among the
-                faults); or a mapping of absolute values of channels, {"PtfmPitch": 5.0}, at the trim, or at
-                another of these with {"start": "zero", ...}
+    initial     "trim" (None): the steady state in the mean wind; "zero": platform and tower at zero;
+                "parked": the steady state with the rotor at rest and feathered blades (None with a start_up
+                among the faults); or a mapping of absolute values of channels, {"PtfmPitch": 5.0}, at the
+                trim, or at another of these with {"start": "zero", ...}
     progress    True shows a bar; a callable is called with the fraction done
     protection  trips by overspeed, overpower, tower-top acceleration and pitch deviation: "turbine" for those
                 of the turbine file, a mapping of its [protection] keys that override individual entries
@@ -276,7 +276,8 @@ def simulate(
     attrs["torque_limited"]: time (s) for which the generator torque differed from the command.
     attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: name of
     that trip, such as "overspeed"; attrs["stop"]: "normal" or "emergency" if a trip or a fault was stopping
-    the turbine at the end, else None; attrs["ratings"]: rated rotor speed, overspeed, rated power and rated
+    the turbine at the end, else None; attrs["connected"]: time (s) at which a start-up connected the
+    generator, if it did; attrs["ratings"]: rated rotor speed, overspeed, rated power and rated
     wind speed of the turbine (descriptions.ratings), marked in plots.
 
     Warns (PlantWarning) once of commands implausible in N m and rad; and at the end of a run with events that
