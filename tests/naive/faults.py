@@ -52,9 +52,9 @@ class Overridden:
 class Started:
     """A controller in a start-up, read through exact sensors, from a parked turbine.
 
-    feathered, fine: rad; rate: deg/s; connect: rad/s of the rotor; torque_limit(speed, pitch): N m while the
-    rotor is slow, over generator speed (rad/s) and blade pitch; fast: rad/s of the generator, above which, as
-    below the blade pitch `flat`, the start-up is over; longest: s, as after this time.
+    limits: (feathered, fine: rad, rate: deg/s, connect: rad/s of the rotor, fast: rad/s of the generator,
+    above which, as below the blade pitch flat, rad, and `longest` (s) after the connection, it is over);
+    curve(generator speed, rad/s): N m, the most until then.
     """
 
     def __init__(self, inner, time, limits, curve, control_dt, longest=60.0):
@@ -62,7 +62,8 @@ class Started:
         self.feathered, self.fine, rate, self.connect, self.fast, self.flat = limits
         self.step = radians(rate) * control_dt
         self.target, self.connected, self.loaded = self.feathered, None, False
-        self.information = (*inner.information, "rotor_speed", "blade_pitch", "generator_speed")
+        read = ("rotor_speed", "blade_pitch", "generator_speed", "generator_torque")
+        self.information = (*inner.information, *read)
 
     def prepare(self, scene):
         self.inner.prepare(scene)
@@ -77,10 +78,12 @@ class Started:
             if running_up and m.rotor_speed >= self.connect:
                 self.connected = m.time
                 self.inner.reset(m)
+                self.inner.command[1] = self.target
             elif m.time >= self.time - 1e-9:
                 self.target = max(self.target - self.step, self.fine)
         if self.connected is None:
             return 0.0, self.target
+        self.inner.command[0] = m.generator_torque  # in force, below the command
         torque, pitch = self.inner.act(m)
         if self.connected < m.time:
             done = m.generator_speed >= self.fast or m.blade_pitch < self.flat

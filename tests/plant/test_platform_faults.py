@@ -1,4 +1,4 @@
-"""Mooring lines that break and compartments that are flooded, against platforms that have been so from the start."""
+"""Mooring lines that break and compartments that are flooded, against platforms built so."""
 
 import numpy as np
 import pandas as pd
