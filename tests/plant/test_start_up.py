@@ -57,10 +57,12 @@ def test_the_stages_of_a_start(scene):
     np.testing.assert_allclose(np.diff(pitching[PITCH]) / DT, -1.0, rtol=1e-4)  # start_rate
     assert not frame.loc[time < connected - 1e-9, TORQUE].any()
     assert pitching[SPEED].max() < CONNECT <= after[SPEED].iloc[0]
-    slow = after[after[SPEED] < 11.9]
+    slow = after[(after[SPEED] < 11.9) & (after[TIME] < connected + 60.0 - 1e-9)]
     curve = build_torque_curve(scene.turbine.torque_law)
     allowed = [generator_torque(v * 97.0 * np.pi / 30.0, 0.0, curve) * 1e-3 for v in slow[SPEED]]
     assert (slow[TORQUE] <= np.array(allowed) + 1e-9).all() and slow["GenTqLim_[-]"].any()
+    loaded = after[(after[TIME] > connected + 62.0) & (after[SPEED] < 11.8)]
+    assert loaded[TORQUE].min() > 43.0  # in wind above rated, where a rotor at 10 rpm would have 25 kN m
     assert frame[SPEED].max() < 1.1 * 12.1 and frame.attrs["stop"] is None
     assert frame[time > 170.0][SPEED].mean() == pytest.approx(12.1, abs=0.2)
 

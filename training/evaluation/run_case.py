@@ -93,6 +93,8 @@ def scored(run, measure=None):
         if case.displaced is not None:
             point = trim(scene)
             initial = {name: point[name] + change for name, change in case.displaced.items()}
+        elif initial is None and case.parked and _is_operable(scene):
+            initial = "parked"  # its steady state would be one of production
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlantWarning)  # reported in the row's events and warning
             frame = fowt_env.simulate(
@@ -124,6 +126,11 @@ def scored(run, measure=None):
         raise error  # wrong settings of the run
     frame, stopped = _end(error)
     return _row(run, FAILED, frame) | {"reason": reason_of(error), "stopped_[s]": stopped}, frame
+
+
+def _is_operable(scene):
+    """Return whether the turbine could operate in the mean wind of a scene."""
+    return scene.wind_speed is not None and 0.0 < scene.wind_speed <= scene.turbine.cut_out_wind_speed
 
 
 def faults_of(case):
