@@ -146,18 +146,21 @@ class _Tail:
         self.count = self.weights.sum(axis=1)
         self.rate = self.count / (draws @ condition.hours)  # per hour
 
-    def spread(self, shape):
-        """Return a^c (k,) in heights of the threshold: the maximum likelihood estimate for c (k,)."""
-        excess = self.height[None, :] ** shape[:, None] - 1.0
-        total = np.sum(self.weights * excess, axis=1)
-        return np.where(total > 0.0, total / np.maximum(self.count, 1.0), 1e-12)
+        # mean of height^c - 1 for each c: at the best a it is (a / threshold)^c
+        powers = self.height[:, None] ** SHAPES - 1.0
+        self.spreads = np.maximum(self.weights @ powers / np.maximum(self.count, 1.0)[:, None], 1e-12)
 
     def likelihood(self):
         """Return the logarithm of the likelihood (k, SHAPES), at the best a for each exponent."""
-        n = self.count[:, None]
-        mean = self.weights @ (self.height[:, None] ** SHAPES - 1.0) / np.maximum(n, 1.0)
         logs = (self.weights @ np.log(self.height))[:, None]
-        return n * (np.log(SHAPES) - np.log(np.maximum(mean, 1e-300))) + (SHAPES - 1.0) * logs
+        return self.count[:, None] * np.log(SHAPES / self.spreads) + (SHAPES - 1.0) * logs
+
+    def spread(self, shape):
+        """Return (a / threshold)^c (k,) for exponents c (k,); its logarithm is linear between SHAPES."""
+        at = np.clip(np.log(shape / SHAPES[0]) / log(SHAPES[1] / SHAPES[0]), 0.0, len(SHAPES) - 1.001)
+        left, rows = at.astype(int), np.arange(len(at))
+        logs = np.log(self.spreads)
+        return np.exp(logs[rows, left] + (at - left) * (logs[rows, left + 1] - logs[rows, left]))
 
 
 def _best_shape(likelihood):
@@ -249,6 +252,14 @@ def _curve(value, largest, parts):
     return np.stack([loads[kept], rates[kept]], axis=1)
 
 
+def gumbel_fit(values):
+    """Return (mode, scale) of a Gumbel distribution by L-moments of at least two values."""
+    ordered, n = np.sort(values), len(values)
+    spread = np.sum((2.0 * np.arange(n) / (n - 1) - 1.0) * ordered) / n
+    scale = max(float(spread) / log(2.0), 1e-300)
+    return float(ordered.mean()) - EULER * scale, scale
+
+
 def block_maxima(conditions, years=YEARS):
     """Return the load of a return period from the largest values of the runs: Gumbel by L-moments.
 
@@ -257,14 +268,11 @@ def block_maxima(conditions, years=YEARS):
     """
     fits = []
     for condition in conditions:
-        ordered, n = np.sort(condition.largest), len(condition.largest)
-        if n < 2:
+        if len(condition.largest) < 2:
             return nan
-        first = ordered.mean()
-        second = np.sum((2.0 * np.arange(n) / (n - 1) - 1.0) * ordered) / n
-        scale = max(second / log(2.0), 1e-300)
+        mode, scale = gumbel_fit(condition.largest)
         # of one hour: F^(1/h) is a Gumbel distribution again
-        fits.append((condition.share, first - EULER * scale - scale * log(condition.hours.mean()), scale))
+        fits.append((condition.share, mode - scale * log(condition.hours.mean()), scale))
     share, mode, scale = np.array(fits).T
     target = 1.0 / (years * HOURS_PER_YEAR)
 
@@ -334,3 +342,70 @@ def inverse_form(response, states, years=YEARS, hours=1.0, dimensions=3, count=4
         else:
             step *= 0.5
     return best, np.asarray(states(beta * point[None, :]))[0], beta * point
+
+
+def states_of(climate):
+    """Return the Rosenblatt transformation of a Climate: (n, 2) or (n, 3) normal variables to wind, Hs, Tp.
+
+    With two variables Tp is the median of Hs and wind.
+    """
+
+    def states(normal):
+        below = norm.cdf(normal)
+        wind = climate.wind_at(below[:, 0])
+        Hs = climate.height_at(below[:, 1], wind)
+        Tp = climate.period_at(below[:, 2] if below.shape[1] > 2 else 0.5, Hs, wind)
+        return np.stack([wind, Hs, Tp], axis=1)
+
+    return states
+
+
+def form_load(runs, column, side, climate, years=YEARS):
+    """Return (load, wind, Hs) of a return period by inverse FORM over wind, Hs and the largest load in a run.
+
+    runs: of production in normal turbulence, with several Hs in each wind, the severe sea among them: the
+    largest load of a run is a Gumbel variable whose mode and scale are interpolated in Hs and wind, and
+    continued beyond the largest Hs. (nan, nan, nan) with fewer than two winds.
+    """
+    sign = 1.0 if side == "max" else -1.0
+    points = {}
+    for members in conditions_of(runs).values():
+        case = members[0][0]
+        if case.wind_speed is None or len(members) < 2:
+            continue
+        mode, scale = gumbel_fit(sign * np.array([each.value(column, side) for _, each in members]))
+        points.setdefault(case.wind_speed, []).append((case.Hs, mode, scale))
+    winds = np.array(sorted(points))
+    if len(winds) < 2:
+        return nan, nan, nan
+    tables = [np.array(sorted(points[wind])) for wind in winds]
+
+    def at_wind(number, Hs):  # (2, n) mode and scale in one wind
+        table = tables[number]
+        if len(table) == 1:
+            return np.repeat(table[0, 1:, None], len(Hs), axis=1)
+        left = np.clip(np.searchsorted(table[:, 0], Hs) - 1, 0, len(table) - 2)
+        part = np.maximum(Hs - table[left, 0], 0.0) / (table[left + 1, 0] - table[left, 0])
+        return (table[left, 1:] + part[:, None] * (table[left + 1, 1:] - table[left, 1:])).T
+
+    def response(state):
+        wind, Hs, below = state.T
+        left = np.clip(np.searchsorted(winds, wind) - 1, 0, len(winds) - 2)
+        part = np.clip((wind - winds[left]) / (winds[left + 1] - winds[left]), 0.0, 1.0)
+        values = np.array([at_wind(number, Hs) for number in range(len(winds))])  # (winds, 2, n)
+        columns = np.arange(len(wind))
+        mode, scale = (1.0 - part) * values[left, :, columns].T + part * values[left + 1, :, columns].T
+        load = mode - np.maximum(scale, 0.0) * np.log(-np.log(np.clip(below, 1e-300, 1.0 - 1e-16)))
+        # outside the bins the turbine does not produce
+        half = 0.5 * (winds[1] - winds[0])
+        return np.where((wind < winds[0] - half) | (wind > winds[-1] + half), -inf, load)
+
+    weather = states_of(climate)
+
+    def states(normal):
+        state = weather(normal[:, :2])
+        return np.column_stack([state[:, :2], norm.cdf(normal[:, 2])])
+
+    hours = float(np.mean([each.duration for _, each in runs])) / HOUR
+    load, state, _ = inverse_form(response, states, years, hours)
+    return sign * load, float(state[0]), float(state[1])

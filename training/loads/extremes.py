@@ -114,7 +114,7 @@ def _driving(conditions, column, side, sign, label, extrapolated):
             load = sign * known.value
         else:
             load = characteristic(values, rule)
-        loads.append((_factored(load, case.factor), key, rule, values, load))
+        loads.append((_factored(load, factor_of(case, column)), key, rule, values, load))
     if not loads:
         return None
     design, key, rule, values, load = max(loads, key=lambda entry: entry[0])
@@ -122,10 +122,17 @@ def _driving(conditions, column, side, sign, label, extrapolated):
     index = int(np.argmin(np.abs(values - load)))
     case, own = conditions[key][index]
     extreme = Extreme(
-        column, side, label, sign * load, sign * design, case.factor, case.dlc, case.name, case.seed,
+        column, side, label, sign * load, sign * design, factor_of(case, column),
+        case.dlc, case.name, case.seed,
         own.value(column, f"time_{side}"), sign * values.max(), rule, own.at.get(column, {}).get(side, {}),
     )  # fmt: skip
-    return extreme, _resampled(loads, conditions, sign, extrapolated.get((label, column, side)))
+    factors = {key: factor_of(members[0][0], column) for key, members in conditions.items()}
+    return extreme, _resampled(loads, factors, sign, extrapolated.get((label, column, side)))
+
+
+def factor_of(case, column):
+    """Return the partial factor of a channel in a LoadCase: that for loads of forces and moments, else 1."""
+    return case.factor if column.endswith(("_[kN]", "_[kN-m]", "_[N]", "_[N-m]")) else 1.0
 
 
 def _factored(load, factor):
@@ -133,17 +140,17 @@ def _factored(load, factor):
     return load * factor if load > 0.0 else load / factor
 
 
-def _resampled(loads, conditions, sign, extrapolation):
+def _resampled(loads, factors, sign, extrapolation):
     """Return the design loads (k,) of resampled seeds; conditions that cannot govern in any are left out."""
     least = max(
-        _factored(values.min(), conditions[key][0][0].factor)
+        _factored(values.min(), factors[key])
         for _, key, rule, values, _ in loads
         if rule != EXTRAPOLATED or len(loads) == 1
     )
     draws = drawn_seeds([len(values) for *_, values, _ in loads])
     result = None
     for _, key, rule, values, _ in loads:
-        factor = conditions[key][0][0].factor
+        factor = factors[key]
         if rule == EXTRAPOLATED:
             load = sign * extrapolation.drawn
         elif _factored(values.max(), factor) < least:

@@ -11,7 +11,6 @@ import numpy as np
 
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation.run_case import PARKED
 from fowt_env.training.loads.selection import (
     bounds,
     columns_of,
@@ -45,34 +44,22 @@ class LifetimeLoad:
     share: tuple = ()  # ((dlc, share of the damage), ...), largest first
 
 
-def with_availability(runs, availability):
-    """Return [(LoadCase, RunStatistics, hours per year)] of fatigue runs for a fraction of operating time.
+def fatigue_runs(runs):
+    """Return the runs [(LoadCase, RunStatistics)] that count in the lifetime's fatigue."""
+    return [run for run in runs if run[0].hours_per_year > 0.0 and run[0].analysis != "ultimate"]
 
-    The hours of the operating turbine are multiplied by the availability, and those that it loses are added
-    to the parked turbine's, in proportion to its hours; 1: hours as they are.
-    Raises: InputError outside (0, 1], and below 1 without a parked fatigue case.
-    """
-    check_number("availability", availability, 0.0, 1.0, low_open=True)
-    used = [(case, each) for case, each in runs if case.hours_per_year > 0.0 and case.analysis != "ultimate"]
-    parked = sum(case.hours_per_year for case, _ in used if case.controller == PARKED)
-    operating = sum(case.hours_per_year for case, _ in used) - parked
-    if availability < 1.0 and parked <= 0.0:
-        raise InputError(
-            f"availability = {availability:g}: below 1 needs fatigue cases of the parked turbine (DLC 6.4)"
-        )
-    added = 1.0 + (1.0 - availability) * operating / parked if parked else 1.0
-    factors = {True: added, False: availability}
-    return [(case, each, case.hours_per_year * factors[case.controller == PARKED]) for case, each in used]
+
+def repetitions(case, statistics, years):
+    """Return how often a run occurs in a lifetime."""
+    return years * case.hours_per_year * HOUR / statistics.duration
 
 
 def _contributions(runs, column, index, years):
     """Return {number of seeds: (seeds,) lifetime sums of count times range^m}, and {dlc: sum}."""
-    hours = {case.key: value for case, _, value in runs}
     totals, shares = {}, {}
-    for members in conditions_of([(case, each) for case, each, _ in runs]).values():
+    for members in conditions_of(runs).values():
         own = np.array([
-            years * hours[case.key] * HOUR / each.duration * each.cycles[column].sums[index]
-            for case, each in members
+            repetitions(case, each, years) * each.cycles[column].sums[index] for case, each in members
         ])  # fmt: skip
         totals[len(own)] = totals.get(len(own), 0.0) + own
         dlc = members[0][0].dlc
@@ -80,14 +67,7 @@ def _contributions(runs, column, index, years):
     return totals, shares
 
 
-def lifetime_table(
-    runs,
-    exponents=(3, 4, 10),
-    years=YEARS,
-    reference_cycles=REFERENCE_CYCLES,
-    availability=1.0,
-    baseline=None,
-):
+def lifetime_table(runs, exponents=(3, 4, 10), years=YEARS, reference_cycles=REFERENCE_CYCLES, baseline=None):
     """Return [LifetimeLoad] of every force and moment, exponent and controller of runs.
 
     value: range of the channel's unit that, repeated reference_cycles times, has the damage of the lifetime:
@@ -101,16 +81,17 @@ def lifetime_table(
     check_number("reference_cycles", reference_cycles, 0.0, low_open=True)
     labels = controllers_of(runs)
     baseline = labels[0] if baseline is None else baseline
-    own = {label: with_availability(runs_of(runs, label), availability) for label in labels}
-    if not any(own.values()):
+    own = {label: fatigue_runs(runs_of(runs, label)) for label in labels}
+    own = {label: part for label, part in own.items() if part}
+    used = [run for part in own.values() for run in part]
+    if not used:
         return []
-    used = [(case, each) for part in own.values() for case, each, _ in part]
     columns = [name for name in columns_of(used) if all(name in each.cycles for _, each in used)]
     table = []
     for column in columns:
         for exponent in exponents:
             found = {}
-            for label in labels:
+            for label in own:
                 totals, shares = _contributions(own[label], column, EXPONENTS.index(exponent), years)
                 draws = drawn_seeds(totals)
                 estimate = sum(float(each.sum()) for each in totals.values())
@@ -146,19 +127,17 @@ class Markov:
     mean_edges: np.ndarray  # (means + 1,)
 
 
-def markov_matrix(runs, column, years=YEARS, availability=1.0):
+def markov_matrix(runs, column, years=YEARS):
     """Return the Markov matrix of a channel over the lifetime of one controller's runs.
 
     Widths of the bins are those of the coarsest run: bins of others are joined, as their edges coincide.
     Raises: InputError without fatigue runs that have cycles of the channel.
     """
-    used = with_availability(runs, availability)
     used = [
-        (each.cycles[column], years * hours * HOUR / each.duration)
-        for _, each, hours in used
-        if column in each.cycles
+        (each.cycles[column], repetitions(case, each, years))
+        for case, each in fatigue_runs(runs)
+        if column in each.cycles and len(each.cycles[column].cells)
     ]
-    used = [(cycles, weight) for cycles, weight in used if len(cycles.cells)]
     if not used:
         raise InputError(f"channel {column!r}: no fatigue run has its rainflow matrix")
     width, mean_width = (max(getattr(c, name) for c, _ in used) for name in ("width", "mean_width"))
@@ -213,7 +192,7 @@ def goodman(ranges, means, ultimate):
     return ranges / (1.0 - np.abs(means) / ultimate)
 
 
-def damage(runs, column, curve, stress_per_load, ultimate=None, years=YEARS, availability=1.0):
+def damage(runs, column, curve, stress_per_load, ultimate=None, years=YEARS):
     """Return the Palmgren-Miner damage of a channel over the lifetime of one controller's runs; 1: failure.
 
     curve            SNCurve
@@ -222,7 +201,7 @@ def damage(runs, column, curve, stress_per_load, ultimate=None, years=YEARS, ava
     Computed from the Markov matrix with the middle of its bins, times the ratio of the exact sum of range^m
     to that of the matrix where the runs have the curve's exponent m, which removes most of the binning error.
     """
-    matrix = markov_matrix(runs, column, years, availability)
+    matrix = markov_matrix(runs, column, years)
     ranges = 0.5 * (matrix.range_edges[1:] + matrix.range_edges[:-1])[:, None]
     means = 0.5 * (matrix.mean_edges[1:] + matrix.mean_edges[:-1])[None, :]
     ranges, means = np.broadcast_arrays(ranges, means)
@@ -231,9 +210,11 @@ def damage(runs, column, curve, stress_per_load, ultimate=None, years=YEARS, ava
     effective = ranges if ultimate is None else goodman(ranges, means, ultimate)
     total = float(np.sum(cycles / curve.cycles(stress_per_load * effective)))
     if curve.m in EXPONENTS:
-        exact, index = 0.0, EXPONENTS.index(int(curve.m))
-        for _, each, hours in with_availability(runs, availability):
-            if column in each.cycles:
-                exact += years * hours * HOUR / each.duration * each.cycles[column].sums[index]
+        index = EXPONENTS.index(int(curve.m))
+        exact = sum(
+            repetitions(case, each, years) * each.cycles[column].sums[index]
+            for case, each in fatigue_runs(runs)
+            if column in each.cycles
+        )
         total *= exact / float(np.sum(cycles * ranges**curve.m))
     return total

@@ -6,7 +6,7 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation.bootstrap import RANDOM_SEED, interval
 from fowt_env.training.evaluation.run_case import PARKED
 
-RESAMPLES = 1000  # of seeds: the ends of a 95 % interval then vary by some 3 % of its width
+RESAMPLES = 600  # of seeds: the ends of a 95 % interval then vary by some 4 % of its width
 
 
 def controllers_of(runs):

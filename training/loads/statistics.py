@@ -456,7 +456,7 @@ def groups_of(names):
 def _simultaneous(place, columns, table, low, high):
     """Return {column: {"min" or "max": {column: value}}} at the extremes of each load of a group.
 
-    A load's companions are the other loads of its group and CONDITIONS.
+    Kept are the loads of its group, itself included, and CONDITIONS.
     """
     at = {}
     for members in groups_of(place).values():
@@ -464,7 +464,7 @@ def _simultaneous(place, columns, table, low, high):
         for name in members:
             k = place[name]
             at[columns[k]] = {
-                side: {columns[i]: float(table[i, row]) for i in kept if i != k}
+                side: {columns[i]: float(table[i, row]) for i in kept}
                 for side, row in (("min", low[k]), ("max", high[k]))
             }
     return at
@@ -531,6 +531,8 @@ def _flags(place, table, time, scene, limits):
     lines = [table[k] for name, k in place.items() if name.startswith("FAIRTEN")]
     if lines:
         add("line tension", np.max(lines, axis=0), "kN")
-        slack = min(lines, key=lambda tension: tension.min() / tension.mean())
+    holding = [tension for tension in lines if tension[-1] > 0.0]  # a line that broke is not slack
+    if holding:
+        slack = min(holding, key=lambda tension: tension.min() / tension.mean())
         add("slack line", slack / slack.mean(), "of mean", np.argmin)
     return tuple(flags)
