@@ -6,6 +6,7 @@ from typing import Annotated
 from rich.markup import escape
 from typer import Argument, Option
 
+from fowt_env.descriptions.checks import check_number, check_whole_number
 from fowt_env.errors import unknown
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import (
@@ -29,6 +30,7 @@ HOURS = "Length of a run that is not an event, h, after its transient."
 WIND = (
     "Turbulence: full-field (a box of wind for each run), or rotor-averaged (faster, uniform over the rotor)."
 )
+DECK = "OpenFAST deck (.fst) that driving runs are written for. Default: PLATFORM, if it is one."
 PLOT_SITE = "Plot of the site's climate, e.g. site.png; nothing is run."
 MOST_LOST = 10  # runs without result that are printed
 
@@ -48,6 +50,9 @@ def loads_command(
     baseline: Annotated[
         str | None, Option(help="Controller of the paired differences. Default: first.")
     ] = None,
+    years: Annotated[float, Option(help="Lifetime of the fatigue loads, years.")] = 25.0,
+    deck: Annotated[str | None, Option(help=DECK)] = None,
+    driving: Annotated[int, Option(help="Driving runs that are written for a check in OpenFAST.")] = 10,
     plot_site: Annotated[str | None, Option(help=PLOT_SITE)] = None,
     jobs: shared.JobsOption = 1,
     engine: shared.EngineOption = "processes",
@@ -69,20 +74,25 @@ def loads_command(
     fowt loads --site mine.csv --plot-site site.png  # fit a site to a table, and look at it
 
     [bold]Files written[/bold]: manifest.json (the settings), runs/CONTROLLER/CONDITION_seedN.zip (statistics
-    of each run) and the tables made of them. The same command resumes an interrupted table and adds further
-    controllers, load cases or seeds to the folder. docs/guides/load-table.md explains cases and site.
+    of each run), loads.html (the page), tables/ (CSV, and spreadsheets in the layout of IEA-22's design
+    loads), driving/ (the runs that drive the table, with their wind, sea and deck for OpenFAST). The same
+    command resumes an interrupted table and adds further controllers, load cases or seeds to the folder.
+    docs/guides/load-table.md explains cases and site, docs/guides/load-results.md the results.
     """
     from fowt_env.controllers import controller_names
     from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.loads.matrix import expanded
+    from fowt_env.training.loads.output import write_results
     from fowt_env.training.loads.run import check_controllers, expected_seconds, run_matrix
     from fowt_env.training.loads.site import read_site
 
     output(plot_site, "--plot-site")
     folder = Path(out_folder)
-    deck = platform if platform.lower().endswith(".fst") else None
-    if deck is not None:
-        platform = _imported(deck, folder / "platform")
+    check_whole_number("--driving", driving, 0)
+    check_number("--years", years, 0.0, low_open=True)
+    if platform.lower().endswith(".fst"):
+        deck = platform if deck is None else deck
+        platform = _imported(platform, folder / "platform")
     if plot_site is not None:
         _plot_site(platform, site, plot_site)
         return
@@ -130,6 +140,14 @@ def loads_command(
             fail(error, EXIT_STOPPED)
     note(f"{', '.join(f'{count} {status}' for status, count in sorted(statuses.items()))}: runs in {folder}")
     _print_lost(matrix, folder)
+    with progress_bar("tables") as update:
+        _, paths, remarks = write_results(
+            folder, matrix, named, read_site(site).name, baseline=baseline, deck=deck, driving=driving,
+            years=years, progress=update,
+        )  # fmt: skip
+    for remark in remarks:
+        note(remark)
+    wrote(*paths)
 
 
 def _imported(deck, folder):

@@ -5,6 +5,7 @@ import re
 import pytest
 from command_line import fowt
 
+from fowt_env.files.tables import read_table
 from fowt_env.training.loads.records import read_run
 from fowt_env.training.loads.site import FOLDER
 
@@ -37,9 +38,15 @@ def test_a_dry_run_prints_the_matrix_what_is_left_out_and_the_time(tmp_path, sit
 
 def test_a_table_of_two_controllers_is_run_from_end_to_end(tmp_path, site):
     folder = tmp_path / "out"
-    arguments = ("loads", "--site", site, *SHORT, "--dlc", "2.3", "--out", str(folder))
+    arguments = ("loads", "--site", site, *SHORT, "--dlc", "2.3", "--out", str(folder), "--driving", "1")
     _, errors = fowt(*arguments)
     assert "6 ok: runs in" in errors
+    ultimate = read_table(folder / "tables" / "ultimate.csv")
+    assert set(ultimate["controller"]) == {"pi", "pi_land"} and set(ultimate["dlc"]) == {2.3}
+    (driving,) = (folder / "driving").iterdir()
+    assert {path.name for path in driving.iterdir()} == {"README.md", "run.outb", "waves.Elev", "wind.wnd"}
+    assert (folder / "loads.html").stat().st_size > 1_000_000  # with plotly.js
+    assert (folder / "tables" / "oc3_hywind_DLB_directional_extreme_loads.xlsx").is_file()
     runs = sorted(folder.glob("runs/*/*.zip"))
     assert [path.parent.name for path in runs] == ["pi"] * 3 + ["pi_land"] * 3
     speeds = {read_run(path).statistics.value("GenTq_[kN-m]", "min") for path in runs}
