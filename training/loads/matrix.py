@@ -8,7 +8,7 @@ availability, events by their number per year.
 from collections import Counter
 from dataclasses import dataclass
 from itertools import product
-from math import pi
+from math import log2, pi
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -35,9 +35,10 @@ GUSTS = ("eog", "ecd", "edc", "ews")
 TURNED = (*TURBULENT, "nwp")  # kinds of wind that can blow at an angle to the rotor
 RATED_STEP = 2.0  # m/s about rated wind
 IDLE_WIDTH = 5.0  # m/s, of the bin of winds above cut-out; the last bin is open
-CELL = 10.0  # m, at most, between the points of a box of wind
-POINTS = (16, 32)  # least and most of them in each direction
-BOX_STEP = (0.2, 2.0)  # s, least and most between the slices of a box
+POINTS = 16  # of a box of wind in each direction across: 12.5 cells over the rotor
+BOX_STEP = (0.05, 5.0)  # s, least and most between the slices of a box
+MOST_SLICES = 13  # base-2 logarithm; 8192 of them take 0.7 GB while they are made
+SPARE = 2.0  # rotor diameters that a box is longer than the run
 Angles = tuple[bounded(ge=-180, le=180), ...]
 
 
@@ -255,7 +256,7 @@ class _Settings:
         design = site.design
         factor = self.file.factor[entry.factor or entry.safety]
         skip = design.transient
-        length = self.hours * HOUR if entry.length == "hours" else entry.length
+        length = self._length(entry)
         yaws = design.yaw_errors if entry.yaw_errors == "site" else entry.yaw_errors
         faults = entry.faults or (None,)
         angles = self._misalignments(entry)
@@ -279,6 +280,10 @@ class _Settings:
                         for label in ((PARKED,) if entry.parked else self.controllers)
                     ]  # fmt: skip
         return found
+
+    def _length(self, entry):
+        """Return the s of a run of an entry that are counted."""
+        return self.hours * HOUR if entry.length == "hours" else entry.length
 
     def _bins(self, entry):
         """Return the Bins of an entry; probabilities of single winds are those of the winds about them."""
@@ -404,12 +409,14 @@ class _Settings:
             return keys | ({"turbine_class": about.turbine_class} if entry.wind == "eog" else {})
         if self.full_field:
             diameter = 2.0 * self.turbine.rotor.tip_radius
-            points = int(np.clip(np.ceil(1.2 * diameter / CELL) + 1, *POINTS))
-            cell = 1.2 * diameter / (points - 1)
+            length = self._length(entry) + self.climate.site.design.transient + SPARE * diameter / speed
+            # as many slices as make cells about as long as wide; a power of two, to which a box is rounded up
+            cells = length * speed / (1.2 * diameter / (POINTS - 1))
+            step = length / 2.0 ** min(round(log2(cells)), MOST_SLICES)
             return {
                 "kind": "mann", "model": entry.wind, "speed": speed, "class": about.turbulence_class,
-                "turbine_class": about.turbine_class, "direction": yaw, "points": points,
-                "dt": round(float(np.clip(cell / speed, *BOX_STEP)), 2), **variant,
+                "turbine_class": about.turbine_class, "direction": yaw, "points": POINTS,
+                "dt": float(np.clip(np.ceil(step * 1000.0) / 1000.0, *BOX_STEP)), **variant,
             }  # fmt: skip
         keys = {"kind": entry.wind, "speed": speed, "direction": yaw, **variant}
         if entry.wind == "ewm":
