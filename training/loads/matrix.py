@@ -38,6 +38,7 @@ IDLE_WIDTH = 5.0  # m/s, of the bin of winds above cut-out; the last bin is open
 POINTS = 16  # of a box of wind in each direction across: 12.5 cells over the rotor
 BOX_STEP = (0.05, 5.0)  # s, least and most between the slices of a box
 MOST_SLICES = 13  # base-2 logarithm; 8192 of them take 0.7 GB while they are made
+RAMP = 60.0  # s over which waves grow: a sea that begins at once can trip a turbine within a minute
 SPARE = 2.0  # rotor diameters that a box is longer than the run
 Angles = tuple[bounded(ge=-180, le=180), ...]
 
@@ -387,7 +388,7 @@ class _Settings:
         return Case(
             name,
             self._wind(entry, speed, variant, yaw, None if entry.at is None else start + entry.at + late),
-            {"kind": "jonswap", "Hs": Hs, "Tp": Tp, "heading": heading},
+            {"kind": "jonswap", "Hs": Hs, "Tp": Tp, "heading": heading, "ramp": min(RAMP, 0.5 * start)},
             self.platform,
             options,
             fault=event,
