@@ -6,8 +6,8 @@ from typing import Annotated
 from rich.markup import escape
 from typer import Argument, Option
 
-from fowt_env.descriptions.checks import check_number, check_whole_number
-from fowt_env.errors import unknown
+from fowt_env.descriptions.checks import check_number, check_whole_number, parse_number
+from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import (
     EXIT_INTERRUPTED,
@@ -31,6 +31,7 @@ WIND = (
     "Turbulence: full-field (a box of wind for each run), or rotor-averaged (faster, uniform over the rotor)."
 )
 DECK = "OpenFAST deck (.fst) that driving runs are written for. Default: PLATFORM, if it is one."
+FLOOD = "Compartment that may be flooded: water in it, kg, and its centre from the platform, m; repeatable."
 PLOT_SITE = "Plot of the site's climate, e.g. site.png; nothing is run."
 MOST_LOST = 10  # runs without result that are printed
 
@@ -46,6 +47,7 @@ def loads_command(
     wind: Annotated[str, Option(help=WIND)] = "full-field",
     fidelity: Annotated[str, Option(help="Fidelity: standard, elastic or reference.")] = "standard",
     sensors: Annotated[str, Option(help="Sensors: exact, or the name of a sensor chain.")] = "standard",
+    flood: Annotated[list[str] | None, Option(metavar="MASS:X:Y:Z", help=FLOOD)] = None,
     dry_run: Annotated[bool, Option("--dry-run", help="Print the matrix and its time; run nothing.")] = False,
     baseline: Annotated[
         str | None, Option(help="Controller of the paired differences. Default: first.")
@@ -100,16 +102,9 @@ def loads_command(
     if baseline is not None and baseline not in labels:
         raise unknown("baseline among --controllers", baseline, labels)
     matrix = expanded(
-        platform,
-        site,
-        labels,
-        dlc=dlc,
-        seeds=seeds,
-        hours=hours,
-        wind=wind,
-        fidelity=fidelity,
-        sensors=sensors,
-    )
+        platform, site, labels, dlc=dlc, seeds=seeds, hours=hours, wind=wind, fidelity=fidelity,
+        sensors=sensors, compartments=[_compartment(text) for text in flood or ()],
+    )  # fmt: skip
     named = {label: label for label in labels}
     check_controllers(named, matrix)
     _print_matrix(matrix)
@@ -159,6 +154,14 @@ def _imported(deck, folder):
         err.print(f"[yellow]deck: {escape(str(contradiction))}: {escape(str(consequence))}[/yellow]")
     note(f"imported {deck} into {folder}; what differs from the deck is in report.md there")
     return str(folder / "platform.toml")
+
+
+def _compartment(text):
+    """Return {"mass", "point"} of a text MASS:X:Y:Z. Raises: InputError for another text."""
+    numbers = [parse_number(part) for part in text.split(":")]
+    if len(numbers) != 4 or None in numbers:
+        raise InputError(f"--flood {text!r}: must be MASS:X:Y:Z, in kg and m")
+    return {"mass": check_number("--flood MASS", numbers[0], 0.0, low_open=True), "point": numbers[1:]}
 
 
 def _plot_site(platform, site, path):

@@ -15,8 +15,8 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from fowt_env.descriptions.checks import check_number, parse_names
-from fowt_env.descriptions.faults import Fault
+from fowt_env.descriptions.checks import check_number, is_number, parse_names
+from fowt_env.descriptions.faults import KINDS, PLATFORM_FAULTS, Fault
 from fowt_env.descriptions.files import read_toml
 from fowt_env.descriptions.platform import read_platform, turbine_of
 from fowt_env.descriptions.records import NonNegative, Positive, Record, bounded, checked_record, validate
@@ -40,6 +40,14 @@ BOX_STEP = (0.05, 5.0)  # s, least and most between the slices of a box
 MOST_SLICES = 13  # base-2 logarithm; 8192 of them take 0.7 GB while they are made
 RAMP = 60.0  # s over which waves grow: a sea that begins at once can trip a turbine within a minute
 SPARE = 2.0  # rotor diameters that a box is longer than the run
+START, EACH = "start", "each"  # of a run; of the lines or compartments of a platform
+EXAMPLE_OF_EACH = {  # keys that are filled in from the platform or the command, to check the others
+    "line_loss": {"line": 1},
+    "flooded_compartment": {"mass": 1.0, "point": (0.0, 0.0, 0.0)},
+}
+START_UP = "start_up"
+OWN_START = 2400.0  # s of a start-up by the controller: ROSCO's takes 1700 s with the defaults of its toolbox
+FULL_PROTECTION = tuple(kind for kind in KINDS if kind not in (*PLATFORM_FAULTS, START_UP))
 Angles = tuple[bounded(ge=-180, le=180), ...]
 
 
@@ -66,7 +74,7 @@ class CaseEntry(Record):
     parked: Annotated[bool, Field(strict=True)] = False
     individual: Annotated[bool, Field(strict=True)] = False  # blades pitch on their own
     length: Positive | Literal["hours"] = "hours"  # s
-    at: NonNegative | None = None  # s after the transient, start of a gust
+    at: tuple[NonNegative, ...] = ()  # s after the transient, starts of a gust
     faults: tuple[dict[str, Any], ...] = ()
     events: Literal["start", "stop", "fault"] | None = None
     analysis: Literal[ANALYSES] | None = None
@@ -83,14 +91,17 @@ class CaseEntry(Record):
         for key in ("speeds", "sea", "analysis", "safety"):
             if getattr(self, key) is None:
                 yield f"{key} is missing: {self.dlc} needs it"
-        if self.wind in GUSTS and self.at is None:
+        if self.wind in GUSTS and not self.at:
             yield f"at is missing: the start of the {self.wind} in s after the transient"
         if self.wind in GUSTS and self.yaw_errors not in ((0.0,), "site"):
             yield f"yaw_errors: a {self.wind} blows along the rotor axis"
         for number, fault in enumerate(self.faults, 1):
-            keys = {key: value for key, value in fault.items() if key != "after"}
-            if not isinstance(fault.get("after"), int | float):
-                yield f"faults.{number}.after is missing: s after the transient"
+            keys = {key: value for key, value in fault.items() if value != EACH} | EXAMPLE_OF_EACH.get(
+                fault.get("kind"), {}
+            )
+            after = keys.pop("after", None)
+            if after != START and not is_number(after):
+                yield f"faults.{number}.after is missing: s after the transient, or {START!r}"
             for problem in validate(Fault, {**keys, "time": 0.0})[1]:
                 yield f"faults.{number}.{problem}"
 
@@ -175,6 +186,7 @@ def expanded(
     wind="full-field",
     fidelity="standard",
     sensors="standard",
+    compartments=(),
     table=TABLE,
     first_seed=1,
 ):
@@ -188,6 +200,7 @@ def expanded(
     hours        length of a run that is not an event
     wind         "full-field" or "rotor-averaged" turbulence
     fidelity     of build_scene; sensors: name of the chain
+    compartments   of the platform that may be flooded: {"mass": kg, "point": [x, y, z] in m} each
     Raises: InputError naming the key, its value and what is allowed.
     """
     file, site = read_cases(table), read_site(site)
@@ -205,13 +218,14 @@ def expanded(
     settings = _Settings(
         platform, climate_of(site, turbine), turbine, tuple(controllers),
         tuple(range(first_seed, first_seed + seeds)), hours, wind == "full-field", fidelity, sensors, file,
+        description, tuple(compartments),
     )  # fmt: skip
     cases, left_out = [], []
     for entry in entries:
-        if entry.left_out:
-            left_out.append((entry.dlc, entry.description, entry.left_out))
         if entry.wind is not None:
             cases += settings.cases(entry)
+        if reason := entry.left_out or settings.lacking(entry):
+            left_out.append((entry.dlc, entry.description, reason))
     depth = description.environment.water_depth
     remarks = []
     if site.water_depth is not None and abs(depth - site.water_depth) > 0.1 * depth:
@@ -250,6 +264,8 @@ class _Settings:
     fidelity: str
     sensors: str
     file: CasesFile
+    description: Any  # of the platform
+    compartments: tuple
 
     def cases(self, entry):
         """Return the LoadCases of a CaseEntry."""
@@ -259,18 +275,23 @@ class _Settings:
         skip = design.transient
         length = self._length(entry)
         yaws = design.yaw_errors if entry.yaw_errors == "site" else entry.yaw_errors
-        faults = entry.faults or (None,)
+        faults = self._faults(entry)
+        starts = entry.at or (None,)
         angles = self._misalignments(entry)
         bins = self._bins(entry)
-        shared = len(yaws) * len(faults) * len(entry.variants) * len(self.seeds)
+        shared = len(yaws) * len(faults) * len(entry.variants) * len(starts) * len(self.seeds)
         found = []
-        for each, variant, fault, yaw, (angle, likely) in product(bins, entry.variants, faults, yaws, angles):
+        for each, variant, at, fault, yaw, (angle, likely) in product(
+            bins, entry.variants, starts, faults, yaws, angles
+        ):
             for sea in self._seas(entry, each.speed):
                 Hs, Tp, share = sea
                 year = self._hours_per_year(entry, length) * each.probability * share * likely / shared
-                name = self._name(entry, each.speed, variant, fault, yaw, angle, Hs, Tp)
+                name = self._name(entry, each.speed, variant, at, fault, yaw, angle, Hs, Tp)
                 for order, seed in enumerate(self.seeds):
-                    case = self._case(entry, name, each.speed, variant, fault, yaw, angle, (Hs, Tp), order)
+                    case = self._case(
+                        entry, name, each.speed, variant, at, fault, yaw, angle, (Hs, Tp), order
+                    )
                     found += [
                         LoadCase(
                             entry.dlc, name, entry.description, case, label, seed, skip + length, skip,
@@ -282,8 +303,36 @@ class _Settings:
                     ]  # fmt: skip
         return found
 
+    def _faults(self, entry):
+        """Return the faults of an entry, one for each line or compartment; (None,) without a fault."""
+        found = []
+        for fault in entry.faults:
+            if fault.get("line") == EACH:
+                found += [fault | {"line": line + 1} for line in range(len(self.description.lines))]
+            elif fault.get("compartment") == EACH:
+                found += [
+                    fault | {"compartment": number + 1} | each
+                    for number, each in enumerate(self.compartments)
+                ]
+            elif fault["kind"] == START_UP:
+                found.append(fault | {"by": self.climate.site.design.start})
+            else:
+                found.append(fault)
+        return tuple(found) if entry.faults else (None,)
+
+    def lacking(self, entry):
+        """Return why an entry has no runs on this platform; "" if it has some."""
+        if entry.wind is None or self._faults(entry):
+            return ""
+        if any("line" in fault for fault in entry.faults):
+            return "The platform has no mooring lines."
+        return "No compartment is given: --flood MASS:X:Y:Z, kg and m."
+
     def _length(self, entry):
         """Return the s of a run of an entry that are counted."""
+        starts = any(fault["kind"] == START_UP for fault in entry.faults)
+        if starts and self.climate.site.design.start == "controller":
+            return OWN_START
         return self.hours * HOUR if entry.length == "hours" else entry.length
 
     def _bins(self, entry):
@@ -351,7 +400,7 @@ class _Settings:
             return 0.0
         return YEAR * ((1.0 - design.availability) if entry.parked else design.availability)
 
-    def _name(self, entry, speed, variant, fault, yaw, angle, Hs, Tp):
+    def _name(self, entry, speed, variant, at, fault, yaw, angle, Hs, Tp):
         """Return the name of a condition: plain, so that it is the name of a file."""
         parts = [f"dlc{entry.runs_of or entry.dlc}", f"u{speed:g}"]
         for key, value in variant.items():
@@ -359,14 +408,16 @@ class _Settings:
         if fault is not None:
             texts = [
                 str(fault["kind"]),
-                *(str(fault[key]) for key in ("towards", "field", "line") if key in fault),
+                *(str(fault[key]) for key in ("towards", "field", "line", "compartment") if key in fault),
             ]
             parts.append("-".join(texts))
+        if len(entry.at) > 1:
+            parts.append(f"at{at:g}")
         parts += [f"h{Hs:g}", f"t{Tp:g}"]
         parts += [f"{word}{value:+g}" for word, value in (("yaw", yaw), ("mis", angle)) if value]
         return "_".join(parts).replace("+", "p").replace(" ", "_")
 
-    def _case(self, entry, name, speed, variant, fault, yaw, angle, sea, order):
+    def _case(self, entry, name, speed, variant, at, fault, yaw, angle, sea, order):
         """Return the Case of a condition; order: number of the seed, which shifts the azimuth of an event."""
         site = self.climate.site
         start = site.design.transient
@@ -383,19 +434,21 @@ class _Settings:
             options["current"] = current
         event = None
         if fault is not None:
-            keys = {key: value for key, value in fault.items() if key != "after"}
-            event = Fault(**keys, time=round(start + fault["after"] + late, 6))
+            keys = {key: value for key, value in fault.items() if key not in ("after", "compartment")}
+            time = 0.0 if fault["after"] == START else round(start + fault["after"] + late, 6)
+            event = Fault(**keys, time=time)
+        full = event is not None and event.kind in FULL_PROTECTION and not entry.parked
         return Case(
             name,
-            self._wind(entry, speed, variant, yaw, None if entry.at is None else start + entry.at + late),
+            self._wind(entry, speed, variant, yaw, None if at is None else start + at + late),
             {"kind": "jonswap", "Hs": Hs, "Tp": Tp, "heading": heading, "ramp": min(RAMP, 0.5 * start)},
             self.platform,
             options,
             fault=event,
             parked=entry.parked,
             # without a fault the overspeed trip alone: another would end the production that is studied
-            trip=TRIP if event is None else None,
-            protection=None if event is None or entry.parked else "turbine",
+            trip=None if full else TRIP,
+            protection="turbine" if full else None,
             sensors=self.sensors,
         )
 

@@ -138,7 +138,8 @@ class Design(Sourced):
     """Defines what a standard leaves to the designer.
 
     availability: fraction of time in which the turbine can operate. hs_classes, tp_classes: classes of equal
-    probability of the sea for each wind, of a fitted sea. events: times per year, by kind of event.
+    probability of the sea for each wind, of a fitted sea. events: times per year, by kind of event. start:
+    whose start-up is run, the supervisor's for all controllers or each controller's own.
     """
 
     availability: Probability = 0.95
@@ -148,6 +149,7 @@ class Design(Sourced):
     yaw_errors: tuple[bounded(ge=-30, le=30), ...] = (0.0,)  # deg, in production
     extreme_misalignments: tuple[bounded(ge=-180, le=180), ...] = (0.0,)  # deg, in the 1- and 50-year sea
     transient: Positive = 600.0  # s at the start of a run that are not counted
+    start: Literal["supervisor", "controller"] = "supervisor"
     events: dict[Literal["start", "stop", "fault"], NonNegative] = {}
 
 

@@ -75,6 +75,7 @@ def test_the_plot_of_a_site_is_written_with_its_extremes(tmp_path):
     ("--controllers", "pj", "pj"),
     ("--baseline", "rosco", "baseline among --controllers"),
     ("--wind", "steady", "unknown wind 'steady'"),
+    ("--flood", "1e5:0:0", "--flood '1e5:0:0': must be MASS:X:Y:Z, in kg and m"),
     ("--fidelity", "fine", "unknown fidelity 'fine'"),
 ])  # fmt: skip
 def test_bad_options_are_refused_before_anything_runs(tmp_path, option, value, message):

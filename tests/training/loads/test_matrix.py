@@ -19,11 +19,25 @@ from fowt_env.weather.wind_field import is_field
 COUNTED = {
     "1.1": 11 * 3 * 6, "1.2": 11 * 3 * 6, "1.3": 11 * 6, "1.4": 3 * 2 * 6, "1.5": 11 * 4 * 6,
     "1.6": 11 * 2 * 6, "2.1": 3 * 4 * 6, "2.2": 3 * 2 * 6, "2.3": 3 * 6, "2.4": 3 * 2 * 6, "4.1": 3 * 6,
-    "4.2": 3 * 6, "5.1": 3 * 6,
+    "4.2": 3 * 6, "5.1": 3 * 6, "3.1": 3 * 6, "3.2": 3 * 4 * 6, "3.3": 3 * 2 * 2 * 6, "9.1": 3 * 3 * 6,
+    "9.2": 3 * 3 * 6, "10.1": 3 * 6, "10.2": 3 * 6,
     "6.1": 3 * 2 * 6, "6.2": 14 * 6, "6.3": 5 * 6, "6.4": 3 * 3 * 6, "7.1": 3 * 6, "7.2": 11 * 2 * 6,
 }  # fmt: skip
-EVENTS = ("1.4", "1.5", "2.1", "2.2", "2.3", "2.4", "4.1", "4.2", "5.1")  # of ten minutes
-PARKED = ("6.1", "6.2", "6.3", "6.4", "7.1", "7.2")
+EVENTS = (
+    "3.1",
+    "3.2",
+    "3.3",
+    "1.4",
+    "1.5",
+    "2.1",
+    "2.2",
+    "2.3",
+    "2.4",
+    "4.1",
+    "4.2",
+    "5.1",
+)  # of ten minutes
+PARKED = ("6.1", "6.2", "6.3", "6.4", "7.1", "7.2", "10.1", "10.2")
 
 
 @pytest.fixture(scope="module")
@@ -91,7 +105,9 @@ def test_production_idling_and_repair_add_up_to_a_year(matrix):
     # events of ten minutes: 20 faults and 1000 stops a year
     assert hours["2.4"] == pytest.approx(20.0 / 6.0, rel=1e-12)
     assert hours["4.1"] == pytest.approx(1000.0 / 6.0, rel=1e-12)
+    assert hours["3.1"] == pytest.approx(1000.0 / 6.0, rel=1e-12)
     assert set(hours) - {dlc for dlc in hours if hours[dlc]} == set(COUNTED) - {
+        "3.1",
         "1.1",
         "1.2",
         "2.4",
@@ -118,8 +134,8 @@ def test_factors_and_classes_are_those_of_weis(matrix):
     normal, abnormal, fatigue = (1.35, "normal"), (1.1, "abnormal"), (1.0, "fatigue")
     assert of.pop("1.1") == (1.25, "normal")
     for dlc, found in of.items():
-        expected = abnormal if dlc in ("2.2", "2.3", "6.2", "7.1") else normal
-        assert found == (fatigue if dlc in ("1.2", "2.4", "4.1", "6.4", "7.2") else expected), dlc
+        expected = abnormal if dlc in ("2.2", "2.3", "6.2", "7.1", "9.1", "9.2", "10.1", "10.2") else normal
+        assert found == (fatigue if dlc in ("1.2", "2.4", "3.1", "4.1", "6.4", "7.2") else expected), dlc
     assert all((case.analysis == "fatigue") == (case.safety == "fatigue") for case in matrix.cases)
 
 
@@ -135,6 +151,32 @@ def test_each_seed_has_its_event_at_another_azimuth(matrix):
     assert times == pytest.approx([660.0 + third * i / 6 for i in range(6)], abs=0.05 + 1e-9)
     gusts = [case for case in matrix.cases if case.dlc == "2.3" and case.controller == "pi"]
     assert {round(case.case.fault.time - case.case.wind["start"], 6) for case in gusts} == {4.0}
+
+
+def test_each_line_is_lost_in_turn_and_compartments_are_flooded_from_the_start():
+    water = ({"mass": 1e5, "point": (0.0, 5.0, -10.0)}, {"mass": 2e5, "point": (0.0, -5.0, -10.0)})
+    both = expanded("oc3_hywind", "norway_5", ("pi",), dlc="9.1,9.2,9.3", seeds=1, compartments=water)
+    events = {case.dlc: [] for case in both.cases}
+    for case in both.cases:
+        if case.wind_speed == 25.0:
+            events[case.dlc].append(case.case.fault)
+    assert [(fault.line, fault.time) for fault in events["9.1"]] == [(1, 660.0), (2, 660.0), (3, 660.0)]
+    assert [(fault.line, fault.time) for fault in events["9.2"]] == [(1, 0.0), (2, 0.0), (3, 0.0)]
+    assert [(fault.mass, fault.time) for fault in events["9.3"]] == [(1e5, 0.0), (2e5, 0.0)]
+    assert not both.left_out
+    without = expanded("oc3_hywind", "norway_5", ("pi",), dlc="9.3", seeds=1)
+    assert [number for number, _, _ in without.left_out] == ["9.3"] and not without.cases
+
+
+def test_a_start_is_the_supervisors_unless_the_site_wants_the_controllers_own():
+    site = read_site("norway_5")
+    own = site.model_copy(update={"design": site.design.model_copy(update={"start": "controller"})})
+    for mine, by, length in ((site, "supervisor", 600.0), (own, "controller", 2400.0)):
+        cases = expanded("oc3_hywind", mine, ("rosco",), dlc="3.1,3.2", seeds=1).cases
+        assert {case.case.fault.by for case in cases} == {by}
+        assert {case.duration - case.skip for case in cases} == {length}
+        gusts = {case.case.wind["start"] - case.case.fault.time for case in cases if case.dlc == "3.2"}
+        assert gusts == {40.0, 70.0, 100.0, 130.0}
 
 
 def test_waves_come_at_the_misalignment_from_the_wind(matrix):
@@ -236,7 +278,7 @@ def test_bad_settings_are_refused_by_name(change, message):
     ('dlc = "1.3"', 'dlc = "1.2"', "case '1.2': defined twice"),
     ('{kind = "emergency_stop",', '{kind = "emergency_brake",', "emergency_brake"),
     ('{kind = "emergency_stop", after = 60.0}', '{kind = "emergency_stop"}', "faults.1.after is missing"),
-    ("at = 60.0", "", "at is missing: the start of the ecd"),
+    ("at = [60.0]", "", "at is missing: the start of the ecd"),
     ('left_out = "No model of ice."', "", "wind is missing: D.1 to D.8 needs it, or left_out"),
     ("value = 1.35", "value = 0.0", "factor.normal.value = 0.0: must be a number > 0"),
 ])  # fmt: skip
