@@ -163,14 +163,14 @@ def run_matrix(
     with locked(folder, f"load table {str(folder)!r}", "another process is writing to it"):
         done = _prepared(folder, matrix, controllers, about or {}, retry_failed)
         boxes = folder / "boxes" if engine == "processes" else None
-        tasks = _ordered(
+        tasks, places = _ordered(
             [
                 Task(load, None if key[0] == PARKED else controllers[key[0]], boxes, time_limit)
                 for key, load in runs.items()
                 if key not in done
             ]
         )
-        needed = Counter(map(_box_of, tasks))
+        needed = Counter(places)
         statuses, before, began = Counter(done.values()), len(done), time.monotonic()
         report(before, len(runs), None, None)
         function = partial(simulated, here=provenance.versions()) if engine == "ray" else simulated
@@ -179,7 +179,7 @@ def run_matrix(
                 for count, (index, (finished, content)) in enumerate(ended, 1):
                     write_run(content, run_path(folder, finished.key))
                     statuses[finished.status] += 1
-                    box = _box_of(tasks[index])
+                    box = places[index]
                     needed[box] -= 1
                     if box is not None and not needed[box]:
                         box.unlink(missing_ok=True)
@@ -199,11 +199,13 @@ def _box_of(task):
 
 
 def _ordered(tasks):
-    """Return the Tasks with those in the same box of wind, or the same wind and seed, after each other."""
-    first = {}
-    for number, task in enumerate(tasks):
-        first.setdefault((str(task.case.case.wind), task.case.seed), number)
-    return sorted(tasks, key=lambda task: first[str(task.case.case.wind), task.case.seed])
+    """Return (Tasks, their boxes), those in the same turbulence, or the same wind and seed, after each other."""
+    first, keys, places = {}, [], list(map(_box_of, tasks))
+    for number, (task, box) in enumerate(zip(tasks, places, strict=True)):
+        keys.append(box or (str(task.case.case.wind), task.case.seed))
+        first.setdefault(keys[-1], number)
+    order = sorted(range(len(tasks)), key=lambda number: first[keys[number]])
+    return [tasks[number] for number in order], [places[number] for number in order]
 
 
 def check_controllers(controllers, matrix):

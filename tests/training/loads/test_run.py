@@ -13,12 +13,12 @@ import pytest
 
 import fowt_env
 from fowt_env.errors import InputError
-from fowt_env.training.evaluation import wind_boxes
 from fowt_env.training.loads import run
 from fowt_env.training.loads.matrix import expanded
 from fowt_env.training.loads.records import read_run, run_path
 from fowt_env.training.loads.run import Task, finished_runs, lost, run_matrix, simulated
 from fowt_env.training.loads.site import read_site
+from fowt_env.weather import wind_field
 from fowt_env.weather.wind_field import WindBox
 
 SCRIPT = """
@@ -172,29 +172,24 @@ def test_a_table_that_was_killed_goes_on_and_ends_with_the_same_statistics(table
         np.testing.assert_array_equal(one.max, other.max)
 
 
-def test_runs_in_one_box_of_wind_follow_each_other_and_share_its_file(tmp_path, monkeypatch):
-    """1.6 has the winds of 1.2, and both controllers have them all: 22 boxes for 176 runs."""
-    made = []
+def test_runs_in_one_turbulence_follow_each_other_and_share_its_file(tmp_path, monkeypatch):
+    """1.2, 1.3, 1.6 and 7.2 have the same 11 winds, in two models and three directions."""
+    made, kept = [], []
 
-    def small(spec, **arguments):
-        made.append((spec["speed"], arguments["seed"]))
-        y = np.linspace(-80.0, 80.0, 4)
-        velocity = np.zeros((8, 4, 4, 3), np.float32)
-        velocity[..., 0] = spec["speed"]
-        return WindBox(velocity, y, y + 90.0, 1.0, spec["speed"], True, 0.0)
+    def noise(n_time, n_side, dx, step, length, seed):
+        made.append((round(dx, 3), seed))
+        return np.random.default_rng(seed).normal(size=(n_time, n_side, n_side, 3)).astype(np.float32)
 
-    monkeypatch.setattr(wind_boxes, "read_box", small)
+    monkeypatch.setattr(wind_field, "mann_turbulence", noise)
     monkeypatch.setattr(run, "scored", lambda each, measure: (_row(each), None))
-    monkeypatch.setattr(run, "run_statistics", None)
-    matrix = quick("pi", "lqr", dlc="1.2,1.6", wind="full-field", seeds=2)
-    assert len(matrix.runs) == 2 * (11 * 3 + 11 * 2) * 2
-    kept = []
+    matrix = quick("pi", "lqr", dlc="1.2,1.3,1.6,7.2", wind="full-field", seeds=2)
+    assert len(matrix.runs) == 2 * 11 * (2 * (3 + 1 + 2) + 2)
     run_matrix(
         matrix, {"pi": "pi", "lqr": "lqr"}, tmp_path,
-        progress=lambda *_: kept.append(len(list((tmp_path / "boxes").glob("*.npz")))),
+        progress=lambda *_: kept.append(len(list((tmp_path / "boxes").glob("*.npy")))),
     )  # fmt: skip
     assert len(made) == len(set(made)) == 22
-    assert max(kept) <= 1 and not (tmp_path / "boxes").exists()
+    assert max(kept) == 1 and not (tmp_path / "boxes").exists()
 
 
 def _row(each):
@@ -219,6 +214,16 @@ def test_a_bad_controller_or_an_empty_table_is_refused_before_anything_runs(tmp_
     with pytest.raises(InputError, match="all chosen load cases are left out"):
         run_matrix(quick("pi", dlc="2.5"), {"pi": "pi"}, tmp_path / "c")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_line_that_is_lost_from_the_start_is_not_called_slack(tmp_path):
+    matrix = quick("pi", dlc="9.2")
+    run_matrix(matrix, {"pi": "pi"}, tmp_path)
+    for case, finished in finished_runs(matrix, tmp_path):
+        statistics = finished.statistics
+        assert statistics.value(f"FAIRTEN{case.case.fault.line}_[kN]", "max") == 0.0
+        (slack,) = (flag for flag in statistics.flags if flag.name == "slack line")
+        assert 0.0 < slack.value < 1.0
 
 
 def test_a_run_is_the_same_alone_and_in_a_table(table):
