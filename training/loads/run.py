@@ -199,7 +199,7 @@ def _box_of(task):
 
 
 def _ordered(tasks):
-    """Return (Tasks, their boxes), those in the same turbulence, or the same wind and seed, after each other."""
+    """Return (Tasks, their boxes), with those in the same turbulence, or wind and seed, after each other."""
     first, keys, places = {}, [], list(map(_box_of, tasks))
     for number, (task, box) in enumerate(zip(tasks, places, strict=True)):
         keys.append(box or (str(task.case.case.wind), task.case.seed))
