@@ -529,7 +529,6 @@ def _flags(place, table, time, scene, limits):
     add("air gap", deck + table[place["PtfmHeave"]] - table[place["Wave1Elev"]], "m", np.argmin)
     add("offset", table[place["PtfmOffset"]], "m")
     lines = [table[k] for name, k in place.items() if name.startswith("FAIRTEN")]
-    lines = [tension for tension in lines if tension.any()]  # one lost from the start has none
     if lines:
         add("line tension", np.max(lines, axis=0), "kN")
     holding = [tension for tension in lines if tension[-1] > 0.0]  # a line that broke is not slack
