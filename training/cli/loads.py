@@ -137,7 +137,7 @@ def loads_command(
     _print_lost(matrix, folder)
     with progress_bar("tables") as update:
         _, paths, remarks = write_results(
-            folder, matrix, named, read_site(site).name, baseline=baseline, deck=deck, driving=driving,
+            folder, matrix, named, read_site(site), baseline=baseline, deck=deck, driving=driving,
             years=years, progress=update,
         )  # fmt: skip
     for remark in remarks:

@@ -30,14 +30,14 @@ from scipy.stats import norm
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.bootstrap import RANDOM_SEED, interval
+from fowt_env.training.loads.records import HOUR
 from fowt_env.training.loads.selection import RESAMPLES, conditions_of
+from fowt_env.training.loads.site import YEAR
 
 YEARS = 50.0  # return period
-HOURS_PER_YEAR = 8766.0
-HOUR = 3600.0  # s
 POOL = 6.0  # m/s: conditions of which a wind speed further away has no part in the exponent c
 SHAPES = np.exp(np.linspace(log(0.4), log(5.0), 81))  # values of c that are searched
-BISECTIONS = 60
+BISECTIONS = 40
 EULER = 0.5772156649015329
 
 
@@ -92,7 +92,7 @@ def conditions_of_runs(runs, column, side, shares=None):
     found = []
     for key, members in conditions_of(runs).items():
         hours = sum(case.hours_per_year for case, _ in members)
-        share = hours / HOURS_PER_YEAR if shares is None else shares.get(key, 0.0)
+        share = hours / YEAR if shares is None else shares.get(key, 0.0)
         if share <= 0.0 or any(column not in each.peaks for _, each in members):
             continue
         peaks = [each.peaks[column][side] for _, each in members]
@@ -183,7 +183,7 @@ def _pooling(conditions):
 def _long_term(conditions, draws, years):
     """Return (values (k,), fits, exceedances per hour) of the load of a return period, for k samples."""
     tails = [_Tail(condition, draws[len(condition.peaks)]) for condition in conditions]
-    likelihood = np.einsum("ij,jkc->ikc", _pooling(conditions), [tail.likelihood() for tail in tails])
+    likelihood = np.tensordot(_pooling(conditions), np.array([tail.likelihood() for tail in tails]), 1)
     shape = np.array([_best_shape(each) for each in likelihood]).T  # (k, conditions)
     spread = np.array([tail.spread(c) for tail, c in zip(tails, shape.T, strict=True)]).T
     rate = np.array([tail.rate if tail.used else 0.0 * tail.rate for tail in tails]).T
@@ -195,7 +195,7 @@ def _long_term(conditions, draws, years):
         return share * rate * np.exp(-(height**shape - 1.0) / spread)
 
     fits = (level, rate, (level - mean) * spread ** (1.0 / shape), shape)
-    target = 1.0 / (years * HOURS_PER_YEAR)
+    target = 1.0 / (years * YEAR)
     low = np.full(len(rate), min(level))
     if not (parts(low).sum(axis=1) > target).all():
         return np.full(len(rate), nan), fits, parts
@@ -247,7 +247,7 @@ def _curve(value, largest, parts):
         return np.empty((0, 2))
     span = max(abs(value - largest), 0.1 * abs(value), 1e-12)
     loads = np.linspace(min(value, largest) - 3.0 * span, max(value, largest) + 0.5 * span, 80)
-    rates = np.array([float(parts(np.array([load])).sum()) for load in loads]) * HOURS_PER_YEAR
+    rates = np.array([float(parts(np.array([load])).sum()) for load in loads]) * YEAR
     kept = (rates > 1e-4) & (rates < 1e4)
     return np.stack([loads[kept], rates[kept]], axis=1)
 
@@ -274,7 +274,7 @@ def block_maxima(conditions, years=YEARS):
         # of one hour: F^(1/h) is a Gumbel distribution again
         fits.append((condition.share, mode - scale * log(condition.hours.mean()), scale))
     share, mode, scale = np.array(fits).T
-    target = 1.0 / (years * HOURS_PER_YEAR)
+    target = 1.0 / (years * YEAR)
 
     def rate(load):
         return float(np.sum(share * -np.expm1(-np.exp(np.minimum(-(load - mode) / scale, 700.0)))))
@@ -293,7 +293,7 @@ def block_maxima(conditions, years=YEARS):
 
 def reliability_index(years=YEARS, hours=1.0):
     """Return beta, the standard normal quantile that a state of some hours exceeds once in some years."""
-    return float(norm.isf(hours / (years * HOURS_PER_YEAR)))
+    return float(norm.isf(hours / (years * YEAR)))
 
 
 def sphere(dimensions, count):
@@ -369,16 +369,18 @@ def form_load(runs, column, side, climate, years=YEARS):
     """
     sign = 1.0 if side == "max" else -1.0
     points = {}
-    for members in conditions_of(runs).values():
-        case = members[0][0]
-        if case.wind_speed is None or len(members) < 2:
-            continue
-        mode, scale = gumbel_fit(sign * np.array([each.value(column, side) for _, each in members]))
-        points.setdefault(case.wind_speed, []).append((case.Hs, mode, scale))
-    winds = np.array(sorted(points))
+    for case, each in runs:
+        if case.wind_speed is not None:
+            seas = points.setdefault(case.wind_speed, {})
+            seas.setdefault(case.Hs, []).append(sign * each.value(column, side))
+    tables = {
+        wind: np.array([(Hs, *gumbel_fit(seas[Hs])) for Hs in sorted(seas) if len(seas[Hs]) > 1])
+        for wind, seas in points.items()
+    }
+    winds = np.array(sorted(wind for wind, table in tables.items() if len(table)))
     if len(winds) < 2:
         return nan, nan, nan
-    tables = [np.array(sorted(points[wind])) for wind in winds]
+    tables = [tables[wind] for wind in winds]
 
     def at_wind(number, Hs):  # (2, n) mode and scale in one wind
         table = tables[number]

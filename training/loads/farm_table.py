@@ -85,7 +85,7 @@ def performance_table(
         frame = fowt_env.simulate(scene, controller, duration=duration)
         mean = frame[frame[TIME] >= skip - 1e-9].mean()
         pressure = 0.5 * air * pi * radius**2 * wind**2
-        tilt = np.degrees(turbine.rotor.shaft_tilt) + mean["PtfmPitch_[deg]"]
+        tilt = tilt_of(turbine, mean["PtfmPitch_[deg]"])
         row = (
             height, wind, mean["GenPwr_[kW]"], 1e3 * mean["GenPwr_[kW]"] / (pressure * wind),
             mean["RtFldFxh_[N]"] / pressure, tilt, mean["PtfmSurge_[m]"], mean["RotSpeed_[rpm]"],
@@ -101,6 +101,11 @@ def performance_table(
         table, scene.platform.name, turbine.rotor.hub_height, 2.0 * radius,
         float(np.degrees(turbine.rotor.shaft_tilt)), air, float(ratio),
     )  # fmt: skip
+
+
+def tilt_of(turbine, platform_pitch):
+    """Return the tilt of the rotor, deg, positive where it faces upwards, at a platform pitch (deg)."""
+    return float(np.degrees(turbine.rotor.shaft_tilt) + platform_pitch)
 
 
 def _increasing(name, values):

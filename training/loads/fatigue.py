@@ -11,6 +11,7 @@ import numpy as np
 
 from fowt_env.descriptions.checks import check_number
 from fowt_env.errors import InputError
+from fowt_env.training.loads.records import HOUR
 from fowt_env.training.loads.selection import (
     bounds,
     columns_of,
@@ -23,7 +24,6 @@ from fowt_env.training.loads.statistics import EXPONENTS
 
 YEARS = 25.0
 REFERENCE_CYCLES = 1e7
-HOUR = 3600.0  # s
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,13 @@
 
 from pathlib import Path
 
-from fowt_env.descriptions.platform import read_platform
+from fowt_env.descriptions.platform import read_platform, turbine_of
 from fowt_env.errors import InputError
 from fowt_env.files.openfast_deck.parser import PartFile
 from fowt_env.training.loads.decks import write_driving
 from fowt_env.training.loads.page import write_load_page
 from fowt_env.training.loads.run import finished_runs
+from fowt_env.training.loads.site import climate_of
 from fowt_env.training.loads.spreadsheet import write_spreadsheets
 from fowt_env.training.loads.tables import DRIVING, load_tables, write_csv
 from fowt_env.training.reports.metric_words import counted
@@ -21,7 +22,7 @@ def write_results(
     """Write the results of a Matrix whose runs are in a folder; return (LoadTables, paths, remarks).
 
     controllers  {label: name or object}, for the driving runs
-    site         name of the site, for the title
+    site         SiteFile
     baseline     controller of the paired differences, None: the first
     deck         path of an .fst of the platform for the driving runs, None: no decks
     driving      number of driving runs that are written, 0: none
@@ -34,11 +35,13 @@ def write_results(
         PartFile(deck, "OpenFAST")  # fails before hours of tables if it cannot be read
     finished = {case.key: run for case, run in finished_runs(matrix, folder)}
     options = {} if years is None else {"years": years}
-    results = load_tables(matrix.cases, finished, baseline=baseline, progress=say, **options)
+    description = read_platform(matrix.cases[0].case.platform)
+    climate = climate_of(site, turbine_of(description))
+    results = load_tables(matrix.cases, finished, baseline=baseline, climate=climate, progress=say, **options)
     paths, remarks = list(write_csv(folder / "tables", results)), []
-    name = read_platform(matrix.cases[0].case.platform).name
+    name = description.name
     about = {
-        "title": f"Design loads of {name} at {site}",
+        "title": f"Design loads of {name} at {site.name}",
         "lead": _lead(results, matrix),
         "left_out": matrix.left_out,
         "remarks": matrix.remarks,
@@ -73,7 +76,7 @@ def _facts(results, matrix, site):
     case = matrix.cases[0].case
     return {
         "platform": str(case.platform),
-        "site": str(site),
+        "site": f"{site.name}: {site.description}",
         "options of the scene": ", ".join(f"{key} {value}" for key, value in case.options.items()),
         "sensors": case.sensors,
         "baseline": results.baseline,

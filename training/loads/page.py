@@ -200,6 +200,7 @@ def _curves(results):
         row["cells"][results.controllers.index(label)] = {
             "value": _number(each.value), "low": _number(each.low), "high": _number(each.high),
             "block": _number(each.block), "largest": _number(each.largest), "governing": each.governing,
+            "form": [_number(value) for value in results.forms.get((label, column, side), ())],
             "curve": [[_number(load), _number(rate)] for load, rate in each.curve],
         }  # fmt: skip
     return [found[key] for key in sorted(found, key=lambda key: _rank(key[0]))]
@@ -324,9 +325,10 @@ def _extrapolation():
         '<details class="help"><summary aria-label="Method">?</summary><div><p>Peaks over threshold in each'
         " condition, with the tail of a Weibull distribution about the mean load, integrated over the winds"
         " and seas of the site; the exponent is estimated from neighbouring winds together. Interval: a"
-        " bootstrap"
-        " over the seeds. Cross: Gumbel distributions of the largest values of the runs, as a check. Without"
-        " partial factor.</p></div></details>"
+        " bootstrap over the seeds. Inverse FORM: the largest load on the 50-year contour of wind, Hs and"
+        " largest load of a run, from runs in usual and severe seas, with its wind and sea. Cross: Gumbel"
+        " distributions of the largest values of the runs, as a check. Without partial factor.</p></div>"
+        "</details>"
         '<div class="plot" id="extrapolation-plot"></div><div class="scroll"><div tabindex="0" role="region"'
         ' aria-label="50-year loads"><table class="figures" id="extrapolation-table"><thead></thead><tbody>'
         "</tbody></table></div></div></section>"

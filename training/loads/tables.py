@@ -14,7 +14,7 @@ from fowt_env.descriptions.channel_meanings import channel_meaning
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.carried import missing_part
 from fowt_env.training.evaluation.metrics import TIME
-from fowt_env.training.loads.extrapolation import conditions_of_runs, extrapolate
+from fowt_env.training.loads.extrapolation import conditions_of_runs, extrapolate, form_load
 from fowt_env.training.loads.extremes import EXTRAPOLATED, SIDES, extreme_table, flag_table
 from fowt_env.training.loads.fatigue import REFERENCE_CYCLES, YEARS, lifetime_table
 from fowt_env.training.loads.selection import columns_of, controllers_of, runs_of
@@ -37,6 +37,7 @@ WORDS = {
     "blades": "rigid blades",
     "mooring": "quasi-static lines",
 }
+SEVERE = "1.6"  # number of the load case of production in the severe sea
 DRIVING = 10  # runs that are exported for a check in OpenFAST
 
 
@@ -46,7 +47,8 @@ class LoadTables:
 
     cases: all LoadCases; runs: [(LoadCase, RunStatistics)] of those that have statistics; lost: [(LoadCase,
     FinishedRun or None)] without; ended: [(LoadCase, FinishedRun)] that the protection ended early.
-    extrapolations: {(controller, column, side): Extrapolation}.
+    extrapolations: {(controller, column, side): Extrapolation}; forms: {(controller, column, side): (load,
+    wind m/s, Hs m)} of 50 years by inverse FORM, {} without runs in the severe sea.
     """
 
     cases: list
@@ -59,6 +61,7 @@ class LoadTables:
     lifetime: list
     flags: list
     extrapolations: dict
+    forms: dict
     years: float
     reference_cycles: float
 
@@ -99,11 +102,13 @@ def load_tables(
     years=YEARS,
     reference_cycles=REFERENCE_CYCLES,
     exponents=(3, 4, 10),
+    climate=None,
     progress=None,
 ):
     """Return the LoadTables of LoadCases and {key: FinishedRun}.
 
     baseline: controller that others are compared with, None: the first. years: lifetime of the fatigue loads.
+    climate: site.Climate, for loads by inverse FORM; None: without these.
     progress: called as progress(done, total, text).
     Raises: InputError if no run has statistics, or for an unknown exponent.
     """
@@ -114,7 +119,8 @@ def load_tables(
     baseline = labels[0] if baseline is None else baseline
     production = [run for run in runs if run[0].characteristic == EXTRAPOLATED]
     peaked = [name for name in columns if production and all(name in each.peaks for _, each in production)]
-    extrapolations = {}
+    severe = [run for run in runs if run[0].dlc == SEVERE]
+    extrapolations, forms = {}, {}
     for number, column in enumerate(peaked):
         say(number, len(peaked), f"extrapolating {column}")
         for label in labels:
@@ -124,12 +130,15 @@ def load_tables(
             for side in SIDES:
                 conditions = conditions_of_runs(own, column, side)
                 extrapolations[label, column, side] = extrapolate(conditions, side)
+                if climate is not None and severe:
+                    in_seas = own + runs_of(severe, label)
+                    forms[label, column, side] = form_load(in_seas, column, side, climate)
     say(0, 1, "tabulating extremes and fatigue")
     return LoadTables(
         list(cases), runs, lost, ended, tuple(labels), baseline,
         extreme_table(runs, columns, baseline, extrapolations),
         lifetime_table(runs, exponents, years, reference_cycles, baseline),
-        flag_table(runs), extrapolations, years, reference_cycles,
+        flag_table(runs), extrapolations, forms, years, reference_cycles,
     )  # fmt: skip
 
 
@@ -215,6 +224,8 @@ def write_csv(folder, results):
                     "channel": column, "side": side, "controller": label, "years": each.years,
                     "value": each.value, "low": each.low, "high": each.high, "block_maxima": each.block,
                     "largest_simulated": each.largest, "governing": each.governing,
+                    **dict(zip(("inverse_form", "form_wind_m_s", "form_Hs_m"),
+                               results.forms.get((label, column, side), ()), strict=False)),
                 }
                 for (label, column, side), each in results.extrapolations.items()
             ]

@@ -1,5 +1,6 @@
 """Long-term loads against distributions whose 50-year value is known, and inverse FORM in closed form."""
 
+from dataclasses import replace
 from math import exp, log
 
 import numpy as np
@@ -10,7 +11,6 @@ from scipy.stats import norm
 
 from fowt_env.errors import InputError
 from fowt_env.training.loads.extrapolation import (
-    HOURS_PER_YEAR,
     Condition,
     block_maxima,
     conditions_of_runs,
@@ -23,7 +23,7 @@ from fowt_env.training.loads.extrapolation import (
     sphere,
     states_of,
 )
-from fowt_env.training.loads.site import climate_of, read_site
+from fowt_env.training.loads.site import YEAR, climate_of, read_site
 
 RATE = 150.0  # peaks per hour above the threshold
 WINDS = np.arange(4.0, 25.0, 3.0)
@@ -48,7 +48,7 @@ def truth(kind):
 
     def excess(load):
         rate = sum(SHARE * RATE * exceedance(kind, load, scale) for scale in SCALES)
-        return log(max(rate, 1e-300)) - log(1.0 / (50.0 * HOURS_PER_YEAR))
+        return log(max(rate, 1e-300)) - log(1.0 / (50.0 * YEAR))
 
     return brentq(excess, 1.5, 100.0)
 
@@ -91,6 +91,11 @@ def test_many_runs_give_the_known_value():
 def test_block_maxima_of_many_runs_give_the_known_value():
     """Largest values of an hour of exponential peaks have a Gumbel distribution."""
     assert block_maxima(sample("exponential", 2, runs=3000)) == pytest.approx(truth("exponential"), rel=0.04)
+    blocks = [
+        replace(c, largest=c.largest.reshape(-1, 6).max(axis=1), hours=np.full(500, 6.0))
+        for c in sample("exponential", 2, runs=3000)
+    ]  # the largest of six hours each
+    assert block_maxima(blocks) == pytest.approx(truth("exponential"), rel=0.04)
     mode, scale = gumbel_fit(np.random.default_rng(1).gumbel(3.0, 2.0, 200_000))
     assert (mode, scale) == (pytest.approx(3.0, abs=0.02), pytest.approx(2.0, abs=0.02))
 

@@ -75,20 +75,20 @@ def test_intervals_and_differences_are_those_of_a_plain_bootstrap(runs):
     draws = np.random.default_rng(RANDOM_SEED).integers(5, size=(RESAMPLES, 5))
     drawn = {}
     for label in ("pi", "lqr"):
-        loads = []
-        for name, rule, factor in (("calm", "mean", 1.35), ("fault", "upper_half", 1.1)):
-            own = sorted(
-                (c.seed, e.value(MOMENT, "max")) for c, e in runs if (c.name, c.controller) == (name, label)
-            )
-            values = np.array([value for _, value in own])
-            loads.append([characteristic(values[draw], rule) * factor for draw in draws])
-        drawn[label] = np.max(loads, axis=0)
-        row = found[MOMENT, "max", label]
-        low, high = interval(np.array([row.factored]), drawn[label][:, None], 5)
-        assert (row.low, row.high) == pytest.approx((low[0], high[0]), rel=1e-12)
+        for side, sign in (("max", 1.0), ("min", -1.0)):
+            loads = []
+            for name, rule, factor in (("calm", "mean", 1.35), ("fault", "upper_half", 1.1)):
+                own = {c.seed: e for c, e in runs if (c.name, c.controller) == (name, label)}
+                values = sign * np.array([own[seed].value(MOMENT, side) for seed in sorted(own)])
+                load = np.array([characteristic(values[draw], rule) for draw in draws])
+                loads.append(np.where(load > 0.0, load * factor, load / factor))
+            drawn[label, side] = sign * np.max(loads, axis=0)
+            row = found[MOMENT, side, label]
+            low, high = interval(np.array([row.factored]), drawn[label, side][:, None], 5)
+            assert (row.low, row.high) == pytest.approx((low[0], high[0]), rel=1e-12)
     row = found[MOMENT, "max", "lqr"]
     gap = row.factored - found[MOMENT, "max", "pi"].factored
-    low, high = interval(np.array([gap]), (drawn["lqr"] - drawn["pi"])[:, None], 5)
+    low, high = interval(np.array([gap]), (drawn["lqr", "max"] - drawn["pi", "max"])[:, None], 5)
     assert (row.difference, row.difference_low, row.difference_high) == pytest.approx((gap, low[0], high[0]))
     assert row.difference_high < 0.0  # 1.5 against 2: decided
     assert np.isnan(found[MOMENT, "max", "pi"].difference)

@@ -6,8 +6,9 @@ from command_line import fowt
 from floris import FlorisModel
 
 import fowt_env
+from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.errors import InputError
-from fowt_env.training.loads.farm_table import performance_table, write_floris
+from fowt_env.training.loads.farm_table import performance_table, tilt_of, write_floris
 
 WINDS, HS, TP = (8.0, 12.0, 18.0), (0.0, 4.0), (8.0, 12.0)
 
@@ -38,6 +39,10 @@ def test_still_water_is_the_steady_operating_point(table):
         assert found["Ct"] == pytest.approx(point["RtFldFxh"] / pressure, rel=2e-3)
         assert found["Cp"] == pytest.approx(1e3 * point["GenPwr"] / (pressure * wind), rel=2e-3)
         assert found.drop("Tp_s").equals(row(table, wind, 0.0, 12.0).drop("Tp_s"))
+
+
+def test_the_tilt_is_that_of_the_shaft_plus_the_platform():
+    assert tilt_of(read_turbine("iea15"), 2.5) == pytest.approx(8.5)  # a shaft tilt of 6 deg
 
 
 def test_waves_change_the_mean(table):

@@ -4,11 +4,13 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
-from load_runs import SCENE, frame_of, load_case, small_table
+from load_runs import SCENE, frame_of, load_case, run_of, small_table
 
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.loads.extrapolation import form_load
 from fowt_env.training.loads.records import FinishedRun
+from fowt_env.training.loads.site import climate_of, read_site
 from fowt_env.training.loads.spreadsheet import ANGLES, write_spreadsheets
 from fowt_env.training.loads.statistics import EXPONENTS, run_statistics
 from fowt_env.training.loads.tables import (
@@ -58,6 +60,30 @@ def test_hours_of_lost_runs_go_to_the_other_seeds():
     assert [case.hours_per_year for case in other] == [500.0] * 4
     del finished[lost]
     assert joined(cases, finished)[1] == [(case, None) for case in cases if case.key == lost]
+
+
+def test_loads_by_inverse_form_need_runs_in_the_severe_sea():
+    cases, finished = small_table()
+    climate = climate_of(read_site("norway_5"), SCENE.turbine)
+    assert load_tables(cases, finished, climate=climate).forms == {}
+    for wind in (8.0, 12.0, 16.0):
+        for seed in (1, 2, 3, 4):
+            about = {"wind_speed": wind, "Hs": 9.0, "seed": seed, "controller": "pi"}
+            case = load_case("1.6", f"dlc1.6_u{wind:g}", **about)
+            cases.append(case)
+            statistics = run_of(case, 4.0)[1]
+            finished[case.key] = FinishedRun(*case.key, "ok", statistics=statistics)
+    found = load_tables(cases, finished, climate=climate)
+    assert set(found.forms) == set(found.extrapolations)
+    load, wind, Hs = found.forms["pi", MOMENT, "max"]
+    usual, severe = (
+        [each.value(MOMENT, "max") for case, each in found.runs if (case.controller, case.dlc) == ("pi", dlc)]
+        for dlc in ("1.2", "1.6")
+    )
+    # the load grows with Hs from 3 to 9 m, and the 50-year sea lies between or beyond
+    assert load > max(severe) > max(usual) and 4.0 < wind < 20.0 and Hs > 6.0
+    own = [(c, e) for c, e in found.runs if c.controller == "pi" and c.dlc in ("1.1", "1.6")]
+    assert found.forms["pi", MOMENT, "max"] == form_load(own, MOMENT, "max", climate)
 
 
 def test_a_table_without_runs_is_refused():

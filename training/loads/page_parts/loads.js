@@ -209,13 +209,14 @@ function drawExtrapolation() {
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: 1 / DATA.return_years, y1: 1 / DATA.return_years, line: { width: 1, dash: "dot", color: css("--soft") } }],
   });
   const head = element("tr");
-  head.append(...["controller", `once in ${DATA.return_years} years`, "95 % interval", "block maxima", "largest simulated", "most exceedances in"].map((text) => element("th", text)));
+  head.append(...["controller", `once in ${DATA.return_years} years`, "95 % interval", "block maxima", "inverse FORM", "largest simulated", "most exceedances in"].map((text) => element("th", text)));
   $("extrapolation-table").tHead.replaceChildren(head);
   $("extrapolation-table").tBodies[0].replaceChildren(...chosen.cells.flatMap((cell, i) => {
     if (!cell) return [];
     const line = element("tr");
     const ends = cell.low === null ? "–" : `${figure(cell.low)} … ${figure(cell.high)}`;
-    line.append(...[DATA.controllers[i], figure(cell.value), ends, figure(cell.block), figure(cell.largest), cell.governing].map((text) => element("td", text)));
+    const form = cell.form.length && cell.form[0] !== null ? `${figure(cell.form[0])} (${figure(cell.form[1])} m/s, Hs ${figure(cell.form[2])} m)` : "–";
+    line.append(...[DATA.controllers[i], figure(cell.value), ends, figure(cell.block), form, figure(cell.largest), cell.governing].map((text) => element("td", text)));
     return [line];
   }));
 }
