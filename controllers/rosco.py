@@ -60,6 +60,16 @@ OFF = (
 )  # fmt: skip
 IPC_AMPLITUDE = 0.2618  # rad, largest cyclic pitch: IPC_IntSat of ROSCO's toolbox
 IPC_RAMP = (0.8, 1.0)  # of rated wind, range over which IPC fades in: IPC_Vramp of ROSCO's toolbox
+# start-up (SU_Mode) of a written DISCON.IN: the defaults of ROSCO's toolbox, in load stages of the torque;
+# its rotor speed at which the load begins is that of the torque law. A DISCON.IN of a turbine has its own
+STARTS = {
+    "SU_FW_MinDuration": 200.0,
+    "SU_RotorSpeedCornerFreq": 0.41888,
+    "SU_LoadStages_N": 2,
+    "SU_LoadStages": (0.2, 1.0),
+    "SU_LoadRampDuration": (100.0, 100.0),
+    "SU_LoadHoldDuration": (200.0, 100.0),
+}
 SILENT = {"LoggingLevel": 0, "Echo": 0, "Ext_Interface": 0}  # no log files, standard interface
 ENTRY = re.compile(r"^(?P<value>[^!]*?)(?P<gap>\s*!\s*)(?P<name>\w+)\b")
 BLADES_READ = (
@@ -193,6 +203,7 @@ class Rosco(BladedCalls):
         self.name = str(name)
         self.individual = bool(individual)
         self._files = self._remove = None
+        self._start_up = {}  # entries of DISCON.IN of an ordered start-up
         self.nodding = bool(nodding)
         # sensors measure the rate of the platform's pitch, not the acceleration of the nacelle's
         differenced = isinstance(settings, Discon) and not self.nodding
@@ -211,6 +222,20 @@ class Rosco(BladedCalls):
     def __setstate__(self, state):
         self.__init__(**state)
 
+    def order_start_up(self, time):
+        """Order the start-up of ROSCO (SU_Mode) at a time, s, before prepare(); None: none.
+
+        Raises: InputError for a DISCON.IN without it.
+        """
+        self._start_up = {} if time is None else {"SU_Mode": 1, "SU_StartTime": float(time)}
+        if self._start_up and isinstance(self.settings, Discon):
+            for key in ("SU_Mode", "SU_StartTime", "SU_RotorSpeedThresh", *STARTS):
+                if key not in self.settings.values:
+                    raise InputError(
+                        f"faults: start_up: DISCON.IN {str(self.settings.path)!r} has no {key}: must be a"
+                        " file of ROSCO 2.10 or later, or by = 'supervisor'"
+                    )
+
     def prepare(self, scene):
         """Write DISCON.IN and the rotor table for a scene, or those of the Discon.
 
@@ -223,13 +248,17 @@ class Rosco(BladedCalls):
         turbine, density = scene.turbine, scene.platform.environment.air_density
         self._turbine = turbine
         if isinstance(self.settings, Discon):
-            text, table = self.settings.texts(self.changes, lambda: rotor_table(turbine, density))
+            changes = self.changes | self._start_up
+            text, table = self.settings.texts(changes, lambda: rotor_table(turbine, density))
         else:
             computed = rotor_table(turbine, density)
             values = deck(with_gains(scene), density, computed, self.settings)
             if self.individual:
                 values |= individual_entries(turbine, self.control_dt)
+            if self._start_up:
+                values |= STARTS | {"SU_RotorSpeedThresh": turbine_connects(turbine)}
             _check_entries(self.changes, values)
+            values |= self._start_up
             text, table = deck_text(values | self.changes), table_text(computed)
         if self._remove is not None:
             self._remove()
@@ -463,6 +492,11 @@ def deck(turbine, density, table, settings):
         "Fl_Kp": settings.gain,
         "Fl_U": 0.0,
     }
+
+
+def turbine_connects(turbine):
+    """Return the rotor speed (rad/s) at which the torque law of a turbine begins."""
+    return turbine.torque_law.cut_in_speed / turbine.drivetrain.gear_ratio
 
 
 def individual_entries(turbine, control_dt):

@@ -1,11 +1,12 @@
 """Checks a library with the Bladed interface without a plant: records, demands, messages, times, determinism.
 
 The library is called on a series of an operating point above rated wind speed: the rotor's speed and the
-tower top oscillate, and torque and pitch follow the demands. Which records it reads is found by changing one
-at a time, which it writes by values that no library would return.
+tower top oscillate, and torque and pitch follow the demands. Which records it reads is found by changing
+groups of them, halved where the demands change; which it writes by values that no library would return.
 """
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import pi, sin
 from typing import Any
@@ -24,8 +25,11 @@ PROBE_STEPS = 40  # calls of a series that finds which records are read
 WIND, PITCH = 18.0, 0.26  # m/s, rad: steady state of the NREL 5 MW turbine
 SWING, PERIOD = 0.03, 10.0  # fraction of the speed, s
 LAG = 0.3  # fraction of the way to the demanded pitch in a period
+SLOW_START = 1.0  # s
+STARTS = 40  # of a library that reads some eight records
 UNTOUCHED = -12345.678  # value of a record that the library has not written
-CHANGE = 0.1  # of a record that is probed: fraction of its value, or the change of a zero
+CHANGE = 0.1, 0.15  # range of changes of a probed record: fraction of its value, or the change of a zero
+GOLDEN = 0.6180339887498949  # its multiples spread evenly between 0 and 1
 # sizes of buffers and places of arrays: a library that is given others may write where it must not
 NOT_PROBED = (
     "message_size", "input_file_size", "output_name_size", "output_name_capacity", "most_logs", "log_start",
@@ -51,14 +55,21 @@ class DllCheck:
     faults: list[str] = field(default_factory=list)
 
 
-def check_dll(library: BladedLibrary, turbine: Any, control_dt: float = 0.1) -> DllCheck:
-    """Return the DllCheck of a library called every control_dt (s) with the values of a turbine."""
+def check_dll(
+    library: BladedLibrary, turbine: Any, control_dt: float = 0.1, note: Callable[[str], object] | None = None
+) -> DllCheck:
+    """Return the DllCheck of a library called every control_dt (s) with the values of a turbine.
+
+    note: function that is told (a text) that the check of a slow library will take long.
+    """
     result = DllCheck(check_library(library.files[0], library.symbol))
     try:
         first = _whole_series(library, turbine, control_dt, result)
     except ControllerError as error:
         result.faults.append(str(error))
         return result
+    if note is not None and result.start > SLOW_START:
+        note(f"a start takes {result.start:.1f} s, the check some {STARTS} starts: {library.files[0]}")
     second, beside = _two_at_once(library, turbine, control_dt)
     if not np.array_equal(first, second, equal_nan=True):
         result.faults.append("two runs of the same series differ in their demands")
@@ -183,20 +194,43 @@ def _find_written(library, turbine, control_dt, result):
 
 
 def _find_read(library, turbine, control_dt, result):
-    """Find the records to the library whose change changes what it writes."""
+    """Find the records to the library whose change changes what it writes.
+
+    Each series starts the library anew, which takes seconds where its law runs in Python: hence the groups.
+    """
     places = [record.index for record in result.written]
 
     def answers(change):
         return [after[places] for _, after in _calls(library, turbine, control_dt, change)]
 
     usual = answers(lambda records: None)
-    for record in RECORDS:
-        if record.direction == FROM or record.name in NOT_PROBED:
-            continue
 
-        def change(records, place=record.index):
-            records[place] += CHANGE * (records[place] or 1.0)
+    def matter(group):
+        indices = np.array([record.index for record in group])
+        # a change of its own for each: a law of the ratio of two records would hide the same change of both
+        fractions = CHANGE[0] + (CHANGE[1] - CHANGE[0]) * (GOLDEN * indices % 1.0)
+
+        changed = np.full(len(group), np.nan)
+
+        def change(records):
+            values = records[indices]
+            new = values + fractions * np.where(values == 0.0, 1.0, values)
+            records[indices] = np.where(values == changed, values, new)  # constants are given once
+            changed[:] = records[indices]
 
         found = answers(change)
-        if len(found) < len(usual) or not np.array_equal(found, usual, equal_nan=True):
-            result.read.append(record)
+        return len(found) < len(usual) or not np.array_equal(found, usual, equal_nan=True)
+
+    probed = [record for record in RECORDS if record.direction != FROM and record.name not in NOT_PROBED]
+    result.read = _those_that_matter(probed, matter)
+
+
+def _those_that_matter(items, matter, known=False):
+    """Return the items that matter on their own; matter(items): whether a list has some; known: it has."""
+    if not items or not ((known and len(items) > 1) or matter(items)):
+        return []
+    if len(items) == 1:
+        return items
+    half = len(items) // 2
+    first = _those_that_matter(items[:half], matter)
+    return first + _those_that_matter(items[half:], matter, known=not first)

@@ -1,4 +1,4 @@
-"""Describes the faults of a run: grid loss, faults of pitch drives and sensors, and ordered stops."""
+"""Describes the faults of a run: grid, pitch drives, sensors, platform, and ordered stops and start-up."""
 
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, NamedTuple
@@ -26,6 +26,13 @@ FAULTS = {
     "normal_stop": FaultKind(
         ("rate",), "the blades feather at the normal rate; the torque falls with the rotor speed"
     ),
+    "start_up": FaultKind(
+        ("rate", "by"), "the parked turbine starts at TIME: blades pitch to fine, then the generator connects"
+    ),
+    "line_loss": FaultKind(("line",), "a mooring line breaks at its fairlead (JSON: line)"),
+    "flooded_compartment": FaultKind(
+        ("mass", "point", "duration"), "water fills a compartment (JSON: mass, kg, and point [x, y, z], m)"
+    ),
     "stuck_pitch": FaultKind(("blades", "backup"), "blades stay at their pitch of TIME"),
     "pitch_runaway": FaultKind(
         ("blades", "towards", "backup"), "blades run to one end of their range (JSON: towards)"
@@ -40,7 +47,9 @@ FAULTS = {
 KINDS = tuple(FAULTS)
 BLADE_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "blades" in fault.keys)
 SENSOR_FAULTS = tuple(kind for kind, fault in FAULTS.items() if "field" in fault.keys)
-NEEDED = ("towards", "offset", "field", "value")  # required by the kinds of fault that have these keys
+PLATFORM_FAULTS = ("line_loss", "flooded_compartment")
+# required by the kinds of fault that have these keys
+NEEDED = ("towards", "offset", "field", "value", "line", "mass", "point")
 Blade = Annotated[int, Field(ge=1, le=3, strict=True)]
 
 
@@ -57,7 +66,7 @@ class Fault(Record):
     kind: Literal[KINDS]
     time: NonNegative  # s
     delay: NonNegative | None = None  # s from the loss of the grid to feathering; None: no feathering
-    rate: Positive | None = None  # deg/s of feathering, replaces the rate of the protection
+    rate: Positive | None = None  # deg/s of feathering or of a start-up, replaces the rate of the protection
     blades: tuple[Blade, ...] | None = None  # None: all
     # whether an emergency stop still feathers these blades, from their backup energy storage
     backup: Annotated[bool, Field(strict=True)] = False
@@ -65,6 +74,12 @@ class Fault(Record):
     offset: Finite | None = None  # deg, actual blade pitch minus encoder reading
     field: str | None = None
     value: Finite | None = None  # SI, added to the reading
+    # which start-up: that of the supervisor or of the controller; None: the controller's if it has one
+    by: Literal["supervisor", "controller"] | None = None
+    line: Annotated[int, Field(ge=1, strict=True)] | None = None  # number of a mooring line
+    mass: Positive | None = None  # kg of water in the full compartment
+    point: tuple[Finite, Finite, Finite] | None = None  # m, centre of this water in body axes
+    duration: NonNegative | None = None  # s of filling at a constant rate; None: full at once
 
     def _problems(self):
         known = FAULTS[self.kind].keys
@@ -87,7 +102,7 @@ class Fault(Record):
     @property
     def ends_operation(self) -> bool:
         """Return whether the fault stops the turbine, so that the protection is part of the load case."""
-        return self.kind not in (*SENSOR_FAULTS, "pitch_offset")
+        return self.kind not in (*SENSOR_FAULTS, *PLATFORM_FAULTS, "pitch_offset", "start_up")
 
 
 def read_faults(value: Any) -> tuple[Fault, ...]:

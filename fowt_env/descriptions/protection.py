@@ -1,4 +1,4 @@
-"""Describes the protection of a turbine: the limits of its trips and its two kinds of stop."""
+"""Describes the protection of a turbine: the limits of its trips, its two kinds of stop, its start-up."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
@@ -16,6 +16,7 @@ STOPS = ("normal", "emergency", "end")
 NORMAL_RATE = 0.9 * DEGREE  # rad/s
 EMERGENCY_RATE = 8.0 * DEGREE
 OFF_SPEED = 0.3
+START_RATE = 1.0 * DEGREE  # rad/s
 
 
 class TripLimit(Record):
@@ -34,13 +35,14 @@ Limited = Annotated[TripLimit | None, BeforeValidator(lambda value: None if valu
 
 
 class Protection(Record):
-    """Describes the trips of a turbine, each a TripLimit or None, and the two kinds of stop.
+    """Describes the trips of a turbine, each a TripLimit or None, its two kinds of stop and its start-up.
 
     Defaults: trips at 1.3 of rated rotor speed, 1.25 of rated power for 1 s, 3.3 m/s2 (the constraint of the
     ATLAS Offshore contest, ARPA-E 2019) and 5 deg for 1 s; feathering at 8 deg/s in an emergency
     (NREL/TP-500-38060) and at 0.9 deg/s otherwise (90 deg in 100 s: ASME OMAE2020 V009T09A070), each limited
     by the pitch drive. A normal stop reduces the torque with the rotor speed, to zero at off_speed, where the
-    generator is disconnected.
+    generator is disconnected. In a start-up the blades pitch from feather at start_rate, 1 deg/s by choice of
+    this project, and the generator is connected at connect_speed.
     """
 
     overspeed: Limited = TripLimit(limit=1.3)  # of rated rotor speed
@@ -52,6 +54,9 @@ class Protection(Record):
     normal_rate: Positive = NORMAL_RATE  # rad/s
     emergency_rate: Positive = EMERGENCY_RATE
     off_speed: bounded(gt=0, lt=1) = OFF_SPEED  # of rated rotor speed
+    start_rate: Positive = START_RATE  # rad/s
+    # of rated rotor speed; None: where the torque law begins, its cut_in_speed
+    connect_speed: bounded(gt=0, lt=1) | None = None
 
     def _problems(self):
         for name in ("overspeed", "overpower"):

@@ -18,6 +18,7 @@ FILE_UNITS = {
     "maximum_deg": ("maximum", DEGREE),
     "limit_deg": ("limit", DEGREE),
     "normal_rate_deg_per_s": ("normal_rate", DEGREE),
+    "start_rate_deg_per_s": ("start_rate", DEGREE),
     "emergency_rate_deg_per_s": ("emergency_rate", DEGREE),
     "azimuth_deg": ("azimuth", DEGREE),
     "shaft_tilt_deg": ("shaft_tilt", DEGREE),

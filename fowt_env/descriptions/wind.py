@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import create_model
 
-from fowt_env.descriptions.checks import check_in_range, parse_number, short
+from fowt_env.descriptions.checks import check_in_range, check_whole_number, parse_number, short
 from fowt_env.descriptions.files import json_text
 from fowt_env.descriptions.iec import REFERENCE_SPEED, TURBULENCE_INTENSITY
 from fowt_env.descriptions.records import (
@@ -20,6 +20,7 @@ from fowt_env.descriptions.records import (
     Record,
     Seed,
     array,
+    checked,
     in_range,
     one_of,
     samples,
@@ -45,6 +46,7 @@ START = (in_range(0.0, 1e6, "s"), 60.0)
 SIGN = (one_of((1, -1)), 1)
 COMPONENT = (samples(-SPEED_LIMIT, SPEED_LIMIT, "m/s") | None, None)
 SEED = (Seed | None, None)
+Points = checked(check_whole_number, "a whole number in [8, 64]", 8, 64)  # of a box's grid in each direction
 SHIFT = (in_range(0.0, 1e5, "s") | None, None)
 SHEAR_EXPONENT = (in_range(0.0, 1.0) | None, None)
 RANDOM = {  # keys of every turbulent wind
@@ -106,7 +108,10 @@ KINDS = {
     ),
     "ewm": _uniform(
         '{"kind": "ewm"}', "extreme wind of 50 years or one, steady or turbulent: a parked turbine",
-        {"turbine_class": TURBINE_CLASS, "recurrence": (one_of((50, 1)), 50), "turbulent": (Flag, False)}
+        {
+            "turbine_class": TURBINE_CLASS, "recurrence": (one_of((50, 1)), 50), "turbulent": (Flag, False),
+            "speed": (in_range(*MOVING_SPEEDS) | None, None),  # of a site; None: of the class
+        }
         | RANDOM,
     ),
     "steps": _uniform(
@@ -133,7 +138,9 @@ FIELD_KINDS = {
         "mann:18:B", "full-field Mann turbulence (needs the extra mann)",
         {
             "speed": MOVING, "class": TURBULENCE_CLASS, "sigma": NTM_SIGMA, "seed": SEED,
-            "dt": (in_range(0.05, 1.0, "s"), 0.2), "shear_exponent": SHEAR_EXPONENT,
+            "dt": (in_range(0.05, 5.0, "s"), 0.2), "shear_exponent": SHEAR_EXPONENT,
+            "model": (one_of(("ntm", "etm", "ewm")), "ntm"), "turbine_class": TURBINE_CLASS,
+            "direction": DIRECTION, "points": (Points, 32),
         },
     ),
     "box": _kind(

@@ -1,6 +1,7 @@
 """Provides the Gymnasium environments of fowt_env with their tasks and Markdown tables."""
 
 from fowt_env.envs.env import FowtEnv
+from fowt_env.envs.jacobians import PeriodJacobian, PeriodJacobians
 from fowt_env.envs.objectives import FowtObjectivesEnv
 from fowt_env.envs.safety import SafetyCosts, SafetyLayer
 from fowt_env.envs.settings import (
@@ -22,6 +23,8 @@ __all__ = [
     "FowtObjectivesEnv",
     "FowtVectorEnv",
     "InterfaceSettings",
+    "PeriodJacobian",
+    "PeriodJacobians",
     "PlantSettings",
     "SafetyCosts",
     "SafetyLayer",

@@ -68,14 +68,15 @@ from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Task, draw_faults, task_of
 from fowt_env.errors import InputError, unknown
 from fowt_env.loop.interface import Interface, interface_data
-from fowt_env.loop.protection import Watch
+from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START, Watch
 from fowt_env.loop.sensing import open_sensors
 from fowt_env.plant.advance import STOP_REASONS, TRIPPED, output
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import counted
 from fowt_env.plant.measurement import Measurement
 from fowt_env.plant.state import N_COMMANDS, Command, State
-from fowt_env.run.interface import guard_of, law_wind_ahead, wind_ahead_of
+from fowt_env.run.initial_conditions import initial_state
+from fowt_env.run.interface import guard_of, law_wind_ahead, starts_parked, wind_ahead_of
 from fowt_env.run.outcome import run_frame, stop_facts, trip_name
 from fowt_env.run.simulation import check_duration, steps_in
 from fowt_env.scene.build import build_scene
@@ -302,8 +303,17 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def is_stopping(self) -> bool:
-        """Return whether a trip or a fault is stopping the turbine, so that actions are ignored."""
-        return self.is_protected and bool(self._episode.link.watch[Watch.STOP] >= 0.0)
+        """Return whether the turbine is being stopped or started, so that actions are ignored."""
+        if not self.is_protected:
+            return False
+        watch = self._episode.link.watch
+        return bool(watch[Watch.STOP] >= 0.0 or PRODUCTION < watch[START] < LOADING)
+
+    def hand_over(self) -> None:
+        """End a start-up that has reached the speed of connection: loops restart, and actions count."""
+        if self.is_protected and self._episode.link.watch[START] == READY:
+            self._episode.link.watch[START] = LOADING
+            self.restart_loops()
 
     def twin(self) -> "FowtEnv":
         """Return a new environment with the same settings, not reset; constant parts are shared."""
@@ -377,7 +387,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         """
         if self._limits is None:
             return None
-        return guard_of(scene, self._limits, faults, self._per_control * self.dt)
+        return guard_of(scene, self._limits, faults, self._per_control * self.dt, self._baseline)
 
     def _connect(self, scene, guard):
         """Return (Interface, WindAhead of the observation or None) of an episode in a scene's weather."""
@@ -446,6 +456,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             power = torque * reference.rotor_speed * turbine.drivetrain.gear_ratio
             usual = usual_deviations(turbine, scene.wind_speed)
             reference = Reference(*reference[:3], torque, power, *usual)
+        if starts_parked(episode.faults):
+            state, command = initial_state(scene, "parked")
         state, command = moved_state(scene, state, command, episode.offsets)
         guard = self._guard(scene, episode.faults)
         return Start(episode, scene, self._nominal_in(scene), state, command, reference, guard)
@@ -531,6 +543,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         status, reward = act(self._handle, self._baseline_law, self._estimator_law, requested)
         if status == BAD_ACTION:
             raise InputError(f"action = {action!r}: must be finite")
+        self.hand_over()
         return self._result(status, reward)
 
     def _not_running(self):
@@ -560,7 +573,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             values = ", ".join(repr(float(value)) for value in blade_pitch)
             raise InputError(f"torque = {float(torque)!r}, blade_pitch = {values}: must be finite")
         self._units.see(float(command[0]), float(command[1]), self._episode.x[State.ROTOR_SPEED])
-        return self._result(*act_physical(self._handle, self._estimator_law, command))
+        outcome = act_physical(self._handle, self._estimator_law, command)
+        self.hand_over()
+        return self._result(*outcome)
 
     def _result(self, status, reward):
         """Return what step returns, from the status and reward of a control period."""

@@ -23,7 +23,7 @@ from fowt_env.envs.observations import ObservationMap, fill_observation, fill_si
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.loop.interface import Interface, InterfaceData
 from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
-from fowt_env.loop.protection import has_ended, is_stopping, stop_turbine
+from fowt_env.loop.protection import has_ended, is_supervised, supervise_turbine
 from fowt_env.loop.sensing import WindAhead, read_wind_ahead
 from fowt_env.plant.advance import (
     NON_FINITE,
@@ -254,8 +254,8 @@ def rate_period(goals, failed, scales, episode):
 def act_for_period(config, episode, baseline_law, estimator_law):
     """Advance one control period under episode.action. Returns (status, reward)."""
     model, link, interface = config.model, episode.link, config.interface
-    if is_stopping(interface.guard, link):
-        stop_turbine(episode.x, interface.guard, link)
+    if is_supervised(interface.guard, link):
+        supervise_turbine(episode.x, interface.guard, link)
     else:
         show_command(episode.u, interface, config.actions.individual, model.pitches, link)
         command_of(
@@ -307,7 +307,7 @@ def act(handle, baseline_law, estimator_law, action):
 
     baseline_law, estimator_law: Handles whose data is the control kernel, or None; passing the kernel
     directly from Python takes ten times as long. With the status BAD_ACTION nothing is changed. While the
-    guard stops the turbine, the action is ignored.
+    guard stops or starts the turbine, the action is ignored.
     """
     config, episode = model_of(handle), data_of(handle)
     return act_for_decision(
@@ -323,8 +323,8 @@ def act_physical(handle, estimator_law, command):
     """
     config, episode = model_of(handle), data_of(handle)
     link, interface = episode.link, config.interface
-    if is_stopping(interface.guard, link):
-        stop_turbine(episode.x, interface.guard, link)
+    if is_supervised(interface.guard, link):
+        supervise_turbine(episode.x, interface.guard, link)
     else:
         copy_into(link.command, command)
     apply_period(config, episode)

@@ -14,7 +14,7 @@ CARRIED = {
     ),
     "link": ("measurement", "reading", "law_reading", "command", "past", "motion", "watch", "held"),
     "data": (
-        "lines", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples",
+        "lines", "flood", "counters", "stages", "cache", "added_mass", "matrix", "user", "history", "samples",
         "radiation", "blades", "elastic", "slow",
     ),
     "decided": ("observations", "seen", "smoothed", "lasting", "wind", "decision"),

@@ -26,7 +26,8 @@ from fowt_env.weather.wind_field import is_field
 
 SITE = "gulf_of_maine_normal"
 LARGEST_SEED = 2**31  # exclusive upper limit of weather seeds
-RANGED, FAR = ("time", "delay", "rate", "offset", "value"), 1e9  # keys of a fault that may be ranges
+# keys of a fault that may be ranges
+RANGED, FAR = ("time", "delay", "rate", "offset", "value", "mass", "duration"), 1e9
 SAMPLED = ("series", "steps", "components")  # kinds with lists of data, never ranges
 OFFSETS = tuple(name for name, (index, _) in INITIAL.items() if not State.VX <= index <= State.WZ)
 

@@ -290,6 +290,9 @@ class FowtVectorEnv(gymnasium.vector.VectorEnv):
                 bad = act_all_parallel(*arguments, self.threads)
         if bad >= 0:
             raise InputError(f"action of environment {bad} = {requested[bad].tolist()}: must be finite")
+        if self.envs[0].is_protected:
+            for env in self.envs:
+                env.hand_over()
 
     def _infos(self, infos, shown, terminations):
         """Add the step infos of the shown environments to infos, in the format of _add_info."""

@@ -31,7 +31,7 @@ class InterfaceData(NamedTuple):
     measurement: np.ndarray  # (n,) of the current control instant
     reading: np.ndarray  # (n,) output of the sensors; without sensors the measurement itself
     law_reading: np.ndarray  # (n + leads,) input of the law; without a law the reading itself
-    command: np.ndarray  # (n_commands,) of the law or a stop, before faults and generator limits
+    command: np.ndarray  # (n_commands,) of the law, a stop or a start-up, before faults and generator limits
     past: np.ndarray | None  # memory of the sensors (new_past); None without sensors
     motion: np.ndarray | None  # memory of a lidar on the nacelle (WindAhead); None without a law
     watch: np.ndarray | None  # (N_WATCH,) memory of the protection; None without a guard
@@ -52,7 +52,7 @@ def interface_data(interface, n_state, n_commands, size):
         command=np.zeros(n_commands),
         past=None if sensors is None else new_past(sensors.chain),
         motion=None if ahead is None else ahead.new_memory(),
-        watch=None if guard is None else new_watch(),
+        watch=None if guard is None else new_watch(guard),
         held=None if guard is None else np.full(len(guard.faults), np.nan),
         dx=np.zeros(n_state),
     )

@@ -1,13 +1,21 @@
 """Defines the control period: no other file orders its parts.
 
 begin_period: check the trips, read the sensors, apply sensor faults, fill the input of the law.
-Then the law or a stop writes InterfaceData.command.
-apply_command: apply pitch-drive faults, limit the torque; the plant then advances under u.
+Then the law, a stop or a start-up writes InterfaceData.command.
+apply_command: apply faults of platform and pitch drives, limit the torque; the plant then advances under u.
 """
 
 from math import isfinite
 
-from fowt_env.loop.protection import break_drives, break_sensors, is_stopping, off_grid, watch_turbine
+from fowt_env.loop.protection import (
+    break_drives,
+    break_sensors,
+    damage_platform,
+    is_supervised,
+    loaded_torque,
+    off_grid,
+    watch_turbine,
+)
 from fowt_env.loop.sensing import inform_law, take_reading
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.drivetrain import followed_torque, lose_torque, torque_was_limited
@@ -18,7 +26,7 @@ from fowt_env.plant.state import BLADES, Command
 
 @kernel
 def begin_period(period, t, x, model, interface, link):
-    """Begin a control period after its measurement. Returns whether the turbine is being stopped.
+    """Begin a control period after its measurement. Returns whether the turbine is being stopped or started.
 
     period: number of control instants before this one; t: time, s.
     """
@@ -26,7 +34,7 @@ def begin_period(period, t, x, model, interface, link):
     take_reading(interface.sensors, period, link.measurement, link.past, link.reading)
     break_sensors(t, interface.guard, link)
     inform_law(interface.hidden, interface.ahead, period, t, link)
-    return is_stopping(interface.guard, link)
+    return is_supervised(interface.guard, link)
 
 
 @kernel
@@ -73,20 +81,22 @@ def hide_pitches(hidden, individual, pitches, command):
 
 @kernel
 def apply_command(t, x, u, model, data, interface, link):
-    """Fill u with link.command after pitch-drive faults and torque limits, for the control period from t (s).
+    """Fill u with link.command after faults and torque limits, for the control period from t (s).
 
     On entry u holds the torque in force. Off the grid the torque is zero at once, whatever the command.
     """
     torque, command = u[Command.GENERATOR_TORQUE], link.command[Command.GENERATOR_TORQUE]
     for i in range(Command.BLADE_PITCH, u.shape[0]):
         u[i] = link.command[i]
+    damage_platform(t, interface.control_dt, interface.guard, data)
     break_drives(t, x, u, model, interface.guard, link)
     if off_grid(t, interface.guard, link):
         u[Command.GENERATOR_TORQUE] = 0.0
         data.cache[LoadCache.TORQUE_LIMITED] = 0.0
         lose_torque(x, model.converter)
         return
-    reached = followed_torque(torque, command, interface.control_dt, model.generator)
+    allowed = loaded_torque(command, interface.guard, link)
+    reached = followed_torque(torque, allowed, interface.control_dt, model.generator)
     u[Command.GENERATOR_TORQUE] = reached
     limited = torque_was_limited(reached, command, model.generator)
     data.cache[LoadCache.TORQUE_LIMITED] = 1.0 if limited else 0.0

@@ -1,4 +1,4 @@
-"""Models protection and faults of a turbine: trips, stops, faults of pitch drives and of sensors.
+"""Models protection and faults of a turbine: trips, stops, start-up, faults of drives, sensors and platform.
 
 All of them act at control instants, in the order of loop/period.py. Python builds a Guard per run
 (build_guard), whose memory is in InterfaceData: watch and held.
@@ -14,12 +14,20 @@ from fowt_env.plant.blade_pitches import halt_blade, pitch_of
 from fowt_env.plant.channels import acceleration_at
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.compile.handle import by_reference
-from fowt_env.plant.drivetrain import clamp
+from fowt_env.plant.drivetrain import TorqueCurve, clamp, generator_torque
 from fowt_env.plant.elastic.tower import bend_of, nacelle_rates, turned_pose
+from fowt_env.plant.hydro.flooding import add_point_mass
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.model import LoadCache
+from fowt_env.plant.mooring import is_lost, lose_line
 from fowt_env.plant.state import BLADES, Command, State, pose_of
 
 ROUNDING = 1e-9  # s, tolerance in comparisons of times
+# stages of a start-up, in InterfaceData.watch[START]: none, or ended; idling until the ordered time; blades
+# pitch towards fine; the rotor has the speed at which the law, once reset, takes over; the law commands, with
+# a torque of at most the torque curve of fine pitch
+PRODUCTION, PARKED, RUN_UP, READY, LOADING = 0, 1, 2, 3, 4
+LONGEST_LOADING = 60.0  # s: a load stage in ROSCO's example of a start-up
 
 
 class Trip(IntEnum):
@@ -57,6 +65,7 @@ class Failure(IntEnum):
     BIAS = 3  # a value adds to a reading
     FREEZE = 4  # a reading keeps its value
     LOSS = 5  # a reading is zero
+    LINE_LOSS = 6  # a mooring line breaks at its fairlead
 
 
 class Part(IntEnum):
@@ -64,9 +73,20 @@ class Part(IntEnum):
 
     KIND = 0  # Failure
     TIME = 1  # s, onset
-    PLACE = 2  # blade (0, 1, 2), or field of the measurement
+    PLACE = 2  # blade (0, 1, 2), field of the measurement, or mooring line from 0
     VALUE = 3  # offset (rad) or bias (SI); end of a runaway: below zero fine, above feather
     BACKUP = 4  # 1: in an emergency stop the blade still feathers, by its backup drive
+
+
+class Flood(IntEnum):
+    """Enumerates the columns of Guard.floods."""
+
+    TIME = 0  # s, at which the compartment begins to fill
+    DURATION = 1  # s of filling at a constant rate; 0: full at once
+    MASS = 2  # kg of water when full
+    X = 3  # m, its centre in body axes
+    Y = 4
+    Z = 5
 
 
 class Watch(IntEnum):
@@ -78,10 +98,12 @@ class Watch(IntEnum):
     TORQUE = 3  # N m at the start of a stop; zero once the generator is off
     SPEED = 4  # rotor speed at the start of a stop, rad/s
     SINCE = 5  # s, of each trip: time from which its limit is exceeded; infinite: not exceeded
-    TARGET = 9  # rad, of each blade: pitch command of a stop
+    TARGET = 9  # rad, of each blade: pitch command of a stop or a start-up
 
 
-N_WATCH = Watch.TARGET + BLADES
+# further entries: stage of the start-up, and the time (s) of its stage READY; infinite: not yet
+START, CONNECTED = Watch.TARGET + BLADES, Watch.TARGET + BLADES + 1
+N_WATCH = CONNECTED + 1
 
 
 @by_reference
@@ -95,11 +117,19 @@ class Guard(NamedTuple):
     off_speed: float  # rad/s, rotor speed at which a normal stop disconnects the generator
     grid_loss: float  # s, time of the grid loss
     faults: np.ndarray  # (n, len(Part))
+    floods: np.ndarray  # (n, len(Flood))
+    start: float  # s, time of an ordered start-up, before which the turbine idles; infinite: none
+    start_rate: float  # rad per control period, pitch rate of a start-up
+    fine: float  # rad, pitch at which it ends
+    connect_speed: float  # rad/s, rotor speed at which the generator is connected
+    curve: TorqueCurve  # which limits the torque of a start-up until the rotor has its speed
 
 
-def new_watch():
-    """Return the initial InterfaceData.watch, with neither trip nor stop."""
+def new_watch(guard):
+    """Return the initial InterfaceData.watch of a run, with neither trip nor stop."""
     watch = np.zeros(N_WATCH)
+    watch[START] = PRODUCTION if isinf(guard.start) else PARKED
+    watch[CONNECTED] = inf
     watch[Watch.TRIPPED_AT] = inf
     watch[Watch.STOP] = Stop.NONE
     watch[Watch.SINCE : Watch.SINCE + len(Trip)] = inf
@@ -107,9 +137,21 @@ def new_watch():
 
 
 def build_guard(
-    trips=None, ordered=(inf, inf), rates=(0.0, 0.0), feathered=0.0, off_speed=0.0, grid_loss=inf, faults=None
+    trips=None,
+    ordered=(inf, inf),
+    rates=(0.0, 0.0),
+    feathered=0.0,
+    off_speed=0.0,
+    grid_loss=inf,
+    faults=None,
+    floods=None,
+    start=inf,
+    start_rate=0.0,
+    fine=0.0,
+    connect_speed=0.0,
+    curve=None,
 ):
-    """Return the Guard of a run; the defaults have no trips, stops or faults."""
+    """Return the Guard of a run; the defaults have no trips, stops, start-up or faults."""
     if trips is None:
         trips = [(inf, 0.0, Stop.EMERGENCY)] * len(Trip)
     return Guard(
@@ -120,6 +162,12 @@ def build_guard(
         float(off_speed),
         float(grid_loss),
         np.array(faults or np.zeros((0, len(Part))), dtype=np.float64),
+        np.array(floods or np.zeros((0, len(Flood))), dtype=np.float64),
+        float(start),
+        float(start_rate),
+        float(fine),
+        float(connect_speed),
+        TorqueCurve(*[0.0] * len(TorqueCurve._fields)) if curve is None else curve,
     )
 
 
@@ -216,14 +264,40 @@ def watch_turbine(t, x, model, guard, link):
                 pitch = pitch_of(blade, x, model.pitches) - encoder_offset(blade, t, guard)
                 watch[Watch.TARGET + blade] = pitch
         watch[Watch.STOP] = stop
+        watch[START] = PRODUCTION
+    elif watch[START] > PRODUCTION:
+        watch_start(t, x, model, guard, link.measurement, watch)
 
 
 @kernel
-def is_stopping(guard, link):
-    """Return whether the turbine is being stopped: commands of the law are then ignored."""
+def watch_start(t, x, model, guard, measurement, watch):
+    """Advance the stage of a start-up at a control instant.
+
+    It ends at the speed of region 3, once the blades are at fine pitch, where the torque law follows the
+    rotor speed, or LONGEST_LOADING after the connection, for controllers that hold another speed.
+    """
+    if watch[START] == LOADING:
+        done = measurement[Measure.GENERATOR_SPEED] >= guard.curve.region3_start_speed
+        done = done or t - watch[CONNECTED] >= LONGEST_LOADING - ROUNDING
+        if done or measurement[Measure.BLADE_PITCH] < guard.curve.region3_min_pitch:
+            watch[START] = PRODUCTION
+    elif watch[START] < RUN_UP:
+        for blade in range(BLADES):
+            pitch = pitch_of(blade, x, model.pitches) - encoder_offset(blade, t, guard)
+            watch[Watch.TARGET + blade] = pitch
+        if t >= guard.start - ROUNDING:
+            watch[START] = RUN_UP
+    elif x[State.ROTOR_SPEED] >= guard.connect_speed:
+        watch[START] = READY  # until LOADING, when the controller has been reset
+        watch[CONNECTED] = min(watch[CONNECTED], t)
+
+
+@kernel
+def is_supervised(guard, link):
+    """Return whether the turbine is being stopped or started: commands of the law are then ignored."""
     if guard is None:
         return False
-    return link.watch[Watch.STOP] >= 0.0
+    return link.watch[Watch.STOP] >= 0.0 or PRODUCTION < link.watch[START] < LOADING
 
 
 @kernel
@@ -243,10 +317,31 @@ def off_grid(t, guard, link):
 
 
 @kernel
-def stop_turbine(x, guard, link):
-    """Command the stop: blades feather from their pitch at its start, the torque falls with rotor speed."""
+def supervise_turbine(x, guard, link):
+    """Command the stop or the start-up that is under way."""
     if guard is None:
         return
+    if link.watch[Watch.STOP] < 0.0:
+        start_turbine(guard, link.watch, link.command)
+    else:
+        stop_turbine(x, guard, link)
+
+
+@kernel
+def start_turbine(guard, watch, command):
+    """Command a start-up: no torque, and from the run-up on blades that pitch from feather towards fine."""
+    rate = guard.start_rate if watch[START] >= RUN_UP else 0.0
+    for blade in range(BLADES):
+        target = max(watch[Watch.TARGET + blade] - rate, guard.fine)
+        watch[Watch.TARGET + blade] = target
+        if Command.BLADE_PITCH + blade < command.shape[0]:
+            command[Command.BLADE_PITCH + blade] = target
+    command[Command.GENERATOR_TORQUE] = 0.0
+
+
+@kernel
+def stop_turbine(x, guard, link):
+    """Command the stop: blades feather from their pitch at its start, the torque falls with rotor speed."""
     watch, command = link.watch, link.command
     emergency = int(watch[Watch.STOP]) == Stop.EMERGENCY
     rate = guard.rates[1] if emergency else guard.rates[0]
@@ -261,6 +356,67 @@ def stop_turbine(x, guard, link):
     span = max(watch[Watch.SPEED] - guard.off_speed, ROUNDING)
     fraction = clamp((speed - guard.off_speed) / span, 0.0, 1.0)
     command[Command.GENERATOR_TORQUE] = watch[Watch.TORQUE] * fraction
+
+
+@kernel
+def loaded_torque(torque, guard, link):
+    """Return the generator torque (N m) of a command, in a start-up at most that of the torque curve.
+
+    Torque laws with constant torque above a blade pitch would stop a rotor that is still slow.
+    """
+    if guard is None:
+        return torque
+    if link.watch[START] != LOADING or not isfinite(torque):
+        return torque
+    return min(torque, generator_torque(link.measurement[Measure.GENERATOR_SPEED], 0.0, guard.curve))
+
+
+@kernel
+def damage_platform(t, control_dt, guard, data):
+    """Break mooring lines and fill flooded compartments at a control instant.
+
+    A line that breaks and a compartment that fills at once are jumps of the load, at which the multistep
+    integrators start again.
+    """
+    if guard is None:
+        return
+    for k in range(guard.faults.shape[0]):
+        line = int(guard.faults[k, Part.PLACE])
+        if kind_now(k, t, guard) == Failure.LINE_LOSS and not is_lost(line, data.lines):
+            lose_line(line, data.lines)
+            data.cache[LoadCache.VALID] = data.cache[LoadCache.STEPS] = 0.0
+    fill_compartments(t, control_dt, guard.floods, data)
+
+
+@kernel
+def water_in(k, t, floods):
+    """Return the mass (kg) of water in compartment k, which fills at a constant rate."""
+    late, duration = t - floods[k, Flood.TIME], floods[k, Flood.DURATION]
+    if late < -ROUNDING:
+        return 0.0
+    if late >= duration:
+        return floods[k, Flood.MASS]
+    return max(late, 0.0) / duration * floods[k, Flood.MASS]
+
+
+@kernel
+def fill_compartments(t, control_dt, floods, data):
+    """Set the mass matrix of the water in the flooded compartments at a control instant."""
+    total = 0.0
+    for k in range(floods.shape[0]):
+        total += water_in(k, t, floods)
+    if total == data.flood[0, 0]:
+        return
+    for i in range(6):
+        for j in range(6):
+            data.flood[i, j] = 0.0
+    for k in range(floods.shape[0]):
+        x, y, z = floods[k, Flood.X], floods[k, Flood.Y], floods[k, Flood.Z]
+        add_point_mass(water_in(k, t, floods), x, y, z, data.flood)
+        late = t - floods[k, Flood.TIME]
+        if floods[k, Flood.DURATION] == 0.0 and -ROUNDING <= late < control_dt - ROUNDING:
+            data.cache[LoadCache.STEPS] = 0.0
+    data.cache[LoadCache.VALID] = 0.0
 
 
 @kernel

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
-from fowt_env.loop.protection import has_ended, is_stopping, stop_turbine
+from fowt_env.loop.protection import has_ended, is_supervised, supervise_turbine
 from fowt_env.plant.advance import BAD_COMMAND, RUNNING, TRIPPED, observe_plant, output_plant, status_of
 from fowt_env.plant.blade_pitches import spread_command
 from fowt_env.plant.compile.decorators import entry, kernel
@@ -20,11 +20,12 @@ class Schedule(NamedTuple):
     last: int  # step at which the run ends, with a row
     individual: bool = False  # whether the law commands each blade, else one pitch for all
     external: bool = False  # whether commands come from an external controller, after begin_command
+    begun: bool = False  # whether begin_command has begun the first control period of a rollout
 
 
 @kernel
 def observe_and_begin(step, model, data, x, u, interface, link, schedule):
-    """Measure at a control instant and begin its period. Returns whether the turbine is being stopped."""
+    """Measure at a control instant and begin its period. Returns whether the law is not to command."""
     t = step * schedule.dt
     observe_plant(model, data, x, u, t, link.dx, link.measurement)
     return begin_period(step // schedule.per_control, t, x, model, interface, link)
@@ -34,7 +35,7 @@ def observe_and_begin(step, model, data, x, u, interface, link, schedule):
 def begin_command(handle, x, u, linked, schedule, step):
     """Begin a control period for an external controller; link.command then holds the command in force.
 
-    Returns whether the turbine is being stopped: commands of the controller are then ignored.
+    Returns whether the turbine is being stopped or started: commands of the controller are then ignored.
     """
     model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
     stopping = observe_and_begin(step, model, data, x, u, interface, link, schedule)
@@ -51,8 +52,8 @@ def rollout(handle, x, u, law, parameters, memory, linked, schedule, first, end,
     linked      Handle of the run's Interface and InterfaceData
     out         (k, n_channels) output rows, SI
     Returns (status, step reached, rows written). x (n_state,), u, memory and the InterfaceData are updated.
-    While the guard stops the turbine, the law is not called. With schedule.external, begin_command has begun
-    the period of `first`, and no other control instant may lie before end.
+    While the guard stops or starts the turbine, the law is not called. With schedule.external, begin_command
+    has begun the period of `first`, and no other control instant may lie before end.
     """
     model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
     dt, rows = schedule.dt, 0
@@ -62,13 +63,13 @@ def rollout(handle, x, u, law, parameters, memory, linked, schedule, first, end,
         if step == end and not ending:
             break
         if ending or step % schedule.per_control == 0:
-            if ending or not schedule.external:
+            if ending or not (schedule.external or (schedule.begun and step == first)):
                 observe_and_begin(step, model, data, x, u, interface, link, schedule)
             if has_ended(interface.guard, link):
                 return TRIPPED, step, rows
         if not ending and step % schedule.per_control == 0:
-            if is_stopping(interface.guard, link):
-                stop_turbine(x, interface.guard, link)
+            if is_supervised(interface.guard, link):
+                supervise_turbine(x, interface.guard, link)
             else:
                 if not schedule.external:
                     show_command(u, interface, schedule.individual, model.pitches, link)

@@ -29,7 +29,7 @@ def follow(x, y, half, dt, model, data):
     """Fill y, of known motion of the platform, with the followers a step dt (half: half of it) after x."""
     plane = model.rigid_body.plane
     memory_after(x, y, half, plane, model.hydro, data.radiation)
-    lines_after(x, y, 0.5 * dt if half else dt, plane, model.mooring, data.line_work)
+    lines_after(x, y, 0.5 * dt if half else dt, plane, model.mooring, data.lines, data.line_work)
 
 
 @inlined_kernel
@@ -37,4 +37,4 @@ def end_followers(x, dt, model, data):
     """Advance the followers of x to the end of a step of dt; all other states of x are already there."""
     plane = model.rigid_body.plane
     end_memory(x, plane, model.hydro, data.radiation)
-    end_lines(x, dt, plane, model.mooring, data.line_work)
+    end_lines(x, dt, plane, model.mooring, data.lines, data.line_work)

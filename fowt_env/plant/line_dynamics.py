@@ -15,7 +15,15 @@ import numpy as np
 
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
-from fowt_env.plant.mooring import SUSPENDED, TOUCHDOWN, line_shape, line_state, mooring_load
+from fowt_env.plant.mooring import (
+    REGIME,
+    SUSPENDED,
+    TOUCHDOWN,
+    is_lost,
+    line_shape,
+    line_state,
+    mooring_load,
+)
 from fowt_env.plant.state import NO_LOAD, Wrench, pose_in, to_body, to_inertial
 
 PER_NODE = 6  # states of an inner node
@@ -298,12 +306,17 @@ def _substeps(i, dt, fairlead, x, dynamics):
 
 
 @kernel
-def _advance(x, dt, plane, mooring, dynamics, work):
-    """Advance the lines of x by dt, whose platform is already there; work has the fairleads of the start."""
+def _advance(x, dt, plane, mooring, dynamics, lines, work):
+    """Advance the lines of x by dt, whose platform is already there; work has the fairleads of the start.
+
+    The states of a lost line, which no longer moves the platform, stay as they are.
+    """
     if dynamics.resting:
         return
     pose = pose_in(x, plane)
     for i in range(mooring.length.shape[0]):
+        if is_lost(i, lines):
+            continue
         old, new = work[STARTS + i], _fairlead(pose, i, mooring)
         count = _substeps(i, dt, old, x, dynamics)
         h = dt / count
@@ -355,7 +368,7 @@ def _put_anchor(i, x, mooring, dynamics, row):
     while lying < n and x[start + 2 * n + lying] <= dynamics.bed:
         lying += 1
     row[4] = dynamics.length[i] * lying
-    row[5] = TOUCHDOWN if lying else SUSPENDED
+    row[REGIME] = TOUCHDOWN if lying else SUSPENDED
 
 
 @kernel
@@ -363,6 +376,8 @@ def _dynamic_load(pose, x, mooring, dynamics, lines):
     """Return the wrench of moving lines, body axes, about the body origin; fill the rows of lines."""
     fx = fy = fz = mx = my = mz = 0.0
     for i in range(mooring.length.shape[0]):
+        if is_lost(i, lines):
+            continue
         X, Y, Z = _pull(i, _fairlead(pose, i, mooring), x, dynamics)
         lines[i, 0] = hypot(X, Y)
         lines[i, 1] = -Z
@@ -433,35 +448,35 @@ def begin_lines(x, plane, mooring, work):
 
 
 @kernel
-def _after(x, y, dt, plane, mooring, dynamics, work):
+def _after(x, y, dt, plane, mooring, dynamics, lines, work):
     if dynamics is None:
         return
     for k in range(dynamics.first, dynamics.first + PER_NODE * dynamics.begin[-1]):
         y[k] = x[k]
-    _advance(y, dt, plane, mooring, dynamics, work)
+    _advance(y, dt, plane, mooring, dynamics, lines, work)
 
 
 @inlined_kernel
-def lines_after(x, y, dt, plane, mooring, work):
+def lines_after(x, y, dt, plane, mooring, lines, work):
     """Fill y, of known motion of the platform, with the lines a time dt after x."""
     if mooring is None:
         return
-    _after(x, y, dt, plane, mooring, mooring.dynamics, work)
+    _after(x, y, dt, plane, mooring, mooring.dynamics, lines, work)
 
 
 @kernel
-def _end(x, dt, plane, mooring, dynamics, work):
+def _end(x, dt, plane, mooring, dynamics, lines, work):
     if dynamics is None:
         return
-    _advance(x, dt, plane, mooring, dynamics, work)
+    _advance(x, dt, plane, mooring, dynamics, lines, work)
 
 
 @inlined_kernel
-def end_lines(x, dt, plane, mooring, work):
+def end_lines(x, dt, plane, mooring, lines, work):
     """Advance the lines of x to the end of a step of dt; all other states of x are already there."""
     if mooring is None:
         return
-    _end(x, dt, plane, mooring, mooring.dynamics, work)
+    _end(x, dt, plane, mooring, mooring.dynamics, lines, work)
 
 
 # ---------------------------------------------------------------- equilibrium

@@ -84,11 +84,12 @@ N_CACHE = 50
 class Data(NamedTuple):
     """Holds the variables and work arrays of one plant.
 
-    lines, counters, cache, matrix, history, elastic, samples, radiation, slow and blades persist between
-    calls.
+    lines, flood, counters, cache, matrix, history, elastic, samples, radiation, slow and blades persist
+    between calls.
     """
 
-    lines: np.ndarray  # (n_lines, 6) mooring warm start and results
+    lines: np.ndarray  # (n_lines, 6) mooring warm start and results; a broken line stays mooring.LOST
+    flood: np.ndarray  # (6, 6) mass matrix of the water in flooded compartments, body axes; zero: none
     line_work: np.ndarray  # line_dynamics.line_work; empty with quasi-static lines
     counters: np.ndarray  # (N_COUNTERS,)
     kinematics: np.ndarray  # (7, n_nodes) water kinematics at the strip nodes

@@ -15,7 +15,9 @@ from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.events import Counter
 from fowt_env.plant.state import NO_LOAD, Wrench
 
-SLACK, TOUCHDOWN, SUSPENDED = 0, 1, 2  # regimes, as written to the last column of `lines`
+# regimes, as written to the last column of `lines`; LOST: the line broke at its fairlead and exerts no load
+SLACK, TOUCHDOWN, SUSPENDED, LOST = 0, 1, 2, 3
+REGIME = 5  # that column
 
 N_LINE = 6  # columns of `lines`: H, V, fairlead tension, anchor tension, length on seabed, regime
 
@@ -347,16 +349,33 @@ def line_state(x_f, z_f, i, mooring, table, start):
 
 
 @kernel
+def is_lost(i, lines):
+    """Return whether line i has broken at its fairlead: it exerts no load from then on."""
+    return lines[i, REGIME] == LOST
+
+
+@kernel
+def lose_line(i, lines):
+    """Break line i at its fairlead, with no tension left in its row of lines."""
+    for column in range(REGIME):
+        lines[i, column] = 0.0
+    lines[i, REGIME] = LOST
+
+
+@kernel
 def mooring_load(pose, mooring, lines, counters):
     """Return the wrench of all mooring lines, body axes, about the body origin (theory.md, 5.5).
 
-    lines: (n, N_LINE), kept between calls: the next call starts from its H; zeros: cold start.
+    lines: (n, N_LINE), kept between calls: the next call starts from its H; zeros: cold start; a line of the
+    regime LOST is left out.
     counters[MOORING_UNCONVERGED] counts lines that missed the tolerance.
     """
     if mooring is None:
         return NO_LOAD
     fx = fy = fz = mx = my = mz = 0.0
     for i in range(mooring.length.shape[0]):
+        if is_lost(i, lines):
+            continue
         bx = mooring.fairlead[i, 0]
         by = mooring.fairlead[i, 1]
         bz = mooring.fairlead[i, 2]
@@ -370,7 +389,7 @@ def mooring_load(pose, mooring, lines, counters):
         lines[i, 2] = line.fairlead_tension
         lines[i, 3] = line.anchor_tension
         lines[i, 4] = line.seabed_length
-        lines[i, 5] = line.regime
+        lines[i, REGIME] = line.regime
         if not line.converged:
             counters[Counter.MOORING_UNCONVERGED] += 1.0
         pull = line.H / x_f if x_f > 0.0 else 0.0  # a vertical line has no horizontal direction

@@ -6,6 +6,7 @@ four evaluations, an error of the order of the step's own (Adams-Bashforth 4).
 """
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.hydro.flooding import with_floods
 from fowt_env.plant.hydro.load import HydroLoad, hydro_load
 from fowt_env.plant.line_dynamics import lines_load
 from fowt_env.plant.model import LoadCache
@@ -20,6 +21,7 @@ FIRST = 7  # steps before four evaluations exist
 @inlined_kernel
 def _evaluated(t, pose, x, model, data):
     hydro = hydro_load(t, pose, x, model.hydro, data)
+    hydro = with_floods(pose, hydro, model.rigid_body.gravity, data.flood, data.added_mass)
     return hydro, lines_load(pose, x, model.mooring, data.lines, data.counters)
 
 

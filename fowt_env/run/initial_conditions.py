@@ -8,7 +8,7 @@ import numpy as np
 
 from fowt_env.analysis.blade_coordinates import bending_states, turned_to
 from fowt_env.analysis.equilibrium import impossible_place
-from fowt_env.analysis.trim import trim
+from fowt_env.analysis.trim import trim, trim_prescribed
 from fowt_env.descriptions.checks import check_number, refusal
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import (
@@ -21,7 +21,7 @@ from fowt_env.scene.actuators import rest_actuators
 from fowt_env.scene.channel_names import channel_name
 from fowt_env.scene.scene import Scene
 
-STARTS = ("trim", "zero")
+STARTS = ("trim", "zero", "parked")
 INITIAL = {  # channel: (state, factor to SI)
     "PtfmSurge": (State.SURGE, 1.0),
     "PtfmSway": (State.SWAY, 1.0),
@@ -48,8 +48,9 @@ def initial_state(
     """Return (state, command) at the beginning of a run.
 
     initial: "trim" (or None), the floating steady state in the mean wind; "zero", all states of platform,
-    tower and blade bending zero, with the rotor speed and blade pitch of that wind on a fixed platform; or
-    a mapping of absolute values of channels at the trim, or at {"start": "zero"}. Channels are named
+    tower and blade bending zero, with the rotor speed and blade pitch of that wind on a fixed platform;
+    "parked", the floating steady state with the rotor at rest, feathered blades and no torque; or a mapping
+    of absolute values of channels at the trim, or at {"start": "zero"} or "parked". Channels are named
     PtfmPitch or PtfmPitch_[deg]; BldPitch1 sets the pitch of all blades, with individual pitch that of
     blade 1; TTDspFA and TTDspSS bend the tower in its first modes only; OoPDefl and IPDefl of the blade tips
     (OoPDefl1: of blade 1) bend the blades in the first flapwise and the edgewise mode only, as in ElastoDyn.
@@ -58,12 +59,15 @@ def initial_state(
     facing away from the wind.
     """
     if not isinstance(initial, str | Mapping | None):
-        raise InputError(f"initial = {initial!r}: must be 'trim', 'zero' or a mapping of channels")
+        raise InputError(f"initial = {initial!r}: must be 'trim', 'zero', 'parked' or a mapping of channels")
     values = dict(initial) if isinstance(initial, Mapping) else {"start": initial or "trim"}
     start = values.pop("start", "trim")
     if start not in STARTS:
         raise unknown("start", start, STARTS)
-    point = trim(scene, platform="floating" if start == "trim" else "fixed")
+    if start == "parked":
+        point = trim_prescribed(scene, 0.0, scene.turbine.pitch_drive.maximum)
+    else:
+        point = trim(scene, platform="floating" if start == "trim" else "fixed")
     x, u = point.state.copy(), point.command.copy()
     known = INITIAL | {f"BldPitch{blade}": (i, DEGREE) for blade, i in enumerate(scene.pitch_states, 1)}
     if (tower := scene.model.tower) is not None:

@@ -1,7 +1,7 @@
 """Builds the interface of a run from descriptions: protection, faults, sensors and wind ahead."""
 
 from collections.abc import Sequence
-from math import exp, inf, isfinite, radians
+from math import exp, inf, isfinite, isinf, radians
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from fowt_env.errors import InputError
 from fowt_env.loop.interface import Interface
 from fowt_env.loop.protection import ROUNDING, Failure, Guard, Stop, Trip, build_guard
 from fowt_env.loop.sensing import WindAhead, no_wind_ahead
+from fowt_env.plant.drivetrain import build_torque_curve
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
 from fowt_env.plant.state import BLADES
 from fowt_env.scene.scene import Scene
@@ -28,11 +29,21 @@ FAILURES = {
     "sensor_bias": Failure.BIAS,
     "sensor_freeze": Failure.FREEZE,
     "sensor_loss": Failure.LOSS,
+    "line_loss": Failure.LINE_LOSS,
 }
 
 
-def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_dt: float) -> Guard:
-    """Return the Guard of a run: the trips of a protection, and the faults. Raises: InputError."""
+def guard_of(
+    scene: Scene,
+    limits: Protection,
+    faults: Sequence[Fault],
+    control_dt: float,
+    controller: Any = None,
+) -> Guard:
+    """Return the Guard of a run: the trips of a protection, and the faults. Raises: InputError.
+
+    controller: the law of the run, before it is prepared, which may have a start-up of its own; None: none.
+    """
     turbine, drive = scene.turbine, scene.turbine.pitch_drive
     units = {
         Trip.OVERSPEED: turbine.rated_rotor_speed,
@@ -59,7 +70,83 @@ def guard_of(scene: Scene, limits: Protection, faults: Sequence[Fault], control_
     off_speed = limits.off_speed * turbine.rated_rotor_speed
     losses = [fault.grid_loss for fault in faults if fault.grid_loss is not None]
     grid_loss = min(losses, default=inf) - ROUNDING
-    return build_guard(trips, ordered, steps, drive.maximum, off_speed, grid_loss, rows)
+    start, start_rate = _start_of(faults, limits, controller)
+    cut_in = turbine.torque_law.cut_in_speed / turbine.torque_law.rated_speed
+    connect = cut_in if limits.connect_speed is None else limits.connect_speed
+    return build_guard(
+        trips,
+        ordered,
+        steps,
+        drive.maximum,
+        off_speed,
+        grid_loss,
+        rows,
+        [_flood(scene, fault) for fault in faults if fault.kind == "flooded_compartment"],
+        start,
+        min(start_rate, drive.rate_limit) * control_dt,
+        drive.minimum,
+        connect * turbine.rated_rotor_speed,
+        None if isinf(start) else build_torque_curve(turbine.torque_law),
+    )
+
+
+def starts_parked(faults: Sequence[Fault]) -> bool:
+    """Return whether a run with these faults begins with a parked turbine: it has a start-up."""
+    return any(fault.kind == "start_up" for fault in faults)
+
+
+def _start_of(faults, limits, controller):
+    """Return (time, pitch rate rad/s) of the supervisor's start-up; an infinite time: none.
+
+    A controller with order_start_up(time) has a start-up of its own, and is told its time, or None.
+    """
+    ordered = [fault for fault in faults if fault.kind == "start_up"]
+    if len(ordered) > 1:
+        times = ", ".join(f"{fault.time:g}" for fault in ordered)
+        raise InputError(f"faults: start_up at {times} s: must be one in a run")
+    law = controller
+    while not hasattr(law, "order_start_up") and hasattr(law, "controller"):
+        law = law.controller
+    own = getattr(law, "order_start_up", None)
+    fault = ordered[0] if ordered else None
+    if fault is not None and fault.by == "controller" and own is None:
+        raise InputError(
+            f"faults: start_up: by = 'controller': controller {getattr(controller, 'name', None)!r} has no"
+            " start-up of its own; must be 'supervisor'"
+        )
+    if own is not None:
+        itself = fault is not None and fault.by != "supervisor"
+        if itself and fault.rate is not None:
+            raise InputError(
+                f"faults: start_up: rate = {fault.rate:g}: is a key of the supervisor's start-up (by ="
+                f" 'supervisor'), and controller {law.name!r} starts by its own"
+            )
+        own(fault.time if itself else None)
+        if itself:
+            return inf, 0.0
+    if fault is None:
+        return inf, 0.0
+    return fault.time, limits.start_rate if fault.rate is None else radians(fault.rate)
+
+
+def _flood(scene, fault):
+    """Return the row of Guard.floods of a Fault."""
+    where = "faults: flooded_compartment"
+    if scene.model.hydro is None:
+        raise InputError(f"{where}: needs a scene with hydrodynamics")
+    most, base = scene.model.rigid_body.mass, scene.model.layout.base_height
+    if fault.mass > most:
+        raise InputError(f"{where}: mass = {fault.mass:g} kg: must be at most {most:.4g} kg, the turbine's")
+    x, y, z = fault.point
+    if not -scene.platform.environment.water_depth <= z <= base:
+        depth = scene.platform.environment.water_depth
+        raise InputError(
+            f"{where}: point = {list(fault.point)}: z must be in [{-depth:g}, {base:g}] m, from the sea bed"
+            " to the base of the tower"
+        )
+    if scene.model.rigid_body.plane is not None and y != 0.0:
+        raise InputError(f"{where}: point = {list(fault.point)}: y must be 0 in a planar scene")
+    return (fault.time, fault.duration or 0.0, fault.mass, x, y, z)
 
 
 def _failures(scene, fault):
@@ -67,6 +154,11 @@ def _failures(scene, fault):
     if fault.kind not in FAILURES:
         return []
     kind, time = FAILURES[fault.kind], fault.time
+    if kind == Failure.LINE_LOSS:
+        count = scene.n_lines
+        if fault.line > count:
+            raise InputError(f"faults: line_loss: line = {fault.line}: the scene has {count} mooring lines")
+        return [(kind, time, fault.line - 1, 0.0, 0.0)]
     individual = scene.model.pitches is not None
     if fault.kind not in BLADE_FAULTS:
         fields = (*Measurement._fields, *(BladeMeasurement._fields if individual else ()))

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from fowt_env.descriptions.ratings import ratings
-from fowt_env.loop.protection import Stop, Trip, Watch
+from fowt_env.loop.protection import CONNECTED, Stop, Trip, Watch
 from fowt_env.plant.channels import Out
 from fowt_env.plant.events import counted
 from fowt_env.scene.scene import Scene
@@ -19,9 +19,13 @@ def trip_name(watch: np.ndarray) -> str:
 
 
 def stop_facts(watch: np.ndarray) -> dict[str, Any]:
-    """Return {"tripped": time (s) of the trip, "trip": its name, "stop": its kind}, None without one."""
+    """Return {"tripped": time (s) of the trip, "trip": its name, "stop": its kind}, None without one.
+
+    After a start-up also "connected": time (s) at which it connected the generator.
+    """
     tripped, stop = float(watch[Watch.TRIPPED_AT]), int(watch[Watch.STOP])
-    return {
+    connected = float(watch[CONNECTED])
+    return ({} if isinf(connected) else {"connected": connected}) | {
         "tripped": None if isinf(tripped) else tripped,
         "trip": None if isinf(tripped) else trip_name(watch),
         "stop": Stop(stop).name.lower() if stop >= 0 else None,

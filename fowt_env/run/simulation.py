@@ -36,6 +36,7 @@ from fowt_env.errors import (
     unknown_keyword,
 )
 from fowt_env.loop.interface import interface_data
+from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START
 from fowt_env.loop.rollout import Schedule, begin_command, rollout
 from fowt_env.plant.advance import RUNNING, STOP_REASONS, TRIPPED
 from fowt_env.plant.channels import Out
@@ -45,7 +46,7 @@ from fowt_env.plant.events import harm
 from fowt_env.plant.measurement import Measurement
 from fowt_env.plant.state import Command, State
 from fowt_env.run.initial_conditions import initial_state
-from fowt_env.run.interface import build_interface, guard_of
+from fowt_env.run.interface import build_interface, guard_of, starts_parked
 from fowt_env.run.outcome import run_frame, trip_name
 from fowt_env.scene.scene import Scene, check_scene
 from fowt_env.weather.preview import Preview
@@ -189,21 +190,23 @@ def build_run(
             f"faults: {listed[0].kind}: faults need a controller; with controller=None rotor speed and blade"
             " pitch are constant"
         )
-    if not without_controller:
+    if without_controller:
+        per_control = last  # no controller reads a measurement
+    else:
         controller = make(controller, scene.turbine, control_dt)
         check_pitches(controller, scene.model.pitches is not None)
+    period = per_control * dt
+    guard = guard_of(scene, limits, listed, period, controller)
+    if not without_controller:
         with _controller_errors():
             controller.prepare(known_scene(scene if nominal is None else nominal, controller, preview))
-    x, u = initial_state(scene, initial)
+    x, u = initial_state(scene, "parked" if initial is None and starts_parked(listed) else initial)
     if without_controller:
         scene = scene.with_model({"rigid_body.rotor_fixed": True})
         controller = HeldCommand(scene.model.pitches is not None)
-        per_control = last  # no controller reads a measurement
         chain = None
     external = not isinstance(controller, CompiledController)
     schedule = Schedule(float(dt), per_control, per_output, last, bool(controller.individual), external)
-    period = per_control * dt
-    guard = guard_of(scene, limits, listed, period)
     periods = -(-last // per_control)
     interface = build_interface(scene, controller, guard, chain, preview, period, periods)
     return Run(scene, controller, x, u, schedule, interface)
@@ -237,9 +240,10 @@ def simulate(
     duration    s; rows run from 0 to duration inclusive, every output_dt
     dt          physics step, s; must divide control_dt and output_dt, and output_dt the duration.
                 None: scene.dt (0.0125 s at fidelity "reference", 0.1 s at the others)
-    initial     "trim" (None): the steady state in the mean wind; "zero": platform and tower at zero; or a
-                mapping of absolute values of channels, {"PtfmPitch": 5.0}, at the trim, or at zero with
-                {"start": "zero", ...}
+    initial     "trim" (None): the steady state in the mean wind; "zero": platform and tower at zero;
+                "parked": the steady state with the rotor at rest and feathered blades (None with a start_up
+                among the faults); or a mapping of absolute values of channels, {"PtfmPitch": 5.0}, at the
+                trim, or at another of these with {"start": "zero", ...}
     progress    True shows a bar; a callable is called with the fraction done
     protection  trips by overspeed, overpower, tower-top acceleration and pitch deviation: "turbine" for those
                 of the turbine file, a mapping of its [protection] keys that override individual entries
@@ -249,7 +253,8 @@ def simulate(
                 stop without torque, in a normal one with a torque that falls with the rotor speed. The run
                 continues to its end, except where the trip's stop is "end". None: no trips
     faults      a Fault (fowt_env.descriptions.faults), a mapping of its keys, or a list of these: loss of the
-                grid, ordered stops, faults of pitch drives and of sensors. None: no faults
+                grid, ordered stops and start-up, faults of pitch drives and of sensors, mooring lines that
+                break, compartments that are flooded. None: no faults
     sensors     sensors that the controller reads: None or "exact" for exact measurements, the name of a
                 built-in chain ("standard") or a SensorChain (fowt_env.descriptions.sensors). Rows
                 are true motions; the noise follows from the scene's seed and is the same for every controller
@@ -271,7 +276,8 @@ def simulate(
     attrs["torque_limited"]: time (s) for which the generator torque differed from the command.
     attrs["tripped"]: time (s) at which the protection stopped the turbine, or None; attrs["trip"]: name of
     that trip, such as "overspeed"; attrs["stop"]: "normal" or "emergency" if a trip or a fault was stopping
-    the turbine at the end, else None; attrs["ratings"]: rated rotor speed, overspeed, rated power and rated
+    the turbine at the end, else None; attrs["connected"]: time (s) at which a start-up connected the
+    generator, if it did; attrs["ratings"]: rated rotor speed, overspeed, rated power and rated
     wind speed of the turbine (descriptions.ratings), marked in plots.
 
     Warns (PlantWarning) once of commands implausible in N m and rad; and at the end of a run with events that
@@ -354,19 +360,36 @@ class Run:
         try:
             while step < last:
                 began = perf_counter()
+                starting = self.is_starting
                 if schedule.external:
                     self._command(step)
-                step = self.roll(step, min(step + size, last))
-                if not schedule.external and perf_counter() - began < 0.25 * CHUNK_TIME:
+                elif starting:
+                    self.begin(step)
+                end = step + (schedule.per_control if starting else size)
+                step = self.roll(step, min(end, last), starting)
+                if not (schedule.external or starting) and perf_counter() - began < 0.25 * CHUNK_TIME:
                     size *= 4
                 report(step / last)
         except KeyboardInterrupt as interrupt:
             interrupt.frame = self.frame()  # the caller may keep the rows so far
             raise
 
+    @property
+    def is_starting(self):
+        """Return whether a start-up has not yet handed over to the controller."""
+        return PRODUCTION < self.link.watch[START] < LOADING
+
     def begin(self, step):
-        """Begin the control period of a step; return whether the turbine is being stopped."""
-        return begin_command(self.handle, self.x, self.u, self.linked, self.schedule, step)
+        """Begin the control period of a step; return whether the turbine is being stopped or started.
+
+        A start-up that has reached the speed of connection ends here: the controller is reset and takes over.
+        """
+        supervised = begin_command(self.handle, self.x, self.u, self.linked, self.schedule, step)
+        if self.link.watch[START] != READY:
+            return supervised
+        self.link.watch[START] = LOADING
+        self.controller.reset(self._reading())
+        return False
 
     def _reading(self):
         """Return the readings at the current control instant as the controller's view."""
@@ -382,10 +405,14 @@ class Run:
         self.link.command[: len(command)] = command
         self.units.see(command[0], command[1], self.x[State.ROTOR_SPEED])
 
-    def roll(self, first, end):
-        """Advance from step first to end; return the step reached. Raises: SimulationStopped."""
+    def roll(self, first, end, begun=False):
+        """Advance from step first to end; return the step reached. Raises: SimulationStopped.
+
+        begun: whether the control period of first has begun.
+        """
+        schedule = self.schedule._replace(begun=True) if begun else self.schedule
         status, step, count = rollout(
-            self.handle, self.x, self.u, *self.law, self.linked, self.schedule, first, end,
+            self.handle, self.x, self.u, *self.law, self.linked, schedule, first, end,
             self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count

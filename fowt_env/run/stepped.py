@@ -97,7 +97,7 @@ class SteppedRun:
     def advance(self, command: Sequence[float]) -> None:
         """Advance by one control period under a command in the units of command_columns.
 
-        While a trip, a fault or stop() is stopping the turbine, the command is ignored.
+        While a trip, a fault or stop() is stopping the turbine, or it starts up, the command is ignored.
         Raises: InputError for anything but finite numbers, one for each column, and after the end of the run;
         SimulationStopped as simulate.
         """

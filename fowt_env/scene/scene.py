@@ -178,6 +178,7 @@ class Scene:
         nodes = 0 if members is None else laid or len(members.nodes)
         return Data(
             lines=np.zeros((self.n_lines, 6)),
+            flood=np.zeros((6, 6)),
             line_work=line_work(self.model.mooring),
             counters=np.zeros(N_COUNTERS),
             kinematics=np.zeros((7, 0 if strips is None else strips.shape.nodes)),

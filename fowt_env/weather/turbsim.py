@@ -1,4 +1,4 @@
-"""Reads TurbSim full-field wind files (.bts) by openfast_io, after a check of the file header."""
+"""Reads TurbSim full-field wind files (.bts) by openfast_io, after a check of the header, and writes them."""
 
 import os
 import struct
@@ -77,3 +77,25 @@ def _check_head(path, where):
             f"{where}: spacings {dz:g} m, {dy:g} m, {dt:g} s, wind {speed:g} m/s, scales {scales}:"
             " all numbers of the header must be finite, these positive, and no scale zero"
         )
+
+
+def write_bts(path, velocity, y, z, dt, speed, hub_height, periodic, description="fowt_env"):
+    """Write a box of wind as a TurbSim file, with what read_bts returns; hub_height (m) is for the header.
+
+    Values have 16 bits: an error of at most half of 1/65534 of the span of each component. path: written
+    directly, not atomically. Raises: InputError for a box whose lowest point is below still water.
+    """
+    if z[0] < 0.0:
+        raise InputError(f"wind box: its lowest point is at z = {z[0]:g} m: must be at least 0")
+    low, high = (f(velocity.reshape(-1, 3), axis=0).astype(np.float64) for f in (np.min, np.max))
+    span = np.where(high > low, high - low, 1.0)
+    scale = (65534.0 / span).astype(np.float32)
+    offset = (-32767.0 - scale * low).astype(np.float32)
+    text = description.encode("ascii", "replace")
+    counts = (PERIODIC if periodic else NOT_PERIODIC, len(z), len(y), 0, len(velocity))
+    steps = (z[1] - z[0], y[1] - y[0], dt, speed, hub_height, z[0])
+    scales = np.stack([scale, offset], axis=1).reshape(-1)
+    with open(path, "wb") as file:
+        file.write(HEAD.pack(*counts, *steps, *scales, len(text)) + text)
+        for part in velocity:  # one instant at a time: less memory
+            file.write(np.clip(np.rint(part * scale + offset), -32768, 32767).astype("<i2").tobytes())

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from fowt_env.caches import cached
-from fowt_env.descriptions.iec import length_scale, ntm_sigma_at
+from fowt_env.descriptions.iec import etm_sigma, length_scale, ntm_sigma, ntm_sigma_at
 
 LENGTH_RATIO = np.array([8.1, 2.7, 0.66])  # L_u, L_v, L_w over Lambda_1 (IEC Annex B)
 SIGMA_RATIO = np.array([1.0, 0.8, 0.5])  # sigma of u, v, w over sigma_1 (IEC Annex B)
@@ -150,6 +150,20 @@ def drawn_ntm_sigma(speed, turbulence_class, seed):
     is gusty at every wind speed. seed: as in component_generator.
     """
     return ntm_sigma_at(speed, turbulence_class, component_generator(seed, SIGMA_STREAM).normal())
+
+
+def drawn_sigma(model, speed, values, seed):
+    """Return sigma_1 (m/s) of the turbulence model ntm, etm or ewm at a mean speed (m/s).
+
+    values: keys of the wind: class, turbine_class (etm) and sigma (ntm). seed: of a drawn sigma.
+    """
+    if model == "etm":
+        return etm_sigma(speed, values["class"], values["turbine_class"])
+    if model == "ewm":
+        return 0.11 * speed  # the turbulent extreme wind of IEC 61400-1
+    if values["sigma"] == "drawn":
+        return drawn_ntm_sigma(speed, values["class"], seed)
+    return ntm_sigma(speed, values["class"])
 
 
 def turbulence(

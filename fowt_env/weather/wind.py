@@ -12,12 +12,12 @@ import numpy as np
 
 from fowt_env.caches import cached
 from fowt_env.descriptions.checks import check_in_range, check_whole_number
-from fowt_env.descriptions.iec import EXTREME_SHEAR_EXPONENT, etm_sigma, extreme_speed, ntm_sigma
+from fowt_env.descriptions.iec import EXTREME_SHEAR_EXPONENT, extreme_speed
 from fowt_env.descriptions.wind import read_wind
 from fowt_env.errors import InputError
 from fowt_env.plant.aero.wind import LOWEST_HEIGHT, WindSeries
 from fowt_env.weather import gusts
-from fowt_env.weather.turbulence import SHORTEST_PERIOD, drawn_ntm_sigma, hub_turbulence, turbulence
+from fowt_env.weather.turbulence import SHORTEST_PERIOD, drawn_sigma, hub_turbulence, turbulence
 
 OPENING = 60.0  # s; the trim uses the mean of a user's series over this time
 
@@ -123,7 +123,7 @@ def nominal_speed(spec):
         return float(spec["speeds"][0])
     if spec.kind == "series":
         return _opening_mean(spec["time"], spec["speed"])
-    if spec.kind == "ewm":
+    if spec.kind == "ewm" and spec["speed"] is None:
         return extreme_speed(spec["turbine_class"], spec["recurrence"], turbulent=spec["turbulent"])
     return spec["speed"]
 
@@ -184,14 +184,7 @@ def _drawn(spec, height, diameter, seed, duration):
         seed = spec["seed"]
     elif not isinstance(seed, np.random.SeedSequence):
         seed = check_whole_number("seed", seed, 0)
-    if spec.kind == "etm":
-        sigma = etm_sigma(speed, spec["class"], spec["turbine_class"])
-    elif spec.kind == "ewm":
-        sigma = 0.11 * speed  # the turbulent extreme wind of IEC 61400-1
-    elif spec["sigma"] == "drawn":
-        sigma = drawn_ntm_sigma(speed, spec["class"], seed)
-    else:
-        sigma = ntm_sigma(speed, spec["class"])
+    sigma = drawn_sigma(spec.kind, speed, spec.values, seed)
     rotor = {"height": height, "diameter": diameter}
     return {"speed": speed, "sigma": sigma, **rotor, "period": period, "seed": seed}
 

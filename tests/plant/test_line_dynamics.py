@@ -70,7 +70,7 @@ def driven(mooring, times, rise=20.0):
         x[State.SURGE : State.HEAVE + 1] = position - FAIRLEAD
         x[State.VX : State.VZ + 1] = velocity
         if k:
-            lines.end_lines(x, t - times[k - 1], None, mooring, work)
+            lines.end_lines(x, t - times[k - 1], None, mooring, np.zeros((1, 6)), work)
         row = np.zeros((1, 6))
         wrench = lines.lines_load(pose_of(x), x, mooring, row, np.zeros(8))
         forces.append(wrench[:3])

@@ -32,14 +32,14 @@ err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
 MODULES = (  # modules that add commands to the app
     "simulate", "listing", "check", "check_dll", "evaluate", "validate", "doctor", "warmup", "cache",
     "benchmark", "design", "plot", "report", "scores", "leaderboard", "import_deck", "export", "hydro",
-    "campbell", "train", "serve", "compare", "export_fmu",
+    "campbell", "train", "serve", "compare", "export_fmu", "loads", "table",
 )  # fmt: skip
 GROUPS = {  # headings of fowt --help -> their commands, in the order shown
     "Run": ("simulate", "trim", "plot", "compare", "animate", "check"),
     "Build": ("import", "hydro", "campbell"),
     "Connect": ("check-dll", "export", "serve", "fmu"),
     "Design": ("linearize", "design"),
-    "Evaluate": ("evaluate", "report", "scores", "leaderboard"),
+    "Evaluate": ("evaluate", "report", "scores", "leaderboard", "loads", "table"),
     "Train": ("train", "export-policy"),
     "Set up": ("list", "doctor", "warmup", "cache"),
     "Develop": ("validate", "paper", "benchmark"),

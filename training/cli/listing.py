@@ -12,6 +12,7 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli.console import command, out
 from fowt_env.training.cli.tables import figure, print_table
 
+SITE_HUB = 100.0  # m, height of the winds of sites
 LAST = ("DEMONSTRATION", "comparison only")  # marks of controllers not for use, which are listed last
 
 
@@ -109,6 +110,18 @@ def _agents():
         sees = f"wind {max(ahead):g} s ahead" if ahead else "measurements, estimates"
         trained = f"{about['algo'].upper()}, seed {about['seed']}, {about['steps']:,} decisions"
         rows.append((f"{POLICY_PREFIX}{name}", acts, sees, trained))
+    return rows
+
+
+def _sites():
+    from fowt_env.training.loads.site import Climate, read_site, site_names
+
+    rows = []
+    for name in site_names():
+        site = read_site(name)
+        wind, Hs, Tp, _, _ = Climate(site, SITE_HUB).extreme(50)
+        depth = "" if site.water_depth is None else figure(site.water_depth)
+        rows.append((name, depth, figure(wind), figure(Hs), figure(Tp), site.description))
     return rows
 
 
@@ -230,6 +243,11 @@ KINDS = {
     "suites": Kind(
         "--suite", "sets of load cases with seeds and rules",
         ("name", "cases", "seeds", "what it is"), _suites, "Cases of a suite:  fowt list cases above_rated",
+    ),
+    "sites": Kind(
+        "loads --site", "sites with the joint climate of wind and sea",
+        ("name", "depth m", "50-year wind m/s", "Hs m", "Tp s", "what it is"), _sites,
+        f"Winds of 10 min at {SITE_HUB:g} m. Your own site: the path of a .toml file or of a .csv table",
     ),
     "cases": Kind(
         "--cases", "load cases: wind, sea, duration", ("name", "suite", "wind", "sea", "s"), _cases

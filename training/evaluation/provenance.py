@@ -31,18 +31,21 @@ def _digest(paths, key=""):
     return digest.hexdigest()[:16]
 
 
-def plant_files():
-    """Return the files that affect a run, in order: imported sources and data, without the controllers."""
+def plant_files(start=RUN):
+    """Return the files that affect a run, in order: imported sources and data, without the controllers.
+
+    start: the module that runs it.
+    """
 
     def inside(path):
         return _package_of(path) in ("simulator", "training") or path in ALWAYS
 
-    return in_order([*imported_files([RUN], [PACKAGE.parent], inside), *_data(PACKAGE / "data")])
+    return in_order([*imported_files([start], [PACKAGE.parent], inside), *_data(PACKAGE / "data")])
 
 
-def plant_code():
+def plant_code(start=RUN):
     """Return the hash of all sources and data that affect a run, without the controllers."""
-    return _digest(plant_files())
+    return _digest(plant_files(start))
 
 
 def _data(folder):

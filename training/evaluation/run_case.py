@@ -63,9 +63,10 @@ class Run:
         return self.label, self.case.name, self.seed
 
 
-def scored(run):
+def scored(run, measure=None):
     """Return (row, time series or None) of one run; a failed run has a reason instead of metrics.
 
+    measure: what is measured of a run, in place of `run_metrics` and with its arguments.
     If the turbine's protection ends the run, the row has the metrics until then, the time and the reason.
     Raises: InputError for settings that no controller could use.
     """
@@ -92,6 +93,8 @@ def scored(run):
         if case.displaced is not None:
             point = trim(scene)
             initial = {name: point[name] + change for name, change in case.displaced.items()}
+        elif initial is None and case.parked and _is_operable(scene):
+            initial = "parked"  # its steady state would be one of production
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PlantWarning)  # reported in the row's events and warning
             frame = fowt_env.simulate(
@@ -104,7 +107,7 @@ def scored(run):
                 nominal=nominal,
                 **settings,
             )
-        return frame, run_metrics(frame, case, nominal, run.skip)
+        return frame, (measure or run_metrics)(frame, case, nominal, run.skip)
 
     # an error of the controller fails this run, not the evaluation
     outcome, error = attempt(work, run.time_limit)
@@ -123,6 +126,11 @@ def scored(run):
         raise error  # wrong settings of the run
     frame, stopped = _end(error)
     return _row(run, FAILED, frame) | {"reason": reason_of(error), "stopped_[s]": stopped}, frame
+
+
+def _is_operable(scene):
+    """Return whether the turbine could operate in the mean wind of a scene."""
+    return scene.wind_speed is not None and 0.0 < scene.wind_speed <= scene.turbine.cut_out_wind_speed
 
 
 def faults_of(case):

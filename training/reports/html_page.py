@@ -9,16 +9,13 @@ pip install "fowt-env[report]".
 
 import base64
 import html
-import json
 from pathlib import Path
-from string import Template
 
 import numpy as np
 
 from fowt_env.descriptions.checks import check_number, is_number
 from fowt_env.descriptions.files import parse_json
 from fowt_env.errors import InputError, unknown
-from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table
 from fowt_env.training.evaluation.bootstrap import lifetime_means
 from fowt_env.training.evaluation.evaluate import run_file
@@ -31,6 +28,7 @@ from fowt_env.training.evaluation.run_case import OK
 from fowt_env.training.reports import page_words
 from fowt_env.training.reports.evaluation_plots import platform_pitch_period
 from fowt_env.training.reports.metric_words import SHORT, about_metric, counted, seeds_text, short_name
+from fowt_env.training.reports.page_file import PAGE, page_path, plotly_source, write_page
 from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict
 from fowt_env.visual.response import BOXES, SCHEDULE
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
@@ -70,14 +68,9 @@ def write_report(
     Raises: InputError for a folder without results, a table or run that cannot be read, an unknown case
     or seed, or if plotly is missing.
     """
-    try:
-        from plotly.offline import get_plotlyjs
-    except ImportError as error:
-        raise InputError(f'the report needs plotly ({error}): pip install "fowt-env[report]"') from error
+    plotly = plotly_source()
     folder = Path(folder)
-    out = folder / "report.html" if out is None else Path(out)
-    if out.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"report page {str(out)!r}: must end with .html")
+    out = page_path(folder / "report.html" if out is None else out)
     if rate is not None:
         check_number("rate", rate, 0.0, low_open=True, allowed="a positive number of samples per second")
     if not folder.is_dir():
@@ -91,19 +84,7 @@ def write_report(
     point = _schedule(platform, about, say) if schedule else None
     data = _page_data(table, board_file, manifest, runs, point)
     texts = _page_texts(folder, table, manifest, board_file, data, runs, point)
-    page = Path(__file__).parent / "page"
-    scripts = {"plotly": get_plotlyjs(), "script": (page / "page.js").read_text(encoding="utf-8")}
-    # plotly.js sets styles as it draws
-    texts["policy"] = page_words.content_policy(scripts.values(), dynamic_styles=True)
-    texts["style"] = (page / "page.css").read_text(encoding="utf-8")
-    # no NaN, and no < that could end the element
-    text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    for character in "<\u2028\u2029":
-        text = text.replace(character, f"\\u{ord(character):04x}")
-    template = Template((page / "page.html").read_text(encoding="utf-8"))
-    with replacing(out) as temporary:
-        temporary.write_text(template.substitute(texts, data=text, **scripts), encoding="utf-8")
-    return out
+    return write_page(out, PAGE / "page.html", PAGE / "page.js", texts, data, plotly)
 
 
 def _json_file(path):

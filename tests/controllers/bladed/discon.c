@@ -41,6 +41,11 @@ void DISCON(float *avrSWAP, int *aviFAIL, const char *accINFILE, char *avcOUTNAM
     SWAP(45) = integral;
     for (int blade = 0; blade < 3; blade++)
         SWAP(42 + blade) = integral + 0.001f * blade;
+    if (!strcmp(mode, "ratio")) { /* of two readings, in steps of a hundredth */
+        SWAP(47) = 43093.55f;
+        for (int place = 42; place <= 45; place++)
+            SWAP(place) = 0.0026f * roundf(100 * SWAP(20) / SWAP(19));
+    }
     if (!strcmp(mode, "scribble"))
         SWAP(21) = SWAP(200) = 7;
     if (!strcmp(mode, "outname") && status == 0)

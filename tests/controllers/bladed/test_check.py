@@ -4,6 +4,7 @@ import pytest
 from bladed_library import built, needs_gcc
 from command_line import fowt
 
+from fowt_env.controllers.bladed import check
 from fowt_env.controllers.bladed.check import check_dll
 from fowt_env.controllers.bladed.controller import BladedLibrary
 from fowt_env.controllers.bladed.records import RECORDS
@@ -39,6 +40,28 @@ def test_what_a_library_reads_and_writes_is_what_its_source_says(checked):
     assert 0.25 < found.pitch[0] < found.pitch[1] < 0.28
     assert 0.0 < found.call <= found.slowest and found.call < 0.05 and found.start > found.call
     assert found.output == "301 calls, last at 29.9 s"
+
+
+def test_records_that_matter_are_found_in_few_series_and_each_is_tried_alone():
+    tried = []
+
+    def matter(group):
+        tried.append(group)
+        return bool({3, 20, 21} & set(group)) or {40, 41} <= set(group)  # 40 and 41: only together
+
+    assert check._those_that_matter(list(range(64)), matter) == [3, 20, 21]
+    assert [3] in tried and len(tried) < 64
+
+
+def test_a_law_of_the_ratio_of_two_readings_reads_both(checked):
+    assert [record.number for record in checked("ratio").read] == [19, 20]
+
+
+def test_a_library_that_starts_slowly_is_announced(library, turbine, monkeypatch):
+    monkeypatch.setattr(check, "SLOW_START", 0.0)
+    said = []
+    check_dll(BladedLibrary(str(library)), turbine, note=said.append)
+    assert len(said) == 1 and str(library) in said[0] and "40 starts" in said[0]
 
 
 @pytest.mark.slow

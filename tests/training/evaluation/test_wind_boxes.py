@@ -1,48 +1,63 @@
-"""Boxes of wind that are kept: made once, and again where their file is broken."""
+"""Turbulence that is kept: made once, and again where its file is broken."""
 
 import numpy as np
 import pytest
 
 from fowt_env.training.evaluation import wind_boxes
-from fowt_env.weather.wind_field import WindBox
+from fowt_env.weather import wind_field
 
-SPEC = {"kind": "mann", "speed": 18.0}
+SPEC = {"kind": "mann", "speed": 18.0, "points": 8, "dt": 5.0}
 
 
 @pytest.fixture
 def made(tmp_path, monkeypatch):
-    """List of the boxes that were made; a small one stands for hipersim's."""
+    """List of the turbulence that was made; random numbers stand for hipersim's."""
     monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path))
-    boxes = []
+    fields = []
 
-    def make(spec, *, seed, **arguments):
-        velocity = np.random.default_rng(seed).normal(18.0, 1.0, (4, 2, 2, 3)).astype(np.float32)
-        line = np.array([-70.0, 70.0])
-        boxes.append(WindBox(velocity, line, line + 90.0, 0.2, 18.0, True, 3.5))
-        return boxes[-1]
+    def make(n_time, n_side, *_, seed=None):
+        seed = _[-1]
+        fields.append(
+            np.random.default_rng(seed).normal(0.0, 1.0, (n_time, n_side, n_side, 3)).astype(np.float32)
+        )
+        return fields[-1]
 
-    monkeypatch.setattr(wind_boxes, "read_box", make)
-    return boxes
-
-
-def box(seed=1):
-    return wind_boxes.cached_box(SPEC, "oc3_hywind", seed, {"duration": 700.0})
+    monkeypatch.setattr(wind_field, "mann_turbulence", make)
+    return fields
 
 
-def test_a_box_is_made_once_for_each_seed_and_read_bit_for_bit(made):
+def box(seed=1, **keys):
+    return wind_boxes.cached_box(SPEC | keys, "oc3_hywind", seed, {"duration": 700.0})
+
+
+def test_turbulence_is_made_once_for_each_seed_and_read_bit_for_bit(made):
     for seed in (1, 2, 1, 2):
+        new = wind_boxes.new_box(SPEC, "oc3_hywind", seed, {"duration": 700.0})
         kept = box(seed)
-        np.testing.assert_array_equal(kept.velocity, made[seed - 1].velocity)
-        assert (kept.dt, kept.speed, kept.periodic, kept.shift) == (0.2, 18.0, True, 3.5)
-    assert len(made) == 2
+        np.testing.assert_array_equal(kept.velocity, new.velocity)
+        assert (kept.dt, kept.speed, kept.periodic, kept.shift) == (new.dt, new.speed, True, new.shift)
+    assert len(made) == 2 + 4
 
 
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 half", None])
+def test_models_classes_and_directions_share_the_turbulence_and_scale_it(made):
+    normal, extreme = box(), box(model="etm", turbine_class="I")
+    turned, other = box(direction=8.0), box(**{"class": "A"})
+    assert len(made) == 1
+    hub = np.s_[:, 4, 4, 0]
+    assert extreme.velocity[hub].std() > 1.2 * normal.velocity[hub].std()
+    assert other.velocity[hub].std() == pytest.approx(16.0 / 14.0 * normal.velocity[hub].std(), rel=1e-5)
+    mean = turned.velocity[..., 1].mean() / turned.velocity[..., 0].mean()
+    assert np.degrees(np.arctan(mean)) == pytest.approx(8.0, abs=0.2)
+    box(points=9), box(dt=4.0), box(speed=17.0)
+    assert len(made) == 4
+
+
+@pytest.mark.parametrize("content", [b"", b"\x93NUMPY half", None])
 def test_a_broken_file_is_made_again(made, tmp_path, content):
-    box()
+    first = box()
     (path,) = (tmp_path / "wind_boxes").iterdir()
     path.write_bytes(path.read_bytes()[:-100] if content is None else content)
-    np.testing.assert_array_equal(box().velocity, made[0].velocity)
+    np.testing.assert_array_equal(box().velocity, first.velocity)
     box()
     assert len(made) == 2
 
@@ -59,4 +74,4 @@ def test_without_a_folder_of_ones_own_boxes_are_made_each_time(given, made, tmp_
         monkeypatch.setattr(wind_boxes, "cache_root", lambda: None)
     box(), box()
     assert len(made) == 2
-    assert not list(tmp_path.rglob("*.npz"))
+    assert not list(tmp_path.rglob("*.np?"))

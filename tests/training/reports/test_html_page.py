@@ -1,5 +1,4 @@
 import base64
-import contextlib
 import json
 import re
 import shutil
@@ -8,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from offline_browser import browser, offline_page  # noqa: F401  # browser is a fixture
 from typer.testing import CliRunner
 
 pytest.importorskip("plotly", reason="plotly is not installed: the extra `report` is missing")
@@ -20,6 +20,7 @@ from fowt_env.training.evaluation.evaluate import run_file  # noqa: E402
 from fowt_env.training.reports import html_page  # noqa: E402
 from fowt_env.training.reports.html_page import SCHEDULE_WINDS, write_report  # noqa: E402
 
+SERIES = "#series-plot .scatterlayer path.js-line"  # what is drawn last
 EVIL = "<img src=x onerror=alert(1)></script>&"
 CONTROLLERS = ("calm", "busy", EVIL)
 CASES = ("ntm_14", "ntm_18")
@@ -242,43 +243,13 @@ def test_a_page_comes_out_where_the_platform_of_the_evaluation_is_a_file_of_anot
 
 
 @pytest.fixture(scope="module")
-def browser():
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with sync_api.sync_playwright() as playwright:
-        found = [*map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))]
-        found.append(shutil.which(playwright.chromium.executable_path))  # of `playwright install chromium`
-        path = next(filter(None, found), None)
-        if path is None:
-            pytest.skip("no Chromium is installed: the page is not opened in a browser")
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@contextlib.contextmanager
-def offline_page(browser, path, **settings):
-    """A page in an offline browser, whose console must stay empty: no error, no script refused."""
-    context = browser.new_context(offline=True, **settings)
-    page = context.new_page()
-    page.set_default_timeout(15_000)
-    messages = []
-    page.on("console", lambda message: messages.append(message.text))
-    page.on("pageerror", lambda error: messages.append(str(error)))
-    page.goto(path.as_uri())
-    page.wait_for_selector("#series-plot .scatterlayer path.js-line")
-    yield page
-    context.close()
-    assert messages == []
-
-
-@pytest.fixture(scope="module")
 def page_file(folder, tmp_path_factory):
     return write_report(folder, tmp_path_factory.mktemp("page") / "page.html", schedule=False)
 
 
 @pytest.fixture
-def opened(browser, page_file):
-    with offline_page(browser, page_file) as page:
+def opened(browser, page_file):  # noqa: F811
+    with offline_page(browser, page_file, SERIES) as page:
         yield page
 
 
@@ -323,7 +294,7 @@ def test_another_case_and_another_theme_change_what_is_drawn(opened):
     assert opened.evaluate("getComputedStyle(document.body).backgroundColor") != light
 
 
-def test_a_difference_has_its_percentage_its_mark_and_its_star_in_the_table(copy, browser):
+def test_a_difference_has_its_percentage_its_mark_and_its_star_in_the_table(copy, browser):  # noqa: F811
     """Significant: star and mark; tested and not significant: neither; not tested: the mark alone."""
     speed, pitch, other = "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "novelty_[-]"
     base = {"mean": 0.5}
@@ -338,7 +309,7 @@ def test_a_difference_has_its_percentage_its_mark_and_its_star_in_the_table(copy
         {"controller": EVIL, "rank": 2, **part, "difference": gaps},
     ]
     (copy / "leaderboard.json").write_text(json.dumps({"baseline": "calm", "controllers": entries}))
-    with offline_page(browser, write_report(copy, schedule=False)) as page:
+    with offline_page(browser, write_report(copy, schedule=False), SERIES) as page:
         cells = page.locator("#table tbody tr").nth(1).locator("td .gap")
         assert cells.all_inner_texts() == ["\N{MINUS SIGN}40 % * ✓", "+20 %", "+50 % ✗"]
         assert [each.get_attribute("class") for each in cells.all()] == [
@@ -352,7 +323,7 @@ def test_a_difference_has_its_percentage_its_mark_and_its_star_in_the_table(copy
         assert page.locator("#table tbody td").count() == 0
 
 
-def test_a_law_that_lost_runs_is_best_in_nothing_and_a_wreck_sets_no_scale(copy, browser):
+def test_a_law_that_lost_runs_is_best_in_nothing_and_a_wreck_sets_no_scale(copy, browser):  # noqa: F811
     figure = {"RotSpeed_std_[rpm]": {"mean": 0.5}, "PtfmPitch_std_[deg]": {"mean": 0.5}}
     wreck = {name: {"mean": 0.001} for name in figure}
     gap = {name: {"mean": -0.4, "percent": -80.0} for name in figure}
@@ -366,7 +337,7 @@ def test_a_law_that_lost_runs_is_best_in_nothing_and_a_wreck_sets_no_scale(copy,
     frame = pd.read_parquet(path)
     frame.loc[frame.index[-100:], "RotSpeed_[rpm]"] = 0.0
     frame.to_parquet(path)
-    with offline_page(browser, write_report(copy, schedule=False)) as page:
+    with offline_page(browser, write_report(copy, schedule=False), SERIES) as page:
         names = page.locator("#table thead th button .label").all_inner_texts()
         assert "rank" not in names and names[1] == "lost"
         rows = page.locator("#table tbody tr")
@@ -427,7 +398,7 @@ def test_a_lost_run_is_seen_with_its_reason_where_its_series_ends(opened):
     assert "busy (lost)" in opened.locator("#series-plot .legendtext").all_text_contents()
 
 
-def test_what_slips_in_as_markup_is_not_run(browser, page_file, tmp_path):
+def test_what_slips_in_as_markup_is_not_run(browser, page_file, tmp_path):  # noqa: F811
     """The policy's hashes, tried with a page into which a script and a handler were written."""
     path = tmp_path / "page.html"
     text = page_file.read_text(encoding="utf-8")
@@ -441,8 +412,8 @@ def test_what_slips_in_as_markup_is_not_run(browser, page_file, tmp_path):
     context.close()
 
 
-def test_nothing_is_wider_than_a_telephone_and_a_wide_table_says_that_it_scrolls(browser, page_file):
-    with offline_page(browser, page_file, viewport={"width": 390, "height": 800}) as page:
+def test_nothing_is_wider_than_a_telephone_and_a_wide_table_says_that_it_scrolls(browser, page_file):  # noqa: F811
+    with offline_page(browser, page_file, SERIES, viewport={"width": 390, "height": 800}) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         assert page.locator("#leaderboard .hint").is_visible()
         page.evaluate("document.querySelector('#leaderboard .scroll > div').scrollLeft = 1e6")

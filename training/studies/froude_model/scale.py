@@ -78,7 +78,8 @@ EXPONENTS = {  # record: {field: exponent of the scale, or one for each entry}
     "second_order": SECOND_ORDER,
     "protection": {
         "overspeed": SAME, "overpower": SAME, "acceleration": SAME, "pitch_deviation": SAME,
-        "normal_rate": RATE, "emergency_rate": RATE, "off_speed": SAME,
+        "normal_rate": RATE, "emergency_rate": RATE, "off_speed": SAME, "start_rate": RATE,
+        "connect_speed": SAME,
     },
     "trip": {"limit": SAME, "time": TIME, "stop": SAME},
     "torque_law": {

@@ -1,0 +1,161 @@
+"""Driving runs for a check in OpenFAST: series, wind, sea and the user's deck with these."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fowt_env.descriptions.wind_files import read_uniform_wind
+from fowt_env.errors import InputError
+from fowt_env.files.openfast import read_outb
+from fowt_env.files.openfast_deck.parser import PartFile
+from fowt_env.run.simulation import simulate
+from fowt_env.scene.build import build_scene
+from fowt_env.training.evaluation.cases import Case
+from fowt_env.training.loads.decks import EditedPart, write_deck, write_driving, write_waves, write_wind
+from fowt_env.training.loads.records import FinishedRun, LoadCase
+from fowt_env.training.loads.statistics import run_statistics
+from fowt_env.training.loads.tables import load_tables
+from fowt_env.weather.turbsim import read_bts, write_bts
+from fowt_env.weather.wind_field import WindBox
+
+DECKS = Path(__file__).parents[2] / "reference" / "decks" / "IEA-15-240-RWT" / "OpenFAST"
+FST = DECKS / "IEA-15-240-RWT-UMaineSemi" / "IEA-15-240-RWT-UMaineSemi.fst"
+CASE = Case("dlc1.3_u18", wind=18.0, sea={"kind": "jonswap", "Hs": 4.0, "Tp": 9.0})
+LOAD = LoadCase(
+    "1.3", "dlc1.3_u18", "test", CASE, "pi", 1, 30.0, 10.0, "ultimate", "normal", 1.35, "test",
+    wind_speed=18.0, Hs=4.0, Tp=9.0, wave_direction=30.0,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run():
+    scene = build_scene("oc3_hywind", wind=18.0, sea=CASE.sea, seed=1, duration=30.0, fidelity="standard")
+    return scene, simulate(scene, "pi", duration=30.0)
+
+
+def box():
+    """Return a small box of wind around the rotor."""
+    random = np.random.default_rng(2)
+    velocity = random.normal(size=(20, 4, 3, 3)).astype(np.float32)
+    velocity[..., 0] += 18.0
+    return WindBox(
+        velocity, np.array([-80.0, 0.0, 80.0]), np.array([10.0, 65.0, 120.0, 175.0]), 0.5, 18.0, True, 4.0
+    )
+
+
+def test_a_box_written_for_turbsim_is_read_back(tmp_path):
+    own = box()
+    write_bts(tmp_path / "w.bts", own.velocity, own.y, own.z, own.dt, own.speed, 90.0, own.periodic)
+    velocity, y, z, dt, speed, periodic = read_bts(tmp_path / "w.bts")
+    span = np.ptp(own.velocity.reshape(-1, 3), axis=0)
+    assert (np.abs(velocity - own.velocity).reshape(-1, 3) <= 0.51 * span / 65534.0 + 2e-6).all()
+    np.testing.assert_allclose(y, own.y, atol=1e-4)
+    np.testing.assert_allclose(z, own.z, atol=1e-4)
+    assert (dt, speed, periodic) == (0.5, 18.0, True)
+    write_bts(tmp_path / "v.bts", own.velocity, own.y, own.z, own.dt, own.speed, 90.0, False)
+    assert read_bts(tmp_path / "v.bts")[5] is False
+    with pytest.raises(InputError, match="lowest point is at z = -1 m"):
+        write_bts(tmp_path / "u.bts", own.velocity, own.y, own.z - 11.0, own.dt, 18.0, 90.0, True)
+
+
+def test_the_wind_of_a_scene_is_written_as_its_kind(run, tmp_path):
+    scene, _ = run
+    assert write_wind(tmp_path, scene) == (2, "wind.wnd")
+    again = read_uniform_wind(tmp_path / "wind.wnd")
+    series = scene.model.aero.wind
+    np.testing.assert_allclose(again["speed"], series.value[:, 0], rtol=1e-6)
+    assert again["shear_exponent"] == pytest.approx(series.shear_exponent)
+    sheared = series._replace(
+        time=np.array([0.0, 10.0]), value=np.array([[10.0, 0.0, 0.5, 2.0, -1.0], [12.0, 0.0, 0.0, 3.0, 1.0]])
+    )
+    model = scene.model._replace(aero=scene.model.aero._replace(wind=sheared))
+    write_wind(tmp_path, replace(scene, model=model))
+    again = read_uniform_wind(tmp_path / "wind.wnd")
+    for column, key in enumerate(("speed", "v", "w", "vertical_shear", "horizontal_shear")):
+        np.testing.assert_allclose(again[key], sheared.value[:, column], atol=1e-6)
+    turned = sheared._replace(value=np.array([[10.0, 3.0, 0.0, 0.0, 0.0], [12.0, -1.0, 0.0, 0.0, 0.0]]))
+    model = scene.model._replace(aero=scene.model.aero._replace(wind=turned))
+    write_wind(tmp_path, replace(scene, model=model))
+    rows = np.loadtxt(tmp_path / "wind.wnd", comments="!")
+    # clockwise seen from above: wind towards +y has a negative direction
+    np.testing.assert_allclose(rows[:, 2], -np.degrees(np.arctan2([3.0, -1.0], [10.0, 12.0])), rtol=1e-6)
+    assert write_wind(tmp_path, replace(scene, wind=box())) == (3, "wind.bts")
+    assert read_bts(tmp_path / "wind.bts")[4] == 18.0
+
+
+def test_the_elevation_is_that_of_the_run_and_ends_smoothly(run, tmp_path):
+    _, frame = run
+    end = write_waves(tmp_path, frame)
+    rows = np.loadtxt(tmp_path / "waves.Elev", skiprows=1)
+    assert end == rows[-1, 0] == pytest.approx(90.0) and rows[-1, 1] == 0.0
+    during = rows[rows[:, 0] <= 30.0]
+    np.testing.assert_allclose(during[:, 1], frame["Wave1Elev_[m]"].to_numpy()[::2], rtol=1e-6, atol=1e-9)
+
+
+def test_the_deck_has_the_case_and_all_else_of_the_users(run, tmp_path):
+    scene, frame = run
+    wind, end = write_wind(tmp_path, scene), write_waves(tmp_path, frame)
+    main = PartFile(write_deck(tmp_path, FST, LOAD, scene, frame, wind, end), "OpenFAST")
+    old = PartFile(FST, "OpenFAST")
+    assert main.number("TMax") == 30.0 and main.whole("CompInflow") == 1
+    for key in ("DT", "Gravity", "WtrDpth", "CompMooring"):
+        assert main.number(key) == old.number(key)
+    # files that do not change are those of the deck, by relative paths
+    for key in ("AeroFile", "ServoFile", "HydroFile", "MooringFile"):
+        assert not Path(main.text(key)).is_absolute()
+        assert main.other(key).resolve() == old.other(key).resolve()
+    elastodyn = PartFile(main.other("EDFile"), "ElastoDyn")
+    for key, channel in (
+        ("PtfmSurge", "PtfmSurge_[m]"),
+        ("RotSpeed", "RotSpeed_[rpm]"),
+        ("PtfmPitch", "PtfmPitch_[deg]"),
+    ):
+        assert elastodyn.number(key) == pytest.approx(frame[channel].iloc[0], rel=1e-6)
+    assert elastodyn.number("BlPitch(2)") == pytest.approx(frame["BldPitch1_[deg]"].iloc[0], rel=1e-6)
+    assert elastodyn.other("TwrFile").is_file() and elastodyn.blade("BldFile", 3, ()).is_file()
+    mass = PartFile(old.other("EDFile"), "ElastoDyn")
+    assert elastodyn.number("HubMass") == mass.number("HubMass")
+    inflow = PartFile(main.other("InflowFile"), "InflowWind")
+    assert inflow.whole("WindType") == 2 and inflow.number("RefLength") == 126.0
+    assert inflow.other("Filename_Uni").name == "wind.wnd" and inflow.number("RefHt_Uni") == 90.0
+    sea = PartFile(main.other("SeaStFile"), "SeaState")
+    assert sea.whole("WaveMod") == 5 and sea.number("WaveTMax") == 90.0 and sea.number("WaveDT") == 0.2
+    assert sea.number("WaveDir") == 30.0 and sea.text("WvKinFile") == "waves"
+    write_deck(tmp_path, FST, LOAD, scene, frame, (3, "wind.bts"), end)
+    assert PartFile(tmp_path / inflow.path.name, "InflowWind").text("FileName_BTS") == "wind.bts"
+
+
+def test_an_edit_keeps_comments_and_names_a_missing_key(tmp_path):
+    path = tmp_path / "part.dat"
+    path.write_text(
+        "title\ntitle\n  0.5   0.6, 1.0   WindVxiList  - a list of RefHt values\n 90.0\tRefHt  - m\n"
+    )
+    part = EditedPart(path, "InflowWind")
+    part.put(120, "RefHt")
+    part.put("1 2", "WindVxiList")
+    part.write(tmp_path / "new.dat")
+    lines = (tmp_path / "new.dat").read_text().splitlines()
+    assert lines[3].split() == ["120", "RefHt", "-", "m"]
+    assert lines[2] == "1 2    WindVxiList  - a list of RefHt values"
+    with pytest.raises(InputError, match="InflowWind file .*WindType is missing"):
+        part.put(1, "WindType")
+
+
+def test_driving_runs_are_those_of_the_table(run, tmp_path):
+    scene, frame = run
+    finished = {LOAD.key: FinishedRun(*LOAD.key, "ok", statistics=run_statistics(frame, scene, 10.0))}
+    results = load_tables([LOAD], finished)
+    (folder,) = write_driving(tmp_path, results, {"pi": "pi"}, FST, 1)
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "IEA-15-240-RWT-UMaineSemi_ElastoDyn.dat", "IEA-15-240-RWT-UMaineSemi_SeaState.dat",
+        "IEA-15-240-RWT_InflowFile.dat", "README.md", "model.fst", "run.outb", "waves.Elev", "wind.wnd",
+    ]  # fmt: skip
+    series = read_outb(folder / "run.outb")
+    np.testing.assert_array_equal(series["TwrBsMyt_[kN-m]"], frame["TwrBsMyt_[kN-m]"])
+    assert "DLC 1.3" in (folder / "README.md").read_text()
+    other = run_statistics(frame * 1.01, scene, 10.0)
+    results = load_tables([LOAD], {LOAD.key: FinishedRun(*LOAD.key, "ok", statistics=other)})
+    with pytest.raises(InputError, match="was made by other sources or on another machine"):
+        write_driving(tmp_path, results, {"pi": "pi"}, None, 1)

@@ -1,0 +1,413 @@
+"""Extrapolates loads of normal operation to a value that is exceeded once in 50 years on average (DLC 1.1).
+
+Peaks over threshold: in each condition k (a wind bin with its sea), which takes the fraction p_k of the time,
+independent peaks exceed a threshold u_k at a rate, and above it they are distributed as the tail of a Weibull
+distribution about the mean b_k of the load,
+
+    P(peak > x | peak > u) = exp(((u - b) / a)^c - ((x - b) / a)^c),
+
+with c = 2 for peaks of a Gaussian process (Rayleigh) and c = 1 for exponential ones: the family that IEC
+61400-1 and Moriarty, Holley and Butterfield (NREL/TP-500-34421, 2004) fit to peaks, and of the tails of mean
+upcrossing rates of Naess and Gaidai (Journal of Engineering Mechanics 134(8), 2008). The long-term rate is
+
+    rate(x) = sum over k of p_k rate_k P_k(peak > x),
+
+and the value of N years solves rate(x) = 1 / N. a and c are maximum likelihood estimates; c varies slowly
+over the wind speed and is that of the likelihood of conditions within POOL, weighted by their distance (local
+likelihood), since six hours alone do not define it. A Gumbel distribution of the runs' largest values is the
+check.
+
+For the sea, `environmental_contour` and `inverse_form` search the states of the same return period
+(Winterstein et al., ICOSSAR 1993).
+"""
+
+from dataclasses import dataclass, field
+from math import inf, log, nan, pi, sqrt
+
+import numpy as np
+from scipy.stats import norm
+
+from fowt_env.descriptions.checks import check_number
+from fowt_env.errors import InputError
+from fowt_env.training.evaluation.bootstrap import RANDOM_SEED, interval
+from fowt_env.training.loads.records import HOUR
+from fowt_env.training.loads.selection import RESAMPLES, conditions_of
+from fowt_env.training.loads.site import YEAR
+
+YEARS = 50.0  # return period
+POOL = 6.0  # m/s: conditions of which a wind speed further away has no part in the exponent c
+SHAPES = np.exp(np.linspace(log(0.4), log(5.0), 81))  # values of c that are searched
+BISECTIONS = 40
+EULER = 0.5772156649015329
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Holds what a load does in one condition of normal operation, for one channel and side, more is worse.
+
+    share: fraction of the time; peaks: (n,) independent peaks of each run; counts: number of all peaks of
+    each run, of which `peaks` are the largest; largest and hours: (runs,) largest value and length of each
+    run; mean: of the load.
+    """
+
+    name: str
+    share: float
+    peaks: tuple
+    counts: tuple
+    largest: np.ndarray
+    hours: np.ndarray
+    mean: float
+    wind_speed: float = nan  # m/s
+
+
+@dataclass(frozen=True)
+class Extrapolation:
+    """Holds a long-term load of a channel and side: value, 95 % interval, check by block maxima, curve.
+
+    largest: of all runs. curve: (n, 2) load and number of its exceedances per year. fits: per condition
+    (name, wind speed, threshold, rate per hour, scale a, exponent c). governing: name of the condition with
+    the largest part of the exceedances. drawn: (RESAMPLES,) values of resampled seeds. Values have the sign
+    of the channel.
+    """
+
+    value: float
+    low: float
+    high: float
+    block: float
+    largest: float
+    curve: np.ndarray
+    fits: tuple
+    governing: str
+    years: float
+    drawn: np.ndarray = field(repr=False)
+
+
+def conditions_of_runs(runs, column, side, shares=None):
+    """Return [Condition] of the runs [(LoadCase, RunStatistics)] of one controller.
+
+    shares: {(dlc, name): fraction of the time}; None: from hours_per_year of the runs. Conditions without
+    share are left out. Raises: InputError if none is left.
+    """
+    sign = 1.0 if side == "max" else -1.0
+    found = []
+    for key, members in conditions_of(runs).items():
+        hours = sum(case.hours_per_year for case, _ in members)
+        share = hours / YEAR if shares is None else shares.get(key, 0.0)
+        if share <= 0.0 or any(column not in each.peaks for _, each in members):
+            continue
+        peaks = [each.peaks[column][side] for _, each in members]
+        speed = members[0][0].wind_speed
+        found.append(
+            Condition(
+                key[1], share, tuple(sign * value for value, _ in peaks), tuple(count for _, count in peaks),
+                np.array([sign * each.value(column, side) for _, each in members]),
+                np.array([each.duration / HOUR for _, each in members]),
+                sign * float(np.mean([each.value(column, "mean") for _, each in members])),
+                nan if speed is None else float(speed),
+            )
+        )  # fmt: skip
+    if not found:
+        raise InputError(
+            f"extrapolation of {column}: no condition of the runs has both a share of the time and peaks of"
+            " this channel"
+        )
+    return found
+
+
+# --------------------------------------------------------------------------- peaks over threshold
+
+
+def _threshold(condition):
+    """Return the least level above which the peaks of every run of a condition are complete; inf: no peak.
+
+    That is the smallest peak, or of runs with more peaks than are stored the largest of their smallest ones.
+    """
+    runs = [
+        (peaks, count) for peaks, count in zip(condition.peaks, condition.counts, strict=True) if len(peaks)
+    ]
+    cut = [float(peaks.min()) for peaks, count in runs if count > len(peaks)]
+    return max(cut) if cut else min((float(peaks.min()) for peaks, _ in runs), default=inf)
+
+
+class _Tail:
+    """Holds the peaks of a condition above its threshold, and their likelihood in k samples of the runs."""
+
+    def __init__(self, condition, draws):
+        """Take the peaks; draws (k, runs): how often each run occurs."""
+        self.mean, self.level = condition.mean, _threshold(condition)
+        above = [peaks[peaks >= self.level] for peaks in condition.peaks]
+        self.used = self.level < inf and self.level > self.mean
+        if not self.used:
+            above, self.level = [np.empty(0) for _ in above], self.mean + 1.0
+        run = np.repeat(np.arange(len(above)), [len(part) for part in above])
+        # heights over the mean, in heights of the threshold: the Weibull tail has then the threshold 1
+        self.height = (np.concatenate(above) - self.mean) / (self.level - self.mean)
+        self.weights = draws[:, run].astype(np.float64)
+        self.count = self.weights.sum(axis=1)
+        self.rate = self.count / (draws @ condition.hours)  # per hour
+
+        # mean of height^c - 1 for each c: at the best a it is (a / threshold)^c
+        powers = self.height[:, None] ** SHAPES - 1.0
+        self.spreads = np.maximum(self.weights @ powers / np.maximum(self.count, 1.0)[:, None], 1e-12)
+
+    def likelihood(self):
+        """Return the logarithm of the likelihood (k, SHAPES), at the best a for each exponent."""
+        logs = (self.weights @ np.log(self.height))[:, None]
+        return self.count[:, None] * np.log(SHAPES / self.spreads) + (SHAPES - 1.0) * logs
+
+    def spread(self, shape):
+        """Return (a / threshold)^c (k,) for exponents c (k,); its logarithm is linear between SHAPES."""
+        at = np.clip(np.log(shape / SHAPES[0]) / log(SHAPES[1] / SHAPES[0]), 0.0, len(SHAPES) - 1.001)
+        left, rows = at.astype(int), np.arange(len(at))
+        logs = np.log(self.spreads)
+        return np.exp(logs[rows, left] + (at - left) * (logs[rows, left + 1] - logs[rows, left]))
+
+
+def _best_shape(likelihood):
+    """Return the exponents (k,) of the largest likelihood (k, SHAPES), by a parabola through three values."""
+    rows = np.arange(len(likelihood))
+    middle = np.clip(likelihood.argmax(axis=1), 1, len(SHAPES) - 2)
+    before, at, after = (likelihood[rows, middle + step] for step in (-1, 0, 1))
+    bend = before - 2.0 * at + after
+    step = np.where(bend < 0.0, 0.5 * (before - after) / np.where(bend < 0.0, bend, 1.0), 0.0)
+    return SHAPES[middle] * (SHAPES[1] / SHAPES[0]) ** np.clip(step, -1.0, 1.0)
+
+
+def _pooling(conditions):
+    """Return the weights (conditions, conditions) of the likelihoods in each condition's exponent."""
+    wind = np.array([condition.wind_speed for condition in conditions])
+    distance = np.abs(wind[:, None] - wind[None, :])
+    return np.where(np.isfinite(distance), np.maximum(1.0 - distance / POOL, 0.0), 1.0)
+
+
+def _long_term(conditions, draws, years):
+    """Return (values (k,), fits, exceedances per hour) of the load of a return period, for k samples."""
+    tails = [_Tail(condition, draws[len(condition.peaks)]) for condition in conditions]
+    likelihood = np.tensordot(_pooling(conditions), np.array([tail.likelihood() for tail in tails]), 1)
+    shape = np.array([_best_shape(each) for each in likelihood]).T  # (k, conditions)
+    spread = np.array([tail.spread(c) for tail, c in zip(tails, shape.T, strict=True)]).T
+    rate = np.array([tail.rate if tail.used else 0.0 * tail.rate for tail in tails]).T
+    share = np.array([condition.share for condition in conditions])
+    mean, level = (np.array([getattr(tail, name) for tail in tails]) for name in ("mean", "level"))
+
+    def parts(load):  # exceedances per hour (k, conditions) of loads (k,)
+        height = np.maximum((load[:, None] - mean) / (level - mean), 1.0)
+        return share * rate * np.exp(-(height**shape - 1.0) / spread)
+
+    fits = (level, rate, (level - mean) * spread ** (1.0 / shape), shape)
+    target = 1.0 / (years * YEAR)
+    low = np.full(len(rate), min(level))
+    if not (parts(low).sum(axis=1) > target).all():
+        return np.full(len(rate), nan), fits, parts
+    reach = np.max(level) - np.min(level) + np.max(level - mean)
+    high = low + reach
+    while (beyond := parts(high).sum(axis=1) > target).any():
+        high = np.where(beyond, high + (high - low), high)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        above = parts(middle).sum(axis=1) > target
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return 0.5 * (low + high), fits, parts
+
+
+def extrapolate(conditions, side="max", years=YEARS):
+    """Return the Extrapolation of the Conditions of a channel and side; NaN for a load without peaks.
+
+    The interval is a bootstrap over the runs of each condition (seeds), with the same draws for conditions of
+    equally many runs, widened for few seeds as in training.evaluation.bootstrap; none for fewer than four.
+    Raises: InputError for a return period that is not positive.
+    """
+    check_number("years", years, 0.0, low_open=True)
+    sign = 1.0 if side == "max" else -1.0
+    random = np.random.default_rng(RANDOM_SEED)
+    counts = sorted({len(condition.peaks) for condition in conditions})
+    draws = {n: random.multinomial(n, np.full(n, 1.0 / n), size=RESAMPLES) for n in counts}
+    (value,), fits, parts = _long_term(conditions, {n: np.ones((1, n)) for n in counts}, years)
+    drawn = _long_term(conditions, draws, years)[0]
+    low, high = interval(np.array([value]), drawn[:, None], counts[-1])
+    largest = max(float(condition.largest.max()) for condition in conditions)
+    governing = ""
+    if np.isfinite(value):
+        governing = conditions[int(np.argmax(parts(np.array([value]))[0]))].name
+    level, rate, scale, shape = fits
+    rows = zip(conditions, sign * level, rate[0], scale[0], shape[0], strict=True)
+    curve = _curve(value, largest, parts)
+    curve[:, 0] *= sign
+    return Extrapolation(
+        sign * float(value), *sorted((sign * float(low[0]), sign * float(high[0]))),
+        sign * block_maxima(conditions, years), sign * largest, curve,
+        tuple((c.name, c.wind_speed, *map(float, numbers)) for c, *numbers in rows),
+        governing, float(years), sign * drawn,
+    )  # fmt: skip
+
+
+def _curve(value, largest, parts):
+    """Return (n, 2) loads and exceedances per year, from 1e4 per year to beyond the value."""
+    if not np.isfinite(value):
+        return np.empty((0, 2))
+    span = max(abs(value - largest), 0.1 * abs(value), 1e-12)
+    loads = np.linspace(min(value, largest) - 3.0 * span, max(value, largest) + 0.5 * span, 80)
+    rates = np.array([float(parts(np.array([load])).sum()) for load in loads]) * YEAR
+    kept = (rates > 1e-4) & (rates < 1e4)
+    return np.stack([loads[kept], rates[kept]], axis=1)
+
+
+def gumbel_fit(values):
+    """Return (mode, scale) of a Gumbel distribution by L-moments of at least two values."""
+    ordered, n = np.sort(values), len(values)
+    spread = np.sum((2.0 * np.arange(n) / (n - 1) - 1.0) * ordered) / n
+    scale = max(float(spread) / log(2.0), 1e-300)
+    return float(ordered.mean()) - EULER * scale, scale
+
+
+def block_maxima(conditions, years=YEARS):
+    """Return the load of a return period from the largest values of the runs: Gumbel by L-moments.
+
+    The rate of exceedance per hour is the share-weighted sum of 1 - F(x)^(1 h / length of the run).
+    NaN if a condition has fewer than two runs.
+    """
+    fits = []
+    for condition in conditions:
+        if len(condition.largest) < 2:
+            return nan
+        mode, scale = gumbel_fit(condition.largest)
+        # of one hour: F^(1/h) is a Gumbel distribution again
+        fits.append((condition.share, mode - scale * log(condition.hours.mean()), scale))
+    share, mode, scale = np.array(fits).T
+    target = 1.0 / (years * YEAR)
+
+    def rate(load):
+        return float(np.sum(share * -np.expm1(-np.exp(np.minimum(-(load - mode) / scale, 700.0)))))
+
+    low, high = float(mode.max()), float(np.max(mode + 60.0 * scale))
+    while rate(low) < target:
+        low -= float(scale.max())
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if rate(middle) > target else (low, middle)
+    return 0.5 * (low + high)
+
+
+# --------------------------------------------------------------------------- inverse FORM
+
+
+def reliability_index(years=YEARS, hours=1.0):
+    """Return beta, the standard normal quantile that a state of some hours exceeds once in some years."""
+    return float(norm.isf(hours / (years * YEAR)))
+
+
+def sphere(dimensions, count):
+    """Return (count, dimensions) points spread evenly over the unit sphere: a circle, or Fibonacci's spiral.
+
+    Raises: InputError for another number of dimensions than 2 or 3.
+    """
+    if dimensions == 2:
+        angle = 2.0 * pi * np.arange(count) / count
+        return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    if dimensions != 3:
+        raise InputError(f"dimensions = {dimensions!r}: must be 2 or 3")
+    height = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
+    angle = pi * (3.0 - sqrt(5.0)) * np.arange(count)
+    radius = np.sqrt(1.0 - height**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=1)
+
+
+def environmental_contour(states, years=YEARS, hours=1.0, dimensions=2, count=90):
+    """Return (count, variables) states of weather on the contour of a return period (inverse FORM).
+
+    states: function of (n, dimensions) standard normal variables that returns (n, variables), the Rosenblatt
+    transformation of the joint distribution: wind, Hs given the wind, Tp given both.
+    """
+    return np.asarray(states(reliability_index(years, hours) * sphere(dimensions, count)))
+
+
+def inverse_form(response, states, years=YEARS, hours=1.0, dimensions=3, count=400):
+    """Return (largest response, its state (variables,), its standard normal point (dimensions,)).
+
+    response: function of states (n, variables) that returns the load (n,) of each, such as the median or
+    another quantile of the largest value in the state's hours. The largest over the sphere of radius beta is
+    searched on a grid and then by steps along the sphere that are halved where none is larger.
+    """
+    beta = reliability_index(years, hours)
+    points = sphere(dimensions, count)
+    values = np.asarray(response(np.asarray(states(beta * points))), dtype=np.float64)
+    best, point, step = float(values.max()), points[int(values.argmax())], 2.0 / sqrt(count)
+    directions = np.concatenate([np.eye(dimensions), -np.eye(dimensions)])
+    while step > 1e-7:
+        trial = point + step * directions
+        trial /= np.linalg.norm(trial, axis=1, keepdims=True)
+        values = np.asarray(response(np.asarray(states(beta * trial))), dtype=np.float64)
+        if values.max() > best:
+            best, point = float(values.max()), trial[int(values.argmax())]
+        else:
+            step *= 0.5
+    return best, np.asarray(states(beta * point[None, :]))[0], beta * point
+
+
+def states_of(climate):
+    """Return the Rosenblatt transformation of a Climate: (n, 2) or (n, 3) normal variables to wind, Hs, Tp.
+
+    With two variables Tp is the median of Hs and wind.
+    """
+
+    def states(normal):
+        below = norm.cdf(normal)
+        wind = climate.wind_at(below[:, 0])
+        Hs = climate.height_at(below[:, 1], wind)
+        Tp = climate.period_at(below[:, 2] if below.shape[1] > 2 else 0.5, Hs, wind)
+        return np.stack([wind, Hs, Tp], axis=1)
+
+    return states
+
+
+def form_load(runs, column, side, climate, years=YEARS):
+    """Return (load, wind, Hs) of a return period by inverse FORM over wind, Hs and the largest load in a run.
+
+    runs: of production in normal turbulence, with several Hs in each wind, the severe sea among them: the
+    largest load of a run is a Gumbel variable whose mode and scale are interpolated in Hs and wind, and
+    continued beyond the largest Hs. (nan, nan, nan) with fewer than two winds.
+    """
+    sign = 1.0 if side == "max" else -1.0
+    points = {}
+    for case, each in runs:
+        if case.wind_speed is not None:
+            seas = points.setdefault(case.wind_speed, {})
+            seas.setdefault(case.Hs, []).append(sign * each.value(column, side))
+    tables = {
+        wind: np.array([(Hs, *gumbel_fit(seas[Hs])) for Hs in sorted(seas) if len(seas[Hs]) > 1])
+        for wind, seas in points.items()
+    }
+    winds = np.array(sorted(wind for wind, table in tables.items() if len(table)))
+    if len(winds) < 2:
+        return nan, nan, nan
+    tables = [tables[wind] for wind in winds]
+
+    def at_wind(number, Hs):  # (2, n) mode and scale in one wind
+        table = tables[number]
+        if len(table) == 1:
+            return np.repeat(table[0, 1:, None], len(Hs), axis=1)
+        left = np.clip(np.searchsorted(table[:, 0], Hs) - 1, 0, len(table) - 2)
+        part = np.maximum(Hs - table[left, 0], 0.0) / (table[left + 1, 0] - table[left, 0])
+        return (table[left, 1:] + part[:, None] * (table[left + 1, 1:] - table[left, 1:])).T
+
+    def response(state):
+        wind, Hs, below = state.T
+        left = np.clip(np.searchsorted(winds, wind) - 1, 0, len(winds) - 2)
+        part = np.clip((wind - winds[left]) / (winds[left + 1] - winds[left]), 0.0, 1.0)
+        values = np.array([at_wind(number, Hs) for number in range(len(winds))])  # (winds, 2, n)
+        columns = np.arange(len(wind))
+        mode, scale = (1.0 - part) * values[left, :, columns].T + part * values[left + 1, :, columns].T
+        load = mode - np.maximum(scale, 0.0) * np.log(-np.log(np.clip(below, 1e-300, 1.0 - 1e-16)))
+        # outside the bins the turbine does not produce
+        half = 0.5 * (winds[1] - winds[0])
+        return np.where((wind < winds[0] - half) | (wind > winds[-1] + half), -inf, load)
+
+    weather = states_of(climate)
+
+    def states(normal):
+        state = weather(normal[:, :2])
+        return np.column_stack([state[:, :2], norm.cdf(normal[:, 2])])
+
+    hours = float(np.mean([each.duration for _, each in runs])) / HOUR
+    load, state, _ = inverse_form(response, states, years, hours)
+    return sign * load, float(state[0]), float(state[1])
