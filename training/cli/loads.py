@@ -33,6 +33,9 @@ WIND = (
 DECK = "OpenFAST deck (.fst) that driving runs are written for. Default: PLATFORM, if it is one."
 FLOOD = "Compartment that may be flooded: water in it, kg, and its centre from the platform, m; repeatable."
 PLOT_SITE = "Plot of the site's climate, e.g. site.png; nothing is run."
+CENTURY = "Simulate the hours of production of so many years instead, with rotor-averaged turbulence."
+PERIOD = "With --century: return period of the values, years."
+SAMPLE = "With --century: hours of importance sampling instead of all hours."
 MOST_LOST = 10  # runs without result that are printed
 
 
@@ -56,6 +59,9 @@ def loads_command(
     deck: Annotated[str | None, Option(help=DECK)] = None,
     driving: Annotated[int, Option(help="Driving runs that are written for a check in OpenFAST.")] = 10,
     plot_site: Annotated[str | None, Option(help=PLOT_SITE)] = None,
+    century: Annotated[float | None, Option(metavar="YEARS", help=CENTURY)] = None,
+    return_period: Annotated[float, Option(metavar="YEARS", help=PERIOD)] = 50.0,
+    sample: Annotated[int | None, Option(metavar="HOURS", help=SAMPLE)] = None,
     jobs: shared.JobsOption = 1,
     engine: shared.EngineOption = "processes",
     address: shared.AddressOption = None,
@@ -74,12 +80,16 @@ def loads_command(
     fowt loads deck/model.fst --site mine.toml --dlc 1.2,6.1 --seeds 2 --wind rotor-averaged  # a first look
     fowt loads iea15_volturnus_s --site gulf_of_maine --fidelity elastic  # blades and tower that bend
     fowt loads --site mine.csv --plot-site site.png  # fit a site to a table, and look at it
+    fowt loads --century 100 --controllers pi --jobs 2  # 50-year values without extrapolation: core-days
+    fowt loads --century 100 --sample 20000 --controllers pi --jobs 2  # nearly as good, in core-hours
 
     [bold]Files written[/bold]: manifest.json (the settings), runs/CONTROLLER/CONDITION_seedN.zip (statistics
     of each run), loads.html (the page), tables/ (CSV, and spreadsheets in the layout of IEA-22's design
     loads), driving/ (the runs that drive the table, with their wind, sea and deck for OpenFAST). The same
     command resumes an interrupted table and adds further controllers, load cases or seeds to the folder.
-    docs/guides/load-table.md explains cases and site, docs/guides/load-results.md the results.
+    docs/guides/load-table.md explains cases and site, docs/guides/load-results.md the results. --century
+    writes OUT/century/CONTROLLER: century.csv has the values of --return-period, and those to which the runs
+    of DLC 1.1 in OUT extrapolate, if they have been made with --wind rotor-averaged.
     """
     from fowt_env.controllers import controller_names
     from fowt_env.training.evaluation.engines import WorkersLost
@@ -101,6 +111,16 @@ def loads_command(
     labels = controller_names(controllers)
     if baseline is not None and baseline not in labels:
         raise unknown("baseline among --controllers", baseline, labels)
+    if century is not None:
+        from fowt_env.training.cli.century import show_centuries
+
+        settings = {"fidelity": fidelity, "sensors": sensors}
+        table = {"seeds": seeds, "hours": hours, **settings}
+        show_centuries(
+            platform, site, labels, century, return_period, sample, folder, settings, table,
+            jobs=jobs, engine=engine, address=address,
+        )  # fmt: skip
+        return
     matrix = expanded(
         platform, site, labels, dlc=dlc, seeds=seeds, hours=hours, wind=wind, fidelity=fidelity,
         sensors=sensors, compartments=[_compartment(text) for text in flood or ()],

@@ -1,0 +1,128 @@
+"""Implements fowt loads --century: values of the hours of many years, and those of the extrapolation."""
+
+from rich.markup import escape
+
+from fowt_env.descriptions.checks import check_number, check_whole_number
+from fowt_env.descriptions.files import parse_json
+from fowt_env.training.cli.console import EXIT_INTERRUPTED, EXIT_STOPPED, fail, note, progress_bar, wrote
+from fowt_env.training.cli.tables import out, print_table
+
+SHOWN = ("TwrBsMyt", "TwrBsMxyt", "YawBrMyp", "RootMyc1", "RotThrust", "PtfmPitch", "PtfmOffset", "NcIMUTAxs",
+         "RotSpeed", "FAIRTEN1", "FAIRTEN2", "FAIRTEN3")  # fmt: skip
+PILOT = 200  # hours of plain sampling from which the states of importance sampling are chosen
+
+
+def show_centuries(platform, site, labels, years, period, sample, folder, settings, table, **machine):
+    """Simulate the hours of some years for each controller, and print what the extrapolation makes of them.
+
+    period: return period, years; sample: hours of importance sampling in place of all hours; settings: of
+    Century; table: of the matrix of load cases in the folder. Raises: InputError.
+    """
+    from fowt_env.training.loads.century import Century
+    from fowt_env.training.loads.site import read_site
+
+    check_number("century", years, 0.0, 1e4, low_open=True, allowed="a number of years in (0, 10000]")
+    check_number("return_period", period, 0.0, low_open=True, allowed="a positive number of years")
+    if sample is not None:
+        check_whole_number("sample", sample, 1)
+    for label in labels:
+        century = Century(platform, read_site(site), label, **settings)
+        runs = _extrapolated_runs(platform, site, label, folder, table)
+        _show_century(century, years, period, sample, folder / "century" / label, runs, **machine)
+
+
+def _extrapolated_runs(platform, site, label, folder, table):
+    """Return [(LoadCase, RunStatistics)] of DLC 1.1 in a folder, with rotor-averaged turbulence; or []."""
+    from fowt_env.training.loads.matrix import expanded
+    from fowt_env.training.loads.run import finished_runs
+
+    manifest = folder / "manifest.json"
+    if not manifest.exists():
+        return []
+    stored = parse_json(manifest.read_text(encoding="utf-8")).get("cases", {})
+    matrix = expanded(platform, site, (label,), dlc="1.1", wind="rotor-averaged", **table)
+    plain = {name for name, case in stored.items() if case.get("wind", {}).get("kind") == "ntm"}
+    found = [
+        (case, run.statistics)
+        for case, run in finished_runs(matrix, folder)
+        if case.name in plain and run.statistics is not None
+    ]
+    if len(found) < len(matrix.cases):
+        note(f"{folder} has {len(found)} of {len(matrix.cases)} runs of DLC 1.1: nothing is compared")
+        return []
+    return found
+
+
+def _show_century(century, years, period, sample, folder, runs, *, jobs, engine, address):
+    """Simulate the hours of a Century and write century.csv in a folder; print its main loads."""
+    from fowt_env.training.evaluation.engines import WorkersLost
+    from fowt_env.training.loads.century import (
+        century_table,
+        extrapolations,
+        run_century,
+        seconds_per_hour,
+    )
+
+    total = century.hours(years)
+    stages = [(total, None)] if sample is None else [(min(PILOT, total), None), (sample, period)]
+    hours = sum(each for each, _ in stages)
+    with progress_bar("measuring the speed"):
+        seconds = seconds_per_hour(century)
+    out.print(
+        f"{years:g} years: {total:,} h of production ({100.0 * century.production:.1f} % of the time);"
+        f" {hours:,} h are simulated at {3600.0 / seconds:,.0f} times real time:"
+        f" {hours * seconds / 3600.0:.2g} core-hours, all hours {total * seconds / 3600.0:.3g}"
+    )
+    done = 0
+    with progress_bar("sampling") as update:
+
+        def report(finished, blocks, left):
+            nonlocal done
+            done = finished
+            update(finished, blocks, f"{finished} of {blocks} blocks, {left / 60.0:.0f} min left")
+
+        try:
+            found, wall, simulated = run_century(
+                century, folder, stages, jobs=jobs, engine=engine, address=address, progress=report
+            )
+        except KeyboardInterrupt:
+            what = f"{done} blocks of this stage are in {folder}; the same command resumes the sample"
+            fail(f"interrupted; {what}", EXIT_INTERRUPTED)
+        except WorkersLost as error:
+            fail(error, EXIT_STOPPED)
+    note(
+        f"{simulated:,} h simulated in {wall:.0f} s with {jobs} processes; {found.hours:,} h in all,"
+        f" {found.lost} lost, {found.tripped} with a trip"
+    )
+    table = century_table(found, period, extrapolations(runs, period) if runs else None)
+    path = folder / "century.csv"
+    table.to_csv(path, index=False)
+    shown = table[table["load"].isin(SHOWN) & table["value"].notna()]
+    headings = (
+        "load",
+        "side",
+        "value",
+        "low",
+        "high",
+        "hours",
+        "wind m/s",
+        "Hs m",
+        "extrapolated",
+        "low",
+        "high",
+    )
+    columns = ["load", "side", "value", "low", "high", "exceedances", "wind", "Hs", "extrapolated",
+               "extrapolated_low", "extrapolated_high"]  # fmt: skip
+    print_table(headings, shown[columns].values.tolist(), f"once in {period:g} years", left=(0, 1))
+    missing = table["value"].isna().sum()
+    if missing:
+        out.print(f"{missing} of {len(table)} values are beyond what {found.hours:,} h can show")
+    compared = table["covered"].dropna()
+    if len(compared):
+        outside = table[table["covered"] == False]  # noqa: E712
+        names = ", ".join(f"{row.load} {row.side}" for row in outside.itertuples())
+        out.print(
+            f"the interval of the extrapolation covers {int(compared.sum())} of {len(compared)} values;"
+            f" not: {escape(names) or 'none'}"
+        )
+    wrote(path)
