@@ -46,3 +46,18 @@ def interpolated(order, new, h0, h1, h2):
     d2 = new - 2.0 * h0 + h1 if order > 1 else 0.0
     d3 = new - 3.0 * h0 + 3.0 * h1 - h2 if order > 2 else 0.0
     return h0, new - h0 - 0.5 * d2 - d3 / 6.0, 0.5 * d2, d3 / 6.0
+
+
+@inlined_kernel
+def with_integrals(begun, ended, area, moment):
+    """Return (c0, c1, c2, c3) of the cubic in s with these values at 0 and 1 and integrals over the step.
+
+    area, moment: its first and second integral from 0 to 1.
+    """
+    rise, area, moment = ended - begun, area - begun, moment - 0.5 * begun
+    return (
+        begun,
+        3.0 * rise - 24.0 * area + 60.0 * moment,
+        -12.0 * rise + 84.0 * area - 180.0 * moment,
+        10.0 * rise - 60.0 * area + 120.0 * moment,
+    )

@@ -184,19 +184,19 @@ def adams(t, x, u, dt, model, method, data):
     begin_twist(shaft, work)
     keep_twist(x, blades, shaft, data.elastic, work, history[0])
     begin_swing(steps, x, body, tower, blades, matrix, work, still)
-    keep_swing(x, tower, shaft, work, history[0])
+    keep_swing(x, tower, blades, shaft, work, history[0])
     begin_followers(x, dt, False, model, data)
     for i in range(n):
         y[i] = x[i] + dt * bashforth(order, i, history)
     advance_actuators(x, u, dt, model, y)
-    twist_on(steps, dt, x, u, order, history, data.elastic, blades, shaft, model, work, y)
+    twist_on(steps, dt, x, u, order, history, data.elastic, blades, shaft, model, matrix, work, still, y)
     swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, still, extra, y)
     sample_rotor(t, x, u, dt, model, method.substeps, data)
     if method.corrector or steps < START_STEPS or feathering(x, model):
         follow(x, y, False, dt, model, data)
         derivative(t + dt, y, u, model, data, new)
         keep_twist_after(y, blades, shaft, work, new)
-        keep_swing(y, tower, shaft, work, new)
+        keep_swing(y, tower, blades, shaft, work, new)
         for i in range(State.VX, n):
             y[i] = x[i] + dt * moulton(order, new[i], i, history)
         advance_actuators(x, u, dt, model, y)

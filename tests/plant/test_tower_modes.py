@@ -209,7 +209,7 @@ def swung(pinned, integrator, dt, steps):
         row = data.history[START_STEPS - 1 - k]
         observe(handle, x, u, k * dt, row, np.zeros(N_MEASUREMENTS))
         begin_swing(k, x, model.rigid_body, model.tower, None, data.matrix, data.rotor, data.stages[2])
-        keep_swing(x, model.tower, None, data.rotor, row)
+        keep_swing(x, model.tower, None, None, data.rotor, row)
     forget(handle)
     data.cache[LoadCache.STEPS] = START_STEPS
     x = start[-1].copy()

@@ -5,6 +5,7 @@
     STUDY here FOLDER                               runs the models of this package in the same wind and waves
     STUDY table FOLDER --out figures.csv            adds the figures of finished runs to the file
     STUDY table figures.csv                         prints the tables of the file
+    STUDY spread FOLDER --winds 12 --seeds 1        prints how far the ratios depend on the start of the runs
 
 A finished run is not repeated: both commands continue where they stopped, and with --done figures.csv where
 the runs of another machine stopped. A run of OpenFAST is kept as a series of CHANNELS, so that its figures
@@ -59,6 +60,7 @@ WINDS, SEEDS = (14.0, 18.0, 12.0, 22.0), (1, 2, 3, 4)  # m/s; of wind and waves
 ALL_LAWS = ",".join(LAWS)
 ALL_WINDS, ALL_SEEDS = (",".join(f"{value:g}" for value in values) for values in (WINDS, SEEDS))
 DURATION, BEGIN = 500.0, 100.0  # s; start-up that is left out
+STARTS = {"PtfmPitch": 0.2, "RotSpeed": 0.2, "PtfmSurge": 1.0}  # deg, rpm, m: changes of `spread`, both ways
 OUTPUT_DT = 0.1  # s, of both codes
 WAVE_PERIOD = 720.0  # s, WaveTMax of openfast_decks: components are its harmonics
 SEA_STREAM = 7  # of the random generator of wave phases
@@ -313,11 +315,11 @@ def wind_here(case, box, scene):
     return {"kind": "series", "time": when, "speed": value[:, 0]}
 
 
-def run_here(case, folder, duration):
-    """Return the DataFrame of a run here."""
+def run_here(case, folder, duration, change=None):
+    """Return the DataFrame of a run here; change: {channel: value} added to its start."""
     platform, options = models(case.platform)[case.model]
     nominal = build_scene(case.platform, wind=case.wind)
-    begin = start(case.platform, case.wind)
+    begin = {k: v + (change or {}).get(k, 0.0) for k, v in start(case.platform, case.wind).items()}
     scene = build_scene(
         platform, wind=wind_here(case, box_path(folder, *case.weather), nominal),
         sea=sea_here(sea_components(case.wind, case.seed)), duration=duration + SPARE,
@@ -504,6 +506,27 @@ def report(rows, platform, names=None, laws=None, winds=None):
     return "\n\n".join(parts)
 
 
+def spread_table(wanted, folder, duration):
+    """Return the Markdown table of the least and greatest ratio to BASELINE over starts changed by STARTS.
+
+    wanted: Cases of one model, those of BASELINE among them. Averages are those of `averages`.
+    """
+    turbine = read_turbine(read_platform(SUBJECTS[wanted[0].platform].plant).turbine)
+    changes = [{}, *({name: sign * size} for name, size in STARTS.items() for sign in (1.0, -1.0))]
+    tables = []
+    for change in changes:
+        figures = [figures_of(run_here(case, folder, duration, change), turbine) for case in wanted]
+        rows = [vars(case) | values for case, values in zip(wanted, figures, strict=True)]
+        tables.append(ratios(averages(pd.DataFrame(rows))))
+    every = pd.concat(tables, keys=range(len(tables)))
+    low, high = (getattr(every.groupby(level=["model", "law"], sort=False), end)() for end in ("min", "max"))
+    rows = [
+        [figure, f"`{law}`", *(f"{table.loc[(model, law), figure]:.1f}" for table in (tables[0], low, high))]
+        for figure in FIGURES for model, law in low.index if law != BASELINE
+    ]  # fmt: skip
+    return markdown_table(["figure", "controller", "ratio, %", "least", "greatest"], rows)
+
+
 def chosen(what, names, known):
     """Return the names of a text with commas. Raises: InputError for one that is not known."""
     names = parse_names(names)
@@ -645,6 +668,25 @@ def here(
 
     if failed := at_once(work, waiting, 1):
         raise InputError(f"{failed} runs failed")
+
+
+@app.command()
+def spread(
+    folder: Annotated[Path, typer.Argument(help="Folder of the runs, with the wind boxes.")],
+    platform: Platform = "oc3_hywind",
+    laws: Laws = ALL_LAWS,
+    winds: Winds = ALL_WINDS,
+    seeds: Seeds = ALL_SEEDS,
+    model: Annotated[str, typer.Option(help="Of `here`.")] = "elastic",
+    duration: Duration = DURATION,
+):
+    """Print how far the ratios here depend on the start: platform pitch, rotor speed and surge both ways."""
+    names = f"{BASELINE},{laws}"
+    wanted = list(dict.fromkeys(_chosen_cases(platform, model, models(platform), names, winds, seeds)))
+    for case in wanted:
+        if not box_path(folder, *case.weather).exists():
+            raise InputError(f"{case}: has no wind box in {str(folder)!r}; run `openfast` first")
+    print(spread_table(wanted, folder, duration))
 
 
 @app.command()

@@ -1,7 +1,9 @@
 """Compares turbines whose blades and tower bend with OpenFAST: steady wind, free decays, turbulence.
 
-OpenFAST's runs and their settings: training/validation/reference/elastic. Both codes have the same degrees of
-freedom: blades="modes2" and tower="modes2" are ElastoDyn's three modes a blade and two a direction.
+Runs are at fidelity "standard" with its default step; ROSCO, which another interval makes another controller,
+is called as in OpenFAST, and the step is then that interval. OpenFAST's runs and their settings:
+training/validation/reference/elastic. Both codes have the same degrees of freedom: blades="modes2" and
+tower="modes2" are ElastoDyn's three modes a blade and two a direction.
 """
 
 from dataclasses import dataclass, replace
@@ -31,8 +33,9 @@ PLACE = "elastic"
 WINDS = (8, 12, 18, 24)  # m/s
 TURNS, HARMONICS = 8, 6  # last whole turns of a steady run; harmonics fitted to them
 STEADY, STEADY_STEP = 100.0, 0.05  # s, duration and output step of a steady run
-FREE, FREE_DT, FREE_STEP = 60.0, 0.005, 0.02  # s, duration and steps of a free decay
-POLE_STEP, FIRST_SECONDS = 0.06, 12.0  # s, samples of the fit of poles; record whose rms error is computed
+FREE, FREE_STEP = 60.0, 0.05  # s, duration and output step of a free decay
+POLE_STEP, FIRST_SECONDS = 0.1, 12.0  # s, samples of the fit of poles; record whose rms error is computed
+COMMON_STEP = 0.2  # s, of this record: multiple of the steps of both codes
 TURBULENT_STEP = 0.05  # s, of the statistics; the stored series have every second row
 TIP = ("OoPDefl1_[m]", "IPDefl1_[m]")
 ROOT = ("RootMyb1_[kN-m]", "RootMxb1_[kN-m]", "RootMyc1_[kN-m]", "RootMxc1_[kN-m]")
@@ -66,7 +69,7 @@ class Machine:
     bent: dict  # wind, m/s: first tip deflection (out of plane, in plane), m
     released: tuple  # m, tip deflection (out of plane, in plane) at the start of free decays
     gauges: tuple  # fractions of the span, of Spn1 and Spn2: the middles of ElastoDyn's elements
-    control_dt: float  # s
+    control_dt: float | None  # s, between calls of the controller; None: the default step
     shaft: str  # option of the turbulent runs
     under_rosco: bool
 
@@ -76,13 +79,13 @@ class Machine:
         tips = dict(zip(("OoPDefl", "IPDefl"), deflection, strict=True))
         return {"start": "zero", "RotSpeed": rotor_speed, **pitches, **tips}
 
-    def controller(self, individual=False):
-        """Return the controller of the turbulent runs."""
+    def controller(self, dt, individual=False):
+        """Return the controller of the turbulent runs, called every dt s."""
         if not self.under_rosco:
             return "openfast_oc3"
         turbine = read_turbine(read_platform(self.platform).turbine)
         deck = Discon(turbine.discon, individual)
-        return Rosco(deck, self.control_dt, individual=individual, nodding=True)
+        return Rosco(deck, dt, individual=individual, nodding=True)
 
 
 IEA15 = Machine(
@@ -95,7 +98,7 @@ NREL5 = Machine(
     "nrel5mw", "oc3_hywind_openfast",
     {8: (9.208, 0.0), 12: (12.1, 3.963), 18: (12.1, 14.95), 24: (12.1, 22.141)},
     {8: (3.2, -0.4), 12: (4.0, -0.6), 18: (1.2, -0.6), 24: (0.0, -0.5)}, (2.0, 1.0),
-    (4.5 / 17.0, 8.5 / 17.0), 0.0125, "torsion", False,
+    (4.5 / 17.0, 8.5 / 17.0), None, "torsion", False,
 )  # fmt: skip
 
 
@@ -107,9 +110,9 @@ def with_gauges(scene, fractions):
 
 
 def _scene(machine, wind, **options):
-    """Return the scene of a turbine as in OpenFAST's runs, at fidelity "reference"."""
+    """Return the scene of a turbine as in OpenFAST's runs, at fidelity "standard" with its default step."""
     options = {"blades": "modes2", "skewed_wake": True, "shear_exponent": 0.0, **options}
-    scene = build_scene(machine.platform, wind=wind, **{"fidelity": "reference", **options})
+    scene = build_scene(machine.platform, wind=wind, **{"fidelity": "standard", **options})
     return scene if options["blades"] == "rigid" else with_gauges(scene, machine.gauges)
 
 
@@ -218,9 +221,15 @@ def free_run(machine, case, **options):
     scene = scene.with_model({"rigid_body.gravity": 0.0})
     rotor_speed = machine.operating[12][0] if rated else 0.0
     return simulate(
-        scene, controller=None, duration=FREE, dt=FREE_DT, control_dt=FREE_STEP, output_dt=FREE_STEP,
+        scene, controller=None, duration=FREE, control_dt=FREE_STEP, output_dt=FREE_STEP,
         initial=machine.start(rotor_speed, (pitch,) * BLADES, machine.released),
     )  # fmt: skip
+
+
+def _every(frame, step):
+    """Return the rows of a frame, whose first column is the time, at multiples of a step, s."""
+    time = frame.iloc[:, 0].to_numpy()
+    return frame.iloc[:: round(step / (time[1] - time[0]))].reset_index(drop=True)
 
 
 def blade_decays(study, machine):
@@ -237,9 +246,10 @@ def blade_decays(study, machine):
             there = row["frequency_Hz"]
             study.add(f"blades, {case}", f"{mode}, frequency", "Hz", there, frequency, allowed=FREQUENCY)
             study.add(f"blades, {case}", f"{mode}, damping ratio", "-", row["damping_ratio"], ratio)
-        early = ours[ours[TIME] <= FIRST_SECONDS + 1e-6].iloc[::2]  # the step of the reference is 0.04 s
+        early = _every(ours[ours[TIME] <= FIRST_SECONDS + 1e-6], COMMON_STEP)
+        same = _every(theirs, COMMON_STEP)
         for channel, mine in FREE_CHANNELS.items():
-            (name, unit), both = name_and_unit(channel), (theirs[channel], early[mine])
+            (name, unit), both = name_and_unit(channel), (same[channel], early[mine])
             error = 100.0 * normalised_rms(both[1], both[0])
             quantity = f"{name}, {STATISTICS['rms']} of the first {FIRST_SECONDS:g} s"
             study.add(f"blades, {case}", quantity, unit, *(values.std() for values in both), error)
@@ -261,9 +271,10 @@ def turbulent_run(machine, wind, duration, folder=None, individual=False, **opti
     options = {"tower": "modes2", "shaft": machine.shaft, **options}
     rotor_speed, pitch = machine.operating[wind]
     scene = _scene(machine, turbulent_wind(wind, folder), sea=wave_components(folder), **options)
+    dt = scene.dt if machine.control_dt is None else machine.control_dt
     return simulate(
-        scene, controller=machine.controller(individual), duration=duration,
-        dt=min(scene.dt, machine.control_dt), control_dt=machine.control_dt, output_dt=TURBULENT_STEP,
+        scene, controller=machine.controller(dt, individual), duration=duration, control_dt=dt,
+        output_dt=TURBULENT_STEP,
         initial=machine.start(rotor_speed, (pitch,) * BLADES, machine.bent[wind]),
     )  # fmt: skip
 
@@ -320,9 +331,8 @@ def relief(study, machine):
         return
     stored = table(f"{PLACE}/{machine.name}_turbulent.csv.gz", study.folder)
     stored = stored.set_index(["case", "channel"])["DEL"]
-    machine = replace(machine, control_dt=SHEAR_CONTROL_DT)
     cases = "turb_18mps_shear", "turb_18mps_shear_ipc"
-    frames = []
+    machine, frames = replace(machine, control_dt=SHEAR_CONTROL_DT), []
     for case in cases:
         study.say(f"{machine.name}, {case}")
         individual = case.endswith("ipc")

@@ -21,10 +21,15 @@ LABELS = {
     Channel.SPEED: "rotor speed\n(rpm)", Channel.BLADE: "blade pitch\n(deg)",
     Channel.THRUST: "thrust\n(N)", Channel.TORQUE: "torque\n(N m)", "FAIRTEN1_[kN]": "tension 1\n(kN)",
     "TTDspFA_[m]": "tower top\n(m)", "TwrBsMyt_[kN-m]": "tower base\n(kN m)",
+    "OoPDefl1_[m]": "tip, out of\nplane (m)", "RootMyb1_[kN-m]": "root, flap\n(kN m)",
+    "RootMxb1_[kN-m]": "root, edge\n(kN m)", "RotTorq_[kN-m]": "shaft\n(kN m)",
 }  # fmt: skip
 TURNING = (*Channel.PLANE, Channel.SPEED, Channel.BLADE)
 OPERATING, WAVE = (*TURNING, Channel.TENSIONS[0]), (*Channel.PLANE, Channel.TENSIONS[0])
 BENDING = (Channel.PITCH, Channel.SPEED, "TTDspFA_[m]", "TwrBsMyt_[kN-m]")
+ELASTIC = (
+    Channel.SPEED, "OoPDefl1_[m]", "RootMyb1_[kN-m]", "RootMxb1_[kN-m]", "RotTorq_[kN-m]", "TwrBsMyt_[kN-m]"
+)  # fmt: skip
 WAKE = (Channel.THRUST, Channel.TORQUE)
 WHOLE, LONG, SHORT = (0.0, 600.0), (100.0, 400.0), (100.0, 200.0)  # s
 PLOTS = {  # platform: {case: (channels, time range in s, whether spectra are plotted)}
@@ -37,6 +42,7 @@ PLOTS = {  # platform: {case: (channels, time range in s, whether spectra are pl
         "turb_18mps_Hs7.5_uniform": (OPERATING, LONG, True),
         "turb_18mps_Hs7.5_uniform_flex": (BENDING, SHORT, True),
         "turb_18mps_Hs7.5_box": (OPERATING, LONG, True),
+        "elastic, turb_18mps": (ELASTIC, SHORT, True),
     },
     "iea15_volturnus_s": {
         "regwave_H4T9": (Channel.PLANE, (410.0, 500.0), False),
@@ -48,6 +54,7 @@ PLOTS = {  # platform: {case: (channels, time range in s, whether spectra are pl
         "turb_18mps_Hs7.5_uniform_tower": (BENDING, SHORT, True),
         "wake_pitch_step": (WAKE, (10.0, 100.0), False),
         "wake_wind_step_18mps": (WAKE, (10.0, 100.0), False),
+        "elastic, turb_18mps": (ELASTIC, SHORT, True),
     },
     "nrel5mw_oc4_semi": {
         "waves_Hs7.5": (Channel.PLANE, LONG, True),
@@ -204,6 +211,11 @@ def _generator(study, path, per_decade=12):
     return save_figure(figure, path)
 
 
+def _plot_name(case):
+    """Return the file name of the plot of a case, without its ending."""
+    return case.replace(", ", "_")
+
+
 def write_plots(study, folder):
     """Write the plots of a study and return their paths."""
     folder, paths = Path(folder), []
@@ -223,10 +235,10 @@ def write_plots(study, folder):
         if case in study.runs:
             ours, theirs = study.runs[case]
             frames = {THERE: theirs, HERE: ours}
-            _overlay(frames, channels, window, path(case), case)
+            _overlay(frames, channels, window, path(_plot_name(case)), case)
             if spectra:
                 start = 400.0 if case.startswith("regwave") else 100.0
-                _spectra(frames, channels, path(f"{case}_spectra"), case, start)
+                _spectra(frames, channels, path(f"{_plot_name(case)}_spectra"), case, start)
     if "spectra of the wind" in study.runs:
         channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED)
         for name, (title, runs) in COST_PLOTS.items():
@@ -243,7 +255,7 @@ def markdown(study, plots=()):
     plots: file names, in the folder of the text
     """
     cases = list(dict.fromkeys(row.case for row in study.rows))
-    plots_of = {case: [f"{case}.png", f"{case}_spectra.png"] for case in cases}
+    plots_of = {case: [f"{_plot_name(case)}.png", f"{_plot_name(case)}_spectra.png"] for case in cases}
     others = [name for name in plots if not any(name in names for names in plots_of.values())]
 
     def images(names):

@@ -17,6 +17,8 @@ from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.beam import Beam, reduce_beam
 from fowt_env.plant.state import BLADES, State
 
+APART_COSINE, APART_SINE = cos(2.0 * pi / BLADES), sin(2.0 * pi / BLADES)  # of the angle between blades
+
 
 class Point(NamedTuple):
     """Holds shapes of n modes at a point of the pitch axis of a blade."""
@@ -81,9 +83,8 @@ class RotorFrame(NamedTuple):
 
 
 @kernel
-def fill_blade_axes(psi, pitch, cone_cosine, cone_sine, frame, axes):
-    """Fill axes (3, 3) with the columns j1, j2, j3 of a blade at azimuth psi (rad), platform axes."""
-    s, c = sin(psi), cos(psi)
+def fill_blade_axes(c, s, pitch, cone_cosine, cone_sine, frame, axes):
+    """Fill axes (3, 3) with the columns j1, j2, j3 of a blade, platform axes; c, s: of its azimuth."""
     rx, ry, rz = c * frame.zx - s * frame.yx, c * frame.zy - s * frame.yy, c * frame.zz - s * frame.yz
     # against the direction of rotation
     kx, ky, kz = c * frame.yx + s * frame.zx, c * frame.yy + s * frame.zy, c * frame.yz + s * frame.zz
@@ -292,11 +293,11 @@ def _no_blades(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work):
 
 @inlined_kernel
 def _add_blades(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work):
+    c, s = cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH])
     for number in range(BLADES):
-        psi = x[State.AZIMUTH] + 2.0 * pi * number / BLADES
-        fill_blade_axes(
-            psi, pitch_of(number, x, pitches), blades.cone_cosine, blades.cone_sine, frame, work.axes[number]
-        )
+        pitch = pitch_of(number, x, pitches)
+        fill_blade_axes(c, s, pitch, blades.cone_cosine, blades.cone_sine, frame, work.axes[number])
+        c, s = APART_COSINE * c - APART_SINE * s, APART_SINE * c + APART_COSINE * s
         _add_blade(number, x, frame.ax, frame.ay, frame.az, bx, by, bz, wx, wy, wz, blades, work)
 
 

@@ -28,6 +28,10 @@ from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
 from fowt_env.plant.state import State, cross
 
+FREE = (
+    6  # entry of RotorScratch.place: inverse of the inertia of rotor and generator, 1/(kg m2), zero if held
+)
+
 
 class Top(NamedTuple):
     """Holds the motion of the frame that carries nacelle and rotor, platform axes, for zero accelerations.

@@ -14,13 +14,14 @@ def _add_aerodynamics(shape, force):
     """Add the forces of the station loads of a BentShape to force (n,)."""
     loads = shape.loads
     for i in range(len(shape.modes.count)):
-        total, mode = 0.0, MODAL + LANES * N_MODAL * i
+        mode = MODAL + LANES * N_MODAL * i
+        normal = tangential = moment = 0.0  # sums of their own, which the processor forms at the same time
         for j in range(shape.modes.x.shape[0]):
             at = N_STATION_LOAD * j
-            total += placed(j, mode, shape) * loads[at]
-            total += placed(j, mode + LANES, shape) * loads[at + 1]
-            total += placed(j, mode + 2 * LANES, shape) * loads[at + 2]
-        force[i] += total
+            normal += placed(j, mode, shape) * loads[at]
+            tangential += placed(j, mode + LANES, shape) * loads[at + 1]
+            moment += placed(j, mode + 2 * LANES, shape) * loads[at + 2]
+        force[i] += normal + tangential + moment
 
 
 @inlined_kernel

@@ -11,12 +11,19 @@ cubic, with the share of the generator torque as it is known over the step, and 
 impulses on shaft and modes that make the difference from the Adams formula turn the hub, too, so that
 momentum about the shaft is kept. A and B need not be exact: every step finds g anew from past z, z' and z'',
 so that the order stays 4.
+
+Beside a rotor that is held, a tower feels all of the torque by which blades in phase twist the shaft. Its
+step (steps.py) then takes twist and torque as cubics with the values of z at both ends and its integrals,
+which are exact, too. A shaft that swings too fast for the step bends the tower by its share e of the twist: A
+and B then contain what this bending does. A free rotor keeps most of the torque to itself: what is left of it
+is extrapolated with the tower's g.
 """
 
-from fowt_env.plant.adams import extrapolated, interpolated, moulton
+from fowt_env.plant.adams import extrapolated, interpolated, moulton, with_integrals
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.blades import BladeModes
+from fowt_env.plant.elastic.chain import FREE, answer
 from fowt_env.plant.elastic.shaft import (
     MOBILITY,
     MOBILITY_BEGUN,
@@ -26,17 +33,19 @@ from fowt_env.plant.elastic.shaft import (
     share_over,
     smooth_of,
 )
+from fowt_env.plant.elastic.tower import bend_by_modes
 from fowt_env.plant.state import BLADES, State
 
 # rows of RotorScratch.in_phase, (N_IN_PHASE, 1 + n): mean accelerations of the modes by a unit one of the
 # twist; z; z' and g, of four steps each, latest first; g at the end of the step; two for means and series
 REACTION, Z, RATE, REST, REST_AFTER, SERIES = 0, 1, 2, 6, 10, 11
-N_IN_PHASE = 13
 SPRING, DECAY = 0, 1  # entries of RotorScratch.in_phase_matrix: A, B
 STEP, MOBILE, HUB, MODES = 0, 1, 2, 3  # entries of RotorScratch.found, of the last matrices
 DRIFT = 0.02  # of k and e relative to those, up to which the matrices stay
 SHORT = 0.25  # square of the angle of the fastest oscillation, and decay, in a part of a step that has a
+UNRESOLVED = 1.0  # square of the angle in a step from which on a shaft swings too fast for the tower
 TERMS = 14  # power series of so many terms
+NO_CUBIC = (0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -73,11 +82,42 @@ def _find_matrices(mobility, e, blades, shaft, work):
 
 
 @kernel
+def _add_tower(dt, x, body, tower, blades, matrix, work, still):
+    """Add to A and B the springs and dampers of a tower that the twist bends by its share e alone.
+
+    So it does where the shaft swings too fast for a step, and for the tower's own modes: the rest of its
+    bending is then smooth. For a slower shaft this share would itself be an oscillation in g.
+    """
+    if tower is None:
+        return
+    if work.place[FREE] > 0.0 or work.in_phase_matrix[SPRING, 0, 0] * dt * dt < UNRESOLVED:
+        return
+    n, m, e, reaction = len(tower.beam.count), len(blades.beam.count), work.twist[1], work.in_phase[REACTION]
+    v, first, bend = tower.first + n, blades.first + BLADES * m, bend_by_modes(x, tower)
+    for part in range(2):
+        of_tower = tower.beam.stiffness if part == SPRING else tower.beam.damping
+        out, torque = work.in_phase_matrix[part], 0.0
+        still[:] = 0.0
+        for i in range(n):
+            for j in range(n):
+                still[v + i] += of_tower[i, j] * e[v + j]
+            torque += e[v + i] * still[v + i]
+        answer(0.0, bend, body, tower, blades, matrix, work, still)
+        pull = work.shaft_torque[MOBILITY_BEGUN] * torque
+        out[0, 0] += pull
+        for j in range(m):
+            out[1 + j, 0] += reaction[1 + j] * pull
+            for number in range(BLADES):
+                out[1 + j, 0] += still[first + m * number + j] / BLADES
+
+
+@kernel
 def fill_propagator(dt, work):
     """Fill work.propagator with what A and B make of z and load over a step dt (s).
 
-    (2 N, 6 N): (z, dt z') at the end by z, dt z' and the coefficients of dt2 g as a cubic in s, 0 to 1 over
-    the step. A power series over a part of the step, 2^-k of it, is doubled k times.
+    (4 N, 6 N): (z, dt z') at the end, and the first and second integral of z over s, 0 to 1 over the step,
+    by z, dt z' and the coefficients of dt2 g as a cubic in s. A power series over a part of the step, 2^-k
+    of it, is doubled k times.
     """
     A, B = work.in_phase_matrix[SPRING], work.in_phase_matrix[DECAY]
     P, Q = work.propagator[0], work.propagator[1]
@@ -96,6 +136,8 @@ def fill_propagator(dt, work):
             now[i] = 1.0 if kind == 0 and i == j else 0.0
             after[i] = 1.0 if kind == 1 and i == j else 0.0
             P[i, column], P[size + i, column] = now[i] + part * after[i], after[i]
+            P[2 * size + i, column] = part * now[i] + 0.5 * part * part * after[i]
+            P[3 * size + i, column] = part * part * (0.5 * now[i] + part * after[i] / 6.0)
         power = part
         for term in range(TERMS):  # now, after: coefficients of s^term, s^(term + 1)
             for i in range(size):
@@ -107,6 +149,9 @@ def fill_propagator(dt, work):
                 now[i], after[i] = after[i], Q[i, column]
                 P[size + i, column] += (term + 2) * power * after[i]
                 P[i, column] += power * part * after[i]
+                area = power * part * part * after[i] / (term + 3)
+                P[2 * size + i, column] += area
+                P[3 * size + i, column] += area * part / (term + 4)
             power *= part
     for _ in range(doublings):
         _double(part, P, Q)
@@ -116,11 +161,15 @@ def fill_propagator(dt, work):
 @kernel
 def _double(part, P, Q):
     """Make a propagator P over a part of a step one over twice this part; Q: work array."""
-    twice = P.shape[0]
-    size = twice // 2
-    for i in range(twice):
+    size = P.shape[0] // 4
+    twice = 2 * size
+    for i in range(4 * size):
         for column in range(6 * size):
             total = 0.0
+            if i >= twice:  # integrals over the first half
+                total = P[i, column]
+            if i >= 3 * size:
+                total += part * P[i - size, column]
             for k in range(twice):
                 total += P[i, k] * P[k, column]
             if column >= twice:  # the cubic in the second half: of (part + s)^power, by the binomials
@@ -131,13 +180,13 @@ def _double(part, P, Q):
                     choose *= (power - lower) / (lower + 1.0)
                     shift /= part
             Q[i, column] = total
-    for i in range(twice):
+    for i in range(4 * size):
         for column in range(6 * size):
             P[i, column] = Q[i, column]
 
 
 @kernel
-def _renew(steps, dt, blades, shaft, work):
+def _renew(steps, dt, x, body, tower, blades, shaft, matrix, work, still):
     """Find matrices and propagator for this step where they have drifted, and before the first step."""
     e, found, k = work.in_phase[REACTION], work.found, work.shaft_torque[MOBILITY_BEGUN]
     n, hub, least, most = len(blades.beam.count), work.twist[1, State.ROTOR_SPEED], 0.0, 0.0
@@ -153,6 +202,7 @@ def _renew(steps, dt, blades, shaft, work):
         for j in range(1, 1 + n):
             found[MODES + j] = e[j]
         _find_matrices(k, e, blades, shaft, work)
+        _add_tower(dt, x, body, tower, blades, matrix, work, still)
         fill_propagator(dt, work)
 
 
@@ -176,9 +226,9 @@ def _put_rest(bent, twist, share, dx, z, rate, rest, blades, shaft, work):
 
 
 @inlined_kernel
-def _put_past(steps, dt, history, past, blades, shaft, work):
+def _put_past(steps, dt, x, history, past, blades, shaft, model, matrix, work, still):
     """Fill z, z' and g of the beginning of the step and of past steps, by matrices of this step."""
-    _renew(steps, dt, blades, shaft, work)
+    _renew(steps, dt, x, model.rigid_body, model.tower, blades, shaft, matrix, work, still)
     rows, size = work.in_phase, BLADES * len(blades.beam.count)
     for k in range(past.shape[0] - 1, -1, -1):  # the latest last, whose z stays
         _put_rest(
@@ -188,12 +238,12 @@ def _put_past(steps, dt, history, past, blades, shaft, work):
 
 
 @inlined_kernel
-def _put_load(i, begun, ended, c0, c1, c2, c3, dt, work):
+def _put_load(i, share, c0, c1, c2, c3, dt, work):
     """Put dt2 times the cubic of entry i of g, and of the share of the generator torque, into work."""
     row, k = work.propagated[0], work.shaft_torque[MOBILITY_BEGUN]
     size, square = work.in_phase.shape[1], dt * dt
     if i == 0:
-        c0, c1 = c0 + k * begun, c1 + k * (ended - begun)
+        c0, c1, c2 = c0 + k * share[0], c1 + k * share[1], c2 + k * share[2]
     at = 2 * size + i
     row[at], row[at + size], row[at + 2 * size], row[at + 3 * size] = (
         square * c0, square * c1, square * c2, square * c3,
@@ -208,7 +258,7 @@ def _move(dt, order, blades, shaft, work, y):
     row, done, size, q = work.propagated[0], work.propagated[1], 1 + n, shaft.first
     first = blades.first + BLADES * n
     mean, change, M = rows[SERIES], rows[SERIES + 1], blades.beam
-    for i in range(2 * size):
+    for i in range(4 * size):
         total = 0.0
         for j in range(6 * size):
             total += P[i, j] * row[j]
@@ -274,6 +324,55 @@ def shift_means(blades, shaft, work, y):
 
 
 @inlined_kernel
+def _no_reaction(x, blades, shaft, work):
+    return 0.0
+
+
+@inlined_kernel
+def _reaction(x, blades, shaft, work):
+    if shaft is None:
+        return 0.0
+    if work.place[FREE] > 0.0:
+        return 0.0
+    n, K, e, total = len(blades.beam.count), blades.beam.stiffness, work.twist[0], 0.0
+    first = blades.first + BLADES * n
+    for j in range(n):
+        bent = shaken = 0.0
+        for number in range(BLADES):
+            shaken += e[first + n * number + j]
+            for i in range(n):
+                bent += K[j, i] * x[blades.first + n * number + i]
+        total += shaken * bent / BLADES
+    return work.shaft_torque[MOBILITY] * total
+
+
+@inlined_kernel
+def _slow_twist_over(dt, x, blades, shaft, work):
+    if shaft is None:
+        return NO_CUBIC, NO_CUBIC
+    return (x[shaft.first], dt * x[shaft.first + 1], 0.0, 0.0), NO_CUBIC
+
+
+@inlined_kernel
+def _twist_over(dt, x, blades, shaft, work):
+    if shaft is None:
+        return NO_CUBIC, NO_CUBIC
+    if work.place[FREE] > 0.0:
+        return (x[shaft.first], dt * x[shaft.first + 1], 0.0, 0.0), NO_CUBIC
+    n, K, e = len(blades.beam.count), blades.beam.stiffness, work.in_phase[REACTION]
+    before, after, size = work.propagated[0], work.propagated[1], 1 + n
+    begun = ended = area = moment = 0.0
+    for j in range(1, 1 + n):
+        pull = 0.0
+        for i in range(n):
+            pull += BLADES * work.shaft_torque[MOBILITY_BEGUN] * e[1 + i] * K[i, j - 1]
+        begun, ended = begun + pull * before[j], ended + pull * after[j]
+        area, moment = area + pull * after[2 * size + j], moment + pull * after[3 * size + j]
+    twist = with_integrals(before[0], after[0], after[2 * size], after[3 * size])
+    return twist, with_integrals(begun, ended, area, moment)
+
+
+@inlined_kernel
 def _keep_torque(x, blades, shaft, past, work, dx):
     keep_smooth(shaft, work, dx)
 
@@ -305,7 +404,7 @@ def _keep_rest_after(y, blades, shaft, work, new):
 
 
 @inlined_kernel
-def _twist_on(steps, dt, x, u, order, history, past, blades, shaft, model, work, y):
+def _twist_on(steps, dt, x, u, order, history, past, blades, shaft, model, matrix, work, still, y):
     h0, h1, h2, h3 = history[0], history[1], history[2], history[3]
     c0, c1, c2, c3 = extrapolated(
         order, smooth_of(shaft, h0), smooth_of(shaft, h1), smooth_of(shaft, h2), smooth_of(shaft, h3)
@@ -314,17 +413,17 @@ def _twist_on(steps, dt, x, u, order, history, past, blades, shaft, model, work,
 
 
 @inlined_kernel
-def _swing_on(steps, dt, x, u, order, history, past, blades, shaft, model, work, y):
+def _swing_on(steps, dt, x, u, order, history, past, blades, shaft, model, matrix, work, still, y):
     if shaft is None:
         return
-    _put_past(steps, dt, history, past, blades, shaft, work)
-    begun, ended = share_over(x, u, shaft, model, work, y)
+    _put_past(steps, dt, x, history, past, blades, shaft, model, matrix, work, still)
+    share = share_over(x, u, shaft, model, work, y)
     rows = work.in_phase
     for i in range(rows.shape[1]):
         c0, c1, c2, c3 = extrapolated(
             order, rows[REST, i], rows[REST + 1, i], rows[REST + 2, i], rows[REST + 3, i]
         )
-        _put_load(i, begun, ended, c0, c1, c2, c3, dt, work)
+        _put_load(i, share, c0, c1, c2, c3, dt, work)
     _move(dt, order, blades, shaft, work, y)
 
 
@@ -341,16 +440,22 @@ def _twist_again(dt, x, u, order, new, history, blades, shaft, model, work, y):
 def _swing_again(dt, x, u, order, new, history, blades, shaft, model, work, y):
     if shaft is None:
         return
-    begun, ended = share_over(x, u, shaft, model, work, y)
+    share = share_over(x, u, shaft, model, work, y)
     rows = work.in_phase
     for i in range(rows.shape[1]):
         c0, c1, c2, c3 = interpolated(
             order, rows[REST_AFTER, i], rows[REST, i], rows[REST + 1, i], rows[REST + 2, i]
         )
-        _put_load(i, begun, ended, c0, c1, c2, c3, dt, work)
+        _put_load(i, share, c0, c1, c2, c3, dt, work)
     _move(dt, order, blades, shaft, work, y)
 
 
+# (x, blades, shaft, work) -> acceleration of the twist, 1/s2, less its sign, by the stiffness of blades in
+# phase: what the rigid shaft of the last solution passes on to the nacelle from a rotor that is held
+reaction_at = chosen_by_class("blades", {type(None): _no_reaction, BladeModes: _reaction}, inlined=True)
+# (dt, x, blades, shaft, work) -> coefficients (4) in s, 0 to 1 over the step from x, of the twist, rad, and
+# of reaction_at: by z of twist_on beside a rotor that is held, else at the rate at x, and none
+twist_over = chosen_by_class("blades", {type(None): _slow_twist_over, BladeModes: _twist_over}, inlined=True)
 # (x, blades, shaft, past, work, dx): after an evaluation of the rates dx at x, keeps what twist_on needs of
 # it, before what past steps left
 keep_twist = chosen_by_class("blades", {type(None): _keep_torque, BladeModes: _keep_twist}, inlined=True)
@@ -358,8 +463,9 @@ keep_twist = chosen_by_class("blades", {type(None): _keep_torque, BladeModes: _k
 keep_twist_after = chosen_by_class(
     "blades", {type(None): _keep_torque_after, BladeModes: _keep_rest_after}, inlined=True
 )
-# (steps, dt, x, u, order, history, past, blades, shaft, model, work, y): advances the twist, and blades in
-# phase, by the loads of the last `order` steps; y has the velocities of Adams-Bashforth
+# (steps, dt, x, u, order, history, past, blades, shaft, model, matrix, work, still, y): advances the twist,
+# and blades in phase, by the loads of the last `order` steps; y has the velocities of Adams-Bashforth; still:
+# work array
 twist_on = chosen_by_class("blades", {type(None): _twist_on, BladeModes: _swing_on}, inlined=True)
 # (dt, x, u, order, new, history, blades, shaft, model, work, y): by the load at the end of the step, too; y
 # has the velocities of Adams-Moulton

@@ -12,13 +12,14 @@ extrapolates T as a polynomial in time, less the share of the generator torque, 
 solves for the oscillation exactly; and replaces the quadrature of q'' in every velocity by its exact change.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.drivetrain import shaft_torque, torque_in_force
 from fowt_env.plant.elastic.oscillator import swung
-from fowt_env.plant.state import State
+from fowt_env.plant.state import Command, State
 
 # entries of RotorScratch.shaft_torque: mobility k, 1/(kg m2), now and at the beginning of the step; torque of
 # a rigid shaft, N m, by all but the generator, which is smooth, and by the generator
@@ -80,20 +81,11 @@ def keep_smooth(shaft, work, dx):
 
 
 @kernel
-def rate_by_twist(i, shaft, work, dx):
-    """Return the part of the rate of velocity i in dx that the acceleration of the twist causes."""
+def rate_by_twist(i, more, shaft, work, dx):
+    """Return the part of the rate of velocity i in dx that the twist causes, accelerated by more (1/s2)."""
     if shaft is None:
         return 0.0
-    return work.twist[0, i] * dx[shaft.first + 1]
-
-
-@kernel
-def change_by_twist(i, dt, x, shaft, work, y):
-    """Return the changes by the twist of velocity i, and of its integral, over a step dt from x to y."""
-    if shaft is None:
-        return 0.0, 0.0
-    e, q = work.twist[1, i], shaft.first
-    return e * (y[q + 1] - x[q + 1]), e * (y[q] - x[q] - dt * x[q + 1])
+    return work.twist[0, i] * (dx[shaft.first + 1] + more)
 
 
 @kernel
@@ -114,13 +106,29 @@ def smooth_of(shaft, dx):
     return dx[shaft.first]
 
 
+@kernel
+def _middle_torque(begun, ended, u, converter):
+    """Return the generator torque (N m) in the middle of a step, in which a lag approaches its command."""
+    if converter is None:
+        return begun
+    command = u[Command.GENERATOR_TORQUE]
+    rest = sqrt(abs((begun - command) * (ended - command)))
+    return command + (rest if begun > command else -rest)
+
+
 @inlined_kernel
 def share_over(x, u, shaft, model, work, y):
-    """Return the generator's share of the torque in a rigid shaft, N m, at the beginning x and the end y."""
+    """Return the generator's share of the torque in a rigid shaft over the step from x to y, N m.
+
+    As coefficients (3) of the square in s, 0 to 1, through its values at both ends and in the middle.
+    """
     share, speed = 1.0 - work.twist[1, State.ROTOR_SPEED], generator_speed(x, shaft)
-    begun = -share * shaft_torque(0.0, torque_in_force(x, u, model.converter), speed, model.drivetrain)
-    ended = -share * shaft_torque(0.0, torque_in_force(y, u, model.converter), speed, model.drivetrain)
-    return begun, ended
+    first, last = torque_in_force(x, u, model.converter), torque_in_force(y, u, model.converter)
+    half = _middle_torque(first, last, u, model.converter)
+    begun = -share * shaft_torque(0.0, first, speed, model.drivetrain)
+    middle = -share * shaft_torque(0.0, half, speed, model.drivetrain)
+    ended = -share * shaft_torque(0.0, last, speed, model.drivetrain)
+    return begun, 4.0 * middle - 3.0 * begun - ended, 2.0 * (begun - 2.0 * middle + ended)
 
 
 @inlined_kernel
@@ -131,8 +139,8 @@ def _no_twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
 @inlined_kernel
 def _twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
     e, k, over = work.twist[1], work.shaft_torque[MOBILITY_BEGUN], 1.0 / after
-    begun, ended = share_over(x, u, shaft, model, work, y)
-    c0, c1, c2, c3 = c0 + begun, (c1 + ended - begun) * over, c2 * over * over, c3 * over * over * over
+    s0, s1, s2 = share_over(x, u, shaft, model, work, y)
+    c0, c1, c2, c3 = c0 + s0, (c1 + s1) * over, (c2 + s2) * over * over, c3 * over * over * over
     q, rate = swung(
         x[shaft.first], x[shaft.first + 1], k * c0, k * c1, k * c2, k * c3, after, k * shaft.stiffness,
         0.5 * k * shaft.damping,

@@ -20,9 +20,9 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.blades import BladeModes
 from fowt_env.plant.elastic.chain import answer
-from fowt_env.plant.elastic.in_phase import note_means, restore_means
-from fowt_env.plant.elastic.oscillator import swung
-from fowt_env.plant.elastic.shaft import change_by_twist, rate_by_twist
+from fowt_env.plant.elastic.in_phase import note_means, reaction_at, restore_means, twist_over
+from fowt_env.plant.elastic.oscillator import swung_by, turn_in
+from fowt_env.plant.elastic.shaft import Torsion, rate_by_twist
 from fowt_env.plant.elastic.tower import bend_by_modes
 from fowt_env.plant.state import BLADES, State
 
@@ -30,6 +30,9 @@ IMPLICIT = 251.0 / 720.0  # factor on the fourth difference of a force: Adams-Mo
 # factor on that of a force linear in deflections: error constant of Adams-Bashforth 4 (251/720) minus that of
 # Adams-Moulton 4 for the deflections (19/720), so that errors of velocity and position cancel
 ELASTIC_WEIGHT = 232.0 / 720.0
+# rows of RotorScratch.swing, of the tower's own modes: square of the frequency, 1/s2, and decay, 1/s; then
+# results of turn_in for a step, s
+SQUARE, DECAY, STEP, LEFT, COSINE, SINE = range(6)
 ROUNDS = 2  # of the impulse on the tower, whose inertia is that at the first step
 JACOBI_SWEEPS = 8
 
@@ -63,7 +66,7 @@ def begin_swing(steps, x, body, tower, blades, matrix, work, still):
     _find_eigenvectors(A, W)
     L, R = tower.root, tower.flexible_root
     for i in range(n):
-        work.swing[0, i] = A[i, i]
+        work.swing[SQUARE, i], work.swing[STEP, i] = A[i, i], 0.0
         for j in range(n):
             G[i, j] = 0.0
             for k in range(n):
@@ -72,7 +75,7 @@ def begin_swing(steps, x, body, tower, blades, matrix, work, still):
         for j in range(n):
             A[i, j] = 0.0
             for k in range(n):
-                A[i, j] += G[k, i] * G[k, j] / work.swing[0, k]
+                A[i, j] += G[k, i] * G[k, j] / work.swing[SQUARE, k]
     for j in range(n):  # W to R W, column by column
         for i in range(n):
             still[i] = 0.0
@@ -85,7 +88,7 @@ def begin_swing(steps, x, body, tower, blades, matrix, work, still):
         for j in range(n):
             for k in range(n):
                 damped += W[j, i] * tower.beam.damping[j, k] * W[k, i]
-        work.swing[1, i] = 0.5 * work.swing[0, i] * damped
+        work.swing[DECAY, i] = 0.5 * work.swing[SQUARE, i] * damped
 
 
 @kernel
@@ -109,19 +112,28 @@ def _find_eigenvectors(A, W):
 
 
 @kernel
-def keep_swing(x, tower, shaft, work, dx):
+def _keep_turns(dt, swing):
+    """Keep what a free oscillation of the tower's own modes does in a step, until the step changes."""
+    for i in range(swing.shape[1]):
+        if swing[STEP, i] != dt:
+            swing[STEP, i] = dt
+            swing[LEFT, i], swing[COSINE, i], swing[SINE, i] = turn_in(dt, swing[SQUARE, i], swing[DECAY, i])
+
+
+@kernel
+def keep_swing(x, tower, blades, shaft, work, dx):
     """Put g, smooth and without the twist, of the rates dx at x, in place of the deflections' rates in dx."""
     if tower is None:
         return
-    n, q = len(tower.beam.count), tower.first
+    n, q, reaction = len(tower.beam.count), tower.first, reaction_at(x, blades, shaft, work)
     for i in range(n):
         p = rate = smooth = 0.0
         for j in range(n):
             p += work.to_own[i, j] * x[q + j]
             rate += work.to_own[i, j] * x[q + n + j]
-            steady = dx[q + n + j] - rate_by_twist(q + n + j, shaft, work, dx)
+            steady = dx[q + n + j] - rate_by_twist(q + n + j, reaction, shaft, work, dx)
             smooth += work.to_own[i, j] * steady
-        dx[q + i] = smooth + work.swing[0, i] * p + 2.0 * work.swing[1, i] * rate
+        dx[q + i] = smooth + work.swing[SQUARE, i] * p + 2.0 * work.swing[DECAY, i] * rate
 
 
 @kernel
@@ -129,10 +141,12 @@ def swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, st
     """Advance the tower by the g of the last `order` steps; y has the Adams-Bashforth velocities."""
     if tower is None:
         return
+    _keep_turns(dt, work.swing)
+    twist, reaction = twist_over(dt, x, blades, shaft, work)
     for i in range(tower.first, tower.first + len(tower.beam.count)):
         c = extrapolated(order, history[0, i], history[1, i], history[2, i], history[3, i])
-        _swing_mode(i - tower.first, dt, x, c, tower, work, still)
-    _move_tower(dt, x, body, tower, blades, shaft, matrix, work, still, extra, y)
+        _swing_mode(i - tower.first, dt, x, y, c, twist, reaction, tower, shaft, work, still)
+    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
 
 
 @kernel
@@ -140,37 +154,67 @@ def swing_again(dt, x, order, new, history, body, tower, blades, shaft, matrix, 
     """Advance the tower by the g at the end of the step, too; y has the Adams-Moulton velocities."""
     if tower is None:
         return
+    _keep_turns(dt, work.swing)
+    twist, reaction = twist_over(dt, x, blades, shaft, work)
     for i in range(tower.first, tower.first + len(tower.beam.count)):
         c = interpolated(order, new[i], history[0, i], history[1, i], history[2, i])
-        _swing_mode(i - tower.first, dt, x, c, tower, work, still)
-    _move_tower(dt, x, body, tower, blades, shaft, matrix, work, still, extra, y)
+        _swing_mode(i - tower.first, dt, x, y, c, twist, reaction, tower, shaft, work, still)
+    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
 
 
 @inlined_kernel
-def _swing_mode(i, dt, x, c, tower, work, still):
-    """Put own mode i and its rate after dt, with the coefficients c (4) of g, into still."""
+def _swing_alone(i, dt, x, y, c, twist, reaction, tower, shaft, work, still):
     n, q, over = len(tower.beam.count), tower.first, 1.0 / dt
     p = rate = 0.0
     for j in range(n):
         p += work.to_own[i, j] * x[q + j]
         rate += work.to_own[i, j] * x[q + n + j]
-    still[q + i], still[q + n + i] = swung(
-        p, rate, c[0], c[1] * over, c[2] * over * over, c[3] * over * over * over, dt, work.swing[0, i],
-        work.swing[1, i],
+    still[q + i], still[q + n + i] = swung_by(
+        p, rate, c[0], c[1] * over, c[2] * over * over, c[3] * over * over * over, dt, work.swing[SQUARE, i],
+        work.swing[DECAY, i], work.swing[LEFT, i], work.swing[COSINE, i], work.swing[SINE, i],
     )  # fmt: skip
 
 
 @inlined_kernel
-def _move_tower(dt, x, body, tower, blades, shaft, matrix, work, still, extra, y):
+def _swing_with_twist(i, dt, x, y, c, twist, reaction, tower, shaft, work, still):
+    n, q, v, t = len(tower.beam.count), tower.first, tower.first + len(tower.beam.count), shaft.first
+    square, over, share = work.swing[SQUARE, i], 1.0 / dt, 0.0
+    a, b, d = twist, reaction, 2.0 * work.swing[DECAY, i] / dt
+    p = rate = 0.0
+    for j in range(n):
+        share += work.to_own[i, j] * work.twist[1, v + j]
+        p += work.to_own[i, j] * x[q + j]
+        rate += work.to_own[i, j] * x[v + j]
+    p, rate = swung_by(
+        p - share * x[t],
+        rate - share * x[t + 1],
+        c[0] + share * (b[0] - square * a[0] - d * a[1]),
+        (c[1] + share * (b[1] - square * a[1] - 2.0 * d * a[2])) * over,
+        (c[2] + share * (b[2] - square * a[2] - 3.0 * d * a[3])) * over * over,
+        (c[3] + share * (b[3] - square * a[3])) * over * over * over,
+        dt, square, work.swing[DECAY, i], work.swing[LEFT, i], work.swing[COSINE, i], work.swing[SINE, i],
+    )  # fmt: skip
+    still[q + i], still[v + i] = p + share * y[t], rate + share * y[t + 1]
+
+
+# (i, dt, x, y, c, twist, reaction, tower, shaft, work, still): puts own mode i and its rate after dt into
+# still, with the coefficients c (4) of g. A twist that bends the tower by its share alone leaves the rest
+# p - share q, which is smooth: the spring of the tower pulls it back by all of p. twist, reaction: of
+# twist_over
+_swing_mode = chosen_by_class("shaft", {type(None): _swing_alone, Torsion: _swing_with_twist}, inlined=True)
+
+
+@inlined_kernel
+def _move_tower(x, body, tower, blades, matrix, work, still, extra, y):
     """Give y the deflections of the own modes in still, and their velocities, by an impulse on the tower."""
     n, q = len(tower.beam.count), tower.first
     v, bend = q + n, bend_by_modes(x, tower)
     for i in range(n):
-        _, y[q + i] = change_by_twist(v + i, dt, x, shaft, work, y)
+        y[q + i] = 0.0
         for j in range(n):
             y[q + i] += work.from_own[i, j] * still[q + j]
     for i in range(n):
-        still[q + i], _ = change_by_twist(v + i, dt, x, shaft, work, y)
+        still[q + i] = 0.0
         for j in range(n):
             still[q + i] += work.from_own[i, j] * still[v + j]
     for _ in range(ROUNDS):

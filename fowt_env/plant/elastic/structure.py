@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.compile.handle import by_reference
-from fowt_env.plant.elastic.in_phase import N_IN_PHASE
 from fowt_env.plant.model import RigidBody
 from fowt_env.plant.state import BLADES
+
+N_IN_PHASE = 13  # rows of RotorScratch.in_phase, see in_phase.py
 
 
 @by_reference
@@ -68,7 +69,7 @@ class RotorScratch(NamedTuple):
     axis: np.ndarray  # (3,) direction of the shaft, downwind
     # own modes of the tower, see steps.py: square of the frequency (1/s2) and decay rate (1/s); (n, n) from
     # deflections to them and back; impulse per unit change of the deflections' velocities, kg
-    swing: np.ndarray  # (2, n)
+    swing: np.ndarray  # (6, n), see steps.py
     to_own: np.ndarray
     from_own: np.ndarray
     impulse: np.ndarray
@@ -78,7 +79,7 @@ class RotorScratch(NamedTuple):
     in_phase: np.ndarray  # (in_phase.N_ROW, 1 + n)
     in_phase_matrix: np.ndarray  # (2, 1 + n, 1 + n)
     found: np.ndarray  # (4 + n,)
-    propagator: np.ndarray  # (2, 2 + 2 n, 6 + 6 n)
+    propagator: np.ndarray  # (2, 4 + 4 n, 6 + 6 n)
     propagated: np.ndarray  # (2, 6 + 6 n) what it is applied to, and the result
     offset: np.ndarray  # (n,) m, of exact mean deflections from those by Adams-Moulton
 
@@ -92,8 +93,8 @@ def rotor_scratch(structure, tower, blades, shaft, n_state):
     shapes = (
         (3, 3, 3), (BLADES + 1, 3), (BLADES + 1, 6), (BLADES + 1, n, 6), (BLADES + 1, 6), (BLADES, n, 6),
         (n, n), (BLADES, n, n), (BLADES, n), (BLADES, n), (6, 6), 6,
-        (6, 6), 6, 6, n, 6, 6, 3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (2, m), (m, m),
+        (6, 6), 6, 6, n, 6, 6, 3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (6, m), (m, m),
         (m, m), (m, m), (2, n_state), 4,
-        (N_IN_PHASE, z), (2, z, z), z and 3 + z, (2, 2 * z, 6 * z), (2, 6 * z), z and n,
+        (N_IN_PHASE, z), (2, z, z), z and 3 + z, (2, 4 * z, 6 * z), (2, 6 * z), z and n,
     )  # fmt: skip
     return RotorScratch(*(np.zeros(shape) for shape in shapes))

@@ -59,7 +59,7 @@ def swung(case, start, steps):
         )
         keep_blades(x, model.blades, data.elastic)
         keep_twist(x, model.blades, model.shaft, data.elastic, data.rotor, dx)
-        keep_swing(x, model.tower, model.shaft, data.rotor, dx)
+        keep_swing(x, model.tower, model.blades, model.shaft, data.rotor, dx)
         data.history[START_STEPS - 1 - k] = dx
     forget(handle)
     data.cache[LoadCache.STEPS] = START_STEPS

@@ -235,6 +235,30 @@ def test_means_over_runs_add_variances_and_damage():
     assert found["pitch travel"] == pytest.approx(10.0 * 15.5)
 
 
+def test_the_spread_is_over_starts_changed_one_at_a_time_both_ways(tmp_path, monkeypatch, capsys):
+    changes = []
+
+    def run(case, folder, duration, change):
+        changes.append((case.law, change))
+        return output(speed=0.2 if case.law == "gspi_oc3" else 0.1 + 0.1 * change.get("RotSpeed", 0.0))
+
+    monkeypatch.setattr(transfer, "run_here", run)
+    choice = {"winds": "14", "seeds": "1", "laws": "lqr,gspi_oc3", "duration": 300.0}
+    with pytest.raises(InputError, match="gspi_oc3 14 m/s seed 1: has no wind box"):
+        transfer.spread(tmp_path, **choice)
+    box = transfer.box_path(tmp_path, "oc3_hywind", 14.0, 1)
+    box.parent.mkdir(parents=True)
+    box.write_bytes(b"")
+    transfer.spread(tmp_path, **choice)
+    assert "| rotor speed std | `lqr` | 50.0 | 40.0 | 60.0 |" in capsys.readouterr().out
+    assert [law for law, _ in changes] == ["gspi_oc3", "lqr"] * 7
+    found = [next(iter(change.items())) for law, change in changes if law == "lqr" and change]
+    assert found == [
+        ("PtfmPitch", 0.2), ("PtfmPitch", -0.2), ("RotSpeed", 0.2), ("RotSpeed", -0.2), ("PtfmSurge", 1.0),
+        ("PtfmSurge", -1.0),
+    ]  # fmt: skip
+
+
 def test_only_weather_with_all_runs_counts():
     rows = stored()
     lost = (rows["model"] == "rigid") & (rows["law"] == "mpc") & (rows["wind"] == 18.0)
