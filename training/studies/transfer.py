@@ -476,6 +476,16 @@ def exchanged_table(table, names):
     return markdown_table(head, rows)
 
 
+def mixed_code(rows):
+    """Return [text] that names the commits of the laws whose runs are of more than one; [] if none is."""
+    if COMMIT not in rows:
+        return []
+    commits = rows[COMMIT].fillna("").map(lambda text: text[:8] or "not recorded")
+    found = {law: sorted(set(group)) for law, group in commits.groupby(rows["law"], sort=False)}
+    words = [f"`{law}` ({', '.join(names)})" for law, names in found.items() if len(names) > 1]
+    return [f"Averages over runs of different commits: {'; '.join(words)}."] if words else []
+
+
 def report(rows, platform, names=None, laws=None, winds=None):
     """Return the Markdown text of a platform: baseline, ratios, order, and exchanged pairs.
 
@@ -503,6 +513,7 @@ def report(rows, platform, names=None, laws=None, winds=None):
     )
     parts = [f"{platform}, {words}; ratios to `{BASELINE}` in %", baseline_table(means, names)]
     parts += [make(table, names) for make in (ratio_table, order_table, exchanged_table)]
+    parts += mixed_code(rows)
     return "\n\n".join(parts)
 
 

@@ -202,6 +202,14 @@ def test_equal_runs_have_equal_ratios_and_order():
     assert "| tower base DEL | kN-m | 10 | 10 |" in text
 
 
+def test_averages_over_laws_of_different_commits_are_named():
+    rows = stored()
+    rows.loc[(rows["law"] == "mpc") & (rows["wind"] == 18.0), "commit"] = "0123456789"
+    text = report(rows, "oc3_hywind")
+    assert text.endswith("Averages over runs of different commits: `mpc` (01234567, not recorded).")
+    assert "Averages over" not in report(rows, "oc3_hywind", winds=[18.0])
+
+
 def test_an_exchanged_pair_is_named_with_its_gaps():
     text = report(stored(factor=12.5 / 14.0), "oc3_hywind")  # between rosco_float, 12, and lqr, 13
     assert "| rotor speed std | rigid | `lqr`, `mpc` | -10.0 | +5.0 |" in text
