@@ -219,7 +219,15 @@ class Sample:
     states: dict  # {key of STATE: (n,)}
     production: float  # fraction of time
     lost: int  # hours without result, which are left out
-    tripped: int  # hours with a trip, with extremes until then
+    tripped: int  # hours in which a trip stopped the turbine, with the extremes of the stop
+
+    @property
+    def sides(self):
+        """Yield (column, side) of the extremes that can be asked for; of magnitudes the largest alone."""
+        for column in self.columns:
+            yield column, "max"
+            if column not in RESULTANTS:
+                yield column, "min"
 
     @property
     def hours(self):
@@ -296,23 +304,22 @@ def tail_shares(sample, century, years):
     target = 1.0 / (years * YEAR * sample.production)
     design, there = (_quadratic(*each) for each in ((sample.states["wind"], sample.states["Hs"]), middle))
     shares = []
-    for column in sample.columns:
-        for side in ("max", "min"):
-            values = sample.values(column, side).astype(np.float64)
-            mean = np.linalg.lstsq(design, values, rcond=None)[0]
-            spread = np.linalg.lstsq(design, np.abs(values - design @ mean), rcond=None)[0]
-            least = 0.3 * np.mean(np.abs(values - design @ mean))
-            # mean absolute deviation and mean of a Gumbel variable of scale 1: 0.9804, and Euler's constant
-            scale = np.maximum(there @ spread, least) / 0.9804 + 1e-300
-            mode = there @ mean - 0.5772 * scale
-            low, high = float(mode.min()), float((mode + 40.0 * scale).max())
-            for _ in range(60):
-                level = 0.5 * (low + high)
-                beyond = -np.expm1(-np.exp(np.minimum(-(level - mode) / scale, 50.0)))
-                beyond = beyond.reshape(len(p), -1).mean(axis=1)
-                low, high = (level, high) if p @ beyond > target else (low, level)
-            share = p * np.sqrt(beyond)
-            shares.append(share / share.sum())
+    for column, side in sample.sides:
+        values = sample.values(column, side).astype(np.float64)
+        mean = np.linalg.lstsq(design, values, rcond=None)[0]
+        spread = np.linalg.lstsq(design, np.abs(values - design @ mean), rcond=None)[0]
+        least = 0.3 * np.mean(np.abs(values - design @ mean))
+        # mean absolute deviation and mean of a Gumbel variable of scale 1: 0.9831, and Euler's constant
+        scale = np.maximum(there @ spread, least) / 0.9831 + 1e-300
+        mode = there @ mean - 0.5772 * scale
+        low, high = float(mode.min()), float((mode + 40.0 * scale).max())
+        for _ in range(60):
+            level = 0.5 * (low + high)
+            beyond = -np.expm1(-np.exp(np.minimum(-(level - mode) / scale, 50.0)))
+            beyond = beyond.reshape(len(p), -1).mean(axis=1)
+            low, high = (level, high) if p @ beyond > target else (low, level)
+        share = p * np.sqrt(beyond)
+        shares.append(share / share.sum())
     return DEFENCE * p + (1.0 - DEFENCE) * np.mean(shares, axis=0)
 
 
@@ -492,17 +499,16 @@ def century_table(sample, years, extrapolated=None):
     whether the value is within the interval of the extrapolation; empty where one of them is missing.
     """
     rows = []
-    for column in sample.columns:
-        for side in ("max", "min"):
-            level = return_level(sample, column, side, years)
-            row = [column, side, years, level.value, level.low, level.high, level.exceedances, *level.state]
-            each = (extrapolated or {}).get((column, side))
-            if each is None:
-                rows.append([*row, nan, nan, nan, None])
-                continue
-            known = np.isfinite([level.value, each.low, each.high]).all()
-            covered = bool(each.low <= level.value <= each.high) if known else None
-            rows.append([*row, each.value, each.low, each.high, covered])
+    for column, side in sample.sides:
+        level = return_level(sample, column, side, years)
+        row = [column, side, years, level.value, level.low, level.high, level.exceedances, *level.state]
+        each = (extrapolated or {}).get((column, side))
+        if each is None:
+            rows.append([*row, nan, nan, nan, None])
+            continue
+        known = np.isfinite([level.value, each.low, each.high]).all()
+        covered = bool(each.low <= level.value <= each.high) if known else None
+        rows.append([*row, each.value, each.low, each.high, covered])
     return pd.DataFrame(rows, columns=list(TABLE))
 
 

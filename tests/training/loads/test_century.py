@@ -1,6 +1,9 @@
 """Hours of a site: limits and values of known distributions, weights of strata, and folders."""
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import gumbel_r
 
@@ -145,6 +148,23 @@ def test_a_sample_is_resumed_extended_and_weighted_over_its_stages(tmp_path, qui
         run_century(other, tmp_path, [(100, None)])
     with pytest.raises(InputError, match="has no hours yet"):
         read_sample(CENTURY, tmp_path / "empty")
+
+
+def test_extremes_are_those_after_the_transient_with_magnitudes_of_their_largest_value_alone():
+    frame = pd.DataFrame(
+        {
+            "Time_[s]": [0.0, 1.0, 2.0, 3.0],
+            "PtfmPitch_[deg]": [9.0, 3.0, 4.0, -3.0],
+            "PtfmRoll_[deg]": [-9.0, 4.0, 0.0, 0.0],
+            "GenPwr_[kW]": [1.0, 1.0, 1.0, 1.0],
+        }
+    )
+    found = module._extremes(frame, None, None, 1.0)
+    assert found["columns"] == ["PtfmPitch", "PtfmRoll", "PtfmTilt"]
+    assert found["low"].tolist() == [-3.0, 0.0, 3.0] and found["high"].tolist() == [4.0, 4.0, 5.0]
+    sample = replace(sample_of(np.arange(10.0)), columns=tuple(found["columns"]))
+    assert [side for column, side in sample.sides if column == "PtfmRoll"] == ["max", "min"]
+    assert list(sample.sides)[-1] == ("PtfmTilt", "max")
 
 
 def test_an_hour_is_a_run_of_its_state(tmp_path):
