@@ -13,7 +13,7 @@ from setuptools import find_packages, setup
 from setuptools.command.build_py import build_py
 
 BESIDE = ("controllers", "training")
-# what runs from a clone alone: the studies, and the OpenFAST series of `fowt validate`
+# what runs from a clone alone: the studies, and the OpenFAST series of `fowt dev validate`
 LEFT_OUT = ("training.studies*", "training.validation.reference*")
 
 

@@ -28,5 +28,5 @@ def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
 
 
 def tuned(name: str) -> dict[str, Any]:
-    """Return {setting: value} of a controller that `fowt design tune` has tuned."""
+    """Return {setting: value} of a controller that `fowt design search` has tuned."""
     return tomllib.loads(TUNED.read_text())[name]["settings"]

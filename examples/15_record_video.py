@@ -3,8 +3,8 @@
 render_mode="rgb_array" makes pictures without a window, so this works on a machine without a display;
 render_mode="human" shows the same picture in a window as the episode runs. The wrapper calls render() after
 each step and writes an MP4 when the episode ends. A picture is one control period of 0.1 s and 30 of them
-are shown a second, so the video is three times as fast as life; `fowt animate` draws the same with titles and
-several controllers side by side.
+are shown a second, so the video is three times as fast as life; `fowt dev animate` draws the same with titles
+and several controllers side by side.
 Needs pip install "fowt-env[video]"; with the extra `render` alone the pictures are counted, not written.
 """
 

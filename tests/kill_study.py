@@ -30,7 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 EVALUATE = (
     "evaluate --controllers pi,pi_land --cases ntm_16,ntm_18 --seeds 1,2 --duration 30 --skip 5 --no-plot"
 )
-VALIDATE = "validate --case steady --no-plot"
+VALIDATE = "dev validate --case steady --no-plot"
 TRAIN = (
     "train --algo {algo} --steps 160 --seed 3 --set environment.num_envs=2 --set environment.rotor=table"
     " --set environment.wave_components=10 --set environment.duration=12 --set decisions.history=2"

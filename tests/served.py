@@ -17,7 +17,7 @@ FAST = Timing(factor=inf, timeout=5.0)
 
 
 class Client:
-    """Speaks the records of fowt serve over a socket."""
+    """Speaks the records of fowt connect serve over a socket."""
 
     def __init__(self, protocol, address, hello=True):
         kind = socket.SOCK_STREAM if protocol == "tcp" else socket.SOCK_DGRAM

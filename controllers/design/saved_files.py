@@ -1,20 +1,28 @@
 """Saves and loads controllers as versioned JSON files and checks every value.
 
-A design of kind "pi" contains gains and schedule, a design of kind "lqr" settings and linear models, so that
-designs run at any control period, independently of later changes of the plant. Controller name: design:FILE.
+A design of kind "pi" or "gspi" contains gains and schedule, a design of kind "lqr" settings and linear
+models, so that these run at any control period, independently of later changes of the plant. A design of kind
+"floating_feedback", "mpc" or "rosco" contains the settings of the law, which is designed on the plant of
+each run. Controller name: design:FILE.
 """
 
 import json
 import math
 from dataclasses import asdict, fields
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from fowt_env.controllers.floating_feedback import FeedbackSettings, FloatingFeedback
+from fowt_env.controllers.gspi import GSPI
 from fowt_env.controllers.lqr.design import MODEL_SHAPES, DesignModel, LQGSettings, lowest_design_wind
 from fowt_env.controllers.lqr.law import LQR
+from fowt_env.controllers.mpc.law import MPC
+from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.controllers.pi import PI, PISettings
-from fowt_env.descriptions.checks import is_number
+from fowt_env.controllers.rosco import Rosco, RoscoSettings
+from fowt_env.descriptions.checks import check_whole_number, is_number
 from fowt_env.descriptions.files import parse_json, read_text
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.atomic import replacing
@@ -113,13 +121,31 @@ def _finite(key, value):
     return float(value)
 
 
-def _pi(settings, where):
+def _scheduled(law, settings, where):
     """Return a function that makes a PI controller; a gain_schedule_pitch of null means no schedule."""
     values = {}
     for key, value in settings.items():
         free = key == "gain_schedule_pitch" and value is None
         values[key] = math.inf if free else _finite(f"{where}: settings.{key}", value)
-    return lambda turbine, control_dt, name: PI(PISettings.published(turbine, **values), control_dt, name)
+    return lambda turbine, control_dt, name: law(PISettings.published(turbine, **values), control_dt, name)
+
+
+def _of_settings(record, law, settings, where):
+    """Return a function that makes a law of a record of settings, law(record, turbine, control_dt, name)."""
+    values, default = {}, record()
+    for key, value in settings.items():
+        usual, entry = getattr(default, key), f"{where}: settings.{key}"
+        if isinstance(usual, str | bool):
+            if type(value) is not type(usual):
+                raise InputError(f"{entry} = {str(value)[:60]}: must be a {type(usual).__name__}")
+            values[key] = value
+        else:
+            values[key] = (check_whole_number if isinstance(usual, int) else _finite)(entry, value)
+    try:
+        chosen = record(**values)
+    except InputError as error:
+        raise InputError(f"{where}: settings: {error}") from None
+    return lambda turbine, control_dt, name: law(chosen, turbine, control_dt, name)
 
 
 def _lqr(settings, where):
@@ -176,5 +202,23 @@ def _model(row, entry, where):
     return DesignModel(**values)
 
 
+def _names(record):
+    return tuple(item.name for item in fields(record))
+
+
+def _feedback(chosen, turbine, control_dt, name):
+    return FloatingFeedback(PISettings.published(turbine), chosen, control_dt, name)
+
+
 # kind: (keys of settings, function that returns the maker of the controller)
-DESIGN_KINDS = {"pi": (PI_KEYS, _pi), "lqr": (("lqg", "models"), _lqr)}
+DESIGN_KINDS = {
+    "pi": (PI_KEYS, partial(_scheduled, PI)),
+    "gspi": (PI_KEYS, partial(_scheduled, GSPI)),
+    "lqr": (("lqg", "models"), _lqr),
+    "floating_feedback": (_names(FeedbackSettings), partial(_of_settings, FeedbackSettings, _feedback)),
+    "mpc": (_names(MPCSettings), partial(_of_settings, MPCSettings, lambda s, t, dt, n: MPC(t, dt, s, n))),
+    "rosco": (
+        _names(RoscoSettings),
+        partial(_of_settings, RoscoSettings, lambda s, t, dt, n: Rosco(s, dt, n)),
+    ),
+}

@@ -56,8 +56,8 @@ class LQGSettings(Settings):
     """Holds objective and limits of the feedback of lqr, see controllers/lqr/optimum.py.
 
     The limits are on deviations of the linear loop; limits near rated wind apply at lowest_design_wind. The
-    defaults are results of `fowt design tune lqr` on OC3-Hywind; winds and travels are those of the NREL 5 MW
-    turbine and are scaled to other turbines.
+    defaults are results of `fowt design search lqr` on OC3-Hywind; winds and travels are those of the NREL
+    5 MW turbine and are scaled to other turbines.
     """
 
     NAME = "lqr"

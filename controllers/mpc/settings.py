@@ -11,7 +11,7 @@ PRICES = ("speed", "platform_pitch", "surge", "shaft", "power", "speed_integral"
 class MPCSettings(Settings):
     """Holds the prices of deviations over those of gspi_oc3 (weights.py), horizon and limits of MPC.
 
-    The aim of the default prices is that of `fowt design tune mpc --aim scores`.
+    The aim of the default prices is that of `fowt design search mpc --aim scores`.
 
     Raises: InputError naming the key, value and allowed range.
     """

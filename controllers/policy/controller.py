@@ -52,7 +52,7 @@ def policy_path(name):
     if path.suffix == ".zip":
         raise InputError(
             f"controller 'policy:{name}': a stable-baselines3 zip runs code of its author when it is loaded;"
-            " turn one that you trust into a policy file with fowt export-policy --trust-zip"
+            " turn one that you trust into a policy file with fowt connect export-policy --trust-zip"
         )
     if path.suffix == ".npz":
         if not path.is_file():

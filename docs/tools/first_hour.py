@@ -56,7 +56,7 @@ ROWS = (  # what, words after `python`
     ("the same again", ("-c", ENVIRONMENT)),
     ("make_vec, reset, step", ("-c", VECTOR)),
     ("linearize", ("-c", LINEAR)),
-    ("fowt trim (fidelity reference)", (*FOWT, "trim")),
+    ("fowt model trim (fidelity reference)", (*FOWT, "model", "trim")),
     ("examples/05_own_sea_state.py", (str(ROOT / "examples" / "05_own_sea_state.py"),)),
     ("examples/06_own_load.py", (str(ROOT / "examples" / "06_own_load.py"),)),
     ("examples/06_own_load.py again", (str(ROOT / "examples" / "06_own_load.py"),)),

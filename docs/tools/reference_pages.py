@@ -418,10 +418,10 @@ def cli_page():
 
 
 def _inner(command):
-    """The command, or those of a group."""
-    return (
-        (c for c in command.commands.values() if not c.hidden) if hasattr(command, "commands") else (command,)
-    )
+    """The command, or those of a group and of its groups."""
+    if not hasattr(command, "commands"):
+        return [command]
+    return [each for inner in command.commands.values() if not inner.hidden for each in _inner(inner)]
 
 
 def _entries(command):
@@ -440,16 +440,15 @@ def _shared(families):
 
 
 def _sections(command, name, shared):
-    """Sections of a command, or of a group with its commands."""
+    """Sections of a command, or of a group with its commands and groups."""
+    level = "#" * (2 + len(name.split()) - 1)
     if not hasattr(command, "commands"):
-        return [_section(command, name, shared, "###")]
+        return [_section(command, name, shared, level)]
     inner = {key: each for key, each in command.commands.items() if not each.hidden}
-    own = [entry for entry in _shared([[each] for each in inner.values()]) if entry not in shared]
-    lines = [f"### `{name}`", _plain(command.help)] + ([_options_table(own)] if own else [])
-    return [
-        *lines,
-        *(_section(each, f"{name} {key}", [*shared, *own], "####") for key, each in inner.items()),
-    ]
+    own = [entry for entry in _shared([_inner(each) for each in inner.values()]) if entry not in shared]
+    lines = [f"{level} `{name}`", _plain(command.help)] + ([_options_table(own)] if own else [])
+    known = [*shared, *own]
+    return lines + [text for key in inner for text in _sections(inner[key], f"{name} {key}", known)]
 
 
 def _section(command, name, shared, level):

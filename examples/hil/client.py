@@ -1,6 +1,6 @@
-"""A client of `fowt serve` over TCP: the OC3-Hywind pitch controller, with the standard library alone.
+"""A client of `fowt connect serve` over TCP: OC3-Hywind's pitch controller, with the standard library alone.
 
-python client.py [HOST PORT]  # after: fowt serve --wind ntm:18:B --control-dt 0.01
+python client.py [HOST PORT]  # after: fowt connect serve --wind ntm:18:B --control-dt 0.01
 """
 
 import json

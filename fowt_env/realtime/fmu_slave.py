@@ -1,4 +1,4 @@
-"""Implements the plant that an FMU of fowt fmu runs; imported where the FMU is loaded."""
+"""Implements the plant that an FMU of fowt connect fmu runs; imported where the FMU is loaded."""
 
 import json
 from pathlib import Path

@@ -75,8 +75,8 @@ def build_scene(
               pitch move; ntm and etm turbulence is reduced to its components in the plane
 
     Raises: InputError naming the key, the value and what is allowed. Warns (PlantWarning), once, of
-    implausible positions of the platform (details: `fowt check`), of waves above the breaking limit, and of a
-    mean wind in which the turbine does not operate.
+    implausible positions of the platform (details: `fowt model check`), of waves above the breaking limit,
+    and of a mean wind in which the turbine does not operate.
     """
     label = platform.name if isinstance(platform, Platform) else str(platform)
     if not isinstance(platform, Platform):

@@ -207,7 +207,7 @@ def _dark(colour):
     return [round(0.85 * c) for c in colour]
 
 
-def _solids(platform):
+def solids(platform):
     """Yield (ends (2, 3), two diameters or (width, height), whether round) of a hull, the farthest first.
 
     The spar, else shapes of the platform file, else members, else a box with the hull's volume and draft.
@@ -333,7 +333,7 @@ class TurbinePanel(_SideView):
     def _hull(self, canvas, pose):
         """Draw hull and tower."""
         platform, tower = self.scene.platform, self.scene.platform.tower
-        for ends, size, is_round in _solids(platform):
+        for ends, size, is_round in solids(platform):
             shape = self._member if is_round else self._beam
             shape(canvas, pose, ends, size, -SPLASH * platform.draft)
         ends = np.array([(0.0, 0.0, tower.base_height), (0.0, 0.0, tower.top_height)])

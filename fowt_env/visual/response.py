@@ -24,7 +24,7 @@ from fowt_env.visual.style import (
 from fowt_env.visual.time_series import PANELS, TIME, even_step, named_runs
 
 WAVE = "Wave1Elev_[m]"
-WIND = "Wind_[m/s]"  # column of `fowt trim --out`
+WIND = "Wind_[m/s]"  # column of `fowt model trim --out`
 WHISKERS = (1.0, 99.0)  # percentiles
 HATCHES = ("", "/////", "....", "xxxx")  # of boxes, for each further round of colours
 ENERGETIC = 0.02  # of the peak of the wave spectrum: minimum wave energy for the estimate of an RAO
@@ -114,7 +114,7 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
 
 
 def plot_schedule(points, path=None, title=None, *, rated_wind=None):
-    """Plot steady operating points over wind speed, of one table or {label: table} of `fowt trim`.
+    """Plot steady operating points over wind speed, of one table or {label: table} of `fowt model trim`.
 
     rated_wind: m/s, marked by a line; None: not marked.
     """

@@ -231,7 +231,7 @@ def test_the_counts_of_the_validation_are_those_of_the_stored_figures():
         folder = DOCS / "results" / "validation" / ("" if platform == "oc3_hywind" else platform)
         verdicts = pd.read_csv(folder / "validation.csv")["verdict"].value_counts()
         assert (int(met), int(judged)) == (verdicts["met"], verdicts["met"] + verdicts.get("MISSED", 0))
-    table = text.partition("<!-- measured: fowt validate --platform iea15_volturnus_s -->")[2].partition(
+    table = text.partition("<!-- measured: fowt dev validate --platform iea15_volturnus_s -->")[2].partition(
         "\n\n#"
     )[0]
     cases = re.findall(r"(\d+) of (\d+) \|$", table, re.M)
@@ -253,7 +253,7 @@ def test_the_margins_of_the_robustness_page_are_those_of_its_table():
 
 
 def test_the_table_of_compile_times_has_the_rows_of_the_benchmark():
-    table = (ROOT / SPEED).read_text().partition("<!-- measured: fowt benchmark compile -->")[2]
+    table = (ROOT / SPEED).read_text().partition("<!-- measured: fowt dev benchmark compile -->")[2]
     rows = re.findall(r"^\| ([\w -]+) \| [^|]+ \| \d+\.\d \|$", table.partition("<!-- end -->")[0], re.M)
     assert rows == list(compile_time.NAMES)
 

@@ -165,7 +165,9 @@ def checkpoint_of_a_stranger(folder, mark):
     return folder
 
 
-@pytest.mark.parametrize("words", [("export-policy", "--out", "policy.npz"), ("train", "--resume", "--out")])
+@pytest.mark.parametrize(
+    "words", [("connect", "export-policy", "--out", "policy.npz"), ("train", "--resume", "--out")]
+)
 def test_a_checkpoint_of_a_stranger_is_not_loaded_unless_it_is_trusted(tmp_path, mark, monkeypatch, words):
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     monkeypatch.chdir(tmp_path)

@@ -104,7 +104,7 @@ def test_animate_without_space_names_the_file_and_keeps_the_old_one(tmp_path, en
     pytest.importorskip("imageio_ffmpeg", reason="imageio_ffmpeg is not installed")
     path = tmp_path / f"run{ending}"
     path.write_text("old")
-    words = ("animate", path, "--controllers", "pi", "--duration", "20", "--width", "320", "--height", "240")
+    words = ("dev", "animate", path, "--controllers", "pi", "--duration", "20", "--width", "320")
     with files_of_at_most(3000):
         refused(*words, named=path)
     assert contents(tmp_path) == {path: b"old"}
@@ -125,7 +125,7 @@ def test_train_without_space_keeps_the_checkpoint_before_and_goes_on_later(tmp_p
 
 
 def test_validate_without_space_keeps_the_old_table(tmp_path):
-    words = ("validate", "--case", "steady", "--no-plot", "--out", tmp_path)
+    words = ("dev", "validate", "--case", "steady", "--no-plot", "--out", tmp_path)
     result = invoke(*words)
     assert result.exit_code == 0, result.output
     before = contents(tmp_path)
@@ -141,9 +141,9 @@ def test_validate_without_space_keeps_the_old_table(tmp_path):
         ("simulate", *SHORT, "--plot", "PLACE/run.png"),
         (*EVALUATE, "--no-plot", "--out", "PLACE"),
         (*TRAIN, "--out", "PLACE"),
-        ("animate", "PLACE/run.gif", "--controllers", "pi", "--duration", "10", "--width", "320"),
-        ("benchmark", "evaluation", "--count", "1", "--out", "PLACE/table.csv"),
-        ("trim", "--winds", "18", "--out", "PLACE/trim.csv"),
+        ("dev", "animate", "PLACE/run.gif", "--controllers", "pi", "--duration", "10", "--width", "320"),
+        ("dev", "benchmark", "evaluation", "--count", "1", "--out", "PLACE/table.csv"),
+        ("model", "trim", "--winds", "18", "--out", "PLACE/trim.csv"),
     ],
     ids=lambda words: f"{words[0]} {words[-2]}",
 )

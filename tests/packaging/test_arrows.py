@@ -13,8 +13,8 @@ LAYERS = (
     "errors", "caches", "folders", "layout", "display", "registration", "plant", "loop", "descriptions",
     "weather", "scene", "files", "analysis", "control", "run", "realtime", "visual", "envs", "warmup",
     "controllers", "training", "training.evaluation", "training.design", "training.rl", "training.reports",
-    "training.board", "training.loads", "training.validation", "training.benchmarks", "training.studies",
-    "training.cli",
+    "training.live", "training.board", "training.loads", "training.validation", "training.benchmarks",
+    "training.studies", "training.cli",
 )  # fmt: skip
 
 

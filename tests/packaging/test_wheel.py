@@ -146,7 +146,7 @@ def test_the_wheel_runs_the_readme_example_in_an_empty_environment_without_torch
     name = "fowt_env:fowt_env/OC3Hywind-v1"
     program = f"import gymnasium; print(gymnasium.make({name!r}, task='steady').spec.id)"
     assert run(python, "-c", program, **options).strip() == "fowt_env/OC3Hywind-v1"
-    for command in ("paper", "benchmark stability"):
+    for command in ("dev paper", "dev benchmark stability"):
         words = [tmp_path / "venv" / "bin" / "fowt", *command.split()]
         done = subprocess.run(words, capture_output=True, text=True, **options)
         (line,) = done.stderr.splitlines()

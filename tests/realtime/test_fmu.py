@@ -114,10 +114,10 @@ def test_an_fmu_of_another_version_is_refused(fmpy, plant, tmp_path):
 
 def test_the_command_writes_an_fmu_and_refuses_another_name(fmpy, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    stderr = fowt("fmu", "oc3_hywind", "plant.fmu", "--duration", "5", "--control-dt", "0.05")[1]
+    stderr = fowt("connect", "fmu", "oc3_hywind", "plant.fmu", "--duration", "5", "--control-dt", "0.05")[1]
     assert "wrote plant.fmu" in stderr and "0.05 s" in stderr
     assert zipfile.is_zipfile("plant.fmu")
-    assert "must end with .fmu" in fowt("fmu", "oc3_hywind", "plant.zip", code=2)[1]
+    assert "must end with .fmu" in fowt("connect", "fmu", "oc3_hywind", "plant.zip", code=2)[1]
     assert [path.name for path in tmp_path.iterdir()] == ["plant.fmu"]
 
 

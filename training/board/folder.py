@@ -73,7 +73,7 @@ class Board:
         path = self.folder / SETTINGS
         if not path.is_file():
             raise InputError(
-                f"board {str(folder)!r}: has no {SETTINGS}: create one with fowt leaderboard add, or choose"
+                f"board {str(folder)!r}: has no {SETTINGS}: create one with fowt dev leaderboard add, or"
                 " another --board"
             )
         where = f"board {str(folder)!r}"
@@ -217,13 +217,13 @@ def read_seeds(path: Path | str) -> tuple[tuple[int, ...], str]:
     elif Path(path).is_file():
         content = Path(path).read_bytes()
     else:
-        raise InputError(f"{where}: does not exist; create it with fowt leaderboard seeds")
+        raise InputError(f"{where}: does not exist; create it with fowt dev leaderboard seeds")
     first, *lines = content.decode("ascii", "replace").split("\n")
     words = [line.strip() for line in lines if line.strip()]
     if not SALT.fullmatch(first.strip()):
         raise InputError(
             f"{where}: must begin with a line of 'salt' and 32 or more hexadecimal digits, without which the"
-            " hash would reveal the seeds; create the file with fowt leaderboard seeds"
+            " hash would reveal the seeds; create the file with fowt dev leaderboard seeds"
         )
     if not words or not all(word.isdecimal() and len(word) < 20 for word in words):
         raise InputError(f"{where}: must contain whole numbers, one per line, after the salt")

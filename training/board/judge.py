@@ -76,7 +76,7 @@ def judge(
     submissions, left_out = board.read()
     baseline, names = board.settings.baseline, [each.name for each in submissions]
     if not submissions:
-        raise InputError(f"board {str(board.folder)!r}: has no submissions: fowt leaderboard add FOLDER")
+        raise InputError(f"board {str(board.folder)!r}: has no submissions: fowt dev leaderboard add FOLDER")
     if baseline not in names:
         why = f" ({left_out[baseline]})" if baseline in left_out else ""
         raise InputError(f"{unknown('baseline among the submissions', baseline, names)}{why}")

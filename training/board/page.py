@@ -178,7 +178,7 @@ def board_rows(folder, regime=None):
     """
     path = Path(folder) / "board.csv"
     if not path.is_file():
-        raise InputError(f"board {str(folder)!r}: has no results: fowt leaderboard run --board {folder}")
+        raise InputError(f"board {str(folder)!r}: has no results: fowt dev leaderboard run --board {folder}")
     frame = read_table(path)
     names = list(dict.fromkeys(frame["regime"]))
     regime = regime or names[0]

@@ -4,8 +4,8 @@
         card.toml            author, licence, inputs
         controller.py        or a policy file (.npz), or a library with the Bladed interface (.so)
 
-A policy file contains arrays and no code. `fowt leaderboard run` runs a Python file or a library only with
---trust-code, and then in a separate process (training.board.isolated).
+A policy file contains arrays and no code. `fowt dev leaderboard run` runs a Python file or a library only
+with --trust-code, and then in a separate process (training.board.isolated).
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Implements fowt benchmark: speed, compile times, accuracy, evaluation and stability."""
+"""Implements fowt dev benchmark: speed, compile times, accuracy, evaluation and stability."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,11 +10,19 @@ from typer import Option
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_names
-from fowt_env.training.cli.console import add_group, command, from_a_clone, progress_bar, text_progress, wrote
+from fowt_env.training.cli.console import (
+    add_group,
+    command,
+    dev,
+    from_a_clone,
+    progress_bar,
+    text_progress,
+    wrote,
+)
 from fowt_env.training.cli.options import WHOLE, CsvOption, FolderOption, PlotsOption, SuiteOption
 from fowt_env.training.cli.tables import out, print_table, show
 
-benchmarks = add_group("benchmark", "Measure speed, accuracy and stability.")
+benchmarks = add_group("benchmark", "Measure speed, accuracy and stability.", dev)
 ScenesOption = Annotated[str, Option(help="Platform of the scenes.")]
 
 
@@ -23,7 +31,7 @@ def compile_command(out_path: CsvOption = "results/benchmark/compile.csv"):
     """Time the first run, with compilation, of six kinds of scene.
 
     Examples:
-    fowt benchmark compile  # a minute or two; the kernel cache stays unchanged
+    fowt dev benchmark compile  # a minute or two; the kernel cache stays unchanged
     """
     from fowt_env.training.benchmarks import compile_time
     from fowt_env.training.benchmarks import speed as bench
@@ -47,8 +55,8 @@ def speed(
     """Time simulate on each kind of scene, load by load.
 
     Examples:
-    fowt benchmark speed  # every kind of scene, load by load (some minutes: each kind is compiled)
-    fowt benchmark speed --kinds "full, standard;full, fast" --starts  # two kinds, and start times
+    fowt dev benchmark speed  # every kind of scene, load by load (some minutes: each kind is compiled)
+    fowt dev benchmark speed --kinds "full, standard;full, fast" --starts  # two kinds, and start times
 
     [bold]File written[/bold]: speed.csv, with machine, versions, commit and calibration in its header.
     """
@@ -64,6 +72,29 @@ def speed(
     for line in remarks:
         out.print(line)
     wrote(bench.write_csv(table, out_path, remarks))
+
+
+@command(benchmarks)
+def tune_command(
+    controller: Annotated[str, Option(help="Controller whose first slider is moved.")] = "pi",
+    moves: Annotated[int, Option(min=2, help="Number of moves.")] = 40,
+    motion: Annotated[bool, Option("--motion", help="Let the turbines move meanwhile.")] = False,
+    out_path: CsvOption = "results/benchmark/tune.csv",
+):
+    """Time the live page from a slider to the picture, in headless Chromium.
+
+    Examples:
+    fowt dev benchmark tune  # median and 95 % quantile of 40 moves
+    """
+    from fowt_env.training.benchmarks import speed as bench
+    from fowt_env.training.benchmarks.live_page import delays
+
+    with text_progress("tune") as progress:
+        table = delays(controller, moves, motion, progress)
+    values = table["delay_[ms]"]
+    rows = [(controller, len(values), *(f"{values.quantile(part):.0f}" for part in (0.5, 0.95)))]
+    print_table(("controller", "moves", "median ms", "95 % ms"), rows, "from a slider to the picture")
+    wrote(bench.write_csv(table, out_path))
 
 
 @command(benchmarks)
@@ -84,9 +115,9 @@ def accuracy(
     Varies integrators, steps, rotor models and wave sums.
 
     Examples:
-    fowt benchmark accuracy  # every variant, three seeds of 600 s: an hour
-    fowt benchmark accuracy --seeds 1 --duration 100 --axes "all together"  # a first look
-    fowt benchmark accuracy --platform iea15_volturnus_s --axes levels  # fidelity levels of another platform
+    fowt dev benchmark accuracy  # every variant, three seeds of 600 s: an hour
+    fowt dev benchmark accuracy --seeds 1 --duration 100 --axes "all together"  # a first look
+    fowt dev benchmark accuracy --platform iea15_volturnus_s --axes levels  # levels of another platform
 
     [bold]Files written[/bold]: accuracy.csv (a row after each run; a rerun resumes), accuracy.png.
     """
@@ -147,8 +178,8 @@ def evaluation(
     --ray adds the overhead of distributing the runs.
 
     Examples:
-    fowt benchmark evaluation  # 21 runs of the suite above_rated with pi
-    fowt benchmark evaluation --count 7 --controller lqr --ray  # another controller, and Ray
+    fowt dev benchmark evaluation  # 21 runs of the suite above_rated with pi
+    fowt dev benchmark evaluation --count 7 --controller lqr --ray  # another controller, and Ray
     """
     from fowt_env.training.benchmarks import evaluation as study
     from fowt_env.training.benchmarks import speed as bench
@@ -178,10 +209,10 @@ def stability(
     Covers time steps, random scenes, adversarial actions, extreme conditions and long runs.
 
     Examples:
-    fowt benchmark stability  # every part with small counts: some minutes
-    fowt benchmark stability --cases 100000 --steps 10000000 --hostile 3000  # as documented: an hour
-    fowt benchmark stability --parts map,extremes  # two parts; the report also has those in the folder
-    fowt benchmark stability --replay results/stability/failures/case_0000.json  # rerun a failure
+    fowt dev benchmark stability  # every part with small counts: some minutes
+    fowt dev benchmark stability --cases 100000 --steps 10000000 --hostile 3000  # as documented: an hour
+    fowt dev benchmark stability --parts map,extremes  # two parts; the report also has those in the folder
+    fowt dev benchmark stability --replay results/stability/failures/case_0000.json  # rerun a failure
 
     [bold]Files written[/bold]: PART.json, failures/case_NNNN.json, robustness.md, robustness/PART.csv.
     """

@@ -1,4 +1,4 @@
-"""Implements fowt cache: shows and clears compiled kernels and other cached files on disk."""
+"""Implements fowt dev cache: shows and clears compiled kernels and other cached files on disk."""
 
 from typing import Annotated
 
@@ -7,10 +7,10 @@ from rich.markup import escape
 from typer import Option
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import add_group, command, note, out, reported
+from fowt_env.training.cli.console import add_group, command, dev, note, out, reported
 from fowt_env.training.cli.tables import print_table
 
-cache = add_group("cache", "Show or clear the cache on disk.", invoke_without_command=True)
+cache = add_group("cache", "Show or clear the cache on disk.", dev, invoke_without_command=True)
 
 
 @cache.callback()
@@ -38,9 +38,9 @@ def clear(
     """Remove compiled kernels of other versions and of submissions; files not created by this package stay.
 
     Examples:
-    fowt cache clear  # compiled kernels of other versions, and those of a leaderboard's submissions
-    fowt cache clear --all  # also those of this version: the next run compiles them again
-    fowt cache clear --wind-boxes --yes  # also full-field wind, without confirmation
+    fowt dev cache clear  # compiled kernels of other versions, and those of a leaderboard's submissions
+    fowt dev cache clear --all  # also those of this version: the next run compiles them again
+    fowt dev cache clear --wind-boxes --yes  # also full-field wind, without confirmation
     """
     from fowt_env.training.cli import health
 

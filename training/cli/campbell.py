@@ -1,4 +1,4 @@
-"""Implements fowt campbell: natural frequencies of a flexible turbine over its rotor speed."""
+"""Implements fowt model campbell: natural frequencies of a flexible turbine over its rotor speed."""
 
 from typing import Annotated
 
@@ -7,7 +7,7 @@ from typer import Argument, Option
 
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.descriptions.units import DEGREE, RPM
-from fowt_env.training.cli.console import command, output, save_table, wrote
+from fowt_env.training.cli.console import command, model, output, save_table, wrote
 from fowt_env.training.cli.options import RANGE, PlotOption, TableOption
 from fowt_env.training.cli.tables import print_table
 
@@ -16,7 +16,7 @@ HARMONICS = (1, 3, 6)
 DEFAULT_STEPS = 24
 
 
-@command()
+@command(model)
 def campbell(
     platform: Annotated[str, Argument(help="Platform: a built-in name or the path of a TOML file.")],
     speeds: Annotated[
@@ -36,9 +36,9 @@ def campbell(
     drivetrain.
 
     Examples:
-    fowt campbell iea15_volturnus_s --plot campbell.png  # 0 to 9.07 rpm, with lines at 1P, 3P and 6P
-    fowt campbell nrel5mw_oc4_semi --speeds 6.9:12.1:0.4 --pitch 5 --out campbell.csv
-    fowt campbell iea15_volturnus_s --tower rigid --generator fixed  # the rotor alone
+    fowt model campbell iea15_volturnus_s --plot campbell.png  # 0 to 9.07 rpm, with lines at 1P, 3P and 6P
+    fowt model campbell nrel5mw_oc4_semi --speeds 6.9:12.1:0.4 --pitch 5 --out campbell.csv
+    fowt model campbell iea15_volturnus_s --tower rigid --generator fixed  # the rotor alone
 
     Frequencies are those in the fixed frame: the regressive and progressive mode of a rotor lie about one
     rotor frequency (1P) below and above that of the rotating blade. The platform file needs \\[tower.modes],

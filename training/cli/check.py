@@ -1,4 +1,4 @@
-"""Implements fowt check: a platform at rest, and contradictions in its file."""
+"""Implements fowt model check: a platform at rest, and contradictions in its file."""
 
 import json
 from typing import Annotated
@@ -9,14 +9,14 @@ from rich.markup import escape
 from typer import Argument, Option
 
 from fowt_env.training.cli.arguments import parse_pairs
-from fowt_env.training.cli.console import EXIT_STOPPED, command, out
+from fowt_env.training.cli.console import EXIT_STOPPED, command, model, out
 from fowt_env.training.cli.options import OptionOption
 from fowt_env.training.cli.tables import print_table
 
 SPEEDS = ("at rest", "at rated speed")  # of a check.RotorFrequency
 
 
-@command()
+@command(model)
 def check(
     platform: Annotated[str, Argument(help="Platform: a built-in name or the path of a TOML file.")],
     option: OptionOption = None,
@@ -27,8 +27,8 @@ def check(
     Prints the platform at rest without wind, and contradictions in the platform file.
 
     Examples:
-    fowt check mine.toml  # weight against buoyancy, stability, pretension, rest, natural periods
-    fowt check oc3_hywind --json  # the same as JSON
+    fowt model check mine.toml  # weight against buoyancy, stability, pretension, rest, natural periods
+    fowt model check oc3_hywind --json  # the same as JSON
 
     [bold]Exit code[/bold]: 0 if the platform is consistent, 1 if not, 2 if the file cannot be read.
     """

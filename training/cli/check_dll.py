@@ -1,4 +1,4 @@
-"""Implements fowt check-dll: what a library with the Bladed interface reads, demands, says and takes."""
+"""Implements fowt connect check-dll: what a library with the Bladed interface reads and demands."""
 
 from typing import Annotated
 
@@ -6,13 +6,13 @@ import typer
 from rich.markup import escape
 from typer import Argument, Option
 
-from fowt_env.training.cli.console import EXIT_STOPPED, command, note, out
+from fowt_env.training.cli.console import EXIT_STOPPED, command, connect, note, out
 from fowt_env.training.cli.tables import print_table
 
 DEGREES = 57.29577951308232  # in a radian
 
 
-@command()
+@command(connect)
 def check_dll(
     library: Annotated[str, Argument(metavar="PATH[,INPUT_FILE]", help="Library, as after dll: in a name.")],
     turbine: Annotated[str, Option(help="Turbine whose values the library is given: name or TOML file.")] = (
@@ -27,8 +27,8 @@ def check_dll(
     runs with your rights: check only libraries that you trust.
 
     Examples:
-    fowt check-dll libdiscon.so,DISCON.IN  # records, demands, messages, time of a call
-    fowt check-dll discon.so,symbol=discon,pitch=individual  # another function; a demand to each blade
+    fowt connect check-dll libdiscon.so,DISCON.IN  # records, demands, messages, time of a call
+    fowt connect check-dll discon.so,symbol=discon,pitch=individual  # a demand to each blade
     fowt simulate --controller dll:libdiscon.so,DISCON.IN --wind ntm:18:B  # then run it
 
     [bold]Exit code[/bold]: 0 if the library can be used, 1 if not, 2 if it cannot be loaded here.

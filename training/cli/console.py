@@ -32,27 +32,63 @@ err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
 MODULES = (  # modules that add commands to the app
     "simulate", "listing", "check", "check_dll", "evaluate", "validate", "doctor", "warmup", "cache",
     "benchmark", "design", "plot", "report", "scores", "leaderboard", "import_deck", "export", "hydro",
-    "campbell", "train", "serve", "compare", "export_fmu", "loads", "table",
+    "campbell", "train", "serve", "compare", "export_fmu", "tune", "study", "loads", "table",
 )  # fmt: skip
 GROUPS = {  # headings of fowt --help -> their commands, in the order shown
-    "Run": ("simulate", "trim", "plot", "compare", "animate", "check"),
-    "Build": ("import", "hydro", "campbell"),
-    "Connect": ("check-dll", "export", "serve", "fmu"),
-    "Design": ("linearize", "design"),
-    "Evaluate": ("evaluate", "report", "scores", "leaderboard", "loads", "table"),
-    "Train": ("train", "export-policy"),
-    "Set up": ("list", "doctor", "warmup", "cache"),
-    "Develop": ("validate", "paper", "benchmark"),
+    "Run": ("simulate", "plot", "compare"),
+    "Platform": ("import", "model"),
+    "Control": ("tune", "study", "design"),
+    "Evaluate": ("evaluate", "report", "loads"),
+    "Train": ("train",),
+    "Connect": ("connect",),
+    "Set up": ("list", "doctor", "warmup"),
+    "Develop": ("dev",),
+}
+MOVED = {  # former name of a command: its name now
+    **{name: f"model {name}" for name in ("trim", "linearize", "check", "hydro", "campbell", "table")},
+    **{name: f"connect {name}" for name in ("check-dll", "export", "serve", "fmu", "export-policy")},
+    **{name: f"dev {name}" for name in ("validate", "paper", "benchmark", "scores", "leaderboard", "cache")},
+    "animate": "dev animate",
+    "design tune": "design search",
 }
 START = (  # first examples in fowt --help
     ("fowt simulate --wind 18 --plot run.png", "one run: statistics and a plot"),
-    ("fowt list", "platforms, seas, controllers, ..."),
-    ("fowt evaluate --controllers pi,lqr", "compare controllers"),
+    ("fowt tune", "move gains on a live page"),
+    ("fowt study DECK.fst --controller mine:Law", "your deck, your controller"),
     ("fowt COMMAND --help", "options and examples"),
+)
+NEXT = (  # what fowt alone suggests: command, and what it is for
+    ("fowt simulate --wind ntm:14:B --sea jonswap:4:9 --plot run.png", "a first run, and its picture"),
+    ("fowt tune", "move gains and see at once what they do"),
+    (
+        "fowt evaluate --controllers gspi_oc3,module:Mine",
+        "score your controller beside a published one",
+    ),
+    (
+        "fowt study DECK.fst --controller dll:my.so",
+        "your OpenFAST model and controller: a verdict",
+    ),
+    ("fowt train --help", "train an agent"),
+    ("fowt --help", "all commands"),
 )
 
 
-class Overview(TyperGroup):
+class Renamed(TyperGroup):
+    """Tells who calls a command by its former name the name that it has now."""
+
+    def resolve_command(self, ctx, args):
+        """Return the command of the arguments. Raises: UsageError, for a former name with the present one."""
+        parents, parent = [], ctx
+        while parent.parent is not None:
+            parents.insert(0, parent.info_name)
+            parent = parent.parent
+        name = " ".join([*parents, args[0]])
+        if name in MOVED:
+            ctx.fail(f"fowt {name} is now called fowt {MOVED[name]}")
+        return super().resolve_command(ctx, args)
+
+
+class Overview(Renamed):
     """Shows the commands in groups, one line each, so that the help fits on one screen."""
 
     def format_help(self, ctx, formatter):
@@ -79,7 +115,6 @@ new_folders: list[Path] = []  # that the running command may create
 app = typer.Typer(
     name="fowt",
     cls=Overview,
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -89,6 +124,7 @@ app = typer.Typer(
 
 @app.callback(invoke_without_command=True)
 def version_option(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
 ):
     """Handle the options of fowt itself."""
@@ -97,13 +133,24 @@ def version_option(
 
         out.print(__version__)
         raise typer.Exit
+    if context.invoked_subcommand is None:
+        width = max(len(command) for command, _ in NEXT)
+        for command, text in NEXT:
+            out.print(f"[cyan]{command:{width}}[/cyan]  # {text}", soft_wrap=True)
+        out.print("[dim]The first run of a kind of scene compiles for half a minute: fowt warmup.[/dim]")
 
 
-def add_group(name, text, **options):
-    """Add a group of commands to the app and return the group; text: help of the group."""
-    group = typer.Typer(rich_markup_mode="rich", help=text, **(options or {"no_args_is_help": True}))
-    app.add_typer(group, name=name)
+def add_group(name, text, parent=app, **options):
+    """Add a group of commands to the app or a parent group and return it; text: help of the group."""
+    options = options or {"no_args_is_help": True}
+    group = typer.Typer(cls=Renamed, rich_markup_mode="rich", help=text, **options)
+    parent.add_typer(group, name=name)
     return group
+
+
+model = add_group("model", "Check a platform; operating points, modes, linear models.")
+connect = add_group("connect", "Export controllers; run the plant for others, as an FMU.")
+dev = add_group("dev", "Validate, benchmark, score agents, keep boards, animate.")
 
 
 def command(group=app):

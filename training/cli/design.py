@@ -1,4 +1,4 @@
-"""Implements fowt linearize and fowt design: linear models, control design and performance limits."""
+"""Implements fowt model linearize and fowt design: linear models, control design and performance limits."""
 
 import shlex
 from pathlib import Path
@@ -11,7 +11,16 @@ from fowt_env.errors import InputError
 from fowt_env.files.tables import TABLE_SUFFIXES
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_names, parse_pairs
-from fowt_env.training.cli.console import add_group, command, note, output, progress_bar, save_table, wrote
+from fowt_env.training.cli.console import (
+    add_group,
+    command,
+    model,
+    note,
+    output,
+    progress_bar,
+    save_table,
+    wrote,
+)
 from fowt_env.training.cli.tables import out, print_table, show
 
 design = add_group("design", "Design and tune controllers; compute their limits.")
@@ -62,7 +71,7 @@ def _balanced(table):
     return table.loc[best, columns]
 
 
-@command()
+@command(model)
 def linearize(
     platform: shared.PlatformOption = "oc3_hywind",
     winds: Annotated[str | None, Option(help=SWEPT)] = None,
@@ -73,10 +82,10 @@ def linearize(
     Each model is at the steady operating point of its wind.
 
     Examples:
-    fowt linearize --winds 18  # modes with periods and damping at one wind
-    fowt linearize --winds 4:25:1 --out modes.csv  # the sweep, cut-in to cut-out
-    fowt linearize --out study  # a folder: tables, models, pole map, damping and Bode plots
-    fowt linearize --winds 18 --out model.mat  # the matrices, for MATLAB and Simulink (write_mat)
+    fowt model linearize --winds 18  # modes with periods and damping at one wind
+    fowt model linearize --winds 4:25:1 --out modes.csv  # the sweep, cut-in to cut-out
+    fowt model linearize --out study  # a folder: tables, models, pole map, damping and Bode plots
+    fowt model linearize --winds 18 --out model.mat  # the matrices, for MATLAB and Simulink (write_mat)
 
     Modes are those of the plant at constant torque and blade pitch. A right-half-plane zero from blade pitch
     to rotor speed limits the bandwidth of any pitch controller that measures speed alone.
@@ -356,7 +365,7 @@ def lqr_sweep(
 
 
 @command(design)
-def tune_command(
+def search(
     name: Annotated[str, Argument(help="Controller: pi_tuned, rosco_float, lqr, mpc, ...")],
     budget: Annotated[int, Option(help="Number of settings tried.")] = 40,
     suite: shared.SuiteOption = "above_rated",
@@ -375,9 +384,9 @@ def tune_command(
     Objective, seeds and limits are the same for all controllers.
 
     Examples:
-    fowt design tune pi_tuned  # three factors on the published gains, 40 settings tried
-    fowt design tune rosco_float --jobs 2 --keep  # write the result to controllers/tuned.toml
-    fowt design tune mpc --aim scores --keep  # for both scores of the suite
+    fowt design search pi_tuned  # three factors on the published gains, 40 settings tried
+    fowt design search rosco_float --jobs 2 --keep  # write the result to controllers/tuned.toml
+    fowt design search mpc --aim scores --keep  # for both scores of the suite
 
     Cost: the aim, and penalties for exceeded limits of the suite, for energy below 99.5 % and for failed or
     tripped runs. Aims: motions, the mean lifetime ratio of rotor-speed and platform-pitch deviation to

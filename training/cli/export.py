@@ -1,4 +1,4 @@
-"""Implements fowt export: writes a controller as a library, as C code or as ROSCO's input file."""
+"""Implements fowt connect export: writes a controller as a library, as C code or as ROSCO's input file."""
 
 from typing import Annotated
 
@@ -6,14 +6,14 @@ from typer import Argument, Option
 
 from fowt_env.errors import InputError
 from fowt_env.training.cli import options as shared
-from fowt_env.training.cli.console import command, note, output, progress_bar, wrote
+from fowt_env.training.cli.console import command, connect, note, output, progress_bar, wrote
 from fowt_env.training.cli.simulate import CONTROLLER
 
 LIBRARIES = (".so", ".dll", ".dylib")
 AGAIN = "Run the law in a Python process, even if it is available in C."
 
 
-@command()
+@command(connect)
 def export(
     controller: Annotated[str, Argument(help=CONTROLLER.partition(" none:")[0])],
     dll: Annotated[str | None, Option(help="Output library with the Bladed interface: .so.")] = None,
@@ -26,11 +26,11 @@ def export(
     """Export a controller for OpenFAST, a PLC or ROSCO.
 
     Examples:
-    fowt export gspi_oc3 --dll libgspi.so  # a library that OpenFAST loads in place of DISCON
-    fowt export mpc --dll libmpc.so --platform iea15_volturnus_s  # runs in Python beside the host
-    fowt export mine:Hold --dll libmine.so  # your own Python controller
-    fowt export policy:ppo_lqr --c plc  # C99 without allocation: law.h and law.c
-    fowt export design:mine.json --rosco DISCON.IN  # gains and limits of a PI law for the ROSCO library
+    fowt connect export gspi_oc3 --dll libgspi.so  # a library that OpenFAST loads in place of DISCON
+    fowt connect export mpc --dll libmpc.so --platform iea15_volturnus_s  # runs in Python beside the host
+    fowt connect export mine:Hold --dll libmine.so  # your own Python controller
+    fowt connect export policy:ppo_lqr --c plc  # C99 without allocation: law.h and law.c
+    fowt connect export design:mine.json --rosco DISCON.IN  # gains and limits of a PI law for ROSCO
 
     The PI laws, floating_feedback, ipc, lqr and agents on these become C code, all others run in a Python
     process that the library starts and ends. A C compiler is needed: gcc, clang or pip install ziglang.
@@ -39,7 +39,7 @@ def export(
     from fowt_env.controllers.export import library
 
     if dll is None and c_folder is None and rosco is None:
-        raise InputError("fowt export: needs an output: --dll libmine.so, --c FOLDER or --rosco DISCON.IN")
+        raise InputError("fowt connect export: needs --dll libmine.so, --c FOLDER or --rosco DISCON.IN")
     output(dll, "--dll", endings=LIBRARIES)
     output(c_folder, "--c", folder=True)
     output(rosco, "--rosco", endings=(".IN", ".in"))

@@ -1,4 +1,4 @@
-"""Implements fowt fmu: the plant as an FMU for co-simulation."""
+"""Implements fowt connect fmu: the plant as an FMU for co-simulation."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,11 +9,11 @@ from fowt_env.descriptions.sea_state import sea_of
 from fowt_env.descriptions.wind import wind_of
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection
-from fowt_env.training.cli.console import command, note, output, wrote
+from fowt_env.training.cli.console import command, connect, note, output, wrote
 from fowt_env.training.cli.simulate import FAULT, INITIAL, LEAST_WAVES, PROTECTION, REPEATED
 
 
-@command()
+@command(connect)
 def fmu(
     platform: Annotated[str, Argument(help="Platform: a name or the path of a TOML file.")],
     out_path: Annotated[str, Argument(metavar="OUT.fmu", help="FMU to write.")],
@@ -37,8 +37,8 @@ def fmu(
     loop.
 
     Examples:
-    fowt fmu oc3_hywind plant.fmu --wind ntm:18:B --sea jonswap:7.5:10:3.3
-    fowt fmu iea15_volturnus_s plant.fmu --control-dt 0.05 --option pitch=individual
+    fowt connect fmu oc3_hywind plant.fmu --wind ntm:18:B --sea jonswap:7.5:10:3.3
+    fowt connect fmu iea15_volturnus_s plant.fmu --control-dt 0.05 --option pitch=individual
     """
     from fowt_env.realtime.fmu import write_fmu
 

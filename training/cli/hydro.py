@@ -1,4 +1,4 @@
-"""Implements fowt hydro: computes potential-flow coefficients of a hull from its panel mesh."""
+"""Implements fowt model hydro: computes potential-flow coefficients of a hull from its panel mesh."""
 
 from pathlib import Path
 from typing import Annotated
@@ -7,12 +7,12 @@ import numpy as np
 from typer import Argument, Option
 
 from fowt_env.descriptions.checks import check_number, parse_numbers
-from fowt_env.training.cli.console import command, output, text_progress, wrote
+from fowt_env.training.cli.console import command, model, output, text_progress, wrote
 from fowt_env.training.cli.options import RANGE
 from fowt_env.training.cli.tables import print_table
 
 
-@command()
+@command(model)
 def hydro(
     mesh: Annotated[Path, Argument(help="Panel mesh in metres, z up from still water, normals outward.")],
     depth: Annotated[float, Option(help="Water depth, m.")],
@@ -28,8 +28,8 @@ def hydro(
     Capytaine solves for added mass, damping, wave excitation and hydrostatics.
 
     Examples:
-    fowt hydro semi.gdf --depth 200 --out hydro.npz  # 0.05 to 3 rad/s, waves from -180 to 180 deg
-    fowt hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0  # fewer frequencies and headings
+    fowt model hydro semi.gdf --depth 200 --out hydro.npz  # 0.05 to 3 rad/s, waves from -180 to 180 deg
+    fowt model hydro spar.stl --depth 320 --omega 0.1:2.5:0.1 --heading 0  # fewer frequencies and headings
 
     In the platform file: \\[potential_flow] coefficients = "hydro.npz" and displaced_volume, which is
     printed. A boundary-value problem with 3000 panels takes a second; each frequency has six and one per

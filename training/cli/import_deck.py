@@ -30,7 +30,7 @@ def import_command(
     discon: Annotated[str | None, Option(help="ROSCO DISCON.IN, used instead of the deck's.")] = None,
     search: Annotated[list[str] | None, Option(help="Further folder to search; repeatable.")] = None,
     overwrite: Annotated[bool, Option(help="Replace the files of an earlier import.")] = False,
-    check: Annotated[bool, Option(help="Check the imported platform at rest, as fowt check does.")] = True,
+    check: Annotated[bool, Option(help="Check the platform at rest, as fowt model check does.")] = True,
 ) -> None:
     """Convert an OpenFAST or FAST 8 deck to a platform file.
 
@@ -43,7 +43,7 @@ def import_command(
     docs/guides/import.md lists what is read, approximated and refused.
 
     [bold]Exit code[/bold]: 0 if the imported platform is consistent, 1 if it is written but has
-    contradictions (see fowt check), 2 if the deck cannot be imported.
+    contradictions (see fowt model check), 2 if the deck cannot be imported.
     """
     from fowt_env.analysis.check import check_platform
     from fowt_env.files.openfast_deck.importer import import_deck
@@ -77,6 +77,6 @@ def import_command(
             faults = (f"The platform cannot be checked: {error}",)
         print_faults(faults)
         if faults:
-            note(f"the files are kept; for details: fowt check {platform}")
+            note(f"the files are kept; for details: fowt model check {platform}")
             raise typer.Exit(EXIT_STOPPED)
     note(f"next: fowt simulate --platform {platform} --wind 14")

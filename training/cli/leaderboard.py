@@ -1,4 +1,4 @@
-"""Implements fowt leaderboard: a public ranking of submitted controllers, re-run by its organiser."""
+"""Implements fowt dev leaderboard: a public ranking of submitted controllers, re-run by its organiser."""
 
 import shlex
 from pathlib import Path
@@ -6,11 +6,11 @@ from typing import Annotated
 
 from typer import Argument, Option
 
-from fowt_env.training.cli.console import add_group, command, note, out, output, progress_bar
+from fowt_env.training.cli.console import add_group, command, dev, note, out, output, progress_bar
 from fowt_env.training.cli.options import JobsOption
 from fowt_env.training.cli.tables import print_table
 
-board_app = add_group("leaderboard", "Keep a public ranking of submitted controllers.")
+board_app = add_group("leaderboard", "Keep a public ranking of submitted controllers.", dev)
 
 PLATFORM = "Platform (name or path) of a new board, to which its suites are scaled."
 DRAWN = "Hash from which the public seeds are drawn, instead of the board's seeds."
@@ -29,7 +29,7 @@ def add_command(
     The submitted code is not run.
 
     Examples:
-    fowt leaderboard add my_controller  # into ./board; a new board starts with the package's controllers
+    fowt dev leaderboard add my_controller  # into ./board; a new board starts with the package's controllers
 
     A submission is a folder with card.toml and the controller named in the card:
 
@@ -52,7 +52,7 @@ def add_command(
     for kind, folder in zip(kinds, submissions, strict=True):
         name = Board(board).add(folder)
         trusted = " --trust-code (once you have read its code)" if kind in CODE else ""
-        note(f"added {name}; judge it with: fowt leaderboard run --board {board}{trusted}")
+        note(f"added {name}; judge it with: fowt dev leaderboard run --board {board}{trusted}")
 
 
 @command(board_app)
@@ -63,7 +63,7 @@ def seeds_command(
     """Draw an organiser's secret seeds, too large to guess, with a salt.
 
     Examples:
-    fowt leaderboard seeds seeds.txt  # publish the printed SHA-256, and keep the file
+    fowt dev leaderboard seeds seeds.txt  # publish the printed SHA-256, and keep the file
     """
     from fowt_env.training.board.folder import write_secret_seeds
 
@@ -77,7 +77,7 @@ def run_command(
     board: BoardOption = Path("board"),
     jobs: JobsOption = 1,
     draw_seeds: Annotated[str | None, Option(help=DRAWN)] = None,
-    secret: Annotated[Path | None, Option(help="File of fowt leaderboard seeds; -: standard input.")] = None,
+    secret: Annotated[Path | None, Option(help="File of leaderboard seeds; -: standard input.")] = None,
     private: Annotated[Path | None, Option(help="Folder for the runs of the secret seeds.")] = None,
     trust_code: Annotated[bool, Option("--trust-code", help="Run submitted code.")] = False,
     within: Annotated[str | None, Option(help=WITHIN)] = None,
@@ -85,9 +85,9 @@ def run_command(
     """Run every submission on the board's frozen suites and write the page of the board.
 
     Examples:
-    fowt leaderboard run --jobs 2  # all submissions on the board's seeds
-    fowt leaderboard run --draw-seeds $COMMIT  # seeds from a commit
-    fowt leaderboard run --secret seeds.txt --private private --trust-code  # also on secret seeds
+    fowt dev leaderboard run --jobs 2  # all submissions on the board's seeds
+    fowt dev leaderboard run --draw-seeds $COMMIT  # seeds from a commit
+    fowt dev leaderboard run --secret seeds.txt --private private --trust-code  # also on secret seeds
 
     Python files and libraries run only with [bold]--trust-code[/bold], each in a separate process, with your
     user's permissions: read them first, or run them in a container with [bold]--within[/bold]
@@ -116,7 +116,7 @@ def show_command(
     """Print the board as last judged.
 
     Examples:
-    fowt leaderboard show  # the board in ./board, its first regime
+    fowt dev leaderboard show  # the board in ./board, its first regime
     """
     from fowt_env.training.board.page import board_rows
 

@@ -230,8 +230,8 @@ KINDS = {
     ),
     "controllers": Kind(
         "--controller", "built-in control laws", ("name", "what it is", "also uses"), _controllers,
-        "Also policy:NAME (fowt list agents), design:FILE (fowt design), dll:FILE.so (fowt check-dll) and\n"
-        "module:Name (your own).\n"
+        "Also policy:NAME (fowt list agents), design:FILE (fowt design), dll:FILE.so\n"
+        "(fowt connect check-dll) and module:Name (your own).\n"
         "All use generator speed, torque and blade pitch; motion: nacelle and platform. Full list: --json.",
         extra=("measurements and models",),
     ),

@@ -69,7 +69,9 @@ def loads_command(
     retry_failed: Annotated[bool, Option("--retry-failed", help="Repeat failed runs in the folder.")] = False,
     out_folder: shared.FolderOption = "results/loads",
 ):
-    """Make the design load table of a platform at a site: extremes with factors, and lifetime fatigue.
+    """Make the design load table of a platform at a site.
+
+    The table has extremes with factors, and lifetime fatigue.
 
     The load cases are those of IEC 61400-3-2 for floating turbines. First the matrix is printed: the runs of
     each load case, what is left out and why, and the time it takes on this machine, measured by short runs.

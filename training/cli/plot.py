@@ -30,7 +30,7 @@ def plot(
     fowt plot series openfast.outb run.csv  # a run of OpenFAST and one of fowt simulate
     fowt plot boxes results/demo/runs/*/ntm_18_seed1.parquet --out boxes.png  # a box for each run
     fowt plot raos waves.parquet --skip 100  # motion per metre of wave, from a run in irregular waves
-    fowt plot schedule steady.csv  # operating points saved by fowt trim --out
+    fowt plot schedule steady.csv  # operating points saved by fowt model trim --out
 
     Runs are files of fowt simulate --out or of an evaluation's runs folder, or .outb files of OpenFAST.
     """

@@ -8,7 +8,7 @@ from typer import Argument, Option
 
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.training.cli.arguments import parse_names, parse_pairs
-from fowt_env.training.cli.console import command, note, output, progress_bar
+from fowt_env.training.cli.console import command, dev, note, output, progress_bar
 from fowt_env.training.cli.options import FidelityOption, OptionOption, SeaOption, WindOption
 
 
@@ -43,7 +43,7 @@ def report(
     note(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")
 
 
-@command()
+@command(dev)
 def animate(
     out_file: Annotated[str, Argument(help="Output animation: .gif or .mp4.")],
     controllers: Annotated[str, Option(help="One to four controllers, comma-separated.")] = "pi,pi_land",
@@ -64,8 +64,8 @@ def animate(
     All controllers are simulated in the same wind and waves.
 
     Examples:
-    fowt animate gust.gif  # OC3 and land gains in an extreme operating gust at 18 m/s
-    fowt animate run.mp4 --controllers pi --wind ntm:14:B --sea jonswap:4:9 --duration 120
+    fowt dev animate gust.gif  # OC3 and land gains in an extreme operating gust at 18 m/s
+    fowt dev animate run.mp4 --controllers pi --wind ntm:14:B --sea jonswap:4:9 --duration 120
     """
     from fowt_env.training.cli.simulate import compared_runs
     from fowt_env.visual.animation import animate as animate_runs

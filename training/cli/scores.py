@@ -1,4 +1,4 @@
-"""Implements fowt scores: agents relative to baselines and to the performance limit, gusts and faults."""
+"""Implements fowt dev scores: agents relative to baselines and to the performance limit, gusts and faults."""
 
 from typing import Annotated
 
@@ -7,9 +7,9 @@ from typer import Argument, Option
 from fowt_env.errors import InputError
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_names
-from fowt_env.training.cli.console import add_group, command, out, output, progress_bar, wrote
+from fowt_env.training.cli.console import add_group, command, dev, out, output, progress_bar, wrote
 
-scores = add_group("scores", "Compare agents with baselines, from saved evaluations.")
+scores = add_group("scores", "Compare agents with baselines, from saved evaluations.", dev)
 FoldersArgument = Annotated[
     list[str], Argument(metavar="RESULTS...", help="Output folders or results.csv files of fowt evaluate.")
 ]
@@ -72,8 +72,8 @@ def baselines_command(
 
     Examples:
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --out results/rl
-    fowt scores baselines results/rl --against gspi_oc3,rosco_float --out results/rl/scores
-    fowt scores baselines results/rl --group lqr=policy:ppo_lqr,policy:ppo_lqr_seed1
+    fowt dev scores baselines results/rl --against gspi_oc3,rosco_float --out results/rl/scores
+    fowt dev scores baselines results/rl --group lqr=policy:ppo_lqr,policy:ppo_lqr_seed1
 
     Each cell: ratio of lifetime means on the same runs, its 95 % interval, and a verdict against the targets:
     missed, first, then (or met), with * if significant (p at most 0.05 after Holm's correction for all
@@ -104,8 +104,8 @@ def cases_command(
 
     Examples:
     fowt evaluate --suite shifted --controllers policy:ppo_lqr,gspi_oc3 --out results/shifted
-    fowt scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"  # any metric
-    fowt scores cases results/sea_states --each  # one row per sea state
+    fowt dev scores cases results/gusts --figures "RotSpeed_max_[rpm],PtfmPitch_max_[deg]"  # any metric
+    fowt dev scores cases results/sea_states --each  # one row per sea state
     """
     from fowt_env.training.reports.scores import by_kind, figures_named, kinds_markdown
 
@@ -127,7 +127,7 @@ def bound(
     """Score controllers against the limit of linear control.
 
     Examples:
-    fowt scores bound results/rl --plot results/rl/bound.png --out results/rl/bound
+    fowt dev scores bound results/rl --plot results/rl/bound.png --out results/rl/bound
 
     Values in brackets: more blade-pitch travel or power deviation than gspi_oc3, which the limit excludes.
     """
@@ -150,7 +150,7 @@ def faults(results: FoldersArgument, cases: CasesOption = None, out_path: OutOpt
 
     Examples:
     fowt evaluate --suite faults --controllers pi,gspi_oc3,rosco_float,lqr --out results/faults
-    fowt scores faults results/faults
+    fowt dev scores faults results/faults
 
     Survived: no capsize, blow-up or error, and within the suite's limits. A trip is not a failure here.
     """
@@ -174,7 +174,7 @@ def gust(
     """Plot a gust under several controllers.
 
     Examples:
-    fowt scores gust gust.png --controllers pi,gspi_oc3,rosco_float,lqr,policy:ppo_lqr
+    fowt dev scores gust gust.png --controllers pi,gspi_oc3,rosco_float,lqr,policy:ppo_lqr
     """
     from fowt_env.training.cli.simulate import compared_runs
     from fowt_env.training.reports.score_plots import plot_gust

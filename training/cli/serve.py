@@ -1,4 +1,4 @@
-"""Implements fowt serve: the plant in real time for a controller outside."""
+"""Implements fowt connect serve: the plant in real time for a controller outside."""
 
 import json
 from math import inf
@@ -12,7 +12,7 @@ from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import SERIES_SUFFIXES
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_fault, parse_names, parse_pairs, parse_protection
-from fowt_env.training.cli.console import command, note, output, wrote
+from fowt_env.training.cli.console import command, connect, note, output, wrote
 from fowt_env.training.cli.simulate import FAULT, INITIAL, PROTECTION, REPEATED, save_run, scene_of
 from fowt_env.training.cli.tables import print_table
 
@@ -20,7 +20,7 @@ LEAST_PATIENCE = 1.0  # s of silence after which another client may connect
 WARM_PERIODS = 3  # before the clock starts, so that all kernels are loaded
 
 
-@command()
+@command(connect)
 def serve(
     platform: shared.PlatformOption = "oc3_hywind",
     wind: shared.WindOption = "18",
@@ -60,9 +60,9 @@ def serve(
     blade pitch. Records, clients in Python and C, timing: docs, Hardware in the loop.
 
     Examples:
-    fowt serve --wind ntm:18:B --duration 600 --control-dt 0.01  # 100 Hz on 127.0.0.1:5500
-    fowt serve --protocol udp --listen 192.168.1.10:5500 --hold 5 --then feather  # a PLC in the network
-    fowt serve --factor inf --control-dt 0.1 --out run.outb  # as fast as the client answers
+    fowt connect serve --wind ntm:18:B --duration 600 --control-dt 0.01  # 100 Hz on 127.0.0.1:5500
+    fowt connect serve --protocol udp --listen 192.168.1.10:5500 --hold 5 --then feather  # a PLC
+    fowt connect serve --factor inf --control-dt 0.1 --out run.outb  # as fast as the client answers
     """
     from fowt_env.realtime.server import Server, Timing, check_timing, open_link
     from fowt_env.run.stepped import SteppedRun

@@ -1,4 +1,4 @@
-"""Implements fowt simulate and fowt trim: single runs and steady operating points."""
+"""Implements fowt simulate and fowt model trim: single runs and steady operating points."""
 
 from typing import Annotated
 
@@ -11,7 +11,7 @@ from fowt_env.errors import SimulationStopped
 from fowt_env.files.tables import SERIES_SUFFIXES, TABLE_SUFFIXES, write_table
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_protection
-from fowt_env.training.cli.console import command, note, output, progress_bar, save_table, wrote
+from fowt_env.training.cli.console import command, model, note, output, progress_bar, save_table, wrote
 from fowt_env.training.cli.tables import print_table
 
 ROUNDING = 1e-9  # fraction of the mean below which a standard deviation is rounding error
@@ -174,7 +174,7 @@ TRIM_CHANNELS = (
 )
 
 
-@command()
+@command(model)
 def trim(
     platform: shared.PlatformOption = "oc3_hywind",
     winds: Annotated[str, Option(help=f"Steady winds, m/s: {shared.RANGE}.")] = "4:24:1",
@@ -187,9 +187,9 @@ def trim(
     """Compute steady operating points over wind speed.
 
     Examples:
-    fowt trim  # the floating turbine from cut-in to cut-out
-    fowt trim --winds 8,11.4,18 --fixed --out steady.csv  # fixed platform, saved to a file
-    fowt trim --plot schedule.png  # plot of the steady schedule
+    fowt model trim  # the floating turbine from cut-in to cut-out
+    fowt model trim --winds 8,11.4,18 --fixed --out steady.csv  # fixed platform, saved to a file
+    fowt model trim --plot schedule.png  # plot of the steady schedule
     """
     import pandas as pd
 

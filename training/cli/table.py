@@ -1,4 +1,4 @@
-"""Implements fowt table: power, thrust, tilt and surge over wind and sea, for tools of wind farms."""
+"""Implements fowt model table: power, thrust, tilt and surge over wind and sea, for tools of wind farms."""
 
 from typing import Annotated
 
@@ -7,12 +7,12 @@ from typer import Argument, Option
 from fowt_env.descriptions.checks import parse_numbers
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_pairs
-from fowt_env.training.cli.console import command, output, progress_bar, wrote
+from fowt_env.training.cli.console import command, model, output, progress_bar, wrote
 from fowt_env.training.cli.simulate import CONTROLLER
 from fowt_env.training.cli.tables import figure, print_table
 
 
-@command()
+@command(model)
 def table(
     platform: Annotated[str, Argument(help="Platform: a name from fowt list platforms or a TOML file.")],
     controller: Annotated[str, Option(help=CONTROLLER)] = "pi",
@@ -27,8 +27,8 @@ def table(
     """Tabulate power, thrust, tilt and surge over wind and sea, for FLORIS.
 
     Examples:
-    fowt table iea15_volturnus_s  # 22 winds, 4 wave heights, 3 periods: a turbine of FLORIS
-    fowt table oc3_hywind --controller lqr --winds 4:24:2 --hs 0,4 --tp 10 --out oc3
+    fowt model table iea15_volturnus_s  # 22 winds, 4 wave heights, 3 periods: a turbine of FLORIS
+    fowt model table oc3_hywind --controller lqr --winds 4:24:2 --hs 0,4 --tp 10 --out oc3
 
     Runs in steady wind and JONSWAP seas, means after the transient. FLORIS reads the folder by
     turbine_type: !include NAME.yaml and turbine_library_path, with multidim_conditions: {Tp: 10, Hs: 4}.

@@ -1,4 +1,4 @@
-"""Implements fowt train, fowt export-policy and fowt benchmark training."""
+"""Implements fowt train, fowt connect export-policy and fowt dev benchmark training."""
 
 import shlex
 from pathlib import Path
@@ -10,7 +10,16 @@ from typer import Argument, Option
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.benchmark import benchmarks
-from fowt_env.training.cli.console import EXIT_INTERRUPTED, command, err, note, output, progress_bar, wrote
+from fowt_env.training.cli.console import (
+    EXIT_INTERRUPTED,
+    command,
+    connect,
+    err,
+    note,
+    output,
+    progress_bar,
+    wrote,
+)
 from fowt_env.training.cli.options import CsvOption
 from fowt_env.training.cli.tables import print_table, show
 
@@ -95,7 +104,7 @@ def _print_validations(run):
     print_table(headings, rows, f"relative to {run.reference_name} (score 1); less is better")
 
 
-@command()
+@command(connect)
 def export_policy(
     folder: Annotated[str, Argument(help="Output folder of fowt train.")],
     out_path: Annotated[str, Option("--out", help="Output policy file, .npz.")],
@@ -104,7 +113,7 @@ def export_policy(
     """Convert a training checkpoint to a policy file.
 
     Examples:
-    fowt export-policy runs/ppo_0 --out mine.npz --trust-zip  # from your own run
+    fowt connect export-policy runs/ppo_0 --out mine.npz --trust-zip  # from your own run
     fowt evaluate --controllers policy:mine.npz,pi  # compare it
 
     Training already writes best.npz and last.npz: use this after an interrupted run.
@@ -132,7 +141,7 @@ def training(
     Times of physics, torch and Python are listed separately.
 
     Examples:
-    fowt benchmark training --envs 16 --steps 20000  # a first look
+    fowt dev benchmark training --envs 16 --steps 20000  # a first look
     """
     from fowt_env.training.benchmarks.speed import write_csv
     from fowt_env.training.benchmarks.training import benchmark_training

@@ -1,4 +1,4 @@
-"""Implements fowt validate and fowt paper: comparison with OpenFAST, load cases of the source paper."""
+"""Implements fowt dev validate and fowt dev paper: comparison with OpenFAST, cases of the source paper."""
 
 from typing import Annotated
 
@@ -7,7 +7,7 @@ from typer import Argument, Option
 
 from fowt_env.errors import unknown
 from fowt_env.training.cli.arguments import parse_names
-from fowt_env.training.cli.console import command, from_a_clone, out, text_progress, wrote
+from fowt_env.training.cli.console import command, dev, from_a_clone, out, text_progress, wrote
 from fowt_env.training.cli.options import FolderOption, PlotsOption
 from fowt_env.training.cli.tables import print_table
 
@@ -16,7 +16,7 @@ CASE = "Groups of comparisons in docs/results/validation.md, comma-separated, or
 FOLDER = "Output folder; default: results/validation, or its subfolder PLATFORM if not OC3."
 
 
-@command()
+@command(dev)
 def validate(
     platform: Annotated[str, Option(help=PLATFORM)] = "oc3_hywind",
     case: Annotated[str | None, Option(help=CASE)] = None,
@@ -30,10 +30,10 @@ def validate(
     Simulates the cases of stored OpenFAST runs, prints a verdict on every quantity and writes plots.
 
     Examples:
-    fowt validate --case decays,steady  # quick comparisons
-    fowt validate  # every comparison with OpenFAST
-    fowt validate --platform iea15_volturnus_s  # another platform
-    fowt validate --case all --bts turbsim_18mps.bts  # also the cheaper model options, and the full box
+    fowt dev validate --case decays,steady  # quick comparisons
+    fowt dev validate  # every comparison with OpenFAST
+    fowt dev validate --platform iea15_volturnus_s  # another platform
+    fowt dev validate --case all --bts turbsim_18mps.bts  # also the cheaper model options, and the full box
 
     [bold]Files written[/bold]: validation.csv and validation.md (every quantity with its verdict), and plots.
     """
@@ -60,7 +60,7 @@ def validate(
     wrote(*write_validation_report(study, out_folder, plot))
 
 
-@command()
+@command(dev)
 def paper(
     case: Annotated[str, Argument(help="LC1 to LC12, comma-separated; all; or full_scale.")] = "all",
     out_folder: FolderOption = "results/paper",
@@ -71,9 +71,9 @@ def paper(
     Also checks the results against the claims of the paper.
 
     Examples:
-    fowt paper LC5  # one load case of the 1:50 model
-    fowt paper all  # LC1 to LC12 with the paper's claims checked
-    fowt paper full_scale  # decays, regular wave, wind and waves at full scale
+    fowt dev paper LC5  # one load case of the 1:50 model
+    fowt dev paper all  # LC1 to LC12 with the paper's claims checked
+    fowt dev paper full_scale  # decays, regular wave, wind and waves at full scale
 
     [bold]Files written[/bold]: runs/CASE.parquet, statistics.csv, paper.md (claims and tables), and plots.
     """

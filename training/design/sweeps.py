@@ -1,6 +1,6 @@
 """Computes linear models over the wind, their modes and zeros of blade pitch to rotor speed; sweeps lqr.
 
-Used by fowt linearize and fowt design; every function returns a table that can be written unchanged.
+Used by fowt model linearize and fowt design; every function returns a table that can be written unchanged.
 """
 
 import json

@@ -1,6 +1,6 @@
 """Tunes all baselines by one search: same objective, seeds, sensors, limits and number of evaluations.
 
-    fowt design tune rosco_float --budget 40 --out results/tune
+    fowt design search rosco_float --budget 40 --out results/tune
 
 Settings are evaluated on the cases of a suite with validation seeds (1000 and above, never used for scoring).
 The cost is the aim over gspi_oc3 on the same runs, plus PENALTY times the relative excess over the suite's
@@ -91,10 +91,14 @@ class Space:
         return np.where(low > 0.0, logarithmic, (value - low) / (high - low))
 
 
-def _pi(settings, turbine, control_dt):
+def scaled_pi(settings, turbine):
+    """Return the published PISettings of a turbine times {setting: factor}."""
     published = PISettings.published(turbine)
-    changes = {name: getattr(published, name) * factor for name, factor in settings.items()}
-    return PI(PISettings.published(turbine, **changes), control_dt, "pi_tuned")
+    return published.changed(**{name: getattr(published, name) * factor for name, factor in settings.items()})
+
+
+def _pi(settings, turbine, control_dt):
+    return PI(scaled_pi(settings, turbine), control_dt, "pi_tuned")
 
 
 _LQR = {
@@ -117,7 +121,7 @@ _ROSCO = {
     "kp": (0.3, 3.0), "ki": (0.1, 2.0), "gain": (-0.3, 0.0), "low_pass": (0.05, 0.6),
     "high_pass": (0.003, 0.04),
 }  # fmt: skip
-_FACTORS = {"KP": (0.3, 4.0), "KI": (0.05, 3.0), "gain_schedule_pitch": (0.3, 4.0)}
+FACTORS = {"KP": (0.3, 4.0), "KI": (0.05, 3.0), "gain_schedule_pitch": (0.3, 4.0)}
 
 
 def spaces():
@@ -141,7 +145,7 @@ def spaces():
         "mpc": predictive("mpc"),
         "mpc_lidar": predictive("mpc_lidar", lidar=True),
         "mpc_preview": predictive("mpc_preview", preview=True),
-        "pi_tuned": Space(_FACTORS, tuned("pi_tuned"), _pi),
+        "pi_tuned": Space(FACTORS, tuned("pi_tuned"), _pi),
         "rosco_float": Space(
             _ROSCO, tuned("rosco_float"),
             lambda s, t, dt: Rosco(RoscoSettings(mode=1, **s), dt, "rosco_float"),
@@ -259,7 +263,7 @@ def write_tuned(name, settings, figures, budget, objective, path=TUNED):
         | ({} if aim == MOTIONS else {"aim": aim}),
     }
     lines = [
-        "# Settings optimised by `fowt design tune NAME`. Ratios are to gspi_oc3 on the seeds searched.",
+        "# Settings optimised by `fowt design search NAME`. Ratios are to gspi_oc3 on the seeds searched.",
     ]
     for controller in sorted(stored):
         for section, values in stored[controller].items():

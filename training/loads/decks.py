@@ -261,7 +261,7 @@ def _write_readme(folder, case, deck):
         f" {case.wave_direction:g} deg, yaw error {case.yaw_error:g} deg",
         f"- {case.duration:g} s, statistics from {case.skip:g} s; partial factor {case.factor:g}",
         f"- not in the deck, to be set by hand: {'; '.join(events) or 'no event'}; controller: the library of"
-        f" `fowt export {case.controller} --dll lib.so` in ServoDyn" * (not case.case.parked),
+        f" `fowt connect export {case.controller} --dll lib.so` in ServoDyn" * (not case.case.parked),
     ]
     if deck is not None:
         lines.append(

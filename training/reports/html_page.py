@@ -49,8 +49,9 @@ SCHEDULE_WINDS = (4.0, 6.0, 8.0, 10.0, 11.0, 11.5, 12.0, 13.0, 14.0, 16.0, 18.0,
 
 
 def write_report(
-    folder, out=None, cases=None, seeds=None, rate=None, platform=None, schedule=True, progress=None
-):
+    folder, out=None, cases=None, seeds=None, rate=None, platform=None, schedule=True, progress=None,
+    sections=(),
+):  # fmt: skip
     """Write the HTML page of an evaluation folder; return its path.
 
     folder     contains results.csv (or metrics.csv) and runs/<controller>/<case>_seed<n>.parquet, and
@@ -65,6 +66,7 @@ def write_report(
                cannot be read here, the page says so in place of the schedule
     schedule   whether the page has a steady schedule (some seconds)
     progress   called as progress(done, total, text)
+    sections   (heading, HTML) of further sections, below the verdict; their texts must be escaped
     Raises: InputError for a folder without results, a table or run that cannot be read, an unknown case
     or seed, or if plotly is missing.
     """
@@ -84,6 +86,10 @@ def write_report(
     point = _schedule(platform, about, say) if schedule else None
     data = _page_data(table, board_file, manifest, runs, point)
     texts = _page_texts(folder, table, manifest, board_file, data, runs, point)
+    texts["further"] = "".join(
+        f'<section><div class="heading"><h2>{html.escape(heading)}</h2></div>{body}</section>'
+        for heading, body in sections
+    )
     return write_page(out, PAGE / "page.html", PAGE / "page.js", texts, data, plotly)
 
 

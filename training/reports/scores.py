@@ -1,7 +1,7 @@
 """Scores agents against baselines on the same runs: ratios of lifetime means, with 95 % intervals.
 
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --seeds 1:6:1 --out results/rl
-    fowt scores baselines results/rl --against gspi_oc3,rosco_float
+    fowt dev scores baselines results/rl --against gspi_oc3,rosco_float
 
 Both means are over the lifetime, in the same wind and waves. Training seeds of one configuration form a
 group, whose interval resamples training and weather seeds (training.evaluation.bootstrap). A lost run of an

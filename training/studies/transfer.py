@@ -12,8 +12,8 @@ the runs of another machine stopped. A run of OpenFAST is kept as a series of CH
 can be computed anew without OpenFAST.
 
 Both codes have one wind, a TurbSim box sampled at every blade station (`uniform`: its rotor average), and one
-sea, the same components. Controllers are those of `fowt export`, designed for the published platform; here
-they run on the model that has the figures of the deck. Runs start at the trim of the rigid model.
+sea, the same components. Controllers are those of `fowt connect export`, designed for the published platform;
+here they run on the model that has the figures of the deck. Runs start at the trim of the rigid model.
 """
 
 import json

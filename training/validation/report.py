@@ -267,7 +267,7 @@ def markdown(study, plots=()):
 
     lines = [
         f"# All results of {study.platform}", "",
-        f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}: `fowt validate --platform"
+        f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}: `fowt dev validate --platform"
         f" {study.platform}`. Quantities without an allowed error are reported only.", "",
         *images(others),
     ]  # fmt: skip

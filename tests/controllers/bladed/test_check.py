@@ -1,4 +1,4 @@
-"""fowt check-dll: the records that a library reads and writes, its demands, and what makes it unusable."""
+"""fowt connect check-dll: records that a library reads and writes, its demands, what makes it unusable."""
 
 import pytest
 from bladed_library import built, needs_gcc
@@ -98,12 +98,12 @@ def test_every_record_has_a_name_of_its_own_and_the_numbers_increase():
 
 @pytest.mark.slow
 def test_the_command_prints_the_records_and_ends_with_what_it_found(library, tmp_path):
-    printed, notes = fowt("check-dll", str(library))
+    printed, notes = fowt("connect", "check-dll", str(library))
     assert "usable: the same demands in two runs" in printed and "exports" in printed
     assert "20  generator_speed" in printed and "47  generator_torque_demand" in printed
     assert "301 calls" in notes
     (tmp_path / "fail.IN").write_text("fail")
-    printed, _ = fowt("check-dll", f"{library},{tmp_path / 'fail.IN'}", code=1)
+    printed, _ = fowt("connect", "check-dll", f"{library},{tmp_path / 'fail.IN'}", code=1)
     assert "no wind vane" in printed and "usable" not in printed
-    _, error = fowt("check-dll", str(tmp_path / "fail.IN"), code=2)
+    _, error = fowt("connect", "check-dll", str(tmp_path / "fail.IN"), code=2)
     assert "is no shared library (ELF)" in error

@@ -99,8 +99,8 @@ def test_initial_values_a_locked_rotor_and_a_wind_series_reach_the_run(tmp_path)
         (("evaluate", "--engine", "rai"), "ray"),
         (("evaluate", "--seeds", "1.5"), "whole numbers"),
         (("evaluate", "--skip", "700"), "skip = 700"),
-        (("trim", "--winds", "24:4:1"), "START:STOP[:STEP]"),
-        (("trim", "--winds", ""), "winds"),
+        (("model", "trim", "--winds", "24:4:1"), "START:STOP[:STEP]"),
+        (("model", "trim", "--winds", ""), "winds"),
         (("list", "platfroms"), "platforms"),
     ],
 )
@@ -267,7 +267,7 @@ def test_evaluate_takes_a_suite_of_the_users_own_compares_and_resumes(tmp_path):
 
 def test_trim_prints_the_operating_points_of_trim(tmp_path):
     out = tmp_path / "steady.csv"
-    stdout, _ = fowt("trim", "--winds", "8,18", "--out", str(out))
+    stdout, _ = fowt("model", "trim", "--winds", "8,18", "--out", str(out))
     assert "RotThrust" in stdout
     table = pd.read_csv(out)
     assert table["Wind_[m/s]"].tolist() == [8.0, 18.0]
@@ -319,6 +319,21 @@ def test_help_fits_one_screen_and_has_every_command_in_a_group():
     assert all(listed)
 
 
+def test_fewer_than_twenty_commands_are_at_the_first_level_and_fowt_alone_says_what_is_next():
+    assert len(typer.main.get_command(app).commands) < 20
+    stdout, _ = fowt()
+    lines = stdout.splitlines()
+    assert len(lines) <= 8 and all(line.startswith("fowt ") for line in lines[:-1])
+    assert "fowt simulate" in lines[0] and "fowt --help" in stdout and "fowt warmup" in stdout
+
+
+@pytest.mark.parametrize(("former", "present"), console.MOVED.items())
+def test_a_former_name_of_a_command_is_answered_with_its_present_one(former, present):
+    stdout, stderr = fowt(*former.split(), "--out", "x.csv", code=2)
+    assert f"fowt {former} is now called fowt {present}" in " ".join(stderr.split()) and stdout == ""
+    fowt(*present.split(), "--help")
+
+
 def test_what_reads_only_the_first_lines_of_a_list_is_no_error():
     code = "import sys; from fowt_env.training.cli.app import main; main()"
     command = f"{shlex.quote(sys.executable)} -c '{code}' list metrics | head -1"
@@ -334,12 +349,12 @@ def test_what_reads_only_the_first_lines_of_a_list_is_no_error():
     [
         ("simulate", "--duration", "1", "--plot", "{}/new/run.png"),
         ("simulate", "--duration", "1", "--out", "{}/new/run.csv"),
-        ("trim", "--winds", "18", "--out", "{}/new/trim.csv"),
-        ("linearize", "--winds", "18", "--out", "{}/new/deeper"),
+        ("model", "trim", "--winds", "18", "--out", "{}/new/trim.csv"),
+        ("model", "linearize", "--winds", "18", "--out", "{}/new/deeper"),
         ("design", "bound", "--wind", "18", "--plot", "{}/new/bound.png"),
         ("evaluate", "--controllers", "pi", "--cases", "steady_16", "--out", "{}/new/deeper"),
-        ("export-policy", "run", "--out", "{}/new/p.npz"),
-        ("animate", "{}/new/gust.gif"),
+        ("connect", "export-policy", "run", "--out", "{}/new/p.npz"),
+        ("dev", "animate", "{}/new/gust.gif"),
     ],
 )
 def test_no_folder_is_made_outside_of_the_working_folder(words, tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""fowt cache: what it counts and what it removes, which is nothing that this package did not make."""
+"""fowt dev cache: what it counts and what it removes, which is nothing that this package did not make."""
 
 import pytest
 from typer.testing import CliRunner
@@ -39,7 +39,7 @@ def root(tmp_path, monkeypatch):
 
 
 def fowt(*words, **options):
-    return CliRunner().invoke(app, ["cache", *words], **options)
+    return CliRunner().invoke(app, ["dev", "cache", *words], **options)
 
 
 def left(root):

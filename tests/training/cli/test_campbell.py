@@ -1,4 +1,4 @@
-"""fowt campbell: a table on the screen, the same figures in a file, and a plot."""
+"""fowt model campbell: a table on the screen, the same figures in a file, and a plot."""
 
 import numpy as np
 import pandas as pd
@@ -15,7 +15,7 @@ pytest.importorskip("matplotlib", reason="matplotlib is not installed: the extra
 def test_the_file_holds_the_frequencies_of_the_analysis_in_hz_over_rpm(tmp_path):
     table, picture = tmp_path / "campbell.csv", tmp_path / "campbell.png"
     stdout, _ = fowt(
-        "campbell", "iea15_volturnus_s", "--speeds", "0:9:3", "--pitch", "5", "--tower", "modes",
+        "model", "campbell", "iea15_volturnus_s", "--speeds", "0:9:3", "--pitch", "5", "--tower", "modes",
         "--generator", "fixed", "--out", str(table), "--plot", str(picture),
     )  # fmt: skip
     rows = pd.read_csv(table)
@@ -42,5 +42,5 @@ def test_the_file_holds_the_frequencies_of_the_analysis_in_hz_over_rpm(tmp_path)
     ],
 )
 def test_what_cannot_be_computed_ends_with_a_message(arguments, words):
-    _, stderr = fowt("campbell", *arguments, code=2)
+    _, stderr = fowt("model", "campbell", *arguments, code=2)
     assert all(word in stderr for word in words), stderr

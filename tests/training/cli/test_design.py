@@ -1,4 +1,4 @@
-"""fowt linearize and fowt design from the shell."""
+"""fowt model linearize and fowt design from the shell."""
 
 import json
 
@@ -10,7 +10,7 @@ from command_line import fowt
 
 def test_linearize_writes_models_and_says_where_the_pitch_rests(tmp_path):
     out = tmp_path / "m.npz"
-    stdout, stderr = fowt("linearize", "--winds", "8,18", "--out", str(out))
+    stdout, stderr = fowt("model", "linearize", "--winds", "8,18", "--out", str(out))
     assert "up to 8 m/s the blade pitch is at its minimum" in " ".join(stdout.split())
     assert "m.npz" in stderr
     assert np.load(out)["A"].shape == (2, 14, 14)
@@ -18,23 +18,23 @@ def test_linearize_writes_models_and_says_where_the_pitch_rests(tmp_path):
 
 def test_linearize_writes_the_table_of_modes_or_a_folder_of_everything(tmp_path):
     table, folder = tmp_path / "modes.csv", tmp_path / "study"
-    fowt("linearize", "--winds", "18", "--out", str(table))
+    fowt("model", "linearize", "--winds", "18", "--out", str(table))
     assert set(pd.read_csv(table)["mode"]) >= {"surge", "platform_pitch"}
-    _, stderr = fowt("linearize", "--winds", "18", "--out", str(folder))
+    _, stderr = fowt("model", "linearize", "--winds", "18", "--out", str(folder))
     assert {path.name for path in folder.iterdir()} >= {"modes.csv", "models.json"}
     assert all(path.name in stderr for path in folder.iterdir())
 
 
 def test_linearize_writes_the_model_of_one_wind_for_matlab(tmp_path):
     out = tmp_path / "m.mat"
-    fowt("linearize", "--winds", "18", "--out", str(out))
+    fowt("model", "linearize", "--winds", "18", "--out", str(out))
     assert scipy.io.loadmat(out)["A"].shape == (14, 14)
-    _, stderr = fowt("linearize", "--winds", "12,18", "--out", str(tmp_path / "n.mat"), code=2)
+    _, stderr = fowt("model", "linearize", "--winds", "12,18", "--out", str(tmp_path / "n.mat"), code=2)
     assert "a .mat contains the model of one wind" in stderr
 
 
 def test_linearize_refuses_other_endings_before_it_starts(tmp_path):
-    _, stderr = fowt("linearize", "--winds", "18", "--out", str(tmp_path / "m.xls"), code=2)
+    _, stderr = fowt("model", "linearize", "--winds", "18", "--out", str(tmp_path / "m.xls"), code=2)
     assert "must be a folder or end with .csv, .parquet, .json, .npz, .mat" in " ".join(stderr.split())
 
 

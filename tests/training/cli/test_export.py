@@ -1,4 +1,4 @@
-"""fowt export writes what it names, and refuses the rest before anything is written."""
+"""fowt connect export writes what it names, and refuses the rest before anything is written."""
 
 import pytest
 from bladed_host import Library, needs_compiler, series
@@ -11,7 +11,7 @@ from fowt_env.descriptions.turbine import read_turbine
 @needs_compiler
 def test_each_output_is_written_and_the_library_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    words = ("export", "gspi_oc3", "--dll", "libgspi.so", "--c", "plc", "--rosco", "DISCON.IN")
+    words = ("connect", "export", "gspi_oc3", "--dll", "libgspi.so", "--c", "plc", "--rosco", "DISCON.IN")
     _, stderr = fowt(*words, "--control-dt", "0.05")
     assert "wrote libgspi.so" in stderr and "the law runs in C" in stderr and "divides 0.05 s" in stderr
     assert "plc/law.h" in stderr and "small-signal values" in stderr
@@ -36,5 +36,5 @@ def test_each_output_is_written_and_the_library_runs(tmp_path, monkeypatch):
 )
 def test_what_cannot_be_exported_is_refused_and_leaves_no_file(words, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    _, stderr = fowt("export", *words, code=2)
+    _, stderr = fowt("connect", "export", *words, code=2)
     assert message in stderr and list(tmp_path.iterdir()) == []

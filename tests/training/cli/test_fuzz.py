@@ -114,7 +114,7 @@ def test_simulate_works_or_names_what_is_wrong(count):
 def test_trim_works_or_names_what_is_wrong(option, value):
     usual = {"--winds": "18", "--rotor": "lookup", "--option": "integrator=ab4"}
     arguments = [f"{name}={text}" for name, text in (usual | {option: value}).items()]
-    check_command(["trim", *arguments], {option: value})
+    check_command(["model", "trim", *arguments], {option: value})
 
 
 @examples(40)

@@ -28,8 +28,8 @@ def test_an_import_ends_with_what_does_not_fit_in_the_imported_platform(tmp_path
     assert "line" in printed.rsplit("Wind of the deck", 1)[1] and "no contradictions found" not in printed
     assert "the files are kept" in notes
     assert read_platform(tmp_path / "out" / "platform.toml").lines[0].length == 100.0
-    # exactly what fowt check says
-    said, _ = fowt("check", str(tmp_path / "out" / "platform.toml"), code=1)
+    # exactly what fowt model check says
+    said, _ = fowt("model", "check", str(tmp_path / "out" / "platform.toml"), code=1)
     faults = printed.rsplit("power law", 1)[1].split("\n", 1)[1]
     assert said.endswith(faults)
 

@@ -1,4 +1,4 @@
-"""fowt leaderboard, and fowt evaluate on drawn seeds, which nobody can know while controllers are tuned."""
+"""fowt dev leaderboard, and fowt evaluate on drawn seeds, which nobody knows while controllers are tuned."""
 
 import hashlib
 import json
@@ -17,10 +17,10 @@ SUITE = (
 
 def test_seeds_prints_the_hash_of_the_file_that_it_makes_and_replaces_none(tmp_path):
     path = tmp_path / "seeds.txt"
-    printed = fowt("leaderboard", "seeds", str(path), "--count", "3")[0].split()
+    printed = fowt("dev", "leaderboard", "seeds", str(path), "--count", "3")[0].split()
     assert printed == [hashlib.sha256(path.read_bytes()).hexdigest()]
     assert len(path.read_text().splitlines()) == 4
-    assert "cannot be written" in fowt("leaderboard", "seeds", str(path), code=2)[1]
+    assert "cannot be written" in fowt("dev", "leaderboard", "seeds", str(path), code=2)[1]
 
 
 def test_evaluate_draws_the_seeds_of_a_suite_and_says_so_in_what_it_writes(tmp_path):

@@ -63,7 +63,7 @@ def test_runs_are_named_by_what_tells_them_apart():
 
 def test_trim_plots_the_schedule_and_plot_does_so_from_its_table(tmp_path):
     table, picture, again = (tmp_path / name for name in ("steady.csv", "one.png", "two.png"))
-    fowt("trim", "--winds", "8,18", "--out", str(table), "--plot", str(picture))
+    fowt("model", "trim", "--winds", "8,18", "--out", str(table), "--plot", str(picture))
     fowt("plot", "schedule", str(table), "--out", str(again))
     assert picture.read_bytes().startswith(PNG) and again.read_bytes().startswith(PNG)
 

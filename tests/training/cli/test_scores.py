@@ -14,7 +14,7 @@ from fowt_env.training.reports.scores import FIGURES  # noqa: E402
 
 
 def call(*arguments):
-    return CliRunner().invoke(app, ["scores", *map(str, arguments)])
+    return CliRunner().invoke(app, ["dev", "scores", *map(str, arguments)])
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""What fowt serve refuses before it listens; tests/examples runs it with its clients."""
+"""What fowt connect serve refuses before it listens; tests/examples runs it with its clients."""
 
 import pytest
 from command_line import fowt
@@ -32,6 +32,6 @@ def test_an_address_has_a_host_and_a_port():
 )
 def test_a_wrong_option_is_one_line_that_names_it(words, message, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    stderr = fowt("serve", *words.split(), code=2)[1]
+    stderr = fowt("connect", "serve", *words.split(), code=2)[1]
     assert message in stderr.strip().splitlines()[-1]
     assert not list(tmp_path.iterdir())

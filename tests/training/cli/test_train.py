@@ -39,9 +39,9 @@ def test_a_run_ends_goes_on_and_its_checkpoint_becomes_a_policy_on_request_only(
     assert again.exit_code == EXIT_INPUT and "already contains a run" in again.output
     assert call("train", "--resume", "--out", folder, "--steps", 64).exit_code == 0
     assert [p.name for p in (folder / "checkpoints").iterdir()] == ["step_64"]
-    refused = call("export-policy", folder, "--out", tmp_path / "p.npz")
+    refused = call("connect", "export-policy", folder, "--out", tmp_path / "p.npz")
     assert refused.exit_code == EXIT_INPUT and "executes code" in refused.output
-    done = call("export-policy", folder, "--out", tmp_path / "p.npz", "--trust-zip")
+    done = call("connect", "export-policy", folder, "--out", tmp_path / "p.npz", "--trust-zip")
     assert done.exit_code == 0 and "warning" in done.output
     assert (tmp_path / "p.npz").stat().st_size == pytest.approx((folder / "last.npz").stat().st_size, abs=50)
 
@@ -93,7 +93,7 @@ def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on
 @pytest.mark.slow
 def test_benchmark_training_writes_a_row_per_kind_of_environment(tmp_path):
     path = tmp_path / "training.csv"
-    done = call("benchmark", "training", "--envs", "8", "--steps", "1024", "--out", path)
+    done = call("dev", "benchmark", "training", "--envs", "8", "--steps", "1024", "--out", path)
     assert done.exit_code == 0, done.output
     table = pd.read_csv(path, comment="#")
     assert list(table["kind"]) == list(VECTOR_ENVS) and (table["steps_per_s"] > 0.0).all()
@@ -108,7 +108,7 @@ def test_benchmark_training_writes_a_row_per_kind_of_environment(tmp_path):
         (("train", "--set", "reward=1"), "unknown setting 'reward'"),
         (("train", "--resume", "--set", "task=x", "--out", "nowhere"), "keeps its settings"),
         (("train", "--resume", "--out", "nowhere"), "contains no run"),
-        (("export-policy", "nowhere", "--out", "p.zip"), "must end with .npz"),
+        (("connect", "export-policy", "nowhere", "--out", "p.zip"), "must end with .npz"),
     ],
 )
 def test_wrong_input_is_named(arguments, message, tmp_path, monkeypatch):

@@ -94,7 +94,7 @@ def test_wrong_arguments_are_named():
 def test_the_command_writes_the_files(tmp_path):
     out = tmp_path / "x"
     options = ("--winds", "8,12", "--hs", "0", "--tp", "10", "--duration", "20", "--out", out)
-    fowt("table", "oc3_hywind", *options)
+    fowt("model", "table", "oc3_hywind", *options)
     assert sorted(path.name for path in out.iterdir()) == [
         "oc3_hywind.csv", "oc3_hywind.yaml", "oc3_hywind_Tp_Hs.csv",
     ]  # fmt: skip

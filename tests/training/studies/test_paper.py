@@ -180,7 +180,7 @@ def test_case_names_are_checked():
 
 
 def test_the_command_writes_series_statistics_and_claims(tmp_path):
-    result = CliRunner().invoke(app, ["paper", "LC5", "--out", str(tmp_path), "--no-plot"])
+    result = CliRunner().invoke(app, ["dev", "paper", "LC5", "--out", str(tmp_path), "--no-plot"])
     assert result.exit_code == 0
     assert "twice the wave frequency" in result.output
     assert (tmp_path / "runs" / "LC5.parquet").exists()

@@ -69,7 +69,7 @@ def test_default_step_keeps_a_factor_of_two_on_the_whole_map(name):
     assert (both["measured_s"] > 0.8 * both["theory_s"]).all()
 
 
-NIGHTLY = [pytest.mark.slow, pytest.mark.nightly]  # `fowt benchmark stability --cases N` runs more
+NIGHTLY = [pytest.mark.slow, pytest.mark.nightly]  # `fowt dev benchmark stability --cases N` runs more
 ALL = ("standard", "fast", "standard", "standard", "reference")
 
 
@@ -376,7 +376,7 @@ def test_the_report_counts_what_was_missed(tmp_path, monkeypatch):
     assert (
         "| bad | 4 | **MISSED**: 2 | 1 |" in text and "| good | 3 | 1 | 1 |" in text and "| x | 1 |" in text
     )
-    assert "`fowt benchmark stability --parts plain --seed 3`" in text
+    assert "`fowt dev benchmark stability --parts plain --seed 3`" in text
     assert "(report/plain_2.csv)" in text and "y39" not in text
     many = pd.read_csv(tmp_path / "report" / "plain_2.csv")
     assert list(many["a"]) == [f"y{n}" for n in range(40)] and (many["b"] == 2).all()
@@ -388,11 +388,11 @@ def test_replay_from_the_command_line_tells_the_outcome(scene, tmp_path):
     case = random_cases._case(scene, 18.0, CALM, 0, np.zeros(N_RIGID), [[0.0, 1.5]], 2.0)
     path = tmp_path / "case.json"
     path.write_text(json.dumps(case))
-    done = CliRunner().invoke(app, ["benchmark", "stability", "--replay", str(path)])
+    done = CliRunner().invoke(app, ["dev", "benchmark", "stability", "--replay", str(path)])
     assert done.exit_code == 0 and "ran to its end" in done.output
     case["state"][State.VX] = float("nan")
     path.write_text(json.dumps(case))
-    done = CliRunner().invoke(app, ["benchmark", "stability", "--replay", str(path)])
+    done = CliRunner().invoke(app, ["dev", "benchmark", "stability", "--replay", str(path)])
     assert done.exit_code == 1 and "non-finite" in done.output
 
 

@@ -162,7 +162,7 @@ class PaperClaim(NamedTuple):
 
 
 class PaperStudy(NamedTuple):
-    """Holds the runs and claims of `fowt paper`."""
+    """Holds the runs and claims of `fowt dev paper`."""
 
     runs: dict  # model-scale case -> frame
     claims: list

@@ -1,4 +1,4 @@
-"""Writes the files of `fowt paper`: time series, statistics, claims, and plots as in the paper."""
+"""Writes the files of `fowt dev paper`: time series, statistics, claims, and plots as in the paper."""
 
 from datetime import UTC, datetime
 from functools import partial
@@ -185,7 +185,7 @@ def write_paper_report(study, folder, plot=True):
     """Write all results of a study into a folder and return the paths."""
     folder = Path(folder)
     written = f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}"
-    paths, text = [], ["# All claims of the paper", "", f"{written}: `fowt paper all,full_scale`.", ""]
+    paths, text = [], ["# All claims of the paper", "", f"{written}: `fowt dev paper all,full_scale`.", ""]
     if study.runs:
         for case, frame in study.runs.items():
             paths.append(Path(write_table(frame, folder / "runs" / f"{case}.parquet")))

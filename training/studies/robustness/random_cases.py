@@ -1,6 +1,6 @@
 """Runs random scenes and initial states over the valid range and checks that the state stays bounded.
 
-A case is a dict with everything needed to repeat it (`fowt benchmark stability --replay FILE`).
+A case is a dict with everything needed to repeat it (`fowt dev benchmark stability --replay FILE`).
 """
 
 import json

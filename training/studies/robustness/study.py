@@ -345,7 +345,7 @@ def write_robustness_report(folder, path):
     for name, stored in parts.items():
         part, sizes = PARTS[name], stored["sizes"]
         about = dict(line.partition(": ")[::2] for line in stored["about"])
-        command = f"fowt benchmark stability --parts {name}"
+        command = f"fowt dev benchmark stability --parts {name}"
         if part.size is not None:
             command += f" {part.size[1]} {sizes[part.size[0]]}"
         if sizes["seed"]:
