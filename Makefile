@@ -13,7 +13,7 @@ INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --ed
 .DELETE_ON_ERROR:
 
 help:
-	@echo "make demo        score the PI controller of Eq. (8) above rated: table and plots under results/demo"
+	@echo "make demo        the published PI law beside a predictive one: a verdict, and results/demo/report.html"
 	@echo "make test        prove this installation: each layer against an independent reference"
 	@echo "make test-all    all tests: make test, make test-rest (the other ones) and make test-nightly (the longest)"
 	@echo "make test-quick  all but the slow ones, as after an edit: minutes once their kernels are compiled"
@@ -26,18 +26,18 @@ $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "needs Python 3.11, 3.12 or 3.13: make PYTHON=/path/to/python3.12" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.installed-plot: $(PROJECT) | $(BIN)/python
-	$(INSTALL) ".[plot]"
+$(VENV)/.installed-demo: $(PROJECT) | $(BIN)/python
+	$(INSTALL) ".[mpc,plot,render,report]"
 	@touch $@
 
 $(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
 	$(INSTALL) ".[dev]"
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco capytaine hipersim xarray
-	@touch $@ $(VENV)/.installed-plot
+	@touch $@ $(VENV)/.installed-demo
 
-# its cases share one kind of scene, which two processes would both compile
-demo: $(VENV)/.installed-plot
-	$(BIN)/fowt evaluate --controllers pi --cases above_rated --seeds 1 --out results/demo
+# one process: the cases share one kind of scene, which two would both compile
+demo: $(VENV)/.installed-demo
+	@$(BIN)/fowt study --controller mpc --against gspi_oc3 --seeds 1 --out results/demo
 
 test: $(VENV)/.installed-dev
 	@echo "minutes, most of them for compiling kernels, which are kept"

@@ -342,7 +342,7 @@ def test_links_out_of_docs_lead_to_the_site_s_own_pages():
     assert hooks.linked(text, "page.md") == text.replace("../README.md#", "readme.md#")
     assert hooks.linked("[e](../examples/01_simulate.py)", "page.md") == "[e](examples/01_simulate.md)"
     assert hooks.linked("[`e`](01_simulate.py)", "examples/index.md") == "[`e`](01_simulate.md)"
-    assert hooks.linked("![f](docs/figures/gust.gif)", "readme.md") == "![f](figures/gust.gif)"
+    assert hooks.linked("![f](docs/figures/turbulence.gif)", "readme.md") == "![f](figures/turbulence.gif)"
     assert hooks.linked("[g](../../CONTRIBUTING.md)", "reference/envs.md") == "[g](../contributing.md)"
 
 

@@ -52,6 +52,7 @@ def animate(
     sea: SeaOption = "jonswap:4:10",
     duration: Annotated[float, Option(help="Length of the runs, s.")] = 80.0,
     seed: Annotated[int, Option(help="Seed of wind and waves.")] = 0,
+    start: Annotated[float, Option(help="Time of the first image, s.")] = 0.0,
     speed: Annotated[float, Option(help="Playback speed relative to real time.")] = 5.0,
     fps: Annotated[float, Option(help="Frames per second.")] = 15.0,
     width: Annotated[int, Option(help="Width, pixels.")] = 960,
@@ -65,6 +66,7 @@ def animate(
 
     Examples:
     fowt dev animate gust.gif  # OC3 and land gains in an extreme operating gust at 18 m/s
+    fowt dev animate two.gif --controllers gspi_oc3,mpc --wind ntm:14:B --start 94 --duration 142  # later
     fowt dev animate run.mp4 --controllers pi --wind ntm:14:B --sea jonswap:4:9 --duration 120
     """
     from fowt_env.training.cli.simulate import compared_runs
@@ -77,5 +79,6 @@ def animate(
     with progress_bar("simulating") as update:
         scene, runs = compared_runs(controllers, duration, update, **options)
         progress = partial(update, text="drawing")
-        animate_runs(scene, runs, path, speed=speed, fps=fps, size=(width, height), progress=progress)
+        size = width, height
+        animate_runs(scene, runs, path, speed=speed, fps=fps, size=size, start=start, progress=progress)
     note(f"wrote {path} ({path.stat().st_size / 1e6:.1f} MB)")

@@ -1,0 +1,71 @@
+"""fowt study: a platform and controllers in, one page with a verdict out."""
+
+import numpy as np
+import pytest
+from command_line import fowt
+
+import fowt_env
+from fowt_env.files.tables import write_table
+from fowt_env.training.cli.study import FILM, most_different
+
+SUITE = """\
+
+version = 1
+description = "one case"
+source = "a test"
+wind = "rotor-averaged"
+duration = 90.0
+skip = 30.0
+seeds = [1]
+
+[[case]]
+name = "ntm_16"
+wind = { kind = "ntm", speed = 16.0 }
+sea = { kind = "jonswap", Hs = 4.0, Tp = 9.0 }
+"""
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A run of another law in steady wind, as a user's own output."""
+    frame = fowt_env.simulate(fowt_env.build_scene("oc3_hywind", wind=16.0), "pi_unscheduled", duration=90.0)
+    return write_table(frame, tmp_path_factory.mktemp("theirs") / "run.outb")
+
+
+def test_a_study_says_the_verdict_and_writes_one_page_with_all_parts(tmp_path, monkeypatch, recorded):
+    pytest.importorskip("plotly", reason="plotly is not installed: the extra `report` is missing")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "short.toml").write_text(SUITE)
+    words = ("--controller", "pi", "--against", "gspi_oc3,pi_land", "--suite", "short.toml", "--seeds", "1")
+    stdout, _ = fowt("study", *words, "--compare", str(recorded), "--no-animation", "--out", "made")
+    lines = stdout.splitlines()
+    assert lines[-1] == "open made/report.html"
+    assert any(line.startswith("pi against gspi_oc3: ") for line in lines)
+    assert any(line.startswith("pi_land against gspi_oc3: ") and "worse: " in line for line in lines)
+    text = (tmp_path / "made" / "report.html").read_text(encoding="utf-8")
+    assert (
+        text.index("Beside your own run")
+        < text.index("Linear margins at 16 m/s")
+        < text.index('id="leaderboard"')
+    )
+    assert "RotSpeed rpm" in text and "phase margin (deg)" in text
+
+
+def test_what_cannot_be_studied_is_refused_before_anything_is_evaluated(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words, said in (
+        (("nowhere.fst",), "nowhere.fst"),
+        (("--controller", ""), "--controller"),
+        (("--controller", "pi", "--compare", "nowhere.outb"), "nowhere.outb"),
+        (("oc3_hywin",), "oc3_hywind"),
+    ):
+        assert said in fowt("study", *words, code=2)[1]
+    assert not (tmp_path / "results" / "study" / "results.csv").exists()
+
+
+def test_the_animation_shows_where_the_first_signal_swings_and_the_second_does_not():
+    time = np.arange(0.0, 600.0, 0.1)
+    second = np.sin(0.2 * time)
+    first = np.where((time > 300.0) & (time < 300.0 + FILM), 3.0, 1.0) * second
+    assert abs(most_different(first, second) - 300.0) <= 4.0
+    assert most_different(first[:700], second[:700]) == 60.0
