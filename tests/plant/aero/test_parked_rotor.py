@@ -12,7 +12,7 @@ SPEED = 40.0
 
 @pytest.mark.parametrize("direction", [0.0, -8.0, 20.0, 60.0, 90.0, 135.0, 180.0, -90.0])
 def test_wind_from_any_direction_loads_a_parked_rotor_by_its_polars(direction):
-    """Without induction: at rest a rotor has no wake (nacelle_yaw errors of DLC 6.2 and 7.1)."""
+    """Without induction: at rest a rotor has no wake (yaw errors of DLC 6.2 and 7.1)."""
     wind = {"kind": "steady", "speed": SPEED, "direction": direction}
     scene = fowt_env.build_scene("oc3_hywind", wind=wind, fidelity="standard")
     initial = {"start": "zero", "RotSpeed": 0.0, "BldPitch1": 90.0, "Azimuth": 0.0}
