@@ -32,7 +32,7 @@ $(VENV)/.installed-demo: $(PROJECT) | $(BIN)/python
 
 $(VENV)/.installed-dev: $(PROJECT) | $(BIN)/python
 	$(INSTALL) ".[dev]"
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco capytaine hipersim xarray
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --no-deps rosco capytaine hipersim xarray mo-gymnasium
 	@touch $@ $(VENV)/.installed-demo
 
 # one process: the cases share one kind of scene, which two would both compile

@@ -9,6 +9,7 @@ from gymnasium.envs.registration import register, registry
 ENTRY_POINT = "fowt_env.envs:FowtEnv"
 VECTOR_ENTRY_POINT = "fowt_env.envs:FowtVectorEnv"
 SCORE = {"reward": "score"}  # goals in [0, 1]: fowt_env/envs/goals.py
+BLADES = ("1", "2", "3")
 ENVIRONMENTS = {  # {name: settings}; those of before the reward in [0, 1] keep their bits
     "fowt_env/OC3Hywind-v1": {},
     "fowt_env/VolturnUS15MW-v0": {"platform": "iea15_volturnus_s"},
@@ -53,6 +54,25 @@ SENSOR_FAULTS = (  # each at a time, and of a size, drawn for the episode
     {"kind": "sensor_bias", "field": "platform_pitch", "time": (30.0, 270.0), "value": (-0.03, 0.03)},
     {"kind": "sensor_freeze", "field": "nacelle_velocity", "time": (30.0, 270.0)},
 )
+ROOTS = {  # at the same scale, so that an observation can be turned from blade to blade
+    name: scaling
+    for channel, scaling in (("blade_pitch", (0.2, 0.1, 0.02)), ("root_out_of_plane", (5e6, 3e6, 1e6)))
+    for name in (f"{channel}_{blade}" for blade in BLADES)
+}
+INDIVIDUAL_PITCH = {
+    "task": "above_rated",
+    "fidelity": "elastic",
+    "action_mode": "individual_residual",
+    "baseline": "pi",
+    "duration": 120.0,
+    "residual_torque": 0.05,
+    "residual_pitch": 2.0,
+    # a rotation takes 5 s: the low pass must let through additions that turn with the rotor
+    "decisions": {"hold": 2, "smoothing": 0.2, "history": 1, "washout": 30.0},
+    "observation": (*TURBINE, "azimuth", *ROOTS, "previous_action"),
+    "normalise": TURBINE | ROOTS,
+    "reward": "score_blades",
+}
 AHEAD = (1.5, 3.0, 4.5)  # s; with blocked shots 4.9 s is the horizon of the lidar at 24 m/s
 LADDER = {  # tasks for agents, of rising difficulty
     "fowt_env/OC3HywindEasy-v0": EASY,
@@ -69,6 +89,7 @@ LADDER = {  # tasks for agents, of rising difficulty
         "normalise": TURBINE | {f"wind_preview_{lead:g}s": (17.0, 4.0, 1.0) for lead in AHEAD},
     },
     "fowt_env/OC3HywindUnknown-v0": MEDIUM | {"task": "above_rated"},
+    "fowt_env/OC3HywindIndividualPitch-v0": INDIVIDUAL_PITCH,
 }
 OBJECTIVES = {"fowt_env/OC3HywindObjectives-v0": EASY}  # a vector of rewards, for MO-Gymnasium
 STEPS = 600  # decisions of an episode of the ladder

@@ -39,7 +39,7 @@ from fowt_env.descriptions.lidar import read_lidar
 from fowt_env.descriptions.nrel5mw import RATED_WIND
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
-from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.drivetrain import build_torque_curve, clamp, generator_torque, rate_limit
 from fowt_env.plant.measurement import Measure
 
@@ -77,7 +77,7 @@ class Memory(IntEnum):
     PITCH_RATE = 4
 
 
-@entry
+@kernel
 def observe(estimator, estimated, measurement, command, p, memory):
     """Update the estimate, the operating wind and the speed integral to the present instant."""
     estimate(estimator, estimated, measurement, command)
@@ -88,13 +88,13 @@ def observe(estimator, estimated, measurement, command, p, memory):
     memory[Memory.INTEGRAL] = speed_integral(memory[Memory.INTEGRAL], error, command[1] > RESTING, dt)
 
 
-@entry
+@kernel
 def lowest_torque(estimated, p, curve):
     """Return the lower limit of torque, N m: that of the settings, or of the turbine's curve in a lull."""
     return min(p[Entry.TORQUE_LOW], generator_torque(p[Entry.GEAR_RATIO] * estimated[ROTOR], 0.0, curve))
 
 
-@entry
+@kernel
 def move(estimated, p, memory, curve, low_torque, command):
     """Integrate the command with the rates in force, within limits.
 

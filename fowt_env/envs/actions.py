@@ -1,7 +1,7 @@
 """Maps actions in [-1, 1] to physical commands in each action mode.
 
-The first action commands generator torque (or the rotor-speed set-point), the second blade pitch. In mode
-"individual" the second to fourth command the pitch of each blade.
+The first action commands generator torque (or the rotor-speed set-point), the second blade pitch. In the modes
+"individual" and "individual_residual" the second to fourth command the pitch of each blade.
 """
 
 from enum import IntEnum
@@ -28,9 +28,12 @@ class ActionMode(IntEnum):
     SETPOINT = 1
     RESIDUAL = 2
     INDIVIDUAL = 3
+    INDIVIDUAL_RESIDUAL = 4
 
 
 ACTION_MODES = {mode.name.lower(): mode for mode in ActionMode}
+OF_EACH_BLADE = (ActionMode.INDIVIDUAL, ActionMode.INDIVIDUAL_RESIDUAL)
+ADDING = (ActionMode.RESIDUAL, ActionMode.INDIVIDUAL_RESIDUAL)  # to the commands of a baseline
 
 
 class ActionMap(NamedTuple):
@@ -52,7 +55,7 @@ class ActionMap(NamedTuple):
 
 def n_actions(mode):
     """Return the number of actions of an ActionMode."""
-    return N_INDIVIDUAL_COMMANDS if mode == ActionMode.INDIVIDUAL else N_COMMANDS
+    return N_INDIVIDUAL_COMMANDS if mode in OF_EACH_BLADE else N_COMMANDS
 
 
 def build_action_map(mode, task, turbine, control_dt, individual=False):
@@ -141,13 +144,13 @@ def command_of(action, actions, baseline_law, parameters, memory, reading, comma
 
     reading: input of the baseline law; command: on entry the command in force, masked for this law.
     """
-    if actions.mode == ActionMode.RESIDUAL:
+    if actions.mode == ActionMode.RESIDUAL or actions.mode == ActionMode.INDIVIDUAL_RESIDUAL:
         call_baseline(baseline_law, parameters, memory, reading, command)
         if not actions.individual:
             spread_command(command)
         command[0] += action[0] * actions.residual_torque
         for i in range(FIRST_PITCH, command.shape[0]):
-            command[i] += action[1] * actions.residual_pitch
+            command[i] += action[min(i, action.shape[0] - 1)] * actions.residual_pitch
     else:
         command[0] = unscale(action[0], actions.low, actions.high)
         for i in range(FIRST_PITCH, action.shape[0]):
@@ -162,11 +165,11 @@ def command_of(action, actions, baseline_law, parameters, memory, reading, comma
 def action_of(u, rotor_speed, actions, action):
     """Set the action that commands the present state: u, with the rotor speed as set-point.
 
-    In residual mode this action is zero: no addition to the baseline.
+    In the residual modes this action is zero: no addition to the baseline.
     """
-    if actions.mode == ActionMode.RESIDUAL:
-        action[0] = 0.0
-        action[1] = 0.0
+    if actions.mode == ActionMode.RESIDUAL or actions.mode == ActionMode.INDIVIDUAL_RESIDUAL:
+        for i in range(action.shape[0]):
+            action[i] = 0.0
         return
     first = rotor_speed if actions.mode == ActionMode.SETPOINT else u[Command.GENERATOR_TORQUE]
     action[0] = scale(first, actions.low, actions.high)

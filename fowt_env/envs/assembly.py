@@ -122,9 +122,9 @@ def build_config(scene, task, mode, observed, timing, laws, interface, ahead, ag
 
     observed: entries of the observation; timing: (dt, physics steps in a control period, control_dt);
     laws: (baseline, estimator), compiled controllers or None; ahead: WindAhead of the observation or None;
-    agent: (DecisionSettings or None, setting `normalise`, whether the reward is that of goals.py).
+    agent: (DecisionSettings or None, setting `normalise`, reward of goals.py or None).
     """
-    chosen, normalise, by_score = agent
+    chosen, normalise, goals = agent
     decisions = None
     if chosen is not None:
         decisions = build_decision_map(
@@ -145,8 +145,8 @@ def build_config(scene, task, mode, observed, timing, laws, interface, ahead, ag
         estimator=None if estimator is None else estimator.parameters,
         observation_map=build_observation_map(observed, task.wind_preview),
         scales=build_scales(turbine, control_dt),
-        goals=build_goals(turbine, control_dt) if by_score else None,
-        weights=goal_weights() if by_score else weight_array(task.weights),
+        goals=build_goals(turbine, control_dt) if goals else None,
+        weights=goal_weights(goals) if goals else weight_array(task.weights),
         overspeed=float(turbine.overspeed) if interface.guard is None else inf,
         dt=dt,
         per_control=per_control,

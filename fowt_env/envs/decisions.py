@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.descriptions.checks import check_number, check_whole_number, is_number
-from fowt_env.envs.actions import ActionMode
+from fowt_env.envs.actions import ADDING
 from fowt_env.envs.observations import N_ACTIONS
 from fowt_env.errors import InputError
 from fowt_env.plant.compile.decorators import kernel
@@ -64,7 +64,7 @@ def wind_entry(settings, mode, observed):
     if settings.washout == 0.0 and settings.authority is None:
         return None
     key = "washout" if settings.washout else "authority"
-    if mode != ActionMode.RESIDUAL:
+    if mode not in ADDING:
         value = getattr(settings, key)
         raise InputError(f"decisions.{key} = {value!r}: needs the action mode 'residual'")
     if settings.authority is None:

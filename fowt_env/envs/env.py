@@ -26,7 +26,14 @@ from fowt_env.descriptions.platform import Platform, turbine_of
 from fowt_env.descriptions.protection import read_protection
 from fowt_env.descriptions.sea_state import sea_state_of
 from fowt_env.descriptions.sensors import SensorChain
-from fowt_env.envs.actions import ACTION_MODES, ActionMode, n_actions, start_tracking
+from fowt_env.envs.actions import (
+    ACTION_MODES,
+    ADDING,
+    OF_EACH_BLADE,
+    ActionMode,
+    n_actions,
+    start_tracking,
+)
 from fowt_env.envs.assembly import (
     adapted_task,
     allocate_episode,
@@ -50,8 +57,7 @@ from fowt_env.envs.episode import (
     start_episode,
 )
 from fowt_env.envs.external_baseline import ExternalBaseline
-from fowt_env.envs.goals import KEYS as GOAL_KEYS
-from fowt_env.envs.goals import REWARD, usual_deviations
+from fowt_env.envs.goals import GOAL_KEYS, ROOT_REWARD, usual_deviations
 from fowt_env.envs.observations import ESTIMATE_CHANNELS, entries
 from fowt_env.envs.reset import Start, kept_if_refused, moved_state, with_options
 from fowt_env.envs.rewards import REWARD_TERMS, Reference, check_own_reward, paid
@@ -194,9 +200,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if control.action_mode not in ACTION_MODES:
             raise unknown("action_mode", control.action_mode, ACTION_MODES)
         mode = ACTION_MODES[control.action_mode]
-        if mode == ActionMode.INDIVIDUAL and options.setdefault("pitch", "individual") != "individual":
+        if mode in OF_EACH_BLADE and options.setdefault("pitch", "individual") != "individual":
             raise InputError(
-                f"pitch = {options['pitch']!r}: action_mode = 'individual' commands the pitch of each blade,"
+                f"pitch = {options['pitch']!r}: action_mode = {control.action_mode!r} commands the pitch of each blade,"
                 " which needs pitch = 'individual'"
             )
         self.render_mode = render_mode
@@ -205,15 +211,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         self.render_size = render_size
         turbine = turbine_of(platform, options.get("turbine"))
         reward = settings.episode.reward
-        if isinstance(reward, str) and reward != REWARD:
-            raise unknown("reward", reward, (REWARD,))
+        if isinstance(reward, str) and reward not in GOAL_KEYS:
+            raise unknown("reward", reward, GOAL_KEYS)
         self._custom_reward = check_own_reward("reward", reward) if callable(reward) else None
         decisions = check_decisions(control.decisions)
-        self._agent = (decisions, settings.episode.normalise, reward == REWARD)
-        self.term_keys = GOAL_KEYS if reward == REWARD else REWARD_KEYS
+        by_goals = isinstance(reward, str)
+        self._agent = (decisions, settings.episode.normalise, reward if by_goals else None)
+        self.term_keys = GOAL_KEYS[reward] if by_goals else REWARD_KEYS
         task = self.task = adapted_task(task_of(task, turbine), settings)
-        if reward == REWARD and task.shutdown is not None:
-            raise InputError(f"reward = {REWARD!r}: is of operation: task {task.name!r} has a shutdown")
+        if by_goals and task.shutdown is not None:
+            raise InputError(f"reward = {reward!r}: is of operation: task {task.name!r} has a shutdown")
         self.action_mode, self.baseline = control.action_mode, control.baseline
         control_dt = control.control_dt
         steps_in("duration", task.duration, control_dt, "control_dt")
@@ -229,6 +236,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             "fidelity": settings.plant.fidelity,
         }
         self.scene = build_scene(platform, **common, **options)
+        if reward == ROOT_REWARD and not self.individual:
+            raise InputError(f"reward = {reward!r}: is of single blades: needs pitch = 'individual'")
         check_duration(self.scene, task.duration)
         self._nominal = None  # scene of the nominal plant, if different from the true plant
         if control.nominal_plant is not None:
@@ -359,7 +368,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         )
         self._baseline = None
         self._hidden = None  # measurements that the baseline law must not read
-        if mode == ActionMode.RESIDUAL:
+        if mode in ADDING:
             copy = deepcopy(self.baseline)  # each environment of a batch needs separate controller memory
             self._baseline = named_baseline(copy, self.design_scene.turbine, self.control_dt)
             preview_leads(self._baseline)

@@ -7,19 +7,24 @@ deviation under the controller gspi_oc3 in normal turbulence (`usual`). A turbin
 little. A step is worth 0 to 1 and the step of a failure 0, so that ending an episode early forfeits the rest.
 The mean over a run falls as the metrics of the score rise, each relative to gspi_oc3's in the same wind; the
 deviation of the shaft torque is squared, as fatigue grows faster than deviations. Costs count in no reward.
+
+The reward "score_blades", of scenes with individual pitch, has a further goal of the blade roots, with
+ROOT_SHARE of the reward.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.descriptions.nrel5mw import RATED_WIND, ROTOR_SPEED
+from fowt_env.descriptions.nrel5mw import GEAR_RATIO, RATED_WIND, ROTOR_SPEED, TORQUE
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.envs.rewards import pitch_moved, unit_fraction
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
+from fowt_env.plant.state import BLADES
 
-REWARD = "score"  # value of the setting `reward`
+REWARD, ROOT_REWARD = "score", "score_blades"  # values of the setting `reward`
 LEAST_POWER = 0.5  # of the operating power, below which goals are worth less in proportion
 WORST = 3.0  # usual deviations, from which on a goal is worth 0
 # Weights of the ratios in the order of GOALS, chosen on the validation seeds 1001 and 1002 such that ten
@@ -43,6 +48,11 @@ GOALS = {
     "pitch_travel": "little travel of the blade pitch; with individual pitch the mean over the blades",
     "shaft": "torque of the low-speed shaft close to that of the operating point",
 }
+ROOT_GOAL = {"blade_root": "equal out-of-plane bending moments at the blade roots"}
+ROOT_SHARE = 0.4
+# Usual root mean square over the blades of the deviation of these moments from their mean under pi, N m: means
+# of the validation seeds 1001 and 1002, OC3-Hywind, fidelity elastic, winds WINDS in joint seas.
+USUAL_ROOT = np.array([723.0, 820.0, 920.0, 1018.0, 1113.0, 1214.0, 1318.0]) * 1e3
 COSTS = {
     "overspeed": "rotor speed above {SPEED_LIMIT:g} of rated",
     "tilt": "platform pitch more than {TILT_LIMIT:g} deg from that of the operating point",
@@ -52,7 +62,10 @@ SPEED_LIMIT, TILT_LIMIT, TOP_LIMIT = 1.15, 5.0, 2.0
 N_GOALS, N_COSTS = len(GOALS), len(COSTS)
 COST = N_GOALS + N_COSTS  # entry of the sum of the costs
 N_ENTRIES = COST + 1
+ROOT = N_ENTRIES  # entry of the goal of the blade roots
 KEYS = (*(f"reward/{name}" for name in GOALS), *(f"cost/{name}" for name in COSTS), "cost")
+KEYS_WITH_ROOT = (*KEYS, *(f"reward/{name}" for name in ROOT_GOAL))
+GOAL_KEYS = {REWARD: KEYS, ROOT_REWARD: KEYS_WITH_ROOT}  # of the infos
 OPERATING_TORQUE, OPERATING_POWER, FIRST_USUAL = 3, 4, 5  # entries of a Reference
 
 
@@ -81,23 +94,37 @@ def build_goals(turbine, control_dt):
 
 
 def usual_deviations(turbine, wind_speed):
-    """Return the usual deviations (N_GOALS,), SI, at a mean wind (m/s); constant outside WINDS.
+    """Return the usual deviations, SI, of GOALS and ROOT_GOAL at a mean wind (m/s); constant outside WINDS.
 
     Those of another turbine have the same ratio to rated speed and torque, and equal travel in a revolution.
     """
     above = wind_speed - turbine.rated_wind_speed
     speed = turbine.rated_rotor_speed
     torque = turbine.torque_law.rated_torque * turbine.drivetrain.gear_ratio
-    scales = (speed, 1.0, speed / ROTOR_SPEED, torque)
+    scales = (speed, 1.0, speed / ROTOR_SPEED, torque, torque / (GEAR_RATIO * TORQUE))
     return [
         scale * float(np.interp(above, WINDS, usual))
-        for scale, usual in zip(scales, USUAL.values(), strict=True)
+        for scale, usual in zip(scales, (*USUAL.values(), USUAL_ROOT), strict=True)
     ]
 
 
-def goal_weights():
-    """Return the weights (N_ENTRIES,) of the reward; costs have none."""
-    return np.concatenate([WEIGHTS, np.zeros(N_COSTS + 1)])
+def goal_weights(reward=REWARD):
+    """Return the weights of REWARD or ROOT_REWARD, in the order of KEYS or KEYS_WITH_ROOT; costs have none.
+    """
+    weights = np.concatenate([WEIGHTS, np.zeros(N_COSTS + 1)])
+    return np.append((1.0 - ROOT_SHARE) * weights, ROOT_SHARE) if reward == ROOT_REWARD else weights
+
+
+@kernel
+def root_deviation(m):
+    """Return the root mean square over the blades of the deviation of the out-of-plane moments, N m."""
+    first = N_MEASUREMENTS + BladeMeasure.ROOT_OUT_OF_PLANE_1
+    mean, total = 0.0, 0.0
+    for blade in range(BLADES):
+        mean += m[first + blade] / BLADES
+    for blade in range(BLADES):
+        total += (m[first + blade] - mean) ** 2
+    return sqrt(total / BLADES)
 
 
 @kernel
@@ -108,7 +135,7 @@ def goal(deviation, usual, largest):
 
 @kernel
 def fill_goals(m, previous, reference, failed, goals, entries):
-    """Fill entries (N_ENTRIES,) from the measurements m and previous, one control period apart."""
+    """Fill entries, in the order of KEYS or KEYS_WITH_ROOT, from m and previous, one control period apart."""
     speed, torque = m[Measure.ROTOR_SPEED], m[Measure.GENERATOR_TORQUE]
     change = (speed - previous[Measure.ROTOR_SPEED]) / goals.control_dt
     shaft = goals.gear_ratio * (torque - reference[OPERATING_TORQUE]) + goals.inertia * change
@@ -122,8 +149,12 @@ def fill_goals(m, previous, reference, failed, goals, entries):
     if reference[OPERATING_POWER] > 0.0:
         power = speed * torque * goals.gear_ratio
         producing = max(0.0, min(1.0, power / (LEAST_POWER * reference[OPERATING_POWER])))
+    if failed:
+        producing = 0.0
     for i in range(N_GOALS):
-        entries[i] = 0.0 if failed else producing * entries[i]
+        entries[i] = producing * entries[i]
+    if entries.shape[0] > ROOT:
+        entries[ROOT] = producing * goal(root_deviation(m), reference[FIRST_USUAL + N_GOALS], WORST)
     entries[N_GOALS] = 1.0 if speed > goals.fastest else 0.0
     entries[N_GOALS + 1] = 1.0 if tilt > goals.tilt else 0.0
     entries[N_GOALS + 2] = 1.0 if abs(m[Measure.NACELLE_ACCELERATION]) > goals.acceleration else 0.0

@@ -48,6 +48,7 @@ class Reference(NamedTuple):
     usual_platform_pitch: float = 1.0
     usual_pitch_travel: float = 1.0
     usual_shaft: float = 1.0
+    usual_blade_root: float = 1.0
 
 
 class RewardTerm(NamedTuple):

@@ -44,7 +44,7 @@ class PlantSettings:
 class ControlSettings:
     """Holds the action mode, the control period and the compiled baseline controller."""
 
-    action_mode: str = "direct"  # "direct", "setpoint", "residual" or "individual"
+    action_mode: str = "direct"  # "direct", "setpoint", "residual", "individual" or "individual_residual"
     baseline: Any = "pi"  # controller (name or object) that the residual mode adds to
     # largest additions of the residual mode: fraction of rated torque, deg of blade pitch; None: of the task
     residual_torque: float | None = None

@@ -32,14 +32,14 @@ err = Console(stderr=True, emoji=False, highlight=False, soft_wrap=True)
 MODULES = (  # modules that add commands to the app
     "simulate", "listing", "check", "check_dll", "evaluate", "validate", "doctor", "warmup", "cache",
     "benchmark", "design", "plot", "report", "scores", "leaderboard", "import_deck", "export", "hydro",
-    "campbell", "train", "serve", "compare", "export_fmu", "tune", "study", "loads", "table",
+    "campbell", "train", "dataset", "serve", "compare", "export_fmu", "tune", "study", "loads", "table",
 )  # fmt: skip
 GROUPS = {  # headings of fowt --help -> their commands, in the order shown
     "Run": ("simulate", "plot", "compare"),
     "Platform": ("import", "model"),
     "Control": ("tune", "study", "design"),
     "Evaluate": ("evaluate", "report", "loads"),
-    "Train": ("train",),
+    "Train": ("train", "dataset"),
     "Connect": ("connect",),
     "Set up": ("list", "doctor", "warmup"),
     "Develop": ("dev",),
