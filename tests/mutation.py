@@ -234,7 +234,7 @@ class Samples:
         from fowt_env.controllers.policy.controller import AGENTS, PolicyController
 
         path = self.folder / "policy.npz"
-        shutil.copy(AGENTS / "ppo_lqr_preview.npz", path)
+        shutil.copy(AGENTS / "ppo_lqr.npz", path)
 
         def load(path=path):
             return PolicyController(path, self.turbine, 0.1, "policy")

@@ -33,6 +33,9 @@ from fowt_env.controllers.ipc.law import IPC, NYQUIST_SHARE, TILT_NOTCHES, Cycli
 from fowt_env.controllers.ipc.law import N_MEMORY as IPC_MEMORY
 from fowt_env.controllers.lqr import design, estimator
 from fowt_env.controllers.lqr.law import FORGETTING, INTEGRAL_LIMIT, LQR
+from fowt_env.controllers.mpc import clone
+from fowt_env.controllers.mpc import law as mpc
+from fowt_env.controllers.mpc.clone import MPCClone
 from fowt_env.controllers.pi import PI, Memory, Parameter
 from fowt_env.controllers.policy.controller import PolicyController
 from fowt_env.envs.actions import ActionMode
@@ -42,7 +45,10 @@ from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, build_tor
 from fowt_env.plant.measurement import BLADES_MEASURED, MEASURED, Measure
 
 TEMPLATES = Path(__file__).parent / "c"
-FAMILIES = {IPC: "ipc", GSPI: "gspi", FloatingFeedback: "floating_feedback", LQR: "lqr", PI: "pi"}
+FAMILIES = {
+    IPC: "ipc", GSPI: "gspi", FloatingFeedback: "floating_feedback", LQR: "lqr", PI: "pi",
+    MPCClone: "mpc_clone",
+}  # fmt: skip
 METHODS = ("kernel", "reset", "act")  # that a law in C repeats
 
 
@@ -170,7 +176,12 @@ def _law(code, controller, table):
         code.tables[table] = "double", controller.parameters
     if name == "lqr":
         _lqr_names(code)
-        code.add("estimator.c", "lqr.c")
+        code.add("estimator.c", "speed_integral.c", "lqr.c")
+        return len(controller.memory)
+    if name == "mpc_clone":
+        _lqr_names(code)
+        _clone_names(code)
+        code.add("estimator.c", "speed_integral.c", "mpc_clone.c")
         return len(controller.memory)
     code.enums |= {f"PI_{entry.name}": int(entry) for entry in Parameter}
     code.enums |= {f"PI_M_{entry.name}": int(entry) for entry in Memory}
@@ -207,6 +218,19 @@ def _lqr_names(code):
         "LQR_WIND": design.WIND, "LQR_MOMENT": design.MOMENT,
     }  # fmt: skip
     code.macros |= {"LQR_INTEGRAL_LIMIT": INTEGRAL_LIMIT, "LQR_FORGETTING": FORGETTING}
+
+
+def _clone_names(code):
+    """Add the names of the arrays of the clone of mpc."""
+    code.enums |= {f"CLONE_{entry.name}": int(entry) for entry in mpc.Entry}
+    code.enums |= {f"CLONE_M_{entry.name}": int(entry) for entry in (*mpc.Memory, *clone.CloneMemory)}
+    entries = "CURVE EVERY ESTIMATOR MEAN SCALE WEIGHT_0 BIAS_0 WEIGHT_1 BIAS_1 WEIGHT_2 BIAS_2 HIDDEN N_INPUTS"
+    code.enums |= {f"CLONE_{name}": int(getattr(clone, name)) for name in entries.split()}
+    code.enums |= {
+        "CLONE_X_TORQUE": clone.TORQUE_STATE, "CLONE_X_PITCH": clone.COMMAND,
+        "CLONE_X_INTEGRAL": clone.INTEGRAL, "CLONE_X_FILTER": clone.FILTER,
+    }  # fmt: skip
+    code.macros["CLONE_RESTING"] = mpc.RESTING
 
 
 def _policy(code, policy, fields):

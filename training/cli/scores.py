@@ -73,7 +73,7 @@ def baselines_command(
     Examples:
     fowt evaluate --controllers policy:ppo_lqr,gspi_oc3,rosco_float --out results/rl
     fowt dev scores baselines results/rl --against gspi_oc3,rosco_float --out results/rl/scores
-    fowt dev scores baselines results/rl --group lqr=policy:ppo_lqr,policy:ppo_lqr_seed1
+    fowt dev scores baselines results/rl --group agents=policy:ppo_lqr,policy:runs/mine/best.npz
 
     Each cell: ratio of lifetime means on the same runs, its 95 % interval, and a verdict against the targets:
     missed, first, then (or met), with * if significant (p at most 0.05 after Holm's correction for all

@@ -1,6 +1,6 @@
 """Computes the fraction of the performance limit of linear control that a controller reaches, per wind speed.
 
-    fowt dev scores bound results/rl --group agents=policy:ppo_lqr,policy:ppo_lqr_seed1 --plot front.png
+    fowt dev scores bound results/rl --group agents=policy:ppo_lqr,policy:runs/mine/best.npz --plot front.png
 
 The limit depends on the controller's information and actuators (training/design/linear_bound.py): preview
 of the wind, five sensors or fewer, torque and blade pitch or blade pitch alone. It applies to linear feedback

@@ -16,14 +16,6 @@ static double feed_back(const double *p, int low, double fraction, const double 
     return total;
 }
 
-/* Returns the integral of the speed error after dt; it decays below rated speed at minimum pitch. */
-static double speed_integral(double integral, double error, int pitching, double dt)
-{
-    if (pitching || error > 0.0)
-        return clamp(integral + dt * error, -LQR_INTEGRAL_LIMIT, LQR_INTEGRAL_LIMIT);
-    return integral * (1.0 - LQR_FORGETTING * dt);
-}
-
 static void lqr_step(const double *p, double *m, const double *reading, double *command)
 {
     double dt = p[LQR_CONTROL_DT], rated = p[LQR_RATED_SPEED], ratio = p[LQR_GEAR_RATIO];

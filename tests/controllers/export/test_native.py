@@ -25,8 +25,9 @@ TURBINE = read_turbine("nrel5mw")
 POLICY = "policy:ppo_lqr"
 LAWS = (
     "pi", "pi_land_power", "pi_unscheduled", "gspi_oc3", "floating_feedback", "ipc", "ipc_constrained",
-    "ipc_floating", "lqr", POLICY,
+    "ipc_floating", "lqr", "mpc_clone", POLICY,
 )  # fmt: skip
+MODES = ("direct", "setpoint", "residual")  # of policies
 SCALE = np.array([TURBINE.torque_law.rated_torque, 1.0, 1.0, 1.0])  # of torque and pitch, N m and rad
 DT = 0.1
 STRICT = ("-pedantic", "-Wconversion", "-Werror")
@@ -66,14 +67,17 @@ def other_policies(folder):
     settings |= {"observation": channels, "baseline": "gspi_oc3", "squash": "tanh", "activation": "relu"}
     arrays["weight_0"] = arrays["weight_0"][:, :10]
     arrays |= {"mean": arrays["mean"][:10], "scale": arrays["scale"][:10] + 0.1}
-    for mode in ("direct", "setpoint", "residual"):
+    for mode in MODES:
         decisions = {"hold": 2, "smoothing": 0.3, "history": 1}
         arrays["settings"] = np.array(json.dumps(settings | {"action_mode": mode, "decisions": decisions}))
         np.savez(folder / f"{mode}.npz", **arrays)
-    return {mode: f"policy:{folder / mode}.npz" for mode in ("direct", "setpoint", "residual")}
+    channels[2] = "wind_preview"
+    settings |= {"wind_preview": [2.0], "action_mode": "residual", "decisions": decisions}
+    np.savez(folder / "looking ahead.npz", **arrays | {"settings": np.array(json.dumps(settings))})
+    return {mode: f"policy:{folder / mode}.npz" for mode in (*MODES, "looking ahead")}
 
 
-@pytest.mark.parametrize("mode", ("direct", "setpoint", "residual"))
+@pytest.mark.parametrize("mode", MODES)
 def test_a_policy_of_another_mode_commands_in_c_what_it_does_here(mode, other_policies, folder):
     check_law(other_policies[mode], folder)
 
@@ -117,7 +121,11 @@ def test_a_law_of_the_user_is_not_mistaken_for_the_one_that_it_changes():
     settings = PISettings.published(TURBINE)
     assert native_law(PI(settings, DT)) and not native_law(Stepwise(settings, DT))
     assert not native_law(make("constant", TURBINE, DT)) and not native_law(make("mpc", TURBINE, DT))
-    assert not native_law(make("policy:ppo_lqr_preview", TURBINE, DT))
+
+
+def test_a_policy_that_looks_ahead_is_not_offered_in_c(other_policies):
+    assert native_law(make(other_policies["residual"], TURBINE, DT))
+    assert not native_law(make(other_policies["looking ahead"], TURBINE, DT))
 
 
 def test_a_policy_s_single_precision_in_python_is_within_a_millionth(folder):

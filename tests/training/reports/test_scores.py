@@ -144,7 +144,7 @@ def test_each_controller_stands_with_its_inputs():
     assert inputs("lqr") == "measured, plant_model"
     assert inputs("rosco_float") == "measured, wind_speed, plant_model"
     assert inputs("policy:ppo_lqr") == "measured, plant_model"
-    assert inputs("policy:ppo_lqr_preview") == "measured, plant_model, wind_speed, wind_preview"
+    assert inputs("mpc_preview") == "measured, plant_model, wind_preview"
     assert inputs("my_module:Mine") == inputs("policy:gone.npz") == inputs("mine") == ""
 
 
