@@ -15,7 +15,7 @@ from fowt_env.controllers.rosco import rosco, rosco_float, rosco_ipc
 
 FACTORIES = (  # (turbine: descriptions.turbine.Turbine, control_dt: float) -> controller
     constant, eq8_literal, floating_feedback, gspi_land, gspi_oc3, ipc, ipc_constrained, ipc_floating,
-    lq_preview, lqr, mpc, mpc_clone, mpc_lidar, mpc_preview, openfast_oc3, pi, pi_land, pi_land_power, pi_tuned,
-    pi_unscheduled, preview, rosco, rosco_float, rosco_ipc,
+    lq_preview, lqr, mpc, mpc_clone, mpc_lidar, mpc_preview, openfast_oc3, pi, pi_land, pi_land_power,
+    pi_tuned, pi_unscheduled, preview, rosco, rosco_float, rosco_ipc,
 )  # fmt: skip
 CONTROLLERS = {factory.__name__: factory for factory in FACTORIES}

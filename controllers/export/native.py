@@ -224,7 +224,9 @@ def _clone_names(code):
     """Add the names of the arrays of the clone of mpc."""
     code.enums |= {f"CLONE_{entry.name}": int(entry) for entry in mpc.Entry}
     code.enums |= {f"CLONE_M_{entry.name}": int(entry) for entry in (*mpc.Memory, *clone.CloneMemory)}
-    entries = "CURVE EVERY ESTIMATOR MEAN SCALE WEIGHT_0 BIAS_0 WEIGHT_1 BIAS_1 WEIGHT_2 BIAS_2 HIDDEN N_INPUTS"
+    entries = (
+        "CURVE EVERY ESTIMATOR MEAN SCALE WEIGHT_0 BIAS_0 WEIGHT_1 BIAS_1 WEIGHT_2 BIAS_2 HIDDEN N_INPUTS"
+    )
     code.enums |= {f"CLONE_{name}": int(getattr(clone, name)) for name in entries.split()}
     code.enums |= {
         "CLONE_X_TORQUE": clone.TORQUE_STATE, "CLONE_X_PITCH": clone.COMMAND,

@@ -209,8 +209,7 @@ class MPCClone(CompiledController):
         self.prepared = True
 
     def reset(self, measurement):
-        """Start as mpc, at the trim with the measured pitch. Raises: InputError if prepare() was not called.
-        """
+        """Start as mpc, at the trim with the measured pitch. Raises: InputError before prepare()."""
         if not self.prepared:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         estimator = self._planner.estimator

@@ -1,7 +1,7 @@
 """Maps actions in [-1, 1] to physical commands in each action mode.
 
-The first action commands generator torque (or the rotor-speed set-point), the second blade pitch. In the modes
-"individual" and "individual_residual" the second to fourth command the pitch of each blade.
+The first action commands generator torque (or the rotor-speed set-point), the second blade pitch. In the
+modes "individual" and "individual_residual" the second to fourth command the pitch of each blade.
 """
 
 from enum import IntEnum

@@ -126,9 +126,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
     Actions outside [-1, 1] are clipped; info["saturated_actions"] counts such periods. The torque stays
     within the generator's range and rate limit, the blade pitch within the range and rate limit of its
     actuator; info["torque_limited"] counts periods with a limited torque command. "individual" commands the
-    pitch of each blade in a scene with pitch="individual"; the other action modes command one pitch for all
-    blades. In residual mode the baseline lqr continues from the applied command, so an addition in every
-    period is an addition to its rates.
+    pitch of each blade in a scene with pitch="individual", "individual_residual" adds to it; the other action
+    modes command one pitch for all blades. In residual mode the baseline lqr continues from the applied
+    command, so an addition in every period is an addition to its rates.
 
     Failure terminates an episode: rotor speed above the turbine file's overspeed, capsize (platform pitch
     beyond 80 deg) or a state that is not finite; info["termination"] has the reason. The environment
@@ -202,8 +202,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         mode = ACTION_MODES[control.action_mode]
         if mode in OF_EACH_BLADE and options.setdefault("pitch", "individual") != "individual":
             raise InputError(
-                f"pitch = {options['pitch']!r}: action_mode = {control.action_mode!r} commands the pitch of each blade,"
-                " which needs pitch = 'individual'"
+                f"pitch = {options['pitch']!r}: action_mode = {control.action_mode!r} commands the pitch of"
+                " each blade, which needs pitch = 'individual'"
             )
         self.render_mode = render_mode
         self._view: Any = None
@@ -217,7 +217,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         decisions = check_decisions(control.decisions)
         by_goals = isinstance(reward, str)
         self._agent = (decisions, settings.episode.normalise, reward if by_goals else None)
-        self.term_keys = GOAL_KEYS[reward] if by_goals else REWARD_KEYS
+        self.term_keys = GOAL_KEYS[reward] if isinstance(reward, str) else REWARD_KEYS
         task = self.task = adapted_task(task_of(task, turbine), settings)
         if by_goals and task.shutdown is not None:
             raise InputError(f"reward = {reward!r}: is of operation: task {task.name!r} has a shutdown")

@@ -90,9 +90,7 @@ class FowtFuncEnv(FuncEnv[FunctionalState, np.ndarray, npt.ArrayLike, float, boo
         """Return the reward of the transition that led to next_state."""
         return next_state.reward
 
-    def terminal(
-        self, state: FunctionalState, rng: Any = None, params: dict[str, Any] | None = None
-    ) -> bool:
+    def terminal(self, state: FunctionalState, rng: Any = None, params: dict[str, Any] | None = None) -> bool:
         """Return whether an episode ended in this state by failure or at its duration."""
         return state.terminated or state.truncated
 

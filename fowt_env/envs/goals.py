@@ -50,8 +50,8 @@ GOALS = {
 }
 ROOT_GOAL = {"blade_root": "equal out-of-plane bending moments at the blade roots"}
 ROOT_SHARE = 0.4
-# Usual root mean square over the blades of the deviation of these moments from their mean under pi, N m: means
-# of the validation seeds 1001 and 1002, OC3-Hywind, fidelity elastic, winds WINDS in joint seas.
+# Usual root mean square over the blades of the deviation of these moments from their mean under pi, N m:
+# means of the validation seeds 1001 and 1002, OC3-Hywind, fidelity elastic, winds WINDS in joint seas.
 USUAL_ROOT = np.array([723.0, 820.0, 920.0, 1018.0, 1113.0, 1214.0, 1318.0]) * 1e3
 COSTS = {
     "overspeed": "rotor speed above {SPEED_LIMIT:g} of rated",
@@ -109,8 +109,7 @@ def usual_deviations(turbine, wind_speed):
 
 
 def goal_weights(reward=REWARD):
-    """Return the weights of REWARD or ROOT_REWARD, in the order of KEYS or KEYS_WITH_ROOT; costs have none.
-    """
+    """Return the weights of REWARD (KEYS) or ROOT_REWARD (KEYS_WITH_ROOT); costs have none."""
     weights = np.concatenate([WEIGHTS, np.zeros(N_COSTS + 1)])
     return np.append((1.0 - ROOT_SHARE) * weights, ROOT_SHARE) if reward == ROOT_REWARD else weights
 

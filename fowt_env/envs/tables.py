@@ -32,6 +32,8 @@ def action_table(task, turbine):
         ("residual", 1, f"added to the baseline's blade pitch, +-{task.residual_pitch:g} deg"),
         ("individual", 0, f"generator torque, 0 to {law.max_torque * 1e-3:.2f} kN m (high-speed shaft)"),
         ("individual", "1 to 3", f"{pitch}, of each blade"),
+        ("individual_residual", 0, "as residual"),
+        ("individual_residual", "1 to 3", "as residual, of each blade"),
     ]
     return markdown_table(("mode", "action", "from -1 to 1"), rows, aligned=True)
 

@@ -74,9 +74,9 @@ def make_dataset(behaviour, hours, dataset_id=None, duration=None, progress=None
     """Write the episodes of a behaviour as a data set of Minari; return it.
 
     hours: of operation, rounded up to whole episodes. dataset_id: with namespace and version; None:
-    fowt_env/oc3hywind/BEHAVIOUR-v0. Its folder is that of Minari (MINARI_DATASETS_PATH). After an interruption
-    a second call continues with the next episode; more hours extend a set. progress: function (episodes done,
-    episodes).
+    fowt_env/oc3hywind/BEHAVIOUR-v0. Its folder is that of Minari (MINARI_DATASETS_PATH). After an
+    interruption a second call continues with the next episode; more hours extend a set. progress: function
+    (episodes done, episodes).
 
     Raises: InputError for unknown behaviours, hours out of range and a set of another behaviour.
     """
@@ -122,9 +122,7 @@ def _storage(library, dataset_id, env, behaviour):
     if namespace is not None and namespace not in namespaces.list_local_namespaces():
         namespaces.create_namespace(namespace)
     path.mkdir(parents=True, exist_ok=True)
-    storage = MinariStorage.new(
-        path, env.observation_space, env.action_space, env.spec, data_format=FORMAT
-    )
+    storage = MinariStorage.new(path, env.observation_space, env.action_space, env.spec, data_format=FORMAT)
     storage.update_metadata(
         {
             "dataset_id": dataset_id,

@@ -29,10 +29,10 @@ class FowtBladesEnv(ParallelEnv):
     """Gives each blade of an environment with the action mode individual_residual to an agent.
 
     name: of the registered environment; settings: those of gymnasium.make(name, ...). The action of an agent
-    (1,) in [-1, 1] is an addition to the pitch of its blade; the baseline commands the torque alone. Each agent
-    observes what the environment observes, with its own blade in the place of blade 1, the blades that follow
-    in the places of 2 and 3, and its own azimuth: agents may share a policy. The reward of the environment is
-    that of every agent; all end together.
+    (1,) in [-1, 1] is an addition to the pitch of its blade; the baseline commands the torque alone. Each
+    agent observes what the environment observes, with its own blade in the place of blade 1, the blades that
+    follow in the places of 2 and 3, and its own azimuth: agents may share a policy. The reward of the
+    environment is that of every agent; all end together.
 
     Raises: InputError for another action mode and for actions that do not name every blade.
     """
@@ -96,8 +96,8 @@ class FowtBladesEnv(ParallelEnv):
 def turn(names, blade):
     """Return the matrix (n, n) that turns an observation of entries `names` to the place of a blade, 0 to 2.
 
-    Entries of single blades are renumbered, with the blade itself as the first, as are the previous actions of
-    blades; sine and cosine of the azimuth become those of the blade.
+    Entries of single blades are renumbered, with the blade itself as the first, as are the previous actions
+    of blades; sine and cosine of the azimuth become those of the blade.
     """
     matrix = np.eye(len(names))
     for row, name in enumerate(names):

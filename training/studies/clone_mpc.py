@@ -2,10 +2,11 @@
 
     python -m fowt_env.training.studies.clone_mpc --out runs/clone
 
-In the first round mpc operates the turbine, in each later one the network of the round before, while mpc
-states what it would do. Episodes are those of the task above_rated_mixture with mean winds of WINDS, weather
-from the training seeds, sensors `standard`. The folder has a file for each episode and each network: a second
-call continues, one with --ship copies the last network. A changed mpc needs another folder.
+In the first round mpc operates the turbine (or, after a small change of mpc, the network given by --start),
+in each later one the network of the round before, while mpc states what it would do. Episodes are those of
+the task above_rated_mixture with mean winds of WINDS, weather from the training seeds, sensors `standard`.
+The folder has a file for each episode and each network: a second call continues, one with --ship copies the
+last network. A changed mpc needs another folder.
 """
 
 import hashlib
@@ -54,7 +55,12 @@ class Teacher(MPC):
     def _replan(self, ahead):
         estimator = self.estimator
         inputs = inputs_of(
-            self.parameters, estimator.parameters, estimator.memory, self.memory, self.low_torque, self.command
+            self.parameters,
+            estimator.parameters,
+            estimator.memory,
+            self.memory,
+            self.low_torque,
+            self.command,
         )
         super()._replan(ahead)
         limits = [self.parameters[limit] for _, limit in RATES]
@@ -93,12 +99,18 @@ def environment(low, high, controller):
     )
 
 
-def record(number, round_, folder):
+def driver_of(round_, folder, start):
+    """Return the file of the network that operates the turbine in a round; None: mpc does."""
+    return folder / f"network_{round_ - 1}.npz" if round_ else start
+
+
+def record(number, round_, folder, start):
     """Run episode `number` of a round and write its inputs and rates; an existing file is kept."""
     path = folder / f"round_{round_}" / f"episode_{number}.npz"
     if path.exists():
         return
-    network = read_clone(folder / f"network_{round_ - 1}.npz")[1] if round_ else None
+    driver = driver_of(round_, folder, start)
+    network = None if driver is None else read_clone(driver)[1]
     records = Records()
     teacher = Teacher(turbine_of(PLATFORM), CONTROL_DT, records, network)
     env = environment(*WINDS[number % len(WINDS)], teacher)
@@ -187,6 +199,9 @@ def main(
     episodes: Annotated[int, typer.Option(help="Episodes of a round.")] = 32,
     seed: Annotated[int, typer.Option(help="Seed of the fits.")] = 0,
     jobs: Annotated[int, typer.Option(help="Processes side by side.")] = 1,
+    start: Annotated[
+        Path | None, typer.Option(help="Network to begin with, a file of an earlier one.")
+    ] = None,
     ship: Annotated[bool, typer.Option(help="Copy the last network to controllers/mpc.")] = False,
 ):
     """Record, fit and repeat."""
@@ -199,7 +214,7 @@ def main(
         path.write_text(json.dumps(made_of), encoding="utf-8")
     data = []
     for round_ in range(rounds):
-        run = partial(record, round_=round_, folder=out)
+        run = partial(record, round_=round_, folder=out, start=start)
         if jobs == 1:
             list(map(run, range(episodes)))
         else:
@@ -212,8 +227,9 @@ def main(
         path = out / f"network_{round_}.npz"
         if not path.exists():
             inputs, rates = (np.concatenate([part[name] for part in data]) for name in ("inputs", "rates"))
-            start = read_clone(out / f"network_{round_ - 1}.npz")[1] if round_ else None
-            network, found = fitted(inputs, rates, seed, start)
+            driver = driver_of(round_, out, start)
+            before = None if driver is None else read_clone(driver)[1]
+            network, found = fitted(inputs, rates, seed, before)
             about = made_of | {
                 "rounds": round_ + 1, "episodes": episodes, "decisions": len(inputs), "seed": seed,
                 "R2_torque_rate": round(found[0], 4), "R2_pitch_rate": round(found[1], 4),

@@ -7,6 +7,7 @@ in the place of the agent, with the sensors, faults and plant of the task.
 from functools import partial
 from typing import Annotated
 
+import gymnasium
 import numpy as np
 import typer
 
@@ -25,6 +26,8 @@ def earned(name, law):
     """Return the mean reward of a control period of a controller on the validation episodes of a task."""
     settings = {key: value for key, value in LADDER[name].items() if key not in AGENT}
     settings |= {"action_mode": "residual", "baseline": law}
+    if LADDER[name]["action_mode"] == "individual_residual":
+        settings["pitch"] = "individual"
     env = unknown_plant(**settings) if "Unknown" in name else FowtEnv(**settings)
     totals = []
     for options in episodes():
@@ -45,7 +48,8 @@ def main(
     """Print the table."""
     rows = []
     for name in names or LADDER:
-        zero = returns(name, lambda seen: np.zeros((len(seen), 2))).mean()
+        actions = gymnasium.make(name).action_space.shape
+        zero = returns(name, lambda seen, actions=actions: np.zeros((len(seen), *actions))).mean()
         values = (zero, *map(partial(earned, name), laws.split(",")))
         rows.append((f"`{name.partition('/')[2]}`", *(f"{value:.3f}" for value in values)))
         print(rows[-1], flush=True)

@@ -12,9 +12,9 @@ pytest.importorskip("pettingzoo")
 from pettingzoo.test import parallel_api_test  # noqa: E402
 
 from fowt_env.errors import InputError  # noqa: E402
-from fowt_env.training.rl import pettingzoo_env  # noqa: E402
 from fowt_env.training.rl.pettingzoo_env import AGENTS, NAME, FowtBladesEnv, turn  # noqa: E402
 
+QUICK = {"fidelity": "standard", "duration": 4.0}
 NAMES = ["rotor_speed", "sin_azimuth", "cos_azimuth", "root_1", "root_2", "root_3"]
 NAMES += [f"previous_action_{i}" for i in range(4)]
 
@@ -38,12 +38,12 @@ class Checked(FowtBladesEnv):
 
 @pytest.mark.slow
 def test_pettingzoo_s_checker_accepts_it():
-    parallel_api_test(Checked(duration=4.0), num_cycles=30)
+    parallel_api_test(Checked(**QUICK), num_cycles=30)
 
 
 @pytest.mark.slow
 def test_agents_together_are_the_environment_and_each_moves_its_own_blade():
-    env, single = FowtBladesEnv(duration=4.0), gymnasium.make(NAME, duration=4.0)
+    env, single = FowtBladesEnv(**QUICK), gymnasium.make(NAME, **QUICK)
     first, infos = env.reset(seed=3)
     observation, info = single.reset(seed=3)
     assert np.array_equal(first[AGENTS[0]], observation) and infos[AGENTS[1]] == info
@@ -63,6 +63,7 @@ def test_agents_together_are_the_environment_and_each_moves_its_own_blade():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly  # the elastic turbine takes minutes to compile
 def test_random_actions_survive_and_lower_no_blade_s_load_for_free():
     """A reward for equal root moments: less with additions at random than without."""
     env = gymnasium.make_vec(NAME, num_envs=4, threads=1, duration=30.0, autoreset_mode="Disabled")
@@ -82,10 +83,11 @@ def test_random_actions_survive_and_lower_no_blade_s_load_for_free():
 def test_other_modes_and_missing_blades_are_refused(monkeypatch):
     with pytest.raises(InputError, match="action_mode = 'residual': must be 'individual_residual'"):
         FowtBladesEnv("fowt_env/OC3HywindEasy-v0")
-    env = FowtBladesEnv(duration=4.0)
+    env = FowtBladesEnv(**QUICK)
     env.reset(seed=0)
     with pytest.raises(InputError, match="actions of blade_1: must be of blade_1, blade_2, blade_3"):
         env.step({"blade_1": [0.0]})
+    assert "fowt_env.training.rl.pettingzoo_env" in sys.modules
     monkeypatch.setitem(sys.modules, "pettingzoo", None)
     monkeypatch.delitem(sys.modules, "fowt_env.training.rl.pettingzoo_env")
     with pytest.raises(ImportError, match=r"pip install 'fowt-env\[pettingzoo\]'"):
