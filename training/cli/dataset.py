@@ -15,7 +15,7 @@ def make(
     behaviour: Annotated[str, Argument(help="Who acts: expert, medium, random or faulty.")],
     hours: Annotated[float, Option(help="Hours of operation, in episodes of ten minutes.")] = 1.0,
     dataset_id: Annotated[
-        str | None, Option("--id", help="Name in Minari; default: fowt_env/oc3hywind/BEHAVIOUR-v0.")
+        str | None, Option("--id", help="Name in Minari; default: oc3hywind/BEHAVIOUR-v0.")
     ] = None,
 ):
     """Make a data set of a controller's operation.
@@ -25,7 +25,7 @@ def make(
     Examples:
     fowt dataset make medium  # an hour of the PI law
     fowt dataset make expert --hours 500  # model predictive control, about 2 GB
-    fowt dataset check fowt_env/oc3hywind/medium-v0
+    fowt dataset check oc3hywind/medium-v0
 
     [bold]Behaviour[/bold]: expert (mpc), medium (pi), random (pi with held random additions), faulty (pi with
     faulty sensors). Weather is that of training seeds. A stopped command continues when it is repeated, and
@@ -49,7 +49,7 @@ def check(
     """Check a data set: arrays, seeds, and episodes replayed bit for bit.
 
     Examples:
-    fowt dataset check fowt_env/oc3hywind/expert-v0
+    fowt dataset check oc3hywind/expert-v0
     """
     from fowt_env.training.rl.dataset import check_dataset
 

@@ -74,7 +74,7 @@ def make_dataset(behaviour, hours, dataset_id=None, duration=None, progress=None
     """Write the episodes of a behaviour as a data set of Minari; return it.
 
     hours: of operation, rounded up to whole episodes. dataset_id: with namespace and version; None:
-    fowt_env/oc3hywind/BEHAVIOUR-v0. Its folder is that of Minari (MINARI_DATASETS_PATH). After an
+    oc3hywind/BEHAVIOUR-v0. Its folder is that of Minari (MINARI_DATASETS_PATH). After an
     interruption a second call continues with the next episode; more hours extend a set. progress: function
     (episodes done, episodes).
 
@@ -87,7 +87,7 @@ def make_dataset(behaviour, hours, dataset_id=None, duration=None, progress=None
     chosen = BEHAVIOURS[behaviour]
     env = environment(behaviour, duration)
     count = ceil(round(hours * 3600.0 / env.unwrapped.task.duration, 9))
-    dataset_id = dataset_id or f"fowt_env/oc3hywind/{behaviour}-v0"
+    dataset_id = dataset_id or f"oc3hywind/{behaviour}-v0"
     storage = _storage(library, dataset_id, env, behaviour)
     while storage.total_episodes < count:
         number = int(storage.total_episodes)

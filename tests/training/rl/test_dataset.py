@@ -28,14 +28,14 @@ def folder(tmp_path, monkeypatch):
 @pytest.mark.parametrize("behaviour", BEHAVIOURS)
 def test_a_set_is_loaded_by_minari_and_replays_bit_for_bit(behaviour, folder):
     make_dataset(behaviour, HOURS, duration=DURATION)
-    dataset = minari.load_dataset(f"fowt_env/oc3hywind/{behaviour}-v0")
+    dataset = minari.load_dataset(f"oc3hywind/{behaviour}-v0")
     assert dataset.total_episodes == 2 and dataset.total_steps == 180
     episodes = list(dataset.iterate_episodes())
     assert episodes[0].observations.shape == (91, 18) and episodes[0].actions.dtype == np.float32
     assert not np.array_equal(episodes[0].observations, episodes[1].observations)
     found = check_dataset(dataset.spec.dataset_id, replays=2)
     assert found["episodes"] == 2 and found["hours"] == pytest.approx(HOURS) and 0.2 < found["reward"] < 1.0
-    card = (folder / "fowt_env" / "oc3hywind" / f"{behaviour}-v0" / "README.md").read_text()
+    card = (folder / "oc3hywind" / f"{behaviour}-v0" / "README.md").read_text()
     assert BEHAVIOURS[behaviour].summary in card and "| 17 | wind_speed | m/s |" in card
     seeds = [one["seed"] for one in dataset.storage.get_episode_metadata(range(2))]
     assert len(set(seeds)) == 2 and all(seed in TRAINING for seed in seeds)
@@ -117,7 +117,7 @@ def test_what_is_wrong_with_an_episode_is_said(change, fault):
 
 @pytest.mark.slow
 def test_the_command_checks(folder):
-    name = "fowt_env/oc3hywind/medium-v0"
+    name = "oc3hywind/medium-v0"
     make_dataset("medium", HOURS, name, DURATION)
     shown, told = fowt("dataset", "check", name)
     assert name in shown and "checked: 2 episodes, 2 of them replayed" in told
