@@ -147,7 +147,7 @@ FIGURES = {  # what several pages say: {page: pattern with the figure as its gro
     "score of the agent": {
         README: r"`policy:ppo_lqr` \(RL\) (\d\S+\d)",
         CONTROLLERS: r"\| `policy:ppo_lqr` .* \| (\S+) \[",
-        AGENTS: r"\| `ppo_lqr`, seeds 0, 1, 2 .*\| (\S+), \S+, \S+ \|",
+        AGENTS: r"\| PPO on `lqr`, seeds 0, 1, 2 .*\| (\S+), \S+, \S+ \|",
     },
 }
 

@@ -81,6 +81,8 @@ static void clone_move(const double *p, double *m, double *command)
     command[1] = clamp(pitch, p[CLONE_PITCH_MINIMUM], p[CLONE_PITCH_MAXIMUM]);
     torque = command[0] + dt * m[CLONE_M_TORQUE_RATE];
     torque = clamp(torque, m[CLONE_M_LOW_TORQUE], p[CLONE_TORQUE_HIGH]);
+    if (torque * estimated[LQR_ROTOR] > p[CLONE_POWER_HIGH])
+        torque = p[CLONE_POWER_HIGH] / estimated[LQR_ROTOR];
     wind = m[CLONE_M_OPERATING_WIND];
     if (estimated[LQR_WIND + 1] > wind)
         wind = estimated[LQR_WIND + 1];
