@@ -217,6 +217,10 @@ class MPCClone(CompiledController):
         self.memory[:] = 0.0
         self.memory[CloneMemory.ESTIMATE :] = estimator.memory
         self.memory[mpc.Memory.OPERATING_WIND] = estimator.memory[ESTIMATED_WIND + 1]
+        drive, torque = self.turbine.pitch_drive, measurement.generator_torque
+        pitch = min(max(measurement.blade_pitch, drive.minimum), drive.maximum)
+        rated = self.turbine.torque_law.rated_torque
+        self.command[:] = torque if np.isfinite(torque) else rated, pitch  # for act()
 
 
 def mpc_clone(turbine, control_dt):
