@@ -45,6 +45,7 @@ from fowt_env.plant.measurement import Measure
 
 PERIOD = 0.5  # s between plans
 RESTING = 0.01745  # rad of pitch command, below which the speed integral decays at low rotor speed
+FARTHEST = 0.02  # of rated speed, limit of the distance of the set-point from it
 CURVE_WINDS = (8.5, 9.5)  # m/s, of the NREL 5 MW turbine: torque curve and minimum pitch below, plan above
 
 
@@ -268,6 +269,14 @@ class MPC:
         model = WindModel(*((1.0 - f) * part[node] + f * part[node + 1] for part in self.models))
         return model, self.first_wind + index
 
+    def _set_point(self):
+        """Return the rotor speed (rad/s) that the plan aims at: turbulence offsets the mean from it."""
+        rated, shift = (
+            self.turbine.rated_rotor_speed,
+            self.memory[Memory.INTEGRAL] / self.settings.set_point_time,
+        )
+        return rated - min(max(shift, -FARTHEST * rated), FARTHEST * rated)
+
     def _replan(self, ahead):
         """Improve the plan and set the rates to its first move."""
         model, wind = self._model()
@@ -282,7 +291,7 @@ class MPC:
         x[FILTER:] = estimated[ESTIMATED_WIND:MOMENT]
         x[FILTER : FILTER + 2] -= wind
         references, end = np.zeros(N_COST), np.zeros(N_FEEDBACK)
-        references[0] = end[SPEED] = rated - model.trim[SPEED]
+        references[0] = end[SPEED] = self._set_point() - model.trim[SPEED]
         rate = turbine.torque_law.max_torque_rate / torque
         torques = np.array([self.low_torque, self.parameters[Entry.TORQUE_HIGH]])
         torques = torques / torque - model.trim[TORQUE]

@@ -59,6 +59,23 @@ def test_it_betters_the_baseline_at_no_more_pitch_travel_on_a_validation_seed():
     assert ours["blade_pitch_travel_[deg/s]"] <= theirs["blade_pitch_travel_[deg/s]"]
 
 
+def test_the_set_point_moves_against_the_integral_of_the_speed_error():
+    """By at most 2 % of rated; a plan with a lower one pitches faster towards feather."""
+    scene, pitching = steady(18.0), {}
+    for time in (25.0, 1e6):
+        law = MPC(scene.turbine, 0.1, MPCSettings(set_point_time=time))
+        simulate(scene, law, duration=2.0)
+        law.memory[Memory.INTEGRAL], law.plan = 0.2, np.zeros_like(law.plan)
+        law._replan(np.zeros((0, 2)))
+        pitching[time] = law.memory[Memory.PITCH_RATE]
+    assert pitching[25.0] > 2.0 * pitching[1e6] > 0.0
+    rated, law = scene.turbine.rated_rotor_speed, MPC(scene.turbine, 0.1)
+    simulate(scene, law, duration=1.0)
+    for integral, expected in ((0.0, 0.0), (0.2, -0.2 / 25.0), (-0.9, 0.02 * rated), (0.9, -0.02 * rated)):
+        law.memory[Memory.INTEGRAL] = integral
+        assert law._set_point() - rated == pytest.approx(expected, abs=1e-12)
+
+
 def test_limits_hold_in_an_extreme_gust():
     """Commands within range and rate, to rounding; the soft speed limit is passed by less than without it."""
     scene = steady({"kind": "eog", "speed": 18.0, "start": 60.0})
