@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from fowt_env.controllers.settings import Settings
 
+ABOVE_ZERO = ("travel", "torque_rate", "schedule_time", "set_point_time")
 PRICES = ("speed", "platform_pitch", "surge", "shaft", "power", "speed_integral")
 
 
