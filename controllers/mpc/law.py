@@ -271,10 +271,8 @@ class MPC:
 
     def _set_point(self):
         """Return the rotor speed (rad/s) that the plan aims at: turbulence offsets the mean from it."""
-        rated, shift = (
-            self.turbine.rated_rotor_speed,
-            self.memory[Memory.INTEGRAL] / self.settings.set_point_time,
-        )
+        rated = self.turbine.rated_rotor_speed
+        shift = self.memory[Memory.INTEGRAL] / self.settings.set_point_time
         return rated - min(max(shift, -FARTHEST * rated), FARTHEST * rated)
 
     def _replan(self, ahead):

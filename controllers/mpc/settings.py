@@ -20,9 +20,7 @@ class MPCSettings(Settings):
     NAME = "mpc"
     RANGES = {
         **dict.fromkeys(PRICES, {"low": 0.0}),
-        **dict.fromkeys(
-            ("travel", "torque_rate", "schedule_time", "set_point_time"), {"low": 0.0, "low_open": True}
-        ),
+        **dict.fromkeys(ABOVE_ZERO, {"low": 0.0, "low_open": True}),
         "shaft_near_rated": {"low": 0.0, "high": 1.0},
         "horizon": {"low": 5.0, "high": 120.0},
         "preview_time": {"low": 1.0, "high": 60.0},
@@ -44,9 +42,7 @@ class MPCSettings(Settings):
     schedule_time: float = 300.0  # s, time constant of the operating wind
     horizon: float = 30.0  # s
     preview_time: float = 10.0  # s, look-ahead time of laws with preview
-    set_point_time: float = (
-        25.0  # s in which the integral of the speed error moves the set-point by the error
-    )
+    set_point_time: float = 25.0  # s in which a speed error moves the set-point by as much
     speed_limit: float = 1.15  # of rated, soft
     power_limit: float = 1.15  # of torque and rotor speed, of rated; soft in the plan
     torque_low: float = 0.75  # of rated; in lulls that of the torque curve, if less
