@@ -9,7 +9,7 @@ PROJECT := pyproject.toml constraints.txt
 TESTS = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 
-.PHONY: help demo test test-all test-rest test-nightly test-quick coverage lint docs format clean
+.PHONY: help demo test test-all test-rest test-rest-plant test-rest-envs test-rest-training test-rest-others test-nightly test-quick coverage lint docs format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -43,11 +43,26 @@ test: $(VENV)/.installed-dev
 	@echo "minutes, most of them for compiling kernels, which are kept"
 	$(TESTS) -m installation --durations=10
 
-test-all: $(VENV)/.installed-dev
-	$(TESTS) -m "" --durations=20
+test-all: test test-rest test-nightly
 
-test-rest: $(VENV)/.installed-dev
-	$(TESTS) -m "not installation and not nightly" --durations=20
+# in parts, each in processes of its own: kernels stay in memory, and those of all tests would take 24 GB
+test-rest: test-rest-plant test-rest-envs test-rest-training test-rest-others
+
+PLANT_TESTS := tests/plant tests/analysis tests/scene tests/weather
+ENV_TESTS := tests/envs tests/controllers
+REST = $(TESTS) -m "not installation and not nightly" --durations=20
+
+test-rest-plant: $(VENV)/.installed-dev
+	$(REST) $(PLANT_TESTS)
+
+test-rest-envs: $(VENV)/.installed-dev
+	$(REST) $(ENV_TESTS)
+
+test-rest-training: $(VENV)/.installed-dev
+	$(REST) tests/training
+
+test-rest-others: $(VENV)/.installed-dev
+	$(REST) $(addprefix --ignore=,$(PLANT_TESTS) $(ENV_TESTS) tests/training)
 
 test-nightly: $(VENV)/.installed-dev
 	$(TESTS) -m nightly --durations=20

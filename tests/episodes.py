@@ -1,8 +1,10 @@
 """Environments of few kinds, so that each is compiled once, and what their steps return, for tests."""
 
 import numpy as np
+import pytest
 
 from fowt_env.envs import FowtEnv, Task
+from fowt_env.registration import LADDER
 from fowt_env.training.validation.openfast_cases import box_wind
 
 NAME = "fowt_env/OC3Hywind-v1"
@@ -25,6 +27,12 @@ WATCHED = {  # with all that lies between the plant and an agent
     "preview": "four_beam_pulsed", "protection": "turbine", "sensors": "standard", "record": True,
     "faults": [{"kind": "pitch_runaway", "towards": "fine", "time": (0.3, 1.5)}],
 }  # fmt: skip
+
+
+def ladder():
+    """Names of the ladder as parameters; the one of an elastic turbine compiles for minutes."""
+    slowest = "fowt_env/OC3HywindIndividualPitch-v0"
+    return [pytest.param(name, marks=pytest.mark.nightly) if name == slowest else name for name in LADDER]
 
 
 def quick(**settings):

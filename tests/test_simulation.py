@@ -298,7 +298,7 @@ def test_initial_velocities_are_in_inertial_axes(still_scene):
 @pytest.mark.parametrize(
     "options, message",
     [
-        (dict(initial="somewhere"), "unknown start 'somewhere'.*Known: trim, zero"),
+        (dict(initial="somewhere"), "unknown start 'somewhere'.*Known: parked, trim, zero"),
         (dict(initial={"PtfmSurg": 1.0}), "Did you mean 'PtfmSurge'"),
         (dict(initial={"PtfmSurge": float("inf")}), r"initial\['PtfmSurge'\] = inf.*finite"),
         (dict(initial={"PtfmSurge": "5"}), r"initial\['PtfmSurge'\] = '5'"),

@@ -6,7 +6,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
-from episodes import INDIVIDUAL, NAME, NTM, ON_LQR, QUICK, actions, quick, record
+from episodes import INDIVIDUAL, NAME, NTM, ON_LQR, QUICK, actions, ladder, quick, record
 from fresh_python import fresh_python
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
@@ -51,7 +51,7 @@ def test_gymnasium_and_sb3_checkers_find_nothing(settings):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*ENVIRONMENTS, *LADDER])
+@pytest.mark.parametrize("name", [*ENVIRONMENTS, *ladder()])
 def test_the_checkers_find_nothing_in_any_name(name):
     check({"id": name})
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from episodes import INDIVIDUAL, quick
 
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.envs import FowtEnv, PeriodJacobians
@@ -9,7 +10,6 @@ from fowt_env.envs.jacobians import SETTLING
 from fowt_env.errors import InputError
 from fowt_env.plant.advance import forget
 from fowt_env.plant.state import State
-from tests.episodes import INDIVIDUAL, quick
 
 PERIODS = 12
 SPEEDS = {State.VX: 0.3, State.VY: 0.2, State.VZ: 0.1, State.WX: 0.02, State.WY: 0.03, State.WZ: 0.02}

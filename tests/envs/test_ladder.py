@@ -3,9 +3,10 @@
 import gymnasium
 import numpy as np
 import pytest
+from episodes import ladder
 
 from fowt_env.envs import FowtVectorEnv
-from fowt_env.registration import EASY, LADDER, STEPS
+from fowt_env.registration import EASY, STEPS
 
 
 def test_random_actions_survive_easy_in_twenty_of_twenty_episodes():
@@ -29,7 +30,7 @@ def test_what_easy_observes_is_of_order_one():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", LADDER)
+@pytest.mark.parametrize("name", ladder())
 def test_every_rung_runs_alone_and_in_a_batch_with_the_same_bits(name):
     single, batch = gymnasium.make(name), gymnasium.make_vec(name, num_envs=2)
     single.reset(seed=7), batch.reset(seed=[7, 8])

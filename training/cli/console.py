@@ -222,7 +222,7 @@ def from_a_clone(command):
         if not (error.name or "").startswith(STUDIES):
             raise
         raise InputError(
-            f"fowt {command}: needs a clone of the repository (pip install -e . in the clone):"
+            f"fowt dev {command}: needs a clone of the repository (pip install -e . in the clone):"
             " training/studies is not part of the installed package"
         ) from None
 

@@ -57,7 +57,7 @@ def test_only_the_marked_environments_restart(env):
 
 def test_a_failure_is_terminated():
     env = torchrl_env.FowtTorchRLEnv("fowt_env/OC3Hywind-v2", 1, threads=1)
-    done = env.rollout(200, policy=lambda steps: steps.set("action", torch.full((1, 2), -1.0)))["next"][0, -1]
+    done = env.rollout(200, policy=lambda _: torch.full((1, 2), -1.0))["next"][0, -1]
     assert done["terminated"].item() and done["done"].item() and not done["truncated"].item()
 
 
