@@ -173,7 +173,8 @@ def test_one_platform_is_warned_of_once():
 
 
 def run(*arguments):
-    return CliRunner().invoke(cli.app.app, ["model", "check", *arguments], env={"COLUMNS": "200", "NO_COLOR": "1"})
+    environment = {"COLUMNS": "200", "NO_COLOR": "1"}
+    return CliRunner().invoke(cli.app.app, ["model", "check", *arguments], env=environment)
 
 
 def test_the_command_prints_figures_and_ends_well_where_all_fits():
