@@ -40,8 +40,9 @@ def test_a_study_says_the_verdict_and_writes_one_page_with_all_parts(tmp_path, m
     stdout, _ = fowt("study", *words, "--compare", str(recorded), "--no-animation", "--out", "made")
     lines = stdout.splitlines()
     assert lines[-1] == "open made/report.html"
-    assert any(line.startswith("pi against gspi_oc3: ") for line in lines)
-    assert any(line.startswith("pi_land against gspi_oc3: ") and "worse: " in line for line in lines)
+    assert "pi against gspi_oc3, 1 runs each" in lines
+    worst = lines.index("pi_land against gspi_oc3, 1 runs each")
+    assert any(line.startswith("  worse: ") for line in lines[worst + 1 : worst + 3])
     text = (tmp_path / "made" / "report.html").read_text(encoding="utf-8")
     assert (
         text.index("Beside your own run")
