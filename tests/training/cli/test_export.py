@@ -24,7 +24,7 @@ def test_each_output_is_written_and_the_library_runs(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("pi",), "needs an output"),
+        (("pi",), "fowt connect export: needs --dll"),
         (("pj", "--dll", "libpi.so"), "unknown controller 'pj'"),
         (("pi", "--dll", "libpi.txt"), "must end with .so, .dll or .dylib"),
         (("pi", "--rosco", "mine.txt"), "must end with .IN"),
