@@ -1,7 +1,7 @@
-/* A client of `fowt serve` over UDP: the OC3-Hywind pitch controller in C99, for little-endian hosts.
+/* A client of `fowt connect serve` over UDP: the OC3-Hywind pitch controller in C99, for little-endian hosts.
  *
  * cc -std=c99 -O2 -Wall -Wextra -o client client.c && ./client [HOST PORT]
- * after: fowt serve --protocol udp --channels GenSpeed,BldPitch1 --wind ntm:18:B --control-dt 0.01
+ * after: fowt connect serve --protocol udp --channels GenSpeed,BldPitch1 --wind ntm:18:B --control-dt 0.01
  */
 #define _POSIX_C_SOURCE 200112L
 #include <netdb.h>

@@ -59,7 +59,7 @@ def test_a_client_controls_the_plant_as_its_law_does_in_simulate(protocol, tmp_p
 
     monkeypatch.setattr(Server, "serve", with_client)
     out, report = tmp_path / "run.outb", tmp_path / "report.json"
-    words = f"serve --protocol {protocol} --listen 127.0.0.1:0 --wind ntm:18:B --seed 2 --factor inf"
+    words = f"connect serve --protocol {protocol} --listen 127.0.0.1:0 --wind ntm:18:B --seed 2 --factor inf"
     words += f" --control-dt {PERIOD} --duration {DURATION} --channels GenSpeed,BldPitch1 --out {out}"
     stdout, stderr = fowt(*words.split(), "--report", str(report))
     assert "ended: end of the run" in stdout and f"listening on {protocol}://127.0.0.1:" in stderr

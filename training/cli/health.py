@@ -1,4 +1,4 @@
-"""Checks the kernel cache and a short run with known results, for fowt doctor and fowt cache."""
+"""Checks the kernel cache and a short run with known results, for fowt doctor and fowt dev cache."""
 
 import os
 import platform

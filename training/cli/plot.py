@@ -22,7 +22,7 @@ def plot(
 ):
     """Plot saved runs: time series, spectra, box plots.
 
-    Also plots RAOs, and the steady schedule in a table of fowt trim.
+    Also plots RAOs, and the steady schedule in a table of fowt model trim.
 
     Examples:
     fowt plot series run.csv  # stacked time series, in series.png

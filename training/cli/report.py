@@ -1,4 +1,4 @@
-"""Implements fowt report and fowt animate."""
+"""Implements fowt report and fowt dev animate."""
 
 from functools import partial
 from pathlib import Path
