@@ -166,6 +166,9 @@ EVERY = [
     {"kind": "sensor_bias", "time": 5.0, "field": "generator_speed", "value": -12.0},
     {"kind": "sensor_freeze", "time": 5.0, "field": "generator_speed"},
     {"kind": "sensor_loss", "time": 5.0, "field": "blade_pitch"},
+    {"kind": "line_loss", "time": 5.0, "line": 2},
+    {"kind": "flooded_compartment", "time": 5.0, "mass": 8e4, "point": [3.0, 0.0, -60.0]},
+    {"kind": "start_up", "time": 5.0},
 ]
 
 
@@ -176,6 +179,7 @@ OF_BLADES = {"kind": "pitch_offset", "time": 2.0, "blades": [2, 3], "offset": -1
 def test_compiled_and_in_python_a_fault_has_the_same_bits(scene, three, turbine, fault):
     where = three if "blades" in fault else scene
     options = {"faults": fault, "protection": "turbine", "sensors": "standard", "duration": 12.0}
+    options |= {"initial": "parked"} if fault["kind"] == "start_up" else {}
     compiled = run(where, **options)
     python = run(where, Delegate(turbine, DT), **options)
     pd.testing.assert_frame_equal(compiled, python, check_exact=True)
