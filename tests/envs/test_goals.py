@@ -50,7 +50,7 @@ def entries_of(now, before=None, failed=False):
 
 
 def test_the_operating_point_earns_all_and_three_usual_deviations_nothing():
-    usual = dict(zip(GOALS, REFERENCE[FIRST_USUAL:], strict=False))
+    usual = dict(zip(GOALS, REFERENCE[FIRST_USUAL : FIRST_USUAL + N_GOALS], strict=True))
     assert list(entries_of(at_rated()).values()) == pytest.approx([1.0] * N_GOALS + [0.0] * (len(COSTS) + 1))
     assert sum(WEIGHTS) == pytest.approx(1.0) and WEIGHTS.min() > 0.1
     for part, expected in ((0.5, 5.0 / 6.0), (1.0, 2.0 / 3.0), (3.0, 0.0), (9.0, 0.0)):
