@@ -15,7 +15,7 @@ def browser():
         path = next(filter(None, found), None)
         if path is None:
             pytest.skip("no Chromium is installed: the page is not opened in a browser")
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
         yield browser
         browser.close()
 

@@ -5,13 +5,13 @@ import contextlib
 import http.client
 import json
 import re
-import shutil
 import socket
 import urllib.parse
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from offline_browser import browser  # noqa: F401  # a fixture
 
 pytest.importorskip("bokeh", reason="bokeh is not installed: the extra `live` is missing")
 
@@ -32,22 +32,8 @@ def server():
     running.stop()
 
 
-@pytest.fixture(scope="module")
-def browser():
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    with sync_api.sync_playwright() as playwright:
-        found = [*map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))]
-        found.append(shutil.which(playwright.chromium.executable_path))
-        path = next(filter(None, found), None)
-        if path is None:
-            pytest.skip("no Chromium is installed: the page is not opened in a browser")
-        opened = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", "--disable-gpu"])
-        yield opened
-        opened.close()
-
-
 @contextlib.contextmanager
-def page_of(browser, server, **settings):
+def page_of(browser, server, **settings):  # noqa: F811
     """A page whose figures are all there, which loads nothing from elsewhere and reports no error."""
     context = browser.new_context(**settings)
     page, messages = context.new_page(), []
@@ -68,7 +54,7 @@ def is_elsewhere(url):
 
 
 @pytest.fixture(scope="module")
-def page(browser, server):
+def page(browser, server):  # noqa: F811
     with page_of(browser, server) as opened:
         yield opened
 
@@ -117,7 +103,7 @@ def test_b_is_saved_as_a_design_once_and_in_the_working_folder_alone(page, tmp_p
     assert json.loads((tmp_path / "mine.json").read_text())["kind"] == "pi"
 
 
-def test_a_phone_scrolls_in_one_direction_and_both_themes_have_their_colours(browser, server):
+def test_a_phone_scrolls_in_one_direction_and_both_themes_have_their_colours(browser, server):  # noqa: F811
     for scheme in ("light", "dark"):
         with page_of(browser, server, viewport={"width": 380, "height": 800}, color_scheme=scheme) as page:
             assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
