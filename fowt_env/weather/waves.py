@@ -13,6 +13,7 @@ from fowt_env.errors import InputError
 from fowt_env.plant.hydro.waves import Waves
 
 FLAT_PERIOD = 10.0  # s, of the zero-height component that represents still water
+RECORDED_PERIODS = (2.0, 40.0)  # s, of the components that represent a recorded elevation
 MOST_COMPONENTS = 1_000_000  # limit: more take minutes and gigabytes
 
 
@@ -69,6 +70,22 @@ def build_waves(sea, *, depth, density, gravity, seed, duration, components=None
     k = wave_number(omega, depth, gravity)
     random = sea.kind not in ("regular", "components")
     return _pack(omega, k, amplitude, phase, heading, depth, density, sea.ramp, random)
+
+
+def recorded_sea(time, elevation, heading=0.0):
+    """Return the sea state of kind "components" whose elevation at the origin is that of a record.
+
+    time (n,) s from 0, equally spaced; elevation (n,) m; heading deg. The components are the harmonics of the
+    record with periods of RECORDED_PERIODS: slower changes are tides or second-order waves.
+    """
+    spacing = (time[-1] - time[0]) / (len(time) - 1)
+    omega = 2.0 * pi * np.fft.rfftfreq(len(time), spacing)
+    harmonics = np.fft.rfft(elevation) * 2.0 / len(time)
+    shortest, longest = RECORDED_PERIODS
+    chosen = (omega >= 2.0 * pi / longest) & (omega <= min(2.0 * pi / shortest, 0.99 * pi / spacing))
+    harmonics = harmonics[chosen]
+    waves = {"omega": omega[chosen], "amplitude": np.abs(harmonics), "phase": -np.angle(harmonics)}
+    return {"kind": "components", "heading": heading} | {key: value.tolist() for key, value in waves.items()}
 
 
 def flat_waves(*, depth, density, gravity):

@@ -6,7 +6,7 @@ from naive import waves as naive
 
 from fowt_env.descriptions.sea_state import SeaState
 from fowt_env.plant.hydro.waves import elevation, ramp_factor, wave_kinematics
-from fowt_env.weather.waves import build_waves, jonswap, wave_number
+from fowt_env.weather.waves import build_waves, jonswap, recorded_sea, wave_number
 
 pytestmark = pytest.mark.installation
 
@@ -170,3 +170,20 @@ def test_seed_draws_the_phases_and_nothing_else():
     assert np.array_equal(first.phase, again.phase)
     assert not np.array_equal(first.phase, other.phase)
     assert np.array_equal(first.amplitude, other.amplitude)
+
+
+def test_a_recorded_elevation_is_represented_by_its_components():
+    made = build_waves(jonswap_sea(), **SITE)
+    time = np.arange(0.0, 600.0, 0.1)
+    record = np.array([elevation(t, 0.0, 0.0, made) for t in time])
+    record += 0.5 + 0.1 * np.sin(0.05 * time)  # tide, second-order waves
+    found = build_waves(SeaState(**recorded_sea(time, record, heading=30.0)), **SITE)
+    inner = time[600:-600:50]
+    error = [elevation(t, 0.0, 0.0, found) - elevation(t, 0.0, 0.0, made) for t in inner]
+    assert np.std(error) < 0.02 * record.std()
+    assert np.allclose((found.cos_heading, found.sin_heading), np.array([[0.75**0.5], [0.5]]))
+
+
+def test_a_record_of_still_water_has_no_waves():
+    time = np.arange(0.0, 60.0, 0.1)
+    assert build_waves(SeaState(**recorded_sea(time, 0.0 * time)), **SITE) is None

@@ -38,7 +38,7 @@ def study(
     """Study a controller on your deck, with a verdict.
 
     Check, linear margins, evaluation and one page in HTML. A deck is imported first (fowt import). With
-    --compare, the first controller also runs in the wind that the user's file recorded, in still water.
+    --compare, the first controller also runs in the wind and waves of the user's file, from its first state.
 
     Examples:
     fowt study deck/5MW_OC4Semi.fst --controller dll:my.so,mine:Law --against gspi_oc3,mpc
@@ -113,19 +113,25 @@ def _checked(platform, folder):
 
 
 def _compared(platform, name, path):
-    """Return the section that compares a run of OpenFAST with one in its recorded wind."""
+    """Return the section that compares a run of OpenFAST with one in its recorded wind and waves."""
     import fowt_env
     from fowt_env.files.tables import read_series
+    from fowt_env.run.initial_conditions import INITIAL
     from fowt_env.training.reports.compare import compare
     from fowt_env.visual.time_series import TIME
+    from fowt_env.weather.waves import recorded_sea
 
-    theirs, wind = read_series(path), "Wind1VelX_[m/s]"
+    theirs, wind, waves = read_series(path), "Wind1VelX_[m/s]", "Wave1Elev_[m]"
     if wind not in theirs.columns:
         raise InputError(f"--compare {path}: needs the channel Wind1VelX, in whose wind the controller runs")
     time = theirs[TIME].to_numpy() - theirs[TIME].iloc[0]
     series = {"kind": "series", "time": time.tolist(), "speed": theirs[wind].tolist()}
-    scene = fowt_env.build_scene(platform, wind=series)
-    run = fowt_env.simulate(scene, name, duration=float(np.floor(time[-1])), output_dt=0.1)
+    sea = recorded_sea(time, theirs[waves].to_numpy()) if waves in theirs.columns else None
+    scene = fowt_env.build_scene(platform, wind=series, sea=sea)
+    begun = {
+        column: float(value) for column, value in theirs.iloc[0].items() if column.split("_[")[0] in INITIAL
+    }
+    run = fowt_env.simulate(scene, name, duration=float(np.floor(time[-1])), output_dt=0.1, initial=begun)
     theirs = theirs.assign(**{TIME: time})
     known = [one for one in COMPARED if any(column.startswith(f"{one}_[") for column in theirs.columns)]
     result = compare(run, theirs, min(60.0, 0.2 * time[-1]), None, tuple(known))
@@ -135,7 +141,8 @@ def _compared(platform, name, path):
         rows.append((f"{row.channel} {row.unit}", *values, f"{row.correlation:.3f}"))
     heads = ("channel", "mean here", "mean there", "std here", "std there", "correlation")
     notes = "".join(f"<li>{html.escape(f'{which}: {text}')}</li>" for which, text in result.notes)
-    remark = f"{html.escape(name)} in the wind of {html.escape(Path(path).name)}, here in still water."
+    water = "with its waves, towards +x" if sea else f"no waves: the file has no {waves}"
+    remark = f"{html.escape(name)} in the wind of {html.escape(Path(path).name)}, {water}."
     return "Beside your own run", f"<p>{remark}</p>{_html_table(heads, rows)}<ul>{notes}</ul>"
 
 

@@ -27,8 +27,9 @@ sea = { kind = "jonswap", Hs = 4.0, Tp = 9.0 }
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """A run of another law in steady wind, as a user's own output."""
-    frame = fowt_env.simulate(fowt_env.build_scene("oc3_hywind", wind=16.0), "pi_unscheduled", duration=90.0)
+    """A run of another law in steady wind and irregular waves, as a user's own output."""
+    scene = fowt_env.build_scene("oc3_hywind", wind=16.0, sea="jonswap:4:9", seed=3)
+    frame = fowt_env.simulate(scene, "pi_unscheduled", duration=90.0)
     return write_table(frame, tmp_path_factory.mktemp("theirs") / "run.outb")
 
 
@@ -49,6 +50,7 @@ def test_a_study_says_the_verdict_and_writes_one_page_with_all_parts(tmp_path, m
         < text.index("Linear margins at 16 m/s")
         < text.index('id="leaderboard"')
     )
+    assert "in the wind of run.outb, with its waves, towards +x" in text
     assert "RotSpeed rpm" in text and "phase margin (deg)" in text
 
 
