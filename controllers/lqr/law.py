@@ -64,10 +64,13 @@ def feed_back(p, low, fraction, memory, row):
 
 
 @kernel
-def speed_integral(integral, error, pitching, dt):
-    """Return the integral of the speed error (rad/s) after dt (s); decays below rated at minimum pitch."""
+def speed_integral(integral, error, pitching, dt, limit):
+    """Return the integral of the speed error (rad/s) after dt (s), within a limit (rad).
+
+    It decays below rated speed at minimum pitch, where no blade pitch could correct the error.
+    """
     if pitching or error > 0.0:
-        return clamp(integral + dt * error, -INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+        return clamp(integral + dt * error, -limit, limit)
     return integral * (1.0 - FORGETTING * dt)
 
 
@@ -80,7 +83,8 @@ def lqr_law(p, memory, measurement, command):
 
     speed_error = measurement[Measure.GENERATOR_SPEED] / p[Head.GEAR_RATIO] - rated
     pitch, torque = memory[PITCH_COMMAND], memory[TORQUE_COMMAND]
-    memory[INTEGRAL] = speed_integral(memory[INTEGRAL], speed_error, pitch > p[Head.HANDOVER_LOW], dt)
+    pitching = pitch > p[Head.HANDOVER_LOW]
+    memory[INTEGRAL] = speed_integral(memory[INTEGRAL], speed_error, pitching, dt, INTEGRAL_LIMIT)
 
     deviate(p, low, fraction, memory)
     for i in range(N_PLANT):

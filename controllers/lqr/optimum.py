@@ -44,6 +44,7 @@ LIMITED = ("travel", "power", "torque", "shaft")  # fields of Deviations
 NEAR_RATED, NO_LULLS = 14.0, 16.0  # of the NREL 5 MW turbine
 # Upper limits of the deviations of gspi_oc3, used if its linear model gives more or, near rated, is unstable
 SPEED_CEILING, POWER_CEILING, LEAN_CEILING = 0.09, 0.09, 1.2 * DEGREE  # of rated, of rated, rad
+TRAVEL_CEILING = 0.17 * DEGREE  # rad/s, of the NREL 5 MW turbine
 SHAFT_CEILING = 0.018  # of rated torque, if the loop is unstable
 LOWEST, HIGHEST = np.log(1e-3), np.log(1e4)  # range of log multipliers; the objective is of order one
 TOLERANCE = 5e-3  # of the limits, relative
@@ -64,6 +65,7 @@ class Deviations:
     torque: float  # of the generator, of rated
     shaft: float  # torque of the shaft, of rated
     surge: float  # m
+    integral: float  # of the rotor-speed error, rad
 
 
 def generator_inertia(turbine, torque):
@@ -120,6 +122,7 @@ class SampledLoop:
             "torque": (eye[TORQUE], none),
             "shaft": (eye[TORQUE] + self._inertia * acceleration, none),
             "surge": (eye[SURGE], none),
+            "integral": (eye[INTEGRAL], none),
         }
 
     @property
@@ -193,6 +196,7 @@ class SampledLoop:
         """
         rated = self.turbine.rated_rotor_speed
         speed, power, lean = SPEED_CEILING * rated, POWER_CEILING, LEAN_CEILING
+        travel = TRAVEL_CEILING * travel_scale(self.turbine)
         settings = PISettings.published(self.turbine)
         gain = schedule_gain(self.model.pitch, settings.gain_schedule_pitch)
         gain *= settings.gear_ratio / (2.0 - gain)
@@ -210,17 +214,16 @@ class SampledLoop:
         a[n], a[n + 1] = filtered, integral
         q[:n, :n] = self.noise
         if np.abs(np.linalg.eigvals(a)).max() >= 1.0:
-            return Deviations(speed, lean, float("inf"), power, 0.0, SHAFT_CEILING, float("inf"))
+            return Deviations(speed, lean, travel, power, 0.0, SHAFT_CEILING, *[float("inf")] * 2)
         x = stationary_covariance(a, q)
         eye = np.eye(n + 2)
         acceleration = self.model.B[SPEED, 1] * command
         acceleration[:n] += self.model.A[SPEED, :n]
-        rows = (eye[SPEED], eye[LEAN], a[BLADE] - eye[BLADE], acceleration, eye[SURGE])
+        rows = (eye[SPEED], eye[LEAN], a[BLADE] - eye[BLADE], acceleration, eye[SURGE], eye[n + 1])
         std = [sqrt(row @ x @ row) for row in rows]
-        travel, shaft = GAUSSIAN_MEAN / dt * std[2], self._inertia * std[3]
-        return Deviations(
-            min(std[0], speed), min(std[1], lean), travel, min(std[0] / rated, power), 0.0, shaft, std[4]
-        )
+        known = std[0], std[1], GAUSSIAN_MEAN / dt * std[2], std[0] / rated
+        limited = map(min, known, (speed, lean, travel, power))
+        return Deviations(*limited, 0.0, self._inertia * std[3], *std[4:])
 
 
 def limits(settings, wind, baseline, turbine):

@@ -68,6 +68,7 @@ class CloneSettings(Record):
     platform: Annotated[str, Field(min_length=1)]
     turbine: Annotated[str, Field(min_length=1)]
     period: Positive  # s between decisions
+    integral_limit: Positive = 1.0  # rad, of the speed integral in training
     about: dict[str, Any]
 
 
@@ -203,7 +204,8 @@ class MPCClone(CompiledController):
             )
         estimator = self._planner.estimator
         estimator.prepare(scene)
-        planned, curve = self._planner.parameters, [*self._planner.curve]
+        planned, curve = self._planner.parameters.copy(), [*self._planner.curve]
+        planned[Entry.INTEGRAL_LIMIT] = made_for.integral_limit
         parts = (planned, curve, [self.every], self.network, estimator.parameters)
         self.parameters = np.concatenate(parts, dtype=np.float64)
         self.prepared = True

@@ -45,7 +45,7 @@ from fowt_env.plant.measurement import Measure
 
 PERIOD = 0.5  # s between plans
 RESTING = 0.01745  # rad of pitch command, below which the speed integral decays at low rotor speed
-FARTHEST = 0.02  # of rated speed, limit of the distance of the set-point from it
+WINDUP = 7.5  # s times rated speed, limit of the speed integral: 5 % of rated for 150 s
 CURVE_WINDS = (8.5, 9.5)  # m/s, of the NREL 5 MW turbine: torque curve and minimum pitch below, plan above
 
 
@@ -66,6 +66,7 @@ class Entry(IntEnum):
     CURVE_BELOW = 11  # m/s
     PLAN_ABOVE = 12
     POWER_HIGH = 13  # of torque and rotor speed, W
+    INTEGRAL_LIMIT = 14  # of the speed integral, rad
 
 
 class Memory(IntEnum):
@@ -82,11 +83,11 @@ class Memory(IntEnum):
 def observe(estimator, estimated, measurement, command, p, memory):
     """Update the estimate, the operating wind and the speed integral to the present instant."""
     estimate(estimator, estimated, measurement, command)
-    decay, dt = p[Entry.DECAY], p[Entry.CONTROL_DT]
+    decay, dt, limit = p[Entry.DECAY], p[Entry.CONTROL_DT], p[Entry.INTEGRAL_LIMIT]
     wind = estimated[ESTIMATED_WIND + 1]
     memory[Memory.OPERATING_WIND] = decay * memory[Memory.OPERATING_WIND] + (1.0 - decay) * wind
     error = measurement[Measure.GENERATOR_SPEED] / p[Entry.GEAR_RATIO] - p[Entry.RATED_SPEED]
-    memory[Memory.INTEGRAL] = speed_integral(memory[Memory.INTEGRAL], error, command[1] > RESTING, dt)
+    memory[Memory.INTEGRAL] = speed_integral(memory[Memory.INTEGRAL], error, command[1] > RESTING, dt, limit)
 
 
 @kernel
@@ -171,6 +172,7 @@ class MPC:
             Entry.CURVE_BELOW: CURVE_WINDS[0] + (turbine.rated_wind_speed - RATED_WIND),
             Entry.PLAN_ABOVE: CURVE_WINDS[1] + (turbine.rated_wind_speed - RATED_WIND),
             Entry.POWER_HIGH: settings.power_limit * law.rated_torque * turbine.rated_rotor_speed,
+            Entry.INTEGRAL_LIMIT: WINDUP * turbine.rated_rotor_speed,
         }
         return np.array([values[entry] for entry in Entry], dtype=np.float64)
 
@@ -269,12 +271,6 @@ class MPC:
         model = WindModel(*((1.0 - f) * part[node] + f * part[node + 1] for part in self.models))
         return model, self.first_wind + index
 
-    def _set_point(self):
-        """Return the rotor speed (rad/s) that the plan aims at: turbulence offsets the mean from it."""
-        rated = self.turbine.rated_rotor_speed
-        shift = self.memory[Memory.INTEGRAL] / self.settings.set_point_time
-        return rated - min(max(shift, -FARTHEST * rated), FARTHEST * rated)
-
     def _replan(self, ahead):
         """Improve the plan and set the rates to its first move."""
         model, wind = self._model()
@@ -289,7 +285,7 @@ class MPC:
         x[FILTER:] = estimated[ESTIMATED_WIND:MOMENT]
         x[FILTER : FILTER + 2] -= wind
         references, end = np.zeros(N_COST), np.zeros(N_FEEDBACK)
-        references[0] = end[SPEED] = self._set_point() - model.trim[SPEED]
+        references[0] = end[SPEED] = rated - model.trim[SPEED]
         rate = turbine.torque_law.max_torque_rate / torque
         torques = np.array([self.low_torque, self.parameters[Entry.TORQUE_HIGH]])
         torques = torques / torque - model.trim[TORQUE]

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from fowt_env.controllers.settings import Settings
 
-ABOVE_ZERO = ("travel", "torque_rate", "schedule_time", "set_point_time")
-PRICES = ("speed", "platform_pitch", "surge", "shaft", "power", "speed_integral")
+ABOVE_ZERO = ("travel", "mean_speed", "torque_rate", "schedule_time")
+PRICES = ("speed", "platform_pitch", "surge", "shaft", "power")
 
 
 @dataclass(frozen=True)
@@ -32,17 +32,16 @@ class MPCSettings(Settings):
 
     speed: float = 1.0  # price of rotor speed
     platform_pitch: float = 1.2
-    surge: float = 0.7
-    shaft: float = 0.18  # torque of the shaft
+    surge: float = 0.4
+    shaft: float = 0.2  # torque of the shaft
     power: float = 0.05
     travel: float = 0.97  # limit, not a price, of blade-pitch travel, over that of gspi_oc3
     shaft_near_rated: float = 0.018  # deviation of shaft torque by lulls at the lowest design wind, of rated
-    speed_integral: float = 0.001  # cost of (speed integral / 5 % of rated times 10 s)^2
+    mean_speed: float = 0.007  # limit of the deviation of 10-minute means of rotor speed, of rated
     torque_rate: float = 0.1  # cost of (torque rate / 5 % of rated a second)^2
     schedule_time: float = 300.0  # s, time constant of the operating wind
     horizon: float = 30.0  # s
     preview_time: float = 10.0  # s, look-ahead time of laws with preview
-    set_point_time: float = 25.0  # s in which a speed error moves the set-point by as much
     speed_limit: float = 1.15  # of rated, soft
     power_limit: float = 1.15  # of torque and rotor speed, of rated; soft in the plan
     torque_low: float = 0.75  # of rated; in lulls that of the torque curve, if less

@@ -6,23 +6,32 @@ of blade-pitch travel, whose price follows from it. The minimum is that of the q
 with w_i = c_i/(s_i b_i), found by iteration (iteratively reweighted least squares: Daubechies et al., Comm.
 Pure Appl. Math. 63, 2010). Hence no wind is without a price, whatever its fraction of the lifetime.
 
+The weight of the speed integral I follows from a limit of the means of rotor speed over MEAN_TIME, which are
+(I(t + MEAN_TIME) - I(t))/MEAN_TIME from rated: their deviation is sqrt(2) s_I/MEAN_TIME where I is forgotten
+within this time. Without it, slow changes of the wind would leave the speed off rated for minutes.
+
 The linear loop has no lulls, in which the torque must follow the available power. Near rated wind the
-variance shaft_near_rated^2 is therefore added to both variances of the shaft torque, the price of travel is
-that of the next higher wind, and so are the deviations of gspi_oc3 where its linear model is unstable.
+variance shaft_near_rated^2 is therefore added to both variances of the shaft torque, the price of travel and
+the weight of the integral are those of the next higher wind, and so is the surge of gspi_oc3 where its linear
+model is unstable.
 """
+
+from math import sqrt
 
 import numpy as np
 
 from fowt_env.controllers.lqr.design import equivalent_wind, lowest_design_wind
 from fowt_env.controllers.lqr.optimum import GAUSSIAN_MEAN, NEAR_RATED, NO_LULLS, SampledLoop
-from fowt_env.descriptions.units import DEGREE
 
 PRICED = {  # field of Deviations -> its price in MPCSettings
     "speed": "speed", "lean": "platform_pitch", "surge": "surge", "shaft": "shaft", "power": "power",
 }  # fmt: skip
 TRAVEL = "travel"
 CHEAPEST, DEAREST = 0.1, 10.0  # range of the price of pitch travel
-UNKNOWN = {TRAVEL: 0.14 * DEGREE, "surge": 1.0}  # rad/s, m: if gspi_oc3 is unstable in the strongest wind
+MEAN_TIME = 600.0  # s
+# range and start of the cost of (speed integral / 5 % of rated times 10 s)^2
+FREE, USUAL, STRICT = 1e-6, 0.01, 0.1
+UNKNOWN = {"surge": 1.0}  # m, if gspi_oc3 is unstable in the strongest wind
 SHAFT_NOISE = 1e-3  # of rated torque, smallest deviation of shaft torque: direct drives have almost none
 TOLERANCE = 0.02  # of the ratios, relative
 ROUNDS = 30
@@ -33,12 +42,12 @@ def weights_over(models, settings, turbine, dt):
 
     models: DesignModels in ascending order of wind; dt: control period, s.
     """
-    found, base, ratios = {}, UNKNOWN, None
+    found, base, state = {}, UNKNOWN, None
     for model in reversed(models):  # from strong wind, where the linear model holds, down to rated
         if model.wind >= lowest_design_wind(turbine):
             loop = SampledLoop(model, turbine, dt)
             base = _deviations(loop.baseline(), model.wind, settings, turbine, base)
-            found[model.wind], ratios = _weights(loop, base, settings, ratios)
+            found[model.wind], state = _weights(loop, base, settings, state)
     return found
 
 
@@ -52,28 +61,30 @@ def _deviations(deviations, wind, settings, turbine, instead=UNKNOWN):
 
 
 def _weights(loop, base, settings, start):
-    """Return (weights (N_COST,) per second, {field: ratio to base, "price": of travel}) at one wind.
+    """Return (weights (N_COST,) per second, state of the iteration) at one wind.
 
-    start: ratios and price to start from, or None.
+    The state has {field: ratio to base, "price": of travel, "integral": cost of the speed integral};
+    start: state to start from, or None.
     """
     rated, wind = loop.turbine.rated_rotor_speed, loop.model.wind
-    integral, torque_rate = settings.speed_integral / (0.5 * rated) ** 2, settings.torque_rate / 0.05**2
-    ratios = dict.fromkeys([*PRICED, TRAVEL], 1.0) if start is None else start
+    unit, torque_rate = (0.5 * rated) ** 2, settings.torque_rate / 0.05**2
+    fresh = dict.fromkeys([*PRICED, TRAVEL, "price"], 1.0) | {"integral": USUAL}
+    state = fresh if start is None else start
     limited = equivalent_wind(loop.turbine, wind) >= NEAR_RATED
     prices = {name: getattr(settings, price) for name, price in PRICED.items()}
-    price = 1.0 if start is None else start["price"]
     for _ in range(ROUNDS):
-        before = ratios
-        prices[TRAVEL] = price
+        before, integral = state, state["integral"] / unit
+        prices[TRAVEL] = before["price"]
         weight = {name: prices[name] / (before[name] * base[name] ** 2) for name in prices}
         reached = loop.deviations(loop.gain(weight, integral, torque_rate))
-        reached = _deviations(reached, wind, settings, loop.turbine)
-        ratios = {name: value / base[name] for name, value in reached.items()}
-        excess = ratios[TRAVEL] / settings.travel if limited else 1.0
-        price = min(max(price * excess, CHEAPEST), DEAREST)
-        changes = [excess, *(ratios[name] / before[name] for name in prices)]
+        off = sqrt(2.0) * reached.integral / (MEAN_TIME * rated)
+        own = _deviations(reached, wind, settings, loop.turbine)
+        state = {name: value / base[name] for name, value in own.items()}
+        excess = (state[TRAVEL] / settings.travel, off / settings.mean_speed) if limited else (1.0, 1.0)
+        state["price"] = min(max(before["price"] * excess[0], CHEAPEST), DEAREST)
+        state["integral"] = min(max(before["integral"] * excess[1] ** 2, FREE), STRICT)
+        changes = [state[name] / before[name] for name in before]
         if all(abs(change - 1.0) < TOLERANCE for change in changes):
             break
     states = [weight[name] for name in PRICED]
-    weights = np.array([*states, integral, torque_rate, GAUSSIAN_MEAN**2 * weight[TRAVEL]])
-    return weights, ratios | {"price": price}
+    return np.array([*states, integral, torque_rate, GAUSSIAN_MEAN**2 * weight[TRAVEL]]), state

@@ -187,6 +187,7 @@ def write_clone(path, network, about):
         "platform": platform.name,
         "turbine": turbine_of(PLATFORM).name,
         "period": PERIOD,
+        "integral_limit": float(MPC(turbine_of(PLATFORM), CONTROL_DT).parameters[Entry.INTEGRAL_LIMIT]),
         "about": about,
     }
     with replacing(path) as temporary, open(temporary, "wb") as file:

@@ -28,7 +28,8 @@ static void lqr_step(const double *p, double *m, const double *reading, double *
     error = reading[GENERATOR_SPEED] / ratio - rated;
     pitch = m[LQR_M_PITCH_COMMAND];
     torque = m[LQR_M_TORQUE_COMMAND];
-    m[LQR_M_INTEGRAL] = speed_integral(m[LQR_M_INTEGRAL], error, pitch > p[LQR_HANDOVER_LOW], dt);
+    m[LQR_M_INTEGRAL] = speed_integral(m[LQR_M_INTEGRAL], error, pitch > p[LQR_HANDOVER_LOW], dt,
+                                        LQR_INTEGRAL_LIMIT);
 
     deviate(p, low, fraction, m);
     for (i = 0; i < LQR_N_PLANT; i++)

@@ -105,7 +105,8 @@ static void mpc_clone_step(const double *p, double *m, const double *reading, do
     estimate(p + CLONE_ESTIMATOR, estimated, reading, command);
     m[CLONE_M_OPERATING_WIND] = decay * m[CLONE_M_OPERATING_WIND] + (1.0 - decay) * estimated[LQR_WIND + 1];
     m[CLONE_M_INTEGRAL] =
-        speed_integral(m[CLONE_M_INTEGRAL], error, command[1] > CLONE_RESTING, p[CLONE_CONTROL_DT]);
+        speed_integral(m[CLONE_M_INTEGRAL], error, command[1] > CLONE_RESTING, p[CLONE_CONTROL_DT],
+                       p[CLONE_INTEGRAL_LIMIT]);
     if (m[CLONE_M_CALLS] == 0.0) {
         double low = curve_torque(p[CLONE_GEAR_RATIO] * estimated[LQR_ROTOR], 0.0, p + CLONE_CURVE);
         m[CLONE_M_LOW_TORQUE] = p[CLONE_TORQUE_LOW] < low ? p[CLONE_TORQUE_LOW] : low;

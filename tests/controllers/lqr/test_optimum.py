@@ -20,6 +20,7 @@ from fowt_env.controllers.lqr.optimum import (
     LIMITED,
     POWER_CEILING,
     TOLERANCE,
+    TRAVEL_CEILING,
     SampledLoop,
     limits,
     optimal_gain,
@@ -36,7 +37,7 @@ SETTINGS = LQGSettings()
 @pytest.fixture(scope="module")
 def loops():
     scene = build_scene("oc3_hywind", wind=18.0, fidelity="reference")
-    return {wind: SampledLoop(design_model(scene, wind), scene.turbine, 0.1) for wind in (12, 14, 18, 24)}
+    return {wind: SampledLoop(design_model(scene, wind), scene.turbine, 0.1) for wind in (12, 13, 14, 18, 24)}
 
 
 def test_the_covariance_is_that_of_scipy(loops):
@@ -57,7 +58,7 @@ def test_the_deviations_are_those_of_a_long_run_step_by_step(loops):
     # columns are runs: plant and weather, the filter's estimate, commands less the trim, speed integral
     z, estimate = np.zeros((MOMENT, runs)), np.zeros((N_STATE, runs))
     command, integral = np.zeros((2, runs)), np.zeros((1, runs))
-    speed, lean, travel, used = 0.0, 0.0, 0.0, 0
+    speed, lean, travel, drift, used = 0.0, 0.0, 0.0, 0.0, 0
     for step in range(steps):
         noise = np.array(SENSOR_NOISE)[:, None] * rng.normal(size=(5, runs))
         estimate += correction @ (model.C[:, :MOMENT] @ z + noise - model.C @ estimate)
@@ -71,10 +72,12 @@ def test_the_deviations_are_those_of_a_long_run_step_by_step(loops):
             used += 1
             speed, lean = speed + np.mean(z[4] ** 2), lean + np.mean(z[1] ** 2)
             travel += np.mean(np.abs(z[5] - before)) / dt
+            drift += np.mean(integral**2)
     # 24 runs of 2400 s hold some 2000 periods of the platform: 2 % of a deviation
     assert np.sqrt(speed / used) == pytest.approx(expected.speed, rel=0.05)
     assert np.sqrt(lean / used) == pytest.approx(expected.lean, rel=0.05)
     assert travel / used == pytest.approx(expected.travel, rel=0.05)
+    assert np.sqrt(drift / used) == pytest.approx(expected.integral, rel=0.05)
 
 
 @pytest.mark.parametrize("wind", [18, 24])
@@ -98,11 +101,15 @@ def test_the_baseline_is_gspi_in_continuous_time_but_for_sampling(loops, wind):
     assert found.speed == pytest.approx(np.sqrt(x[4, 4]), rel=0.02)
     assert found.lean == pytest.approx(np.sqrt(x[1, 1]), rel=0.02)
     assert found.travel == pytest.approx(np.sqrt(2.0 / np.pi * (a[5] @ x @ a[5])), rel=0.02)
+    assert found.integral == pytest.approx(np.sqrt(x[n + 1, n + 1]), rel=0.02)
 
 
 def test_where_gspi_is_unstable_the_ceilings_stand_for_it(loops):
+    """At 13 m/s gspi_oc3 is nearly unstable, and its linear model has more travel than the ceiling."""
     baseline = loops[12].baseline()
-    assert baseline.travel == float("inf") and baseline.power == POWER_CEILING
+    assert baseline.travel == TRAVEL_CEILING and baseline.power == POWER_CEILING
+    assert baseline.surge == baseline.integral == float("inf")
+    assert loops[13].baseline().travel == TRAVEL_CEILING > loops[14].baseline().travel
     assert limits(SETTINGS, 12.0, baseline, loops[12].turbine)["travel"] == pytest.approx(
         SETTINGS.travel_near_rated * np.pi / 180.0
     )

@@ -8,6 +8,7 @@ import pytest
 from fowt_env import build_scene, simulate
 from fowt_env.controllers import make
 from fowt_env.controllers.mpc.clone import FILE, SHAPES, MPCClone, read_clone
+from fowt_env.controllers.mpc.law import Entry
 from fowt_env.envs import FowtVectorEnv
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import named_cases
@@ -29,7 +30,9 @@ def test_its_law_is_that_of_mpc_around_the_same_network(wind):
     from fowt_env.training.studies.clone_mpc import Records, Teacher
 
     scene = turbulent(wind, 1004, 60.0)
-    teacher = Teacher(scene.turbine, 0.1, Records(), read_clone()[1])
+    made, network = read_clone()
+    teacher = Teacher(scene.turbine, 0.1, Records(), network)
+    teacher.parameters[Entry.INTEGRAL_LIMIT] = made.integral_limit  # of the training
     ours, theirs = (simulate(scene, law, duration=60.0) for law in ("mpc_clone", teacher))
     assert len(teacher.records) == 120
     for channel, rated in (("GenTq_[kN-m]", 43.1), ("BldPitch1_[deg]", 10.0), ("RotSpeed_[rpm]", 12.1)):

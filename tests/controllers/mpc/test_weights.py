@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from fowt_env import build_scene
 from fowt_env.controllers.lqr.design import design_models
-from fowt_env.controllers.lqr.optimum import GAUSSIAN_MEAN, SampledLoop
+from fowt_env.controllers.lqr.optimum import GAUSSIAN_MEAN, INTEGRAL, SampledLoop, stationary_covariance
 from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.controllers.mpc.weights import PRICED, weights_over
 from fowt_env.descriptions.turbine import read_turbine
@@ -40,12 +40,28 @@ def test_pitch_travel_is_that_of_the_limit_in_each_wind(models):
             assert reached(of_wind(models, wind), weights[wind])["travel"] == pytest.approx(travel, rel=0.03)
 
 
+def test_ten_minute_means_of_rotor_speed_deviate_by_the_limit(models):
+    """Exactly: of the difference of the speed integral over 6000 periods of the linear loop."""
+    rated = TURBINE.rated_rotor_speed
+    for limit in (0.003, 0.006):
+        weights = weights_over(models, MPCSettings(mean_speed=limit), TURBINE, 0.1)
+        for wind in (14.0, 18.0, 24.0):
+            loop = of_wind(models, wind)
+            named = dict(zip(PRICED, weights[wind], strict=False))
+            named["travel"] = weights[wind][-1] / GAUSSIAN_MEAN**2
+            a, q, _, _ = loop.closed(loop.gain(named, *weights[wind][5:7]))
+            x = stationary_covariance(a, q)
+            later = np.linalg.matrix_power(a, 6000) @ x
+            means = np.sqrt(2.0 * (x - later)[INTEGRAL, INTEGRAL]) / 600.0
+            assert means == pytest.approx(limit * rated, rel=0.04), (wind, limit)
+
+
 def test_no_other_weights_have_a_smaller_sum_of_ratios(models):
     """Against a general minimiser over all weights, at 18 m/s with the price of travel that was found.
 
     The weight of travel is on the rate of the command, not of the blades, and costs some 0.2 %.
     """
-    settings = MPCSettings(speed_integral=1e-9, torque_rate=1e-6)
+    settings = MPCSettings(mean_speed=1.0, torque_rate=1e-6)
     loop, ours = of_wind(models, 18.0), weights_over(models, settings, TURBINE, 0.1)[18.0]
     prices = [asdict(settings)[name] for name in PRICED.values()]
     ratios = reached(loop, ours)

@@ -43,6 +43,7 @@ def test_a_file_is_read_as_it_was_written(data, monkeypatch, tmp_path):
     clone_mpc.write_clone(tmp_path / "a.npz", network, {"rounds": 3})
     settings, arrays = read_clone(tmp_path / "a.npz")
     assert settings.about == {"rounds": 3} and settings.period == 0.5
+    assert settings.integral_limit == pytest.approx(7.5 * 1.267109)  # of the present mpc
     assert all(np.array_equal(arrays[name], network[name]) for name in SHAPES)
 
 
