@@ -2,7 +2,7 @@
 
 engine="ray" starts a local Ray with `jobs` workers; address="ray://head:10001" takes a running cluster
 instead. Which worker makes a run does not matter: a run's weather follows from its seed alone, so the table
-is that of one process, bit for bit. docs/guides/cluster.md has what handing the runs out costs.
+is that of one process, bit for bit. docs/results/speed.md has what handing the runs out costs.
 Needs pip install "fowt-env[ray]"; without Ray this example says so and ends.
 """
 

@@ -1,11 +1,19 @@
-"""Compiles the usual kinds of scene in advance, so that no later run waits for compilation."""
+"""Compiles the usual kinds of scene in advance, so that no later run waits for compilation.
 
+Also packs what was compiled, for wheels (fowt_env/shipped.py reads it).
+"""
+
+import io
 import json
+import os
 import subprocess
 import sys
+import tarfile
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 import pandas as pd
@@ -29,17 +37,18 @@ def _simulated(fidelity, **weather):
     return run
 
 
-def _stepped(name, **settings):
-    """Return a function that resets and steps an environment, a class of fowt_env.envs."""
+def _stepped(name, modes=("direct",), **settings):
+    """Return a function that resets and steps an environment, a class of fowt_env.envs, in action modes."""
 
     def run(platform):
         from fowt_env import envs
 
-        given = {"task": "above_rated", "platform": platform, "reward": "score"} | settings
-        environment = getattr(envs, name)(**given)
-        environment.reset(seed=0)
-        environment.step(np.zeros(environment.action_space.shape, dtype=np.float32))
-        environment.close()
+        for mode in modes:
+            given = {"task": "above_rated", "platform": platform, "reward": "score", "action_mode": mode}
+            environment = getattr(envs, name)(**given | settings)
+            environment.reset(seed=0)
+            environment.step(np.zeros(environment.action_space.shape, dtype=np.float32))
+            environment.close()
 
     return run
 
@@ -54,7 +63,10 @@ def _linear(platform):
 RUNS = "runs in turbulence and a random sea at fidelity"
 KINDS: dict[str, tuple[str, Callable[[str], object]]] = {  # name: (summary, function that runs it)
     "standard": (f"{RUNS} standard", _simulated("standard", wind=WIND, sea=SEA)),
-    "environment": ("reset and step of the Gymnasium environment", _stepped("FowtEnv")),
+    "environment": (
+        "reset and step of the Gymnasium environment",
+        _stepped("FowtEnv", ("direct", "residual")),
+    ),
     "easy": ("reset and step of the easiest task for agents", _stepped("FowtEnv", **EASY)),
     "vector": ("reset and step of the vector environment", _stepped("FowtVectorEnv", num_envs=2)),
     "steady": (
@@ -66,6 +78,7 @@ KINDS: dict[str, tuple[str, Callable[[str], object]]] = {  # name: (summary, fun
     "reference": (f"{RUNS} reference", _simulated("reference", wind=WIND, sea=SEA)),
 }
 USUAL = ("standard", "environment")
+PACKED = ("standard", "environment", "easy", "vector", "steady")  # which a wheel brings compiled
 
 
 def warmup(
@@ -141,3 +154,57 @@ def _compiled_apart(platform, kind):
     if done.returncode != 0:
         raise InputError(f"kind {kind}: {done.stderr.strip()[-600:]}")
     return tuple(json.loads(done.stdout.splitlines()[-1]))
+
+
+def write_pack(target: str | Path) -> list[str]:
+    """Write the kernels in this process's cache folder as a pack; return the names of its index files.
+
+    Kernels that are linked into others are left out: their callers contain them.
+    """
+    from fowt_env.files.atomic import replacing
+    from fowt_env.plant.compile.decorators import CACHE_FOLDER
+    from fowt_env.shipped import MANIFEST, facts
+
+    paths = [path for path in sorted(CACHE_FOLDER.rglob("*.nb[ic]")) if ".linked" not in path.name]
+    names = [PurePosixPath(path.relative_to(CACHE_FOLDER).as_posix()) for path in paths]
+    indices = [name for name in names if name.suffix == ".nbi"]
+    contents = {MANIFEST: json.dumps(facts(indices), indent=1).encode()}
+    contents |= {name.as_posix(): path.read_bytes() for name, path in zip(names, paths, strict=True)}
+    with replacing(target) as temporary, tarfile.open(temporary, "w:xz") as archive:
+        for name, content in contents.items():
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    return [name.as_posix() for name in indices]
+
+
+PACKER = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from fowt_env.warmup import warmup, write_pack
+warmup(kinds=json.loads(sys.argv[2]))
+write_pack(sys.argv[3])
+"""
+
+
+def compile_pack(folder: str | Path, kinds: Sequence[str] = PACKED) -> Path:
+    """Compile kinds of scene for x86-64-v3, apart from this process and cache; return the path of their pack.
+
+    folder  where the pack is written: fowt_env/kernels of the sources that a wheel is built from
+    kinds   names of KINDS, compiled for OC3-Hywind
+
+    Raises: InputError for an unknown kind, or if the kernels could not be compiled.
+    """
+    from fowt_env.shipped import PACK, VARIABLES
+
+    for kind in kinds:
+        if kind not in KINDS:
+            raise unknown("kind", kind, KINDS)
+    target = Path(folder, PACK.name)
+    with tempfile.TemporaryDirectory() as kernels:
+        variables = os.environ | VARIABLES | {"FOWT_CACHE_DIR": kernels}
+        words = [sys.executable, "-c", PACKER, json.dumps(sys.path), json.dumps(list(kinds)), str(target)]
+        done = subprocess.run(words, capture_output=True, text=True, env=variables)
+    if done.returncode != 0:
+        raise InputError(f"the pack could not be compiled: {done.stderr.strip()[-600:]}")
+    return target

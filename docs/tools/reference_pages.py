@@ -45,6 +45,8 @@ from fowt_env.plant.measurement import HEAD, BladeMeasurement, Measurement, meas
 from fowt_env.registration import ENTRY_POINT, ENVIRONMENTS, LADDER, OBJECTIVES, STEPS
 from fowt_env.scene.loads import LOADS
 from fowt_env.training.cli.app import app
+from fowt_env.training.evaluation.cases import read_suite, suite_names
+from fowt_env.training.evaluation.metrics import metric_table
 
 DOCS = Path(__file__).resolve().parents[1]
 markdown = partial(markdown_table, aligned=True)
@@ -365,6 +367,27 @@ def loads():
     return markdown(("load", "description", "section", "in `fowt_env/plant/`", "disabled by"), rows)
 
 
+def suites():
+    """Cases, seeds and times of the built-in suites."""
+    rows = []
+    for name in suite_names():
+        suite = read_suite(name)
+        scored = f"{suite.duration:g} s after {suite.skip:g} s" if suite.skip else f"{suite.duration:g} s"
+        rows.append((f"`{name}`", len(suite.cases), len(suite.seeds), scored, suite.description))
+    return markdown(("suite", "cases", "seeds", "run", "description"), rows)
+
+
+def metrics():
+    """Metrics that are more than statistics of one channel."""
+    statistics = tuple(f"_{name}" for name in ("mean", "std", "min", "max"))
+    rows = [
+        (f"`{name}_[{unit}]`", meaning)
+        for name, unit, meaning, _ in metric_table()
+        if not name.endswith(statistics) or "capped" in name
+    ]
+    return markdown(("metric", "definition"), rows)
+
+
 def integrators():
     """Facts of the integrators."""
     rows = [
@@ -386,6 +409,7 @@ TABLES = {
     "reference/controllers.md": (measurements, blade_measurements),
     "explanation/theory.md": (loads, integrators),
     "guides/your-dll.md": (bladed_records,),
+    "reference/suites.md": (suites, metrics),
 }  # fmt: skip
 
 

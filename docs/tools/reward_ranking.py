@@ -2,7 +2,7 @@
 
 The reward of weighted terms: in the same turbulence at 14, 18 and 22 m/s. The reward "score": in the cases
 of the suite above_rated, with validation seeds. Rewards are those of the environment's step, from the rows
-of the run; docs/reference/environment.md has the tables.
+of the run; docs/results/rewards.md has the tables.
 """
 
 import numpy as np
@@ -109,7 +109,7 @@ def by_wind(names=LAWS, seeds=VALIDATION):
 
 
 def wind_table(table):
-    """Score and reward of each controller in each wind, as the table of docs/reference/environment.md."""
+    """Score and reward of each controller in each wind, as the table of docs/results/rewards.md."""
     winds = sorted(table["wind"].unique())
     rows = [
         (f"`{name}`", *(f"{row.score:.2f}, {row.reward:.3f}" for row in group.itertuples()))
@@ -138,7 +138,7 @@ def ranking(names=CONTROLLERS, weights=None):
 
 
 def markdown(table):
-    """The ranking as the table of docs/reference/environment.md."""
+    """The ranking as the table of docs/results/rewards.md."""
     rows = [(f"`{name}`", *(f"{value:.2f}" for value in row)) for name, row in table.T.items()]
     return markdown_table(("baseline", "reward of a step", *METRICS), rows, aligned=True)
 

@@ -1,6 +1,6 @@
 """Score of stops at constant feathering rates in the task shutdown.
 
-`python docs/tools/shutdown_baseline.py` prints the table of docs/reference/environment.md.
+`python docs/tools/shutdown_baseline.py` prints the table of docs/results/rewards.md.
 """
 
 import numpy as np

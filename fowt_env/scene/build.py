@@ -38,6 +38,7 @@ from fowt_env.scene.structure import build_structure, build_torsion
 from fowt_env.scene.tower import build_tower_modes, modes_asked, tower_states
 from fowt_env.scene.user_loads import Load, build_user_loads, checked_loads
 from fowt_env.scene.weather import Sea, Wind, build_weather
+from fowt_env.shipped import take_kernels
 
 
 def build_scene(
@@ -78,6 +79,7 @@ def build_scene(
     implausible positions of the platform (details: `fowt model check`), of waves above the breaking limit,
     and of a mean wind in which the turbine does not operate.
     """
+    take_kernels()
     label = platform.name if isinstance(platform, Platform) else str(platform)
     if not isinstance(platform, Platform):
         platform = read_platform(platform)

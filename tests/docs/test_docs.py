@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from doc_pages import DOCS, FENCE, defined
+from offline_browser import browser, offline_page  # noqa: F401  # a fixture
 
 import fowt_env
 from fowt_env.descriptions.turbine import read_turbine
@@ -358,24 +359,43 @@ def test_docstrings_keep_their_lists_of_names_and_their_signs():
     assert as_markdown("a[i] < *b*") == r"a\[i\] &lt; \*b\*"
 
 
-@pytest.mark.slow
-@pytest.mark.nightly
-def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """Return the folder of the built site."""
     pytest.importorskip("mkdocs", reason="mkdocs is not installed: the extra `docs` is missing")
+    folder = tmp_path_factory.mktemp("site")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--config-file", ".mkdocs.yml"]
     variables = os.environ | {"NO_MKDOCS_2_WARNING": "1"}
     done = subprocess.run(
-        [*command, "--site-dir", str(tmp_path)], cwd=ROOT, env=variables, capture_output=True, text=True
+        [*command, "--site-dir", str(folder)], cwd=ROOT, env=variables, capture_output=True, text=True
     )
     assert done.returncode == 0 and "warning" not in done.stderr.lower(), done.stderr
-    pages = list(tmp_path.rglob("*.html"))
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_the_search_of_a_site_in_a_folder_finds_a_page(site, browser):  # noqa: F811
+    with offline_page(browser, site / "guides" / "faq.html", ".md-search__input") as page:
+        page.keyboard.press("/")
+        page.wait_for_selector(".md-search__input:focus")
+        page.keyboard.type("bubblewrap")
+        page.wait_for_selector(".md-search-result__link")
+        found = page.locator(".md-search-result__link").first.get_attribute("href")
+    assert found.endswith("guides/leaderboard.html")
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_the_site_is_built_without_a_warning_and_needs_no_network(site):
+    pages = list(site.rglob("*.html"))
     assert {"index.html", "theory.html", "readme.html", "contributing.html"} <= {page.name for page in pages}
     for page in pages:
         text = page.read_text(encoding="utf-8")
         assert not re.search(r'<(script|img|iframe)[^>]+src="https?:', text), page
         assert not re.search(r'<link[^>]+rel="(stylesheet|preconnect|icon)"[^>]+href="https?:', text), page
         assert 'class="arithmatex"' not in text, page  # a formula that was not drawn
-    theory = (tmp_path / "explanation" / "theory.html").read_text(encoding="utf-8")
+    theory = (site / "explanation" / "theory.html").read_text(encoding="utf-8")
     assert theory.count('class="number"') == len(
         re.findall(r"\\tag\{", (DOCS / "explanation/theory.md").read_text())
     )

@@ -163,7 +163,7 @@ def test_the_default_weights_rank_controllers_as_their_metrics_do():
     assert table.index[0] == "lqr"
     gaps = -np.diff(table["reward"])
     assert gaps.min() > 0.1  # of some 9 that perfection is paid
-    page = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "environment.md").read_text()
+    page = (Path(__file__).resolve().parents[2] / "docs" / "results" / "rewards.md").read_text()
     assert tool.markdown(table) in page, tool.markdown(table)
     even = tool.ranking(("lqr", "pi_unscheduled", "gspi_oc3"), {name: 1.0 for name in REWARD_TERMS})
     assert even.index[0] == "pi_unscheduled"

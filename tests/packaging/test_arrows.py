@@ -10,8 +10,9 @@ from fowt_env.plant.compile.sources import all_imports
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 # from the ground up; a layer imports itself and what stands before it
 LAYERS = (
-    "errors", "caches", "folders", "layout", "display", "registration", "plant", "loop", "descriptions",
-    "weather", "scene", "files", "analysis", "control", "run", "realtime", "visual", "envs", "warmup",
+    "errors", "caches", "folders", "layout", "display", "registration", "plant", "shipped", "loop",
+    "descriptions", "weather", "scene", "files", "analysis", "control", "run", "realtime", "visual", "envs",
+    "warmup",
     "controllers", "training", "training.evaluation", "training.design", "training.rl", "training.reports",
     "training.live", "training.board", "training.loads", "training.validation", "training.benchmarks",
     "training.studies", "training.cli",

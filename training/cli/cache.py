@@ -7,7 +7,7 @@ from rich.markup import escape
 from typer import Option
 
 from fowt_env.errors import InputError
-from fowt_env.training.cli.console import add_group, command, dev, note, out, reported
+from fowt_env.training.cli.console import add_group, command, dev, note, out, reported, wrote
 from fowt_env.training.cli.tables import print_table
 
 cache = add_group("cache", "Show or clear the cache on disk.", dev, invoke_without_command=True)
@@ -57,3 +57,18 @@ def clear(
     note(f"removed {text}")
     if kept:
         raise InputError(f"could not be removed: {', '.join(map(str, kept))}")
+
+
+@command(cache)
+def pack(
+    folder: Annotated[str, Option("--out", help="Folder of the pack.")] = "fowt_env/kernels",
+):
+    """Compile the usual scenes for x86-64-v3 and pack them, for a wheel that starts without compiling.
+
+    Examples:
+    fowt dev cache pack && python -m build  # a wheel with the kernels of this Python version
+    """
+    from fowt_env.warmup import PACKED, compile_pack
+
+    note(f"compiling {len(PACKED)} kinds of scene: {', '.join(PACKED)}")
+    wrote(compile_pack(folder))
