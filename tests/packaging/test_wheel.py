@@ -18,7 +18,8 @@ from fowt_env.training.evaluation.provenance import controller_code, plant_code
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = {"fowt_env": "fowt_env", "controllers": "fowt_env/controllers", "training": "fowt_env/training"}
-LEFT_OUT = ("fowt_env/training/studies/", "fowt_env/training/validation/reference/")  # of a clone alone
+# of a clone alone, and packs of kernels, which a release adds
+LEFT_OUT = ("fowt_env/training/studies/", "fowt_env/training/validation/reference/", "fowt_env/kernels/")
 SHIPPED = {  # one of each kind of file that is no source
     "fowt_env/py.typed",
     "fowt_env/data/sea_states.toml",
