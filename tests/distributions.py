@@ -18,6 +18,12 @@ def run(*command, **options):
     return done.stdout
 
 
+def index_reached(python, folder):
+    """Return whether pip can fetch a package that every index has: nothing else excuses a failure."""
+    probe = [python, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", folder / "probe", "pip"]
+    return subprocess.run(probe, capture_output=True).returncode == 0
+
+
 def repository(folder):
     """Return a folder with a repository whose one commit is the working copy as it is now."""
     names = run("git", "-C", ROOT, "ls-files", "--cached", "--others", "--exclude-standard", "-z").split("\0")

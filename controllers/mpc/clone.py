@@ -171,6 +171,15 @@ def read_clone(path=FILE):
     return record, {name: arrays[name].astype(np.float64) for name in SHAPES}
 
 
+def is_clone(path):
+    """Return whether a file holds a network of a clone, valid or not, and not another policy."""
+    try:
+        settings = parse_json(str(read_arrays(path, MAX_BYTES)["settings"]))
+    except Exception:  # whoever reads it as a policy names what is wrong
+        return False
+    return isinstance(settings, dict) and "period" in settings
+
+
 class MPCClone(CompiledController):
     """Runs a network that imitates mpc, on the plant of its training; call prepare(scene) before reset.
 

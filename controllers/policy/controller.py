@@ -1,8 +1,8 @@
 """Runs an exported policy network as a controller, evaluated with numpy only.
 
 A policy file (network_file.py) is read without pickle, so that loading runs no code of the file's author.
-`policy:NAME` is a file in the folder agents, `policy:PATH` any other file; a stable-baselines3 zip is
-rejected, because loading a zip executes code from it.
+`policy:NAME` is a file in the folder agents, `policy:PATH` any other file, also one with a network for
+mpc_clone; a stable-baselines3 zip is rejected, because loading a zip executes code from it.
 """
 
 from dataclasses import replace
@@ -12,6 +12,7 @@ import numpy as np
 
 from fowt_env.control import CompiledController, call_law, check_control_dt, hidden, view_of, wind_ahead
 from fowt_env.controllers.lqr.law import WindEstimator
+from fowt_env.controllers.mpc.clone import MPCClone, is_clone
 from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.envs.actions import (
     ACTION_MODES,
@@ -191,6 +192,11 @@ class PolicyController:
 
 
 def policy(name):
-    """Return the factory (turbine, control_dt) of the agent "policy:NAME" or "policy:PATH"."""
+    """Return the factory (turbine, control_dt) of the agent "policy:NAME" or "policy:PATH".
+
+    A file with another network for mpc_clone is a compiled law.
+    """
     path = policy_path(name.removeprefix(POLICY_PREFIX))
+    if is_clone(path):
+        return lambda turbine, control_dt: MPCClone(turbine, control_dt, path, name)
     return lambda turbine, control_dt: PolicyController(path, turbine, control_dt, name)

@@ -44,12 +44,12 @@ NEEDS = {  # example: modules without which its claims are not met
 }
 # they start Ray, and torch
 SLOW = {"12_ray": [pytest.mark.slow], "13_resume": [pytest.mark.slow, pytest.mark.nightly]}
-TRAINED = "10_train_small_agent"  # takes minutes: tests/examples has its test
+TRAINED = ("10_train_small_agent", "18_cleanrl_ppo")  # take minutes: tests/examples has a test of each
 
 
 def test_every_example_is_tested_and_listed():
     names = {path.stem for path in FOLDER.glob("*.py")}
-    assert names == {*CLAIMS, TRAINED}
+    assert names == {*CLAIMS, *TRAINED}
     listed = set(re.findall(r"`(\d\d_\w+)\.py`", (FOLDER / "README.md").read_text()))
     assert listed == names
 

@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from distributions import repository, run, wheel_of
+from distributions import index_reached, repository, run, wheel_of
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
@@ -81,12 +81,6 @@ def test_every_library_that_is_imported_at_the_top_of_a_module_is_declared():
                 named = [node.module] if isinstance(node, ast.ImportFrom) else [a.name for a in node.names]
                 missing |= {f"{place}: {name}" for name in named if name.partition(".")[0] not in known}
     assert not missing
-
-
-def index_reached(python, folder):
-    """Whether pip can fetch a package that every index has: a bound that is not to be had is no excuse."""
-    probe = [python, "-m", "pip", "download", "--quiet", "--no-deps", "--dest", folder / "probe", "pip"]
-    return subprocess.run(probe, capture_output=True).returncode == 0
 
 
 @pytest.mark.slow

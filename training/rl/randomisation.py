@@ -85,15 +85,15 @@ PLANTS = 8  # of an environment of unknown plants
 
 def unknown_plant(plant=0, **settings):
     """Return a FowtEnv with the settings and the plant of a seed; its controllers know the nominal plant."""
-    return FowtEnv(**settings, **_of_plants(1, plant)[0])
+    return FowtEnv(**settings, **drawn_plants(1, plant)[0])
 
 
 def unknown_plants(num_envs=1, plant=0, **settings):
     """Return a FowtVectorEnv of num_envs environments, with PLANTS different plants of a seed at most."""
-    return FowtVectorEnv(num_envs, per_env=_of_plants(num_envs, plant), **settings)
+    return FowtVectorEnv(num_envs, per_env=drawn_plants(num_envs, plant), **settings)
 
 
-def _of_plants(n, seed):
-    """Return n dicts of settings with drawn plants, without their sensors."""
+def drawn_plants(n, seed):
+    """Return n dicts of FowtEnv settings with PLANTS different drawn plants at most, without sensors."""
     drawn = randomised({"plants": min(PLANTS, n), "noise": None, "delay": None}, n, seed)
     return [{name: value for name, value in each.items() if name != "sensors"} for each in drawn]

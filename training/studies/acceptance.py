@@ -4,9 +4,10 @@
 
 Each seed is PPO("MlpPolicy", gymnasium.make(NAME), seed=seed).learn(STEPS) in a process of its own. At 0,
 25, 50, 75 and 100 % of the steps the deterministic policy runs the validation episodes of the task; that of
-the end then runs the suite above_rated. The folder has curve_SEED.csv (returns of the training episodes),
-validation.csv, scores.csv, policy_SEED.npz, curve.png and verdict.json. The acceptance is met with a
-validation reward above that of zero action in every seed, and a score below 0.9 in all but one at most.
+the end then runs the suite above_rated, unless with --no-scored. The folder has curve_SEED.csv (returns of
+the training episodes), validation.csv, scores.csv, policy_SEED.npz, curve.png and verdict.json. The
+acceptance is met with a validation reward above that of zero action in every seed, and a score below 0.9 in
+all but one at most.
 """
 
 import json
@@ -26,26 +27,29 @@ import typer
 import fowt_env  # noqa: F401 # registers the environments
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import write_table
-from fowt_env.registration import STEPS
+from fowt_env.registration import LADDER, STEPS
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.seeds import PURPOSES, seeds_for
 
 EASY = "fowt_env/OC3HywindEasy-v0"
-WINDS = (12.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0)  # m/s, of the validation episodes
+WINDS = {  # m/s, of the validation episodes of a task
+    "above_rated": (12.0, 13.0, 14.0, 16.0, 18.0, 20.0, 22.0, 24.0),
+    "full_range": (5.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 24.0),
+}
 FIRST_SEED = 200  # index of the validation seed of the first episode
 PARTS = 4  # a validation after each of these parts of a training
 SCORE = 0.9  # to be reached on the suite
 
 
-def returns(name, policy, winds=WINDS, first=FIRST_SEED):
+def returns(name, policy):
     """Return the mean rewards of a decision (episodes,) in validation episodes of an environment.
 
     policy: function of observations (n, size) that returns actions (n, actions). After an early end decisions
     count 0.
     """
-    options = episodes(winds, first)
+    options = episodes(name)
     env: Any = gymnasium.make_vec(name, len(options), autoreset_mode="Disabled", threads=1)
     observations, _ = env.reset(seed=0, options=options)
     total, running = np.zeros(len(options)), np.ones(len(options), dtype=bool)
@@ -59,9 +63,10 @@ def returns(name, policy, winds=WINDS, first=FIRST_SEED):
     return total / STEPS
 
 
-def episodes(winds=WINDS, first=FIRST_SEED):
-    """Return the options of reset of the validation episodes, one for each mean wind (m/s)."""
-    seeds = seeds_for("validation", first, len(winds))
+def episodes(name):
+    """Return the options of reset of an environment's validation episodes, one for each of its WINDS."""
+    winds = WINDS[LADDER[name]["task"]]
+    seeds = seeds_for("validation", FIRST_SEED, len(winds))
     return [
         {
             "wind": {"kind": "ntm", "speed": wind, "class": "B", "sigma": "drawn"},
@@ -72,25 +77,43 @@ def episodes(winds=WINDS, first=FIRST_SEED):
     ]
 
 
-def trained(seed, name, steps, folder, algo="ppo"):
-    """Train one seed; write its curve and policy and return the rows of its validations."""
+class Validations:
+    """Validates the policy of a training before its first decision, after each part of it and at its end.
+
+    rows: dicts of seed, steps, reward and seconds.
+    """
+
+    def __init__(self, name, seed, steps):
+        self.name, self.seed, self.steps = name, seed, steps
+        self.rows, self.began = [], time.perf_counter()
+
+    def due(self, done, policy):
+        """Validate a policy if a part has ended after `done` decisions."""
+        if len(self.rows) < PARTS and done >= len(self.rows) * self.steps / PARTS:
+            self.now(done, policy)
+
+    def now(self, done, policy):
+        """Validate a policy: a function of observations (n, size) that returns actions."""
+        reward = returns(self.name, policy).mean()
+        seconds = time.perf_counter() - self.began
+        self.rows.append({"seed": self.seed, "steps": done, "reward": reward, "seconds": seconds})
+        print(f"seed {self.seed}: {done} steps, {reward:.4f} a decision", flush=True)
+
+
+def learned(seed, name, steps, algo, validations):
+    """Train an algorithm of stable-baselines3 with default settings; return (model, its Monitor)."""
     import torch
     from stable_baselines3.common.callbacks import BaseCallback
     from stable_baselines3.common.monitor import Monitor
 
-    from fowt_env.training.rl.export import export_policy
     from fowt_env.training.rl.train import make_algorithm
 
     torch.set_num_threads(1)
     env = Monitor(gymnasium.make(name))
-    model = make_algorithm(algo)("MlpPolicy", env, seed=seed)
-    rows, began = [], time.perf_counter()
+    model = make_algorithm(algo)("MlpPolicy", env, seed=seed, device="cpu")
 
-    def validate():
-        values = returns(name, lambda seen: model.predict(seen, deterministic=True)[0])
-        row = {"seed": seed, "steps": model.num_timesteps, "reward": values.mean()}
-        rows.append(row | {"seconds": time.perf_counter() - began})
-        print(f"seed {seed}: {row['steps']} steps, {row['reward']:.4f} a decision", flush=True)
+    def policy(seen):
+        return model.predict(seen, deterministic=True)[0]
 
     class Validate(BaseCallback):
         """Validates before the first decision and after each part of the training but the last."""
@@ -99,18 +122,25 @@ def trained(seed, name, steps, folder, algo="ppo"):
             return True
 
         def _on_rollout_start(self):
-            if len(rows) < PARTS and self.num_timesteps >= len(rows) * steps / PARTS:
-                validate()
+            validations.due(self.num_timesteps, policy)
 
     model.learn(steps, callback=Validate())
-    validate()
+    validations.now(model.num_timesteps, policy)
+    return model, env
+
+
+def trained(seed, name, steps, folder, algo="ppo"):
+    """Train one seed; write its curve and policy and return the rows of its validations."""
+    from fowt_env.training.rl.export import export_policy
+
+    validations = Validations(name, seed, steps)
+    model, env = learned(seed, name, steps, algo, validations)
     lengths = env.get_episode_lengths()
     curve = {"steps": np.cumsum(lengths), "return": env.get_episode_rewards(), "length": lengths}
     write_table(pd.DataFrame(curve), folder / f"curve_{seed}.csv")
     about = {"algo": algo, "name": name, "seed": seed, "steps": model.num_timesteps}
-    if env.unwrapped.action_space.shape == (2,):
-        export_policy(model, env.unwrapped, folder / f"policy_{seed}.npz", about)
-    return rows
+    export_policy(model, env.unwrapped, folder / f"policy_{seed}.npz", about)
+    return validations.rows
 
 
 def scores(controllers, purpose, count, jobs):
@@ -136,6 +166,7 @@ def main(
     purpose: Annotated[
         str, typer.Option(help=f"Seeds of the suite: {', '.join(PURPOSES)} or suite.")
     ] = "suite",
+    scored: Annotated[bool, typer.Option(help="Whether the policies run the suite at the end.")] = True,
 ):
     """Train several seeds side by side, validate and score them."""
     out.mkdir(parents=True, exist_ok=True)
@@ -149,24 +180,28 @@ def main(
     table = pd.DataFrame([row for rows in each for row in rows])
     write_table(table, out / "validation.csv")
     plot(table, zero, name, out / "curve.png")
-    policies = {f"seed {seed}": f"policy:{out / f'policy_{seed}.npz'}" for seed in range(seeds)}
-    chosen = None if purpose == "suite" else purpose
-    found = scores(policies | {"gspi_oc3": "gspi_oc3", "pi": "pi"}, chosen, 2, jobs)
-    write_table(
-        pd.DataFrame([{"controller": k, "score": s, "lost": n} for k, (s, n) in found.items()]),
-        out / "scores.csv",
-    )
     last = table.groupby("seed")["reward"].last()
-    above, below = int((last > zero).sum()), sum(found[label][0] < SCORE for label in policies)
+    above = int((last > zero).sum())
     verdict = {
         "zero": float(zero),
         "rewards": last.tolist(),
-        "scores": {label: found[label][0] for label in policies},
         "above_zero": f"{above} of {seeds}",
-        "below_0.9": f"{below} of {seeds}",
         "seconds": float(table["seconds"].max()),
-        "met": above == seeds and below >= seeds - 1,
     }
+    if scored:
+        policies = {f"seed {seed}": f"policy:{out / f'policy_{seed}.npz'}" for seed in range(seeds)}
+        chosen = None if purpose == "suite" else purpose
+        found = scores(policies | {"gspi_oc3": "gspi_oc3", "pi": "pi"}, chosen, 2, jobs)
+        write_table(
+            pd.DataFrame([{"controller": k, "score": s, "lost": n} for k, (s, n) in found.items()]),
+            out / "scores.csv",
+        )
+        below = sum(found[label][0] < SCORE for label in policies)
+        verdict |= {
+            "scores": {label: found[label][0] for label in policies},
+            "below_0.9": f"{below} of {seeds}",
+            "met": above == seeds and below >= seeds - 1,
+        }
     with replacing(out / "verdict.json") as path:
         path.write_text(json.dumps(verdict, indent=1), encoding="utf-8")
     print(json.dumps(verdict, indent=1))

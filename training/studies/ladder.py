@@ -1,7 +1,7 @@
 """Tabulates what controllers earn on the ladder of tasks: `python -m fowt_env.training.studies.ladder`.
 
 Rewards of a decision, means over the validation episodes of acceptance.py: of zero action, and of controllers
-in the place of the agent, with the sensors, faults and plant of the task.
+in the place of the agent, with the sensors, faults, plants and random seeds that the agent meets.
 """
 
 from functools import partial
@@ -15,11 +15,11 @@ import fowt_env  # noqa: F401 # registers the environments
 from fowt_env.envs import FowtEnv
 from fowt_env.files.markdown import markdown_table
 from fowt_env.registration import LADDER
-from fowt_env.training.rl.randomisation import unknown_plant
+from fowt_env.training.rl.randomisation import drawn_plants
 from fowt_env.training.studies.acceptance import episodes, returns
 
 LAWS = ("pi", "lqr", "mpc")
-AGENT = ("action_mode", "decisions", "normalise", "observation", "residual_torque", "residual_pitch")
+AGENT = ("action_mode", "decisions", "normalise", "residual_torque", "residual_pitch")
 
 
 def earned(name, law):
@@ -28,16 +28,20 @@ def earned(name, law):
     settings |= {"action_mode": "residual", "baseline": law}
     if LADDER[name]["action_mode"] == "individual_residual":
         settings["pitch"] = "individual"
-    env = unknown_plant(**settings) if "Unknown" in name else FowtEnv(**settings)
+    weathers = episodes(name)
+    if "Unknown" in name:  # a plant for each episode, as in a batch
+        envs = [FowtEnv(**settings, **plant) for plant in drawn_plants(len(weathers), 0)]
+    else:
+        envs = [FowtEnv(**settings)] * len(weathers)
     totals = []
-    for options in episodes():
-        env.reset(seed=0, options=options)
-        rewards, ended = [], False
+    for seed, (env, options) in enumerate(zip(envs, weathers, strict=True)):
+        env.reset(seed=seed, options=options)
+        total, ended = 0.0, False
         while not ended:
             _, reward, terminated, truncated, _ = env.step((0.0, 0.0))
-            rewards.append(reward)
+            total += reward
             ended = terminated or truncated
-        totals.append(sum(rewards) * env.control_dt / env.task.duration)  # an early end forfeits the rest
+        totals.append(total * env.control_dt / env.task.duration)  # an early end forfeits the rest
     return float(np.mean(totals))
 
 

@@ -1,0 +1,70 @@
+"""The search for a better last layer of mpc_clone: its optimiser, its candidates, its runs."""
+
+import numpy as np
+import pytest
+
+from fowt_env.controllers.mpc.clone import FILE, HIDDEN, N_INPUTS, read_clone
+from fowt_env.training.evaluation.cases import read_suite
+from fowt_env.training.evaluation.evaluate import evaluate
+from fowt_env.training.studies import search_clone
+
+
+def test_the_distribution_moves_to_the_minimum_of_an_ill_conditioned_cost():
+    scales = np.geomspace(1.0, 30.0, 5)
+    aim = np.linspace(-1.0, 1.0, 5)
+    search = search_clone.Search(5, 10, 0.5, seed=0)
+    for _ in range(120):
+        search.tell(((search.ask(10) - aim) ** 2 * scales**2).sum(axis=1))
+    assert search.mean == pytest.approx(aim, abs=1e-4)
+    lengths = np.sqrt(np.diag(search.covariance))
+    assert lengths[0] > 5.0 * lengths[-1]  # it has found the scales
+
+
+def test_a_candidate_adds_its_vector_times_the_components():
+    network, rng = read_clone(FILE)[1], np.random.default_rng(0)
+    mean, spread = rng.normal(size=HIDDEN), np.array([0.2, 0.05])
+    components = rng.normal(size=(search_clone.COMPONENTS, HIDDEN))
+    vector = rng.normal(size=2 * (search_clone.COMPONENTS + 1))
+    found = search_clone.changed(network, components, mean, spread, vector)
+    x = (network["mean"] + network["scale"] * rng.normal(size=(20, N_INPUTS)) - network["mean"]) / network[
+        "scale"
+    ]
+    for i in range(2):
+        x = np.tanh(x @ network[f"weight_{i}"].T + network[f"bias_{i}"])
+    shown = np.column_stack([np.ones(20), (x - mean) @ components.T])
+    outputs = [x @ each["weight_2"].T + each["bias_2"] for each in (found, network)]
+    assert outputs[0] - outputs[1] == pytest.approx(spread * (shown @ vector.reshape(2, -1).T))
+    same = search_clone.changed(network, components, mean, spread, 0.0 * vector)
+    assert all(np.array_equal(same[name], network[name]) for name in network)
+
+
+@pytest.mark.slow
+def test_episodes_are_the_runs_of_a_suite_and_candidates_differ():
+    suite = read_suite(search_clone.LULLS)
+    case = suite.cases[1]
+    episodes = search_clone.Episodes([case], 2, 40.0, 10.0)
+    one = search_clone.Episodes([case], 1, 40.0, 10.0)
+    one.weather([1234])
+    episodes.begin_as(one)
+    network = read_clone(FILE)[1]
+    stronger = network | {"weight_2": 1.2 * network["weight_2"]}
+    (kept,), (moved,) = episodes.run([network, stronger])
+    table = evaluate(
+        {"mpc_clone": "mpc_clone"}, suite, cases=[case.name], seeds=[1234], duration=40.0, skip=10.0
+    )
+    row = table[table["controller"] == "mpc_clone"].iloc[0]
+    for name in ("RotSpeed_std_[rpm]", "RotTorq_DEL_[kN-m]", "blade_pitch_travel_[deg/s]"):
+        assert kept[name] == pytest.approx(row[name], rel=1e-9)
+        assert moved[name] != kept[name]
+
+
+def test_a_lost_run_and_an_exceeded_limit_cost():
+    run = dict.fromkeys(
+        ("RotSpeed_std_[rpm]", search_clone.TRAVEL, search_clone.SHAFT, search_clone.CAPPED), 1.0
+    )
+    run |= {"torque_travel_[kN-m/s]": 0.5, "GenPwr_max_[kW]": 5000.0}
+    terms = {"RotSpeed_std_[rpm]": 1.0, search_clone.TRAVEL: 1.0}
+    better = run | {"RotSpeed_std_[rpm]": 0.5}
+    assert search_clone.score_of([better, better], [run, run], terms) == pytest.approx((0.75, 0.0))
+    far = run | {search_clone.TRAVEL: 1.12, "torque_travel_[kN-m/s]": 0.6}
+    assert search_clone.score_of([far], [run], terms)[1] == pytest.approx(0.1 + 0.2)

@@ -1,0 +1,283 @@
+"""Searches for a better last layer of the network of mpc_clone by a population (CMA-ES) on an aim of its own.
+
+    python -m fowt_env.training.studies.search_clone lulls --out runs/lulls_0 --seed 0
+    python -m fowt_env.training.studies.search_clone gusts --out runs/gusts_0 --seed 0
+
+A candidate adds a linear function of the leading principal components of the second hidden layer to the two
+outputs, rates of torque and blade pitch: (COMPONENTS + 1) x 2 numbers. All candidates of a generation run the
+same episodes, in weather of training seeds; every RENEWED generations the weather is drawn anew. The cost of
+a candidate is that of the runs as a suite measures them:
+
+lulls   the score of the suite lulls.toml beside this file, normal turbulence of 11.5 to 14.5 m/s
+gusts   the mean of the mean and the largest overspeed in the suite `gusts` over those of mpc_clone, and half
+        the score of the suite above_rated at NORMAL winds over that of mpc_clone, beyond 1
+
+What exceeds the limits of the suite on travel, shaft, torque rate and power costs PRICE, a lost run LOST. The
+folder has clone.npz, the network at the mean of the last distribution, and search.csv, a row for each
+generation. Method: Hansen, "The CMA evolution strategy: a tutorial", 2016.
+"""
+
+import time
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import pandas as pd
+import typer
+
+from fowt_env.controllers.mpc.clone import ESTIMATOR, FILE, NETWORK, CloneMemory, read_clone
+from fowt_env.envs import FowtVectorEnv
+from fowt_env.errors import InputError
+from fowt_env.files.tables import write_table
+from fowt_env.training.evaluation.case_environment import environment_settings
+from fowt_env.training.evaluation.cases import read_suite
+from fowt_env.training.evaluation.metrics import mean_exponent, metrics
+from fowt_env.training.evaluation.seeds import seeds_for
+from fowt_env.training.studies.clone_mpc import write_clone
+
+COMPONENTS = 12
+RENEWED = 5  # generations
+STEP = (
+    0.1  # first standard deviation of a candidate, of the rates' standard deviation per unit of a component
+)
+PRICE = 10.0  # per unit above a limit
+LOST = 10.0  # times the share of lost runs
+TORQUE_TRAVEL, POWER = 0.5, 1.4  # limits of the suite above_rated, kN m/s and of rated power
+RATED_POWER = 5000.0  # kW
+TRAVEL, SHAFT, CAPPED = "blade_pitch_travel_[deg/s]", "RotTorq_DEL_[kN-m]", "GenPwr_capped_mean_[kW]"
+NORMAL = (12, 14, 18, 22)  # m/s
+HOLD = {"hold": 100, "smoothing": 0.0, "history": 0}  # zero actions: the baseline alone, few calls
+LULLS = Path(__file__).with_name("lulls.toml")
+REFERENCE = "gspi_oc3"
+NORMAL_TIME, GUST_TIME = (500.0, 150.0), (300.0, 150.0)  # s, duration and what is skipped of it
+FIRST = 50_000  # number of the first training seed
+
+
+class Episodes:
+    """Runs candidates of a network in the same episodes of load cases, in one batch.
+
+    cases: Cases; candidates: number of networks; duration, skip: s.
+    """
+
+    def __init__(self, cases, candidates, duration, skip, controller="mpc_clone"):
+        self.cases, self.candidates, self.skip = cases, candidates, skip
+        settings = [environment_settings(case, duration) for case in cases]
+        common = {"action_mode": "residual", "baseline": controller, "decisions": HOLD, "threads": 1}
+        self.env = FowtVectorEnv(len(cases) * candidates, "Disabled", per_env=settings * candidates, **common)
+        self.start = None
+
+    def weather(self, seeds):
+        """Begin the episodes of each case in the weather of its seed, for a single candidate."""
+        self.env.reset(options=[{"weather_seed": seed} for seed in seeds])
+        self.start = self.env.get_state()
+
+    def begin_as(self, other):
+        """Begin the episodes of Episodes of the same cases for a single candidate."""
+        self.start = other.start * self.candidates
+
+    def run(self, networks=None):
+        """Return [{metric: value} or None of a lost run] of each case for each candidate.
+
+        networks: list of {name of SHAPES: array}; None: that of the shipped clone, or another controller.
+        """
+        self.env.set_state(self.start)
+        for i, env in enumerate(self.env.envs if networks is not None else ()):
+            network = networks[i // len(self.cases)]
+            env._baseline.parameters[NETWORK:ESTIMATOR] = np.concatenate([*map(np.ravel, network.values())])
+        zero, n = np.zeros((self.env.num_envs, 2)), len(self.cases)
+        self.memories, ended = [], np.zeros(self.env.num_envs, dtype=bool)
+        while not ended.all():
+            *_, terminated, truncated, _ = self.env.step(zero)
+            ended = terminated | truncated
+            if terminated.any():
+                raise RuntimeError("a protected turbine goes on until the end of its run")
+            self.memories.append(np.array([env._episode.memory for env in self.env.envs]))
+        lost = [env.is_stopping for env in self.env.envs]
+        found = [
+            None if gone else metrics(env.frame(), skip=self.skip)
+            for gone, env in zip(lost, self.env.envs, strict=True)
+        ]
+        return [found[i * n : (i + 1) * n] for i in range(self.candidates)]
+
+
+def mean_of(runs, metric):
+    """Return the mean of a metric over runs, as that of a lifetime."""
+    p = mean_exponent(metric)
+    return float(np.mean([run[metric] ** p for run in runs]) ** (1.0 / p))
+
+
+def score_of(runs, reference, terms):
+    """Return (score, excess over the limits) of runs relative to those of a reference, none of them lost."""
+    ratio = {name: mean_of(runs, name) / mean_of(reference, name) for name in (*terms, CAPPED)}
+    score = np.average([ratio[name] for name in terms], weights=list(terms.values())) / ratio[CAPPED]
+    excess = max(0.0, ratio[TRAVEL] - 1.02) + max(0.0, ratio[SHAFT] - 1.1)
+    excess += max(0.0, mean_of(runs, "torque_travel_[kN-m/s]") / TORQUE_TRAVEL - 1.0)
+    excess += max(0.0, max(run["GenPwr_max_[kW]"] for run in runs) / (POWER * RATED_POWER) - 1.0)
+    return score, excess
+
+
+class Aim:
+    """Computes the costs of candidates on an aim. name: lulls or gusts."""
+
+    def __init__(self, name, candidates):
+        self.suite = read_suite(LULLS if name == "lulls" else "above_rated")
+        self.terms = {term.metric: term.weight for term in self.suite.score.term}
+        cases = [case for case in self.suite.cases if name == "lulls" or int(case.name[4:]) in NORMAL]
+        self.parts = {"normal": (cases * (2 if name == "lulls" else 1), NORMAL_TIME)}
+        if name == "gusts":
+            self.parts["gusts"] = (read_suite("gusts").cases, GUST_TIME)
+        self.own = {part: Episodes(cases, candidates, *time) for part, (cases, time) in self.parts.items()}
+        self.start = {part: Episodes(cases, 1, *time) for part, (cases, time) in self.parts.items()}
+        self.base = Episodes(*self.parts["normal"][:1], 1, *NORMAL_TIME, controller=REFERENCE)
+
+    def weather(self, first):
+        """Draw weather by training seeds from number `first` on; run mpc_clone and the reference in it."""
+        for part, (cases, _) in self.parts.items():
+            seeds = seeds_for("training", first, len(cases))
+            for episodes in (self.start[part], *([self.base] if part == "normal" else [])):
+                episodes.weather(seeds)
+            self.own[part].begin_as(self.start[part])
+        (self.reference,) = self.base.run()
+        self.of_start = {part: episodes.run()[0] for part, episodes in self.start.items()}
+
+    def costs(self, networks):
+        """Return the costs (candidates,) of networks."""
+        runs = {part: episodes.run(networks) for part, episodes in self.own.items()}
+        return np.array(
+            [self.cost({part: all_[i] for part, all_ in runs.items()}) for i in range(len(networks))]
+        )
+
+    def cost(self, runs):
+        """Return the cost of {part: runs}; means are of the runs that neither side lost."""
+        lost = [run is None for part in runs.values() for run in part]
+        kept = [(run, base) for run, base in zip(runs["normal"], self.reference, strict=True) if run and base]
+        if not kept:
+            return LOST
+        score, excess = score_of(*zip(*kept, strict=True), self.terms)
+        total = LOST * np.mean(lost) + PRICE * excess
+        if "gusts" not in runs:
+            return total + score
+        started = [pair for pair in zip(self.of_start["normal"], self.reference, strict=True) if all(pair)]
+        total += 0.5 * max(0.0, score / score_of(*zip(*started, strict=True), self.terms)[0] - 1.0)
+        pairs = [pair for pair in zip(runs["gusts"], self.of_start["gusts"], strict=True) if all(pair)]
+        if not pairs:
+            return total + 1.0
+        speeds = np.array([[run["overspeed_[%]"] for run in pair] for pair in pairs])
+        return total + 0.5 * sum(of(speeds[:, 0]) / of(speeds[:, 1]) for of in (np.mean, np.max))
+
+
+class Search:
+    """Holds the distribution of CMA-ES over vectors (n,), with the usual constants and step `sigma`."""
+
+    def __init__(self, n, candidates, sigma, seed):
+        self.rng, self.n, self.sigma = np.random.default_rng([seed, 2]), n, sigma
+        half = candidates // 2
+        weights = np.log(half + 0.5) - np.log(np.arange(1, half + 1))
+        self.weights = weights / weights.sum()
+        self.effective = e = 1.0 / (self.weights**2).sum()
+        self.c_sigma = (e + 2.0) / (n + e + 5.0)
+        self.damping = 1.0 + 2.0 * max(0.0, np.sqrt((e - 1.0) / (n + 1.0)) - 1.0) + self.c_sigma
+        self.c_path = (4.0 + e / n) / (n + 4.0 + 2.0 * e / n)
+        self.c_one = 2.0 / ((n + 1.3) ** 2 + e)
+        self.c_rank = min(1.0 - self.c_one, 2.0 * (e - 2.0 + 1.0 / e) / ((n + 2.0) ** 2 + e))
+        self.usual = np.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n**2))
+        self.mean, self.covariance = np.zeros(n), np.eye(n)
+        self.path, self.path_sigma = np.zeros(n), np.zeros(n)
+        self.count = 0
+
+    def ask(self, candidates):
+        """Return candidates (candidates, n) of the distribution."""
+        values, self.axes = np.linalg.eigh(self.covariance)
+        self.lengths = np.sqrt(np.maximum(values, 1e-20))
+        self.drawn = self.rng.normal(size=(candidates, self.n)) * self.lengths @ self.axes.T
+        return self.mean + self.sigma * self.drawn
+
+    def tell(self, costs):
+        """Move and shape the distribution by the costs of the candidates of ask."""
+        best = self.drawn[np.argsort(costs)[: len(self.weights)]]
+        move = self.weights @ best
+        self.count += 1
+        self.mean = self.mean + self.sigma * move
+        whitened = self.axes @ ((self.axes.T @ move) / self.lengths)
+        c = self.c_sigma
+        self.path_sigma = (1.0 - c) * self.path_sigma + np.sqrt(c * (2.0 - c) * self.effective) * whitened
+        length = np.linalg.norm(self.path_sigma)
+        known = np.sqrt(1.0 - (1.0 - c) ** (2 * self.count)) * self.usual
+        going = float(length / known < 1.4 + 2.0 / (self.n + 1.0))
+        c = self.c_path
+        self.path = (1.0 - c) * self.path + going * np.sqrt(c * (2.0 - c) * self.effective) * move
+        kept = 1.0 - self.c_one - self.c_rank + (1.0 - going) * self.c_one * c * (2.0 - c)
+        self.covariance = (
+            kept * self.covariance
+            + self.c_one * np.outer(self.path, self.path)
+            + self.c_rank * (best.T * self.weights) @ best
+        )
+        self.sigma *= np.exp(self.c_sigma / self.damping * (length / self.usual - 1.0))
+
+
+def about_layer(episodes):
+    """Return (components, mean (HIDDEN,), spread (2,)) of the last run of mpc_clone, one in Episodes.
+
+    components (COMPONENTS, HIDDEN): of the second hidden layer, of unit variance; spread: standard deviations
+    of the outputs.
+    """
+    memory = np.concatenate(episodes.memories)
+    hidden = memory[:, CloneMemory.SECOND : CloneMemory.ESTIMATE]
+    mean = hidden.mean(axis=0)
+    _, sizes, axes = np.linalg.svd(hidden - mean, full_matrices=False)
+    components = axes[:COMPONENTS] * (np.sqrt(len(hidden)) / sizes[:COMPONENTS, None])
+    return components, mean, memory[:, CloneMemory.INPUTS : CloneMemory.INPUTS + 2].std(axis=0)
+
+
+def changed(network, components, mean, spread, vector):
+    """Return the network with a linear function of the components added to its outputs.
+
+    spread: (2,) standard deviations of the outputs, by which the vector (2 (COMPONENTS + 1),) is scaled.
+    """
+    added = spread[:, None] * vector.reshape(2, -1)
+    weight = added[:, 1:] @ components
+    return network | {
+        "weight_2": network["weight_2"] + weight,
+        "bias_2": network["bias_2"] + added[:, 0] - weight @ mean,
+    }
+
+
+def main(
+    aim: Annotated[Literal["lulls", "gusts"], typer.Argument(help="Aim of the search.")],
+    out: Annotated[Path, typer.Option(help="Folder of the results.")],
+    seed: Annotated[int, typer.Option(help="Seed of the search and of its weather.")] = 0,
+    generations: Annotated[int, typer.Option(min=1, help="Generations.")] = 30,
+    candidates: Annotated[int, typer.Option(min=4, help="Candidates of a generation.")] = 12,
+):
+    """Search, and write the network at the mean of the last distribution."""
+    if (out / "clone.npz").exists():
+        raise InputError(f"{out}: already contains a search: needs another folder")
+    out.mkdir(parents=True, exist_ok=True)
+    network = read_clone(FILE)[1]
+    judged = Aim(aim, candidates)
+    first = FIRST + 10_000 * seed
+    judged.weather(first)
+    components, mean, spread = about_layer(judged.start["gusts" if aim == "gusts" else "normal"])
+    search, rows = Search(2 * (COMPONENTS + 1), candidates, STEP, seed), []
+    began = time.process_time()
+    for generation in range(generations):
+        if generation % RENEWED == 0:
+            judged.weather(first + 100 * (1 + generation // RENEWED))
+        vectors = search.ask(candidates - 1)
+        tried = np.vstack([vectors, search.mean])  # the mean too, which is not among the ranked
+        costs = judged.costs([changed(network, components, mean, spread, vector) for vector in tried])
+        rows.append({
+            "generation": generation, "cost_of_the_mean": costs[-1], "best": costs[:-1].min(),
+            "start": judged.cost(judged.of_start), "sigma": search.sigma,
+            "seconds": time.process_time() - began,
+        })  # fmt: skip
+        search.tell(costs[:-1])
+        write_table(pd.DataFrame(rows), out / "search.csv")
+        print({name: round(value, 4) for name, value in rows[-1].items()}, flush=True)
+    found = changed(network, components, mean, spread, search.mean)
+    about = {"aim": aim, "seed": seed, "generations": generations, "candidates": candidates}
+    write_clone(out / "clone.npz", {name: found[name].astype(np.float32) for name in network}, about)
+
+
+if __name__ == "__main__":
+    typer.run(main)
