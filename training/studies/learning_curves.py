@@ -1,9 +1,9 @@
 """Draws learning curves of PPO with default settings on the ladder of tasks, by two implementations.
 
-    python -m fowt_env.training.studies.learning_curves --out runs/curves
+    python -m fowt_env.training.studies.learning_curves --out runs/curves --script examples/18_cleanrl_ppo.py
 
-PPO("MlpPolicy", ...) of stable-baselines3, and the single file examples/18_cleanrl_ppo.py with the default
-settings of CleanRL. At 0, 25, 50, 75 and 100 % of the decisions the deterministic policy runs the validation
+PPO("MlpPolicy", ...) of stable-baselines3, and the PPO of a script: a file with arguments(words) and
+train(arguments, watch). At 0, 25, 50, 75 and 100 % of the decisions the deterministic policy runs the validation
 episodes of the task (acceptance.py). The folder has validation.csv, to which every training adds its rows (a
 repeated call makes only those that are missing), and curves.png.
 """
@@ -21,19 +21,21 @@ from fowt_env.files.tables import write_table
 from fowt_env.registration import LADDER, SOLVED
 from fowt_env.training.studies.acceptance import Validations, learned, returns
 
-CLEANRL = Path(__file__).parents[2] / "examples" / "18_cleanrl_ppo.py"
 SB3, SINGLE_FILE = "stable-baselines3", "CleanRL's settings"
 KEYS = ["name", "implementation", "seed"]  # columns that tell trainings apart
 ACROSS = 4  # panels of a row of the figure
 
 
-def validated(name, implementation, seed, steps):
-    """Train a seed of an implementation of PPO on a task; return the rows of its validations."""
+def validated(name, implementation, seed, steps, script=None):
+    """Train a seed of an implementation of PPO on a task; return the rows of its validations.
+
+    script: path of the file of SINGLE_FILE.
+    """
     validations = Validations(name, seed, steps)
     if implementation == SB3:
         learned(seed, name, steps, "ppo", validations)
     else:
-        script = runpy.run_path(str(CLEANRL))
+        script = runpy.run_path(str(script))
         given = ("--env-id", name, "--seed", str(seed), "--total-timesteps", str(steps))
         made = []
         policy, _ = script["train"](
@@ -49,6 +51,7 @@ def main(
     names: Annotated[list[str] | None, typer.Argument(help="Names of environments; default: all.")] = None,
     steps: Annotated[int, typer.Option(help="Decisions of a training.")] = 50_000,
     seeds: Annotated[int, typer.Option(help="Number of seeds: 0, 1, ...")] = 1,
+    script: Annotated[Path | None, typer.Option(help="File with a PPO of its own, also trained.")] = None,
 ):
     """Train what is missing in the folder, one after the other, and plot all of it."""
     import torch
@@ -59,12 +62,12 @@ def main(
     table = pd.read_csv(path) if path.exists() else pd.DataFrame(columns=KEYS)
     made = set(table[KEYS].itertuples(index=False, name=None))
     for name in names or LADDER:
-        for implementation in (SB3, SINGLE_FILE):
+        for implementation in (SB3, SINGLE_FILE)[: 1 if script is None else 2]:
             for seed in range(seeds):
                 if (name, implementation, seed) in made:
                     continue
                 print(name, implementation, flush=True)
-                rows = pd.DataFrame(validated(name, implementation, seed, steps))
+                rows = pd.DataFrame(validated(name, implementation, seed, steps, script))
                 table = pd.concat([table, rows], ignore_index=True)
                 write_table(table, path)
     plot(table, out / "curves.png")

@@ -108,7 +108,7 @@ def mean_of(runs, metric):
 
 def score_of(runs, reference, terms):
     """Return (score, excess over the limits) of runs relative to those of a reference, none of them lost."""
-    ratio = {name: mean_of(runs, name) / mean_of(reference, name) for name in (*terms, CAPPED)}
+    ratio = {name: mean_of(runs, name) / mean_of(reference, name) for name in {*terms, CAPPED, TRAVEL, SHAFT}}
     score = np.average([ratio[name] for name in terms], weights=list(terms.values())) / ratio[CAPPED]
     excess = max(0.0, ratio[TRAVEL] - 1.02) + max(0.0, ratio[SHAFT] - 1.1)
     excess += max(0.0, mean_of(runs, "torque_travel_[kN-m/s]") / TORQUE_TRAVEL - 1.0)

@@ -68,3 +68,9 @@ def test_a_lost_run_and_an_exceeded_limit_cost():
     assert search_clone.score_of([better, better], [run, run], terms) == pytest.approx((0.75, 0.0))
     far = run | {search_clone.TRAVEL: 1.12, "torque_travel_[kN-m/s]": 0.6}
     assert search_clone.score_of([far], [run], terms)[1] == pytest.approx(0.1 + 0.2)
+    aim = object.__new__(search_clone.Aim)
+    aim.terms, aim.reference = terms, [run, run, None]
+    assert aim.cost({"normal": [better, better, better]}) == pytest.approx(0.75)
+    assert aim.cost({"normal": [better, None, better]}) == pytest.approx(0.75 + search_clone.LOST / 3.0)
+    assert aim.cost({"normal": [far, far, far]}) == pytest.approx(1.06 + search_clone.PRICE * 0.3)
+    assert aim.cost({"normal": [None, None, better]}) == search_clone.LOST
