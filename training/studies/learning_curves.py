@@ -3,9 +3,9 @@
     python -m fowt_env.training.studies.learning_curves --out runs/curves --script examples/18_cleanrl_ppo.py
 
 PPO("MlpPolicy", ...) of stable-baselines3, and the PPO of a script: a file with arguments(words) and
-train(arguments, watch). At 0, 25, 50, 75 and 100 % of the decisions the deterministic policy runs the validation
-episodes of the task (acceptance.py). The folder has validation.csv, to which every training adds its rows (a
-repeated call makes only those that are missing), and curves.png.
+train(arguments, watch). At 0, 25, 50, 75 and 100 % of the decisions the deterministic policy runs the
+validation episodes of the task (acceptance.py). The folder has validation.csv, to which every training adds
+its rows (a repeated call makes only those that are missing), and curves.png.
 """
 
 import runpy
