@@ -16,7 +16,6 @@ import os
 import re
 import shutil
 import tempfile
-import threading
 import weakref
 from _ctypes import dlclose
 from dataclasses import dataclass
@@ -29,10 +28,11 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import brentq
 
 from fowt_env.caches import Cache
-from fowt_env.control import check_control_dt
-from fowt_env.controllers.bladed.controller import SYMBOL, BladedCalls
+from fowt_env.control import call_law, check_control_dt, values_of_blades
+from fowt_env.controllers.bladed.controller import SYMBOL, call_error
+from fowt_env.controllers.bladed.law import N_MEMORY, Memory, Parameter, library_law
 from fowt_env.controllers.bladed.library import MEMORY_SIZE, Library
-from fowt_env.controllers.bladed.records import INDEX
+from fowt_env.controllers.bladed.records import START
 from fowt_env.controllers.bladed.swap import Swap
 from fowt_env.controllers.gains import published_set, with_gains
 from fowt_env.controllers.ipc.design import BANDWIDTH, lead_time, root_slope
@@ -44,6 +44,7 @@ from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError, unknown
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import performance
+from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS
 
 INSTALL = "pip install --no-deps rosco"
 PRELOADED = ("libquadmath", "libgfortran", "libmvec")  # bundled with libdiscon; not found from a copy
@@ -76,6 +77,8 @@ BLADES_READ = (
     "azimuth", "blade_pitch_1", "blade_pitch_2", "blade_pitch_3", "root_out_of_plane_1",
     "root_out_of_plane_2", "root_out_of_plane_3",
 )  # fmt: skip
+MUTEX_SIZE = 64  # bytes, more than sizeof(pthread_mutex_t); PTHREAD_MUTEX_INITIALIZER is zero
+INPUT_FILE, ROTOR_FILE = "DISCON.IN", "rotor.txt"
 OUT_NAME = "rosco.out"  # log files are rosco.RO.dbg ...: ROSCO replaces the extension, and needs one
 TORQUE_FREQUENCY, TORQUE_DAMPING = 0.15, 0.7  # rad/s, of the torque loop in ROSCO's NREL 5 MW deck
 
@@ -131,7 +134,7 @@ class Discon:
     def texts(self, changes, table):
         """Return the texts of DISCON.IN with changes and rotor table; table(): Table if there is no file."""
         _check_entries(changes, self.values)
-        changes = SILENT | {"PerfFileName": '"rotor.txt"'} | self.switched | changes
+        changes = SILENT | {"PerfFileName": f'"{ROTOR_FILE}"'} | self.switched | changes
         named = self.path.parent / self.values["PerfFileName"].strip("\"'")
         if named.is_file():
             rows = read_text(named, "rotor performance")
@@ -182,10 +185,11 @@ def _preload(paths):
             raise InputError(f"controller 'rosco': cannot load libraries ({error}); {INSTALL}") from error
 
 
-_redirecting = threading.Lock()  # overlapping redirections could leave standard output redirected
+# pthread mutex, unlocked: overlapping redirections could leave standard output redirected
+_redirecting = ctypes.create_string_buffer(MUTEX_SIZE)
 
 
-class Rosco(BladedCalls):
+class Rosco:
     """Runs one ROSCO controller, see the module docstring; call prepare(scene) before reset.
 
     settings: RoscoSettings, from which DISCON.IN is written for a scene, or a Discon, used unchanged.
@@ -212,7 +216,12 @@ class Rosco(BladedCalls):
         used = ("time", "rotor_speed", "generator_speed", "generator_torque", "blade_pitch", "wind_speed")
         blades = BLADES_READ if self.individual else ()
         self.information = (*used, *motion, *blades, "plant_model")
-        self._motion = motion
+        self._library = self._swap = None
+        self._parameters, self._memory = np.zeros(len(Parameter)), np.zeros(N_MEMORY)
+        self._parameters[Parameter.CONTROL_DT] = self.control_dt
+        self._parameters[Parameter.INDIVIDUAL] = self.individual
+        self._parameters[Parameter.DIFFERENCED] = "platform_pitch_rate" in motion
+        self._command = np.zeros(N_INDIVIDUAL_COMMANDS if self.individual else N_COMMANDS)
 
     def __getstate__(self):
         """Return the settings without the running library; call prepare() and reset() on a copy."""
@@ -236,17 +245,14 @@ class Rosco(BladedCalls):
                         " file of ROSCO 2.10 or later, or by = 'supervisor'"
                     )
 
-    def prepare(self, scene):
-        """Write DISCON.IN and the rotor table for a scene, or those of the Discon.
+    def inputs(self, scene):
+        """Return {name of the file: text} of DISCON.IN and its rotor table for a scene.
 
-        Raises: InputError without wind or library, and for changes of names not in DISCON.IN.
+        Raises: InputError without wind, and for changes of names not in DISCON.IN.
         """
         if scene.model.aero is None:
             raise InputError(f"controller {self.name!r}: needs a scene with wind for the rotor table")
-        self._source, needed = find_library()
-        _preload(needed)
         turbine, density = scene.turbine, scene.platform.environment.air_density
-        self._turbine = turbine
         if isinstance(self.settings, Discon):
             changes = self.changes | self._start_up
             text, table = self.settings.texts(changes, lambda: rotor_table(turbine, density))
@@ -260,11 +266,22 @@ class Rosco(BladedCalls):
             _check_entries(self.changes, values)
             values |= self._start_up
             text, table = deck_text(values | self.changes), table_text(computed)
+        return {ROTOR_FILE: table, INPUT_FILE: text}
+
+    def prepare(self, scene):
+        """Write DISCON.IN and the rotor table for a scene, or those of the Discon.
+
+        Raises: InputError without wind or library, and for changes of names not in DISCON.IN.
+        """
+        files = self.inputs(scene)
+        self._source, needed = find_library()
+        _preload(needed)
+        self._turbine = scene.turbine
         if self._remove is not None:
             self._remove()
         self._files = tempfile.mkdtemp(prefix="fowt_rosco_")
         self._remove = weakref.finalize(self, shutil.rmtree, self._files, ignore_errors=True)
-        for name, content in (("rotor.txt", table), ("DISCON.IN", text)):
+        for name, content in files.items():
             Path(self._files, name).write_text(content)
 
     def reset(self, measurement):
@@ -277,23 +294,37 @@ class Rosco(BladedCalls):
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         memory = bytearray(MEMORY_SIZE)
         self._library = _Copy(self._source, self._files, memory)
-        deck = str(Path(self._files, "DISCON.IN"))
+        deck = str(Path(self._files, INPUT_FILE))
         self._swap = Swap(memory, self._turbine, self.control_dt, deck, OUT_NAME, self.individual)
-        self._rate = None
-        self._start(measurement)
+        self._parameters[Parameter.EFFICIENCY] = self._turbine.drivetrain.generator_efficiency
+        self._memory[:] = 0.0
+        self._library.put_addresses(self._memory)
+        self._memory[Memory.STATUS] = START
+        self.act(measurement)
+        self._memory[Memory.FIRST] = measurement.time
 
-    def _call(self, status, measurement):
-        swap = self._swap
-        swap.fill(status, measurement)
-        if "platform_pitch_rate" in self._motion:
-            rate = measurement.platform_pitch_rate
-            slope = 0.0 if self._rate is None else (rate - self._rate) / self.control_dt
-            swap.records[INDEX["nacelle_nodding_acceleration"]] = slope
-            self._rate = rate
-        self._library.call()
-        if swap.failure < 0:
-            raise self._error(f"ROSCO reports {swap.message!r}", measurement.time)
-        return swap.demands()
+    def act(self, measurement):
+        """Return (generator torque, blade pitch) or, with individual pitch, (torque, pitch of each blade).
+
+        At the time of reset() this is the command of the first call. Raises: ControllerError with ROSCO's
+        message if the call fails.
+        """
+        values = np.array([*measurement, *values_of_blades(measurement)], dtype=np.float64)
+        call_law(library_law, self._parameters, self._memory, values, self._command)
+        if error := self.failure(measurement.time):
+            raise error
+        return tuple(self._command.tolist())
+
+    @property
+    def in_loop(self):
+        """Return (law, parameters, memory) of the calls of act() for the compiled loop."""
+        return library_law, self._parameters, self._memory
+
+    def failure(self, time):
+        """Return the ControllerError of a last call, at a time in s, that failed; None if it did not."""
+        if self._swap.failure >= 0:
+            return None
+        return call_error(self.name, f"ROSCO reports {self._swap.message!r}", float(time))
 
 
 class _Copy(Library):
@@ -309,27 +340,28 @@ class _Copy(Library):
             raise InputError(f"controller 'rosco': {path} cannot be used ({error}); {INSTALL}") from error
         finally:
             os.unlink(path)  # the file is not needed after loading
-        # flushes the Fortran library's buffer of standard output
-        flushing = (library for library in _needed if hasattr(library, "_gfortran_flush_i4"))
-        self._flush = getattr(next(flushing, None), "_gfortran_flush_i4", lambda unit: None)
         self._null = os.open(os.devnull, os.O_WRONLY)
         self._end = weakref.finalize(self, _unload, self.handle, self._null)
 
-    def call(self):
-        """Call DISCON.
+    def put_addresses(self, memory):
+        """Write what library_law calls into its memory (N_MEMORY,).
 
-        Standard output is suppressed during the call, because at every logging level the library prints six
-        lines at each start and a message when its wind estimator leaves its bounds.
+        The law suppresses standard output during a call, because at every logging level the library prints
+        six lines at each start and a message when its wind estimator leaves its bounds; the buffer of the
+        Fortran library is flushed for this.
         """
-        with _redirecting:
-            saved = os.dup(1)
-            os.dup2(self._null, 1)
-            try:
-                super().call()
-                self._flush(None)
-            finally:
-                os.dup2(saved, 1)
-                os.close(saved)
+        memory[Memory.FUNCTION] = address_of(self._function)
+        memory[Memory.ARGUMENTS : Memory.FLUSH] = self._arguments
+        flushing = (library for library in _needed if hasattr(library, "_gfortran_flush_i4"))
+        flush = getattr(next(flushing, None), "_gfortran_flush_i4", None)
+        memory[Memory.FLUSH] = 0 if flush is None else address_of(flush)
+        memory[Memory.NULL_DEVICE] = self._null
+        memory[Memory.LOCK] = ctypes.addressof(_redirecting)
+
+
+def address_of(function):
+    """Return the address of a function of ctypes."""
+    return ctypes.cast(function, ctypes.c_void_p).value
 
 
 def _unload(library, null):
@@ -483,7 +515,7 @@ def deck(turbine, density, table, settings):
         "WE_GearboxRatio": ratio,
         "WE_Jtot": inertia,
         "WE_RhoAir": density,
-        "PerfFileName": '"rotor.txt"',
+        "PerfFileName": f'"{ROTOR_FILE}"',
         "PerfTableSize": (len(table.blade_pitch), len(table.ratio)),
         "WE_FOPoles_N": len(winds),
         "WE_FOPoles_v": winds,

@@ -91,44 +91,14 @@ def named_library(name: str) -> BladedLibrary:
     return BladedLibrary(path, *files, **settings)
 
 
-class BladedCalls:
-    """Provides act() of a controller that calls a library in every control period, the first time in reset().
-
-    A subclass defines _call(status, measurement), which returns the command.
-    """
-
-    _first = None  # (time, command) of the call in reset()
-
-    def _start(self, measurement):
-        """Make the first call; act() at the same time returns its command."""
-        self._first = (measurement.time, self._call(START, measurement))
-
-    def act(self, measurement):
-        """Return (generator torque, blade pitch) or, with individual pitch, (torque, pitch of each blade).
-
-        Raises: ControllerError with the library's message if the call fails.
-        """
-        if self._first is not None:
-            time, command = self._first
-            self._first = None
-            if time == measurement.time:
-                return command
-        return self._call(STEP, measurement)
-
-    def _call(self, status, measurement):
-        raise NotImplementedError
-
-    def _error(self, why, time):
-        """Return the ControllerError of a failed call."""
-        return ControllerError(
-            f"controller {self.name!r} failed at t = {time:.3f} s: {why}",
-            controller=self.name,
-            time=time,
-            returned=None,
-        )
+def call_error(name, why, time):
+    """Return the ControllerError of a failed call of a controller called name at a time, s."""
+    return ControllerError(
+        f"controller {name!r} failed at t = {time:.3f} s: {why}", controller=name, time=time, returned=None
+    )
 
 
-class BladedController(BladedCalls):
+class BladedController:
     """Runs a BladedLibrary in a process of its own; each reset() starts a new process."""
 
     information, declared = INFORMATION, False  # a reading that there is not in a run is a record of 0
@@ -138,6 +108,7 @@ class BladedController(BladedCalls):
         self.name = f"{DLL_PREFIX}{library.path}"
         self.individual = library.pitch == PITCH[1]
         self._process = self._swap = None
+        self._first = None  # (time, command) of the call in reset()
         self._messages, self._printed = {}, ""
 
     def __reduce__(self):
@@ -156,8 +127,19 @@ class BladedController(BladedCalls):
         try:
             self._process, self._swap = self.library.start(self.turbine, self.control_dt)
         except LibraryFailure as error:
-            raise self._error(str(error), float(measurement.time)) from error
-        self._start(measurement)
+            raise call_error(self.name, str(error), float(measurement.time)) from error
+        self._first = (measurement.time, self._call(START, measurement))
+
+    def act(self, measurement):
+        """Return (generator torque, blade pitch) or, with individual pitch, (torque, pitch of each blade).
+
+        At the time of reset() this is the command of the first call. Raises: ControllerError with the
+        library's message if the call fails.
+        """
+        first, self._first = self._first, None
+        if first is not None and first[0] == measurement.time:
+            return first[1]
+        return self._call(STEP, measurement)
 
     def _call(self, status, measurement):
         swap, time, limit = self._swap, float(measurement.time), self.library.limit
@@ -183,7 +165,7 @@ class BladedController(BladedCalls):
         process, self._process = self._process, None
         self._printed = process.end()
         shown = " ".join(self.console_output.split())[-LONGEST_SHOWN:]
-        return self._error(f"{why}; its output: {shown}" if shown else why, time)
+        return call_error(self.name, f"{why}; its output: {shown}" if shown else why, time)
 
     def finish(self) -> None:
         """Make the last call, with status -1, and end the process; a failure becomes a part of the output."""

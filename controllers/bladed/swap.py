@@ -19,7 +19,8 @@ from fowt_env.controllers.bladed.records import (
     START,
 )
 from fowt_env.errors import InputError
-from fowt_env.plant.measurement import BladeMeasure, Measure
+from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 
 # {record: (field of Measurement, sign)}; OpenFAST's yaw error is the wind direction (0 here) minus the yaw
 READINGS = {
@@ -66,11 +67,11 @@ REFUSED = {
     "torque_override": "a torque control of the simulator, which there is none of",
     "yaw_control_flag": "a yaw torque: the nacelle does not yaw",
 }
+STATUS, FIRST_PITCH = INDEX["status"], INDEX["blade_pitch_1"]
 SHAFT_POWER, ELECTRICAL_POWER = INDEX["shaft_power"], INDEX["electrical_power"]
 LAST_DEMAND, CONTACTOR = INDEX["last_pitch_demand"], INDEX["generator_contactor"]
 TORQUE, LOGS = INDEX["generator_torque_demand"], INDEX["logs"]
-COLLECTIVE = (INDEX["collective_pitch_demand"],)
-INDIVIDUAL = tuple(INDEX[f"pitch_demand_{blade}"] for blade in range(1, BLADES + 1))
+COLLECTIVE, INDIVIDUAL = INDEX["collective_pitch_demand"], INDEX["pitch_demand_1"]  # the other blades follow
 
 
 def _places(readings):
@@ -80,6 +81,42 @@ def _places(readings):
 _PLACES, _BLADE_PLACES, _REFUSED_PLACES = map(_places, (READINGS, BLADE_READINGS, REFUSED))
 _FIELDS, _SIGNS = (np.array(part) for part in zip(*READINGS.values(), strict=True))
 _BLADE_FIELDS = np.array(list(BLADE_READINGS.values()))
+
+
+@kernel
+def fill_records(records, values, blades, status, efficiency):
+    """Fill the records of a call from the values of a measurement; NaN leaves a record as it is.
+
+    values: (n,) of the measurement, those of single blades from the index `blades` on, if there are any.
+    """
+    records[STATUS] = status
+    for i in range(_PLACES.shape[0]):
+        value = values[_FIELDS[i]]
+        if value == value:  # declared, and in the sensor chain
+            records[_PLACES[i]] = value * _SIGNS[i]
+    power = values[Measure.GENERATOR_TORQUE] * values[Measure.GENERATOR_SPEED]
+    if power == power:
+        records[SHAFT_POWER], records[ELECTRICAL_POWER] = power, efficiency * power
+    if values.shape[0] > blades:
+        for i in range(_BLADE_PLACES.shape[0]):
+            value = values[blades + _BLADE_FIELDS[i]]
+            if value == value:  # otherwise the pitch of all blades stays in force
+                records[_BLADE_PLACES[i]] = value
+    if status == START:
+        records[LAST_DEMAND] = records[FIRST_PITCH]
+
+
+@kernel
+def take_demands(records, individual, command):
+    """Write the demands of a call to a command; there is no torque with the generator off.
+
+    individual: whether there is a demand for each blade, else one for all.
+    """
+    command[0] = records[TORQUE] if records[CONTACTOR] != 0.0 else 0.0
+    first, count = (INDIVIDUAL, BLADES) if individual else (COLLECTIVE, 1)
+    for i in range(count):
+        command[1 + i] = records[first + i]
+    records[LAST_DEMAND] = records[first]
 
 
 class Swap:
@@ -96,7 +133,7 @@ class Swap:
         self.records[:] = 0.0
         self._failure = np.frombuffer(memory, np.int32, 1, arguments.FAILURE_AT)
         self._efficiency = turbine.drivetrain.generator_efficiency
-        self._demands = INDIVIDUAL if individual else COLLECTIVE
+        self._individual = bool(individual)
         names = [os.fsencode(name) for name in (input_file, output_name)]
         for name, start, size in (
             (names[0], arguments.INPUT_FILE_AT, arguments.INPUT_FILE_SIZE),
@@ -137,21 +174,8 @@ class Swap:
 
     def fill(self, status, measurement):
         """Fill the records of a call with its status (START or STEP) from a Measurement."""
-        values, records = np.array(measurement), self.records
-        if status == START:  # later calls fill the same records, for speed
-            given = values[_FIELDS] == values[_FIELDS]  # declared, and in the sensor chain: not NaN
-            self._given = _PLACES[given], _FIELDS[given], _SIGNS[given]
-        places, fields, signs = self._given
-        records[0], records[places] = status, values[fields] * signs
-        power = float(values[Measure.GENERATOR_TORQUE] * values[Measure.GENERATOR_SPEED])
-        if power == power:
-            records[SHAFT_POWER], records[ELECTRICAL_POWER] = power, self._efficiency * power
-        if blades := values_of_blades(measurement):
-            values = np.array(blades)[_BLADE_FIELDS]
-            given = values == values  # otherwise the pitch of all blades stays in force
-            records[_BLADE_PLACES[given]] = values[given]
-        if status == START:
-            records[LAST_DEMAND] = records[INDEX["blade_pitch_1"]]
+        values = np.array([*measurement, *values_of_blades(measurement)], dtype=np.float64)
+        fill_records(self.records, values, N_MEASUREMENTS, float(status), self._efficiency)
         self.clear()
 
     def clear(self):
@@ -184,8 +208,6 @@ class Swap:
 
     def demands(self):
         """Return (generator torque, blade pitch or that of each blade); no torque with the generator off."""
-        records = self.records
-        pitches = [float(records[place]) for place in self._demands]
-        records[LAST_DEMAND] = pitches[0]
-        torque = float(records[TORQUE]) if records[CONTACTOR] else 0.0
-        return (torque, *pitches)
+        command = np.empty(1 + (BLADES if self._individual else 1))
+        take_demands(self.records, self._individual, command)
+        return tuple(command.tolist())

@@ -160,6 +160,18 @@ class CheckedController:
                 self.controller.prepare(scene)
 
     @property
+    def in_loop(self) -> tuple[Any, npt.NDArray, npt.NDArray] | None:
+        """Return (law, parameters, memory) of a wrapped controller that the compiled loop can call, or None.
+
+        The law is a ControlKernel with the effect of act(), after reset().
+        """
+        return getattr(self.controller, "in_loop", None)
+
+    def failure(self, time: float, command: npt.NDArray) -> ControllerError:
+        """Return the error of a command that is not finite of a law in the compiled loop at a time, s."""
+        return self.controller.failure(time) or self._refusal(tuple(command.tolist()), time)
+
+    @property
     def console_output(self) -> str:
         """Return what the wrapped controller has printed, "" without its text console_output."""
         text = getattr(self.controller, "console_output", "")
@@ -202,7 +214,10 @@ class CheckedController:
             good = False
         if good and all(map(isfinite, values)):
             return tuple(float(value) for value in values)
-        time = float(measurement.time)
+        raise self._refusal(returned, float(measurement.time))
+
+    def _refusal(self, returned, time):
+        """Return the ControllerError of anything but a finite command, returned at a time, s."""
         allowed = (
             "four finite numbers, (generator torque in N m on the high-speed shaft, pitch of each blade in"
             " rad)"
@@ -211,7 +226,7 @@ class CheckedController:
         )
         if hasattr(returned, "act"):
             allowed += "; a function that makes a controller takes two arguments, (turbine, control_dt)"
-        raise ControllerError(
+        return ControllerError(
             f"controller {self.name!r} returned {_shown(returned)} at t = {time:.3f} s: act() must return"
             f" {allowed}",
             controller=self.name,

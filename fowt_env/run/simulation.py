@@ -38,13 +38,13 @@ from fowt_env.errors import (
 from fowt_env.loop.interface import interface_data
 from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START
 from fowt_env.loop.rollout import Schedule, begin_command, rollout
-from fowt_env.plant.advance import RUNNING, STOP_REASONS, TRIPPED
+from fowt_env.plant.advance import BAD_COMMAND, RUNNING, STOP_REASONS, TRIPPED
 from fowt_env.plant.channels import Out
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.events import harm
 from fowt_env.plant.measurement import Measurement
-from fowt_env.plant.state import Command, State
+from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS, Command, State
 from fowt_env.run.initial_conditions import initial_state
 from fowt_env.run.interface import build_interface, guard_of, starts_parked
 from fowt_env.run.outcome import run_frame, trip_name
@@ -205,7 +205,7 @@ def build_run(
         scene = scene.with_model({"rigid_body.rotor_fixed": True})
         controller = HeldCommand(scene.model.pitches is not None)
         chain = None
-    external = not isinstance(controller, CompiledController)
+    external = not isinstance(controller, CompiledController) and controller.in_loop is None
     schedule = Schedule(float(dt), per_control, per_output, last, bool(controller.individual), external)
     periods = -(-last // per_control)
     interface = build_interface(scene, controller, guard, chain, preview, period, periods)
@@ -342,8 +342,12 @@ class Run:
         self.filled = 0
         period = schedule.per_control * schedule.dt
         self.units = CommandUnits(f"controller {controller.name!r}", scene.turbine, period)
+        self.checked = isinstance(controller, CheckedController) and not schedule.external
         if schedule.external:
             self.law = hold.compiled, np.zeros(1), np.zeros(1)
+        elif self.checked:
+            law, *arrays = controller.in_loop
+            self.law = law.compiled, *arrays
         else:
             self.law = controller.law, controller.parameters, controller.memory
 
@@ -425,6 +429,9 @@ class Run:
     def _stop(self, status, step):
         """Raise SimulationStopped with the reason of a status."""
         reason, time = STOP_REASONS[status], step * self.schedule.dt
+        if status == BAD_COMMAND and self.checked:
+            size = N_INDIVIDUAL_COMMANDS if self.schedule.individual else N_COMMANDS
+            raise self.controller.failure(time, self.link.command[:size])
         if status == TRIPPED:
             reason = f"{trip_name(self.link.watch)} ({reason})"
         if fault := self.scene.first_nonfinite_load(self.data):

@@ -82,7 +82,9 @@ def _check_head(path, where):
 def write_bts(path, velocity, y, z, dt, speed, hub_height, periodic, description="fowt_env"):
     """Write a box of wind as a TurbSim file, with what read_bts returns; hub_height (m) is for the header.
 
-    Values have 16 bits: an error of at most half of 1/65534 of the span of each component. path: written
+    Values have 16 bits: an error of at most half of 1/65534 of the span of each component. A point of the
+    tower repeats the lowest row at y = 0: below it InflowWind interpolates to zero at the ground, as
+    wind_field.py does, and without one it refuses a tower that reaches below the grid. path: written
     directly, not atomically. Raises: InputError for a box whose lowest point is below still water.
     """
     if z[0] < 0.0:
@@ -92,10 +94,14 @@ def write_bts(path, velocity, y, z, dt, speed, hub_height, periodic, description
     scale = (65534.0 / span).astype(np.float32)
     offset = (-32767.0 - scale * low).astype(np.float32)
     text = description.encode("ascii", "replace")
-    counts = (PERIODIC if periodic else NOT_PERIODIC, len(z), len(y), 0, len(velocity))
+    counts = (PERIODIC if periodic else NOT_PERIODIC, len(z), len(y), 1, len(velocity))
     steps = (z[1] - z[0], y[1] - y[0], dt, speed, hub_height, z[0])
     scales = np.stack([scale, offset], axis=1).reshape(-1)
+    right = int(np.clip(np.searchsorted(y, 0.0), 1, len(y) - 1))
+    share = np.float32((0.0 - y[right - 1]) / (y[right] - y[right - 1]))
     with open(path, "wb") as file:
         file.write(HEAD.pack(*counts, *steps, *scales, len(text)) + text)
         for part in velocity:  # one instant at a time: less memory
-            file.write(np.clip(np.rint(part * scale + offset), -32768, 32767).astype("<i2").tobytes())
+            tower = part[0, right - 1] + share * (part[0, right] - part[0, right - 1])
+            values = np.concatenate([part.reshape(-1, 3), tower[None]]) * scale + offset
+            file.write(np.clip(np.rint(values), -32768, 32767).astype("<i2").tobytes())

@@ -26,7 +26,7 @@ PLATFORM = "Platform (name or path of a .toml file) or OpenFAST deck (.fst), whi
 SITE = "Site: a name of fowt list sites, a .toml file, or a .csv table with wind, Hs, Tp, which is fitted."
 CONTROLLERS = "Names, policy:NAME, design:FILE, dll:FILE.so or module:Name, comma-separated."
 DLC = "Design load cases, comma-separated: 1.2,6.1. Default: all that can be run."
-HOURS = "Length of a run that is not an event, h, after its transient."
+HOURS = "Length of a run that is not an event, h (to whole seconds), after its transient."
 WIND = (
     "Turbulence: full-field (a box of wind for each run), or rotor-averaged (faster, uniform over the rotor)."
 )

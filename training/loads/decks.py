@@ -4,12 +4,14 @@
         run.outb       the series here, as an output of OpenFAST
         wind.bts       the box of wind of this run, or wind.wnd
         waves.Elev     elevation of the sea at the origin (WaveMod 5)
-        model.fst      with --deck: the user's deck with this wind, sea, length and initial state; its other
-                       files are those of the deck, by relative paths
-        README.md      case, factor, what the deck lacks of the case (events, controller)
+        model.fst      with --deck: the user's deck with this wind, sea, current, length and initial state,
+                       parked or with ROSCO as in the run; its other files are those of the deck, by relative
+                       paths
+        DISCON.IN, rotor.txt   of ROSCO, which ServoDyn then loads from the installed wheel
+        README.md      case, factor, what the deck lacks of the case (events, controller, sensors)
 
 Only files of the deck that change are copied: .fst, ElastoDyn, InflowWind, SeaState (before OpenFAST 4:
-HydroDyn).
+HydroDyn), ServoDyn.
 """
 
 import os
@@ -20,13 +22,16 @@ from pathlib import Path
 import numpy as np
 
 import fowt_env
+from fowt_env.controllers import make
+from fowt_env.controllers.bladed.controller import SYMBOL
+from fowt_env.controllers.rosco import INPUT_FILE, Rosco, find_library
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 from fowt_env.files.openfast_deck.deck import PARTS
 from fowt_env.files.openfast_deck.parser import PartFile, locate, same_key
 from fowt_env.files.tables import write_table
 from fowt_env.training.evaluation.metrics import TIME
-from fowt_env.training.evaluation.run_case import Run, scored
+from fowt_env.training.evaluation.run_case import CONTROL_DT, Run, scored
 from fowt_env.training.evaluation.wind_boxes import new_box
 from fowt_env.training.loads.tables import DRIVING, driving_runs
 from fowt_env.weather.turbsim import write_bts
@@ -41,6 +46,8 @@ INITIAL = (  # keys of ElastoDyn and channels of the first row
     ("RotSpeed", "RotSpeed_[rpm]"), ("Azimuth", "Azimuth_[deg]"),
     *((f"BlPitch({i})", "BldPitch1_[deg]") for i in (1, 2, 3)),
 )  # fmt: skip
+SEVENTH = 1.0 / 7.0  # exponent of the sub-surface current of SeaState
+NEVER = 9999.9  # s
 FILES = re.compile(r"(?i).*(File|FileName|RootName|Root)\w*(\(\d\))?$")  # keys whose value names a file
 
 
@@ -132,16 +139,55 @@ def write_waves(folder, frame):
     return float(end)
 
 
-def write_deck(folder, deck, case, scene, frame, wind, wave_time):
+def put_current(sea, current):
+    """Set the current of a run, an option of build_scene or None, in an EditedPart of SeaState."""
+    spec = {} if current is None else current
+    speed, heading = (float(spec.get(key, 0.0)) for key in ("speed", "heading"))
+    uniform = float(spec.get("exponent", 0.0)) == 0.0
+    sea.put(1 if speed else 0, "CurrMod")
+    if speed:
+        for keys, value in ((("CurrDIV", "CurrDIDir"), speed * uniform),
+                            (("CurrSSV0", "CurrSSDir"), speed * (not uniform))):  # fmt: skip
+            sea.put(f"{value:.8g}", keys[0])
+            sea.put(f"{heading:.8g}", keys[1])
+        sea.put(0, "CurrNSV0")
+
+
+def put_control(servo, folder, case, first, rosco, scene):
+    """Set a parked turbine, or ROSCO, in an EditedPart of ServoDyn; the rest is the deck's.
+
+    first: first row of the run; rosco: the Rosco of the run or None.
+    """
+    if case.case.parked:  # as without grid: no torque, blades that stay, a rotor free to turn
+        for key, value in (("PCMode", 0), ("VSContrl", 0), ("GenTiStr", True), ("TimGenOn", NEVER)):
+            servo.put(value, key)
+        for i in (1, 2, 3):
+            if servo.has(f"PitNeut({i})"):
+                servo.put(f"{first['BldPitch1_[deg]']:.8g}", f"PitNeut({i})")
+    elif rosco is not None:
+        for name, text in rosco.inputs(scene).items():
+            with replacing(folder / name) as temporary:
+                temporary.write_text(text, encoding="utf-8")
+        for key, value in (("PCMode", 5), ("VSContrl", 5), ("DLL_FileName", f'"{find_library()[0]}"'),
+                           ("DLL_InFile", f'"{INPUT_FILE}"'), ("DLL_ProcName", f'"{SYMBOL}"'),
+                           ("DLL_DT", CONTROL_DT)):  # fmt: skip
+            servo.put(value, key)
+
+
+def write_deck(folder, deck, case, scene, frame, wind, wave_time, rosco=None):
     """Write the user's deck for a run into a folder; return the path of model.fst.
 
-    deck: path of the .fst; case: LoadCase; frame: its run; wind: of write_wind; wave_time: of write_waves.
+    deck: path of the .fst; case: LoadCase; frame: its run; wind: of write_wind; wave_time: of write_waves;
+    rosco: the Rosco of the run; None: the deck's controller stays.
     Raises: InputError naming file and key if the deck lacks a key that must change.
     """
     folder, deck = Path(folder).resolve(), Path(deck)
     main = EditedPart(deck, "OpenFAST")
     parts = {}
-    for name, kind in (("elastodyn", "ElastoDyn"), ("inflow", "InflowWind"), ("seastate", "SeaState")):
+    kinds = (("elastodyn", "ElastoDyn"), ("inflow", "InflowWind"), ("seastate", "SeaState"))
+    if case.case.parked or rosco is not None:
+        kinds += (("servodyn", "ServoDyn"),)
+    for name, kind in kinds:
         key = next((key for key in (PARTS[name][0], f"{PARTS[name][0]}(1)") if main.has(key)), None)
         path = None if key is None else main.file.other(key, folders=())
         if path is None and name == "seastate":  # before OpenFAST 4 the sea is HydroDyn's
@@ -163,6 +209,10 @@ def write_deck(folder, deck, case, scene, frame, wind, wave_time):
     for key, channel in INITIAL:
         own = channel if not key.startswith("BlPitch") else f"BldPitch{key[-2]}_[deg]"
         elastodyn.put(f"{first[own if own in frame else channel]:.8g}", key)
+    if case.case.parked:
+        elastodyn.put(True, "GenDOF")
+    if "servodyn" in parts:
+        put_control(parts["servodyn"][1], folder, case, first, rosco, scene)
     if kind is not None:
         inflow.put(kind, "WindType")
         inflow.put(0, "PropagationDir")
@@ -178,6 +228,7 @@ def write_deck(folder, deck, case, scene, frame, wind, wave_time):
     sea.put(WAVE_STEP, "WaveDT")
     sea.put(f"{case.wave_direction:.8g}", "WaveDir")
     sea.put(f'"{WAVES}"', "WvKinFile")
+    put_current(sea, case.case.options.get("current"))
     for key, value in (("WvLowCOff", 0.0), ("WvHiCOff", np.pi / WAVE_STEP)):  # the record has its own
         if sea.has(key):
             sea.put(f"{value:.8g}", key)
@@ -207,11 +258,19 @@ def write_driving(folder, results, controllers, deck=None, count=DRIVING, progre
         write_table(frame, place / "run.outb")
         wind = write_wind(place, scene)
         wave_time = write_waves(place, frame)
+        rosco = None if deck is None else rosco_of(controllers.get(case.controller), scene)
         if deck is not None:
-            write_deck(place, deck, case, scene, frame, wind, wave_time)
-        _write_readme(place, case, deck)
+            write_deck(place, deck, case, scene, frame, wind, wave_time, rosco)
+        _write_readme(place, case, deck, rosco is not None)
         folders.append(place)
     return folders
+
+
+def rosco_of(controller, scene):
+    """Return the Rosco of a name or object that is one, else None."""
+    made = None if controller is None else make(controller, scene.turbine, CONTROL_DT)
+    inner = getattr(made, "controller", None)
+    return inner if isinstance(inner, Rosco) else None
 
 
 def rerun(case, controller):
@@ -243,16 +302,19 @@ def _check_same(case, frame, statistics):
                 )
 
 
-def _write_readme(folder, case, deck):
-    """Write README.md of a driving case."""
+def _write_readme(folder, case, deck, rosco):
+    """Write README.md of a driving case; rosco: whether the deck has the ROSCO of the run."""
     events = []
     if case.case.fault is not None:
         keys = case.case.fault.model_dump(exclude_none=True, exclude_defaults=True)
         events.append("event: " + ", ".join(f"{key} {value}" for key, value in keys.items()))
-    if case.case.parked:
-        events.append(
-            "parked: blades feathered, no generator torque (ServoDyn: PCMode 0, VSContrl 0, GenDOF)"
-        )
+    if not case.case.parked and case.case.sensors != "exact":
+        events.append(f"sensors: {case.case.sensors}; `--sensors exact` has those of OpenFAST")
+    current = case.case.options.get("current")
+    if current and current.get("exponent", 0.0) not in (0.0, SEVENTH):
+        events.append(f"exponent {current['exponent']:g} of the current: SeaState has 1/7")
+    if not (case.case.parked or rosco):
+        events.append(f"controller: the library of `fowt connect export {case.controller} --dll lib.so`")
     lines = [
         f"# DLC {case.dlc}: {case.description}",
         "",
@@ -260,12 +322,13 @@ def _write_readme(folder, case, deck):
         f"- wind {case.wind_speed} m/s, Hs {case.Hs:g} m, Tp {case.Tp:g} s, waves towards"
         f" {case.wave_direction:g} deg, yaw error {case.yaw_error:g} deg",
         f"- {case.duration:g} s, statistics from {case.skip:g} s; partial factor {case.factor:g}",
-        f"- not in the deck, to be set by hand: {'; '.join(events) or 'no event'}; controller: the library of"
-        f" `fowt connect export {case.controller} --dll lib.so` in ServoDyn" * (not case.case.parked),
+        f"- not in the deck, to be set by hand: {'; '.join(events) or 'nothing'}",
     ]
     if deck is not None:
+        control = ", parked turbine" if case.case.parked else ", ROSCO" if rosco else ""
         lines.append(
-            "- model.fst: wind, sea, length and initial state are those of the run, all else the deck's"
+            f"- model.fst: wind, sea, current, length, initial state{control} are those of the run,"
+            " all else is the deck's"
         )
     with replacing(folder / "README.md") as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")

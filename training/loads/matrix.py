@@ -197,7 +197,7 @@ def expanded(
     controllers  labels
     dlc          numbers of design load cases, None: all
     seeds        realisations of wind and sea of each condition
-    hours        length of a run that is not an event
+    hours        length of a run that is not an event, to the next whole second
     wind         "full-field" or "rotor-averaged" turbulence
     fidelity     of build_scene; sensors: name of the chain
     compartments   of the platform that may be flooded: {"mass": kg, "point": [x, y, z] in m} each
@@ -333,7 +333,7 @@ class _Settings:
         starts = any(fault["kind"] == START_UP for fault in entry.faults)
         if starts and self.climate.site.design.start == "controller":
             return OWN_START
-        return self.hours * HOUR if entry.length == "hours" else entry.length
+        return float(round(self.hours * HOUR)) if entry.length == "hours" else entry.length
 
     def _bins(self, entry):
         """Return the Bins of an entry; probabilities of single winds are those of the winds about them."""
@@ -444,6 +444,9 @@ class _Settings:
             {"kind": "jonswap", "Hs": Hs, "Tp": Tp, "heading": heading, "ramp": min(RAMP, 0.5 * start)},
             self.platform,
             options,
+            # a rotor at rest starts to idle within the transient; far above cut-out the search for an idling
+            # speed can fail
+            initial={"start": "parked"} if entry.parked else None,
             fault=event,
             parked=entry.parked,
             # without a fault the overspeed trip alone: another would end the production that is studied

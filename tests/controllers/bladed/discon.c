@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 #define SWAP(n) avrSWAP[(n) - 1] /* records are numbered from 1 */
 
@@ -57,6 +58,8 @@ void DISCON(float *avrSWAP, int *aviFAIL, const char *accINFILE, char *avcOUTNAM
         memset(avcOUTNAME, 'x', (size_t)SWAP(64) - 1);
         avcOUTNAME[(int)SWAP(64) - 1] = 0;
     }
+    if (!strcmp(mode, "talk") && write(1, "chatter\n", 8) < 0)
+        exit(4);
     if (!late)
         return;
     if (!strcmp(mode, "crash")) {

@@ -1,11 +1,13 @@
 """Driving runs for a check in OpenFAST: series, wind, sea and the user's deck with these."""
 
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fowt_env.controllers.rosco import find_library
 from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
 from fowt_env.files.openfast import read_outb
@@ -13,11 +15,18 @@ from fowt_env.files.openfast_deck.parser import PartFile
 from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.training.evaluation.cases import Case
-from fowt_env.training.loads.decks import EditedPart, write_deck, write_driving, write_waves, write_wind
+from fowt_env.training.loads.decks import (
+    EditedPart,
+    rosco_of,
+    write_deck,
+    write_driving,
+    write_waves,
+    write_wind,
+)
 from fowt_env.training.loads.records import FinishedRun, LoadCase
 from fowt_env.training.loads.statistics import run_statistics
 from fowt_env.training.loads.tables import load_tables
-from fowt_env.weather.turbsim import read_bts, write_bts
+from fowt_env.weather.turbsim import HEAD, read_bts, write_bts
 from fowt_env.weather.wind_field import WindBox
 
 DECKS = Path(__file__).parents[2] / "reference" / "decks" / "IEA-15-240-RWT" / "OpenFAST"
@@ -54,6 +63,11 @@ def test_a_box_written_for_turbsim_is_read_back(tmp_path):
     np.testing.assert_allclose(y, own.y, atol=1e-4)
     np.testing.assert_allclose(z, own.z, atol=1e-4)
     assert (dt, speed, periodic) == (0.5, 18.0, True)
+    content = (tmp_path / "w.bts").read_bytes()
+    *_, u, u0, v, v0, w, w0, length = HEAD.unpack(content[: HEAD.size])
+    stored = np.frombuffer(content[HEAD.size + length :], "<i2").reshape(20, -1, 3)
+    tower = (stored[:, -1] - [u0, v0, w0]) / [u, v, w]  # where InflowWind has it: the lowest row at y = 0
+    np.testing.assert_allclose(tower, own.velocity[:, 0, 1], atol=1e-3)
     write_bts(tmp_path / "v.bts", own.velocity, own.y, own.z, own.dt, own.speed, 90.0, False)
     assert read_bts(tmp_path / "v.bts")[5] is False
     with pytest.raises(InputError, match="lowest point is at z = -1 m"):
@@ -125,6 +139,49 @@ def test_the_deck_has_the_case_and_all_else_of_the_users(run, tmp_path):
     assert sea.number("WaveDir") == 30.0 and sea.text("WvKinFile") == "waves"
     write_deck(tmp_path, FST, LOAD, scene, frame, (3, "wind.bts"), end)
     assert PartFile(tmp_path / inflow.path.name, "InflowWind").text("FileName_BTS") == "wind.bts"
+
+
+def test_a_parked_deck_idles_and_has_the_current_of_its_storm(run, tmp_path):
+    scene, frame = run
+    frame = frame.assign(**{"BldPitch1_[deg]": 90.0, "RotSpeed_[rpm]": 0.0})
+    options = LOAD.case.options | {"current": {"speed": 1.2, "heading": 30.0, "exponent": 1.0 / 7.0}}
+    parked = replace(LOAD, case=replace(LOAD.case, parked=True, options=options))
+    weather, held = ((2, "wind.wnd"), 90.0), tmp_path / "held"  # a deck whose rotor cannot turn on its own
+    held.mkdir()
+    fst = write_deck(held, FST, LOAD, scene, frame, *weather)
+    elastodyn = EditedPart(PartFile(fst, "OpenFAST").other("EDFile"), "ElastoDyn")
+    elastodyn.put(False, "GenDOF")
+    elastodyn.write(elastodyn.file.path)
+    main = PartFile(write_deck(tmp_path, fst, parked, scene, frame, *weather), "OpenFAST")
+    servo, elastodyn = (
+        PartFile(main.other(key), kind) for key, kind in (("ServoFile", "ServoDyn"), ("EDFile", "ElastoDyn"))
+    )
+    assert servo.path.parent == elastodyn.path.parent == tmp_path
+    assert servo.whole("PCMode") == servo.whole("VSContrl") == 0 and servo.number("TimGenOn") > 9000.0
+    assert elastodyn.text("GenDOF").lower() == "true" and elastodyn.number("BlPitch(3)") == 90.0
+    sea = PartFile(main.other("SeaStFile"), "SeaState")
+    assert sea.whole("CurrMod") == 1 and sea.number("CurrSSV0") == 1.2 and sea.number("CurrDIV") == 0.0
+    assert sea.number("CurrSSDir") == 30.0 and sea.number("CurrNSV0") == 0.0
+    uniform = replace(parked, case=replace(parked.case, options=options | {"current": {"speed": 0.4}}))
+    main = PartFile(write_deck(tmp_path, FST, uniform, scene, frame, *weather), "OpenFAST")
+    sea = PartFile(main.other("SeaStFile"), "SeaState")
+    assert sea.number("CurrDIV") == 0.4 and sea.number("CurrSSV0") == 0.0
+
+
+@pytest.mark.skipif(find_spec("rosco") is None, reason="needs pip install --no-deps rosco")
+def test_a_deck_with_rosco_has_the_input_file_of_the_run(run, tmp_path):
+    scene, frame = run
+    rosco = rosco_of("rosco", scene)
+    arguments = (FST, LOAD, scene, frame, (2, "wind.wnd"), 90.0)
+    main = PartFile(write_deck(tmp_path, *arguments, rosco), "OpenFAST")
+    servo = PartFile(main.other("ServoFile"), "ServoDyn")
+    assert servo.whole("PCMode") == servo.whole("VSContrl") == 5
+    assert servo.number("DLL_DT") == 0.1  # as in the run
+    assert Path(servo.text("DLL_FileName")) == find_library()[0]
+    assert servo.other("DLL_InFile").resolve() == (tmp_path / "DISCON.IN").resolve()
+    for name, text in rosco.inputs(scene).items():
+        assert (tmp_path / name).read_text() == text
+    assert rosco_of("pi", scene) is rosco_of(None, scene) is None
 
 
 def test_an_edit_keeps_comments_and_names_a_missing_key(tmp_path):
