@@ -58,6 +58,7 @@ FIRST_CHUNK = 20.0  # simulated seconds
 CHUNK_TIME = 0.05  # s of wall-clock time
 GIB = 2.0**30
 MOST_MEMORY = 0.8  # fraction of the machine's memory that a table may take
+SUNK = "sunk (the foot of the tower is below still water)"
 LIMITED = 0.5  # fraction of a run with limited generator torque that causes a warning
 REPLACED = {  # former keywords of simulate
     "stop_overspeed": "protection='end_at_overspeed'",
@@ -420,11 +421,27 @@ class Run:
             self.rows[self.filled :],
         )  # fmt: skip
         self.filled += count
+        self._check_afloat(count)
         if not self.schedule.external and abs(pitch := self.u[Command.BLADE_PITCH]) > pi:
             self.units.warn(0.0, float(pitch))
         if status != RUNNING:
             self._stop(status, step)
         return step
+
+    def _check_afloat(self, count):
+        """End a run with flooded compartments at the first new row whose tower foot is below still water.
+
+        Raises: SimulationStopped.
+        """
+        if not len(self.interface.guard.floods):
+            return
+        rows = self.rows[self.filled - count : self.filled]
+        foot = self.scene.model.layout.base_height + rows[:, Out.PTFMHEAVE]
+        if count and foot.min() < 0.0:
+            self.filled += int(np.argmax(foot < 0.0)) + 1 - count
+            frame = self.frame()
+            time = float(frame.iloc[-1, 0])
+            raise SimulationStopped(f"stopped at t = {time:.3f} s: {SUNK}", SUNK, time, frame)
 
     def _stop(self, status, step):
         """Raise SimulationStopped with the reason of a status."""

@@ -2,9 +2,10 @@
 
 u(X, Y, Z, t) = box(t + shift - X/U, Y, Z), trilinear in time and both coordinates, sampled at every blade
 station and at the tower. As in InflowWind the shift is half the grid width over the mean wind, so that the
-wind half a width upstream is defined at the start, and below the grid the wind decreases linearly to zero
-at the still-water level; to the sides and above, the wind at the edge is used (read_box rejects grids smaller
-than the rotor). Sources of boxes: TurbSim files (turbsim.py), user arrays, Mann turbulence (hipersim).
+wind half a width upstream is defined at the start (0 for a periodic TurbSim file), and below the grid the
+wind decreases linearly to zero at the still-water level; to the sides and above, the wind at the edge is used
+(read_box rejects grids smaller than the rotor). Sources of boxes: TurbSim files (turbsim.py), user arrays,
+Mann turbulence (hipersim).
 """
 
 from dataclasses import dataclass
@@ -73,7 +74,8 @@ class WindBox:
 def read_box(spec, *, hub_height, rotor_diameter, shear_exponent=0.0, seed=0, duration=600.0, keep=None):
     """Return the WindBox of a specification with "kind" bts, box or mann; a WindBox is returned unchanged.
 
-    bts   path; periodic (None: from the file); shift (s, None: half the grid width over the mean wind)
+    bts   path; periodic (None: from the file); shift (s, None: half the grid width over the mean wind, and 0
+          for a periodic file, as in InflowWind)
     box   u (n_time, n_z, n_y) m/s, optionally v and w; y, z (m); dt (s); speed (m/s)
     mann  speed (m/s); model ntm, etm or ewm of IEC 61400-1 with class, sigma and turbine_class; direction
           (deg) to which its velocities are turned, while it travels along x; seed, dt, points of the grid in
@@ -129,7 +131,8 @@ def _from_bts(values, *_):
     for key, value, limits in (("dt", dt, BOX_STEPS), ("speed", speed, MOVING_SPEEDS)):
         check_in_range(f"wind.path = {str(values['path'])!r}: {key}", value, *limits)
     periodic = repeats if values["periodic"] is None else values["periodic"]
-    return _box(velocity, y, z, dt, speed, periodic, values["shift"])
+    shift = 0.0 if values["shift"] is None and repeats else values["shift"]
+    return _box(velocity, y, z, dt, speed, periodic, shift)
 
 
 def _from_mann(values, hub_height, rotor_diameter, shear_exponent, seed, duration, keep):

@@ -8,7 +8,7 @@ from naive.mooring import catenary
 import fowt_env
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.envs import FowtEnv
-from fowt_env.errors import InputError
+from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.loop.protection import Flood, fill_compartments
 from fowt_env.plant.hydro.flooding import add_point_mass, with_floods
 from fowt_env.plant.hydro.load import NO_HYDRO_LOAD
@@ -152,6 +152,15 @@ def test_a_flooded_platform_moves_as_one_with_this_ballast_and_comes_to_rest_at_
         still, FLOODED, initial=initial | {"RotSpeed": rest["RotSpeed"], "BldPitch1": rest["BldPitch1"]}
     )
     assert np.abs(frame["PtfmHeave_[m]"] - rest["PtfmHeave"]).max() < 1e-3
+
+
+def test_a_platform_that_sinks_ends_the_run_where_its_tower_meets_the_water(scene):
+    flood = {"kind": "flooded_compartment", "time": 5.0, "mass": 4e6, "point": [0.0, 0.0, -100.0]}
+    with pytest.raises(SimulationStopped, match="sunk") as caught:
+        run(scene, flood)
+    foot = 10.0 + caught.value.frame["PtfmHeave_[m]"].to_numpy()
+    assert caught.value.time == caught.value.frame["Time_[s]"].iloc[-1] < 20.0
+    assert foot[-1] < 0.0 < foot[:-1].min()
 
 
 def test_a_compartment_fills_at_a_constant_rate(scene):

@@ -4,7 +4,7 @@ from rich.markup import escape
 
 from fowt_env.descriptions.checks import check_number, check_whole_number
 from fowt_env.descriptions.files import parse_json
-from fowt_env.training.cli.console import EXIT_INTERRUPTED, EXIT_STOPPED, fail, note, progress_bar, wrote
+from fowt_env.training.cli.console import note, progress_bar, resumable, wrote
 from fowt_env.training.cli.tables import out, print_table
 
 SHOWN = ("TwrBsMyt", "TwrBsMxyt", "YawBrMyp", "RootMyc1", "RotThrust", "PtfmPitch", "PtfmOffset", "NcIMUTAxs",
@@ -55,7 +55,6 @@ def _extrapolated_runs(platform, site, label, folder, table):
 
 def _show_century(century, years, period, sample, folder, runs, *, jobs, engine, address):
     """Simulate the hours of a Century and write century.csv in a folder; print its main loads."""
-    from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.loads.century import (
         century_table,
         extrapolations,
@@ -73,23 +72,15 @@ def _show_century(century, years, period, sample, folder, runs, *, jobs, engine,
         f" {hours:,} h are simulated at {3600.0 / seconds:,.0f} times real time:"
         f" {hours * seconds / 3600.0:.2g} core-hours, all hours {total * seconds / 3600.0:.3g}"
     )
-    done = 0
-    with progress_bar("sampling") as update:
+    where = f"in {folder}; the same command resumes the sample"
+    with resumable("sampling", lambda done: f"{done} blocks of this stage are {where}") as update:
 
         def report(finished, blocks, left):
-            nonlocal done
-            done = finished
             update(finished, blocks, f"{finished} of {blocks} blocks, {left / 60.0:.0f} min left")
 
-        try:
-            found, wall, simulated = run_century(
-                century, folder, stages, jobs=jobs, engine=engine, address=address, progress=report
-            )
-        except KeyboardInterrupt:
-            what = f"{done} blocks of this stage are in {folder}; the same command resumes the sample"
-            fail(f"interrupted; {what}", EXIT_INTERRUPTED)
-        except WorkersLost as error:
-            fail(error, EXIT_STOPPED)
+        found, wall, simulated = run_century(
+            century, folder, stages, jobs=jobs, engine=engine, address=address, progress=report
+        )
     note(
         f"{simulated:,} h simulated in {wall:.0f} s with {jobs} processes; {found.hours:,} h in all,"
         f" {found.lost} lost, {found.tripped} with a trip"

@@ -302,6 +302,30 @@ def progress_bar(description, total=None, every=LINE_EVERY):
 
 
 @contextmanager
+def resumable(description, kept):
+    """Show a progress bar of work that another call resumes; yield update(done, total, text).
+
+    kept: kept(done) is the text of what is there for that call if the work is interrupted.
+    """
+    from fowt_env.training.evaluation.engines import WorkersLost
+
+    finished = 0
+    with progress_bar(description) as show:
+
+        def update(done, total, text):
+            nonlocal finished
+            finished = done
+            show(done, total, text)
+
+        try:
+            yield update
+        except KeyboardInterrupt:
+            fail(f"interrupted; {kept(finished)}", EXIT_INTERRUPTED)
+        except WorkersLost as error:
+            fail(error, EXIT_STOPPED)
+
+
+@contextmanager
 def text_progress(description, label=""):
     """Show a progress bar; yield progress(text, done, total), the callback of some studies."""
     with progress_bar(description) as update:

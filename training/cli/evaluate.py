@@ -12,13 +12,11 @@ from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import write_table
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import (
-    EXIT_INTERRUPTED,
-    EXIT_STOPPED,
     command,
     err,
-    fail,
     note,
     progress_bar,
+    resumable,
 )
 from fowt_env.training.cli.tables import out, print_table, table_width
 
@@ -76,7 +74,6 @@ def evaluate_command(
     """
     from fowt_env.controllers import controller_names
     from fowt_env.training.evaluation.cases import chosen_cases
-    from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.evaluation.evaluate import evaluate, summary
     from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
     from fowt_env.training.evaluation.seeds import with_drawn_seeds
@@ -91,36 +88,24 @@ def evaluate_command(
         chosen = with_drawn_seeds(chosen, draw_seeds)
     if baseline is not None and baseline not in (names := controller_names(controllers)):
         raise unknown("baseline among --controllers", baseline, names)
-    finished = 0
-    with progress_bar("evaluating") as update:
-
-        def report(done, total, _):
-            nonlocal finished
-            finished = done
-            update(done, total, f"evaluating, {done} of {total} runs done")
-
-        try:
-            table = evaluate(
-                controllers,
-                chosen,
-                duration=duration,
-                skip=skip,
-                seeds=numbers,
-                jobs=jobs,
-                progress=report,
-                folder=folder,
-                engine=engine,
-                address=address,
-                time_limit=time_limit or None,
-                sensors=sensors,
-                retry_failed=retry_failed,
-                **({} if preview == "exact" else {"preview": preview}),
-            )
-        except KeyboardInterrupt:
-            where = f"in {folder / 'results.csv'}; the same command resumes the evaluation"
-            fail(f"interrupted; the {finished} finished runs are {where}", EXIT_INTERRUPTED)
-        except WorkersLost as error:
-            fail(error, EXIT_STOPPED)
+    where = f"in {folder / 'results.csv'}; the same command resumes the evaluation"
+    with resumable("evaluating", lambda done: f"the {done} finished runs are {where}") as update:
+        table = evaluate(
+            controllers,
+            chosen,
+            duration=duration,
+            skip=skip,
+            seeds=numbers,
+            jobs=jobs,
+            progress=lambda done, total, _: update(done, total, f"evaluating, {done} of {total} runs done"),
+            folder=folder,
+            engine=engine,
+            address=address,
+            time_limit=time_limit or None,
+            sensors=sensors,
+            retry_failed=retry_failed,
+            **({} if preview == "exact" else {"preview": preview}),
+        )
     _print_conditions(folder, suite)
     board = write_leaderboard(table, folder, baseline)
     means = summary(table)

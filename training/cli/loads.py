@@ -10,14 +10,12 @@ from fowt_env.descriptions.checks import check_number, check_whole_number, parse
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import (
-    EXIT_INTERRUPTED,
-    EXIT_STOPPED,
     command,
     err,
-    fail,
     note,
     output,
     progress_bar,
+    resumable,
     wrote,
 )
 from fowt_env.training.cli.tables import out, print_table
@@ -94,7 +92,6 @@ def loads_command(
     of DLC 1.1 in OUT extrapolate, if they have been made with --wind rotor-averaged.
     """
     from fowt_env.controllers import controller_names
-    from fowt_env.training.evaluation.engines import WorkersLost
     from fowt_env.training.loads.matrix import expanded
     from fowt_env.training.loads.output import write_results
     from fowt_env.training.loads.run import check_controllers, expected_seconds, run_matrix
@@ -136,25 +133,17 @@ def loads_command(
     if dry_run:
         return
     about = {"site": read_site(site).model_dump(mode="json")}
-    finished = 0
-    with progress_bar("running") as update:
+    where = f"in {folder}; the same command resumes the table"
+    with resumable("running", lambda done: f"the {done} finished runs are {where}") as update:
 
         def report(done, total, run, left):
-            nonlocal finished
-            finished = done
             text = "" if left is None else f", {_time(left)} left"
             update(done, total, f"{done} of {total} runs done{text}")
 
-        try:
-            statuses = run_matrix(
-                matrix, named, folder, about=about, jobs=jobs, engine=engine, address=address,
-                time_limit=time_limit or None, retry_failed=retry_failed, progress=report,
-            )  # fmt: skip
-        except KeyboardInterrupt:
-            what = f"the {finished} finished runs are in {folder}; the same command resumes the table"
-            fail(f"interrupted; {what}", EXIT_INTERRUPTED)
-        except WorkersLost as error:
-            fail(error, EXIT_STOPPED)
+        statuses = run_matrix(
+            matrix, named, folder, about=about, jobs=jobs, engine=engine, address=address,
+            time_limit=time_limit or None, retry_failed=retry_failed, progress=report,
+        )  # fmt: skip
     note(f"{', '.join(f'{count} {status}' for status, count in sorted(statuses.items()))}: runs in {folder}")
     _print_lost(matrix, folder)
     with progress_bar("tables") as update:

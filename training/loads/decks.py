@@ -17,6 +17,7 @@ HydroDyn), ServoDyn.
 import os
 import re
 from dataclasses import replace
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -35,7 +36,7 @@ from fowt_env.training.evaluation.run_case import CONTROL_DT, Run, scored
 from fowt_env.training.evaluation.wind_boxes import new_box
 from fowt_env.training.loads.tables import DRIVING, driving_runs
 from fowt_env.weather.turbsim import write_bts
-from fowt_env.weather.wind_field import WindBox, is_field
+from fowt_env.weather.wind_field import MARGIN, WindBox, is_field
 
 BOX, UNIFORM, WAVES = "wind.bts", "wind.wnd", "waves"
 WAVE_STEP = 0.2  # s, of the elevation
@@ -93,6 +94,17 @@ class EditedPart:
             temporary.write_text("\n".join(self.lines) + "\n", encoding="latin-1")
 
 
+def covering(box, duration):
+    """Return the velocities of a WindBox for a run of a duration, s, in a file that is not periodic.
+
+    InflowWind starts such a file half its width upstream, as boxes here, but a periodic one at the hub.
+    """
+    count = len(box.velocity)
+    if box.periodic:
+        count = max(count, ceil((duration + box.shift + MARGIN / box.speed) / box.dt) + 2)
+    return box.velocity[np.arange(count) % len(box.velocity)]
+
+
 def write_wind(folder, scene):
     """Write the wind of a Scene for InflowWind; return (WindType, name of the file), (None, None) without.
 
@@ -103,7 +115,8 @@ def write_wind(folder, scene):
     if isinstance(wind, WindBox):
         with replacing(folder / BOX) as temporary:
             write_bts(
-                temporary, wind.velocity, wind.y, wind.z, wind.dt, wind.speed, hub, wind.periodic
+                temporary, covering(wind, scene.options["duration"]), wind.y, wind.z, wind.dt, wind.speed,
+                hub, periodic=False,
             )  # fmt: skip
         return 3, BOX
     if scene.model.aero is None:

@@ -37,7 +37,10 @@ def write_results(
     options = {} if years is None else {"years": years}
     description = read_platform(matrix.cases[0].case.platform)
     climate = climate_of(site, turbine_of(description))
-    results = load_tables(matrix.cases, finished, baseline=baseline, climate=climate, progress=say, **options)
+    limits = site.design.constraint_limits
+    results = load_tables(
+        matrix.cases, finished, baseline=baseline, climate=climate, limits=limits, progress=say, **options
+    )
     paths, remarks = list(write_csv(folder / "tables", results)), []
     name = description.name
     about = {

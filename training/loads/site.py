@@ -26,6 +26,7 @@ from fowt_env.descriptions.sea_state import joint_tables, read_sea_state, sea_st
 from fowt_env.errors import unknown
 from fowt_env.training.evaluation.cases import Site
 from fowt_env.training.loads.site_fit import fitted
+from fowt_env.training.loads.statistics import LIMITS
 
 FOLDER = Path(__file__).parent / "sites"
 YEAR = 8766.0  # h
@@ -139,7 +140,8 @@ class Design(Sourced):
 
     availability: fraction of time in which the turbine can operate. hs_classes, tp_classes: classes of equal
     probability of the sea for each wind, of a fitted sea. events: times per year, by kind of event. start:
-    whose start-up is run, the supervisor's for all controllers or each controller's own.
+    whose start-up is run, the supervisor's for all controllers or each controller's own. limits: of the
+    constraints, by the names of LIMITS of statistics.py with _ for spaces; False: no limit.
     """
 
     availability: Probability = 0.95
@@ -151,6 +153,18 @@ class Design(Sourced):
     transient: Positive = 600.0  # s at the start of a run that are not counted
     start: Literal["supervisor", "controller"] = "supervisor"
     events: dict[Literal["start", "stop", "fault"], NonNegative] = {}
+    limits: dict[str, Literal[False] | Finite] = {}
+
+    def _problems(self):
+        known = [name.replace(" ", "_") for name in LIMITS]
+        for key in self.limits:
+            if key not in known:
+                yield f"limits: {unknown('constraint', key, known)}"
+
+    @property
+    def constraint_limits(self):
+        """Return {constraint: limit} of `limits`, with None for no limit."""
+        return {key.replace("_", " "): None if x is False else x for key, x in self.limits.items()}
 
 
 class SiteFile(Record):

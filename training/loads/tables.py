@@ -103,17 +103,20 @@ def load_tables(
     reference_cycles=REFERENCE_CYCLES,
     exponents=(3, 4, 10),
     climate=None,
+    limits=None,
     progress=None,
 ):
     """Return the LoadTables of LoadCases and {key: FinishedRun}.
 
     baseline: controller that others are compared with, None: the first. years: lifetime of the fatigue loads.
     climate: site.Climate, for loads by inverse FORM; None: without these.
+    limits: {constraint: limit or None} in place of those with which the runs were made.
     progress: called as progress(done, total, text).
     Raises: InputError if no run has statistics, or for an unknown exponent.
     """
     say = progress or (lambda done, total, text: None)
     runs, lost, ended = joined(cases, finished)
+    runs = [(case, with_limits(each, limits or {})) for case, each in runs]
     columns = [name for name in columns_of([(c, s) for c, s in runs]) if name != TIME]
     labels = controllers_of(runs)
     baseline = labels[0] if baseline is None else baseline
@@ -140,6 +143,12 @@ def load_tables(
         lifetime_table(runs, exponents, years, reference_cycles, baseline),
         flag_table(runs), extrapolations, forms, years, reference_cycles,
     )  # fmt: skip
+
+
+def with_limits(statistics, limits):
+    """Return RunStatistics whose Flags have other limits: {constraint: limit or None}."""
+    flags = tuple(flag._replace(limit=limits.get(flag.name, flag.limit)) for flag in statistics.flags)
+    return replace(statistics, flags=flags)
 
 
 def family_of(column):

@@ -32,7 +32,8 @@ def write_page(out, template, script, texts, data, plotly, style=""):
     """Write a page atomically; return its path.
 
     template, script   paths of the HTML and of the page's own script, which follows common.js
-    texts              {placeholder: HTML} of the template, besides policy, style, plotly, script and data
+    texts              {placeholder: HTML} of the template and head.html, besides head, policy, style, plotly,
+                       script and data
     data               mapping that the script reads as JSON, without NaN
     style              CSS that follows page.css
     """
@@ -46,7 +47,13 @@ def write_page(out, template, script, texts, data, plotly, style=""):
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     for character in "<\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
-    page = Template(template.read_text(encoding="utf-8")).substitute(texts, data=text, **scripts)
+    texts["head"] = _filled(PAGE / "head.html", texts)
+    page = _filled(template, texts | {"data": text} | scripts)
     with replacing(out) as temporary:
         temporary.write_text(page, encoding="utf-8")
     return out
+
+
+def _filled(template, texts):
+    """Return the text of a template file with its placeholders filled."""
+    return Template(template.read_text(encoding="utf-8")).substitute(texts)

@@ -27,7 +27,7 @@ from fowt_env.training.loads.records import FinishedRun, LoadCase
 from fowt_env.training.loads.statistics import run_statistics
 from fowt_env.training.loads.tables import load_tables
 from fowt_env.weather.turbsim import HEAD, read_bts, write_bts
-from fowt_env.weather.wind_field import WindBox
+from fowt_env.weather.wind_field import WindBox, read_box
 
 DECKS = Path(__file__).parents[2] / "reference" / "decks" / "IEA-15-240-RWT" / "OpenFAST"
 FST = DECKS / "IEA-15-240-RWT-UMaineSemi" / "IEA-15-240-RWT-UMaineSemi.fst"
@@ -70,6 +70,9 @@ def test_a_box_written_for_turbsim_is_read_back(tmp_path):
     np.testing.assert_allclose(tower, own.velocity[:, 0, 1], atol=1e-3)
     write_bts(tmp_path / "v.bts", own.velocity, own.y, own.z, own.dt, own.speed, 90.0, False)
     assert read_bts(tmp_path / "v.bts")[5] is False
+    for name, shift in (("w.bts", 0.0), ("v.bts", 80.0 / 18.0)):  # of InflowWind: periodic or not
+        spec = {"kind": "bts", "path": str(tmp_path / name)}
+        assert read_box(spec, hub_height=90.0, rotor_diameter=126.0).shift == pytest.approx(shift)
     with pytest.raises(InputError, match="lowest point is at z = -1 m"):
         write_bts(tmp_path / "u.bts", own.velocity, own.y, own.z - 11.0, own.dt, 18.0, 90.0, True)
 
@@ -95,8 +98,14 @@ def test_the_wind_of_a_scene_is_written_as_its_kind(run, tmp_path):
     rows = np.loadtxt(tmp_path / "wind.wnd", comments="!")
     # clockwise seen from above: wind towards +y has a negative direction
     np.testing.assert_allclose(rows[:, 2], -np.degrees(np.arctan2([3.0, -1.0], [10.0, 12.0])), rtol=1e-6)
-    assert write_wind(tmp_path, replace(scene, wind=box())) == (3, "wind.bts")
-    assert read_bts(tmp_path / "wind.bts")[4] == 18.0
+    own = replace(box(), shift=80.0 / 18.0)  # half of its width
+    assert write_wind(tmp_path, replace(scene, wind=own)) == (3, "wind.bts")
+    again = read_box(
+        {"kind": "bts", "path": str(tmp_path / "wind.bts")}, hub_height=90.0, rotor_diameter=126.0
+    )
+    assert not again.periodic and again.usable >= 30.0  # InflowWind starts a periodic file at the hub
+    at = np.linspace(0.0, 30.0, 61), 5.0, -20.0, 100.0
+    np.testing.assert_allclose(again.at(*at), own.at(*at), atol=2e-3)
 
 
 def test_the_elevation_is_that_of_the_run_and_ends_smoothly(run, tmp_path):

@@ -214,3 +214,15 @@ def test_the_plot_shows_the_table_and_the_extremes():
     speed = float(sea[1].get_xdata()[40])
     assert sea[1].get_ydata()[40] == pytest.approx(climate.expected_sea(speed)[0])
     assert sea[2].get_ydata()[40] == pytest.approx(climate.severe_sea(speed)[0])
+
+
+def test_limits_of_constraints_are_the_designers():
+    site = read_site("norway_5")
+    limits = {"platform_pitch": 10.0, "overspeed": False}
+    own = type(site).model_validate(site.model_dump() | {"design": {"source": "x", "limits": limits}})
+    assert own.design.constraint_limits == {"platform pitch": 10.0, "overspeed": None}
+    assert site.design.constraint_limits == {}
+    for wrong, part in (({"platform_tilt": 1.0}, "platform_tilt"), ({"offset": "far"}, "offset"),
+                        ({"offset": float("inf")}, "offset")):  # fmt: skip
+        with pytest.raises(ValueError, match=part):
+            type(site).model_validate(site.model_dump() | {"design": {"source": "x", "limits": wrong}})

@@ -132,6 +132,17 @@ def test_csv_files_have_every_row(results, tmp_path):
     assert len(pd.read_csv(paths["extrapolation"])) == len(results.extrapolations)
 
 
+def test_other_limits_of_constraints_need_no_other_runs():
+    cases, finished = small_table()
+    wide = load_tables(cases, finished, limits={"platform pitch": 1e3, "overspeed": None})
+    before, after = (
+        {flag.name: flag for _, flag, _ in each.flags} for each in (load_tables(cases, finished), wide)
+    )
+    assert before["platform pitch"].exceeded and not after["platform pitch"].exceeded
+    assert after["platform pitch"].limit == 1e3 and after["overspeed"].limit is None
+    assert after["air gap"] == before["air gap"]
+
+
 def test_spreadsheets_have_the_layout_of_iea_22(results, tmp_path):
     """Headings, sensors, directions and units as in outputs/04_design_loads of IEA-22-280-RWT (57979ec)."""
     paths = {path.stem.partition("DLB_")[2]: path for path in write_spreadsheets(tmp_path, "oc3", results)}
