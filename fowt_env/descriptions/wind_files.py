@@ -45,8 +45,19 @@ def read_wind_table(path):
         )
     numeric = frame.select_dtypes("number")
     if numeric.shape[1] != 2:
-        raise InputError(f"{where}: both columns must hold numbers only")
+        raise InputError(f"{where}: {_first_text(frame)}both columns must hold numbers only")
     return {"kind": "series", "time": numeric.iloc[:, 0].to_numpy(), "speed": numeric.iloc[:, 1].to_numpy()}
+
+
+def _first_text(frame):
+    """Return the column, value and row of the first cell of a table that is no number, or ""."""
+    import pandas as pd
+
+    wrong = frame.apply(pd.to_numeric, errors="coerce").isna() & frame.notna()
+    if not wrong.to_numpy().any():
+        return ""
+    row, column = np.argwhere(wrong.to_numpy())[0]
+    return f"{frame.columns[column]} = {frame.iat[row, column]!r} in row {row + 1}: "
 
 
 def read_uniform_wind(path):

@@ -80,7 +80,9 @@ def _print_extras(extras):
         out.print(f"  {extra:14} {state}  {escape(names + advice)}")
     usual = [parts for name, parts in extras.items() if name not in "docs hydro".split()]  # as `all` has them
     if any(package.version is None for parts in usual for package in parts):
-        out.print(escape(f'  all but docs and hydro: pip install "{requirements.DISTRIBUTION}[all]"'))
+        out.print(
+            escape(f'  all without torch, Ray and toolboxes: pip install "{requirements.DISTRIBUTION}[all]"')
+        )
 
 
 def _named(package):

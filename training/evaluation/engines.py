@@ -54,11 +54,7 @@ def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=No
     Raises: InputError for an unknown engine, jobs < 1, tasks that cannot be pickled, or if Ray does not
     start; WorkersLost if workers cannot be started.
     """
-    if engine not in ENGINES:
-        raise unknown("engine", engine, ENGINES)
-    check_whole_number("jobs", jobs, 1)
-    if address is not None and engine != "ray":
-        raise InputError(f"address = {address!r}: needs the engine 'ray'")
+    check_engine(jobs, engine, address)
     if not tasks:
         return
     if engine == "ray":
@@ -70,6 +66,15 @@ def outcomes(function, tasks, jobs=1, engine="processes", address=None, limit=No
         yield index, function(task)
     if first < len(tasks):
         yield from _processes(function, tasks, range(first, len(tasks)), jobs, limit, lost or _raise_lost)
+
+
+def check_engine(jobs, engine, address):
+    """Raise InputError for an unknown engine, jobs < 1, or an address without Ray."""
+    if engine not in ENGINES:
+        raise unknown("engine", engine, ENGINES)
+    check_whole_number("jobs", jobs, 1)
+    if address is not None and engine != "ray":
+        raise InputError(f"address = {address!r}: needs the engine 'ray'")
 
 
 def _raise_lost(task, reason):

@@ -23,7 +23,7 @@ from fowt_env.descriptions.platform import turbine_of
 from fowt_env.errors import InputError, PlantWarning, level_outside
 from fowt_env.files.tables import table_path, write_table
 from fowt_env.training.evaluation.cases import Case, Suite, check_sensors, described, named_cases
-from fowt_env.training.evaluation.engines import outcomes
+from fowt_env.training.evaluation.engines import check_engine, outcomes
 from fowt_env.training.evaluation.failures import KINDS, known_figures, lost_counts, with_lost_power
 from fowt_env.training.evaluation.guard import attempt
 from fowt_env.training.evaluation.metrics import METRICS, metrics
@@ -101,6 +101,7 @@ def evaluate(
     is run once, under the name "parked".
     Raises: InputError for unusable settings.
     """
+    check_engine(jobs, engine, address)
     if folder is not None:
         if out is not None or runs_folder is not None:
             raise InputError("folder: contains both table and runs, so out and runs_folder must be None")

@@ -418,9 +418,14 @@ def test_wind_texts_that_mean_nothing_are_refused(text):
 
 def test_a_wind_series_needs_two_columns_of_numbers(tmp_path):
     path = tmp_path / "wind.csv"
-    for content in ("a,b,c\n1,2,3\n", "time,speed\n0,fast\n", "time\n1\n"):
+    refused = {
+        "a,b,c\n1,2,3\n": "it has a, b, c",
+        "time,speed\n0,9\n1,fast\n": "speed = 'fast' in row 2: both columns must hold numbers only",
+        "time\n1\n": "needs columns time and speed",
+    }
+    for content, words in refused.items():
         path.write_text(content)
-        with pytest.raises(InputError, match="wind series"):
+        with pytest.raises(InputError, match=f"wind series.*{words}"):
             wind_of(str(path))
 
 
