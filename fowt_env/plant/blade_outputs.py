@@ -15,9 +15,7 @@ from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import stored
-from fowt_env.plant.elastic.blades import BladeModes
-from fowt_env.plant.elastic.chain import rotor_frame, top_of
-from fowt_env.plant.elastic.outputs import bearing_moment, hub_load, root_load
+from fowt_env.plant.elastic.outputs import BentRotor, bearing_moment, bent_rotor
 from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.elastic.tower import bend_of
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, BladeMeasure
@@ -182,29 +180,23 @@ def bearing_moments(pose, rates, speed, rate, rotor, masses, body, layout):
 
 
 @inlined_kernel
-def _of_bending(pose, rates, x, dx, model, blades, data):
-    """Return the BladeMoments of bending blades; pose and rates of the nacelle frame are not needed."""
-    plane = model.rigid_body.plane
-    pose = pose_by_sines(x, data.cache[LoadCache.SINES :], plane)
-    bend = bend_of(x, model.tower)
-    top = top_of(pose, x, bend, model.tower)
-    frame, _ = rotor_frame(pose, top, bend, model.rigid_body.gravity, model.structure)
-    _, _, _, _, tilt, yaw = hub_load(x, frame, data.blades, blades, data.rotor)
-    wrench = stored(data.cache, LoadCache.ROTOR)
-    mx, my, mz = bearing_moment(bend, wrench, data.rotor, model.layout.tower_top[2])
+def _of_bending(pose, rates, x, dx, rotor, model, data):
+    """Return the BladeMoments of a BentRotor; pose and rates of the nacelle frame are not needed."""
+    wrench, height, hub = stored(data.cache, LoadCache.ROTOR), model.layout.tower_top[2], rotor.hub
+    mx, my, mz = bearing_moment(bend_of(x, model.tower), wrench, data.rotor, height)
     return BladeMoments(
-        _coned_root(0, x, dx, frame, model.pitches, data.blades, blades, data.rotor),
-        _coned_root(1, x, dx, frame, model.pitches, data.blades, blades, data.rotor),
-        _coned_root(2, x, dx, frame, model.pitches, data.blades, blades, data.rotor),
-        tilt, yaw, mx, my, mz,
+        _coned_root(0, x, rotor.first, model.pitches),
+        _coned_root(1, x, rotor.second, model.pitches),
+        _coned_root(2, x, rotor.third, model.pitches),
+        hub.my, hub.mz, mx, my, mz,
     )  # fmt: skip
 
 
 @inlined_kernel
-def _coned_root(number, x, dx, frame, pitches, loads, blades, work):
-    """Return the RootMoments of a bending blade, coned axes."""
+def _coned_root(number, x, load, pitches):
+    """Return the RootMoments of a SectionLoad of the root of a blade, coned axes."""
     pitch = pitch_of(number, x, pitches)
-    load, c, s = root_load(number, x, dx, frame, pitch, loads, blades, work), cos(pitch), sin(pitch)
+    c, s = cos(pitch), sin(pitch)
     return RootMoments(c * load.mx + s * load.my, c * load.my - s * load.mx)
 
 
@@ -226,7 +218,7 @@ _bearing = chosen_by_class(
 
 
 @inlined_kernel
-def _of_rigid(pose, rates, x, dx, model, blades, data):
+def _of_rigid(pose, rates, x, dx, rotor, model, data):
     """Return the BladeMoments of rigid blades."""
     layout, body, loads = model.layout, model.rigid_body, data.blades
     masses = layout.blade_masses
@@ -248,20 +240,20 @@ def _of_rigid(pose, rates, x, dx, model, blades, data):
     )
 
 
-# (pose, rates, x, dx, model, blades, data) -> BladeMoments at a state with its last loads; pose and rates of
-# the nacelle frame
-blade_moments = chosen_by_class("blades", {type(None): _of_rigid, BladeModes: _of_bending}, inlined=True)
+# (pose, rates, x, dx, rotor, model, data) -> BladeMoments at a state with its last loads; pose and rates of
+# the nacelle frame; rotor: BentRotor, or None
+blade_moments = chosen_by_class("rotor", {type(None): _of_rigid, BentRotor: _of_bending}, inlined=True)
 
 
 @kernel
-def record_blades(pose, rates, x, dx, pitches, model, data, row):
+def record_blades(pose, rates, x, dx, rotor, pitches, model, data, row):
     """Fill the last entries of an output row with channels.BLADE_CHANNELS; nothing with one pitch for all.
 
-    pose, rates: of the nacelle frame.
+    pose, rates: of the nacelle frame; rotor: BentRotor, or None with rigid blades.
     """
     if pitches is None:
         return
-    moments = blade_moments(pose, rates, x, dx, model, model.blades, data)
+    moments = blade_moments(pose, rates, x, dx, rotor, model, data)
     out = row[row.shape[0] - N_BLADE_CHANNELS :]
     out[0], out[1] = pitch_of(1, x, pitches), pitch_of(2, x, pitches)
     out[2], out[3], out[4] = moments.first.in_plane, moments.second.in_plane, moments.third.in_plane
@@ -278,7 +270,12 @@ def measure_blades(pose, rates, x, dx, pitches, model, data, m):
     """
     if pitches is None:
         return
-    moments = blade_moments(pose, rates, x, dx, model, model.blades, data)
+    platform = pose_by_sines(x, data.cache[LoadCache.SINES :], model.rigid_body.plane)
+    rotor = bent_rotor(
+        platform, bend_of(x, model.tower), x, dx, pitches, model.rigid_body, model.structure, model.tower,
+        model.blades, data.blades, data.rotor,
+    )  # fmt: skip
+    moments = blade_moments(pose, rates, x, dx, rotor, model, data)
     out = m[m.shape[0] - N_BLADE_MEASUREMENTS :]
     out[BladeMeasure.AZIMUTH] = x[State.AZIMUTH] % (2.0 * pi)
     for blade in range(BLADES):

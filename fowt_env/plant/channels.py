@@ -13,7 +13,7 @@ from fowt_env.plant.blade_pitches import mean_pitch
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.elastic.chain import weighed_body
-from fowt_env.plant.elastic.outputs import add_upper_load, record_bending, shaft_load
+from fowt_env.plant.elastic.outputs import add_upper_load, bent_rotor, record_bending, shaft_load
 from fowt_env.plant.elastic.shaft import generator_speed, record_twist, twist_channels
 from fowt_env.plant.elastic.tower import Twist, bend_of, nacelle_rates, turned_pose
 from fowt_env.plant.hydro.load import surface_at_origin
@@ -259,15 +259,20 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.GENTQ] = torque
     row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * torque
     row[Out.GENTQLIM] = data.cache[LoadCache.TORQUE_LIMITED]
+    rotor = bent_rotor(
+        pose, bend, x, dx, model.pitches, body, model.structure, model.tower, model.blades, data.blades,
+        data.rotor,
+    )  # fmt: skip
     # shaft loads: aerodynamics less inertia and weight of the rotor
     hub, cm, tilt = layout.hub, layout.rotor_cm, layout.tilt
     cx, _, cz = acceleration_at(nacelle, moving, cm[0], cm[1], cm[2])
     push = along_shaft(cx + body.gravity * nacelle.r31, cz + body.gravity * nacelle.r33, tilt)
     turning = dx[State.ROTOR_SPEED] + along_shaft(moving.wx, moving.wz, tilt)
     row[Out.ROTTHRUST], row[Out.ROTTORQ] = shaft_load(
-        loads.rotor.thrust - layout.rotor_mass * push, loads.rotor.torque - layout.rotor_inertia * turning,
-        pose, bend, x, body, model.structure, model.tower, model.blades, data.blades, data.rotor,
-    )  # fmt: skip
+        loads.rotor.thrust - layout.rotor_mass * push,
+        loads.rotor.torque - layout.rotor_inertia * turning,
+        rotor,
+    )
     row[Out.RTFLDFXH] = loads.rotor.thrust
     row[Out.RTFLDMXH] = loads.rotor.torque
     tower_base(pose, x, dx, loads, bend, body, layout, model.tower, model.structure, data.rotor, row)
@@ -290,11 +295,8 @@ def record(model, data, x, dx, u, t, loads, row):
     n += tower_channels(bend)
     record_twist(x, model.shaft, row[n:])
     n += twist_channels(model.shaft)
-    record_bending(
-        pose, bend, x, dx, model.pitches, body, model.aero, model.structure, model.tower, model.blades,
-        data.blades, data.rotor, row[n:],
-    )  # fmt: skip
-    record_blades(nacelle, moving, x, dx, model.pitches, model, data, row)
+    record_bending(rotor, x, dx, model.pitches, model.aero, model.blades, data.blades, data.rotor, row[n:])
+    record_blades(nacelle, moving, x, dx, rotor, model.pitches, model, data, row)
 
 
 @inlined_kernel

@@ -84,6 +84,15 @@ def outer_part(nodes, station):
     return nodes._replace(z=z, mass=share * nodes.mass, shapes=Shapes(*map(moved, nodes.shapes)))
 
 
+def section_columns(nodes):
+    """Return (k, m) functions of BeamNodes of which places and accelerations of the particles are sums.
+
+    Rows: z, the n shapes U1, the n shapes U2, and S of each pair (i, j), j <= i.
+    """
+    (u1, u2), s = np.swapaxes(nodes.shapes.U, 0, 1), nodes.shapes.S
+    return np.vstack([nodes.z, u1, u2, s[np.tril_indices(len(u1))]])
+
+
 def shapes_between(nodes, z):
     """Return the Shapes of BeamNodes at distances z (m,) from the origin (shapes_at)."""
     left = np.clip(np.searchsorted(nodes.z, z, side="right") - 1, 0, len(nodes.z) - 2)

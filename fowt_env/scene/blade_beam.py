@@ -19,6 +19,7 @@ from fowt_env.scene.beam import (
     Shapes,
     integrated,
     outer_part,
+    section_columns,
     shape_values,
     shapes_between,
     summed,
@@ -113,9 +114,11 @@ def section_at(turbine, option, fraction, aero):
     point = _point(shapes_at(turbine, option, [distance]))
     structure = turbine.blade_structure
     twist = np.interp(fraction, structure.span_fraction, structure.structural_twist)
+    outer = outer_part(blade_nodes(turbine, blade_modes(turbine, option)), distance)
+    columns = section_columns(outer)
     return Section(
-        float(distance), float(np.cos(twist)), float(np.sin(twist)), point,
-        blade_beam(turbine, option, distance), outside,
+        float(distance), float(np.cos(twist)), float(np.sin(twist)), point, float(outer.mass.sum()),
+        columns @ outer.mass, np.ascontiguousarray((columns * outer.mass) @ columns.T), outside,
     )  # fmt: skip
 
 
@@ -129,23 +132,16 @@ def blade_modes(turbine, modes):
     return MODES[modes]
 
 
-def blade_beam(turbine, modes, station=None):
+def blade_beam(turbine, modes):
     """Return the Beam of one blade about the apex; None for "rigid".
 
     modes: "rigid", "modes" (first flapwise, first edgewise) or "modes2" (second flapwise, too, in the order
-    flap 1, flap 2, edge 1). station: distance (m) from the apex, of the Beam of the part outside of it
-    alone, without stiffness and damping: its loads are the internal loads at the station. An element that
-    the station cuts counts by its outer part, as one particle. Raises: InputError for a turbine without
-    [blade_structure].
+    flap 1, flap 2, edge 1). Raises: InputError for a turbine without [blade_structure].
     """
     if modes == "rigid":
         return None
     names = blade_modes(turbine, modes)
-    nodes = blade_nodes(turbine, names)
-    zero = np.zeros((len(names), len(names)))
-    if station is not None:
-        return integrated(outer_part(nodes, station), zero, zero)
-    return integrated(nodes, *_stiffness_and_damping(turbine, names))
+    return integrated(blade_nodes(turbine, names), *_stiffness_and_damping(turbine, names))
 
 
 def blade_nodes(turbine, names=SHAPES):

@@ -10,7 +10,7 @@ from naive.blade_sums import blade_sums
 from fowt_env.descriptions.blade_structure import BladeStructure
 from fowt_env.descriptions.turbine import read_turbine, turbine_names
 from fowt_env.errors import InputError
-from fowt_env.scene.blade_beam import blade_beam, blade_nodes, shapes_at, shapes_between
+from fowt_env.scene.blade_beam import blade_beam, blade_nodes, section_at, shapes_at, shapes_between
 
 DECKS = Path(__file__).parents[1] / "reference" / "decks"
 BLADES = {  # turbine: ElastoDyn's blade file
@@ -187,24 +187,47 @@ def test_shapes_at_a_station_are_weighted_rigid_motions_of_its_neighbours():
     assert close(beyond.U[..., 0], twin[-1][2] + 2.0 * twin[-1][3], 1e-8)
 
 
+def assert_sums(section, wanted):
+    """Assert that a Section has the integrals wanted, in the order z, U1, U2, S of pairs (i, j), j <= i."""
+    n = len(wanted["a"])
+    i, j = np.tril_indices(n)
+    first = np.concatenate([[wanted["first"]], wanted["a"], wanted["b"], np.asarray(wanted["S0"])[i, j]])
+    P, Q = (np.asarray(wanted[key])[:, i, j] for key in "PQ")
+    S1, T = np.asarray(wanted["S1"])[i, j], np.asarray(wanted["T"])[i, j][:, i, j]
+    e, f, C = (np.asarray(wanted[key]) for key in "efC")
+    second = np.vstack(
+        [
+            np.concatenate([[wanted["second"]], e, f, S1]),
+            np.column_stack([e, wanted["A"], C, P]),
+            np.column_stack([f, C.T, wanted["B"], Q]),
+            np.column_stack([S1, P.T, Q.T, T]),
+        ]
+    )
+    assert section.mass == pytest.approx(wanted["mass"], rel=1e-7)
+    assert close(section.first, first, 1e-7) and section.first.shape == (1 + 2 * n + n * (n + 1) // 2,)
+    for row, sums in zip(section.second, second, strict=True):
+        assert close(row, sums, 1e-7)
+
+
 def test_the_part_outside_a_station_has_the_sums_of_its_nodes():
     turbine = with_structure("iea15", tip_mass=55.0)
     twin = sums(turbine, "iea15")["nodes"]
-    half = 0.5 * (twin[1][0] - twin[0][0])
+    rotor, half = turbine.rotor, 0.5 * (twin[1][0] - twin[0][0])
+
+    def outside(z, modes="modes2"):
+        fraction = (z - rotor.hub_radius) / (rotor.tip_radius - rotor.hub_radius)
+        return section_at(turbine, modes, fraction, None)
+
     whole = blade_beam(turbine, "modes2")
-    assert all(map(np.array_equal, blade_beam(turbine, "modes2", turbine.rotor.hub_radius)[:16], whole[:16]))
-    for key, wanted in integrals(twin[20:], (0, 1, 2)).items():
-        assert close(getattr(blade_beam(turbine, "modes2", twin[20][0] - half), key), wanted, 1e-7), key
+    assert_sums(outside(rotor.hub_radius), {key: getattr(whole, key) for key in integrals(twin, (0, 1, 2))})
+    assert_sums(outside(twin[20][0] - half), integrals(twin[20:], (0, 1, 2)))
     # a cut through the middle of an element: its outer half, in the middle of this half
     z, m, u, _, w = twin[20]
     beyond = twin[21]
     near = [z + half / 2, m / 2, 0.75 * u + 0.25 * beyond[2], None, 0.75 * w + 0.25 * beyond[4]]
-    cut = blade_beam(turbine, "modes2", z)
-    for key, wanted in integrals([near, *twin[21:]], (0, 1, 2)).items():
-        assert close(getattr(cut, key), wanted, 1e-7), key
-    assert not cut.stiffness.any() and not cut.damping.any()
-    tip = blade_beam(turbine, "modes", turbine.rotor.tip_radius)
-    assert tip.mass == 55.0 and blade_beam(turbine, "modes", turbine.rotor.tip_radius + 1.0).mass == 0.0
+    assert_sums(outside(z), integrals([near, *twin[21:]], (0, 1, 2)))
+    assert outside(rotor.tip_radius, "modes").mass == pytest.approx(55.0, rel=1e-14)
+    assert outside(rotor.tip_radius + 1.0, "modes").mass == 0.0
 
 
 def test_a_turbine_without_the_structure_of_its_blades_bends_none():

@@ -13,7 +13,7 @@ import numpy as np
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.vector_sums import root
 
-LANES = 8  # stations in a row of a table, as `placed` has it
+LANES = 4  # stations in a row of a table, as `placed` has it: fewer lanes than by 8 remain without a station
 # results: position (m) and normal of the blade axis, as in blade_shape.Station; velocity by bending along the
 # normal and along t, m/s; pitch of a section without bending less the blade pitch, rad; components of the
 # section's axes, against the rotation and downwind, on those of a coned blade; blade_shape.Lever but for the
@@ -22,7 +22,7 @@ X, R, T, NX, NR, V_NORMAL, V_T, CHANGE, ACROSS, ALONG, TURN, T_NX, T_NR, ARM_X, 
     LANES * k for k in range(16)
 )
 N_PLACE, N_MODAL = 15, 3  # results of a station, and further ones of each mode
-N_REST, N_MODE, N_PAIR = 7, 8, 2  # constants of a station, of each mode, of each pair of modes
+N_REST, N_MODE, N_PAIR = 8, 8, 2  # constants of a station, of each mode, of each pair of modes
 
 
 class StationModes(NamedTuple):
@@ -61,14 +61,15 @@ class BentShape(NamedTuple):
 def constants(shape, modes):
     """Return the table of constants of a BladeShape and StationModes.
 
-    Rows: prebend, sweep, distance and sine of the slope; where the load acts, the first three; of each mode
-    x, y, slope_x, slope_y, axial, load_x, load_y, load_axial; of each pair, shortening and load_shortening.
+    Rows: prebend, sweep, distance and sine of the slope; where the load acts, the first three; cosine of the
+    slope; of each mode x, y, slope_x, slope_y, axial, load_x, load_y, load_axial; of each pair, shortening
+    and load_shortening.
     Lanes without a station repeat the last one.
     """
     m, n = modes.x.shape
     rest = (
         shape.prebend, shape.sweep, shape.distance, shape.slope,
-        shape.arm_prebend, shape.arm_sweep, shape.arm_distance,
+        shape.arm_prebend, shape.arm_sweep, shape.arm_distance, np.sqrt(1.0 - shape.slope * shape.slope),
     )  # fmt: skip
     of_mode = (
         modes.x, modes.y, modes.slope_x, modes.slope_y, modes.axial,
@@ -91,7 +92,7 @@ def place_entries(modes):
 def placed(j, result, shape):
     """Return a result of place_stations (X, R, ...) at station j of a BentShape."""
     size = LANES * (N_PLACE + N_MODAL * len(shape.modes.count))
-    at = (j >> 3) * size + (j & (LANES - 1)) + result
+    at = (j >> 2) * size + (j & (LANES - 1)) + result
     return shape.places[np.uintp(at)]  # an unsigned index avoids the test for negative ones
 
 
@@ -142,7 +143,7 @@ def _place_lanes(c, out, q, v, n, turn, cone_cosine, cone_sine, lanes):
         vx, vy = vx - turning_x * back, vy - turning_y * back
         # slopes are rotations of ElastoDyn about pitched axes, components of a rotation vector to second
         # order (SmllRotTrans), so that both together twist the section, as AeroDyn sees it
-        cosine, both = root(1.0 - sine * sine), 0.5 * ahead * side
+        cosine, both = c[np.uintp(7 * LANES + lane)], 0.5 * ahead * side
         w = root(1.0 - 0.25 * (ahead * ahead + side * side))
         level, lift = 1.0 - 0.5 * ahead * ahead, ahead * w
         lean = cos_pitch * (sine * level + cosine * lift) + sin_pitch * (cosine * side * w - sine * both)

@@ -28,7 +28,7 @@ from numba.core.ccallback import CFunc  # noqa: E402
 from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
 from fowt_env.layout import PACKAGE, installed_path  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
-from fowt_env.plant.compile.linked import LinkedDispatcher  # noqa: E402
+from fowt_env.plant.compile.linked import LinkedCompiler, LinkedDispatcher, SharedCompiler  # noqa: E402
 from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # registers its listener
 from fowt_env.plant.compile.sources import imported_at_top, keep_sources, read_source  # noqa: E402
 
@@ -132,14 +132,15 @@ def _keep(compiled, function):
         compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, isinstance(compiled, LinkedDispatcher))
 
 
-def _decorator(linked=False, **options):
-    """Return the decorator numba.njit with these options and the disk cache; linked: by linked.py."""
+def _decorator(linked=None, **options):
+    """Return the decorator numba.njit with these options and the disk cache; linked: class of linked.py."""
 
     def decorate(function):
         if numba.config.DISABLE_JIT:
             return function
         if linked:
-            compiled = LinkedDispatcher(function, targetoptions=options | {"nopython": True})
+            options_of = options | {"nopython": True}
+            compiled = LinkedDispatcher(function, targetoptions=options_of, pipeline_class=linked)
             compiled.keep = _keep
         else:
             compiled = numba.njit(**options)(function)
@@ -154,7 +155,7 @@ _HOUSE = {"error_model": "numpy", "nogil": True}
 # _nrt=False: numba counts references at every slice and call that takes arrays, each an atomic
 # instruction; without reference counts a time step takes a third less time. Such a kernel must not
 # allocate, nor return an array or a tuple that contains one.
-kernel = _decorator(**_HOUSE, _nrt=False, linked=True)
+kernel = _decorator(**_HOUSE, _nrt=False, linked=LinkedCompiler)
 
 # No fastmath anywhere: LLVM then orders a sum differently in each caller's copy of a function, and a
 # process that compiles gets other last bits than one that loads from disk (observed with the look-up
@@ -162,7 +163,12 @@ kernel = _decorator(**_HOUSE, _nrt=False, linked=True)
 
 # A kernel that is inlined whatever its size. A call passes a part of the model by value, up to a few
 # hundred words, which takes longer than many loads: kernels that only pass parts on are inlined.
-inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=True)
+inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=LinkedCompiler)
+
+# A kernel of which an entry has one copy, whatever the number of its callers. LLVM inlines even the largest:
+# copies of all loads take most of the time to compile, and of that to run, in which the processor then waits
+# for instructions.
+shared_kernel = _decorator(**_HOUSE, _nrt=False, linked=SharedCompiler)
 
 # Functions called from Python, which take Handles (counted references) or allocate.
 entry = _decorator(**_HOUSE)

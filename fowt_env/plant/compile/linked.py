@@ -82,14 +82,36 @@ class LinkedLowering(NativeLowering):
 class LinkedCompiler(CompilerBase):
     """Runs numba's compiler pipeline with LinkedLowering as its last pass."""
 
+    lowering: type = LinkedLowering
+
     def define_pipelines(self):
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.passes = [
-            (LinkedLowering, "linked lowering") if kind is NativeLowering else (kind, text)
+            (self.lowering, "linked lowering") if kind is NativeLowering else (kind, text)
             for kind, text in passes.passes
         ]
         passes.finalize()
         return [passes]
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class SharedLowering(LinkedLowering):
+    """Runs LinkedLowering of a kernel that callers link but LLVM never inlines."""
+
+    _name = "shared_lowering"
+
+    def run_pass(self, state):
+        state.flags.forceinline = False  # a kernel that an inlined one calls inherits this option
+        super().run_pass(state)
+        module = state.library._final_module
+        module.get_function(state["cr"].fndesc.llvm_func_name).add_function_attribute("noinline")
+        return True
+
+
+class SharedCompiler(LinkedCompiler):
+    """Runs numba's compiler pipeline with SharedLowering as its last pass."""
+
+    lowering = SharedLowering
 
 
 class LinkedDispatcher(CPUDispatcher):

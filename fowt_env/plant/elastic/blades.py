@@ -32,13 +32,18 @@ class Point(NamedTuple):
 
 @by_reference
 class Section(NamedTuple):
-    """Holds the part of a blade outside of a point of the pitch axis, for the loads there."""
+    """Holds the part of a blade outside of a point of the pitch axis, for the loads there.
+
+    first and second: integrals over the mass of the outer part of the columns of beam.section_columns.
+    """
 
     distance: float  # m, from the rotor centre
     cosine: float  # of the structural twist
     sine: float
     point: Point
-    beam: Beam  # of the outer part, about the rotor centre
+    mass: float  # kg
+    first: np.ndarray  # (k,) of each column
+    second: np.ndarray  # (k, k) of the products of two
     outside: np.ndarray  # (stations,) fraction of the load of each station that acts outside
 
 

@@ -13,8 +13,7 @@ from fowt_env.plant.aero.blade_sweep import shape_of
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.elastic.beam import reduce_beam
-from fowt_env.plant.elastic.blades import BladeModes
+from fowt_env.plant.elastic.blades import BladeModes, RotorFrame
 from fowt_env.plant.elastic.chain import rotor_frame, to_nacelle_axes, top_of
 from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.state import BLADES, State, Wrench, cross
@@ -31,37 +30,44 @@ class SectionLoad(NamedTuple):
     mz: float
 
 
-@inlined_kernel
-def _reduce_outer(number, x, frame, beam, blades, work):
-    """Reduce the outer part of a blade into the last rows of work."""
-    f, E, n, speed = frame, work.axes[number], len(beam.count), x[State.ROTOR_SPEED]
-    ux, uy, uz = _turned(E, f.wx + speed * f.nx, f.wy + speed * f.ny, f.wz + speed * f.nz)
-    q = blades.first + n * number
-    v = q + BLADES * n
-    reduce_beam(
-        x[q : q + n], x[v : v + n], ux, uy, uz, beam, work.moment[BLADES], work.block[BLADES],
-        work.own[BLADES], work.mass, work.pull[BLADES], work.probe_rest,
-    )  # fmt: skip
+NO_SECTION_LOAD = SectionLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class BentRotor(NamedTuple):
+    """Holds the loads of a rotor whose blades bend, of an instant."""
+
+    frame: RotorFrame
+    hub: Wrench  # on the shaft at the rotor centre, non-rotating rotor axes
+    first: SectionLoad  # on the root of each blade
+    second: SectionLoad
+    third: SectionLoad
 
 
 @inlined_kernel
-def _inertial_load(number, reduced, x, dx, frame, beam, blades, work):
-    """Return the SectionLoad of weight and inertia of a Beam about the rotor centre, pitched axes.
+def _root_motion(number, x, frame, work):
+    """Return acceleration (3), with weight, and angular acceleration (3) of a blade's root, pitched axes.
 
-    beam: of the whole blade or of its outer part, in the rows `reduced` of work (number or BLADES). dx:
-    rates, of the last solution of the chain.
+    Of the rotor centre, as of the last solution of the chain.
     """
-    f, E, A, n = frame, work.axes[number], work.motion, len(beam.count)
-    speed = x[State.ROTOR_SPEED]
+    f, E, A, speed = frame, work.axes[number], work.motion, x[State.ROTOR_SPEED]
     bx = f.bx + speed * (f.wy * f.nz - f.wz * f.ny) + A[3]
     by = f.by + speed * (f.wz * f.nx - f.wx * f.nz) + A[4]
     bz = f.bz + speed * (f.wx * f.ny - f.wy * f.nx) + A[5]
-    ax, ay, az = f.ax + A[0], f.ay + A[1], f.az + A[2]
-    v = blades.first + n * (BLADES + number)
-    c, J, X, p = work.moment[reduced], work.block[reduced], work.own[reduced], work.pull[reduced]
-    ax, ay, az = _turned(E, ax, ay, az)
+    ax, ay, az = _turned(E, f.ax + A[0], f.ay + A[1], f.az + A[2])
     bx, by, bz = _turned(E, bx, by, bz)
-    m = beam.mass
+    return ax, ay, az, bx, by, bz
+
+
+@inlined_kernel
+def _inertial_load(number, x, dx, frame, blades, work):
+    """Return the SectionLoad of weight and inertia of a blade about the rotor centre, pitched axes.
+
+    dx: rates, of the last solution of the chain.
+    """
+    n, m = len(blades.beam.count), blades.beam.mass
+    ax, ay, az, bx, by, bz = _root_motion(number, x, frame, work)
+    v = blades.first + n * (BLADES + number)
+    c, J, X, p = work.moment[number], work.block[number], work.own[number], work.pull[number]
     tx, ty, tz = cross(bx, by, bz, c[0], c[1], c[2])
     sx, sy, sz = cross(c[0], c[1], c[2], ax, ay, az)
     fx, fy, fz = p[0] + m * ax + tx, p[1] + m * ay + ty, p[2] + m * az + tz
@@ -112,57 +118,129 @@ def _about(load, x, y, z):
 
 
 @inlined_kernel
-def root_load(number, x, dx, frame, pitch, loads, blades, work):
-    """Return the SectionLoad of the root of a blade (0, 1, 2), pitched axes."""
-    load = _inertial_load(number, number, x, dx, frame, blades.beam, blades, work)
-    return _about(_with_aerodynamics(load, loads[number], pitch, blades), 0.0, 0.0, blades.hub_radius)
+def _outer_aerodynamics(number, x, turn, aero, blades, loads):
+    """Return the SectionLoads about the rotor centre, by the air, outside of the inner and the outer Section.
 
-
-@inlined_kernel
-def _outer_aerodynamics(number, x, turn, aero, section, loads):
-    """Return the SectionLoad about the rotor centre of the station loads outside of a Section."""
+    Pitched axes; of the station loads of a blade.
+    """
     if aero is None:
-        return SectionLoad(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return NO_SECTION_LOAD, NO_SECTION_LOAD
     elements = aero.rotor.elements
     shape = shape_of(number, x, elements.shape, elements.modes, loads)
-    cosine, sine = shape.rest.cone_cosine, shape.rest.cone_sine
-    fx = fr = ft = mx = mr = mt = 0.0
-    for j in range(section.outside.shape[0]):
-        part = section.outside[j]
-        if part > 0.0:
+    inner = outer = NO_SECTION_LOAD
+    for j in range(blades.inner.outside.shape[0]):
+        near, far = blades.inner.outside[j], blades.outer.outside[j]
+        if near > 0.0 or far > 0.0:
             lever, at = bent_lever(j, shape), N_STATION_LOAD * j
-            normal, tangential = part * shape.loads[at], part * shape.loads[at + 1]
-            moment = part * shape.loads[at + 2]
-            fx += normal * lever.nx
-            fr += normal * lever.nr
-            ft += tangential
-            mx += lever.r * tangential - lever.t_nr * normal - moment * lever.nr
-            mr += lever.t_nx * normal - lever.x * tangential + moment * lever.nx
-            mt += lever.turn * normal
-    fx, fz, mx, mz = (
-        cosine * fx + sine * fr,
-        cosine * fr - sine * fx,
-        cosine * mx + sine * mr,
-        cosine * mr - sine * mx,
-    )
-    c, s = turn.cosine, turn.sine
-    return SectionLoad(c * fx + s * ft, s * fx - c * ft, fz, c * mx + s * mt, s * mx - c * mt, mz)
+            normal, tangential, moment = shape.loads[at], shape.loads[at + 1], shape.loads[at + 2]
+            load = SectionLoad(
+                normal * lever.nx,
+                normal * lever.nr,
+                tangential,
+                lever.r * tangential - lever.t_nr * normal - moment * lever.nr,
+                lever.t_nx * normal - lever.x * tangential + moment * lever.nx,
+                lever.turn * normal,
+            )
+            inner, outer = _plus(inner, near, load), _plus(outer, far, load)
+    return _pitched(inner, turn, shape.rest), _pitched(outer, turn, shape.rest)
 
 
 @inlined_kernel
-def _section_load(number, x, dx, frame, pitch, section, aero, loads, blades, work):
-    """Return the SectionLoad at a Section of a blade, about its displaced centre."""
-    turn, n = turn_of(pitch), len(section.beam.count)
-    _reduce_outer(number, x, frame, section.beam, blades, work)
-    inertial = _inertial_load(number, BLADES, x, dx, frame, section.beam, blades, work)
-    wind = _outer_aerodynamics(number, x, turn, aero, section, loads)
-    load = SectionLoad(
-        inertial.fx + wind.fx, inertial.fy + wind.fy, inertial.fz + wind.fz,
-        inertial.mx + wind.mx, inertial.my + wind.my, inertial.mz + wind.mz,
+def _plus(total, factor, load):
+    """Return a SectionLoad plus a factor times another."""
+    return SectionLoad(
+        total.fx + factor * load.fx, total.fy + factor * load.fy, total.fz + factor * load.fz,
+        total.mx + factor * load.mx, total.my + factor * load.my, total.mz + factor * load.mz,
     )  # fmt: skip
-    q, point = blades.first + n * number, section.point
-    px, py, pz = _displaced(x, q, point)
-    return _about(load, px, py, section.distance + pz)
+
+
+@inlined_kernel
+def _pitched(load, turn, rest):
+    """Return the SectionLoad in pitched axes of one along the x, r and t of a BladeShape."""
+    cosine, sine, c, s = rest.cone_cosine, rest.cone_sine, turn.cosine, turn.sine
+    fx, fz = cosine * load.fx + sine * load.fy, cosine * load.fy - sine * load.fx
+    mx, mz = cosine * load.mx + sine * load.my, cosine * load.my - sine * load.mx
+    return SectionLoad(
+        c * fx + s * load.fz, s * fx - c * load.fz, fz, c * mx + s * load.mz, s * mx - c * load.mz, mz
+    )
+
+
+@inlined_kernel
+def _put_particles(number, x, dx, frame, blades, work):
+    """Put positions and accelerations of a blade's particles, as factors of section_columns, into work.
+
+    Accelerations are those in a frame whose origin does not accelerate, pitched axes; dx: rates, of the last
+    solution of the chain.
+    """
+    f, E, n, speed = frame, work.axes[number], len(blades.beam.count), x[State.ROTOR_SPEED]
+    _, _, _, bx, by, bz = _root_motion(number, x, frame, work)
+    wx, wy, wz = _turned(E, f.wx + speed * f.nx, f.wy + speed * f.ny, f.wz + speed * f.nz)
+    # of a position: angular acceleration and centrifugal
+    xx, yy, zz = -wy * wy - wz * wz, -wx * wx - wz * wz, -wx * wx - wy * wy
+    xy, xz, yz = wx * wy - bz, wx * wz + by, wy * wz - bx
+    yx, zx, zy = wx * wy + bz, wx * wz - by, wy * wz + bx
+    q = blades.first + n * number
+    v = q + BLADES * n
+    place, ax, ay, az = work.particles[0], work.particles[1], work.particles[2], work.particles[3]
+    place[0], ax[0], ay[0], az[0] = 1.0, xz, yz, zz
+    at = 1 + 2 * n
+    for i in range(n):
+        one, two, p, r, a = 1 + i, 1 + n + i, x[q + i], 2.0 * x[v + i], dx[v + i]
+        place[one] = place[two] = p
+        ax[one], ay[one], az[one] = xx * p + a, yx * p + wz * r, zx * p - wy * r
+        ax[two], ay[two], az[two] = xy * p - wz * r, yy * p + a, zy * p + wx * r
+        for j in range(i + 1):
+            half = 0.5 if i == j else 1.0
+            short, shrinking = -half * p * x[q + j], -half * (r * x[q + j] + 2.0 * p * x[v + j])
+            place[at] = short
+            ax[at], ay[at] = xz * short + wy * shrinking, yz * short - wx * shrinking
+            az[at] = zz * short - half * (a * x[q + j] + p * dx[v + j] + r * x[v + j])
+            at += 1
+
+
+@inlined_kernel
+def _outer_inertia(number, x, frame, section, blades, work):
+    """Return the SectionLoad of weight and inertia outside of a Section about the rotor centre.
+
+    Pitched axes; of the particles that _put_particles has put into work.
+    """
+    ax, ay, az, _, _, _ = _root_motion(number, x, frame, work)
+    n, second, first, m = len(blades.beam.count), section.second, section.first, section.mass
+    size, place = first.shape[0], work.particles[0]
+    px, py, pz = work.particles[1], work.particles[2], work.particles[3]
+    cx = cy = cz = fx = fy = fz = mx = my = mz = 0.0
+    for k in range(size):
+        X = Y = 0.0
+        for i in range(n):
+            X += second[k, 1 + i] * place[1 + i]
+            Y += second[k, 1 + n + i] * place[1 + n + i]
+        Z = second[k, 0]
+        for i in range(1 + 2 * n, size):
+            Z += second[k, i] * place[i]
+        fx += first[k] * px[k]
+        fy += first[k] * py[k]
+        fz += first[k] * pz[k]
+        mx += Y * pz[k] - Z * py[k]
+        my += Z * px[k] - X * pz[k]
+        mz += X * py[k] - Y * px[k]
+    for i in range(n):
+        cx += first[1 + i] * place[1 + i]
+        cy += first[1 + n + i] * place[1 + n + i]
+    cz = first[0]
+    for i in range(1 + 2 * n, size):
+        cz += first[i] * place[i]
+    return SectionLoad(
+        -fx - m * ax, -fy - m * ay, -fz - m * az,
+        cz * ay - cy * az - mx, cx * az - cz * ax - my, cy * ax - cx * ay - mz,
+    )  # fmt: skip
+
+
+@inlined_kernel
+def _section_load(number, x, frame, wind, section, blades, work):
+    """Return the SectionLoad at a Section of a blade, about its displaced centre; wind: that of the air."""
+    inertia, q = _outer_inertia(number, x, frame, section, blades, work), blades.first
+    px, py, pz = _displaced(x, q + len(blades.beam.count) * number, section.point)
+    return _about(_plus(inertia, 1.0, wind), px, py, section.distance + pz)
 
 
 @inlined_kernel
@@ -172,7 +250,7 @@ def _bending_moments(load, x, q, section):
     q: index of the deflections. The axes are turned by bending, then by the structural twist.
     """
     ahead = side = 0.0
-    for i in range(len(section.beam.count)):
+    for i in range(section.point.slope_x.shape[0]):
         ahead += section.point.slope_x[i] * x[q + i]
         side += section.point.slope_y[i] * x[q + i]
     both, w = 0.5 * ahead * side, sqrt(1.0 - 0.25 * (ahead * ahead + side * side))
@@ -194,8 +272,8 @@ def _displaced(x, q, point):
 
 
 @inlined_kernel
-def hub_load(x, frame, loads, blades, work):
-    """Return the load (6) of the rotor on its shaft at the rotor centre, non-rotating rotor axes."""
+def _hub_load(x, frame, loads, work):
+    """Return the Wrench of the rotor on its shaft at the rotor centre, non-rotating rotor axes."""
     f, h = frame, work.hub_load
     fx = f.nx * h[0] + f.ny * h[1] + f.nz * h[2]
     fy = f.yx * h[0] + f.yy * h[1] + f.yz * h[2]
@@ -212,7 +290,37 @@ def hub_load(x, frame, loads, blades, work):
         mx += row[3]
         my += row[4] * ey - row[5] * ez
         mz += row[4] * ez + row[5] * ey
-    return fx, fy, fz, mx, my, mz
+    return Wrench(fx, fy, fz, mx, my, mz)
+
+
+@inlined_kernel
+def _root_load(number, x, dx, frame, pitches, loads, blades, work):
+    """Return the SectionLoad of the root of a blade (0, 1, 2), pitched axes."""
+    pitch = pitch_of(number, x, pitches)
+    load = _inertial_load(number, x, dx, frame, blades, work)
+    return _about(_with_aerodynamics(load, loads[number], pitch, blades), 0.0, 0.0, blades.hub_radius)
+
+
+@inlined_kernel
+def _no_bending(pose, bend, x, dx, pitches, body, structure, tower, blades, loads, work):
+    return None
+
+
+@inlined_kernel
+def _bent_rotor(pose, bend, x, dx, pitches, body, structure, tower, blades, loads, work):
+    frame, _ = rotor_frame(pose, top_of(pose, x, bend, tower), bend, body.gravity, structure)
+    return BentRotor(
+        frame,
+        _hub_load(x, frame, loads, work),
+        _root_load(0, x, dx, frame, pitches, loads, blades, work),
+        _root_load(1, x, dx, frame, pitches, loads, blades, work),
+        _root_load(2, x, dx, frame, pitches, loads, blades, work),
+    )
+
+
+# (pose, bend, x, dx, pitches, body, structure, tower, blades, loads, work) -> BentRotor of bending blades,
+# None of rigid ones; pose of the platform
+bent_rotor = chosen_by_class("blades", {type(None): _no_bending, BladeModes: _bent_rotor}, inlined=True)
 
 
 @inlined_kernel
@@ -260,54 +368,55 @@ add_upper_load = chosen_by_class("structure", {type(None): _no_upper, Structure:
 
 
 @inlined_kernel
-def _shaft_of_rigid(thrust, torque, pose, bend, x, body, structure, tower, blades, loads, work):
+def _shaft_of_rigid(thrust, torque, rotor):
     return thrust, torque
 
 
 @inlined_kernel
-def _shaft_of_bending(thrust, torque, pose, bend, x, body, structure, tower, blades, loads, work):
-    frame, _ = rotor_frame(pose, top_of(pose, x, bend, tower), bend, body.gravity, structure)
-    thrust, _, _, torque, _, _ = hub_load(x, frame, loads, blades, work)
-    return thrust, torque
+def _shaft_of_bending(thrust, torque, rotor):
+    return rotor.hub.fx, rotor.hub.mx
 
 
-# (thrust, torque, pose, bend, x, body, structure, tower, blades, loads, work) -> thrust (N) and torque (N m)
-# of the shaft: those of the rigid rotor, given, or of bending blades
+# (thrust, torque, rotor) -> thrust (N) and torque (N m) of the shaft: those of the rigid rotor, given, or of
+# a BentRotor
 shaft_load = chosen_by_class(
-    "blades", {type(None): _shaft_of_rigid, BladeModes: _shaft_of_bending}, inlined=True
+    "rotor", {type(None): _shaft_of_rigid, BentRotor: _shaft_of_bending}, inlined=True
 )
 
 
 @inlined_kernel
-def _none_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row):
+def _record_blade(number, root, x, dx, frame, pitches, aero, blades, loads, work, row):
+    """Fill the channels of a blade (0, 1, 2) into the row of record_bending; root: its SectionLoad."""
+    turn, q = turn_of(pitch_of(number, x, pitches)), blades.first + len(blades.beam.count) * number
+    c, s = turn.cosine, turn.sine
+    px, py, pz = _displaced(x, q, blades.tip)
+    row[number], row[3 + number], row[6 + number] = c * px + s * py, c * py - s * px, pz
+    row[9 + number], row[12 + number] = c * root.fx + s * root.fy, c * root.fy - s * root.fx
+    row[15 + number], row[18 + number], row[21 + number] = root.fz, root.mx, root.my
+    row[40 + number], row[43 + number], row[46 + number] = px, py, root.mz
+    _put_particles(number, x, dx, frame, blades, work)
+    near, far = _outer_aerodynamics(number, x, turn, aero, blades, loads)
+    inner = _section_load(number, x, frame, near, blades.inner, blades, work)
+    outer = _section_load(number, x, frame, far, blades.outer, blades, work)
+    row[24 + number], row[27 + number] = _bending_moments(inner, x, q, blades.inner)
+    row[30 + number], row[33 + number] = _bending_moments(outer, x, q, blades.outer)
+
+
+@inlined_kernel
+def _none_bent(rotor, x, dx, pitches, aero, blades, loads, work, row):
     return
 
 
 @inlined_kernel
-def _record_bent(pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row):
-    frame, _ = rotor_frame(pose, top_of(pose, x, bend, tower), bend, body.gravity, structure)
-    tip, n = blades.tip, len(blades.beam.count)
+def _record_bent(rotor, x, dx, pitches, aero, blades, loads, work, row):
     for number in range(BLADES):
-        pitch = pitch_of(number, x, pitches)
-        c, s = cos(pitch), sin(pitch)
-        q = blades.first + n * number
-        px, py, pz = _displaced(x, q, tip)
-        root = root_load(number, x, dx, frame, pitch, loads, blades, work)
-        row[number], row[3 + number], row[6 + number] = c * px + s * py, c * py - s * px, pz
-        row[9 + number], row[12 + number] = c * root.fx + s * root.fy, c * root.fy - s * root.fx
-        row[15 + number], row[18 + number], row[21 + number] = root.fz, root.mx, root.my
-        row[40 + number], row[43 + number], row[46 + number] = px, py, root.mz
-        inner = _section_load(number, x, dx, frame, pitch, blades.inner, aero, loads, blades, work)
-        outer = _section_load(number, x, dx, frame, pitch, blades.outer, aero, loads, blades, work)
-        row[24 + number], row[27 + number] = _bending_moments(inner, x, q, blades.inner)
-        row[30 + number], row[33 + number] = _bending_moments(outer, x, q, blades.outer)
-    fx, fy, fz, _, my, mz = hub_load(x, frame, loads, blades, work)
-    c, s = cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH])
-    row[36], row[37] = c * my + s * mz, c * mz - s * my
-    row[38], row[39] = fy, fz
-    row[49], row[50] = c * fy + s * fz, c * fz - s * fy
+        root = rotor.first if number == 0 else rotor.second if number == 1 else rotor.third
+        _record_blade(number, root, x, dx, rotor.frame, pitches, aero, blades, loads, work, row)
+    hub, c, s = rotor.hub, cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH])
+    row[36], row[37] = c * hub.my + s * hub.mz, c * hub.mz - s * hub.my
+    row[38], row[39] = hub.fy, hub.fz
+    row[49], row[50] = c * hub.fy + s * hub.fz, c * hub.fz - s * hub.fy
 
 
-# (pose, bend, x, dx, pitches, body, aero, structure, tower, blades, loads, work, row): channels of bending
-# blades into row; pose of the platform
-record_bending = chosen_by_class("blades", {type(None): _none_bent, BladeModes: _record_bent}, inlined=True)
+# (rotor, x, dx, pitches, aero, blades, loads, work, row): channels of a BentRotor into row
+record_bending = chosen_by_class("rotor", {type(None): _none_bent, BentRotor: _record_bent}, inlined=True)

@@ -252,7 +252,7 @@ def _nothing_to_correct(dt, x, history, past, blades, shaft, work, y):
 
 @inlined_kernel
 def _correct(dt, x, history, past, blades, shaft, work, y):
-    n, a, b = len(blades.beam.count), work.mass, work.probe_rest
+    n, a, b = len(blades.beam.count), work.mass, work.solved
     size = BLADES * n
     pull, drag = ELASTIC_WEIGHT * dt, IMPLICIT * dt
     for i in range(n):

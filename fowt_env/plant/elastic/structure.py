@@ -40,11 +40,11 @@ class RotorScratch(NamedTuple):
     """Holds the work arrays of a turbine with elastic parts, in platform axes unless said otherwise."""
 
     axes: np.ndarray  # (3, 3, 3) of each blade: columns j1, j2, j3
-    # of each blade in its axes, and last of a part of one, for outputs (reduce_beam)
-    moment: np.ndarray  # (4, 3) first moment
-    block: np.ndarray  # (4, 6) inertia
-    own: np.ndarray  # (4, n, 6) X
-    pull: np.ndarray  # (4, 6) bias
+    # of each blade in its axes (reduce_beam)
+    moment: np.ndarray  # (3, 3) first moment
+    block: np.ndarray  # (3, 6) inertia
+    own: np.ndarray  # (3, n, 6) X
+    pull: np.ndarray  # (3, 6) bias
     coupling: np.ndarray  # (3, n, 6) X in platform axes, forward-eliminated
     mass: np.ndarray  # (n, n) modal mass
     factors: np.ndarray  # (3, n, n) L and 1/D of the modal mass
@@ -55,7 +55,8 @@ class RotorScratch(NamedTuple):
     upper: np.ndarray  # (6, 6) of rotor, free about the shaft, and nacelle, about tower top or body origin
     shaft: np.ndarray  # (6,) inertia times a unit rotor acceleration
     motion: np.ndarray  # (6,) acceleration of the rotor centre
-    probe_rest: np.ndarray  # (n,) of reduce_beam, for outputs
+    solved: np.ndarray  # (n,) of the modes of a blade, in steps.py
+    particles: np.ndarray  # (4, k) place and accelerations of a blade's particles, for outputs
     hub_load: np.ndarray  # (6,) inertial load and weight of the rotor about its centre
     top_load: np.ndarray  # (6,) of rotor and nacelle about tower top or body origin
     tower_moment: np.ndarray  # (3,) of the bent tower, as moment to rest of a blade, in platform axes
@@ -91,10 +92,10 @@ def rotor_scratch(structure, tower, blades, shaft, n_state):
     n, m = (0 if part is None else len(part.beam.count) for part in (blades, tower))
     z = 0 if blades is None or shaft is None else 1 + n
     shapes = (
-        (3, 3, 3), (BLADES + 1, 3), (BLADES + 1, 6), (BLADES + 1, n, 6), (BLADES + 1, 6), (BLADES, n, 6),
+        (3, 3, 3), (BLADES, 3), (BLADES, 6), (BLADES, n, 6), (BLADES, 6), (BLADES, n, 6),
         (n, n), (BLADES, n, n), (BLADES, n), (BLADES, n), (6, 6), 6,
-        (6, 6), 6, 6, n, 6, 6, 3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (6, m), (m, m),
-        (m, m), (m, m), (2, n_state), 4,
+        (6, 6), 6, 6, n, (4, 1 + 2 * n + n * (n + 1) // 2), 6, 6,
+        3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (6, m), (m, m), (m, m), (m, m), (2, n_state), 4,
         (N_IN_PHASE, z), (2, z, z), z and 3 + z, (2, 4 * z, 6 * z), (2, 6 * z), z and n,
     )  # fmt: skip
     return RotorScratch(*(np.zeros(shape) for shape in shapes))

@@ -11,7 +11,7 @@ from copied_code import copied_code
 from numba.core.registry import CPUDispatcher
 
 from fowt_env.layout import PACKAGE
-from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel, shared_kernel
 from fowt_env.plant.compile.linked import LinkedLibrary
 
 
@@ -40,6 +40,31 @@ def test_a_kernel_is_linked_into_its_caller_without_machine_code():
         assert isinstance(result.library, LinkedLibrary)
         assert not result.library._codegen._engine.is_symbol_defined(result.fndesc.mangled_name)
     assert np.array_equal(out, [slope.py_func(value) for value in x])
+
+
+@shared_kernel
+def square(x):
+    return x * x
+
+
+@inlined_kernel
+def squares(x):
+    return square(x) + square(x + 1.0)
+
+
+@entry
+def both(x):
+    return slope(x) + squares(x) - squares(2.0 * x)
+
+
+def test_a_caller_has_one_copy_of_a_shared_kernel_and_of_others_as_many_as_it_calls():
+    """An inlined kernel hands its option down to what it calls, so that LLVM inlines even the largest."""
+    assert both(1.5) == slope(1.5) + (square(1.5) + square(2.5)) - (square(3.0) + square(4.0))
+    (compiled,) = both.overloads.values()
+    code = compiled.library.get_asm_str()
+    defined = [line for line in code.splitlines() if line.startswith("_Z") and line.endswith(":")]
+    assert sum("square" in name and "squares" not in name for name in defined) == 1
+    assert not any("squares" in name or "slope" in name or "cubic" in name for name in defined)
 
 
 def test_python_calls_it_with_the_same_bits():
@@ -109,7 +134,10 @@ def simulated(root, cache=None):
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     "changes",
-    [{"linked=True": "linked=False"}, {"_nrt=False": "_nrt=True", '"_nrt": False': '"_nrt": True'}],
+    [
+        {"linked=LinkedCompiler": "linked=None", "linked=SharedCompiler": "linked=None"},
+        {"_nrt=False": "_nrt=True", '"_nrt": False': '"_nrt": True'},
+    ],
     ids=["not linked", "with counted references"],
 )
 def test_a_scene_compiled_otherwise_has_the_same_bits(changes, tmp_path):
