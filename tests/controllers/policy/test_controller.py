@@ -10,7 +10,8 @@ import pytest
 
 import fowt_env
 from fowt_env.controllers import information, make
-from fowt_env.controllers.policy.controller import read_policy, shipped_agents
+from fowt_env.controllers.mpc.clone import FILE, MPCClone, is_clone
+from fowt_env.controllers.policy.controller import policy_path, read_policy, shipped_agents
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.envs import TASKS, FowtEnv
 from fowt_env.envs.observations import entries
@@ -240,3 +241,20 @@ def test_a_shipped_agent_comes_to_rest_in_steady_wind(name, speed):
     late = run[run["Time_[s]"] >= 300.0]
     assert late["RotSpeed_[rpm]"].to_numpy() == pytest.approx(12.1, rel=0.005)
     assert np.ptp(run[run["Time_[s]"] >= 500.0]["BldPitch1_[deg]"].to_numpy()) < 0.05
+
+
+def test_a_file_with_another_network_for_mpc_clone_is_a_compiled_law(tmp_path):
+    with np.load(FILE) as file:
+        arrays = {name: file[name] for name in file}
+    path = tmp_path / "own.npz"
+    np.savez(path, **arrays | {"weight_2": 1.5 * arrays["weight_2"]})
+    controller, shipped = (make(name, TURBINE, 0.1) for name in (f"policy:{path}", "mpc_clone"))
+    assert isinstance(controller, MPCClone) and controller.name == f"policy:{path}" and is_clone(path)
+    changed = np.flatnonzero(controller.network != shipped.network)
+    assert 0 < len(changed) <= arrays["weight_2"].size
+    assert controller.network[changed] == pytest.approx(1.5 * shipped.network[changed], rel=1e-6)
+    assert not is_clone(policy_path(shipped_agents()[0]))
+    path.write_bytes(b"no archive")
+    assert not is_clone(path)
+    with pytest.raises(InputError, match="cannot be read"):
+        make(f"policy:{path}", TURBINE, 0.1)

@@ -11,8 +11,10 @@ from fowt_env.controllers import information
 from fowt_env.training.rl.train import make_algorithm
 from fowt_env.training.studies.acceptance import EASY, returns, trained
 
-STEPS = 8192
-BAND = (0.69, 0.75)  # of the reward of a decision of PPO after STEPS; zero action earns 0.674
+# Rewards of a decision of PPO's default settings, where zero action earns 0.674. After 8192 decisions six seeds
+# had 0.649 to 0.721, so that one of them says little; after STEPS five seeds had 0.71 to 0.73.
+STEPS = 26_624
+BAND = (0.70, 0.74)
 
 
 def zero():
@@ -22,7 +24,7 @@ def zero():
 @pytest.mark.slow
 def test_ppo_with_default_settings_is_above_the_baseline_after_a_minute(tmp_path):
     rows = trained(0, EASY, STEPS, tmp_path)
-    assert [row["steps"] for row in rows] == [0, 2048, 4096, 6144, 8192]
+    assert [row["steps"] for row in rows] == [0, 8192, 14_336, 20_480, 26_624]
     assert rows[0]["reward"] == pytest.approx(zero(), abs=0.01)  # an untrained policy hardly acts
     assert BAND[0] < rows[-1]["reward"] < BAND[1]
     assert "generator_torque" in information(f"policy:{tmp_path / 'policy_0.npz'}")
