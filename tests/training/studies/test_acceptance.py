@@ -11,7 +11,7 @@ from fowt_env.controllers import information
 from fowt_env.training.rl.train import make_algorithm
 from fowt_env.training.studies.acceptance import EASY, returns, trained
 
-# Rewards of a decision of PPO's default settings, where zero action earns 0.674. After 8192 decisions six seeds
+# Rewards of a decision of PPO with default settings; zero action earns 0.674. After 8192 decisions six seeds
 # had 0.649 to 0.721, so that one of them says little; after STEPS five seeds had 0.71 to 0.73.
 STEPS = 26_624
 BAND = (0.70, 0.74)
