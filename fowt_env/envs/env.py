@@ -1,5 +1,6 @@
 """Defines the Gymnasium environment, which couples a task, a scene and the compiled control period."""
 
+from collections import deque
 from collections.abc import Sequence
 from copy import deepcopy
 from pathlib import Path
@@ -91,6 +92,7 @@ from fowt_env.weather.preview import exact_preview
 
 SMALL_SEA = {"kind": "regular", "H": 1e-3, "T": 10.0}  # used if the first draw of a task has no waves
 SHORTEST_WEATHER = 600.0  # s of random wind and sea: turbulence intensity is defined over 10 min
+TRACED = 600  # rows that the traces of a picture begin with: a minute of control periods of 0.1 s
 CLOSED = "the environment was closed: create another"
 StepResult = tuple[np.ndarray, float, bool, bool, dict[str, Any]]
 REFERENCE_SHUTDOWN = Reference._fields.index("shutdown")
@@ -207,6 +209,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             )
         self.render_mode = render_mode
         self._view: Any = None
+        self._passed: deque[dict[str, float]] = deque(maxlen=TRACED)  # with a render mode: rows since reset
         self._reward: float | None = None  # of the last step of the episode
         self.render_size = render_size
         turbine = turbine_of(platform, options.get("turbine"))
@@ -330,7 +333,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         other.__dict__.update(self.__dict__)
         other._np_random = other._np_random_seed = None
         other._running, other._closed, other._end = False, False, ""
-        other._view = None
+        other._view, other._passed = None, deque(maxlen=TRACED)
         other._build(ACTION_MODES[self.action_mode], self._per_control)
         return other
 
@@ -496,9 +499,16 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             "sampled": deepcopy(planned.episode._asdict()),
         }
         self._reward = None
+        self._passed.clear()
+        self._show()
+        return run.observation.copy(), info
+
+    def _show(self):
+        """Keep what render draws as traces, and draw in the mode "human"."""
+        if self.render_mode is not None:
+            self._passed.append(self.channels())
         if self.render_mode == "human":
             self.render()
-        return run.observation.copy(), info
 
     def _operate(self, seconds):
         """Operate the turbine with the baseline for the given time (s), then signal the stop."""
@@ -605,8 +615,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if self._custom_reward is not None:
             reward = self._reward_of(info)
         self._reward = reward
-        if self.render_mode == "human":
-            self.render()
+        self._show()
         return run.observation.copy(), reward, terminated, truncated, info
 
     def _finish(self, status):
@@ -830,6 +839,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             self._view = rendering.View([self.scene], size=size, speed=speed)
         elif self._view.panels[0].scene is not self.scene:
             self._view.enter(self.scene)
+        while self._passed:
+            self._view.traces.add([self._passed.popleft()])
         self._view.draw([row], rendering.Agent(tuple(self._episode.action.tolist()), self._reward))
         if self.render_mode == "rgb_array":
             return self._view.array()

@@ -47,6 +47,18 @@ def env():
     env.close()
 
 
+def test_one_picture_has_the_traces_of_the_steps_before_it(env):
+    env.reset(seed=2)
+    for _ in range(20):
+        env.step(np.zeros(2))
+    env.render()
+    (history,) = env._view.traces.histories
+    np.testing.assert_allclose([row[0] for row in history], 0.1 * np.arange(21), atol=1e-9)
+    env.reset(seed=2)
+    env.render()
+    assert len(env._view.traces.histories[0]) == 1
+
+
 def test_lines_end_at_anchor_and_fairlead_wherever_the_platform_is(scene):
     mooring = scene.model.mooring
     for row in (

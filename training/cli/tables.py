@@ -27,8 +27,14 @@ def table_width():
 
 
 def figure(value):
-    """Return the text of a value: integers in full, other numbers with four significant digits."""
-    return str(value) if isinstance(value, str | Integral) else f"{value or 0.0:.4g}"
+    """Return the text of a value: integers in full, other numbers with four significant digits.
+
+    Numbers below 1e9 have no exponent: 19790 kN-m.
+    """
+    if isinstance(value, str | Integral):
+        return str(value)
+    text = f"{value or 0.0:.4g}"
+    return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e9 else text
 
 
 def print_table(headings, rows, title=None, keys=1, left=(0,), prose=(), red=()):
