@@ -41,7 +41,7 @@ def export_policy(model, single, path, about, normalisation=None):
     linear, activation, squash = layers_of(model)
     task, decisions, features = single.task, single.decisions, single.features
     mean, scale, clip = features.mean, features.scale, features.bound
-    if normalisation is not None:  # of what the environment has scaled
+    if normalisation is not None and normalisation.norm_obs:  # of what the environment has scaled
         statistics = normalisation.obs_rms
         mean = mean + scale * statistics.mean
         scale = scale * np.sqrt(statistics.var + normalisation.epsilon)

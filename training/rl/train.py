@@ -530,7 +530,7 @@ class Training:
         with (folder / "state.pkl").open("rb") as file:
             state = pickle.load(file)
         stored = VecNormalize.load(str(folder / "normalisation.pkl"), env.venv)
-        for name in ("obs_rms", "ret_rms"):
+        for name in ("obs_rms", "ret_rms") if stored.norm_obs else ("ret_rms",):
             setattr(env, name, getattr(stored, name))
         env.venv.reset()
         inner_env(env).set_state(state["environments"])
