@@ -72,8 +72,11 @@ class Covariances(NamedTuple):
     gates: np.ndarray  # (gates, gates, n) E[g_i(t + lag) g_j(t)]
 
 
-def covariances(lidar, blocked, speed, height, radius, lags):
-    """Return the Covariances at increasing lags (n,) s in a mean wind (m/s), without doubts of the means."""
+def reading_spectra(lidar, blocked, speed, height, radius):
+    """Return spectra over BINS of the wind (n,), cross (n, gates), and of the readings (n, gates, gates).
+
+    (m/s)^2 per bin, in a mean wind (m/s), with the travel times of the gates, hold and lost shots.
+    """
     sigma = ntm_sigma(speed, TUNING_CLASS)
     shares = channel_shares(lidar, speed, sigma, height, radius)
     gates, groups = len(lidar.distances), group_count(lidar)
@@ -92,8 +95,14 @@ def covariances(lidar, blocked, speed, height, radius, lags):
     passed = np.abs(hold) ** 2
     # the values of a beam at two gates are held together: what this folds is as coherent as the values
     folded = ((1.0 - passed)[:, None, None] * same).sum(axis=0).real
-    held = passed[:, None, None] * (same + other + folded / passed.sum())
-    wave = np.exp(1j * np.multiply.outer(lags, omega))
+    return rotor, cross, passed[:, None, None] * (same + other + folded / passed.sum())
+
+
+def covariances(lidar, blocked, speed, height, radius, lags):
+    """Return the Covariances at increasing lags (n,) s in a mean wind (m/s), without doubts of the means."""
+    rotor, cross, held = reading_spectra(lidar, blocked, speed, height, radius)
+    gates = len(lidar.distances)
+    wave = np.exp(1j * np.multiply.outer(lags, 2.0 * np.pi * BINS))
     known, cross = (wave @ rotor).real, (wave @ cross).real.T
     return Covariances(
         known,

@@ -15,8 +15,10 @@ Blades without a pitch actuator have no pitch state: designs use LEAST_LAG.
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import solve_continuous_lyapunov
 
 from fowt_env.analysis.linear_model import MEMORY, VELOCITIES
+from fowt_env.analysis.linear_plant import WAKE
 from fowt_env.errors import InputError
 from fowt_env.plant.state import MOTIONS, STATES
 
@@ -69,23 +71,71 @@ def _undamped(model):
     return float(np.sqrt(max(-values[chosen].real, 1e-6)))
 
 
-def residualised(model, omega=None):
+def residualised(model, omega=None, keep=()):
     """Return the LinearModel reduced to the states of plant.state.STATES; unchanged if there are no others.
 
     omega: rad/s, at which added mass and damping of radiation memory are exact; None: platform_frequency.
+    keep: names of further states that are not replaced.
     Raises: InputError if other internal states are not asymptotically stable.
     """
-    model = _settled(model)
-    memory = [name for name in model.states if name not in STATES]
+    model = _settled(model, keep)
+    memory = [name for name in model.states if name.startswith(MEMORY)]
     if not memory:
         return model
     return _following(model, memory, platform_frequency(model) if omega is None else float(omega))
 
 
-def _settled(model):
-    """Return the LinearModel with all states except STATES and radiation memory in equilibrium."""
-    names = [name for name in model.states if name not in STATES and not name.startswith(MEMORY)]
+def _settled(model, keep=()):
+    """Return the LinearModel with all states except STATES, radiation memory and `keep` in equilibrium."""
+    kept = {*STATES, *keep}
+    names = [name for name in model.states if name not in kept and not name.startswith(MEMORY)]
     return _following(model, names, 0.0)
+
+
+def with_reduced_wake(model, order):
+    """Return the LinearModel with the states of dynamic inflow reduced to `order` balanced ones (wake_1 ...).
+
+    Balanced truncation (Moore, IEEE Trans. Automatic Control 26, 17-32, 1981) of the path from all other
+    states and inputs to all other rates and outputs, each scaled to equal size; the steady gain is that of
+    the whole wake. Unchanged for a model without dynamic inflow, or with no more states of it.
+    """
+    wake = [i for i, name in enumerate(model.states) if name.startswith(WAKE)]
+    if len(wake) <= order:
+        return model
+    kept = [i for i in range(len(model.states)) if i not in wake]
+    n, m = len(kept), model.B.shape[1]
+    within = model.A[np.ix_(wake, wake)]
+    into = np.hstack([model.A[np.ix_(wake, kept)], model.B[wake], model.E[wake]])
+    out = np.vstack([model.A[np.ix_(kept, wake)], model.C[:, wake]])
+    sizes = np.linalg.norm(into, axis=0), np.linalg.norm(out, axis=1)
+    equal_in, equal_out = (array / np.where(size > 0.0, size, 1.0) for array, size in (
+        (into, sizes[0]), (out.T, sizes[1]),
+    ))  # fmt: skip
+    reach = _root(solve_continuous_lyapunov(within, -equal_in @ equal_in.T))
+    seen = _root(solve_continuous_lyapunov(within.T, -equal_out @ equal_out.T))
+    left, values, right = np.linalg.svd(seen.T @ reach)
+    scale = values[:order] ** -0.5
+    to, back = reach @ right[:order].T * scale, (seen @ left[:, :order] * scale).T
+    a, b, c = back @ within @ to, back @ into, out @ to
+    steady = out @ -np.linalg.solve(within, into) + c @ np.linalg.solve(a, b)  # lost by the truncation
+    rates, reads = steady[:n], steady[n:]
+    first = model.A[np.ix_(kept, kept)] + rates[:, :n]
+    return replace(
+        model,
+        states=(*(model.states[i] for i in kept), *(f"{WAKE}{k + 1}" for k in range(order))),
+        A=np.block([[first, c[:n]], [b[:, :n], a]]),
+        B=np.vstack([model.B[kept] + rates[:, n : n + m], b[:, n : n + m]]),
+        E=np.vstack([model.E[kept] + rates[:, n + m :], b[:, n + m :]]),
+        C=np.hstack([model.C[:, kept] + reads[:, :n], c[n:]]),
+        D=model.D + reads[:, n : n + m],
+        F=model.F + reads[:, n + m :],
+    )
+
+
+def _root(gramian):
+    """Return a square root R (n, n) of a symmetric positive semidefinite matrix R R^T."""
+    values, vectors = np.linalg.eigh(0.5 * (gramian + gramian.T))
+    return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 def _following(model, names, omega):

@@ -33,6 +33,10 @@ SettingOption = Annotated[
 SWEPT = f"Winds, m/s: {shared.RANGE}; default: all whole m/s from cut-in to cut-out."
 VARIED = "Setting and its values; repeatable."
 INFORMED = "Information available to the feedback (below), comma-separated; default: the usual sets."
+SHOWN = (  # metrics of fowt design optimum
+    "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]", "RotTorq_DEL_[kN-m]",
+    "TwrBsMyt_DEL_[kN-m]", "FAIRTEN_DEL_[kN]", "GenPwr_std_[kW]", "torque_travel_[kN-m/s]",
+)  # fmt: skip
 LINEARIZED = "Modes (.csv, .parquet), models (.json, .npz; one wind: .mat) or everything (a folder)."
 SETTINGS = {  # field of LQGSettings -> its meaning
     "share": "weight of platform pitch in the cost; the remainder: rotor speed",
@@ -180,11 +184,15 @@ def bound(
     travel: Annotated[float, Option(help="Limit of blade-pitch travel relative to gspi_oc3, or inf.")] = 1.0,
     power: Annotated[float, Option(help="Limit of power deviation relative to gspi_oc3, or inf.")] = 1.0,
     torque_std: Annotated[float, Option(help="Limit of torque deviation, %, or inf.")] = 5.0,
+    torque_travel: Annotated[float, Option(help="Limit of mean torque rate, %/s, or inf.")] = float("inf"),
     previews: Annotated[str, Option(help="Preview times of the wind, s.")] = "3,11",
     sensors: Annotated[str, Option(help="Sensor chain whose noise acts on the feedback.")] = "standard",
     sea: Annotated[
         str | None, Option(help=f"Sea at all winds. {shared.AS_SIMULATE} Default: as in the suites.")
     ] = None,
+    lidar: Annotated[str | None, Option(help="Lidar read besides the sensors, e.g. circular_cw.")] = None,
+    distance: Annotated[float | None, Option(help="Its distance, m; default: the farthest.")] = None,
+    fidelity: shared.FidelityOption = "standard",
     platform: shared.PlatformOption = "oc3_hywind",
     out_path: shared.TableOption = None,
     plot: shared.PlotOption = None,
@@ -198,10 +206,13 @@ def bound(
     fowt design bound --out bound.csv --plot bound.png  # all winds above rated
     fowt design bound --wind 18 --information measured,measured_pitch_only  # with and without torque control
     fowt design bound --wind 18 --previews 5 --information full,full_preview_5  # 5 s of wind preview
+    fowt design bound --fidelity elastic --lidar circular_cw --information measured,measured_lidar
 
     Deviations are ratios to gspi_oc3 on the same model, with no more pitch travel or power deviation.
     Information: full (plant, wind and waves), measured (five sensors with noise) or speed (rotor speed and
-    blade pitch); _preview_T adds the wind T s ahead, _pitch_only excludes torque.
+    blade pitch); _preview_T adds the wind T s ahead, measured_lidar the reading of a lidar, _pitch_only
+    excludes torque. fowt evaluate --of-limit compares each controller with the limit at its own travel,
+    power and torque.
     """
     import fowt_env
     from fowt_env.descriptions.sea_state import sea_of, sea_state_of
@@ -210,7 +221,7 @@ def bound(
 
     output(out_path, endings=TABLE_SUFFIXES)
     speeds = None if wind is None else parse_numbers(wind, "wind")
-    scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0])
+    scene = fowt_env.build_scene(platform, wind=18.0 if speeds is None else speeds[0], fidelity=fidelity)
     with progress_bar("designing") as update:
         table = bound_table(
             scene,
@@ -219,6 +230,9 @@ def bound(
             travel=travel,
             power=power,
             torque_std=0.01 * torque_std,
+            torque_travel=0.01 * torque_travel,
+            lidar=lidar,
+            distance=distance,
             previews=parse_numbers(previews, "previews"),
             noise=noise_of(sensors, scene.turbine),
             sea=None if sea is None else sea_state_of(sea_of(sea)),
@@ -236,6 +250,55 @@ def bound(
         names = {name: INFORMATION.get(name, name) for name in PLOTTED if name in shown}
         plot_bound(table, names or {name: name for name in shown - {"gspi_oc3"}}, path=plot)
     wrote(plot)
+
+
+@command(design)
+def optimum(
+    cases: Annotated[str, Option(help="Cases of the suite, comma-separated.")] = "ntm_12",
+    seeds: shared.ValidationSeeds = "1001,1002",
+    suite: Annotated[str, Option(help="Suite with a score, of rigid turbines.")] = "above_rated",
+    start: Annotated[str, Option(help="Controller of the first commands.")] = "mpc",
+    iterations: Annotated[int, Option(help="Most iterations for each case and seed.")] = 15,
+    out_folder: shared.FolderOption = "results/optimum",
+):
+    """Compute commands of least score in a known wind and sea.
+
+    A clairvoyant optimum: what torque and blade pitch can reach if wind and waves of a run are known. Near
+    rated wind, where no linear limit holds, it is an upper estimate of the limit, since it is reached.
+
+    Examples:
+    fowt design optimum  # 12 m/s, two seeds, started from mpc: about two minutes for each
+    fowt design optimum --cases ntm_12,ntm_14 --seeds 1001:1003:1 --out results/optimum
+
+    The score of each run is minimised by an iterative linear-quadratic regulator through the Jacobians of the
+    plant, within the ranges and rates of torque and pitch and, as penalties, the limits of the suite and of
+    above_rated_elastic. It is a local optimum: a search from other commands may end elsewhere.
+
+    [bold]Files written[/bold]: history.csv (total, score and metrics after each iteration), results.csv
+    (metrics as of fowt evaluate), commands_CASE_SEED.npz. The same command continues an interrupted search.
+    """
+    from fowt_env.training.design import optimum as search
+    from fowt_env.training.evaluation.cases import read_suite
+    from fowt_env.training.evaluation.leaderboard import leaderboard
+
+    output(out_folder, folder=True)
+    numbers = parse_whole_numbers(seeds, "seeds")
+    with progress_bar("searching") as update:
+        results, history = search.optimum(
+            cases, numbers, out_folder, suite=suite, start=start, iterations=iterations, progress=update
+        )
+    columns = ["case", "seed", "iteration", "total", "score"]
+    show(history[columns], "score after each iteration, with penalties: total")
+    board = leaderboard(results, score=read_suite(suite).score)
+    rows = []
+    for entry in board["controllers"]:
+        for case, figures in entry["cases"].items():
+            means = (f"{figures['metrics'][name]['mean']:.4g}" for name in SHOWN)
+            rows.append((entry["controller"], case, *means))
+    scores = {entry["controller"]: entry["score"]["winds"]["mean"] for entry in board["controllers"]}
+    print_table(("controller", "case", *SHOWN), rows, "means over seeds", left=(0, 1))
+    out.print("score, mean of the cases: " + ", ".join(f"{k} {v:.3f}" for k, v in scores.items()))
+    wrote(*(f"{out_folder}/{name}" for name in ("history.csv", "results.csv")))
 
 
 @command(design)

@@ -29,6 +29,7 @@ DRAWN = "Hash from which the suite's seeds are drawn, e.g. of the commit that fr
 PREVIEW = "Wind preview: exact, or measured by the lidar four_beam_pulsed or circular_cw."
 SENSORS = "Sensors: exact, or the name of a sensor chain. Default: that of each case."
 BASELINE = "Controller of the paired differences. Default: gspi_oc3, else pi."
+OF_LIMIT = "Compute the limit of linear control at each controller's own spending (some seconds each)."
 TEXT = str | None
 
 
@@ -54,6 +55,7 @@ def evaluate_command(
     retry_failed: Annotated[bool, Option("--retry-failed", help="Repeat failed runs in the folder.")] = False,
     out_folder: shared.FolderOption = "results/evaluation",
     plot: shared.PlotsOption = True,
+    of_limit: Annotated[bool, Option("--of-limit", help=OF_LIMIT)] = False,
 ):
     """Compare controllers on load cases: a leaderboard.
 
@@ -69,8 +71,11 @@ def evaluate_command(
     fowt evaluate --suite above_rated --draw-seeds $COMMIT --out results/drawn  # seeds from a commit
 
     [bold]Files written[/bold]: runs/CONTROLLER/CASE_seedN.parquet, results.csv (a row per run),
-    leaderboard.json, manifest.json (the settings), summary.csv (means by case) and plots. The same command
-    resumes an interrupted evaluation and adds further controllers, cases or seeds to the folder.
+    leaderboard.json, manifest.json (the settings), summary.csv (means by case) and plots; with --of-limit
+    of_limit.csv: rotor-speed and platform-pitch deviations over the least ones of linear control with the
+    same inputs, travel, power and torque, by case. The column "of its limit" is its mean and range over the
+    winds above the lulls near rated. The same command resumes an interrupted evaluation and adds further
+    controllers, cases or seeds to the folder.
     """
     from fowt_env.controllers import controller_names
     from fowt_env.training.evaluation.cases import chosen_cases
@@ -78,6 +83,7 @@ def evaluate_command(
     from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
     from fowt_env.training.evaluation.seeds import with_drawn_seeds
     from fowt_env.training.reports.evaluation_plots import evaluation_plots
+    from fowt_env.training.reports.own_limits import FILE, own_limits, read_limits
 
     folder = Path(out_folder)
     chosen = chosen_cases(suite, cases, platform)
@@ -110,7 +116,12 @@ def evaluate_command(
     board = write_leaderboard(table, folder, baseline)
     means = summary(table)
     write_table(means, folder / "summary.csv")
-    _print_evaluation(table, means, board)
+    if of_limit:
+        with progress_bar("computing limits") as update:
+            cases_of = getattr(chosen, "cases", chosen)
+            limits = own_limits(table, cases_of, None if preview == "exact" else preview, progress=update)
+        write_table(limits, folder / FILE)
+    _print_evaluation(table, means, board, read_limits(folder))
     plots = []
     if plot:
         try:
@@ -136,14 +147,16 @@ def _print_conditions(folder, suite):
     out.print()
 
 
-def _print_evaluation(table, means, board):
+def _print_evaluation(table, means, board, limits):
     """Print metrics by case and the leaderboard; on stderr, lost runs and reasons for invalid scores."""
+    from fowt_env.training.reports.own_limits import limit_texts
     from fowt_env.training.reports.terminal import leaderboard_rows, summary_rows
 
     headings, rows, failures = summary_rows(means, table_width())
     print_table(headings, rows, keys=2, left=(0, 1), red=[i for i, lost in enumerate(failures) if lost])
     out.print()
-    title, headings, rows, remarks = leaderboard_rows(board, table_width())
+    texts = None if limits is None else limit_texts(limits)
+    title, headings, rows, remarks = leaderboard_rows(board, table_width(), texts)
     lost = [i for i, entry in enumerate(board["controllers"]) if entry["lost"]]
     print_table(headings, rows, title, red=lost)
     for remark in remarks:

@@ -1,10 +1,11 @@
 """Defines plant and weather of the performance limit: planar states with linear drag, and fitted filters.
 
-Per wind speed: surge, heave and platform pitch, rotor and pitch actuator, with hull drag linearised for the
-sea and for the motion under gspi_oc3. The rotor-averaged Kaimal wind is white noise through a filter of order
-3 with one zero, the elevation white noise through two resonators in series, and the wave force on the hull a
-combination of the resonator states. BoundPlant.fitted has these spectra; BoundPlant.true has the spectra from
-which runs are drawn and the exact hull force at each frequency.
+Per wind speed: surge, heave and platform pitch, rotor and pitch actuator, the first bending of an elastic
+tower and of elastic blades, and dynamic inflow, with hull drag linearised for the sea and for the motion
+under gspi_oc3; faster modes of the structure are in equilibrium. The rotor-averaged Kaimal wind is white
+noise through a filter of order 3 with one zero, the elevation white noise through two resonators in series,
+and the wave force on the hull a combination of the resonator states. BoundPlant.fitted has these spectra;
+BoundPlant.true has the spectra from which runs are drawn and the exact hull force at each frequency.
 """
 
 from dataclasses import dataclass
@@ -16,7 +17,8 @@ from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_drag import HullMotion, elevation_spectrum, linear_drag, with_drag
 from fowt_env.analysis.linear_model import linearize
-from fowt_env.analysis.reduced_model import residualised, with_pitch_lag
+from fowt_env.analysis.linear_plant import WAKE
+from fowt_env.analysis.reduced_model import residualised, with_pitch_lag, with_reduced_wake
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LAST_SEA_WIND, SENSORS, SITE, TURBULENCE_CLASS, scene_at
@@ -29,12 +31,13 @@ from fowt_env.weather.turbulence import amplitudes, fft_length
 PLANAR = ("surge", "heave", "platform_pitch", "vx", "vz", "wy", "rotor_speed", "blade_pitch")
 IN_PLANE = (0, 2, 4)  # indices of surge, heave and platform pitch in forces and velocities of the hull
 N = len(PLANAR)
+BENDING = ("tower_fore_aft", "tower_fore_aft_rate", "flap_1", "flap_1_rate")  # below 1 Hz, if there are any
+WAKE_ORDER = 4  # states of dynamic inflow, of four per annulus
 LEAN, VX, VZ, WY, SPEED, BLADE = (
     PLANAR.index(name) for name in ("platform_pitch", "vx", "vz", "wy", "rotor_speed", "blade_pitch")
 )
 RECORD = 800.0  # s, length of the wind records of the named suites: no slower components
 SMALLEST_ROTOR = 200.0  # m2 of swept area, above which the wind models of IEC 61400-1 apply
-ORDER, ZEROS = 3, 1  # of the wind filter, without the high-pass at the length of a record
 SLOWEST = pi / RECORD  # rad/s, half the lowest frequency of a record
 WIND_BAND = (1.0 / RECORD, 0.25)  # Hz, band of the wind fit
 WAVE_BAND = (0.5, 3.0)  # peak frequencies, band of the elevation fit
@@ -61,6 +64,11 @@ class Filter:
     output: np.ndarray
     error: float
 
+    @property
+    def intensity(self):
+        """Return the intensity (m, m) of the noise of the states."""
+        return np.outer(self.b, self.b)
+
     def states(self, omega):
         """Return the complex response (n, m) of the states to the noise."""
         eye = np.eye(self.b.size)
@@ -83,8 +91,9 @@ class Weather:
 class BoundPlant:
     """Holds the linear plant and weather of one wind speed (SI, deviations from trim).
 
-    A (8, 8) of PLANAR, B (8, 2) of torque (in rated torques) and pitch command, wind (8,), E (8, 3) of
-    in-plane forces; C, D, Dwind, F the same of SENSORS. wind_filter and wave_filter are Filters, force (3, 4)
+    A (n, n) of `states` (PLANAR first, then those of BENDING and of the reduced wake that the plant has),
+    B (n, 2) of torque (in rated torques) and pitch command, wind (n,), E (n, 3) of in-plane forces; C, D,
+    Dwind, F the same of SENSORS. wind_filter and wave_filter are Filters, force (3, 4)
     maps the states of the latter to wave force; fitted and true are Weathers. drag is the LinearDrag.
     Raises: InputError if the blade pitch is at its limit, for a rotor too small for the wind models of
     IEC 61400-1, and if gspi_oc3 does not stabilise the plant.
@@ -101,12 +110,16 @@ class BoundPlant:
         if sea is None:
             sea = joint_sea_state(SITE, min(self.wind_speed, LAST_SEA_WIND))
         self.sea = sea_state_of(sea)
-        model = with_pitch_lag(residualised(linearize(scene_at(scene, wind))))
+        whole = with_reduced_wake(linearize(scene_at(scene, wind)), WAKE_ORDER)
+        further = [name for name in whole.states if name in BENDING or name.startswith(WAKE)]
+        self.states = (*PLANAR, *further)
+        self.n = len(self.states)
+        model = with_pitch_lag(residualised(whole, keep=further))
         if model.pitch_rests:
             raise InputError(
                 f"wind = {wind:g}: the blade pitch is at its limit, so no controller can move it"
             )
-        self.torque, self.pitch = (float(value) for value in model.point.command)
+        self.torque, self.pitch = (float(value) for value in model.point.command[:2])
         elevation = elevation_spectrum(self.sea, OMEGA)
         force = np.zeros((OMEGA.size, 3), complex)
         here = elevation > 0.0
@@ -139,7 +152,7 @@ class BoundPlant:
 
     def _take(self, model):
         """Set the matrices from a LinearModel."""
-        rows = [model.index(name) for name in PLANAR]
+        rows = [model.index(name) for name in self.states]
         sensors = [model.output_index(name) for name in SENSORS]
         units = np.array([self.torque, 1.0])  # torque in units of rated torque
         self.A, self.B, self.wind = model.A[np.ix_(rows, rows)], model.B[rows, :2] * units, model.B[rows, 2]
@@ -148,7 +161,7 @@ class BoundPlant:
         self.E, self.F = model.E[np.ix_(rows, IN_PLANE)], model.F[np.ix_(sensors, IN_PLANE)]
 
     def baseline(self):
-        """Return the closed loop (10, 10) of gspi_oc3: PLANAR, filtered rotor speed, integral of its error.
+        """Return the closed loop of gspi_oc3: `states`, filtered rotor speed, integral of its error.
 
         The law in continuous time, with the slope of its schedule (theory.md, Eq. (A7)) and its speed filter.
         Raises: InputError if the closed loop is unstable.
@@ -156,7 +169,8 @@ class BoundPlant:
         settings = PISettings.published(self.turbine)
         gain = schedule_gain(self.pitch, settings.gain_schedule_pitch)
         gain *= settings.gear_ratio / (2.0 - gain)
-        a, n = np.zeros((N + 2, N + 2)), N
+        n = self.n
+        a = np.zeros((n + 2, n + 2))
         a[:n, :n] = self.A
         a[:n, n], a[:n, n + 1] = self.B[:, 1] * gain * settings.KP, self.B[:, 1] * gain * settings.KI
         corner = settings.speed_filter_corner
@@ -169,12 +183,13 @@ class BoundPlant:
         return a
 
     def baseline_response(self, weather):
-        """Return (wind (n, 8), waves (n, 8)) of PLANAR under gspi_oc3 per wind speed and elevation."""
-        drive = np.zeros((OMEGA.size, N + 2, 2), complex)
-        drive[:, :N, 0] = self.wind
-        drive[:, :N, 1] = weather.force @ self.E.T
-        response = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(N + 2) - self.baseline(), drive)
-        return response[:, :N, 0], response[:, :N, 1]
+        """Return the responses (OMEGA.size, n) of `states` under gspi_oc3 per wind speed and elevation."""
+        n = self.n
+        drive = np.zeros((OMEGA.size, n + 2, 2), complex)
+        drive[:, :n, 0] = self.wind
+        drive[:, :n, 1] = weather.force @ self.E.T
+        response = np.linalg.solve(1j * OMEGA[:, None, None] * np.eye(n + 2) - self.baseline(), drive)
+        return response[:, :n, 0], response[:, :n, 1]
 
     def _motion(self):
         """Return the HullMotion under gspi_oc3 on the true spectra."""
@@ -208,22 +223,30 @@ def fit_wind(spectrum):
     Fitted to the log of a wind spectrum over OMEGA; the variances agree. Without the high-pass the optimal
     control would spend torque on slow changes that no run contains.
     """
+    return fit_spectrum(spectrum, (60.0, 8.0, 1.0), (20.0,))
+
+
+def fit_spectrum(spectrum, poles, zeros):
+    """Return a Filter with real poles and zeros, and a high-pass at the length of a record, of a spectrum.
+
+    spectrum: over OMEGA, per rad/s. poles, zeros: times (s) from which the fit of its log starts.
+    """
     used = (OMEGA > 2.0 * pi * WIND_BAND[0]) & (OMEGA < 2.0 * pi * WIND_BAND[1])
-    omega, target = OMEGA[used], spectrum[used]
+    omega, target, order = OMEGA[used], spectrum[used], len(poles)
     slow = -np.log1p((SLOWEST / omega) ** 2)
     weight = np.sqrt(target * np.gradient(omega))
     weight /= np.sqrt(np.mean(weight**2))
 
     def miss(p):
-        squares = np.log1p((np.exp(p[: ORDER + ZEROS])[:, None] * omega) ** 2)
-        level = p[-1] + squares[ORDER:].sum(axis=0) - squares[:ORDER].sum(axis=0)
+        squares = np.log1p((np.exp(p[:-1])[:, None] * omega) ** 2)
+        level = p[-1] + squares[order:].sum(axis=0) - squares[:order].sum(axis=0)
         return weight * (level + slow - np.log(target))
 
-    start = np.r_[np.log([60.0, 8.0, 1.0, 20.0]), np.log(target[0])]
-    times = np.exp(least_squares(miss, start).x[: ORDER + ZEROS])
+    start = np.r_[np.log([*poles, *zeros]), np.log(target[0])]
+    times = np.exp(least_squares(miss, start).x[:-1])
     below, above = (
         reduce(np.polymul, ([time, 1.0] for time in part), np.ones(1))
-        for part in (times[:ORDER], times[ORDER:])
+        for part in (times[:order], times[order:])
     )
     below, above = np.polymul(below / below[0], [1.0, SLOWEST]), np.polymul(above / below[0], [1.0, 0.0])
     a, b, c = _companion(below, above)

@@ -1,6 +1,7 @@
 """Computes the performance limit of linear control: fronts of rotor-speed and platform-pitch deviation.
 
     fowt design bound --wind 12,14,16,18,20,22,24
+    fowt design bound --wind 18 --fidelity elastic --lidar four_beam_pulsed
 
 Per wind speed, on the linear plant of bound_plant.py: the minimum weighted sum of both variances at no more
 blade-pitch travel and power deviation than those of gspi_oc3 on the same model, and a torque deviation
@@ -22,6 +23,7 @@ from fowt_env.descriptions.checks import check_number
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.design.bound_control import Information, Problem, baseline_deviations, front
+from fowt_env.training.design.bound_lidar import lidar_of
 from fowt_env.training.design.bound_plant import BoundPlant
 
 BOUND = Path(__file__).parent / "data" / "linear_bound.csv"  # output of fowt design bound
@@ -35,6 +37,7 @@ KNOWN = {  # information of the feedback: name: (text, sensors)
 }
 FITTED = ("wind", "elevation", "surge_force", "heave_force", "pitch_moment")
 PITCH_ONLY = "_pitch_only"
+LIDAR = "measured_lidar"
 PLOTTED = ("full", "measured", "speed", "measured_pitch_only", "full_preview_3", "full_preview_11")
 RATIOS = {  # column of ratio_table: metric
     "speed_ratio_[-]": "RotSpeed_std_[rpm]",
@@ -52,17 +55,21 @@ def information_sets(previews=PREVIEWS):
         suffix, ahead = (suffix, ahead) if torque else (suffix + PITCH_ONLY, f"{ahead}; no torque")
         for name, (text, sensors) in KNOWN.items():
             sets[name + suffix] = Information(text + ahead, sensors, time, torque)
+    for suffix, torque in (("", True), (PITCH_ONLY, False)):
+        text = "five sensors and a lidar" + ("" if torque else "; no torque")
+        sets[LIDAR + suffix] = Information(text, SENSORS, torque=torque, lidar=True)
     return sets
 
 
-def usual(previews=PREVIEWS):
+def usual(previews=PREVIEWS, lidar=False):
     """Return {name: text} of the default information_sets of a table.
 
     With exact preview of the wind, limits with sensors and with all states differ by less than 1 %: only
     those with all states are included.
     """
     sets = information_sets(previews).items()
-    return {name: known.text for name, known in sets if known.preview is None or known.sensors is None}
+    kept = ((name, known) for name, known in sets if lidar or not known.lidar)
+    return {name: known.text for name, known in kept if known.preview is None or known.sensors is None}
 
 
 INFORMATION = usual()  # name: label in plots
@@ -75,32 +82,39 @@ def winds_of(turbine):
 
 
 def bound_table(
-    scene, winds=None, information=None, *, travel=1.0, power=1.0, torque_std=TORQUE_STD, previews=PREVIEWS,
-    noise=None, sea=None, fractions=FRACTIONS, progress=None,
+    scene, winds=None, information=None, *, travel=1.0, power=1.0, torque_std=TORQUE_STD,
+    torque_travel=float("inf"), previews=PREVIEWS, noise=None, sea=None, fractions=FRACTIONS, lidar=None,
+    distance=None, progress=None,
 ):  # fmt: skip
     """Return a DataFrame of the Pareto front per wind and information, absolute and relative to gspi_oc3.
 
     winds        m/s; None: winds_of the scene's turbine
-    information  names of information_sets(previews); None: those of usual(previews)
+    information  names of information_sets(previews); None: those of usual(previews, lidar)
     travel       limit of blade-pitch travel over that of gspi_oc3; power: the same for the power deviation
     torque_std   limit of the torque deviation, fraction of rated torque; inf: no limit, as for the others
+    torque_travel  limit of the mean absolute torque rate, rated torques per second; inf: no limit
     previews     preview times of the wind, s
     noise        {sensor: standard deviation of a sample every 0.1 s, SI}; None: noise_of() the standard chain
     sea          sea state of every wind; None: the joint sea states of the named suites
     fractions    weights of platform pitch in the minimised sum
+    lidar        name, path or Lidar that the information with a lidar reads, at its distance (m), None: the
+                 farthest
 
     fit_difference_[%]: largest difference of a deviation (rotor speed, platform pitch, travel) between fitted
     and exact spectra. attrs["fits"]: DataFrame of the errors of the fits, and the drag.
     Raises: InputError for winds that are not above rated, limits that are not positive, unknown information,
-    and for a scene that BoundPlant does not support.
+    information with a lidar without one, and for a scene that BoundPlant does not support.
     """
     known = information_sets(previews)
-    chosen = tuple(usual(previews) if information is None else information)
+    chosen = tuple(usual(previews, lidar is not None) if information is None else information)
     for name in chosen:
         if name not in known:
             raise unknown("information", name, known)
+        if known[name].lidar and lidar is None:
+            raise InputError(f"information = {name!r}: needs a lidar")
     allowed = "positive (inf: no limit)"
-    for key, value in (("travel", travel), ("power", power), ("torque_std", torque_std)):
+    limits = {"travel": travel, "power": power, "torque_std": torque_std, "torque_travel": torque_travel}
+    for key, value in limits.items():
         check_number(key, value, 0.0, low_open=True, infinite=True, allowed=allowed)
     low, high = scene.turbine.rated_wind_speed, scene.turbine.cut_out_wind_speed
     winds = winds_of(scene.turbine) if winds is None else winds
@@ -117,9 +131,13 @@ def bound_table(
         fits[-1]["surge_drag_[kN-s/m]"] = 1e-3 * float(plant.drag.damping[0, 0])
         fits[-1]["pitch_drag_[MN-m-s/rad]"] = 1e-6 * float(plant.drag.damping[4, 4])
         rows.append(_row(wind, "gspi_oc3", float("nan"), base, base, fitted))
-        limits = replace(base, travel=travel * base.travel, power=power * base.power, torque=torque_std)
+        limits = replace(
+            base, travel=travel * base.travel, power=power * base.power, torque=torque_std,
+            torque_travel=torque_travel,
+        )  # fmt: skip
+        reader = None if lidar is None else lidar_of(plant, scene, lidar, distance)
         for index, name in enumerate(chosen, 1):
-            problem = Problem(plant, known[name], noise)
+            problem = Problem(plant, known[name], noise, reader)
             for fraction, reached, q in front(problem, limits, fractions):
                 rows.append(_row(wind, name, fraction, reached, base, problem.deviations(q, plant.fitted)))
             if progress is not None:
@@ -137,7 +155,8 @@ def _row(wind, information, fraction, best, base, fitted):
         "wind_[m/s]": float(wind), "information": information, "share_[-]": fraction,
         "RotSpeed_std_[rpm]": best.rotor_speed / RPM, "PtfmPitch_std_[deg]": best.platform_pitch / DEGREE,
         "blade_pitch_travel_[deg/s]": best.travel / DEGREE, "power_std_[%]": 100.0 * best.power,
-        "torque_std_[%]": 100.0 * best.torque, "speed_ratio_[-]": best.rotor_speed / base.rotor_speed,
+        "torque_std_[%]": 100.0 * best.torque, "torque_travel_[%/s]": 100.0 * best.torque_travel,
+        "speed_ratio_[-]": best.rotor_speed / base.rotor_speed,
         "pitch_ratio_[-]": best.platform_pitch / base.platform_pitch,
         "fit_difference_[%]": 100.0 * difference,
     }  # fmt: skip

@@ -21,6 +21,7 @@ from fowt_env.errors import InputError
 from fowt_env.training.design.linear_bound import (
     BOUND,
     KNOWN,
+    LIDAR,
     PITCH_ONLY,
     RATIOS,
     fraction_of_bound,
@@ -47,23 +48,21 @@ def read_bound(path=None):
     return pd.read_csv(file)
 
 
-def limit_for(information, moves_torque, bound, preview_times=()):
+def limit_for(information, uses_torque, bound, preview_times=()):
     """Return the name of the limit in a bound_table that applies to a controller, or None.
 
     information    inputs of the controller: Measurement fields and PRIVILEGED_INPUTS (fowt_env.control)
-    moves_torque   whether it uses the generator torque above rated wind
+    uses_torque    whether it uses the generator torque above rated wind
     preview_times  preview times of the wind, s; () with "wind_preview": the longest of the table
     Preview is assumed exact. The next longer preview time of the table is used, with the same sensors or else
     with all states measured (limits differ by less than 1 %). None applies to a lidar.
     """
     used, limits = set(information) - FREE, list(bound["information"].unique())
     if "lidar" in used:
-        return None  # the table has no limit with a lidar
+        name = LIDAR if uses_torque else LIDAR + PITCH_ONLY
+        return name if name in limits else None
     ahead = "wind_preview" in used
-    if ahead:
-        used -= {"wind_preview", "wind_speed"}  # the preview begins with the present wind
-    known = [name for name, (_, sensors) in KNOWN.items() if sensors is None or used <= set(sensors)]
-    name, end = known[-1], "" if moves_torque else PITCH_ONLY
+    name, end = known_by(used)[0], "" if uses_torque else PITCH_ONLY
     if not ahead:
         return name + end if name + end in limits else None
     times = {}
@@ -72,6 +71,18 @@ def limit_for(information, moves_torque, bound, preview_times=()):
         times |= {float(match[1]): match[0] for match in matches if match}
     horizon = max(preview_times, default=max(times, default=0.0))
     return next((times[time] for time in sorted(times) if time >= horizon), None)
+
+
+def known_by(information):
+    """Return the item of KNOWN with the fewest sensors that include the inputs of a controller.
+
+    Preview and lidar are not counted.
+    """
+    used = set(information) - FREE - {"lidar", "wind_preview"}
+    if "wind_preview" in information:
+        used -= {"wind_speed"}  # the preview begins with the present wind
+    fitting = [name for name, (_, sensors) in KNOWN.items() if sensors is None or used <= set(sensors)]
+    return fitting[-1], KNOWN[fitting[-1]]
 
 
 def bound_fractions(table, bound, groups=None, agents=None, information=None):
@@ -97,7 +108,7 @@ def bound_fractions(table, bound, groups=None, agents=None, information=None):
     rows = []
     for name, labels in chosen.items():
         used, times = (information or {}).get(labels[0]) or declared(labels[0])
-        limit = limit_for(used, _moves_torque(good, base, labels), bound, times)
+        limit = limit_for(used, moves_torque(good, base, labels), bound, times)
         parts = [_ratios(good[good["controller"] == label], base, label) for label in labels]
         parts = [part for part in parts if len(part)]
         if not parts:
@@ -125,7 +136,7 @@ def declared(label):
     return ("surge",), ()
 
 
-def _moves_torque(good, base, labels):
+def moves_torque(good, base, labels):
     """Return whether the torque travel is more than MOVED times that of gspi_oc3 on the same runs."""
     runs = good[good["controller"].isin(labels)].merge(base[[*KEY[1:], TORQUE_TRAVEL]], on=KEY[1:])
     travels = runs[[f"{TORQUE_TRAVEL}_x", f"{TORQUE_TRAVEL}_y"]].mean()

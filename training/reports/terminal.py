@@ -64,8 +64,10 @@ LEADERBOARD = (
 LEADERBOARD_DROPS = ("GenPwr_max_[kW]", "TwrBsMyt_DEL_[kN-m]", "GenPwr_capped_mean_[kW]")
 
 
-def leaderboard_rows(board, width=200):
+def leaderboard_rows(board, width=200, of_limit=None):
     """Return (title, headings, rows of texts, remarks) of a leaderboard, in `width` characters if possible.
+
+    of_limit: {controller: text} of own_limits.limit_texts, or None.
 
     A difference is in percent of the baseline, with "*" if significant: its p-value, corrected for all
     metrics of the row (bootstrap.holm), is at most 1 minus the level of the intervals. Remarks: lines on
@@ -89,6 +91,8 @@ def leaderboard_rows(board, width=200):
         for heading, key in SCORES.items():
             texts = [score_text(entry["score"], key) for entry in entries]
             columns[key] = heading.replace(", ", "\n"), texts
+    if of_limit:
+        columns["of_limit"] = "of its\nlimit", [of_limit.get(entry["controller"], "-") for entry in entries]
     if any(entry["held"] is not None for entry in entries):
         columns["limits"] = "limits", [limits_text(entry) for entry in entries]
     tested = [metric for _, metric, _, _, different in LEADERBOARD if different]
