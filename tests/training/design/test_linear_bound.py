@@ -35,11 +35,15 @@ def fronts(information, speed, pitch):
 def test_bad_wishes_are_named(windy):
     with pytest.raises(InputError, match="wind = 10.0: must be above 11.4"):
         bound_table(windy, (10.0,))
-    for key in ("travel", "power", "torque_std"):
+    for key in ("travel", "power", "torque_std", "torque_travel"):
         with pytest.raises(InputError, match=f"{key} = -1.0: must be positive"):
             bound_table(windy, (18.0,), **{key: -1.0})
     with pytest.raises(InputError, match="unknown information 'mesured'.*measured"):
         bound_table(windy, (18.0,), ("mesured",))
+    with pytest.raises(InputError, match="information = 'measured_lidar': needs a lidar"):
+        bound_table(windy, (18.0,), ("measured_lidar",))
+    with pytest.raises(InputError, match="distance = 70 m: lidar 'four_beam_pulsed' measures at 50, "):
+        bound_table(windy, (18.0,), ("measured_lidar",), lidar="four_beam_pulsed", distance=70.0)
 
 
 def test_the_winds_are_even_ones_above_rated_up_to_cut_out(windy):
@@ -48,7 +52,9 @@ def test_the_winds_are_even_ones_above_rated_up_to_cut_out(windy):
 
 def test_information_is_every_combination_of_what_is_known_ahead_and_moved():
     found = information_sets((3.0,))
-    assert len(found) == 3 * 2 * 2
+    assert len(found) == 3 * 2 * 2 + 2
+    assert found["measured_lidar_pitch_only"].lidar and not found["measured_lidar_pitch_only"].torque
+    assert not any(known.lidar for name, known in found.items() if "lidar" not in name)
     assert found["full"] == Information("plant, wind and waves")
     assert found["speed_preview_3_pitch_only"] == Information(
         "rotor speed and blade pitch, wind 3 s ahead; no torque", ("rotor_speed", "blade_pitch"), 3.0, False

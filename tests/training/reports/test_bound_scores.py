@@ -58,6 +58,9 @@ def test_a_controller_halfway_to_the_front_reaches_half_of_the_bound():
 def test_a_controller_is_held_against_the_limit_of_what_it_knows_and_moves():
     fronts = bound()
     assert limit_for((*FIVE, "plant_model"), True, fronts) == "measured"
+    lidar = fronts.assign(information="measured_lidar")
+    assert limit_for((*FIVE, "lidar"), True, lidar) == "measured_lidar"
+    assert limit_for((*FIVE, "lidar"), False, lidar) is None
     assert limit_for(("time", "generator_speed", "blade_pitch"), True, fronts) == "speed"
     assert limit_for(("generator_speed", "blade_pitch"), False, fronts) == "speed_pitch_only"
     assert limit_for((*FIVE, "surge"), True, fronts) == "full"
