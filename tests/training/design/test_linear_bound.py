@@ -42,8 +42,8 @@ def test_bad_wishes_are_named(windy):
         bound_table(windy, (18.0,), ("mesured",))
     with pytest.raises(InputError, match="information = 'measured_lidar': needs a lidar"):
         bound_table(windy, (18.0,), ("measured_lidar",))
-    with pytest.raises(InputError, match="distance = 70 m: lidar 'four_beam_pulsed' measures at 50, "):
-        bound_table(windy, (18.0,), ("measured_lidar",), lidar="four_beam_pulsed", distance=70.0)
+    with pytest.raises(InputError, match="distance = 71 m: lidar .four_beam_pulsed. measures at "):
+        bound_table(windy, (18.0,), ("measured_lidar",), lidar="four_beam_pulsed", distance=71.0)
 
 
 def test_the_winds_are_even_ones_above_rated_up_to_cut_out(windy):
