@@ -9,7 +9,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "18_cleanrl_ppo.py"
-BAND = (0.68, 0.75)  # of the reward of a decision after 30,000; zero action earns 0.674
+BAND = (0.69, 0.73)  # of the reward of a decision; 0.710 after 30,720, where zero action earns 0.674
 
 
 @pytest.fixture(scope="module")
@@ -52,5 +52,5 @@ def test_a_rollout_ends_episodes_and_gives_a_policy_of_bounded_actions(script):
 def test_it_learns_the_easiest_task(script):
     from fowt_env.training.studies.acceptance import EASY, returns
 
-    policy, _ = script["train"](script["arguments"](["--total-timesteps", "30000"]))
+    policy, _ = script["train"](script["arguments"](["--seed", "0", "--total-timesteps", "30000"]))
     assert BAND[0] < returns(EASY, policy).mean() < BAND[1]

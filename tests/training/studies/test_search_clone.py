@@ -1,5 +1,7 @@
 """The search for a better last layer of mpc_clone: its optimiser, its candidates, its runs."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,9 +51,8 @@ def test_episodes_are_the_runs_of_a_suite_and_candidates_differ():
     network = read_clone(FILE)[1]
     stronger = network | {"weight_2": 1.2 * network["weight_2"]}
     (kept,), (moved,) = episodes.run([network, stronger])
-    table = evaluate(
-        {"mpc_clone": "mpc_clone"}, suite, cases=[case.name], seeds=[1234], duration=40.0, skip=10.0
-    )
+    one_case = replace(suite, cases=[case])
+    table = evaluate("mpc_clone", one_case, seeds=[1234], duration=40.0, skip=10.0)
     row = table[table["controller"] == "mpc_clone"].iloc[0]
     for name in ("RotSpeed_std_[rpm]", "RotTorq_DEL_[kN-m]", "blade_pitch_travel_[deg/s]"):
         assert kept[name] == pytest.approx(row[name], rel=1e-9)
