@@ -40,11 +40,16 @@ def tune_command(
     """
     import webbrowser
 
+    from fowt_env.control.making import make
     from fowt_env.controllers import controller_names
+    from fowt_env.descriptions.platform import turbine_of
     from fowt_env.training.live.server import tune
 
+    turbine, others = turbine_of(platform, None), controller_names(further) if further else ()
+    for name in (controller, against, *others):  # before a page is served that could only show the error
+        make(name.partition("[")[0], turbine, 0.1)
     weather = {"platform": platform, "wind": wind, "sea": sea, "seed": seed, "duration": duration}
-    server = tune(controller, against, controller_names(further) if further else (), port, **weather)
+    server = tune(controller, against, others, port, **weather)
     out.print(server.url)
     note("press Ctrl+C to end")
     if browser:

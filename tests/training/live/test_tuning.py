@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from fowt_env.controllers import make
 from fowt_env.controllers.design.saved_files import load_design
 from fowt_env.controllers.registry import CONTROLLERS
 from fowt_env.errors import InputError
 from fowt_env.run.simulation import simulate
+from fowt_env.training.cli import app as cli
 from fowt_env.training.evaluation.metrics import turbine_metrics
 from fowt_env.training.live import tuning
 from fowt_env.training.live.tuning import Law, Weather, law_of
@@ -200,3 +202,11 @@ def test_the_command_opens_the_page_with_the_same_laws_and_conditions():
     assert words[:2] == ["fowt", "tune"]
     assert law_of(given.pop("--controller")) == second and law_of(given.pop("--against")) == first
     assert given == {"--wind": "eog:18", "--sea": "none", "--seed": "7", "--duration": "300"}
+
+
+@pytest.mark.parametrize("option", ["--controller", "--against", "--further"])
+def test_an_unknown_controller_is_refused_before_a_page_is_served(option, monkeypatch):
+    server = pytest.importorskip("fowt_env.training.live.server", reason="the extra `live` is missing")
+    monkeypatch.setattr(server, "tune", lambda *_, **__: pytest.fail("served"))
+    done = CliRunner().invoke(cli.app, ["tune", option, "lqq", "--no-browser"])
+    assert done.exit_code == 2 and "unknown controller 'lqq'. Did you mean 'lqr'?" in done.stderr
