@@ -167,3 +167,13 @@ def test_of_runs_that_all_failed_there_is_nothing_to_plot(tmp_path):
     (tmp_path / "manifest.json").write_text(json.dumps({"cases": {"calm": {}}}))
     table = pd.DataFrame([{"controller": "x", "case": "calm", "seed": 1, "status": "failed"}])
     assert evaluation_plots(table, {}, tmp_path) == [] and len(list(tmp_path.iterdir())) == 1
+
+
+def test_the_limit_at_own_spending_is_a_column_where_it_is_known():
+    plain, limited = (
+        leaderboard_rows(board([1, 2]), 300, each) for each in (None, {"x": "1.07 (1.02 to 1.12)"})
+    )
+    assert "of its\nlimit" not in plain[1]
+    place = limited[1].index("of its\nlimit")
+    texts = {row[0]: row[place] for row in limited[2]}
+    assert texts.pop("x") == "1.07 (1.02 to 1.12)" and set(texts.values()) == {"-"}
