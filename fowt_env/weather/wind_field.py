@@ -8,11 +8,13 @@ wind decreases linearly to zero at the still-water level; to the sides and above
 Mann turbulence (hipersim).
 """
 
+from copy import copy
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
+from fowt_env.caches import Cache
 from fowt_env.descriptions.checks import check_in_range
 from fowt_env.descriptions.iec import EXTREME_SHEAR_EXPONENT, length_scale
 from fowt_env.descriptions.wind import BOX_STEPS, FIELD_KINDS, MOVING_SPEEDS, checked_keys, wind_of
@@ -24,7 +26,12 @@ from fowt_env.weather.turbulence import drawn_sigma
 
 MARGIN = 75.0  # m of platform drift against the wind that a box must still cover at the end of a run
 DISK_RADII, DISK_AZIMUTHS = 12, 36  # points of the rotor average
+TENSOR_BYTES = 36  # of the square root of a spectral tensor at a wave number: 9 float32
+LARGEST_TENSOR = 2e8  # bytes that are kept: 151 MB for an hour of 16 by 16 points
 PROFILE_STEP = 1.0  # m of height between the points of a steady profile
+
+
+_tensors = Cache(1)
 
 
 def is_field(spec):
@@ -182,13 +189,23 @@ def mann_turbulence(n_time, n_side, dx, step, length, seed):
     Raises: InputError without hipersim.
     """
     try:
-        from hipersim import MannTurbulenceField
+        from hipersim.turbgen.spectral_tensor import MannSpectralTensor, OnetimeMannSpectralTensor
     except ImportError:
         raise InputError(
             "Mann boxes need hipersim, which is not installed: pip install 'fowt-env[mann]'"
         ) from None
-    grid = {"Nxyz": (n_time, n_side, n_side), "dxyz": (dx, step, step)}
-    mann = MannTurbulenceField.generate(L=length, Gamma=3.9, **grid, seed=seed)
+    settings = {"L": length, "Gamma": 3.9, "Nxyz": (n_time, n_side, n_side), "dxyz": (dx, step, step)}
+    if TENSOR_BYTES * (n_time // 2 + 1) * (2 * n_side) ** 2 > LARGEST_TENSOR:
+        spectrum = OnetimeMannSpectralTensor(**settings, n_cpu=1, verbose=0)
+    else:  # the same for all seeds, and four fifths of the time of a box
+
+        def tensor():
+            made = MannSpectralTensor(**settings, n_cpu=1, verbose=0)
+            made.spectral_vars  # noqa: B018  # computed here, as the copies below share it
+            return made
+
+        spectrum = copy(_tensors.get((n_time, n_side, dx, step, length), tensor))
+    mann = spectrum.generate(seed=seed)
     # x of that box points downwind: the slice that arrives first is the one farthest downstream
     return np.transpose(np.asarray(mann.uvw), (1, 3, 2, 0))[::-1].astype(np.float32)
 

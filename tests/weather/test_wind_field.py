@@ -17,6 +17,7 @@ from fowt_env.weather.wind_field import (
     WindBox,
     hub_speed,
     is_field,
+    mann_turbulence,
     profile_field,
     read_box,
     rotor_average,
@@ -268,3 +269,14 @@ def test_a_profile_is_the_power_law_at_every_time_and_place():
         for t, x, y in ((0.0, 0.0, 0.0), (500.0, 30.0, -70.0), (1e4, -30.0, 70.0)):
             law = 11.4 * (z / HUB) ** 0.14, 0.0, 0.0
             assert field_at(t, x, y, z, field) == pytest.approx(law, rel=2.1e-5)
+
+
+def test_boxes_that_share_a_spectrum_are_those_made_one_by_one():
+    hipersim = pytest.importorskip("hipersim")
+    arguments = 64, 4, 9.0, 10.0, 33.6
+    grid = {"Nxyz": (64, 4, 4), "dxyz": (9.0, 10.0, 10.0)}
+    boxes = [mann_turbulence(*arguments, seed) for seed in (1, 2, 1)]
+    for seed, box in zip((1, 2, 1), boxes, strict=True):
+        alone = np.asarray(hipersim.MannTurbulenceField.generate(L=33.6, Gamma=3.9, **grid, seed=seed).uvw)
+        assert np.array_equal(box, np.transpose(alone, (1, 3, 2, 0))[::-1].astype(np.float32))
+    assert not np.array_equal(boxes[0], boxes[1])

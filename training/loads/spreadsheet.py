@@ -39,11 +39,13 @@ def write_spreadsheets(folder, name, results, controller=None):
         (row.column, row.side): row
         for row in extreme_table(runs, columns, controller, results.extrapolations)
     }
-    sheets = {"extreme_loads": {"Sheet1": _extreme_rows(rose, extremes)}}
+    sheets = {}
+    if extremes:  # none of load cases for fatigue alone
+        sheets["extreme_loads"] = {"Sheet1": _extreme_rows(rose, extremes)}
     fatigue = lifetime_table(runs, EXPONENTS, results.years, results.reference_cycles, controller)
     if fatigue:
         sheets["equivalent_loads"] = {"Sheet1": _fatigue_rows(rose, fatigue)}
-    if blades := _blade_sheets(rose, extremes):
+    if extremes and (blades := _blade_sheets(rose, extremes)):
         sheets["extreme_loads_blade_full"] = blades
     paths = []
     for kind, tables in sheets.items():

@@ -65,6 +65,10 @@ class Row(NamedTuple):
     correlation: float  # largest, at the lag
     lag: float  # s by which the first run is later than the second
     coherence: float  # mean over frequency, weighted by the spectrum of the second run
+    smallest: float
+    smallest_other: float
+    largest: float
+    largest_other: float
 
 
 class Comparison(NamedTuple):
@@ -89,8 +93,8 @@ def compare(mine, theirs, start=None, end=None, channels=()) -> Comparison:
     """Compare two runs (DataFrames with OpenFAST's column names, evenly spaced) in their common time.
 
     start, end: s, limits of the compared time; channels: names without units, (): all in common.
-    Means, deviations and fatigue loads are those of each run's own samples; correlation, lag, coherence are
-    of both on the larger of their steps, after a low pass of the finer run.
+    Means, deviations, extremes and fatigue loads are those of each run's own samples; correlation, lag,
+    coherence are of both on the larger of their steps, after a low pass of the finer run.
     Raises: InputError for runs without common time or channels, and for unknown channels.
     """
     frames = [_named(frame, which) for frame, which in ((mine, "the first run"), (theirs, "the second run"))]
@@ -190,7 +194,8 @@ def _row(frames, steps, column, pair):
         correlation, lag = _lag(*pair)
         alike = _coherence(*pair)
     means, deviations = [float(np.mean(x)) for x in own], [float(np.std(x)) for x in own]
-    return Row(name, unit, *means, *deviations, *fatigue, exponent, *peaks, correlation, lag, alike)
+    ends = [float(end(x)) for end in (np.min, np.max) for x in own]
+    return Row(name, unit, *means, *deviations, *fatigue, exponent, *peaks, correlation, lag, alike, *ends)
 
 
 def _lag(time, first, second):

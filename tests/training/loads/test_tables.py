@@ -197,3 +197,10 @@ def test_channels_that_a_run_lacks_are_left_out():
     assert not any(row.column == "FAIRTEN2_[kN]" for row in found.extremes)
     assert any(row.column == "FAIRTEN1_[kN]" for row in found.extremes)
     assert np.isfinite([row.factored for row in found.extremes]).all()
+
+
+def test_load_cases_for_fatigue_alone_have_the_sheet_of_fatigue(tmp_path):
+    cases, finished = small_table()
+    alone = load_tables([case for case in cases if case.analysis == "fatigue"], finished)
+    (path,) = write_spreadsheets(tmp_path, "oc3", alone)
+    assert "equivalent_loads" in path.name
