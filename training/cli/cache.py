@@ -66,7 +66,7 @@ def pack(
     """Compile the usual scenes for x86-64-v3 and pack them, for a wheel that starts without compiling.
 
     Examples:
-    fowt dev cache pack && python -m build  # a wheel with the kernels of this Python version
+    fowt dev cache pack  # then python -m build: a wheel with the kernels of this Python version
     """
     from fowt_env.warmup import PACKED, compile_pack
 
