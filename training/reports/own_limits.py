@@ -90,7 +90,7 @@ def own_limits(table, cases, lidar=None, information=None, progress: Callable | 
     used = [case for case in cases if _holds(case) and case.name in set(base["case"])]
     if not used:
         raise InputError("results: no case at a wind where the linear limit holds")
-    names = [name for name in dict.fromkeys(good["controller"])]
+    names = list(dict.fromkeys(good["controller"]))
     rows, total = [], len(used) * len(names)
     for number, case in enumerate(used):
         wind, why = None, ""
