@@ -18,7 +18,7 @@ def show_centuries(platform, site, labels, years, period, sample, folder, settin
     period: return period, years; sample: hours of importance sampling in place of all hours; settings: of
     Century; table: of the matrix of load cases in the folder. Raises: InputError.
     """
-    from fowt_env.training.loads.century import Century
+    from fowt_env.training.loads.century import FOLDER, Century
     from fowt_env.training.loads.site import read_site
 
     check_number("century", years, 0.0, 1e4, low_open=True, allowed="a number of years in (0, 10000]")
@@ -28,7 +28,7 @@ def show_centuries(platform, site, labels, years, period, sample, folder, settin
     for label in labels:
         century = Century(platform, read_site(site), label, **settings)
         runs = _extrapolated_runs(platform, site, label, folder, table)
-        _show_century(century, years, period, sample, folder / "century" / label, runs, **machine)
+        _show_century(century, years, period, sample, folder / FOLDER / label, runs, **machine)
 
 
 def _extrapolated_runs(platform, site, label, folder, table):
@@ -56,7 +56,9 @@ def _extrapolated_runs(platform, site, label, folder, table):
 def _show_century(century, years, period, sample, folder, runs, *, jobs, engine, address):
     """Simulate the hours of a Century and write century.csv in a folder; print its main loads."""
     from fowt_env.training.loads.century import (
+        FILE,
         century_table,
+        coverage_text,
         extrapolations,
         run_century,
         seconds_per_hour,
@@ -86,7 +88,7 @@ def _show_century(century, years, period, sample, folder, runs, *, jobs, engine,
         f" {found.lost} lost, {found.tripped} with a trip"
     )
     table = century_table(found, period, extrapolations(runs, period) if runs else None)
-    path = folder / "century.csv"
+    path = folder / FILE
     table.to_csv(path, index=False)
     shown = table[table["load"].isin(SHOWN) & table["value"].notna()]
     headings = (
@@ -108,12 +110,6 @@ def _show_century(century, years, period, sample, folder, runs, *, jobs, engine,
     missing = table["value"].isna().sum()
     if missing:
         out.print(f"{missing} of {len(table)} values are beyond what {found.hours:,} h can show")
-    compared = table["covered"].dropna()
-    if len(compared):
-        outside = table[table["covered"] == False]  # noqa: E712
-        names = ", ".join(f"{row.load} {row.side}" for row in outside.itertuples())
-        out.print(
-            f"the interval of the extrapolation covers {int(compared.sum())} of {len(compared)} values;"
-            f" not: {escape(names) or 'none'}"
-        )
+    if text := coverage_text(table):
+        out.print(escape(text))
     wrote(path)

@@ -486,6 +486,7 @@ def seconds_per_hour(century):
 
 # --------------------------------------------------------------------------------------- the table
 
+FOLDER, FILE = "century", "century.csv"  # FOLDER/CONTROLLER/FILE in a folder of fowt loads
 TABLE = (
     "load", "side", "years", "value", "low", "high", "exceedances", "wind", "Hs", "Tp", "extrapolated",
     "extrapolated_low", "extrapolated_high", "covered",
@@ -510,6 +511,28 @@ def century_table(sample, years, extrapolated=None):
         covered = bool(each.low <= level.value <= each.high) if known else None
         rows.append([*row, each.value, each.low, each.high, covered])
     return pd.DataFrame(rows, columns=list(TABLE))
+
+
+def coverage_text(table):
+    """Return which values of a century_table the interval of the extrapolation covers, "" without any."""
+    known = table[table["covered"].notna()]
+    inside = known["covered"].astype(bool)
+    if known.empty:
+        return ""
+    names = ", ".join(f"{row.load} {row.side}" for row in known[~inside].itertuples())
+    count = f"{inside.sum()} of {len(known)}"
+    return f"the interval of the extrapolation covers {count} sampled values; not: {names or 'none'}"
+
+
+def coverage_remarks(folder, labels):
+    """Return coverage_text of each controller of a folder of fowt loads that has sampled hours."""
+    remarks = []
+    for label in labels:
+        path = Path(folder) / FOLDER / label / FILE
+        table = pd.read_csv(path) if path.is_file() else None
+        if table is not None and (text := coverage_text(table)):
+            remarks.append(f"{label}, once in {table['years'].iloc[0]:g} years: {text}")
+    return tuple(remarks)
 
 
 def extrapolations(runs, years):

@@ -5,6 +5,7 @@ from pathlib import Path
 from fowt_env.descriptions.platform import read_platform, turbine_of
 from fowt_env.errors import InputError
 from fowt_env.files.openfast_deck.parser import PartFile
+from fowt_env.training.loads.century import coverage_remarks
 from fowt_env.training.loads.decks import write_driving
 from fowt_env.training.loads.page import write_load_page
 from fowt_env.training.loads.run import finished_runs
@@ -47,7 +48,7 @@ def write_results(
         "title": f"Design loads of {name} at {site.name}",
         "lead": _lead(results, matrix),
         "left_out": matrix.left_out,
-        "remarks": matrix.remarks,
+        "remarks": (*matrix.remarks, *coverage_remarks(folder, results.controllers)),
         "facts": _facts(results, matrix, site),
     }
     for write in (

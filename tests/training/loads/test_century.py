@@ -15,6 +15,8 @@ from fowt_env.training.loads.century import (
     STATE,
     Century,
     Sample,
+    coverage_remarks,
+    coverage_text,
     read_sample,
     return_level,
     run_century,
@@ -187,3 +189,19 @@ def test_an_hour_is_a_run_of_its_state(tmp_path):
     assert found["low"][0, columns.index("TwrBsMyt")] == np.float32(counted["TwrBsMyt_[kN-m]"].min())
     tilt = np.hypot(counted["PtfmPitch_[deg]"], counted["PtfmRoll_[deg]"]).max()
     assert found["high"][0, columns.index("PtfmTilt")] == np.float32(tilt)
+
+
+def test_the_page_names_the_values_that_the_extrapolation_does_not_cover(tmp_path):
+    rows = [
+        ("TwrBsMyt", "max", 50.0, True),
+        ("RotThrust", "min", 50.0, False),
+        ("PtfmYaw", "max", 50.0, None),
+    ]
+    table = pd.DataFrame(rows, columns=["load", "side", "years", "covered"])
+    words = "the interval of the extrapolation covers 1 of 2 sampled values; not: RotThrust min"
+    assert coverage_text(table) == words
+    assert coverage_text(table[:1]).endswith("1 of 1 sampled values; not: none")
+    assert coverage_text(table[2:]) == ""
+    (tmp_path / "century" / "pi").mkdir(parents=True)
+    table.to_csv(tmp_path / "century" / "pi" / "century.csv", index=False)
+    assert coverage_remarks(tmp_path, ("pi", "lqr")) == (f"pi, once in 50 years: {words}",)
