@@ -11,13 +11,13 @@ import json
 import pickle
 import sys
 import tarfile
-from functools import cache
 from pathlib import Path, PurePosixPath
 
 import llvmlite.binding as llvm
 import numba
 from numba.core.registry import cpu_target
 
+from fowt_env.caches import cached
 from fowt_env.layout import PACKAGE, installed_path, module_path
 from fowt_env.plant.compile import decorators
 from fowt_env.plant.compile.disk_cache import SharedCacheFile
@@ -106,7 +106,7 @@ def _copied(files, folder, magic):
     return count
 
 
-@cache
+@cached(4)
 def take_kernels(pack: Path = PACK) -> int:
     """Copy a pack's kernels into the user's cache, once for each cache and pack; return how many were copied.
 
