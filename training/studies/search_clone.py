@@ -12,7 +12,7 @@ lulls   the score of the suite lulls.toml beside this file, normal turbulence of
 gusts   the mean of the mean and the largest overspeed in the suite `gusts` over those of mpc_clone, and half
         the score of the suite above_rated at NORMAL winds over that of mpc_clone, beyond 1
 
-What exceeds the limits of the suite on travel, shaft, torque rate and power costs PRICE, a lost run LOST. The
+What exceeds the limits of the suite (of runs, of their mean, and relative) costs PRICE, a lost run LOST. The
 folder has clone.npz, the network at the mean of the last distribution, and search.csv, a row for each
 generation. Method: Hansen, "The CMA evolution strategy: a tutorial", 2016.
 """
@@ -37,14 +37,10 @@ from fowt_env.training.studies.clone_mpc import write_clone
 
 COMPONENTS = 12
 RENEWED = 5  # generations
-STEP = (
-    0.1  # first standard deviation of a candidate, of the rates' standard deviation per unit of a component
-)
+# first standard deviation of a candidate, of the rates' standard deviation per unit of a component
+STEP = 0.1
 PRICE = 10.0  # per unit above a limit
 LOST = 10.0  # times the share of lost runs
-TORQUE_TRAVEL, POWER = 0.5, 1.4  # limits of the suite above_rated, kN m/s and of rated power
-RATED_POWER = 5000.0  # kW
-TRAVEL, SHAFT, CAPPED = "blade_pitch_travel_[deg/s]", "RotTorq_DEL_[kN-m]", "GenPwr_capped_mean_[kW]"
 NORMAL = (12, 14, 18, 22)  # m/s
 HOLD = {"hold": 100, "smoothing": 0.0, "history": 0}  # zero actions: the baseline alone, few calls
 LULLS = Path(__file__).with_name("lulls.toml")
@@ -106,14 +102,19 @@ def mean_of(runs, metric):
     return float(np.mean([run[metric] ** p for run in runs]) ** (1.0 / p))
 
 
-def score_of(runs, reference, terms):
-    """Return (score, excess over the limits) of runs relative to those of a reference, none of them lost."""
-    ratio = {name: mean_of(runs, name) / mean_of(reference, name) for name in {*terms, CAPPED, TRAVEL, SHAFT}}
-    score = np.average([ratio[name] for name in terms], weights=list(terms.values())) / ratio[CAPPED]
-    excess = max(0.0, ratio[TRAVEL] - 1.02) + max(0.0, ratio[SHAFT] - 1.1)
-    excess += max(0.0, mean_of(runs, "torque_travel_[kN-m/s]") / TORQUE_TRAVEL - 1.0)
-    excess += max(0.0, max(run["GenPwr_max_[kW]"] for run in runs) / (POWER * RATED_POWER) - 1.0)
-    return score, excess
+def score_of(runs, reference, suite):
+    """Return (score, excess over the limits) of runs by a suite, relative to those of a reference.
+
+    None of the runs is lost.
+    """
+    limits, terms = suite.limits, {term.metric: term.weight for term in suite.score.term}
+    names = {*terms, *limits.relative, suite.score.power}
+    ratio = {name: mean_of(runs, name) / mean_of(reference, name) for name in names}
+    score = np.average([ratio[name] for name in terms], weights=list(terms.values()))
+    beyond = [ratio[name] - most for name, most in limits.relative.items()]
+    beyond += [mean_of(runs, name) / most - 1.0 for name, most in limits.lifetime.items()]
+    beyond += [max(run[name] for run in runs) / most - 1.0 for name, most in limits.run.items()]
+    return score / ratio[suite.score.power], sum(max(0.0, each) for each in beyond)
 
 
 class Aim:
@@ -121,7 +122,6 @@ class Aim:
 
     def __init__(self, name, candidates):
         self.suite = read_suite(LULLS if name == "lulls" else "above_rated")
-        self.terms = {term.metric: term.weight for term in self.suite.score.term}
         cases = [case for case in self.suite.cases if name == "lulls" or int(case.name[4:]) in NORMAL]
         self.parts = {"normal": (cases * (2 if name == "lulls" else 1), NORMAL_TIME)}
         if name == "gusts":
@@ -153,12 +153,12 @@ class Aim:
         kept = [(run, base) for run, base in zip(runs["normal"], self.reference, strict=True) if run and base]
         if not kept:
             return LOST
-        score, excess = score_of(*zip(*kept, strict=True), self.terms)
+        score, excess = score_of(*zip(*kept, strict=True), self.suite)
         total = LOST * np.mean(lost) + PRICE * excess
         if "gusts" not in runs:
             return total + score
         started = [pair for pair in zip(self.of_start["normal"], self.reference, strict=True) if all(pair)]
-        total += 0.5 * max(0.0, score / score_of(*zip(*started, strict=True), self.terms)[0] - 1.0)
+        total += 0.5 * max(0.0, score / score_of(*zip(*started, strict=True), self.suite)[0] - 1.0)
         pairs = [pair for pair in zip(runs["gusts"], self.of_start["gusts"], strict=True) if all(pair)]
         if not pairs:
             return total + 1.0

@@ -60,17 +60,17 @@ def test_episodes_are_the_runs_of_a_suite_and_candidates_differ():
 
 
 def test_a_lost_run_and_an_exceeded_limit_cost():
-    run = dict.fromkeys(
-        ("RotSpeed_std_[rpm]", search_clone.TRAVEL, search_clone.SHAFT, search_clone.CAPPED), 1.0
-    )
+    travel, suite = "blade_pitch_travel_[deg/s]", read_suite(search_clone.LULLS)
+    run = dict.fromkeys(("RotSpeed_std_[rpm]", travel, "RotTorq_DEL_[kN-m]", "GenPwr_capped_mean_[kW]"), 1.0)
     run |= {"torque_travel_[kN-m/s]": 0.5, "GenPwr_max_[kW]": 5000.0}
-    terms = {"RotSpeed_std_[rpm]": 1.0, search_clone.TRAVEL: 1.0}
+    terms = [term for term in suite.score.term if term.metric in ("RotSpeed_std_[rpm]", travel)]
+    suite = replace(suite, score=suite.score.model_copy(update={"term": terms}))
     better = run | {"RotSpeed_std_[rpm]": 0.5}
-    assert search_clone.score_of([better, better], [run, run], terms) == pytest.approx((0.75, 0.0))
-    far = run | {search_clone.TRAVEL: 1.12, "torque_travel_[kN-m/s]": 0.6}
-    assert search_clone.score_of([far], [run], terms)[1] == pytest.approx(0.1 + 0.2)
+    assert search_clone.score_of([better, better], [run, run], suite) == pytest.approx((0.75, 0.0))
+    far = run | {travel: 1.12, "torque_travel_[kN-m/s]": 0.6}
+    assert search_clone.score_of([far], [run], suite)[1] == pytest.approx(0.1 + 0.2)
     aim = object.__new__(search_clone.Aim)
-    aim.terms, aim.reference = terms, [run, run, None]
+    aim.suite, aim.reference = suite, [run, run, None]
     assert aim.cost({"normal": [better, better, better]}) == pytest.approx(0.75)
     assert aim.cost({"normal": [better, None, better]}) == pytest.approx(0.75 + search_clone.LOST / 3.0)
     assert aim.cost({"normal": [far, far, far]}) == pytest.approx(1.06 + search_clone.PRICE * 0.3)
