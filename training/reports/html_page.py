@@ -28,6 +28,7 @@ from fowt_env.training.evaluation.run_case import OK
 from fowt_env.training.reports import page_words
 from fowt_env.training.reports.evaluation_plots import platform_pitch_period
 from fowt_env.training.reports.metric_words import SHORT, about_metric, counted, seeds_text, short_name
+from fowt_env.training.reports.own_limits import OF_LIMIT, read_limits
 from fowt_env.training.reports.page_file import PAGE, page_path, plotly_source, write_page
 from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict
 from fowt_env.visual.response import BOXES, SCHEDULE
@@ -37,6 +38,12 @@ NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
 PAGE_METRICS = tuple(SHORT)  # columns of the leaderboard before "all metrics" is chosen
 PARETO_AXES = ("RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "blade_pitch_travel_[deg/s]")  # across, up, size
 SORTS = ("rank", "score_lifetime", PARETO_AXES[0], "controller")  # the first that there is
+LIMIT_COLUMN = {
+    "name": OF_LIMIT, "label": "of its limit", "unit": "", "headline": True, "better": 0,
+    "about": "Rotor-speed and platform-pitch deviations over the least ones of linear control with the same"
+    " inputs, travel, power and torque: 1 at the limit. All cases: mean and range over the winds above the"
+    " lulls near rated wind.",
+}  # fmt: skip
 ALL_CASES = ""
 DISPLAY_RATE = 2.0  # Hz
 MAX_POINTS = 3000  # of one drawn series
@@ -55,7 +62,7 @@ def write_report(
     """Write the HTML page of an evaluation folder; return its path.
 
     folder     contains results.csv (or metrics.csv) and runs/<controller>/<case>_seed<n>.parquet, and
-               optionally leaderboard.json and manifest.json
+               optionally leaderboard.json, manifest.json and of_limit.csv
     out        the page; None: report.html in the folder
     cases      names of the cases with time series; None: all
     seeds      seeds with time series; None: all. Without cases and seeds, at most MAX_SERIES_RUNS runs: the
@@ -84,7 +91,7 @@ def write_report(
     about = page_words.described_cases(manifest)
     runs = _read_runs(folder, table, _chosen_runs(table, cases, seeds), about, rate, say)
     point = _schedule(platform, about, say) if schedule else None
-    data = _page_data(table, board_file, manifest, runs, point)
+    data = _page_data(table, board_file, manifest, runs, point, read_limits(folder))
     texts = _page_texts(folder, table, manifest, board_file, data, runs, point)
     texts["further"] = "".join(
         f'<section><div class="heading"><h2>{html.escape(heading)}</h2></div>{body}</section>'
@@ -397,7 +404,23 @@ def _fine_print(board_file, interval):
     return "".join(f"<p>{line}</p>" for line in lines)
 
 
-def _page_data(table, board_file, manifest, runs, schedule):
+def _add_limits(board, limits):
+    """Add the ratio to the limit at own spending to the leaderboard rows of each case and of all cases.
+
+    board: {case: rows} of _page_data; limits: table of own_limits. Of all cases: mean and range.
+    """
+    for case, rows in board.items():
+        here = limits if case == ALL_CASES else limits[limits["case"] == case]
+        values = here.groupby("controller")[OF_LIMIT].agg(["mean", "min", "max"]).dropna()
+        for row in rows:
+            if row["controller"] in values.index:
+                mean, *ends = _rounded(values.loc[row["controller"]].to_numpy())
+                row["values"][OF_LIMIT] = mean
+                if case == ALL_CASES:
+                    row.setdefault("intervals", {})[OF_LIMIT] = ends
+
+
+def _page_data(table, board_file, manifest, runs, schedule, limits=None):
     """Return the mapping that the page's script reads."""
     metrics = _metric_columns(table)
     names = [metric["name"] for metric in metrics]
@@ -408,6 +431,9 @@ def _page_data(table, board_file, manifest, runs, schedule):
     }
     if any(row["values"].get("score_lifetime") is not None for row in board[ALL_CASES]):
         metrics = [*_score_columns(), *metrics]
+    if limits is not None:
+        _add_limits(board, limits)
+        metrics = [*metrics, LIMIT_COLUMN]
     points = [
         [row["controller"], row["case"], str(row["seed"]), _rounded([row[name] for name in names])]
         for row in table[table["status"] == OK].to_dict("records")

@@ -19,6 +19,7 @@ from fowt_env.training.cli.console import EXIT_INPUT  # noqa: E402
 from fowt_env.training.evaluation.evaluate import run_file  # noqa: E402
 from fowt_env.training.reports import html_page  # noqa: E402
 from fowt_env.training.reports.html_page import SCHEDULE_WINDS, write_report  # noqa: E402
+from fowt_env.training.reports.own_limits import FILE, OF_LIMIT  # noqa: E402
 
 SERIES = "#series-plot .scatterlayer path.js-line"  # what is drawn last
 EVIL = "<img src=x onerror=alert(1)></script>&"
@@ -196,6 +197,23 @@ def test_a_leaderboard_file_gives_its_intervals_and_differences(copy):
     why = "leaderboard.json' does not match this version .baseline is missing.*controllers is missing"
     with pytest.raises(InputError, match=why):
         write_report(copy, schedule=False)
+
+
+def test_the_limit_at_own_spending_is_a_column_with_its_range_over_the_winds(copy, browser):  # noqa: F811
+    rows = [("calm", "ntm_14", 1.1), ("calm", "ntm_18", 1.3), ("busy", "ntm_14", np.nan)]
+    pd.DataFrame(rows, columns=["controller", "case", OF_LIMIT]).to_csv(copy / FILE, index=False)
+    page = write_report(copy, schedule=False)
+    board = data_of(page)["board"]
+    (calm,), (at_18,) = ([r for r in board[case] if r["controller"] == "calm"] for case in ("", "ntm_18"))
+    assert (calm["values"][OF_LIMIT], calm["intervals"][OF_LIMIT]) == (pytest.approx(1.2), [1.1, 1.3])
+    assert at_18["values"][OF_LIMIT] == 1.3
+    assert not any(OF_LIMIT in r["values"] for r in board[""] if r["controller"] != "calm")
+    with offline_page(browser, page, SERIES) as opened:
+        opened.locator("#intervals").check()
+        assert opened.locator("#table tbody tr", has_text="calm").first.locator("td").last.inner_text() == (
+            "1.20\n1.10 … 1.30"
+        )
+        assert OF_LIMIT not in opened.locator("#box-what").inner_html()
 
 
 @pytest.mark.parametrize(

@@ -396,7 +396,7 @@ function drawAll() {
   drawTable(); drawWinds(); drawPareto(); drawBoxes(); drawSeries(); drawSpectra(); drawSchedule();
 }
 fill($("table-case"), [ALL, ...DATA.cases], ["all cases", ...DATA.cases]);
-for (const [kind, title, names] of [["samples", "samples of a channel", Object.keys(DATA.quantiles)], ["metric", "metrics of the runs", DATA.metrics.map((m) => m.name).filter((name) => !name.startsWith("score_"))]]) {
+for (const [kind, title, names] of [["samples", "samples of a channel", Object.keys(DATA.quantiles)], ["metric", "metrics of the runs", DATA.metrics.map((m) => m.name).filter((name) => DATA.columns.includes(name))]]) {
   if (!names.length) continue;
   const group = document.createElement("optgroup");
   group.label = title;
