@@ -240,6 +240,8 @@ def bound(
         )
     single = speeds is not None and len(speeds) == 1
     show(table if single else _balanced(table), f"{platform}: smallest deviations")
+    if omitted := table.attrs.get("omitted"):
+        note(f"no convergence, omitted: {'; '.join(omitted)}")
     if "fits" in table.attrs:
         show(table.attrs["fits"], "weather as filtered noise: errors of the fits; linear drag of the hull")
     save_table(rounded(table), out_path)

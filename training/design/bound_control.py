@@ -300,13 +300,16 @@ def noise_of(chain="standard", turbine=None):
 def front(problem, limits, fractions):
     """Return [(fraction, Deviations, Cost)] optimal for each weight of platform pitch; limits: Deviations.
 
-    Deviations are in the plant's true weather. Fractions that do not converge in ROUNDS iterations are
-    omitted.
+    Deviations are in the plant's true weather. Each search starts with the multipliers of the one before,
+    which are near, and where it does not converge in ROUNDS iterations again from START; fractions that
+    do not converge either way are omitted.
     Raises: InputError if no fraction converges.
     """
     points, start = [], START
     for fraction in fractions:
         met = _met(problem, limits, fraction, start)
+        if met[1] is None and start is not START:
+            met = _met(problem, limits, fraction, START)
         start = met[-1]
         if met[1] is not None:
             points.append((float(fraction), *met[1:3]))

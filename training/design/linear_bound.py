@@ -101,7 +101,8 @@ def bound_table(
                  farthest
 
     fit_difference_[%]: largest difference of a deviation (rotor speed, platform pitch, travel) between fitted
-    and exact spectra. attrs["fits"]: DataFrame of the errors of the fits, and the drag.
+    and exact spectra. attrs["fits"]: DataFrame of the errors of the fits, and the drag; attrs["omitted"]:
+    texts of the points that did not converge.
     Raises: InputError for winds that are not above rated, limits that are not positive, unknown information,
     information with a lidar without one, and for a scene that BoundPlant does not support.
     """
@@ -121,7 +122,7 @@ def bound_table(
     allowed = f"above {low:g} and at most {high:g} m/s"
     for wind in winds:
         check_number("wind", wind, low, high, low_open=True, allowed=allowed)
-    rows, fits, total = [], [], len(winds) * len(chosen)
+    rows, fits, omitted, total = [], [], [], len(winds) * len(chosen)
     for number, wind in enumerate(winds):
         plant = BoundPlant(scene, wind, sea)
         base, fitted = (baseline_deviations(plant, weather) for weather in (plant.true, plant.fitted))
@@ -138,12 +139,15 @@ def bound_table(
         reader = None if lidar is None else lidar_of(plant, scene, lidar, distance)
         for index, name in enumerate(chosen, 1):
             problem = Problem(plant, known[name], noise, reader)
-            for fraction, reached, q in front(problem, limits, fractions):
+            points = front(problem, limits, fractions)
+            for fraction, reached, q in points:
                 rows.append(_row(wind, name, fraction, reached, base, problem.deviations(q, plant.fitted)))
+            for fraction in sorted({float(x) for x in fractions} - {point[0] for point in points}):
+                omitted.append(f"{name} at {wind:g} m/s, share {fraction:g}")
             if progress is not None:
                 progress(number * len(chosen) + index, total)
     table = pd.DataFrame(rows)
-    table.attrs["fits"] = pd.DataFrame(fits)
+    table.attrs["fits"], table.attrs["omitted"] = pd.DataFrame(fits), omitted
     return table
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.errors import InputError
+from fowt_env.training.design import bound_control
 from fowt_env.training.design.bound_control import Information
 from fowt_env.training.design.linear_bound import (
     BOUND,
@@ -93,6 +94,26 @@ def test_a_table_says_how_well_its_weather_is_fitted(windy):
     (fits,) = table.attrs["fits"].to_dict("records")
     assert fits["wind_[m/s]"] == 18.0 and 0.0 < fits["wind_error_[%]"] < 5.0
     assert fits["elevation_error_[%]"] < 10.0 and fits["surge_drag_[kN-s/m]"] > 10.0
+
+
+@pytest.mark.parametrize(("lost", "omitted"), [(1, []), (2, ["full at 18 m/s, share 0.7"])])
+def test_a_point_that_does_not_converge_is_searched_from_the_start_and_then_named(
+    windy, monkeypatch, lost, omitted
+):
+    searches = []
+
+    def met(problem, limits, fraction, multipliers, aim=None):
+        searches.append((fraction, multipliers is bound_control.START))
+        found = converged(problem, limits, fraction, multipliers, aim)
+        count = sum(searched == 0.7 for searched, _ in searches)
+        return (found[0], None, *found[2:]) if 1 <= count <= lost and fraction == 0.7 else found
+
+    converged = bound_control._met
+    monkeypatch.setattr(bound_control, "_met", met)
+    table = bound_table(windy, (18.0,), ("full",), fractions=(0.3, 0.7))
+    assert searches == [(0.3, True), (0.7, False), (0.7, True)]
+    assert table.attrs["omitted"] == omitted
+    assert list(table["share_[-]"].dropna()) == ([0.3] if omitted else [0.3, 0.7])
 
 
 def test_efficient_points_are_those_that_no_other_betters():
