@@ -17,7 +17,7 @@ LIMIT = 120_000.0  # ms, of one wait
 def delays(controller="pi", moves=40, motion=False, progress=None):
     """Return a DataFrame of a row per move: "delay_[ms]" from a key press on a slider to its painted picture.
 
-    The moves come one after another, each after the whole page has followed the last one. motion: whether
+    The moves come one after another, each to a new setting after the whole page has followed. motion: whether
     the turbines move meanwhile. progress: called as progress(text, done, total).
     Raises: InputError without playwright or Chromium, or for a controller without sliders.
     """
@@ -43,9 +43,10 @@ def delays(controller="pi", moves=40, motion=False, progress=None):
             sliders = page.locator("section.law.B .noUi-handle")
             if not sliders.count():
                 raise InputError(f"controller {controller!r}: has no sliders")
-            sliders.first.focus()
             for move in range(moves):
-                page.keyboard.press("ArrowRight" if move < moves // 2 else "ArrowLeft")
+                if move in (0, moves // 2):  # every move is to a new setting: kept runs would be faster
+                    (sliders.last if move else sliders.first).focus()
+                page.keyboard.press("ArrowRight")
                 page.wait_for_function(f"fowt.delays.length > {move}")
                 page.wait_for_function(READY)
                 if progress is not None:

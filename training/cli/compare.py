@@ -10,6 +10,7 @@ from fowt_env.files.tables import TABLE_SUFFIXES, read_series
 from fowt_env.training.cli.arguments import parse_names
 from fowt_env.training.cli.console import command, note, output, save_table, wrote
 from fowt_env.training.cli.tables import out, print_table
+from fowt_env.training.reports.metric_words import number_text
 
 FILE = "Run: .outb or .out of OpenFAST, or .outb, .csv or .parquet of fowt."
 
@@ -77,4 +78,4 @@ def _percent(mine, theirs):
 
 def _text(value):
     """Return a number with four digits, "" for NaN."""
-    return f"{value:.4g}" if isfinite(value) else ""
+    return number_text(value) if isfinite(value) else ""

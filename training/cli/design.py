@@ -295,7 +295,7 @@ def optimum(
     rows = []
     for entry in board["controllers"]:
         for case, figures in entry["cases"].items():
-            means = (f"{figures['metrics'][name]['mean']:.4g}" for name in SHOWN)
+            means = (figures["metrics"][name]["mean"] for name in SHOWN)
             rows.append((entry["controller"], case, *means))
     scores = {entry["controller"]: entry["score"]["winds"]["mean"] for entry in board["controllers"]}
     print_table(("controller", "case", *SHOWN), rows, "means over seeds", left=(0, 1))

@@ -10,7 +10,8 @@ from typer import Argument, Option
 from fowt_env.descriptions.checks import parse_number
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli.console import command, out
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli.tables import print_table
+from fowt_env.training.reports.metric_words import number_text
 
 SITE_HUB = 100.0  # m, height of the winds of sites
 LAST = ("DEMONSTRATION", "comparison only")  # marks of controllers not for use, which are listed last
@@ -52,7 +53,7 @@ def _turbines():
     rows = []
     for turbine in map(read_turbine, turbine_names()):
         power = 1e-3 * turbine.torque_law.rated_power * turbine.drivetrain.generator_efficiency
-        values = (figure(turbine.rated_wind_speed), figure(turbine.rated_rotor_speed / RPM))
+        values = (number_text(turbine.rated_wind_speed), number_text(turbine.rated_rotor_speed / RPM))
         rows.append((turbine.name, f"{power:.5g}", *values, _one_line(turbine.source)))
     return rows
 
@@ -120,8 +121,8 @@ def _sites():
     for name in site_names():
         site = read_site(name)
         wind, Hs, Tp, _, _ = Climate(site, SITE_HUB).extreme(50)
-        depth = "" if site.water_depth is None else figure(site.water_depth)
-        rows.append((name, depth, figure(wind), figure(Hs), figure(Tp), site.description))
+        depth = "" if site.water_depth is None else number_text(site.water_depth)
+        rows.append((name, depth, number_text(wind), number_text(Hs), number_text(Tp), site.description))
     return rows
 
 
@@ -139,7 +140,7 @@ def _cases():
     from fowt_env.training.evaluation.conditions import described_texts
 
     return [
-        (case.name, name, *described_texts(described(case)), figure(case.duration or suite.duration))
+        (case.name, name, *described_texts(described(case)), number_text(case.duration or suite.duration))
         for name, suite in ((name, read_suite(name)) for name in suite_names())
         for case in suite.cases
     ]

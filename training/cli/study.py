@@ -12,6 +12,7 @@ from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import command, note, output, progress_bar
 from fowt_env.training.cli.tables import out
+from fowt_env.training.reports.metric_words import number_text
 
 PLATFORM = "Deck of OpenFAST (.fst), platform file (.toml) or the name of a platform."
 THEIRS = "Run of OpenFAST (.outb, .out) of the first controller, to compare with; needs --controller."
@@ -137,7 +138,7 @@ def _compared(platform, name, path):
     result = compare(run, theirs, min(60.0, 0.2 * time[-1]), None, tuple(known))
     rows = []
     for row in result.rows:
-        values = (f"{value:.4g}" for value in (row.mean, row.mean_other, row.std, row.std_other))
+        values = map(number_text, (row.mean, row.mean_other, row.std, row.std_other))
         rows.append((f"{row.channel} {row.unit}", *values, f"{row.correlation:.3f}"))
     heads = ("channel", "mean here", "mean there", "std here", "std there", "correlation")
     notes = "".join(f"<li>{html.escape(f'{which}: {text}')}</li>" for which, text in result.notes)

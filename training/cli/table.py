@@ -9,7 +9,8 @@ from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.console import command, model, output, progress_bar, wrote
 from fowt_env.training.cli.simulate import CONTROLLER
-from fowt_env.training.cli.tables import figure, print_table
+from fowt_env.training.cli.tables import print_table
+from fowt_env.training.reports.metric_words import number_text
 
 
 @command(model)
@@ -52,6 +53,6 @@ def table(
     frame = found.frame
     least = frame[(frame["Tp_s"] == frame["Tp_s"].min()) & (frame["Hs_m"] == frame["Hs_m"].min())]
     columns = ["wind_m_s", "power_kW", "Cp", "Ct", "tilt_deg", "surge_m"]
-    rows = [[figure(value) for value in row] for row in least[columns].itertuples(index=False)]
+    rows = [[number_text(value) for value in row] for row in least[columns].itertuples(index=False)]
     print_table(("wind (m/s)", "power (kW)", "Cp", "Ct", "tilt (deg)", "surge (m)"), rows)
     wrote(*paths)

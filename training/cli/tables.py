@@ -7,13 +7,14 @@ COLUMNS is set.
 
 import os
 import textwrap
-from numbers import Integral
 
 from rich.box import Box
 from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
+
+from fowt_env.training.reports.metric_words import number_text
 
 out = Console(emoji=False, highlight=False, soft_wrap=True)  # no emoji for a controller module:Name:
 GAP = 2
@@ -26,17 +27,6 @@ def table_width():
     return out.width if out.is_terminal or os.environ.get("COLUMNS", "").isdigit() else float("inf")
 
 
-def figure(value):
-    """Return the text of a value: integers in full, other numbers with four significant digits.
-
-    Numbers below 1e9 have no exponent: 19790 kN-m.
-    """
-    if isinstance(value, str | Integral):
-        return str(value)
-    text = f"{value or 0.0:.4g}"
-    return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e9 else text
-
-
 def print_table(headings, rows, title=None, keys=1, left=(0,), prose=(), red=()):
     """Print rows (sequences of texts and numbers) below headings, with numbers aligned right.
 
@@ -44,7 +34,7 @@ def print_table(headings, rows, title=None, keys=1, left=(0,), prose=(), red=())
     left   indices of left-aligned columns; prose: of columns whose texts may be wrapped
     red    indices of red rows
     """
-    width, rows = table_width(), [list(map(figure, row)) for row in rows]
+    width, rows = table_width(), [list(map(number_text, row)) for row in rows]
     columns = [[row[i] for row in rows] for i in range(len(headings))]
     heads = list(headings)
     if _total(_longest([head, *column]) for head, column in zip(heads, columns, strict=True)) > width:

@@ -1,8 +1,9 @@
 """Builds the page of fowt tune: sliders and figures of Bokeh, filled by tuning.py in a worker thread.
 
 A change of a slider is answered in parts, the picture of the run first; a newer change ends the parts of an
-older one. Bokeh alone is used, without Panel: it adds two packages to those of this project, draws on a
-canvas, sends arrays as binary data and is its own server.
+older one. The picture is sent as one array for each law, and its axes stay while the curves fit in them, as
+Bokeh lays a figure out anew for other numbers at an axis. Bokeh alone is used, without Panel: it adds two
+packages to those of this project, draws on a canvas, sends arrays as binary data and is its own server.
 """
 
 import html
@@ -40,7 +41,7 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation.metrics import better
 from fowt_env.training.live import tuning
 from fowt_env.training.live.tuning import Law, Weather
-from fowt_env.training.reports.metric_words import SHORT, about_metric, short_name
+from fowt_env.training.reports.metric_words import SHORT, about_metric, number_text, short_name
 from fowt_env.training.reports.verdict import percent_text
 from fowt_env.visual.rendering import DEPTH_SHIFT, solids
 from fowt_env.visual.style import COLOURS
@@ -50,6 +51,10 @@ COLOUR = dict(zip(SIDES, COLOURS, strict=False))
 COUNTS = ("1", "4", "6", "12")  # of seeds
 WIND_RANGE = (4.0, 25.0)  # m/s, of the slider
 TEXTS = ("status", "verdict", "command", "table", "loops", "saved")  # elements of the page
+WEATHER, MOVED = tuning.SERIES[:2], tuning.SERIES[2:]  # of the conditions alone, and those of a law
+FILM = ("time", "wave", "wind", *tuning.MOTION)
+FILLED = 0.6  # part of an axis that the curves must fill, else it is set anew
+LINE_WIDTH = 1.0  # pixels; without a graphics card a line of 1.3 takes five times as long to paint
 PAUSE = 0.15  # s without a change, after which more than the picture is computed
 FOLDER = Path(__file__).parent / "page"
 STYLE = """
@@ -187,13 +192,12 @@ class Page:
 
     # figures
 
-    def _plot(self, title, height, x_label=None, **settings):
+    def _plot(self, height, x_label=None, **settings):
         plot = figure(
-            height=height, sizing_mode="stretch_width", min_width=120, toolbar_location=None, title=title,
+            height=height, sizing_mode="stretch_width", min_width=120, toolbar_location=None,
             tools="xpan,xwheel_zoom,reset", active_scroll=None, output_backend="canvas", lod_threshold=None,
             background_fill_color=None, border_fill_color=None, outline_line_color=None, **settings,
         )  # fmt: skip
-        plot.title.text_font_size, plot.title.text_font_style = "12px", "normal"
         plot.xaxis.axis_label, plot.axis.minor_tick_line_color = x_label, None
         plot.axis.ticker.desired_num_ticks = 5
         plot.axis.major_label_text_font_size = plot.axis.axis_label_text_font_size = "11px"
@@ -205,65 +209,75 @@ class Page:
             for side in SIDES
         }
 
-    def _lines(self, plot, kind, x, y, sides=SIDES):
-        for side in sides:
-            plot.line(x, y, source=self.sources[kind][side], color=COLOUR[side], line_width=1.3)
+    def _lines(self, plot, kind, x, y):
+        for side in SIDES:
+            plot.line(x, y, source=self.sources[kind][side], color=COLOUR[side], line_width=LINE_WIDTH)
 
     def _figures(self):
-        self._source("series", ["time", *(channel for _, channel in tuning.SERIES)])
-        self._source("film", ["time", "wave", "wind", *tuning.MOTION])
+        self._source("series", ["time", *(channel for _, channel in MOVED)])
         self._source("spectra", ["frequency", *(channel for _, channel in tuning.SPECTRA)])
         events = [f"{event} {channel}" for event in ("step", "gust") for _, channel in tuning.RESPONSES]
         self._source("responses", ["time", *events])
         self._source("poles", ["real", "imaginary"])
         shape = ColumnDataSource({"json": ["{}"]}, name="shape")
         self.sources["shape"] = {"A": shape}
-        for side in SIDES:  # the motions are drawn by the page's own script, not by a figure
-            self.doc.add_root(_carrier(f"carrier_{side}", self.sources["film"][side], shape, self.words))
-            self.sources["series"][side].js_on_change("data", CustomJS(code="fowt.drawn()"))
-        plots, shared = [], None
+        self.weather_source = ColumnDataSource(
+            {name: [0.0, 1.0] for name in ("time", *(channel for _, channel in WEATHER))}, name="weather"
+        )
+        self.packed = {"series": list(self.sources["series"]["A"].data), "film": list(FILM)}
+        for side in SIDES:  # the page's own script unpacks the series, and draws the motions
+            for kind, names in self.packed.items():
+                source = ColumnDataSource(
+                    {"values": np.zeros(2 * len(names), np.float32)}, name=f"{kind}_packed_{side}", tags=names
+                )
+                source.js_on_change("data", CustomJS(code=f"fowt.unpack('{kind}', '{side}')"))
+                self.sources.setdefault(f"packed {kind}", {})[side] = source
+            sources = [self.sources[f"packed {kind}"][side] for kind in self.packed]
+            self.doc.add_root(_carrier(f"carrier_{side}", *sources, shape, self.words))
+        plots, self.time_axis, self.axes = [], Range1d(0.0, 1.0), {}
         for number, (label, channel) in enumerate(tuning.SERIES):
             last = number >= len(tuning.SERIES) - 2
-            settings = {} if shared is None else {"x_range": shared}
-            plot = self._plot(label, 144 if last else 104, "time (s)" if last else None, **settings)
-            shared = plot.x_range
+            self.axes[channel] = Range1d(0.0, 1.0)
+            plot = self._plot(
+                144 if last else 104, "time (s)" if last else None, x_range=self.time_axis,
+                y_range=self.axes[channel],
+            )  # fmt: skip
             plot.xaxis.visible = last  # text is most of the time of a redraw
-            self._lines(plot, "series", "time", channel, SIDES[1:] if number < 2 else SIDES)
+            if number < len(WEATHER):
+                plot.line("time", channel, source=self.weather_source, line_width=LINE_WIDTH)
+            else:
+                self._lines(plot, "series", "time", channel)
             plot.yaxis.formatter = BasicTickFormatter(use_scientific=False)
-            plots.append(plot)
-        plots[0].x_range.range_padding = 0.0
+            plots.append((plot, label))
         self._grid("series", plots)
-        plots = [
-            self._plot(f"PSD of {label}", 170, "frequency (Hz)", x_axis_type="log", y_axis_type="log")
-            for label, _ in tuning.SPECTRA
-        ]
-        for plot, (_, channel) in zip(plots, tuning.SPECTRA, strict=True):
+        plots = []
+        for label, channel in tuning.SPECTRA:
+            plot = self._plot(170, "frequency (Hz)", x_axis_type="log", y_axis_type="log")
             self._lines(plot, "spectra", "frequency", channel)
+            plots.append((plot, f"PSD of {label}"))
         self._grid("spectra", plots)
         plots = []
         for event, words in (("step", f"step of {tuning.STEP:g} m/s"), ("gust", "extreme operating gust")):
             for label, channel in tuning.RESPONSES:
-                plot = self._plot(f"{words}: {label}", 160, "time (s)")
+                plot = self._plot(160, "time (s)")
                 self._lines(plot, "responses", "time", f"{event} {channel}")
-                plots.append(plot)
+                plots.append((plot, f"{words}: {label}"))
         self._grid("responses", plots)
-        poles = self._plot(
-            "poles of the closed loop at the mean wind (rad/s)", 300, "real part", x_range=Range1d(-0.6, 0.1),
-            y_range=Range1d(0.0, 1.0),
-        )  # fmt: skip
+        poles = self._plot(300, "real part", x_range=Range1d(-0.6, 0.1), y_range=Range1d(0.0, 1.0))
         poles.yaxis.axis_label = "imaginary part"
         for side, marker in zip(SIDES, ("x", "circle"), strict=True):
             poles.scatter(
                 "real", "imaginary", source=self.sources["poles"][side], marker=marker, size=9,
                 line_width=1.8, color=COLOUR[side], fill_color=None if marker == "circle" else COLOUR[side],
             )  # fmt: skip
-        self._root("poles", poles)
+        self._grid("poles", [(poles, "poles of the closed loop at the mean wind (rad/s)")])
 
     def _grid(self, name, plots):
-        for number, plot in enumerate(plots):
+        """Add (figure, heading) to the page; a heading in HTML needs no painting."""
+        for number, (plot, _) in enumerate(plots):
             plot.name = f"{name}_{number}"
             self.doc.add_root(plot)
-        self.doc.template_variables[name] = [plot.name for plot in plots]
+        self.doc.template_variables[name] = [(plot.name, heading) for plot, heading in plots]
 
     # what the user changes
 
@@ -352,8 +366,8 @@ class Page:
     def _work(self):
         """Compute in the worker thread until the newest request is answered."""
         while True:
-            number, began = self.number, self.began
             self.wake.clear()
+            number, began = self.number, self.began
             weather, laws, count = self.weather, dict(self.laws), int(self.count.value)
             try:
                 for part in self._parts(weather, laws, count):
@@ -373,7 +387,8 @@ class Page:
         """Yield functions that show one part of the figures each, in the order of their computing."""
         pictures = {side: tuning.picture(weather, laws[side]) for side in reversed(SIDES)}
         yield partial(self._show_pictures, weather, pictures)
-        self.wake.wait(PAUSE)  # a slider that still moves has only its picture redrawn
+        if self.wake.wait(PAUSE):  # a slider that still moves has only its picture redrawn
+            return
         figures = {side: [tuning.figures(weather, laws[side])] for side in SIDES}
         yield partial(self._show_table, laws, tuning.paired(figures["A"], figures["B"]), 1)
         yield partial(self._show, "spectra", {side: tuning.spectra(weather, laws[side]) for side in SIDES})
@@ -398,12 +413,29 @@ class Page:
         shape = json.dumps(_shape(weather))
         if self.sources["shape"]["A"].data["json"][0] != shape:
             self.sources["shape"]["A"].data = {"json": [shape]}
-        for side in SIDES:
-            if self.shown.get(side) is not pictures[side]:
-                self.shown[side] = pictures[side]
-                self.sources["series"][side].data = pictures[side].series
-                self.sources["film"][side].data = pictures[side].film
+        changed = [side for side in SIDES if self.shown.get(side) is not pictures[side]]
+        self._set_axes(weather, pictures)
+        series, shown = pictures["B"].series, self.weather_source.data
+        if any(not np.array_equal(series[name], shown[name]) for name in shown):
+            self.weather_source.data = {name: series[name] for name in shown}
+        for kind, names in self.packed.items():
+            for side in changed:
+                packed = _packed(getattr(pictures[side], kind), names)
+                self.sources[f"packed {kind}"][side].data = {"values": packed}
+        self.shown = pictures
         self.notes = "; ".join(f"{side}: {pictures[side].note}" for side in SIDES if pictures[side].note)
+
+    def _set_axes(self, weather, pictures):
+        """Set the ranges of the time series that do not fit their curves."""
+        end = weather.duration
+        if self.time_axis.reset_end != end:
+            self.time_axis.update(start=0.0, end=end, reset_start=0.0, reset_end=end)
+        for name, axis in self.axes.items():
+            curves = [each.series[name] for each in pictures.values() if len(each.series.get(name, ()))]
+            found = fitting(np.concatenate(curves), axis.start, axis.end) if curves else None
+            if found not in (None, (axis.start, axis.end)):
+                start, end = found
+                axis.update(start=start, end=end, reset_start=start, reset_end=end)
 
     def _show_table(self, laws, ratios, count):
         names = {side: html.escape(str(laws[side])) for side in SIDES}
@@ -421,7 +453,7 @@ class Page:
             cells = (
                 f"<td title='{html.escape(about_metric(name), quote=True)}'>{words} <span class=soft>"
                 f"{name.partition('_[')[2].rstrip(']')}</span></td>"
-                f"<td>{ratio.first:.4g}</td><td>{ratio.second:.4g}</td>"
+                f"<td>{number_text(ratio.first)}</td><td>{number_text(ratio.second)}</td>"
                 f"<td class='{kind}'>{percent_text(change)}{'*' if ratio.is_sure else ''}</td><td>{span}</td>"
             )
             rows.append(f"<tr>{cells}</tr>")
@@ -457,6 +489,21 @@ def _nothing():
     """Show nothing: a point at which a newer request ends the work."""
 
 
+def fitting(values: np.ndarray, start: float, end: float) -> tuple[float, float]:
+    """Return the range of an axis for curves: the present one if they fill FILLED of it, else round ends."""
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    if start <= low and high <= end and high - low >= FILLED * (end - start):
+        return start, end
+    step = _step(low, max(high, low + 1e-6 * max(1.0, abs(low))), 10.0)
+    return float(step * np.floor(low / step)), float(step * np.ceil(high / step))
+
+
+def _packed(columns, names):
+    """Return columns one after another in single precision, which is one message to the page."""
+    missing = np.full_like(columns["time"], np.nan)
+    return np.concatenate([columns.get(name, missing) for name in names], dtype=np.float32)
+
+
 def _carrier(name, *sources):
     """Return an invisible root that brings sources to the page, which no figure uses."""
     return Div(text="", visible=False, name=name, tags=list(sources))
@@ -479,9 +526,9 @@ def _with_speed(wind, speed):
     return ":".join(parts)
 
 
-def _step(low, high):
-    """Return a round step of about a hundredth of a range."""
-    size = (high - low) / 100.0
+def _step(low, high, parts=100.0):
+    """Return a round step of about that part of a range."""
+    size = (high - low) / parts
     decade = 10.0 ** np.floor(np.log10(size))
     return float(decade * min((1.0, 2.0, 5.0, 10.0), key=lambda factor: abs(factor - size / decade)))
 

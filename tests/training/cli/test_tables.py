@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 import fowt_env
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import tables
+from fowt_env.training.reports.metric_words import number_text
 
 
 @pytest.fixture(params=[80, None], ids=["80 columns", "a pipe"])
@@ -123,11 +124,11 @@ def test_a_table_is_fitted_to_the_terminal(columns, headings, rows, options, exp
 
 
 def test_whole_numbers_are_whole_and_others_have_four_digits():
-    assert [tables.figure(x) for x in (19792.4, -198650.0, 1.5e9, 1e5)] == [
+    assert [number_text(x) for x in (19792.4, -198650.0, 1.5e9, 1e5)] == [
         "19790",
         "-198600",
         "1.5e+09",
         "100000",
     ]
-    texts = [tables.figure(x) for x in (1234567, np.int64(1234567), 1234.567, -0.0, float("nan"), "a")]
+    texts = [number_text(x) for x in (1234567, np.int64(1234567), 1234.567, -0.0, float("nan"), "a")]
     assert texts == ["1234567", "1234567", "1235", "0", "nan", "a"]

@@ -17,6 +17,7 @@ pytest.importorskip("bokeh", reason="bokeh is not installed: the extra `live` is
 
 from fowt_env.errors import InputError  # noqa: E402
 from fowt_env.training.live import tuning  # noqa: E402
+from fowt_env.training.live.page import fitting  # noqa: E402
 from fowt_env.training.live.server import HOST, tune  # noqa: E402
 from fowt_env.training.live.tuning import Weather, law_of  # noqa: E402
 
@@ -101,6 +102,27 @@ def test_b_is_saved_as_a_design_once_and_in_the_working_folder_alone(page, tmp_p
         page.wait_for_function(f"document.getElementById('saved').textContent.includes({json.dumps(words)})")
     assert [path.name for path in tmp_path.iterdir()] == ["mine.json"]
     assert json.loads((tmp_path / "mine.json").read_text())["kind"] == "pi"
+
+
+def test_a_page_shows_a_run_that_was_computed_before_it_was_open(browser, server):  # noqa: F811
+    wanted = tuning.picture(Weather(**SHORT), law_of("pi")).series
+    with page_of(browser, server) as page:
+        np.testing.assert_allclose(page.evaluate(SHOWN), wanted["RotSpeed_[rpm]"], rtol=1e-6)
+        assert page.evaluate("fowt.film.length") > 140.0
+        for channel, axis in (("PtfmPitch_[deg]", "y"), ("Wave1Elev_[m]", "y"), ("time", "x")):
+            name = f"series_{max(0, [c for _, c in tuning.SERIES].index(channel) if axis == 'y' else 0)}"
+            ends = f"(r => [r.start, r.end])(Bokeh.documents[0].get_model_by_name('{name}').{axis}_range)"
+            low, high = page.evaluate(ends)
+            assert low <= wanted[channel].min() and wanted[channel].max() <= high
+
+
+def test_an_axis_stays_while_its_curves_fill_it_and_is_set_anew_otherwise():
+    assert fitting(np.array([1.3, 8.6]), 0.0, 1.0) == (1.0, 9.0)
+    assert fitting(np.array([1.3, np.nan, 8.6]), 0.0, 10.0) == (0.0, 10.0)
+    assert fitting(np.array([1.3, 4.2]), 0.0, 10.0) == pytest.approx((1.2, 4.2))
+    assert fitting(np.array([-1.0, 8.6]), 0.0, 10.0) == (-1.0, 9.0)
+    low, high = fitting(np.full(3, 43.1), 0.0, 1.0)
+    assert low <= 43.1 <= high and 0.0 < high - low < 1e-3
 
 
 def test_a_phone_scrolls_in_one_direction_and_both_themes_have_their_colours(browser, server):  # noqa: F811

@@ -9,6 +9,17 @@ const fowt = {
       if (place.dataset.text !== data[key][0]) place.innerHTML = place.dataset.text = data[key][0];
     }
   },
+  motions: { A: {}, B: {} },
+  // columns that came as one array; the server need not know them apart
+  unpack(kind, side) {
+    const doc = Bokeh.documents[0], { data: { values }, tags } = doc.get_model_by_name(`${kind}_packed_${side}`);
+    const count = values.length / tags.length;
+    const columns = Object.fromEntries(tags.map((name, i) =>
+      [name, new Float32Array(values.buffer, values.byteOffset + 4 * i * count, count)]));
+    if (kind === "film") { this.motions[side] = columns; return; }
+    doc.get_model_by_name(`series_${side}`).setv({ data: columns }, { sync: false });
+    this.drawn();
+  },
   moved() { if (this.since === null) this.since = performance.now(); },
   // Bokeh paints in the next frame; the message after that frame ends the delay
   drawn() {
@@ -31,10 +42,22 @@ const fowt = {
 window.fowt = fowt;
 const G = 9.81, TURN = Math.PI / 180;
 
+// At each painting of a figure Bokeh reads the style of its parts a hundred times and writes dozens of style
+// sheets, most of them as they were, and the browser resolves the styles of the page in between. No variable
+// --bk-... is set on this page, so there is nothing to read. A Bokeh with other internals only paints slower.
+function lighten() {
+  try {
+    const visual = Bokeh.require("core/visuals/visual").VisualProperties.prototype;
+    const sheet = Bokeh.require("core/dom").InlineStyleSheet.prototype, update = sheet._update;
+    if (visual._get_css_value) visual._get_css_value = () => "";
+    if (update) sheet._update = function (css) { if (this.el.textContent !== css) update.call(this, css); };
+  } catch (error) { console.info(`fowt tune: ${error}`); }
+}
+
 function theme(isDark) {
   document.documentElement.dataset.theme = isDark ? "dark" : "light";
   const style = getComputedStyle(document.documentElement), value = name => style.getPropertyValue(name).trim();
-  const [ink, soft, line] = ["--ink", "--soft", "--line"].map(value);
+  const [soft, line] = ["--soft", "--line"].map(value);
   const doc = Bokeh.documents[0];
   const paint = (model, colours) => model.setv(colours, { sync: false });  // the server need not know
   for (const model of doc._all_models.values()) {
@@ -42,16 +65,15 @@ function theme(isDark) {
       paint(model, { major_label_text_color: soft, axis_label_text_color: soft, axis_line_color: line,
         major_tick_line_color: line });
     } else if (model.type === "Grid") paint(model, { grid_line_color: line });
-    else if (model.type === "Title") paint(model, { text_color: ink });
     else if (model.type === "GlyphRenderer") {
-      const colour = value(model.data_source.name.endsWith("_A") ? "--A" : "--B");
+      const colour = value({ A: "--A", B: "--B" }[model.data_source.name.slice(-1)] ?? "--soft");
       paint(model.glyph, { line_color: colour });
     }
   }
 }
 
 function interpolated(data, time) {
-  const times = data.time, last = times.length - 1;
+  const times = data.time, last = (times || []).length - 1;
   if (last < 1) return null;
   const place = Math.min(Math.max((time - times[0]) / (times[1] - times[0]), 0), last - 1e-9);
   const i = Math.floor(place), f = place - i, row = {};
@@ -62,7 +84,6 @@ function interpolated(data, time) {
 class Film {
   constructor(canvas, doc) {
     this.canvas = canvas;
-    this.sources = ["A", "B"].map(side => doc.get_model_by_name(`film_${side}`));
     this.shape = doc.get_model_by_name("shape");
     this.clock = 60;
     this.playing = !matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -70,7 +91,7 @@ class Film {
     const step = now => { this.step(now); requestAnimationFrame(step); };
     requestAnimationFrame(step);
   }
-  get length() { return (this.sources[1].data.time || [0]).at(-1) || 0; }
+  get length() { return (fowt.motions.B.time || [0]).at(-1) || 0; }
   step(now) {
     const rate = Number(document.getElementById("rate").value);
     if (now - this.before < 40) return;
@@ -82,9 +103,10 @@ class Film {
     }
     this.before = now;
     const key = `${this.clock} ${this.canvas.clientWidth} ${document.documentElement.dataset.theme}`;
-    if (key !== this.key || this.sources.some((each, i) => each.data !== this.last?.[i])) this.draw();
+    const { A, B } = fowt.motions;
+    if (key !== this.key || A !== this.last?.[0] || B !== this.last[1]) this.draw();
     this.key = key;
-    this.last = this.sources.map(each => each.data);
+    this.last = [A, B];
   }
   draw() {
     const { canvas } = this, sharp = Math.min(2, window.devicePixelRatio || 1);
@@ -96,10 +118,10 @@ class Film {
     pen.setTransform(sharp, 0, 0, sharp, 0, 0);
     const shape = JSON.parse(this.shape.data.json[0]);
     if (!shape.radius) return;
-    ["A", "B"].forEach((side, i) => this.turbine(pen, shape, side, i, i * width / 2, width / 2, height));
+    ["A", "B"].forEach((side, i) => this.turbine(pen, shape, side, i * width / 2, width / 2, height));
   }
-  turbine(pen, shape, side, number, left, width, height) {
-    const row = interpolated(this.sources[number].data, this.clock);
+  turbine(pen, shape, side, left, width, height) {
+    const row = interpolated(fowt.motions[side], this.clock);
     if (row === null) return;
     const style = getComputedStyle(document.documentElement), isDark = document.documentElement.dataset.theme === "dark";
     const colour = style.getPropertyValue(`--${side}`).trim();
@@ -108,7 +130,7 @@ class Film {
     const pitch = row.pitch * TURN, cos = Math.cos(pitch), sin = Math.sin(pitch);
     // body x, y, z to pixels; y by a cabinet projection, as in the animations of fowt dev animate
     const put = (x, y, z) => [
-      middle + scale * (row.surge - this.mean(number, "surge") + cos * x + sin * z + shape.shift * y),
+      middle + scale * (row.surge - this.mean(side, "surge") + cos * x + sin * z + shape.shift * y),
       scale * (top - (row.heave - sin * x + cos * z))];
     const fill = (points, paint, edge) => {
       pen.beginPath();
@@ -136,11 +158,11 @@ class Film {
     fill([put(-wide / 2, 0, low), put(wide / 2, 0, low), put(narrow / 2, 0, high), put(-narrow / 2, 0, high)],
       isDark ? "#c8d0da" : "#f4f6f8", "#6a7685");
     // the sea over what is submerged; a wave of the record runs past at the speed of its period
-    const period = Math.max(3, this.period(number)), speed = G * period / (2 * Math.PI);
+    const period = Math.max(3, this.period(side)), speed = G * period / (2 * Math.PI);
     pen.beginPath();
     for (let x = 0; x <= width; x += 4) {
       const ago = this.clock - (left + x - middle) / scale / speed;
-      const wave = interpolated(this.sources[number].data, ago);
+      const wave = interpolated(fowt.motions[side], ago);
       pen[x ? "lineTo" : "moveTo"](left + x, scale * (top - wave.wave));
     }
     pen.lineTo(left + width, height); pen.lineTo(left, height);
@@ -173,22 +195,22 @@ class Film {
     words.forEach((text, i) => pen.fillText(text, left + (i ? 8 : 26), 18 + 16 * i));
     pen.restore();
   }
-  mean(number, key) {
-    return this.kept(number, key, values => values.reduce((sum, each) => sum + each, 0) / values.length);
+  mean(side, key) {
+    return this.kept(side, key, values => values.reduce((sum, each) => sum + each, 0) / values.length);
   }
-  period(number) {  // mean time between upcrossings of the wave record
-    return this.kept(number, "wave", values => {
+  period(side) {  // mean time between upcrossings of the wave record
+    return this.kept(side, "wave", values => {
       let count = 0;
       for (let i = 1; i < values.length; i += 1) count += values[i - 1] < 0 && values[i] >= 0;
       return count ? this.length / count : 10;
     });
   }
-  kept(number, key, make) {
-    const { data } = this.sources[number];
-    this.store ??= [new Map(), new Map()];
-    if (this.store[number].get("data") !== data) this.store[number] = new Map([["data", data]]);
-    const map = this.store[number];
-    if (!map.has(key)) map.set(key, make(Array.from(data[key])));
+  kept(side, key, make) {
+    const data = fowt.motions[side];
+    this.store ??= new WeakMap();
+    if (!this.store.has(data)) this.store.set(data, new Map());
+    const map = this.store.get(data);
+    if (!map.has(key)) map.set(key, make(data[key]));
     return map.get(key);
   }
 }
@@ -196,6 +218,7 @@ class Film {
 function begin() {
   const doc = window.Bokeh && Bokeh.documents[0];
   if (!doc || !doc.get_model_by_name("shape")) { setTimeout(begin, 30); return; }
+  lighten();
   const dark = matchMedia("(prefers-color-scheme: dark)");
   theme(dark.matches);
   dark.addEventListener("change", () => theme(dark.matches));
@@ -212,6 +235,7 @@ function begin() {
     setTimeout(() => { $("copy").textContent = "copy the command"; }, 1500);
   });
   fowt.say();
+  for (const side of ["A", "B"]) for (const kind of ["series", "film"]) fowt.unpack(kind, side);  // came with the page
   fowt.ready = true;
 }
 addEventListener("DOMContentLoaded", begin);
