@@ -9,7 +9,7 @@ PROJECT := pyproject.toml constraints.txt
 TESTS = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 
-.PHONY: help demo test test-all test-rest test-rest-plant test-rest-envs test-rest-training test-rest-others test-nightly test-quick coverage lint docs format clean
+.PHONY: help demo test test-all test-rest test-rest-plant test-rest-envs test-rest-training test-rest-others test-nightly test-quick coverage lint docs figures format clean
 .DELETE_ON_ERROR:
 
 help:
@@ -20,6 +20,7 @@ help:
 	@echo "make coverage    what the quick tests reach of what users touch; pages in htmlcov"
 	@echo "make lint        ruff and mypy;  make format: let ruff fix what it can"
 	@echo "make docs        the documentation site, in site/"
+	@echo "make figures     redraw the pictures of the manual that need no long runs"
 	@echo "make clean       remove results and build leftovers (the environment stays; rm -r $(VENV) removes it)"
 
 $(BIN)/python:
@@ -81,6 +82,19 @@ lint: $(VENV)/.installed-dev
 # the variable silences an advertisement of the theme's
 docs: $(VENV)/.installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean --config-file .mkdocs.yml
+
+# studies with stored tables are only drawn; turbulence.gif and pictures of long runs have their commands in the text
+FIGURES := docs/figures
+DATA := training/design/data
+figures: $(VENV)/.installed-dev
+	$(BIN)/fowt simulate --wind ntm:18:B --sea jonswap:7.5:10:3.3 --plot $(FIGURES)/pi_18mps.png
+	$(BIN)/fowt dev benchmark accuracy --axes reference --out $(FIGURES)
+	$(BIN)/fowt dev benchmark accuracy --axes reference --out $(FIGURES) \
+		--platform iea15_volturnus_s --beside $(FIGURES)/accuracy.csv
+	$(BIN)/fowt model linearize --out results/poles && cp results/poles/poles.png $(FIGURES)/linear_poles.png
+	$(BIN)/fowt model linearize --winds 12:24:2 --out results/bode && cp results/bode/bode.png $(FIGURES)/linear_bode.png
+	$(BIN)/fowt design front --runs $(DATA)/lqr_over_wind.csv --bound $(DATA)/linear_bound.csv --plot $(FIGURES)/linear_bound.png
+	$(BIN)/fowt design front --runs $(DATA)/lqr_sweep.csv --bound $(DATA)/linear_bound.csv --plot $(FIGURES)/lqr_sweep.png
 
 format: $(VENV)/.installed-dev
 	$(BIN)/ruff check --fix .

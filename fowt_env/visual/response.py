@@ -20,6 +20,7 @@ from fowt_env.visual.style import (
     note,
     save_figure,
     style_axes,
+    style_numbers,
 )
 from fowt_env.visual.time_series import PANELS, TIME, even_step, named_runs
 
@@ -86,13 +87,13 @@ def plot_boxes(cases, path=None, title=None, skip=0.0):
     figure, cells = _grid(panels, min(3, len(panels)), 4.2, 2.4)
     width = 0.8 / len(labels)
     for axes, (name, channel) in zip(cells, panels, strict=True):
-        for number, label in enumerate(labels):
+        for place, (number, label) in enumerate(zip(style_numbers(labels), labels, strict=True)):
             frames = [runs.get(label, ()) for runs in kept.values()]
             having = [i for i, frame in enumerate(frames) if channel in frame]
             if not having:
                 continue
             values = [frames[i][channel].to_numpy() for i in having]
-            at = [i + width * (number - 0.5 * (len(labels) - 1)) for i in having]
+            at = [i + width * (place - 0.5 * (len(labels) - 1)) for i in having]
             colour = COLOURS[number % len(COLOURS)]
             boxes = axes.boxplot(
                 values, positions=at, widths=0.8 * width, whis=WHISKERS, showfliers=False,
@@ -234,7 +235,7 @@ def plot_raos(runs, path=None, title=None, skip=0.0, segment=None, platform_pitc
     grid = figure.subplots(3, len(panels), sharex=True, squeeze=False, height_ratios=(2.0, 1.2, 0.8))
     for column, (name, channel) in enumerate(panels):
         highest = 0.0
-        for number, (label, frame) in enumerate(runs.items()):
+        for number, (label, frame) in zip(style_numbers(runs), runs.items(), strict=True):
             if channel not in frame.columns:
                 continue
             frequency, amplitude, phase, coherence, energetic = _estimate(frame, channel, skip, segment)

@@ -1,6 +1,7 @@
 """Defines the common style of all figures: colours, axes, text."""
 
 from io import BytesIO
+from itertools import count
 from pathlib import Path
 
 from fowt_env.caches import cached
@@ -9,6 +10,7 @@ from fowt_env.files.atomic import replacing
 
 # palette of Okabe and Ito, distinguishable with any colour vision
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+OWN = ("gspi_oc3", "mpc", "lqr", "floating_feedback", "rosco_float", "pi", "pi_tuned")  # of these colours
 LINES = ("-", "--", ":", "-.")  # for each further round of colours
 INK, SOFT, FAINT = "#333333", "#777777", "#D9D9D9"
 UNSCORED = "#EFEFEF"
@@ -55,8 +57,19 @@ def style_axes(axes, xlabel=None, ylabel=None, title=None):
             write(text, fontsize=9, color=INK)
 
 
+def style_numbers(names):
+    """Return [number] of names for COLOURS and line_style: controllers in OWN have the same in every picture.
+
+    Other names take the numbers that are left, in order.
+    """
+    names = list(names)
+    own = {name: OWN.index(name) for name in names if name in OWN}
+    left = (number for number in count() if number not in own.values())
+    return [own[name] if name in own else next(left) for name in names]
+
+
 def line_style(number):
-    """Return colour and line style of run `number`; the first 28 combinations differ."""
+    """Return colour and line style of a number; the first 28 combinations differ."""
     return {
         "color": COLOURS[number % len(COLOURS)],
         "linestyle": LINES[number // len(COLOURS) % len(LINES)],

@@ -21,6 +21,7 @@ from fowt_env.visual.style import (
     note,
     save_figure,
     style_axes,
+    style_numbers,
 )
 
 TIME = "Time_[s]"
@@ -73,7 +74,8 @@ def named_runs(runs, skip=0.0):
 
 def _lines(runs, channel):
     """Return [(label, style, frame)] of a channel; a single unlabelled entry if all runs agree (weather)."""
-    lines = [(label, line_style(i), f) for i, (label, f) in enumerate(runs.items()) if channel in f.columns]
+    numbered = zip(style_numbers(runs), runs.items(), strict=True)
+    lines = [(label, line_style(i), f) for i, (label, f) in numbered if channel in f.columns]
     if len(lines) > 1:
         first = lines[0][2]
         if all(f[channel].equals(first[channel]) and f[TIME].equals(first[TIME]) for _, _, f in lines[1:]):
@@ -81,13 +83,24 @@ def _lines(runs, channel):
     return lines
 
 
-def _stacked(count, height):
-    """Return (figure, [panels]) with a common time or frequency axis."""
-    figure = new_figure(9.0, 0.9 + height * count)
-    rows = figure.subplots(count, 1, sharex=True, squeeze=False)[:, 0]
+def _stacked(heights):
+    """Return (figure, [panels] of these heights, inches) with a common time or frequency axis."""
+    figure = new_figure(9.0, 0.9 + sum(heights))
+    rows = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for axes in rows:
         style_axes(axes)
     return figure, rows
+
+
+def _ends(lines, channel):
+    """Return (least, largest) value of a channel in the lines of a panel."""
+    series = [frame[channel] for _, _, frame in lines]
+    return min(values.min() for values in series), max(values.max() for values in series)
+
+
+def _is_flat(low, high):
+    """Return whether a signal is constant up to rounding."""
+    return high - low <= STEADY * max(abs(low), abs(high))
 
 
 def plot_run(frame, path=None, title=None, *, skip=0.0, ratings=None):
@@ -115,15 +128,14 @@ def plot_runs(runs, path=None, title=None, *, skip=0.0, ratings=None, panels=PAN
     first = next(iter(runs.values()))
     ratings = first.attrs.get("ratings", {}) if ratings is None else ratings
     start = first[TIME].iloc[0]
-    figure, rows = _stacked(len(panels), 1.1)
-    for axes, (label, channel) in zip(rows, panels, strict=True):
-        lines = _lines(runs, channel)
+    drawn = [_lines(runs, channel) for _, channel in panels]
+    ends = [_ends(lines, channel) for lines, (_, channel) in zip(drawn, panels, strict=True)]
+    figure, rows = _stacked([0.75 if _is_flat(*end) else 1.1 for end in ends])
+    for axes, (label, channel), lines, (low, high) in zip(rows, panels, drawn, ends, strict=True):
         for text, style, frame in lines:
             axes.plot(frame[TIME], frame[channel], linewidth=0.9, label=text, **style)
         axes.ticklabel_format(axis="y", useOffset=False)
-        series = [frame[channel] for _, _, frame in lines]
-        low, high = min(values.min() for values in series), max(values.max() for values in series)
-        if high - low <= STEADY * max(abs(low), abs(high)):  # constant up to rounding
+        if _is_flat(low, high):
             middle, half = 0.5 * (low + high), max(0.05 * abs(low), 0.5)
             axes.set_ylim(middle - half, middle + half)
         for text, rating in MARKED.get(channel, ()):
@@ -178,7 +190,7 @@ def plot_spectra(runs, path=None, title=None, skip=0.0, platform_pitch_period=No
         names = ", ".join(channel for _, channel, _ in SPECTRA)
         why = f"{names} are constant" if present else f"none of {names} is in the run"
         raise InputError(f"nothing to plot: {why}")
-    figure, rows = _stacked(len(shown), 1.7)
+    figure, rows = _stacked([1.7] * len(shown))
     marks = frequency_marks(next(iter(runs.values())), platform_pitch_period)
     for axes, (label, channel, unit) in zip(rows, shown, strict=True):
         top = 0.0

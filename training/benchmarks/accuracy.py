@@ -21,6 +21,7 @@ from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.options import FIDELITIES
 from fowt_env.training.benchmarks.speed import SEA, TURBULENCE, calibration, header, loop_time, silent
+from fowt_env.training.reports.evaluation_plots import label_marks
 from fowt_env.training.validation.signal_errors import normalised_rms
 from fowt_env.visual.style import COLOURS, INK, new_figure, save_figure, style_axes
 from fowt_env.weather.wind_field import is_field
@@ -42,7 +43,7 @@ COLUMNS = (
 # (CPU), largest |difference| in 40 s to this reference: surge m, platform pitch deg, rotor speed rpm),
 # and the standard deviations of the same case over 500 s for normalisation
 OPENFAST = (
-    ("0.0125 s, 1 m: its reference", 1.9, (0.0, 0.0, 0.0)),
+    ("0.0125 s, 1 m:\nits reference", 1.9, (0.0, 0.0, 0.0)),
     ("0.0125 s, 2 m", 2.9, (0.0025, 0.0013, 0.0009)),
     ("0.025 s, 2 m", 6.0, (0.0062, 0.0044, 0.0036)),
     ("0.05 s, 4 m", 15.0, (0.0214, 0.0133, 0.0133)),
@@ -153,6 +154,7 @@ def variants_apart():
     ]
 
 
+MARKS = "osDPXphd*<>H8"  # one for each axis
 # variants that are fidelity levels of build_scene
 LEVELS = {
     "ab4 0.1 s, lookup, fast waves": "standard",
@@ -311,7 +313,7 @@ def plot_accuracy(table, path=None, openfast=True, beside=None):
 
     openfast: whether OpenFAST points (OC3-Hywind) are drawn; beside: (name, table) of another platform.
     """
-    points = accuracy_summary(table)
+    points = accuracy_summary(table).drop_duplicates("variant")  # the reference is a level too
     points = points[np.isfinite(points["real_time_factor"]) & (points["worst"] > 0.0)]
     figure = new_figure(8.5, 5.5)
     axes = figure.subplots()
@@ -322,7 +324,7 @@ def plot_accuracy(table, path=None, openfast=True, beside=None):
     hollow = {"markersize": 6, "markerfacecolor": "none", "linestyle": "none"}
     for index, (axis, group) in enumerate(points.groupby("axis", sort=False)):
         axes.plot(
-            group["real_time_factor"], group["worst"], "osD"[index // len(COLOURS)], markersize=5,
+            group["real_time_factor"], group["worst"], MARKS[index], markersize=5,
             color=COLOURS[index % len(COLOURS)], label=axis, linestyle="none",
         )  # fmt: skip
     front = points[points["front"]].sort_values("real_time_factor")
@@ -330,22 +332,20 @@ def plot_accuracy(table, path=None, openfast=True, beside=None):
     if openfast:
         _draw_openfast(axes, hollow | {"color": "black"})
     if beside is not None:
-        name, other = beside[0], accuracy_summary(beside[1])
-        other = other[other["variant"].isin(set(points["variant"])) & other["axis"].isin(set(points["axis"]))]
+        name, other = beside[0], accuracy_summary(beside[1]).drop_duplicates("variant")
+        other = other[other["variant"].isin(set(points["variant"]))]
         label = f"{name}, the same variants"
         axes.plot(other["real_time_factor"], other["worst"], "s", color=INK, label=label, **hollow)
-    names = []  # points of the front are numbered, levels also named; all names are listed next to the plot
-    for number, row in enumerate(front.to_dict("records"), 1):
-        level = LEVELS.get(row["variant"])
-        names.append(f"{number}  " + row["variant"].replace(", mooring", ",\n    mooring"))
-        axes.annotate(
-            str(number) if level is None else f"{number} {level}", (row["real_time_factor"], row["worst"]),
-            fontsize=7 if level is None else 9, color=INK, ha="left", va="top", xytext=(4, -3),
-            fontweight="normal" if level is None else "bold", textcoords="offset points",
-        )  # fmt: skip
+    # points of the front are numbered, levels also named; all names are listed next to the plot
+    numbered = list(enumerate(front["variant"], 1))
+    texts = {name: f"{number} {LEVELS.get(name, '')}".strip() for number, name in numbered}
+    names = [f"{number}  " + name.replace(", mooring", ",\n    mooring") for number, name in numbered]
     axes.text(1.02, 0.02, "\n".join(names), transform=axes.transAxes, fontsize=7, color=INK, va="bottom")
     axes.margins(x=0.12)
     axes.legend(fontsize=7, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    places, n = points[["real_time_factor", "worst"]].to_numpy(), len(points)
+    labels = [texts.get(name, "") for name in points["variant"]]
+    label_marks(figure, axes, labels, places, np.full(n, 25.0), [(None, None, None)] * n)
     return save_figure(figure, path)
 
 

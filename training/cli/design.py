@@ -113,6 +113,12 @@ def linearize(
     text = "right-half-plane zeros, blade pitch to rotor speed"
     show(zeros, text) if len(zeros) else out.print(f"no {text}")
     resting = [wind for wind, model in models.items() if model.pitch_rests]
+    cut_out = scene.turbine.cut_out_wind_speed
+    if max(models) > cut_out:
+        out.print(
+            f"above cut-out ({cut_out:g} m/s) a turbine stands still with feathered blades: the models there"
+            " are of one that still runs"
+        )
     if resting:
         out.print(
             f"up to {max(resting):g} m/s the blade pitch is at its minimum and pitch control is off:"
@@ -124,8 +130,10 @@ def linearize(
         written = write_table(modes, target)
     elif suffix == ".mat":
         written = write_mat(next(iter(models.values())), target)
+    elif suffix:
+        written = sweeps.save_models(models, target)
     else:
-        written = (sweeps.save_models if suffix else sweeps.save_study)(models, target)
+        written = sweeps.save_study(models, target, f"{platform}, {scene.options['fidelity']}")
     wrote(*written if isinstance(written, list) else [written])
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from fowt_env.descriptions.units import DEGREE, RPM
 from fowt_env.errors import InputError
 from fowt_env.training.design.linear_bound import efficient
-from fowt_env.visual.response import broken_at_wraps
 from fowt_env.visual.style import COLOURS, FAINT, INK, LINES, SOFT, new_figure, save_figure, style_axes
 
 MODE_NAMES = (
@@ -22,15 +21,14 @@ OF_REAL_POLES = ("rotor_speed", "blade_pitch", "surge", "sway", "heave", "roll",
 REAL = 1e-6  # rad/s: a pole with a smaller imaginary part is real
 FASTEST = 2.0  # 1/s: poles that decay faster belong to actuators
 SLOW = 0.4  # rad/s: surge, platform pitch and heave are slower, yaw is faster
-FREQUENCIES = np.geomspace(0.01, 4.0, 400)  # rad/s
+FREQUENCIES = np.geomspace(0.01, 4.0, 4000)  # rad/s; a notch of a damping ratio of 0.001 is followed
 BODE = (  # input, output, title, factor to the unit shown, unit
     ("blade_pitch_command", "rotor_speed", "blade pitch to rotor speed", DEGREE / RPM, "rpm/deg"),
     ("generator_torque", "rotor_speed", "torque to rotor speed", 1e3 / RPM, "rpm/(kN m)"),
     ("wind_speed", "platform_pitch", "wind to platform pitch", 1.0 / DEGREE, "deg/(m/s)"),
 )
-DECADES = 3.0  # range of gain in every Bode plot, for comparable slopes
+GAIN_RANGE = 60.0  # dB, in every Bode plot, for comparable slopes
 WIND = "wind_[m/s]"
-TRAVEL = {"cmap": "coolwarm", "vmin": 0.5, "vmax": 1.5}  # colours of the travel ratio: white at 1
 
 
 def _wind_colours(winds):
@@ -57,13 +55,16 @@ def plot_poles(models, path=None, title=None):
     colours, scale = _wind_colours(list(models))
     poles = [(wind, *pole) for wind, model in models.items() for pole in _poles(model)]
     figure = new_figure(11.5, 5.2)
-    panels = figure.subplots(1, 2)
+    panels = figure.subplots(1, 2, width_ratios=(1.0, 1.8))
     beyond = [(name, pole) for _, name, pole in poles if pole.real < -FASTEST]
     for axes, slow in zip(panels, (False, True), strict=True):
         style_axes(axes)
         shown = [each for each in poles if each[2].real >= -FASTEST and (not slow or abs(each[2]) < SLOW)]
+        for mode in {name for _, name, pole in shown if pole.imag > 0.0}:  # a path over the wind
+            path_of = np.array([pole for _, name, pole in shown if name == mode and pole.imag > 0.0])
+            axes.plot(path_of.real, path_of.imag, color=SOFT, linewidth=0.7, zorder=2)
         for wind, name, pole in shown:
-            style = {"color": colours[wind], "edgecolor": INK, "linewidth": 0.4, "s": 34}
+            style = {"color": colours[wind], "edgecolor": INK, "linewidth": 0.3, "s": 20}
             axes.scatter(pole.real, pole.imag, marker=MODE_MARKERS[MODE_NAMES.index(name)], zorder=3, **style)
         turning = [pole for _, _, pole in shown if pole.imag > 0.0 or not slow]
         _damping_lines(axes, min(p.real for p in turning), max(p.imag for p in turning))
@@ -83,7 +84,7 @@ def plot_poles(models, path=None, title=None):
     _colour_bar(figure, scale, panels, "wind (m/s)")
     figure.legend(
         handles, labels, loc="outside upper center", ncols=len(labels), fontsize=8.5, frameon=False,
-        labelcolor=INK, title=title or "Poles with torque and blade pitch held; grey lines: damping ratio",
+        labelcolor=INK, title=f"{title or 'Poles'}: torque and blade pitch held; grey lines: damping ratio",
         title_fontproperties={"size": 11},
     )  # fmt: skip
     return save_figure(figure, path)
@@ -131,7 +132,7 @@ def _damping_lines(axes, left, top):
         axes.plot([0.0, low], [0.0, -slope * low], color="#BBBBBB", linewidth=0.9, zorder=1)
         over = -slope * low >= high
         position = (-high / slope, high) if over else (low, -slope * low)
-        if over and position[0] - named < 0.045 * -low and named:
+        if over and position[0] - named < 0.075 * -low and named:
             continue  # no space for its label
         named = position[0] if over else named
         axes.annotate(
@@ -163,16 +164,17 @@ def plot_damping(models, path=None, title=None):
     panels[1].axhline(0.0, color=INK, linewidth=0.8)
     panels[1].set_xlabel("wind (m/s)", fontsize=9, color=INK)
     panels[0].legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
-    figure.suptitle(title or "modes over the wind, torque and blade pitch held", fontsize=10, color=INK)
+    figure.suptitle(f"{title or 'Modes over the wind'}: torque and blade pitch held", fontsize=10, color=INK)
     return save_figure(figure, path)
 
 
 def plot_bode(models, path=None, title=None):
-    """Return a Figure of gain and phase of BODE for {wind: LinearModel}.
+    """Return a Figure of gain (dB) and continuous phase of BODE for {wind: LinearModel}.
 
-    Phases are in [-180, 180) deg. Blade pitch is shown only at winds at which the blade pitch is not
-    at its limit.
+    Blade pitch is shown only at winds at which the blade pitch is not at its limit.
     """
+    from matplotlib.ticker import MultipleLocator
+
     colours, scale = _wind_colours(list(models))
     figure = new_figure(12.0, 5.8)
     panels = figure.subplots(2, len(BODE), sharex=True)
@@ -182,21 +184,24 @@ def plot_bode(models, path=None, title=None):
             response = model.response(FREQUENCIES, (source,))[:, model.output_index(output), 0] * factor
             if source == "blade_pitch_command" and model.pitch_rests:
                 continue
-            gain.loglog(FREQUENCIES, np.abs(response), color=colours[wind], linewidth=1.0)
-            line = broken_at_wraps(FREQUENCIES, np.degrees(np.angle(response)))
-            phase.semilogx(*line, color=colours[wind], linewidth=1.0)
+            gain.semilogx(FREQUENCIES, 20.0 * np.log10(np.abs(response)), color=colours[wind], linewidth=1.0)
+            angle = np.degrees(np.unwrap(np.angle(response)))
+            started = phase.lines[-1].get_ydata()[0] if phase.lines else (angle[0] + 90.0) % 360.0 - 90.0
+            angle -= 360.0 * np.round((angle[0] - started) / 360.0)  # beside the one of the wind before
+            phase.semilogx(FREQUENCIES, angle, color=colours[wind], linewidth=1.0)
         gain.set_title(name, fontsize=9.5, color=INK, loc="left")
-        gain.set_ylabel(f"gain, {unit}", fontsize=8.5, color=INK)
+        gain.set_ylabel(f"gain (dB; 0 dB: 1 {unit})", fontsize=8.5, color=INK)
         phase.set_xlabel("frequency (rad/s)", fontsize=9, color=INK)
-        phase.set_ylim(-180.0, 180.0)
-        phase.set_yticks(range(-180, 181, 90))
+        phase.yaxis.set_major_locator(
+            MultipleLocator(90.0 if np.ptp(phase.dataLim.intervaly) > 270.0 else 45.0)
+        )
         for axes in (gain, phase):
             style_axes(axes)
             axes.grid(True, which="minor", axis="x", color=FAINT, linewidth=0.3)
             axes.set_xlim(FREQUENCIES[0], FREQUENCIES[-1])
         if gain.lines:
-            top = max(line.get_ydata().max() for line in gain.lines)
-            gain.set_ylim(top * 10.0**-DECADES, 1.6 * top)
+            top = max(line.get_ydata().max() for line in gain.lines) + 4.0
+            gain.set_ylim(top - GAIN_RANGE, top)
     panels[1, 0].set_ylabel("phase (deg)", fontsize=8.5, color=INK)
     figure.align_ylabels(panels[:, 0])
     _colour_bar(figure, scale, panels, "wind (m/s)")
@@ -227,12 +232,16 @@ def plot_bound(table, names, points=None, path=None, title=None):
     rows = -(-(len(winds) + (len(winds) > 3)) // columns)
     figure = new_figure(3.0 * columns + 0.8, 2.9 * rows + (1.2 if len(winds) <= 3 else 0.5))
     panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
+    if points is not None:  # white at 1, and the ends at the largest difference
+        largest = np.abs(points.loc[points[WIND].isin(winds), "travel_ratio_[-]"] - 1.0).max()
+        span = max(0.05, float(np.ceil(20.0 * largest) / 20.0))
+        travel = {"cmap": "coolwarm", "vmin": 1.0 - span, "vmax": 1.0 + span}
     for axes, wind in zip(panels, winds, strict=False):
         draw_fronts(axes, table, wind, looks, (1.25, 1.15))
         if points is not None:
             shown = points[points[WIND] == wind]
             drawn = axes.scatter(
-                shown["speed_ratio_[-]"], shown["pitch_ratio_[-]"], c=shown["travel_ratio_[-]"], **TRAVEL,
+                shown["speed_ratio_[-]"], shown["pitch_ratio_[-]"], c=shown["travel_ratio_[-]"], **travel,
                 s=30, edgecolor=INK, linewidth=0.5, label="lqr, simulated", zorder=5,
             )  # fmt: skip
     if points is not None:

@@ -148,8 +148,11 @@ def save_models(models, path):
     return path
 
 
-def save_study(models, folder):
-    """Write modes.csv, zeros.csv, models.json, models.npz and three plots into a folder; return the paths."""
+def save_study(models, folder, title=None):
+    """Write modes.csv, zeros.csv, models.json, models.npz and three plots into a folder; return the paths.
+
+    title: of the plots.
+    """
     from fowt_env.training.design.plots import plot_bode, plot_damping, plot_poles
 
     folder = Path(folder)
@@ -158,7 +161,7 @@ def save_study(models, folder):
     written += [save_models(models, folder / f"models{suffix}") for suffix in MODEL_SUFFIXES]
     for name, plot in (("poles", plot_poles), ("damping", plot_damping), ("bode", plot_bode)):
         written.append(folder / f"{name}.png")
-        plot(models, written[-1])
+        plot(models, written[-1], title)
     return written
 
 

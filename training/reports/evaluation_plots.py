@@ -26,6 +26,7 @@ from fowt_env.visual.style import (
     save_figure,
     short_names,
     style_axes,
+    style_numbers,
 )
 from fowt_env.visual.time_series import TIME, plot_runs, plot_spectra
 
@@ -67,14 +68,15 @@ def plot_evaluation(table, metrics, path=None, title=None):
     for axes, name in zip(panels, metrics, strict=False):
         style_axes(axes)
         axes.grid(False, axis="x")
-        for index, controller in enumerate(controllers):
+        numbered = zip(style_numbers(controllers), controllers, strict=True)
+        for index, (number, controller) in enumerate(numbered):
             groups = known[known["controller"] == controller].groupby("case")[name]
             mean, low, high = (getattr(groups, what)().reindex(cases) for what in ("mean", "min", "max"))
             offset = step * (index - 0.5 * (len(controllers) - 1))
             axes.errorbar(
                 np.arange(len(cases)) + offset, mean,
                 yerr=np.maximum([mean - low, high - mean], 0.0),  # the mean of equal values is rounded
-                color=COLOURS[index % len(COLOURS)], marker=MARKS[index % len(MARKS)], markersize=4,
+                color=COLOURS[number % len(COLOURS)], marker=MARKS[number % len(MARKS)], markersize=4,
                 linestyle="none", elinewidth=1.0, capsize=0, label=controller,  # cases have no order: no line
             )  # fmt: skip
         for edge in np.arange(0.5, len(cases) - 1):
@@ -125,7 +127,7 @@ def plot_trade(table, baseline, path=None, title=None):
             style_axes(axes)
             axes.axhline(1.0, color=SOFT, linewidth=0.9, linestyle=(0, (5, 3)))
             power = mean_exponent(metric)
-            for index, name in enumerate(others):
+            for number, name in zip(style_numbers(others), others, strict=True):
                 if name not in good.index:
                     continue
                 own = good.xs(name)[metric]
@@ -134,8 +136,8 @@ def plot_trade(table, baseline, path=None, title=None):
                 ratio = (means[0] / means[1]).reindex(cases) ** (1.0 / power)
                 drawn = drawn or bool(np.isfinite(ratio).any())
                 axes.plot(
-                    np.arange(len(cases)), ratio, color=COLOURS[index % len(COLOURS)], linewidth=1.4,
-                    marker=MARKS[index % len(MARKS)], markersize=4, label=name,
+                    np.arange(len(cases)), ratio, color=COLOURS[number % len(COLOURS)], linewidth=1.4,
+                    marker=MARKS[number % len(MARKS)], markersize=4, label=name,
                 )  # fmt: skip
             axes.set_title(f"{theme}: {metrics[metric]}", fontsize=9, color=INK, loc="left")
             axes.set_xticks(np.arange(len(cases)), cases, fontsize=8, rotation=30)
@@ -164,7 +166,7 @@ def plot_pareto(board, path=None, title=None, order=()):
     seeds, without caps. order: controllers in the order (and colours) of other plots.
     """
     order = list(dict.fromkeys([*order, *(entry["controller"] for entry in board["controllers"])]))
-    kept = []
+    numbers, kept = dict(zip(order, style_numbers(order), strict=True)), []
     for entry in board["controllers"]:
         metrics = [entry["metrics"][name] for name in PARETO_METRICS]
         if all(np.isfinite([figure["mean"] for figure in metrics])) and metrics[0]["mean"] > 0.0:
@@ -189,7 +191,7 @@ def plot_pareto(board, path=None, title=None, order=()):
     names = short_names([entry["controller"] for entry, _ in kept])
     marks, drawn = [], set()
     for index, ((entry, metrics), (point, bars, kind)) in enumerate(zip(kept, positions, strict=True)):
-        number = order.index(entry["controller"])
+        number = numbers[entry["controller"]]
         colour = COLOURS[number % len(COLOURS)]
         square = number // len(COLOURS) % 2  # scatter's s is the bounding box: a circle fills pi/4
         if bars is not None:
@@ -237,7 +239,7 @@ def plot_pareto(board, path=None, title=None, order=()):
         text += f"; {counted(len(board.get('seeds', ())), 'seed')}: no interval"
     figure.suptitle(f"{title}\n{text}" if title else text, fontsize=9, color=INK, x=0.01, ha="left")
     labels = [names[entry["controller"]] for entry, _ in kept]
-    _label_marks(figure, axes, labels, points, areas, positions, base is not None)
+    label_marks(figure, axes, labels, points, areas, positions, base is not None)
     return save_figure(figure, path)
 
 
@@ -283,8 +285,12 @@ def _ratio_ends(gap, fraction):
     return tuple(max(0.0, 1.0 + fraction * gap[end] / gap["mean"]) for end in ("low", "high"))
 
 
-def _label_marks(figure, axes, names, points, areas, positions, ratios):
-    """Write each name next to its mark, if possible without covering a mark, bar or other name."""
+def label_marks(figure, axes, names, points, areas, positions, ratios=False):
+    """Write each name next to its mark, if possible without covering a mark, bar or other name.
+
+    names: "" for a mark without one; points (n, 2) in data units; areas of the marks, points squared;
+    positions: [(any, bars (2, 2, 1) about the point or None, any)]; ratios: whether lines cross at (1, 1).
+    """
     from matplotlib.patheffects import withStroke
 
     figure.draw_without_rendering()  # fixes the layout and the positions of the marks
@@ -312,6 +318,8 @@ def _label_marks(figure, axes, names, points, areas, positions, ratios):
 
     diagonal = SIDES.all(axis=1)
     for name, point, centre, r in zip(names, points, centres, radii, strict=True):
+        if not name:
+            continue
         shape = np.array([0.58 * size * len(name), 1.25 * size])
         gaps = np.where(diagonal, 0.75, 1.0) * r + 2.5 + WAYS[:, None] * np.where(diagonal, 0.7, 1.0)
         low = (centre + gaps[:, :, None] * SIDES - 0.5 * (1.0 - SIDES) * shape).reshape(-1, 2)

@@ -32,6 +32,7 @@ from fowt_env.training.reports.own_limits import OF_LIMIT, read_limits
 from fowt_env.training.reports.page_file import PAGE, page_path, plotly_source, write_page
 from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict
 from fowt_env.visual.response import BOXES, SCHEDULE
+from fowt_env.visual.style import style_numbers
 from fowt_env.visual.time_series import PANELS, SPECTRA, TIME, frequency_marks, spectrum
 
 NO_METRIC = (*KEY, *WORDS, "stopped_[s]", "scored_[s]", WEIGHT)
@@ -448,8 +449,10 @@ def _page_data(table, board_file, manifest, runs, schedule, limits=None):
     lost = {}
     for who, case, seed, text in page_words.lost_runs(table):
         lost.setdefault(case, {}).setdefault(str(seed), {})[who] = text
+    controllers = list(dict.fromkeys(table["controller"]))
     return {
-        "controllers": list(dict.fromkeys(table["controller"])),
+        "controllers": controllers,
+        "numbers": style_numbers(controllers),  # of their colours
         "ranked": ranked,
         "baseline": None if board_file is None else board_file.baseline,
         "alpha": 1.0 - (Interval() if board_file is None else board_file.interval).level,

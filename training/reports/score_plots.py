@@ -3,11 +3,9 @@
 As in visual/time_series.py, every function returns a matplotlib Figure and writes it to a path, if any.
 """
 
-from itertools import cycle
-
 from fowt_env.errors import InputError
 from fowt_env.training.design.plots import WIND, draw_fronts, finish_bound
-from fowt_env.visual.style import COLOURS, INK, new_figure
+from fowt_env.visual.style import COLOURS, INK, new_figure, style_numbers
 from fowt_env.visual.time_series import PANELS, TIME, named_runs, plot_runs
 
 AGENT_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*", "p", "h")
@@ -42,7 +40,10 @@ def plot_fractions(fractions, bound, path=None, title=None):
     figure = new_figure(3.1 * columns + 0.6, 3.1 * rows + 0.3)
     panels = list(figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).flat)
     names = list(dict.fromkeys(fractions["agent"]))
-    styles = list(zip(names, cycle(COLOURS), cycle(AGENT_MARKERS), strict=False))  # 84 distinct styles
+    styles = [
+        (name, COLOURS[number % len(COLOURS)], AGENT_MARKERS[number % len(AGENT_MARKERS)])
+        for name, number in zip(names, style_numbers(names), strict=True)
+    ]  # 84 distinct ones
     for axes, wind in zip(panels, winds, strict=False):
         draw_fronts(axes, bound, wind, FRONTS, (FRAME, FRAME))
         at = fractions[fractions[WIND] == wind]

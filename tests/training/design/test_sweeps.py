@@ -7,7 +7,7 @@ import pytest
 
 from fowt_env import build_scene
 from fowt_env.errors import InputError
-from fowt_env.training.design.plots import plot_bode, plot_damping, plot_poles
+from fowt_env.training.design.plots import BODE, FREQUENCIES, plot_bode, plot_damping, plot_poles
 from fowt_env.training.design.sweeps import (
     mode_table,
     models_over,
@@ -87,12 +87,13 @@ def test_plots_show_every_mode_and_leave_out_a_pitch_that_rests(models):
     bode = plot_bode(models).axes
     assert len(bode[0].lines) == 2  # blade pitch: above rated only
     assert len(bode[1].lines) == 3
-    figure = plot_bode(models)
-    phases = [axes for axes in figure.axes if axes.get_ylim() == (-180.0, 180.0)]
-    assert len(phases) == 3
-    for line in (line for axes in phases for line in axes.lines):
-        angle = line.get_ydata()
-        assert np.nanmax(np.abs(angle)) <= 180.0 and not (np.abs(np.diff(angle)) > 180.0).any()
+    for axes, (source, output, _, factor, _) in zip(bode[:3], BODE, strict=True):
+        response = models[20.0].response(FREQUENCIES, (source,))[:, models[20.0].output_index(output), 0]
+        np.testing.assert_allclose(10.0 ** (axes.lines[-1].get_ydata() / 20.0), np.abs(factor * response))
+    for axes in bode[3:6]:  # phases are continuous, and the winds begin beside each other
+        angles = [line.get_ydata() for line in axes.lines]
+        assert all(np.abs(np.diff(angle)).max() < 45.0 for angle in angles)
+        assert max(abs(angle[0] - angles[0][0]) for angle in angles) < 180.0 and -90.0 <= angles[0][0] < 270.0
     values = np.concatenate([np.linalg.eigvals(model.A) for model in models.values()])
     slow = sorted(value.real for value in values if abs(value.imag) < 1e-9 and value.real > -2.0)
     places = [c.get_offsets()[0] for c in poles.collections if len(c.get_offsets())]

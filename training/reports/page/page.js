@@ -113,7 +113,7 @@ function drawTable() {
     const line = element("tr");
     const name = element("td");
     const swatch = element("span", undefined, "swatch");
-    swatch.style.background = colour(DATA.controllers.indexOf(row.controller));
+    swatch.style.background = colour(DATA.numbers[DATA.controllers.indexOf(row.controller)]);
     name.append(swatch, row.controller);
     const lost = element("td", `${row.lost} of ${row.runs}`);
     if (row.lost) {
@@ -222,7 +222,7 @@ function drawPareto() {
     type: "scatter", mode: "markers+text", name: plain(row.controller), text: [plain(row.controller)], textposition: places[i],
     x: [row.values[across]], y: [row.values[up]], textfont: { size: 13 }, showlegend: false, cliponaxis: false,
     marker: {
-      color: colour(DATA.controllers.indexOf(row.controller)), opacity: 0.8, symbol: row.lost ? "circle-open" : "circle",
+      color: colour(DATA.numbers[DATA.controllers.indexOf(row.controller)]), opacity: 0.8, symbol: row.lost ? "circle-open" : "circle",
       line: row.lost ? { width: 2 } : { color: css("--card"), width: 1 },
       size: [2 * radius(row)],
     },
@@ -253,7 +253,7 @@ function drawPareto() {
 function drawBoxes() {
   const [kind, name] = JSON.parse($("box-what").value);
   const traces = DATA.controllers.map((controller, i) => {
-    const look = { type: "box", name: plain(controller), marker: { color: colour(i), size: 4 }, line: { width: 1.5 }, offsetgroup: String(i) };
+    const look = { type: "box", name: plain(controller), marker: { color: colour(DATA.numbers[i]), size: 4 }, line: { width: 1.5 }, offsetgroup: String(i) };
     if (kind === "metric") {
       const place = DATA.columns.indexOf(name);
       const points = DATA.runs.filter((run) => run[0] === controller && run[3][place] !== null);
@@ -309,7 +309,7 @@ function panels(entries, field, axes) {
         type: "scatter", mode: "lines", xaxis: "x", yaxis: `y${suffix}`,
         x: y.map((_, k) => packed.start + k * packed.step), y: axis.power ? y.map((v) => (v === null ? null : 10 ** v)) : y,
         name: same ? "all controllers" : label, legendgroup: same ? "all" : String(i), showlegend: !named.has(same ? "all" : i),
-        line: { width: 1.2, color: same ? css("--soft") : colour(i) }, hovertemplate: "%{y:.4g}",
+        line: { width: 1.2, color: same ? css("--soft") : colour(DATA.numbers[i]) }, hovertemplate: "%{y:.4g}",
       });
       named.add(same ? "all" : i);
       if (field === "series" && lost[controller] && !same && y.length) {
