@@ -15,6 +15,7 @@ import importlib.util
 import os
 import re
 import shutil
+import sys
 import tempfile
 import weakref
 from _ctypes import dlclose
@@ -162,6 +163,8 @@ def find_library():
 
     Raises: InputError with the install command.
     """
+    if sys.platform != "linux":
+        raise InputError(f"controller 'rosco': its library is loaded on Linux alone: this is {sys.platform}")
     spec = importlib.util.find_spec("rosco")  # without importing the toolbox, which needs more packages
     if spec is None or not spec.submodule_search_locations:
         raise InputError(f"controller 'rosco': the ROSCO library is not installed; {INSTALL}")
@@ -282,7 +285,7 @@ class Rosco:
         self._files = tempfile.mkdtemp(prefix="fowt_rosco_")
         self._remove = weakref.finalize(self, shutil.rmtree, self._files, ignore_errors=True)
         for name, content in files.items():
-            Path(self._files, name).write_text(content)
+            Path(self._files, name).write_text(content, encoding="utf-8")
 
     def reset(self, measurement):
         """Load a new copy of the library and start the controller at a Measurement.

@@ -29,4 +29,4 @@ def tuned_for(name: str, turbine: Any) -> dict[str, Any]:
 
 def tuned(name: str) -> dict[str, Any]:
     """Return {setting: value} of a controller that `fowt design search` has tuned."""
-    return tomllib.loads(TUNED.read_text())[name]["settings"]
+    return tomllib.loads(TUNED.read_text(encoding="utf-8"))[name]["settings"]

@@ -53,7 +53,9 @@ def __getattr__(name: str) -> Any:
     if name in _PUBLIC:
         globals()[name] = getattr(import_module(f"fowt_env.{_PUBLIC[name]}"), name)
         return globals()[name]
-    raise AttributeError(f"module 'fowt_env' has no attribute {name!r}")
+    raise AttributeError(  # with these, Python suggests a similar name
+        f"module 'fowt_env' has no attribute {name!r}", name=name, obj=import_module("fowt_env")
+    )
 
 
 def __dir__() -> list[str]:

@@ -20,7 +20,12 @@ FOLDERS = {name: _folder(name) for name in ("controllers", "training")}
 
 
 def check_packages():
-    """Raise ImportError if Python does not find one of FOLDERS, or finds that of another copy of fowt_env."""
+    """Raise ImportError if Python does not find one of FOLDERS, or finds that of another copy of fowt_env.
+
+    Also on Windows, which lacks the locks, signals and process ids that files and runs are protected with.
+    """
+    if sys.platform == "win32":
+        raise ImportError("fowt_env needs Linux or macOS: on Windows install it in WSL 2 (`wsl --install`)")
     for name, folder in FOLDERS.items():
         spec = find_spec(f"fowt_env.{name}")
         location = None if spec is None else spec.origin and Path(spec.origin).parent

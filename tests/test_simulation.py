@@ -531,6 +531,19 @@ def test_commands_in_other_units_are_warned_of_compiled_or_not(law, torque, pitc
     assert len([text for text in texts if words in text]) == 1, texts
 
 
+@pytest.mark.parametrize(
+    ("periods", "words"),
+    [
+        ({"control_dt": 0.03}, "control_dt = 0.03 s does not divide output_dt"),
+        ({"output_dt": 0.07}, "output_dt = 0.07 s does not divide control_dt"),
+        ({"control_dt": "x"}, "control_dt = 'x': must be a positive number"),
+    ],
+)
+def test_a_period_that_does_not_fit_is_named_as_it_was_given(steady, periods, words):
+    with pytest.raises(InputError, match=words):
+        fowt_env.simulate(steady, "pi", duration=10.0, **periods)
+
+
 def test_a_moment_beyond_the_limits_is_no_other_unit(steady):
     def law(measurement):  # 0.9 s at a time
         return (43093.0, 0.26) if measurement.time % 1.0 < 0.05 else (43093.0, 4.0)

@@ -21,6 +21,8 @@ def check_library(path: Path, symbol: str) -> list[str]:
     Raises: InputError for any other file, and if the library exports functions and not the symbol.
     """
     where = f"library {str(path)!r}"
+    if sys.platform != "linux":
+        raise InputError(f"{where}: libraries are loaded on Linux alone: this is {sys.platform}")
     if not path.is_file():
         raise InputError(f"{where}: {'is a folder' if path.is_dir() else 'there is no such file'}")
     content = path.read_bytes()

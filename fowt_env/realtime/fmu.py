@@ -52,9 +52,9 @@ def write_fmu(path: str | Path, scene: Mapping[str, Any], run: Mapping[str, Any]
     folders = list(sys.path)
     with tempfile.TemporaryDirectory() as folder, replacing(path) as temporary:
         script, resource = Path(folder) / f"{SCRIPT}.py", Path(folder) / PLANT
-        script.write_text(SOURCE)
+        script.write_text(SOURCE, encoding="utf-8")
         try:
-            resource.write_text(json.dumps(described))
+            resource.write_text(json.dumps(described), encoding="utf-8")
         except TypeError as error:
             raise InputError(f"FMU {str(path)!r}: scene and run must be JSON: {error}") from None
         try:

@@ -26,7 +26,7 @@ class FloatingTurbine(Fmi2Slave):
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
-        self._described = json.loads((Path(self.resources) / PLANT).read_text())
+        self._described = json.loads((Path(self.resources) / PLANT).read_text(encoding="utf-8"))
         self._commands = list(self._described["start"])
         self._values = list(self._described["values"])
         self._plant = None

@@ -171,12 +171,17 @@ def build_run(
 ) -> "Run":
     """Build the Run of a scene, checked and at its initial conditions. Arguments and errors as simulate."""
     check_scene(scene)
-    if dt is None:
-        check_period("output_dt", output_dt)  # by its name, not as the step that would follow from it
-        dt = min(scene.dt, control_dt, output_dt)
-    per_control = steps_in("control_dt", control_dt, dt)
-    per_output = steps_in("output_dt", output_dt, dt)
-    last = steps_in("duration", duration, dt)
+    step = "dt"
+    if dt is None:  # errors name the period that the step follows from
+        periods = {"control_dt": control_dt, "output_dt": output_dt}
+        for name, period in periods.items():
+            check_period(name, period)
+        periods = {"dt": scene.dt} | periods
+        step = min(periods, key=periods.get)
+        dt = periods[step]
+    per_control = steps_in("control_dt", control_dt, dt, step)
+    per_output = steps_in("output_dt", output_dt, dt, step)
+    last = steps_in("duration", duration, dt, step)
     steps_in("duration", duration, output_dt, "output_dt")
     check_duration(scene, duration)
     check_memory(scene, duration, output_dt)

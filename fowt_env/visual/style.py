@@ -131,18 +131,23 @@ def note(axes, text, position, offset, scale="data", **look):
     axes.annotate(text, position, xycoords=coordinates, xytext=offset, **look)
 
 
+def plot_path(path):
+    """Return the path of a plot, .png without an extension. Raises: InputError for an unknown one."""
+    path = Path(path)
+    if not path.name:
+        raise InputError(f"plot file {str(path)!r}: must name a file")
+    if not path.suffix:
+        path = path.with_suffix(".png")
+    supported = new_figure(1.0, 1.0).canvas.get_supported_filetypes()
+    if path.suffix[1:].lower() not in supported:
+        allowed = ", ".join(sorted(supported))
+        raise InputError(f"plot file {str(path)!r}: unknown extension; allowed: {allowed}")
+    return path
+
+
 def save_figure(figure, path):
     """Write the figure to `path` (format by extension, default PNG) unless None; return the figure."""
     if path is not None:
-        path = Path(path)
-        if not path.name:
-            raise InputError(f"plot file {str(path)!r}: must name a file")
-        if not path.suffix:
-            path = path.with_suffix(".png")
-        supported = figure.canvas.get_supported_filetypes()
-        if path.suffix[1:].lower() not in supported:
-            allowed = ", ".join(sorted(supported))
-            raise InputError(f"plot file {str(path)!r}: unknown extension; allowed: {allowed}")
-        with replacing(path) as temporary:
+        with replacing(plot_path(path)) as temporary:
             figure.savefig(temporary, dpi=150)
     return figure

@@ -69,3 +69,9 @@ def test_a_source_has_one_path_once_installed_and_a_module_one_source():
     assert module_path("fowt_env.plant.state") == PACKAGE / "plant" / "state"
     assert installed_path(PACKAGE / "plant" / "state.py") == PACKAGE / "plant" / "state.py"
     assert module_path("fowt_env") == PACKAGE and installed_path(ROOT / "tests" / "conftest.py") is None
+
+
+def test_windows_is_refused_with_what_to_install_instead(tmp_path):
+    folder = package(tmp_path)
+    (folder / "sitecustomize.py").write_text("import sys; sys.platform = 'win32'")
+    assert "needs Linux or macOS: on Windows install it in WSL 2" in refusal(folder)

@@ -124,6 +124,17 @@ def test_spectra_mark_platform_pitch_wave_and_1p(tmp_path):
     assert [text.get_text().split()[0] for text in still.axes[0].texts] == ["1P"]
 
 
+def test_a_controller_has_the_same_colour_in_whatever_order_and_company():
+    from fowt_env.visual.style import style_numbers
+
+    assert style_numbers(["mine", "mpc", "gspi_oc3", "other"]) == [2, 1, 0, 3]
+    assert style_numbers(["gspi_oc3", "mpc"]) == [0, 1] and style_numbers(["lqr", "mpc"]) == [2, 1]
+    assert style_numbers(["a", "b", "c"]) == [0, 1, 2]
+    figure = time_series.plot_runs({"mpc": run(), "gspi_oc3": run(1.0)})
+    axes = next(each for each in figure.axes if len(each.lines) > 1)
+    assert [line.get_color() for line in axes.lines[:2]] == ["#D55E00", "#0072B2"]
+
+
 def test_wrong_input_is_named_and_leaves_no_file(tmp_path):
     with pytest.raises(InputError, match="unknown extension"):
         time_series.plot_run(run(), tmp_path / "run.docx")

@@ -102,7 +102,9 @@ def serve(
             save_run(frame, out_path)
             if report is not None:
                 with replacing(report) as temporary:
-                    temporary.write_text(json.dumps({"reason": reason, **server.statistics()}, indent=1))
+                    temporary.write_text(
+                        json.dumps({"reason": reason, **server.statistics()}, indent=1), encoding="utf-8"
+                    )
                 wrote(report)
 
 

@@ -36,6 +36,13 @@ def test_simulate_prints_statistics_and_writes_what_simulate_returns(tmp_path):
     assert plot.read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_plot_of_an_unknown_kind_is_refused_before_the_run(monkeypatch):
+    monkeypatch.setattr(fowt_env, "simulate", Mock())
+    done = CliRunner().invoke(app, ["simulate", *SHORT, "--plot", "run.xyz"])
+    assert done.exit_code == 2 and "unknown extension" in done.output
+    assert not fowt_env.simulate.called
+
+
 def test_a_run_at_the_generator_s_limits_or_past_the_overspeed_says_so(tmp_path, monkeypatch):
     (tmp_path / "runaway.py").write_text(
         "class Off:\n    def reset(self, m): pass\n    def act(self, m): return 0.0, 0.0\n"

@@ -16,6 +16,11 @@ def test_linearize_writes_models_and_says_where_the_pitch_rests(tmp_path):
     assert np.load(out)["A"].shape == (2, 14, 14)
 
 
+def test_a_wind_above_cut_out_is_named_as_such():
+    assert "above cut-out (25 m/s)" in fowt("model", "linearize", "--winds", "24,30")[0]
+    assert "cut-out" not in fowt("model", "linearize", "--winds", "24")[0]
+
+
 def test_linearize_writes_the_table_of_modes_or_a_folder_of_everything(tmp_path):
     table, folder = tmp_path / "modes.csv", tmp_path / "study"
     fowt("model", "linearize", "--winds", "18", "--out", str(table))
