@@ -173,12 +173,11 @@ def build_run(
     check_scene(scene)
     step = "dt"
     if dt is None:  # errors name the period that the step follows from
-        periods = {"control_dt": control_dt, "output_dt": output_dt}
-        for name, period in periods.items():
+        given = {"control_dt": control_dt, "output_dt": output_dt}
+        for name, period in given.items():
             check_period(name, period)
-        periods = {"dt": scene.dt} | periods
-        step = min(periods, key=periods.get)
-        dt = periods[step]
+        steps = [(scene.dt, "dt"), *((period, name) for name, period in given.items())]
+        dt, step = min(steps, key=lambda pair: pair[0])
     per_control = steps_in("control_dt", control_dt, dt, step)
     per_output = steps_in("output_dt", output_dt, dt, step)
     last = steps_in("duration", duration, dt, step)
