@@ -172,13 +172,13 @@ class Case:
         q, v = (x[at:][: BLADES * self.n].reshape(BLADES, self.n) for at in self.states_of("blade"))
         return SimpleNamespace(twin=twin, path=twin.path(x, self.blocks), pitches=pitches, q=q, v=v)
 
-    def air(self, now, found, share=None):
+    def air(self, now, found, outer=None):
         """Air of each blade: of the drawn loads of its stations, of a rigid one as the plant adds them."""
         e, rotor = self.scene.model.aero.rotor.elements, self.turbine.rotor
         if self.n == 0:
             return [air_of_row(*pair, rotor.cone) for pair in zip(found.blades, now.pitches, strict=True)]
         return [
-            air_of(found.drawn[b], now.q[b], now.pitches[b], e.shape, e.modes, share) for b in range(BLADES)
+            air_of(found.drawn[b], now.q[b], now.pitches[b], e.shape, e.modes, outer) for b in range(BLADES)
         ]
 
     def evaluate(self, x, rng):

@@ -93,18 +93,19 @@ def section_columns(nodes):
     return np.vstack([nodes.z, u1, u2, s[np.tril_indices(len(u1))]])
 
 
+def carried_shapes(nodes, z, node):
+    """Return the Shapes at distances z (m,) from the origin, each moved rigidly by the node of this index."""
+    shape, slope, shortening = (values[..., node] for values in nodes.shapes)
+    away, square = z - nodes.z[node], np.einsum("iak,jak->ijk", slope, slope)
+    return Shapes(shape + slope * away, slope, shortening + square * away)
+
+
 def shapes_between(nodes, z):
     """Return the Shapes of BeamNodes at distances z (m,) from the origin (shapes_at)."""
     left = np.clip(np.searchsorted(nodes.z, z, side="right") - 1, 0, len(nodes.z) - 2)
     weight = np.clip((z - nodes.z[left]) / (nodes.z[left + 1] - nodes.z[left]), 0.0, 1.0)
-    shape, slope, shortening = nodes.shapes
-    square = np.einsum("iak,jak->ijk", slope, slope)
-
-    def mixed(values, rates):
-        one, two = (values[..., k] + rates[..., k] * (z - nodes.z[k]) for k in (left, left + 1))
-        return (1.0 - weight) * one + weight * two
-
-    return Shapes(mixed(shape, slope), mixed(slope, np.zeros_like(slope)), mixed(shortening, square))
+    both = zip(*(carried_shapes(nodes, z, k) for k in (left, left + 1)), strict=True)
+    return Shapes(*((1.0 - weight) * one + weight * two for one, two in both))
 
 
 def summed(values, length):

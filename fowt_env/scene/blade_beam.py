@@ -11,12 +11,14 @@ import numpy as np
 
 from fowt_env.descriptions.blade_structure import SHAPES
 from fowt_env.errors import InputError
-from fowt_env.plant.aero.blade_shape import blade_line
+from fowt_env.plant.aero.blade_shape import Bending, BladeLine, blade_line
+from fowt_env.plant.aero.station_choice import outer_fit
 from fowt_env.plant.elastic.blades import BladeModes, Point, Section
 from fowt_env.plant.state import BLADES
 from fowt_env.scene.beam import (
     BeamNodes,
     Shapes,
+    carried_shapes,
     integrated,
     outer_part,
     section_columns,
@@ -104,13 +106,9 @@ def section_at(turbine, option, fraction, aero):
     """Return the Section at a fraction of a blade's span."""
     rotor = turbine.rotor
     distance = rotor.hub_radius + fraction * (rotor.tip_radius - rotor.hub_radius)
-    outside = np.zeros(0)
+    outside = further = np.zeros(0)
     if aero is not None:
-        stations = aero.rotor.elements.shape.distance
-        nodes = np.array([rotor.hub_radius, *stations, rotor.tip_radius])
-        fine = np.linspace(rotor.hub_radius, rotor.tip_radius, FINE)
-        hats = np.array([np.interp(fine, nodes, row) for row in np.eye(len(nodes))[1:-1]])
-        outside = hats[:, fine >= distance].sum(axis=1) / hats.sum(axis=1)
+        outside, further = _outer_loads(turbine, aero.rotor.elements, distance)
     point = _point(shapes_at(turbine, option, [distance]))
     structure = turbine.blade_structure
     twist = np.interp(fraction, structure.span_fraction, structure.structural_twist)
@@ -118,8 +116,32 @@ def section_at(turbine, option, fraction, aero):
     columns = section_columns(outer)
     return Section(
         float(distance), float(np.cos(twist)), float(np.sin(twist)), point, float(outer.mass.sum()),
-        columns @ outer.mass, np.ascontiguousarray((columns * outer.mass) @ columns.T), outside,
+        columns @ outer.mass, np.ascontiguousarray((columns * outer.mass) @ columns.T), outside, further,
     )  # fmt: skip
+
+
+def _outer_loads(turbine, elements, distance):
+    """Return, for each station's load, the fraction outside of a distance (m), and that part's moment, m.
+
+    The moment is about the point where the whole load acts, along the pitch axis. Of stations that stand for
+    others, both are fitted (outer_fit).
+    """
+    stations, known = elements.shape.distance, np.asarray(turbine.blade.radius)
+    share, moment = _hat_parts(stations, turbine.rotor, distance)
+    if len(stations) == len(known):
+        return share, moment
+    whole = _hat_parts(known, turbine.rotor, distance)
+    return outer_fit(turbine, elements, np.searchsorted(known, stations), whole, (share, moment))
+
+
+def _hat_parts(stations, rotor, distance):
+    """Return _outer_loads of a load that is linear between stations and zero at hub and tip."""
+    nodes = np.array([rotor.hub_radius, *stations, rotor.tip_radius])
+    fine = np.linspace(rotor.hub_radius, rotor.tip_radius, FINE)
+    hats = np.array([np.interp(fine, nodes, row) for row in np.eye(len(nodes))[1:-1]])
+    whole, beyond = hats.sum(axis=1), fine >= distance
+    share, first = hats[:, beyond].sum(axis=1) / whole, hats[:, beyond] @ fine[beyond] / whole
+    return share, first - share * (hats @ fine / whole)
 
 
 def blade_modes(turbine, modes):
@@ -189,12 +211,31 @@ def kept_states(blades, shaft):
 
 
 def station_bending(turbine, option):
-    """Return the Shapes of an option blades at the points of the turbine's blade_line; None for "rigid"."""
+    """Return the Bending of an option blades on the turbine's blade_line; None for "rigid".
+
+    As OpenFAST passes loads from AeroDyn's line to ElastoDyn's nodes, the middles of the elements: the line
+    is divided at these nodes, each division's load is shared linearly between its ends, and each end is
+    moved by the nearest node. Motions go another way, see shapes_at.
+    """
     if option == "rigid":
         return None
     rotor = turbine.rotor
     line = blade_line(turbine.blade, rotor.hub_radius, rotor.tip_radius)
-    return shapes_at(turbine, option, line.points[:, 2])
+    nodes = blade_nodes(turbine, blade_modes(turbine, option))
+    middles = nodes.z[1:-1]
+    z = np.union1d(line.points[:, 2], middles)
+    length = np.interp(z, line.points[:, 2], line.length)
+    nearest = 1 + np.abs(z[:, None] - middles).argmin(axis=1)
+    # Simpson's rule, exact here; its middle stands twice, moved by one end's node and by the other's
+    low, high = length[:-1], length[1:]
+    at = np.stack([low, 0.5 * (low + high), 0.5 * (low + high), high], axis=1).ravel()
+    weight = np.outer(high - low, [1.0, 2.0, 2.0, 1.0]).ravel() / 6.0
+    mover = np.stack([nearest[:-1], nearest[:-1], nearest[1:], nearest[1:]], axis=1).ravel()
+    points = np.column_stack([np.interp(at, line.length, values) for values in line.points.T])
+    return Bending(
+        shapes_between(nodes, line.points[:, 2]), BladeLine(points, at), weight,
+        carried_shapes(nodes, points[:, 2], mover),
+    )  # fmt: skip
 
 
 def _elements(turbine, names):

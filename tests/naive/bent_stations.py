@@ -59,16 +59,21 @@ def station(j, q, v, pitch, rest, modes):
     return place, rates @ v, section
 
 
-def air_of(loads, q, pitch, rest, modes, share=None):
-    """Air of station loads (k, 3): normal, along the rotation, pitching moment; share: (k,) of them."""
+def air_of(loads, q, pitch, rest, modes, outer=None):
+    """Air of station loads (k, 3): normal, along the rotation, pitching moment; outer: part outside of a cut.
+
+    outer: (k,) fractions of the loads, and (k,) m, moments of these parts about where the loads act.
+    """
     force, moment, modal = np.zeros(3), np.zeros(3), np.zeros(len(q))
     for j, (normal, forward, twisting) in enumerate(loads):
-        section, part = Section(j, q, pitch, rest, modes), 1.0 if share is None else share[j]
+        section = Section(j, q, pitch, rest, modes)
+        part, further = (1.0, 0.0) if outer is None else (outer[0][j], outer[1][j])
         straight = np.array([rest.arm_prebend[j], rest.arm_sweep[j], rest.arm_distance[j]])
         parts = (modes.load_x[j], modes.load_y[j], modes.load_axial[j], modes.load_shortening[j])
         place, rates = section.moved(q, straight, *parts)
-        F = part * (normal * section.normal - forward * section.against)
-        M = part * twisting * section.axis
+        F = normal * section.normal - forward * section.against
+        M = part * twisting * section.axis + further * np.cross(section.axis, F)
+        F = part * F
         force, moment = force + F, moment + np.cross(place, F) + M
         modal = modal + F @ rates + M @ section.rotations
     return Air(force, moment, modal)

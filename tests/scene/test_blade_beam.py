@@ -1,6 +1,7 @@
 """Integrals of a blade that bends: sums one by one from the decks, closed forms, ElastoDyn's frequencies."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,18 @@ from naive.blade_sums import blade_sums
 from fowt_env.descriptions.blade_structure import BladeStructure
 from fowt_env.descriptions.turbine import read_turbine, turbine_names
 from fowt_env.errors import InputError
-from fowt_env.scene.blade_beam import blade_beam, blade_nodes, section_at, shapes_at, shapes_between
+from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.blade_shape import blade_line
+from fowt_env.plant.aero.station_choice import line_loads
+from fowt_env.scene.blade_beam import (
+    blade_beam,
+    blade_nodes,
+    section_at,
+    shapes_at,
+    shapes_between,
+    station_bending,
+)
+from fowt_env.scene.parts import build_elements
 
 DECKS = Path(__file__).parents[1] / "reference" / "decks"
 BLADES = {  # turbine: ElastoDyn's blade file
@@ -236,3 +248,63 @@ def test_a_turbine_without_the_structure_of_its_blades_bends_none():
     with pytest.raises(InputError) as caught:
         blade_beam(turbine, "modes")
     assert all(word in str(caught.value) for word in ("blades = 'modes'", "[blade_structure]", "'rigid'"))
+
+
+def carried_arms(turbine, station):
+    """(force, sums of U1, U2, axial (n,), S (n, n)) of a unit line load at a station, in 40,000 slices.
+
+    The load falls linearly to the neighbouring stations. As OpenFAST's mapping: the line is cut at
+    ElastoDyn's nodes too, both ends of a piece take their share of each slice, and the node nearest to an end
+    moves that share as a rigid body.
+    """
+    rotor, twin = turbine.rotor, sums(turbine, "iea15")["nodes"][:-1]
+    line = blade_line(turbine.blade, rotor.hub_radius, rotor.tip_radius)
+    at, lengths = line.points[:, 2], line.length
+    cuts = np.sort(np.concatenate([at, [node[0] for node in twin]]))
+    force, total = 0.0, [0.0, 0.0, 0.0, 0.0]
+    for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+        if not at[station - 1] <= 0.5 * (a + b) <= at[station + 1]:
+            continue
+        for share in (np.arange(800) + 0.5) / 800.0:
+            z = a + share * (b - a)
+            step = (np.interp(b, at, lengths) - np.interp(a, at, lengths)) / 800.0
+            load = step * np.interp(z, at[station - 1 : station + 2], [0.0, 1.0, 0.0])
+            offset = [np.interp(z, at, values) for values in line.points[:, :2].T]
+            force += load
+            for end, part in ((a, 1.0 - share), (b, share)):
+                node, _, u, s, w = min(twin, key=lambda row: abs(row[0] - end))
+                moved = u + s * (z - node), s @ offset, w + s @ s.T * (z - node)
+                for k, value in enumerate((moved[0][:, 0], moved[0][:, 1], *moved[1:])):
+                    total[k] = total[k] + part * load * value
+    return force, *total
+
+
+@pytest.mark.parametrize("station", [3, 27, 50])
+def test_loads_act_on_the_nearest_of_elastodyn_s_nodes(station):
+    turbine = read_turbine("iea15")
+    modes = build_blade_elements(turbine, 1.225, bending=station_bending(turbine, "modes2")).modes
+    force, *wanted = carried_arms(turbine, station)
+    for name, value in zip(("load_x", "load_y", "load_axial", "load_shortening"), wanted, strict=True):
+        assert close(getattr(modes, name)[station - 1], value / force, 1e-5), name
+
+
+@pytest.mark.parametrize("count", [50, 18])
+def test_loads_outside_of_a_section_are_those_of_the_line_beyond_it(count):
+    """Force and moment of a line load that is linear between all stations; few stations are fitted to it."""
+    turbine, bent = read_turbine("iea15"), station_bending(read_turbine("iea15"), "modes2")
+    rotor, known = turbine.rotor, np.asarray(turbine.blade.radius)
+    full = build_blade_elements(turbine, 1.225, shaped=True)
+    elements = build_elements(turbine, 1.225, None if count == 50 else count, bent)
+    aero, chosen = SimpleNamespace(rotor=SimpleNamespace(elements=elements)), elements.shape.distance
+    normal, tangential = line_loads(full)
+    for fraction in (0.25, 0.5):
+        section = section_at(turbine, "modes2", fraction, aero)
+        z = np.linspace(section.distance, rotor.tip_radius, 20_001)
+        for loads in (normal[::200], tangential[::200]):
+            for row in loads:
+                density = np.interp(z, [rotor.hub_radius, *known, rotor.tip_radius], [0.0, *row, 0.0])
+                force, moment = np.trapezoid(density, z), np.trapezoid(density * (z - section.distance), z)
+                held = elements.weight * row[np.searchsorted(known, chosen)]
+                arms = section.outside * (elements.shape.arm_distance - section.distance) + section.further
+                assert held @ section.outside == pytest.approx(force, rel=3e-3)
+                assert held @ arms == pytest.approx(moment, rel=5e-3)

@@ -28,7 +28,7 @@ from fowt_env.plant.aero.blade_shape import (
     build_station_modes,
     is_curved,
     line_integrals,
-    modal_columns,
+    modal_integrals,
 )
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.tilt import rotor_axes
@@ -585,7 +585,7 @@ def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=
 
     shaped: with a BladeShape even for straight blades in the rotor plane.
     fit: for curved blades, a function that replaces the factors (force, first) of a station_choice.Fit.
-    bending: scene.blade_beam.Shapes of the modes at the points of blade_line, or None: rigid blades.
+    bending: blade_shape.Bending on the blade_line, or None: rigid blades.
 
     Raises: InputError if a station lies outside the blade or a polar does not span -180 to 180 deg.
     """
@@ -617,14 +617,16 @@ def build_blade_elements(turbine, air_density, stations=None, shaped=False, fit=
     along, end, apart = radius, rotor.tip_radius, radius  # lengths along the blade, distance from the shaft
     if shaped or bending is not None or is_curved(turbine):
         line = blade_line(blade, rotor.hub_radius, rotor.tip_radius)
-        columns = line.points if bending is None else np.hstack([line.points, modal_columns(line, bending)])
-        area, first = line_integrals(line.length, columns, station_weights(line.length, chosen))
+        weights = station_weights(line.length, chosen)
+        area, first = line_integrals(line.length, line.points, weights)
+        if bending is not None:
+            first = np.hstack([first, modal_integrals(line, bending, weights)])
         if fit is not None:
             area, first = fit(area, first)
         arms = first / area[:, None]
         shape = build_blade_shape(turbine, line, chosen, arms[:, :3], np.concatenate(moments))
         if bending is not None:
-            modes = build_station_modes(line, bending, chosen, arms[:, 3:], shape)
+            modes = build_station_modes(line, bending.here, chosen, arms[:, 3:], shape)
         along, end = line.length[1:-1][chosen], line.length[-1]
         apart = np.hypot(shape.cone_cosine * radius + shape.cone_sine * shape.prebend, shape.sweep)
         moment = area * shape.arm_distance

@@ -459,10 +459,25 @@ def line_integrals(length, columns, weights):
     return force, first
 
 
+class Bending(NamedTuple):
+    """Holds shapes of bending modes along a blade (scene.beam.Shapes): of motions, and of loads."""
+
+    here: NamedTuple  # Shapes at the points of the blade's line
+    loaded: BladeLine  # points of a quadrature over the line, for loads
+    weight: np.ndarray  # (k,) m, of the points
+    carried: NamedTuple  # Shapes at the points, of the nodes that carry the loads
+
+
+def modal_integrals(line, bending, weights):
+    """Integrate line loads (m, n + 2) along a blade over modal_columns; return (m, k). bending: Bending."""
+    at, columns = bending.loaded.length, modal_columns(bending.loaded, bending.carried)
+    return np.array([bending.weight * np.interp(at, line.length, row) for row in weights]) @ columns
+
+
 def modal_columns(line, shapes):
     """Return (n + 2, k) shapes of bending modes at the points of a BladeLine: columns of modes_of_columns.
 
-    shapes: scene.blade_beam.Shapes at the distances of the points.
+    shapes: scene.beam.Shapes at the points.
     """
     prebend, sweep = line.points[:, 0], line.points[:, 1]
     axial = shapes.slope[:, 0] * prebend + shapes.slope[:, 1] * sweep

@@ -87,6 +87,25 @@ def fit_stations(loads, chosen, full, prior):
     return Fit(columns[0], np.column_stack(columns[1:]))
 
 
+def outer_fit(turbine, few, chosen, whole, prior):
+    """Return what lies outside of a section of the loads of a few stations, BladeElements few: (n,), (n,).
+
+    Fractions of their loads, and moments of these parts about where the loads act, m. whole: the same of all
+    stations; prior: of the few, by a load that is linear between them.
+    """
+    full = build_blade_elements(turbine, 1.0, shaped=True)
+    loads = _loads.get(elements_key(full), lambda: line_loads(full))
+
+    def parts(elements, share, moment):
+        first = elements.weight * (share * elements.shape.arm_distance + moment)
+        return Fit(elements.weight * share, first[:, None])
+
+    fitted = fit_stations(loads, chosen, parts(full, *whole), parts(few, *prior))
+    share = fitted.force / few.weight
+    return share, fitted.first[:, 0] / few.weight - share * few.shape.arm_distance
+
+
+_loads = Cache(4)  # line loads by blade
 _choices = Cache(16)  # (indices, Fit) by blade and count: half a second to compute
 
 
@@ -97,7 +116,8 @@ def build_fewer_elements(turbine, air_density, count, bending=None):
     Takes minutes with the JIT off. bending: as in build_blade_elements.
     """
     elements = build_blade_elements(turbine, 1.0, bending=bending)
-    key = (elements_key(elements), count, 0 if bending is None else len(bending.U))
+    arms = b"" if bending is None else arms_of(elements.modes).tobytes()
+    key = (elements_key(elements), count, arms)
     chosen, fit = _choices.get(key, lambda: _choice(turbine, elements, count, bending))
     return build_blade_elements(turbine, air_density, chosen, fit=lambda force, first: fit, bending=bending)
 

@@ -45,6 +45,7 @@ class Section(NamedTuple):
     first: np.ndarray  # (k,) of each column
     second: np.ndarray  # (k, k) of the products of two
     outside: np.ndarray  # (stations,) fraction of the load of each station that acts outside
+    further: np.ndarray  # (stations,) m, its moment about the point of the whole load, along the pitch axis
 
 
 @by_reference

@@ -130,7 +130,7 @@ def _outer_aerodynamics(number, x, turn, aero, blades, loads):
     inner = outer = NO_SECTION_LOAD
     for j in range(blades.inner.outside.shape[0]):
         near, far = blades.inner.outside[j], blades.outer.outside[j]
-        if near > 0.0 or far > 0.0:
+        if near != 0.0 or far != 0.0:
             lever, at = bent_lever(j, shape), N_STATION_LOAD * j
             normal, tangential, moment = shape.loads[at], shape.loads[at + 1], shape.loads[at + 2]
             load = SectionLoad(
@@ -141,8 +141,20 @@ def _outer_aerodynamics(number, x, turn, aero, blades, loads):
                 lever.t_nx * normal - lever.x * tangential + moment * lever.nx,
                 lever.turn * normal,
             )
-            inner, outer = _plus(inner, near, load), _plus(outer, far, load)
+            inner = _moved(_plus(inner, near, load), normal, tangential, blades.inner.further[j], lever)
+            outer = _moved(_plus(outer, far, load), normal, tangential, blades.outer.further[j], lever)
     return _pitched(inner, turn, shape.rest), _pitched(outer, turn, shape.rest)
+
+
+@inlined_kernel
+def _moved(total, normal, tangential, distance, lever):
+    """Return a SectionLoad plus the moment of a station's load by a distance outwards along the bent axis."""
+    return SectionLoad(
+        total.fx, total.fy, total.fz,
+        total.mx + distance * lever.nx * tangential,
+        total.my + distance * lever.nr * tangential,
+        total.mz - distance * normal,
+    )  # fmt: skip
 
 
 @inlined_kernel

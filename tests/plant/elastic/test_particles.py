@@ -94,7 +94,7 @@ def blade_loads(case, now, falling, air, plant, b):
     }
     for number, z in enumerate(case.stations):
         section = getattr(case.scene.model.blades, ("inner", "outer")[number])
-        wind = case.air(now, plant, section.outside)[b]
+        wind = case.air(now, plant, (section.outside, section.further))[b]
         at, slopes = case.beam.between(now.q[b], z)
         outer = [(b, case.outer[number])]
         load = twin.section_load(falling, carry, at, [], [(carry, start, *wind[:2])], outer)

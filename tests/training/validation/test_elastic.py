@@ -71,10 +71,7 @@ def test_every_stored_case_is_compared():
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["nrel5mw", pytest.param("iea15", marks=pytest.mark.nightly)])
 def test_steady_deflections_and_moments_are_within_1_percent_and_3_percent(name):
-    """Missed: mean tip deflections in strong wind, of 0.1 to 1.3 m, by 5 to 15 mm.
-
-    AeroDyn's node at the very tip has a load without induction, and ElastoDyn takes loads at its nodes.
-    """
+    """Missed: means in strong wind where AeroDyn's node at the very tip has a load, without induction."""
     rows = rows_of(elastic.bending, MACHINES[name])
     table = stored("steady")
     for row in rows:
@@ -86,11 +83,10 @@ def test_steady_deflections_and_moments_are_within_1_percent_and_3_percent(name)
         assert row.openfast == pytest.approx(there, rel=1e-12)
         scale = max(abs(line["mean"]), first) if row.quantity.endswith("mean") else first
         assert row.error == pytest.approx(100.0 * (row.here - there) / scale, rel=1e-9)
-        deflection = channel in ("OoPDefl1", "IPDefl1") and row.quantity.endswith("mean")
-        strong = row.case.endswith(("18mps", "24mps"))
-        if deflection and strong:
-            assert abs(row.here - row.openfast) < 0.016
-        elif not channel.startswith("Spn"):
+        if row.case.endswith(("18mps", "24mps")) and row.quantity.endswith("mean"):
+            assert row.verdict == "met" or channel in ("OoPDefl1", "IPDefl1", "Spn1MLyb1", "Spn2MLyb1"), row
+            assert row.unit != "m" or abs(row.here - row.openfast) < 0.009
+        else:
             assert row.verdict == "met", row
 
 
@@ -131,12 +127,19 @@ def test_individual_pitch_relieves_the_roots_as_in_openfast():
     if without_rosco():
         pytest.skip(without_rosco())
     rows = rows_of(elastic.relief, elastic.IEA15)
-    points = [
-        row for row in rows if "change of the damage" in row.quantity and row.quantity.startswith("Root")
+    changes = [row for row in rows if "mean over the blades" in row.quantity]
+    points = [row for row in changes if "change of the damage" in row.quantity]
+    assert [row.verdict for row in points] == ["met"] * 4 and all(abs(row.error) < 2.0 for row in points)
+    assert len(changes) == 8 and all(abs(row.error) < 1.0 for row in changes if row not in points)
+    table = stored("iea15_turbulent").set_index(["case", "channel"])["DEL"]
+    without, controlled = (
+        [table[f"iea15/turb_18mps_shear{end}", f"RootMyb{blade}_[kN-m]"] for blade in (1, 2, 3)]
+        for end in ("", "_ipc")
+    )
+    relieved = 100.0 * np.mean(np.array(controlled) / without) - 100.0
+    assert [row.openfast for row in points if row.quantity.startswith("RootMyb,")] == [
+        pytest.approx(relieved, abs=1e-9)
     ]
-    assert len(points) == 4 and all(abs(row.error) < 2.2 for row in points)
-    missed = {row.quantity.split(",")[0] for row in points if row.verdict == "MISSED"}
-    assert missed <= {"RootMyb1", "RootMyc1"}  # 2.13, 2.02 points (docs/results/validation.md); aim 2
     # the rotor does not slow down with individual pitch, as it would with a biased acceleration (by 7 %)
     speeds = [row for row in rows if row.quantity.startswith("RotSpeed, mean")]
     assert len(speeds) == 2 and all(abs(row.error) < 0.5 for row in speeds)

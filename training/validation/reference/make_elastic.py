@@ -92,6 +92,7 @@ def _turbine_cases(deck):
     both = dict(shear=0.14, pitches=(pitch + 2.0, pitch - 1.0, pitch))
     rigid = dict(blades=0, OoPDefl=0, IPDefl=0)
     return {f"steady_{wind}mps": _held(deck, wind) for wind in OPERATING[deck]} | {
+        **{f"steady_{wind}mps_tip": _held(deck, wind, last_node=5e-4) for wind in (18, 24)},
         "steady_12mps_shear": _held(deck, 12, shear=0.14),
         "steady_12mps_shear_pitches": _held(deck, 12, **both),
         "steady_12mps_2modes": _held(deck, 12, blades=2),

@@ -253,8 +253,13 @@ def write_glue(folder, case, **settings):
     (folder / "model.fst").write_text(f"v5\n-\n{text}")
 
 
-def end_nodes(text, inside=0.05):
-    """Return an AeroDyn blade with extra nodes just inside root and tip, whose loads have no induction."""
+def end_nodes(text, last=None, inside=0.05):
+    """Return an AeroDyn blade with extra nodes just inside root and tip.
+
+    Of the nodes at the very root and tip AeroDyn sets the axial induction to 1 (FixedInductions): they see
+    the rotation alone, and their load is that of an inflow angle of zero. last: m from the tip of one more
+    node, which leaves hardly any length to the load of the tip.
+    """
     lines = text.rstrip("\n").split("\n")
     first = next(k for k, line in enumerate(lines) if "NumBlNds" in line)
     count = int(lines[first].split()[0])
@@ -268,9 +273,10 @@ def end_nodes(text, inside=0.05):
 
     root = between(rows[0], rows[1], rows[0][0] + inside)
     tip = between(rows[-2], rows[-1], rows[-1][0] - inside)
-    rows = [rows[0], root, *rows[1:-1], tip, rows[-1]]
+    further = [] if last is None else [between(tip, rows[-1], rows[-1][0] - last)]
+    rows = [rows[0], root, *rows[1:-1], tip, *further, rows[-1]]
     body = [" ".join(f"{v:.12g}" if k != 6 else str(int(v)) for k, v in enumerate(row)) for row in rows]
-    lines[first] = lines[first].replace(str(count), str(count + 2), 1)
+    lines[first] = lines[first].replace(str(count), str(len(rows)), 1)
     return "\n".join(lines[: first + 3] + body) + "\n"
 
 
@@ -318,7 +324,7 @@ class Deck:
         channels = [f"B1N{k}{name}" for k in range(1, len(nodes) + 1) for name in NODE_CHANNELS]
         text = text[:start] + "\n".join(rows) + "\n" + text[end:]
         (folder / "AD.dat").write_text(with_channels(text, [*AERO_CHANNELS, *channels]))
-        (folder / "blade_ad.dat").write_text(end_nodes(blade))
+        (folder / "blade_ad.dat").write_text(end_nodes(blade, case.get("last_node")))
         (folder / "Airfoils").mkdir()
         for polar in polars.iterdir():  # coordinates are for acoustics and plots only
             text = re.sub(r"^\S+(\s+NumCoords)", r"0\1", polar.read_text(), flags=re.M)
