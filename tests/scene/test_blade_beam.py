@@ -308,3 +308,12 @@ def test_loads_outside_of_a_section_are_those_of_the_line_beyond_it(count):
                 arms = section.outside * (elements.shape.arm_distance - section.distance) + section.further
                 assert held @ section.outside == pytest.approx(force, rel=3e-3)
                 assert held @ arms == pytest.approx(moment, rel=5e-3)
+
+
+def test_few_stations_are_fitted_to_the_modes_of_each_blade():
+    """Blades of equal aerodynamics share the line loads, not the shapes."""
+    turbines = read_turbine("iea15"), with_structure("iea15", flap_1=(1.0, 0.0, 0.0, 0.0, 0.0))
+    one, other = (build_elements(t, 1.225, 18, station_bending(t, "modes")).modes for t in turbines)
+    assert not close(one.load_x[:, 0], other.load_x[:, 0], 0.05)
+    whole = build_blade_elements(turbines[1], 1.225, bending=station_bending(turbines[1], "modes")).modes
+    assert close(other.load_x[-1, 0], whole.load_x[-1, 0], 0.05)
