@@ -84,7 +84,7 @@ def test_steady_deflections_and_moments_are_within_1_percent_and_3_percent(name)
         scale = max(abs(line["mean"]), first) if row.quantity.endswith("mean") else first
         assert row.error == pytest.approx(100.0 * (row.here - there) / scale, rel=1e-9)
         if row.case.endswith(("18mps", "24mps")) and row.quantity.endswith("mean"):
-            assert row.verdict == "met" or channel in ("OoPDefl1", "IPDefl1", "Spn1MLyb1", "Spn2MLyb1"), row
+            assert row.verdict == "met" or channel in ("OoPDefl1", "Spn2MLyb1"), row
             assert row.unit != "m" or abs(row.here - row.openfast) < 0.009
         else:
             assert row.verdict == "met", row
