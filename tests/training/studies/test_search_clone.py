@@ -1,32 +1,38 @@
-"""The search for a better last layer of mpc_clone: its optimiser, its candidates, its runs."""
+"""The search for a better last layer of mpc_clone: its optimiser, its candidates, its runs, its costs."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fowt_env.controllers.mpc.clone import FILE, HIDDEN, N_INPUTS, read_clone
+from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.studies import search_clone
 
 
-def test_the_distribution_moves_to_the_minimum_of_an_ill_conditioned_cost():
-    scales = np.geomspace(1.0, 30.0, 5)
-    aim = np.linspace(-1.0, 1.0, 5)
-    search = search_clone.Search(5, 10, 0.5, seed=0)
-    for _ in range(120):
-        search.tell(((search.ask(10) - aim) ** 2 * scales**2).sum(axis=1))
-    assert search.mean == pytest.approx(aim, abs=1e-4)
-    lengths = np.sqrt(np.diag(search.covariance))
-    assert lengths[0] > 5.0 * lengths[-1]  # it has found the scales
+def test_the_same_seed_searches_alike_from_zero():
+    drawn = [search_clone.optimiser(5, 10, seed).ask() for seed in (0, 0, 1)]
+    assert np.array_equal(drawn[0], drawn[1]) and not np.array_equal(drawn[0], drawn[2])
+    assert len(drawn[0]) == 10
+    spread = np.std(search_clone.optimiser(5, 4000, 0).ask(), axis=0)
+    assert spread == pytest.approx(search_clone.STEP, rel=0.1)  # four standard errors
+    assert np.array_equal(search_clone.optimiser(5, 10, 0).mean, np.zeros(5))
+
+
+def test_without_cma_the_extra_to_install_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "cma", None)
+    with pytest.raises(InputError, match=r"fowt-env\[search\]"):
+        search_clone.optimiser(5, 10, 0)
 
 
 def test_a_candidate_adds_its_vector_times_the_components():
     network, rng = read_clone(FILE)[1], np.random.default_rng(0)
     mean, spread = rng.normal(size=HIDDEN), np.array([0.2, 0.05])
     components = rng.normal(size=(search_clone.COMPONENTS, HIDDEN))
-    vector = rng.normal(size=2 * (search_clone.COMPONENTS + 1))
+    vector = rng.normal(size=search_clone.UNKNOWNS)
     found = search_clone.changed(network, components, mean, spread, vector)
     x = (network["mean"] + network["scale"] * rng.normal(size=(20, N_INPUTS)) - network["mean"]) / network[
         "scale"
@@ -64,14 +70,26 @@ def test_a_lost_run_and_an_exceeded_limit_cost():
     run = dict.fromkeys(("RotSpeed_std_[rpm]", travel, "RotTorq_DEL_[kN-m]", "GenPwr_capped_mean_[kW]"), 1.0)
     run |= {"torque_travel_[kN-m/s]": 0.5, "GenPwr_max_[kW]": 5000.0}
     terms = [term for term in suite.score.term if term.metric in ("RotSpeed_std_[rpm]", travel)]
-    suite = replace(suite, score=suite.score.model_copy(update={"term": terms}))
+    relative = {**suite.limits.relative, "RotTorq_DEL_[kN-m]": 1.1, "RotSpeed_std_[rpm]": 0.6}
+    limits = suite.limits.model_copy(update={"relative": relative | {travel: 1.1}})
+    suite = replace(suite, score=suite.score.model_copy(update={"term": terms}), limits=limits)
     better = run | {"RotSpeed_std_[rpm]": 0.5}
     assert search_clone.score_of([better, better], [run, run], suite) == pytest.approx((0.75, 0.0))
-    far = run | {travel: 1.12, "torque_travel_[kN-m/s]": 0.6}
+    margin = suite.limits.relative[travel] * search_clone.MARGIN
+    far = better | {travel: margin + 0.1, "torque_travel_[kN-m/s]": 0.6}
     assert search_clone.score_of([far], [run], suite)[1] == pytest.approx(0.1 + 0.2)
     aim = object.__new__(search_clone.Aim)
     aim.suite, aim.reference = suite, [run, run, None]
     assert aim.cost({"normal": [better, better, better]}) == pytest.approx(0.75)
     assert aim.cost({"normal": [better, None, better]}) == pytest.approx(0.75 + search_clone.LOST / 3.0)
-    assert aim.cost({"normal": [far, far, far]}) == pytest.approx(1.06 + search_clone.PRICE * 0.3)
+    score = (0.5 + margin + 0.1) / 2.0
+    assert aim.cost({"normal": [far, far, far]}) == pytest.approx(score + search_clone.PRICE * 0.3)
     assert aim.cost({"normal": [None, None, better]}) == search_clone.LOST
+    speed = "overspeed_[%]"
+    aim.of_start = {"normal": [better, better, better], "gusts": [run | {speed: 10.0}, run | {speed: 30.0}]}
+    gusts = [run | {speed: 5.0}, run | {speed: 9.0}]
+    runs = {"normal": [better, better, better], "gusts": gusts}
+    assert aim.cost(runs) == pytest.approx(0.5 * (7.0 / 20.0 + 9.0 / 30.0))
+    lacking = gusts[1] | {search_clone.CAPPED: search_clone.LEAST_POWER - 0.3}
+    more = aim.cost(runs | {"gusts": [gusts[0], lacking]}) - aim.cost(runs)
+    assert more == pytest.approx(search_clone.PRICE * 0.3)  # of a single run, not of a mean
