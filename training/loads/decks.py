@@ -169,13 +169,25 @@ def write_wind(folder, scene, frame):
     return 2, UNIFORM
 
 
-def write_waves(folder, frame):
-    """Write the elevation of a run for WaveMod 5; return the analysis time (s) that OpenFAST needs."""
+def write_waves(folder, scene, frame):
+    """Write the elevation of a run for WaveMod 5; return the analysis time (s) that OpenFAST needs.
+
+    Beyond the run the sea goes on and then fades: at depth SeaState's waves at an instant depend on the
+    elevation of the seconds before and after. The record has no mean, which SeaState would take away.
+    """
     time, elevation = frame[TIME].to_numpy(), frame["Wave1Elev_[m]"].to_numpy()
     end = WAVE_STEP * np.ceil((time[-1] + SPARE) / WAVE_STEP)
     grid = WAVE_STEP * np.arange(round(end / WAVE_STEP) + 1)
-    # beyond the run the sea ends within the spare time, so that the record closes smoothly
-    values = np.interp(grid, time, elevation) * np.clip((end - grid) / SPARE, 0.0, 1.0)
+    values = np.interp(grid, time, elevation)
+    late, hydro = grid > time[-1], scene.model.hydro
+    waves = None if hydro is None else hydro.waves
+    values[late] = 0.0
+    if waves is not None:
+        values[late] = np.cos(waves.phase - np.outer(grid[late], waves.omega)) @ waves.amplitude
+    fading = np.clip(2.0 * (grid - end) / SPARE + 1.0, 0.0, 1.0)  # in the second half of the spare time
+    values *= 1.0 - fading
+    smooth = np.sin(np.pi * fading) ** 2
+    values -= smooth * values[:-1].sum() / smooth.sum()
     with replacing(folder / f"{WAVES}.Elev") as temporary:
         np.savetxt(
             temporary, np.stack([grid, values], axis=1), fmt="%.4f %.8g",
@@ -302,7 +314,7 @@ def write_driving(folder, results, controllers, deck=None, count=DRIVING, progre
         _check_same(case, frame, statistics[case.key])
         write_table(frame, place / "run.outb")
         wind = write_wind(place, scene, frame)
-        wave_time = write_waves(place, frame)
+        wave_time = write_waves(place, scene, frame)
         rosco = None if deck is None else rosco_of(controllers.get(case.controller), scene)
         if deck is not None:
             write_deck(place, deck, case, scene, frame, wind, wave_time, rosco)

@@ -12,6 +12,8 @@ from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
 from fowt_env.files.openfast import read_outb
 from fowt_env.files.openfast_deck.parser import PartFile
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.hydro.waves import elevation
 from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.training.evaluation.cases import Case
@@ -36,6 +38,12 @@ LOAD = LoadCase(
     "1.3", "dlc1.3_u18", "test", CASE, "pi", 1, 30.0, 10.0, "ultimate", "normal", 1.35, "test",
     wind_speed=18.0, Hs=4.0, Tp=9.0, wave_direction=30.0,
 )  # fmt: skip
+
+
+@entry
+def call_elevation(time, waves):
+    """Return the elevation at the origin."""
+    return elevation(time, 0.0, 0.0, waves)
 
 
 @pytest.fixture(scope="module")
@@ -132,18 +140,23 @@ def test_a_box_is_widened_to_the_motion_of_the_run_by_its_edges(run, tmp_path, p
         np.testing.assert_allclose(again.at(time, 0.0, y, z), own.at(time + late, 0.0, y, z), atol=2e-3)
 
 
-def test_the_elevation_is_that_of_the_run_and_ends_smoothly(run, tmp_path):
-    _, frame = run
-    end = write_waves(tmp_path, frame)
+def test_the_elevation_is_that_of_the_run_goes_on_and_fades_without_a_mean(run, tmp_path):
+    """A record that ends at once moves the body before its end, and a mean would be taken away."""
+    scene, frame = run
+    end = write_waves(tmp_path, scene, frame)
     rows = np.loadtxt(tmp_path / "waves.Elev", skiprows=1)
-    assert end == rows[-1, 0] == pytest.approx(90.0) and rows[-1, 1] == 0.0
+    assert end == rows[-1, 0] == pytest.approx(90.0) and abs(rows[-1, 1]) < 1e-12
     during = rows[rows[:, 0] <= 30.0]
     np.testing.assert_allclose(during[:, 1], frame["Wave1Elev_[m]"].to_numpy()[::2], rtol=1e-6, atol=1e-9)
+    after = rows[(rows[:, 0] > 30.0) & (rows[:, 0] < 60.0)]
+    beyond = [call_elevation(t, scene.model.hydro.waves) for t in after[:, 0]]
+    np.testing.assert_allclose(after[:, 1], beyond, rtol=1e-6, atol=1e-6)
+    assert abs(rows[:-1, 1].mean()) < 1e-6 and np.abs(rows[:, 1]).max() < 6.0
 
 
 def test_the_deck_has_the_case_and_all_else_of_the_users(run, tmp_path):
     scene, frame = run
-    wind, end = write_wind(tmp_path, scene, frame), write_waves(tmp_path, frame)
+    wind, end = write_wind(tmp_path, scene, frame), write_waves(tmp_path, scene, frame)
     main = PartFile(write_deck(tmp_path, FST, LOAD, scene, frame, wind, end), "OpenFAST")
     old = PartFile(FST, "OpenFAST")
     assert main.number("TMax") == 30.0 and main.whole("CompInflow") == 1
