@@ -7,16 +7,19 @@ replaces the predicted wind, the readings of a lidar improve the prediction (ahe
 step. The rates are constant until the next period. An integral of the speed error removes the offset.
 """
 
+import ctypes
 from enum import IntEnum
-from math import exp
+from math import exp, nan
 
 import numpy as np
 
 from fowt_env.caches import Cache
-from fowt_env.control import USUAL_LIDAR, check_control_dt
+from fowt_env.control import USUAL_LIDAR, check_control_dt, wind_ahead
+from fowt_env.control.views import LidarReading
+from fowt_env.controllers.bladed.law import call_at
 from fowt_env.controllers.lqr.design import MOMENT, N_FEEDBACK, N_PLANT, design_models, lowest_design_wind
 from fowt_env.controllers.lqr.design import WIND as ESTIMATED_WIND
-from fowt_env.controllers.lqr.estimator import ROTOR, estimate
+from fowt_env.controllers.lqr.estimator import N_MEMORY, ROTOR, estimate
 from fowt_env.controllers.lqr.law import LQR, WindEstimator, limits_of, speed_integral
 from fowt_env.controllers.mpc.ahead import Foresight, fusion
 from fowt_env.controllers.mpc.model import (
@@ -35,13 +38,14 @@ from fowt_env.controllers.mpc.rotor_table import rotor_table
 from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.controllers.mpc.solver import Program, load
 from fowt_env.controllers.mpc.weights import weights_over
+from fowt_env.controllers.pi import curve_at
 from fowt_env.descriptions.lidar import read_lidar
 from fowt_env.descriptions.nrel5mw import RATED_WIND
 from fowt_env.descriptions.units import DEGREE
 from fowt_env.errors import InputError
-from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.drivetrain import build_torque_curve, clamp, generator_torque, rate_limit
-from fowt_env.plant.measurement import Measure
+from fowt_env.plant.compile.decorators import control_kernel, kernel
+from fowt_env.plant.drivetrain import TorqueCurve, build_torque_curve, clamp, generator_torque, rate_limit
+from fowt_env.plant.measurement import N_MEASUREMENTS, Measure
 
 PERIOD = 0.5  # s between plans
 RESTING = 0.01745  # rad of pitch command, below which the speed integral decays at low rotor speed
@@ -77,6 +81,25 @@ class Memory(IntEnum):
     BIAS = 2  # of the estimated wind over the preview, m/s
     TORQUE_RATE = 3  # of the present period, N m/s
     PITCH_RATE = 4
+
+
+class LoopMemory(IntEnum):
+    """Enumerates the entries of the law's memory array that follow those of Memory."""
+
+    LOW_TORQUE = len(Memory)  # N m, lower limit until the next plan
+    CALLS = LOW_TORQUE + 1  # control periods since the last plan
+    PLANNER = CALLS + 1  # address of the function that plans; below 2^53 and thus exact
+    PLANNED = PLANNER + 1  # 1 once it has returned
+    COMMAND = PLANNED + 1  # torque and pitch, the law's own: those in force may have been limited
+    ESTIMATE = COMMAND + 2  # memory of the estimator
+    AHEAD = ESTIMATE + N_MEMORY  # wind ahead, or speeds and freshness of a lidar; to the end
+
+
+# the parameter array of the law in the loop: Entry, torque curve, control periods between plans, estimator
+CURVE = len(Entry)
+EVERY = CURVE + len(TorqueCurve._fields)
+ESTIMATOR = EVERY + 1
+PLANNER = ctypes.CFUNCTYPE(None, ctypes.c_void_p)
 
 
 @kernel
@@ -121,6 +144,27 @@ def move(estimated, p, memory, curve, low_torque, command):
     command[0] = rate_limit(command[0], torque, dt * p[Entry.TORQUE_RATE_LIMIT])
 
 
+@control_kernel
+def planned_law(p, memory, measurement, command):
+    """Do what MPC.act does in the compiled loop, with Python for a plan alone; NaN if that fails."""
+    estimated, own = memory[LoopMemory.ESTIMATE :], memory[LoopMemory.COMMAND :]
+    curve = curve_at(p, CURVE)
+    for i in range(memory.shape[0] - LoopMemory.AHEAD):
+        memory[LoopMemory.AHEAD + i] = measurement[N_MEASUREMENTS + i]
+    observe(p[ESTIMATOR:], estimated, measurement, own, p, memory)
+    if memory[LoopMemory.CALLS] == 0.0:
+        memory[LoopMemory.LOW_TORQUE] = lowest_torque(estimated, p, curve)
+        memory[LoopMemory.PLANNED] = 0.0
+        call_at(int(memory[LoopMemory.PLANNER]), (0,))
+        if memory[LoopMemory.PLANNED] == 0.0:
+            command[:] = nan
+            return
+    calls = memory[LoopMemory.CALLS] + 1.0
+    memory[LoopMemory.CALLS] = calls if calls < p[EVERY] else 0.0
+    move(estimated, p, memory, curve, memory[LoopMemory.LOW_TORQUE], own)
+    command[0], command[1] = own[0], own[1]
+
+
 LIDAR_TIME = 20.0  # s, longest look-ahead time of the wind predicted with a lidar
 _MODELS = Cache(16)  # inputs -> (design models, table, (first wind, WindModel of all winds))
 
@@ -155,12 +199,33 @@ class MPC:
         self.grid = grid_of(self.settings, self.period)
         self.parameters = self._parameters()
         self.table = self.program = self.made = None
+        self._state = self._planner = self._error = None
         self.unsolved = 0
 
     @property
     def period(self):
         """Return the time between plans, s: a whole number of control periods."""
         return self.every * self.control_dt
+
+    @property
+    def memory(self):
+        """Return the entries of Memory."""
+        return self._state[: len(Memory)]
+
+    @property
+    def low_torque(self):
+        """Return the lower limit of torque until the next plan, N m."""
+        return self._state[LoopMemory.LOW_TORQUE]
+
+    @property
+    def command(self):
+        """Return the command of the last period: torque (N m) and blade pitch (rad)."""
+        return self._state[LoopMemory.COMMAND : LoopMemory.ESTIMATE]
+
+    @property
+    def estimated(self):
+        """Return the memory of the estimator in this run, which begins with the estimate."""
+        return self._state[LoopMemory.ESTIMATE : LoopMemory.AHEAD]
 
     def _parameters(self):
         turbine, law, settings = self.turbine, self.turbine.torque_law, self.settings
@@ -203,6 +268,8 @@ class MPC:
             lidar = read_lidar(scene.lidar or USUAL_LIDAR)
             self.gates = len(lidar.distances)
             self.made = fusion(scene, lidar, self.period, round(LIDAR_TIME / self.period))
+        leads = 2 * self.gates if self.lidar else len(self.preview_times)
+        self._state = np.zeros(LoopMemory.AHEAD + leads)
 
     def reset(self, measurement):
         """Start at the trim with the measured pitch (or, at minimum pitch, rotor speed) and an empty plan.
@@ -212,48 +279,77 @@ class MPC:
         if self.table is None:
             raise InputError(f"controller {self.name!r}: call prepare(scene) before reset(measurement)")
         self.estimator.reset(measurement)
-        self.memory = np.zeros(len(Memory))
-        self.memory[Memory.OPERATING_WIND] = self.estimator.memory[ESTIMATED_WIND + 1]
+        planner = self._state[LoopMemory.PLANNER]
+        self._state[:] = 0.0  # in place: the compiled loop holds this array
+        self._state[LoopMemory.PLANNER] = planner
+        self.estimated[:] = self.estimator.memory
+        self.memory[Memory.OPERATING_WIND] = self.estimated[ESTIMATED_WIND + 1]
         drive = self.turbine.pitch_drive
         pitch = min(max(measurement.blade_pitch, drive.minimum), drive.maximum)
         torque = measurement.generator_torque
         if not np.isfinite(torque):
             torque = self.turbine.torque_law.rated_torque
-        self.command = np.array([torque, pitch])
+        self.command[:] = torque, pitch
         self.plan = np.zeros(2 * len(self.grid.ends))
         self.work = work_of(self.grid)
         self.foresight = Foresight(self.made, self.gates, self.period, self._slow) if self.lidar else None
-        self.calls = self.unsolved = 0
+        self.unsolved, self._error = 0, None
 
     def act(self, measurement):
         """Return (generator torque, blade pitch) for a Measurement."""
-        values = np.array(measurement, dtype=np.float64)
-        estimated = self.estimator.memory
-        observe(self.estimator.parameters, estimated, values, self.command, self.parameters, self.memory)
-        if self.calls % self.every == 0:
-            self.low_torque = lowest_torque(estimated, self.parameters, self.curve)
-            self._replan(self._ahead(measurement))
-        self.calls += 1
-        move(estimated, self.parameters, self.memory, self.curve, self.low_torque, self.command)
-        return float(self.command[0]), float(self.command[1])
+        state, values = self._state, np.array(measurement, dtype=np.float64)
+        if len(state) > LoopMemory.AHEAD:
+            state[LoopMemory.AHEAD :] = wind_ahead(measurement)
+        estimated, command = self.estimated, self.command
+        observe(self.estimator.parameters, estimated, values, command, self.parameters, state)
+        if state[LoopMemory.CALLS] == 0.0:
+            state[LoopMemory.LOW_TORQUE] = lowest_torque(estimated, self.parameters, self.curve)
+            self._replan(self._ahead())
+        state[LoopMemory.CALLS] = (state[LoopMemory.CALLS] + 1.0) % self.every
+        move(estimated, self.parameters, state, self.curve, self.low_torque, command)
+        return float(command[0]), float(command[1])
+
+    @property
+    def in_loop(self):
+        """Return (law, parameters, memory) for the compiled loop, with the effect of act(), once prepared."""
+        self._planner = PLANNER(self._plan)
+        self._state[LoopMemory.PLANNER] = ctypes.cast(self._planner, ctypes.c_void_p).value
+        parts = self.parameters, [*self.curve], [self.every], self.estimator.parameters
+        return planned_law, np.concatenate(parts, dtype=np.float64), self._state
+
+    def _plan(self, _):
+        """Replan for planned_law; an error is kept, as none can pass through the compiled loop."""
+        try:
+            self._replan(self._ahead())
+            self._state[LoopMemory.PLANNED] = 1.0
+        except BaseException as error:
+            self._error = error
+
+    def failure(self, time):
+        """Return the error of a plan in the compiled loop at a time, s; None if the last one did not fail."""
+        if self._state[LoopMemory.PLANNED] == 1.0:
+            return None
+        # without an error a signal has ended the call before its first line
+        return KeyboardInterrupt() if self._error is None else self._error
 
     @property
     def _slow(self):
         """Return the forgetting factor per period of the mean difference of preview or lidar."""
         return exp(-self.period / self.settings.schedule_time)
 
-    def _ahead(self, measurement):
+    def _ahead(self):
         """Return expected states (n, 2) of the wind filter minus the operating wind; n = 0: no preview."""
         if not self.preview_times and not self.lidar:
             return np.zeros((0, 2))
-        now = self.estimator.memory[ESTIMATED_WIND + 1]
+        seen, now = self._state[LoopMemory.AHEAD :].copy(), self.estimated[ESTIMATED_WIND + 1]
         model, wind = self._model()
         if self.lidar:
-            moving = -model.motion @ self.estimator.memory[[SURGE_RATE, LEAN_RATE]]
+            moving = -model.motion @ self.estimated[[SURGE_RATE, LEAN_RATE]]
             mean = self.memory[Memory.OPERATING_WIND]
-            expected = self.foresight.foresee(mean, now, moving, measurement.lidar)
+            reading = LidarReading(seen[: self.gates], seen[self.gates :])
+            expected = self.foresight.foresee(mean, now, moving, reading)
         else:
-            seen, decay = np.array(measurement.wind_preview, dtype=np.float64), self._slow
+            decay = self._slow
             bias = decay * self.memory[Memory.BIAS] + (1.0 - decay) * (now - seen[0])
             self.memory[Memory.BIAS] = bias
             expected = seen + bias
@@ -276,7 +372,7 @@ class MPC:
         model, wind = self._model()
         turbine, settings = self.turbine, self.settings
         rated, torque, drive = turbine.rated_rotor_speed, turbine.torque_law.rated_torque, turbine.pitch_drive
-        estimated, work = self.estimator.memory, self.work
+        estimated, work = self.estimated, self.work
         x = work.states[0]
         x[:N_PLANT] = estimated[:N_PLANT] - model.trim[:N_PLANT]
         x[TORQUE] = self.command[0] / torque - model.trim[TORQUE]
@@ -320,7 +416,7 @@ class MPC:
 
     def __getstate__(self):
         """Return the state without the solver, which is recreated: each solution has an explicit start."""
-        return self.__dict__ | {"program": None}
+        return self.__dict__ | {"program": None, "_planner": None}
 
 
 def mpc(turbine, control_dt):

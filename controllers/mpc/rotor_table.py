@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.caches import Cache
-from fowt_env.plant.aero.blade_elements import build_blade_elements
+from fowt_env.plant.aero.blade_elements import build_blade_elements, elements_key
 from fowt_env.plant.aero.coefficient_table import performance
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.drivetrain import clamp
@@ -27,24 +27,23 @@ class RotorTable(NamedTuple):
     area_density: float  # rho pi R^2/2, kg/m
 
 
-_tables = Cache(16)  # (id of the turbine, density) -> (turbine, RotorTable)
+_tables = Cache(16)  # (elements_key, tip radius) -> RotorTable: each scene reads its turbine again
 
 
 def rotor_table(turbine, density):
-    """Return the RotorTable of a turbine's blade elements in air of a density, kg/m3."""
+    """Return the RotorTable of a turbine's blade elements in air of a density, kg/m3, cached by values."""
+    elements, radius = build_blade_elements(turbine, density), float(turbine.rotor.tip_radius)
 
     def make():
-        _, thrust, torque = performance(build_blade_elements(turbine, density), RATIOS, PITCHES)
+        _, thrust, torque = performance(elements, RATIOS, PITCHES)
         parts = []
         for values in (thrust, torque):
             parts += [values, *np.gradient(values, RATIOS, PITCHES)]
-        radius = float(turbine.rotor.tip_radius)
         grid = (RATIOS[0], RATIOS[1] - RATIOS[0], PITCHES[0], PITCHES[1] - PITCHES[0])
         numbers = map(float, (*grid, radius, 0.5 * density * np.pi * radius**2))
-        table = RotorTable(np.ascontiguousarray(parts), *numbers)
-        return turbine, table  # keeps the turbine, so that its id stays valid
+        return RotorTable(np.ascontiguousarray(parts), *numbers)
 
-    return _tables.get((id(turbine), float(density)), make)[1]
+    return _tables.get((elements_key(elements), radius), make)
 
 
 @kernel

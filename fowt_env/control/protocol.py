@@ -167,9 +167,17 @@ class CheckedController:
         """
         return getattr(self.controller, "in_loop", None)
 
-    def failure(self, time: float, command: npt.NDArray) -> ControllerError:
-        """Return the error of a command that is not finite of a law in the compiled loop at a time, s."""
-        return self.controller.failure(time) or self._refusal(tuple(command.tolist()), time)
+    def failure(self, time: float, command: npt.NDArray) -> BaseException:
+        """Return the error of a command that is not finite of a law in the compiled loop at a time, s.
+
+        As in act(), an error of the controller's own code becomes a ControllerError.
+        """
+        error = self.controller.failure(time)
+        if error is None:
+            return self._refusal(tuple(command.tolist()), time)
+        if isinstance(error, ControllerError | InputError | SimulationStopped):
+            return error
+        return failure_of(self.name, "in act()", error, time) if isinstance(error, Exception) else error
 
     @property
     def console_output(self) -> str:

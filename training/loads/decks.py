@@ -41,6 +41,8 @@ from fowt_env.weather.wind_field import MARGIN, WindBox, is_field
 BOX, UNIFORM, WAVES = "wind.bts", "wind.wnd", "waves"
 WAVE_STEP = 0.2  # s, of the elevation
 SPARE = 60.0  # s of waves beyond the run
+SPARE_REACH = 10.0  # m of wind beyond the blades: motions in OpenFAST differ, and blades bend
+TRIED = 12  # numbers of columns of which the best is added to a box of wind
 INITIAL = (  # keys of ElastoDyn and channels of the first row
     *((name, f"{name}_[m]") for name in ("PtfmSurge", "PtfmSway", "PtfmHeave")),
     *((name, f"{name}_[deg]") for name in ("PtfmRoll", "PtfmPitch", "PtfmYaw")),
@@ -105,19 +107,49 @@ def covering(box, duration):
     return box.velocity[np.arange(count) % len(box.velocity)]
 
 
-def write_wind(folder, scene):
+def reach_of(frame, scene):
+    """Return how far, m, blades come to the sides of the tower's foot and above the still water in a run."""
+    radius, hub = scene.turbine.rotor.tip_radius, scene.turbine.rotor.hub_height
+    roll = np.sin(np.radians(frame["PtfmRoll_[deg]"]))
+    side = np.abs(frame["PtfmSway_[m]"] - hub * roll).max() + radius
+    return side + SPARE_REACH, hub + radius + max(frame["PtfmHeave_[m]"].max(), 0.0) + SPARE_REACH
+
+
+def widened(box, velocity, side, top):
+    """Return (velocity, y, z) of a WindBox out to `side` and up to `top`, m, by copies of its edges.
+
+    This package continues a box by its edge, InflowWind stops there. InflowWind starts a file half its width
+    upstream: columns are added in a number that makes the wind earlier by whole slices, to a fraction of one,
+    and as many slices are put in front.
+    """
+    step, rise = box.y[1] - box.y[0], box.z[1] - box.z[0]
+    least = max(ceil((side - box.y[-1]) / step), 0)
+    slices = step * np.arange(least, least + TRIED) / (box.speed * box.dt)
+    added = least + int(np.argmin(np.abs(slices - np.rint(slices)))) if least else 0
+    early = round(step * added / (box.speed * box.dt))
+    above = max(ceil((top - box.z[-1]) / rise), 0)
+    before = velocity[np.arange(-early, 0) % len(box.velocity) if box.periodic else np.zeros(early, int)]
+    velocity = np.pad(
+        np.concatenate([before, velocity]), ((0, 0), (0, above), (added, added), (0, 0)), mode="edge"
+    )
+    more = step * np.arange(1, added + 1)
+    y = np.concatenate([box.y[0] - more[::-1], box.y, box.y[-1] + more])
+    return velocity, y, np.concatenate([box.z, box.z[-1] + rise * np.arange(1, above + 1)])
+
+
+def write_wind(folder, scene, frame):
     """Write the wind of a Scene for InflowWind; return (WindType, name of the file), (None, None) without.
 
+    frame: the run, whose motion a box of wind is to cover.
     Linear shears act on the component along x here, and along the wind in InflowWind: the same but for the
     square of the direction.
     """
     hub, wind = scene.turbine.rotor.hub_height, scene.wind
     if isinstance(wind, WindBox):
+        velocity = covering(wind, scene.options["duration"])
+        velocity, y, z = widened(wind, velocity, *reach_of(frame, scene))
         with replacing(folder / BOX) as temporary:
-            write_bts(
-                temporary, covering(wind, scene.options["duration"]), wind.y, wind.z, wind.dt, wind.speed,
-                hub, periodic=False,
-            )  # fmt: skip
+            write_bts(temporary, velocity, y, z, wind.dt, wind.speed, hub, periodic=False)
         return 3, BOX
     if scene.model.aero is None:
         return None, None
@@ -137,13 +169,25 @@ def write_wind(folder, scene):
     return 2, UNIFORM
 
 
-def write_waves(folder, frame):
-    """Write the elevation of a run for WaveMod 5; return the analysis time (s) that OpenFAST needs."""
+def write_waves(folder, scene, frame):
+    """Write the elevation of a run for WaveMod 5; return the analysis time (s) that OpenFAST needs.
+
+    Beyond the run the sea goes on and then fades: at depth SeaState's waves at an instant depend on the
+    elevation of the seconds before and after. The record has no mean, which SeaState would take away.
+    """
     time, elevation = frame[TIME].to_numpy(), frame["Wave1Elev_[m]"].to_numpy()
     end = WAVE_STEP * np.ceil((time[-1] + SPARE) / WAVE_STEP)
     grid = WAVE_STEP * np.arange(round(end / WAVE_STEP) + 1)
-    # beyond the run the sea ends within the spare time, so that the record closes smoothly
-    values = np.interp(grid, time, elevation) * np.clip((end - grid) / SPARE, 0.0, 1.0)
+    values = np.interp(grid, time, elevation)
+    late, hydro = grid > time[-1], scene.model.hydro
+    waves = None if hydro is None else hydro.waves
+    values[late] = 0.0
+    if waves is not None:
+        values[late] = np.cos(waves.phase - np.outer(grid[late], waves.omega)) @ waves.amplitude
+    fading = np.clip(2.0 * (grid - end) / SPARE + 1.0, 0.0, 1.0)  # in the second half of the spare time
+    values *= 1.0 - fading
+    smooth = np.sin(np.pi * fading) ** 2
+    values -= smooth * values[:-1].sum() / smooth.sum()
     with replacing(folder / f"{WAVES}.Elev") as temporary:
         np.savetxt(
             temporary, np.stack([grid, values], axis=1), fmt="%.4f %.8g",
@@ -269,8 +313,8 @@ def write_driving(folder, results, controllers, deck=None, count=DRIVING, progre
         scene, frame = rerun(case, controllers.get(case.controller))
         _check_same(case, frame, statistics[case.key])
         write_table(frame, place / "run.outb")
-        wind = write_wind(place, scene)
-        wave_time = write_waves(place, frame)
+        wind = write_wind(place, scene, frame)
+        wave_time = write_waves(place, scene, frame)
         rosco = None if deck is None else rosco_of(controllers.get(case.controller), scene)
         if deck is not None:
             write_deck(place, deck, case, scene, frame, wind, wave_time, rosco)

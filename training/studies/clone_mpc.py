@@ -57,7 +57,7 @@ class Teacher(MPC):
         inputs = inputs_of(
             self.parameters,
             estimator.parameters,
-            estimator.memory,
+            self.estimated,
             self.memory,
             self.low_torque,
             self.command,

@@ -1,5 +1,7 @@
 """The predictive law in steady wind, turbulence and gusts; what it does where nothing is solved."""
 
+import copy
+import pickle
 import sys
 
 import numpy as np
@@ -17,7 +19,7 @@ from fowt_env.controllers.mpc.plan import BLOCK_ROWS, RATED_BLOCKS  # noqa: E402
 from fowt_env.controllers.mpc.settings import MPCSettings  # noqa: E402
 from fowt_env.controllers.mpc.solver import Program  # noqa: E402
 from fowt_env.descriptions.units import DEGREE  # noqa: E402
-from fowt_env.errors import InputError  # noqa: E402
+from fowt_env.errors import ControllerError, InputError  # noqa: E402
 from fowt_env.training.evaluation.cases import named_cases  # noqa: E402
 from fowt_env.training.evaluation.metrics import metrics  # noqa: E402
 from fowt_env.training.evaluation.plant_perturbation import plant_settings  # noqa: E402
@@ -190,6 +192,57 @@ def test_runs_are_the_same_to_the_bit_whatever_ran_before():
     first = simulate(scene, "mpc", duration=120.0)
     simulate(turbulent(14, 1002, 60.0), again, duration=60.0)
     assert simulate(scene, again, duration=120.0).equals(first)
+
+
+class Outside:
+    """A controller without the compiled loop's law: act() is called in every control period."""
+
+    def __init__(self, inner):
+        self.inner, self.name = inner, inner.name
+        self.information, self.preview_times = inner.information, inner.preview_times
+        self.prepare, self.reset, self.act = inner.prepare, inner.reset, inner.act
+
+
+@pytest.mark.parametrize("name", ["mpc", "mpc_preview"])
+def test_the_compiled_loop_commands_what_act_does(name):
+    """To the bit, in noise, in a lull and after a copy of the controller that has run."""
+    scene = turbulent(10, 1001, 60.0)
+    law = make(name, scene.turbine, 0.1).controller
+    inside, outside = (
+        simulate(scene, one, duration=60.0, sensors="standard") for one in (law, Outside(copy.deepcopy(law)))
+    )
+    assert inside.equals(outside)
+    again = pickle.loads(pickle.dumps(law))
+    assert simulate(scene, again, duration=60.0, sensors="standard").equals(inside)
+
+
+def test_an_error_of_a_plan_in_the_compiled_loop_ends_the_run_as_one_of_act(monkeypatch):
+    scene, replan = steady(18.0), MPC._replan
+
+    def failing(self, ahead):
+        if len(calls) > 20:
+            raise self.error
+        calls.append(1)
+        replan(self, ahead)
+
+    monkeypatch.setattr(MPC, "_replan", failing)
+    for error, expected, text in (
+        (
+            ValueError("no plan"),
+            ControllerError,
+            r"raised ValueError in act\(\) at t = 10.500 s, .*: no plan",
+        ),
+        (InputError("bad"), InputError, "^bad$"),
+        (KeyboardInterrupt("late"), KeyboardInterrupt, "late"),
+    ):
+        law, calls = MPC(scene.turbine, 0.1), []
+        law.error = error
+        for controller in (law, Outside(law)):
+            calls.clear()
+            with pytest.raises(expected, match=text):
+                simulate(scene, controller, duration=20.0)
+    monkeypatch.setattr(MPC, "_replan", replan)
+    assert len(simulate(scene, law, duration=2.0)) == 21  # a failed run leaves nothing behind
 
 
 def test_the_wind_ahead_is_used():

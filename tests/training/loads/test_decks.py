@@ -12,6 +12,8 @@ from fowt_env.descriptions.wind_files import read_uniform_wind
 from fowt_env.errors import InputError
 from fowt_env.files.openfast import read_outb
 from fowt_env.files.openfast_deck.parser import PartFile
+from fowt_env.plant.compile.decorators import entry
+from fowt_env.plant.hydro.waves import elevation
 from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.training.evaluation.cases import Case
@@ -36,6 +38,12 @@ LOAD = LoadCase(
     "1.3", "dlc1.3_u18", "test", CASE, "pi", 1, 30.0, 10.0, "ultimate", "normal", 1.35, "test",
     wind_speed=18.0, Hs=4.0, Tp=9.0, wave_direction=30.0,
 )  # fmt: skip
+
+
+@entry
+def call_elevation(time, waves):
+    """Return the elevation at the origin."""
+    return elevation(time, 0.0, 0.0, waves)
 
 
 @pytest.fixture(scope="module")
@@ -78,8 +86,8 @@ def test_a_box_written_for_turbsim_is_read_back(tmp_path):
 
 
 def test_the_wind_of_a_scene_is_written_as_its_kind(run, tmp_path):
-    scene, _ = run
-    assert write_wind(tmp_path, scene) == (2, "wind.wnd")
+    scene, frame = run
+    assert write_wind(tmp_path, scene, frame) == (2, "wind.wnd")
     again = read_uniform_wind(tmp_path / "wind.wnd")
     series = scene.model.aero.wind
     np.testing.assert_allclose(again["speed"], series.value[:, 0], rtol=1e-6)
@@ -88,18 +96,18 @@ def test_the_wind_of_a_scene_is_written_as_its_kind(run, tmp_path):
         time=np.array([0.0, 10.0]), value=np.array([[10.0, 0.0, 0.5, 2.0, -1.0], [12.0, 0.0, 0.0, 3.0, 1.0]])
     )
     model = scene.model._replace(aero=scene.model.aero._replace(wind=sheared))
-    write_wind(tmp_path, replace(scene, model=model))
+    write_wind(tmp_path, replace(scene, model=model), frame)
     again = read_uniform_wind(tmp_path / "wind.wnd")
     for column, key in enumerate(("speed", "v", "w", "vertical_shear", "horizontal_shear")):
         np.testing.assert_allclose(again[key], sheared.value[:, column], atol=1e-6)
     turned = sheared._replace(value=np.array([[10.0, 3.0, 0.0, 0.0, 0.0], [12.0, -1.0, 0.0, 0.0, 0.0]]))
     model = scene.model._replace(aero=scene.model.aero._replace(wind=turned))
-    write_wind(tmp_path, replace(scene, model=model))
+    write_wind(tmp_path, replace(scene, model=model), frame)
     rows = np.loadtxt(tmp_path / "wind.wnd", comments="!")
     # clockwise seen from above: wind towards +y has a negative direction
     np.testing.assert_allclose(rows[:, 2], -np.degrees(np.arctan2([3.0, -1.0], [10.0, 12.0])), rtol=1e-6)
     own = replace(box(), shift=80.0 / 18.0)  # half of its width
-    assert write_wind(tmp_path, replace(scene, wind=own)) == (3, "wind.bts")
+    assert write_wind(tmp_path, replace(scene, wind=own), frame) == (3, "wind.bts")
     again = read_box(
         {"kind": "bts", "path": str(tmp_path / "wind.bts")}, hub_height=90.0, rotor_diameter=126.0
     )
@@ -108,18 +116,47 @@ def test_the_wind_of_a_scene_is_written_as_its_kind(run, tmp_path):
     np.testing.assert_allclose(again.at(*at), own.at(*at), atol=2e-3)
 
 
-def test_the_elevation_is_that_of_the_run_and_ends_smoothly(run, tmp_path):
-    _, frame = run
-    end = write_waves(tmp_path, frame)
+@pytest.mark.parametrize("periodic", [True, False])
+def test_a_box_is_widened_to_the_motion_of_the_run_by_its_edges(run, tmp_path, periodic):
+    """As this package continues it; InflowWind stops beside or above the box."""
+    scene, frame = run
+    moved = frame.assign(**{
+        "PtfmSway_[m]": np.linspace(0.0, -60.0, len(frame)),
+        "PtfmRoll_[deg]": np.linspace(0.0, 10.0, len(frame)),  # towards -y, as the sway
+        "PtfmHeave_[m]": 8.0,
+    })  # fmt: skip
+    velocity = np.repeat(box().velocity, 5, axis=0)
+    own = replace(box(), velocity=velocity, periodic=periodic, speed=17.3, shift=80.0 / 17.3)
+    write_wind(tmp_path, replace(scene, wind=own), moved)
+    again = read_box(
+        {"kind": "bts", "path": str(tmp_path / "wind.bts")}, hub_height=90.0, rotor_diameter=126.0
+    )
+    side, top = 63.0 + 60.0 + 90.0 * np.sin(np.radians(10.0)), 90.0 + 63.0 + 8.0
+    assert -again.y[0] == again.y[-1] > side and again.z[-1] > top
+    late = again.shift - own.shift - 0.5 * round((again.shift - own.shift) / 0.5)
+    assert 0.0 < abs(late) < 0.1 * own.dt
+    time = np.linspace(0.0, 30.0, 61)
+    for y, z in ((5.0, 100.0), (-20.0, top), (side, 60.0), (-side, top)):
+        np.testing.assert_allclose(again.at(time, 0.0, y, z), own.at(time + late, 0.0, y, z), atol=2e-3)
+
+
+def test_the_elevation_is_that_of_the_run_goes_on_and_fades_without_a_mean(run, tmp_path):
+    """A record that ends at once moves the body before its end, and a mean would be taken away."""
+    scene, frame = run
+    end = write_waves(tmp_path, scene, frame)
     rows = np.loadtxt(tmp_path / "waves.Elev", skiprows=1)
-    assert end == rows[-1, 0] == pytest.approx(90.0) and rows[-1, 1] == 0.0
+    assert end == rows[-1, 0] == pytest.approx(90.0) and abs(rows[-1, 1]) < 1e-12
     during = rows[rows[:, 0] <= 30.0]
     np.testing.assert_allclose(during[:, 1], frame["Wave1Elev_[m]"].to_numpy()[::2], rtol=1e-6, atol=1e-9)
+    after = rows[(rows[:, 0] > 30.0) & (rows[:, 0] < 60.0)]
+    beyond = [call_elevation(t, scene.model.hydro.waves) for t in after[:, 0]]
+    np.testing.assert_allclose(after[:, 1], beyond, rtol=1e-6, atol=1e-6)
+    assert abs(rows[:-1, 1].mean()) < 1e-6 and np.abs(rows[:, 1]).max() < 6.0
 
 
 def test_the_deck_has_the_case_and_all_else_of_the_users(run, tmp_path):
     scene, frame = run
-    wind, end = write_wind(tmp_path, scene), write_waves(tmp_path, frame)
+    wind, end = write_wind(tmp_path, scene, frame), write_waves(tmp_path, scene, frame)
     main = PartFile(write_deck(tmp_path, FST, LOAD, scene, frame, wind, end), "OpenFAST")
     old = PartFile(FST, "OpenFAST")
     assert main.number("TMax") == 30.0 and main.whole("CompInflow") == 1
