@@ -25,6 +25,7 @@ from fowt_env.plant.elastic.tower import (
     carried,
     elastic_force,
     fill_tower_rates,
+    keep_bend,
     reduce_tower,
     turned_pose,
 )
@@ -52,6 +53,7 @@ def evaluate_loads(t, x, model, data, dx):
     fill_sines(x, plane, cache[LoadCache.SINES :])
     pose, modal = pose_by_sines(x, cache[LoadCache.SINES :], plane), cache[LoadCache.MODAL :]
     bend = bend_of(x, model.tower)
+    keep_bend(bend, data.rotor)
     nacelle = turned_pose(pose, bend)
     elastic_force(x, model.tower, modal)
     reduce_tower(x, pose, model.tower, data.rotor)
