@@ -17,8 +17,8 @@ from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
 from fowt_env.plant.advance import forget, output
 from fowt_env.plant.aero import bem_rotor, blade_sweep
-from fowt_env.plant.aero.bent_blade import CHANGE, BentShape, placed
-from fowt_env.plant.aero.blade_shape import N_STATION_LOAD, StationLoad, effective_pitch
+from fowt_env.plant.aero.bent_blade import CHANGE, LANES, N_STATION_LOAD, BentShape, placed
+from fowt_env.plant.aero.blade_shape import StationLoad, effective_pitch
 from fowt_env.plant.state import BLADES, N_BLADE_LOAD, State
 from fowt_env.plant.user_loads import Force, Motion
 from fowt_env.scene.beam import outer_part, shape_values
@@ -193,10 +193,10 @@ class Case:
         forget(handle)
         output(handle, x, u, 0.0, dx, row)
         if self.n:
-            stored = data.blades[:, N_BLADE_LOAD:][:, : N_STATION_LOAD * count].reshape(
-                BLADES, count, N_STATION_LOAD
-            )
-            assert np.allclose(stored, drawn, rtol=1e-14)
+            groups = -(-count // LANES)
+            stored = data.blades[:, N_BLADE_LOAD:][:, : N_STATION_LOAD * LANES * groups]
+            stored = stored.reshape(BLADES, groups, N_STATION_LOAD, LANES).swapaxes(2, 3)
+            assert np.allclose(stored.reshape(BLADES, -1, N_STATION_LOAD)[:, :count], drawn, rtol=1e-14)
         rates = {
             "platform": dx[State.VX : State.WX],
             "turning": dx[State.WX : State.ROTOR_SPEED],

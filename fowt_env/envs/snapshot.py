@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from fowt_env.plant.elastic.structure import RotorScratch
 
 # arrays kept between control periods: in episode.EpisodeData, its InterfaceData, and plant.model.Data
-# (stages: the first row has the wake rates while the cached loads are valid)
+# (stages: the first row has the wake rates while the cached loads are valid, others those of keep_rates)
 CARRIED = {
     "": (
         "x", "u", "memory", "estimate", "action", "ahead", "motion", "observation", "counts", "reference",

@@ -6,7 +6,7 @@ from fowt_env.loop.period import all_finite, apply_command, begin_period, show_c
 from fowt_env.loop.protection import has_ended, is_supervised, supervise_turbine
 from fowt_env.plant.advance import BAD_COMMAND, RUNNING, TRIPPED, observe_plant, output_plant, status_of
 from fowt_env.plant.blade_pitches import spread_command
-from fowt_env.plant.compile.decorators import entry, kernel
+from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.integrators import take_step
 
@@ -56,6 +56,12 @@ def rollout(handle, x, u, law, parameters, memory, linked, schedule, first, end,
     has begun the period of `first`, and no other control instant may lie before end.
     """
     model, data, interface, link = model_of(handle), data_of(handle), model_of(linked), data_of(linked)
+    return _roll(model, data, x, u, law, parameters, memory, interface, link, schedule, first, end, out)
+
+
+@inlined_kernel
+def _roll(model, data, x, u, law, parameters, memory, interface, link, schedule, first, end, out):
+    """Run the loop of rollout, as a kernel: in an entry each slice counts references."""
     dt, rows = schedule.dt, 0
     for step in range(first, end + 1):
         t = step * dt

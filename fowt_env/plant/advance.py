@@ -9,7 +9,7 @@ from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
 from fowt_env.plant.compile.handle import data_of, model_of
 from fowt_env.plant.dynamics import loads_of
 from fowt_env.plant.hydro.radiation import forget_memory
-from fowt_env.plant.integrators import rates, take_step
+from fowt_env.plant.integrators import keep_rates, rates, take_step
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State
 
@@ -72,6 +72,7 @@ def observe_plant(model, data, x, u, t, dx, measurement):
 def output_plant(model, data, x, u, t, dx, row):
     """Fill the rates dx and one output row as output does."""
     rates(t, x, u, model, data, dx)
+    keep_rates(x, u, dx, data)
     record(model, data, x, dx, u, t, loads_of(data, dx), row)
 
 

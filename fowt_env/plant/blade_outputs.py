@@ -15,9 +15,10 @@ from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import stored
+from fowt_env.plant.elastic.blades import COS_PITCH, SIN_PITCH
 from fowt_env.plant.elastic.outputs import BentRotor, bearing_moment, bent_rotor
 from fowt_env.plant.elastic.structure import Structure
-from fowt_env.plant.elastic.tower import bend_of
+from fowt_env.plant.elastic.tower import kept_bend
 from fowt_env.plant.measurement import N_BLADE_MEASUREMENTS, BladeMeasure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
@@ -183,20 +184,19 @@ def bearing_moments(pose, rates, speed, rate, rotor, masses, body, layout):
 def _of_bending(pose, rates, x, dx, rotor, model, data):
     """Return the BladeMoments of a BentRotor; pose and rates of the nacelle frame are not needed."""
     wrench, height, hub = stored(data.cache, LoadCache.ROTOR), model.layout.tower_top[2], rotor.hub
-    mx, my, mz = bearing_moment(bend_of(x, model.tower), wrench, data.rotor, height)
+    mx, my, mz = bearing_moment(kept_bend(model.tower, data.rotor), wrench, data.rotor, height)
     return BladeMoments(
-        _coned_root(0, x, rotor.first, model.pitches),
-        _coned_root(1, x, rotor.second, model.pitches),
-        _coned_root(2, x, rotor.third, model.pitches),
+        _coned_root(rotor.first, data.rotor.turns[0]),
+        _coned_root(rotor.second, data.rotor.turns[1]),
+        _coned_root(rotor.third, data.rotor.turns[2]),
         hub.my, hub.mz, mx, my, mz,
     )  # fmt: skip
 
 
 @inlined_kernel
-def _coned_root(number, x, load, pitches):
-    """Return the RootMoments of a SectionLoad of the root of a blade, coned axes."""
-    pitch = pitch_of(number, x, pitches)
-    c, s = cos(pitch), sin(pitch)
+def _coned_root(load, turn):
+    """Return the RootMoments of a SectionLoad of the root of a blade, coned axes; turn: of its turns."""
+    c, s = turn[COS_PITCH], turn[SIN_PITCH]
     return RootMoments(c * load.mx + s * load.my, c * load.my - s * load.mx)
 
 
@@ -208,7 +208,7 @@ def _bearing_of_rigid(pose, rates, x, speed, rate, wrench, model, structure, dat
 
 @inlined_kernel
 def _bearing_of_elastic(pose, rates, x, speed, rate, wrench, model, structure, data):
-    return bearing_moment(bend_of(x, model.tower), wrench, data.rotor, model.layout.tower_top[2])
+    return bearing_moment(kept_bend(model.tower, data.rotor), wrench, data.rotor, model.layout.tower_top[2])
 
 
 # -> moment (3) of nacelle and rotor on the tower top, see bearing_moments
@@ -272,8 +272,8 @@ def measure_blades(pose, rates, x, dx, pitches, model, data, m):
         return
     platform = pose_by_sines(x, data.cache[LoadCache.SINES :], model.rigid_body.plane)
     rotor = bent_rotor(
-        platform, bend_of(x, model.tower), x, dx, pitches, model.rigid_body, model.structure, model.tower,
-        model.blades, data.blades, data.rotor,
+        platform, kept_bend(model.tower, data.rotor), x, dx, model.rigid_body, model.structure,
+        model.tower, model.blades, data.blades, data.rotor,
     )  # fmt: skip
     moments = blade_moments(pose, rates, x, dx, rotor, model, data)
     out = m[m.shape[0] - N_BLADE_MEASUREMENTS :]

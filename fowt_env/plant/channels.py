@@ -15,7 +15,7 @@ from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.elastic.chain import weighed_body
 from fowt_env.plant.elastic.outputs import add_upper_load, bent_rotor, record_bending, shaft_load
 from fowt_env.plant.elastic.shaft import generator_speed, record_twist, twist_channels
-from fowt_env.plant.elastic.tower import Twist, bend_of, nacelle_rates, turned_pose
+from fowt_env.plant.elastic.tower import Twist, kept_bend, nacelle_rates, turned_pose
 from fowt_env.plant.hydro.load import surface_at_origin
 from fowt_env.plant.measurement import Measure
 from fowt_env.plant.model import LoadCache
@@ -205,7 +205,7 @@ def elevation_now(t, hydro, data):
 def measure(model, data, x, dx, u, t, m):
     """Fill the measurement array m (Scene.n_measurements,) from a state, its loads in data and its rates."""
     layout, sines = model.layout, data.cache[LoadCache.SINES :]
-    pose, bend = pose_by_sines(x, sines, model.rigid_body.plane), bend_of(x, model.tower)
+    pose, bend = pose_by_sines(x, sines, model.rigid_body.plane), kept_bend(model.tower, data.rotor)
     nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, x, bend, dx, model.tower)
     wind = wind_of(t, 0.0, 0.0, layout.hub[2], model.aero)
     top = layout.tower_top
@@ -231,7 +231,7 @@ def record(model, data, x, dx, u, t, loads, row):
     """Fill one output row (n_channels,), SI, in the order of channels()."""
     layout = model.layout
     body, sines = model.rigid_body, data.cache[LoadCache.SINES :]
-    pose, bend = pose_by_sines(x, sines, body.plane), bend_of(x, model.tower)
+    pose, bend = pose_by_sines(x, sines, body.plane), kept_bend(model.tower, data.rotor)
     nacelle, moving = turned_pose(pose, bend), nacelle_rates(pose, x, bend, dx, model.tower)
     row[Out.TIME] = t
     for i in range(6):
@@ -260,8 +260,7 @@ def record(model, data, x, dx, u, t, loads, row):
     row[Out.GENPWR] = layout.generator_efficiency * layout.gear_ratio * speed * torque
     row[Out.GENTQLIM] = data.cache[LoadCache.TORQUE_LIMITED]
     rotor = bent_rotor(
-        pose, bend, x, dx, model.pitches, body, model.structure, model.tower, model.blades, data.blades,
-        data.rotor,
+        pose, bend, x, dx, body, model.structure, model.tower, model.blades, data.blades, data.rotor
     )  # fmt: skip
     # shaft loads: aerodynamics less inertia and weight of the rotor
     hub, cm, tilt = layout.hub, layout.rotor_cm, layout.tilt
@@ -295,7 +294,7 @@ def record(model, data, x, dx, u, t, loads, row):
     n += tower_channels(bend)
     record_twist(x, model.shaft, row[n:])
     n += twist_channels(model.shaft)
-    record_bending(rotor, x, dx, model.pitches, model.aero, model.blades, data.blades, data.rotor, row[n:])
+    record_bending(rotor, x, dx, model, model.blades, data.blades, data.rotor, row[n:])
     record_blades(nacelle, moving, x, dx, rotor, model.pitches, model, data, row)
 
 

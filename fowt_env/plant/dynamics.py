@@ -25,6 +25,7 @@ from fowt_env.plant.elastic.tower import (
     carried,
     elastic_force,
     fill_tower_rates,
+    keep_bend,
     reduce_tower,
     turned_pose,
 )
@@ -52,6 +53,7 @@ def evaluate_loads(t, x, model, data, dx):
     fill_sines(x, plane, cache[LoadCache.SINES :])
     pose, modal = pose_by_sines(x, cache[LoadCache.SINES :], plane), cache[LoadCache.MODAL :]
     bend = bend_of(x, model.tower)
+    keep_bend(bend, data.rotor)
     nacelle = turned_pose(pose, bend)
     elastic_force(x, model.tower, modal)
     reduce_tower(x, pose, model.tower, data.rotor)
@@ -76,7 +78,7 @@ def evaluate_loads(t, x, model, data, dx):
         pose, x, bend, model.rigid_body, model.pitches, model.structure, model.tower, model.blades, data.rotor
     )
 
-    cache[LoadCache.FACTORED] = 0.0
+    cache[LoadCache.FACTORED] = cache[LoadCache.ANSWERED] = 0.0
     store(cache, LoadCache.TOTAL, load)
     store(cache, LoadCache.ROTOR, aero.rotor.wrench)
     store(cache, LoadCache.TOWER, tower)
@@ -90,6 +92,7 @@ def evaluate_loads(t, x, model, data, dx):
 def respond(x, u, model, data, dx):
     """Fill dx with the rates of the state under the command u, from the loads of the last evaluation."""
     cache, body = data.cache, model.rigid_body
+    cache[LoadCache.ANSWERED] = 0.0
     pose = pose_by_sines(x, cache[LoadCache.SINES :], body.plane)
     torque = shaft_torque(
         cache[LoadCache.TORQUE],

@@ -66,15 +66,46 @@ class Adams(NamedTuple):
     substeps: object = None  # RotorSubsteps, or None: one evaluation of the rotor load, as of all loads
 
 
+KEPT_STATE, KEPT_RATES = 3, 4  # rows of Data.stages between an output row and the step that begins there
+
+
+@kernel
+def keep_rates(x, u, dx, data):
+    """Keep the rates dx of a state under u, of the last answer, for the next call of rates with both."""
+    cache, state, kept = data.cache, data.stages[KEPT_STATE], data.stages[KEPT_RATES]
+    cache[LoadCache.ANSWERED] = 1.0
+    for i in range(u.shape[0]):
+        cache[LoadCache.COMMAND + i] = u[i]
+    for i in range(x.shape[0]):
+        state[i], kept[i] = x[i], dx[i]
+
+
+@kernel
+def _are_kept(x, u, data):
+    """Return whether keep_rates has the rates of this state under u, and nothing was answered since."""
+    cache, state, changed = data.cache, data.stages[KEPT_STATE], 0
+    if cache[LoadCache.ANSWERED] < 0.5:
+        return False
+    for i in range(u.shape[0]):
+        changed += 1 if u[i] != cache[LoadCache.COMMAND + i] else 0
+    for i in range(x.shape[0]):  # a sum, of which the compiler makes vector instructions
+        changed += 1 if x[i] != state[i] else 0
+    return changed == 0
+
+
 @inlined_kernel
 def rates(t, x, u, model, data, dx):
-    """Fill dx with the rates of the state under u, from the cached loads where they are valid."""
+    """Fill dx with the rates of the state under u, from the cached loads, or kept rates, where valid."""
     cache = data.cache
     if cache[LoadCache.VALID] < 0.5 or cache[LoadCache.TIME] != t:
         evaluate_loads(t, x, model, data, data.stages[0])
         cache[LoadCache.VALID] = 1.0
         cache[LoadCache.TIME] = t
         cache[LoadCache.ELEVATED] = 0.0
+    if _are_kept(x, u, data):
+        for i in range(x.shape[0]):
+            dx[i] = data.stages[KEPT_RATES, i]
+        return
     for i in range(State.INTERNAL, x.shape[0]):
         dx[i] = data.stages[0, i]
     respond(x, u, model, data, dx)

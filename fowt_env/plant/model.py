@@ -75,9 +75,11 @@ class LoadCache(IntEnum):
     SINES = 42  # six entries, state.fill_sines
     FACTORED = 48  # 1 while Data.matrix holds the factors of the state's mass matrix
     SLOW = 49  # 1 while the loads of water and lines are extrapolated, see slow_loads.py
+    ANSWERED = 50  # 1 while Data.stages has rates, see integrators.keep_rates
+    COMMAND = 51  # four entries: command of these rates
 
 
-N_CACHE = 50
+N_CACHE = 55
 
 
 @by_reference
@@ -99,7 +101,7 @@ class Data(NamedTuple):
     member_water: np.ndarray  # (n * N_WATER,) water motion at the member nodes
     added_mass: np.ndarray  # (6, 6) of the last evaluation, symmetric, about the body origin
     matrix: np.ndarray  # (6 + n, 6 + n) factors of mass with added mass; n: modes of the tower
-    stages: np.ndarray  # (5, n_state) derivatives and states within a step
+    stages: np.ndarray  # (5, n_state) derivatives and states within a step, and integrators.keep_rates
     cache: np.ndarray  # (N_CACHE,), see LoadCache
     user: np.ndarray  # (user_loads.user_data_size(n),) wrench of each user load, and its inputs
     history: np.ndarray  # (4, n_state) derivatives of past steps, latest first

@@ -13,8 +13,7 @@ from fowt_env.descriptions.platform import Platform
 from fowt_env.descriptions.turbine import Turbine
 from fowt_env.display import html_table
 from fowt_env.errors import InputError
-from fowt_env.plant.aero.bent_blade import place_entries
-from fowt_env.plant.aero.blade_shape import N_STATION_LOAD
+from fowt_env.plant.aero.bent_blade import blade_entries
 from fowt_env.plant.channels import Channel, channels, put_hub_wind, scales
 from fowt_env.plant.compile.handle import Handle
 from fowt_env.plant.elastic.structure import rotor_scratch
@@ -206,8 +205,7 @@ class Scene:
         aero = self.model.aero
         if self.model.blades is None or aero is None:
             return N_BLADE_LOAD
-        elements = aero.rotor.elements
-        return N_BLADE_LOAD + N_STATION_LOAD * len(elements.radius) + place_entries(elements.modes)
+        return N_BLADE_LOAD + blade_entries(aero.rotor.elements.modes)
 
     def handle(self, data: Data | None = None) -> Handle:
         """Return the model and data in the form that kernels take from Python."""

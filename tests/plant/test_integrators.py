@@ -138,6 +138,45 @@ def test_loads_are_evaluated_as_often_as_it_says():
     fresh_python(COUNT, paths=[Path(__file__).parents[1]], NUMBA_DISABLE_JIT="1")
 
 
+ROWS = """
+import numpy as np
+from fowt_env import build_scene
+from fowt_env.plant.advance import advance, forget, observe, output
+from fowt_env.plant.state import State
+
+for integrator in ("ab4", "rk4"):
+    scene, ends = build_scene(integrator=integrator, fidelity="reference", shaft="torsion"), []
+    for look, width in ((observe, scene.n_measurements), (output, len(scene.channels))):
+        handle, x, u = scene.handle(), np.zeros(scene.n_state), np.array([2e4, 0.1])
+        x[[State.ROTOR_SPEED, State.VX]] = 1.0, 0.3
+        forget(handle)
+        for k in range(8):
+            look(handle, x, u, 0.01 * k, np.zeros_like(x), np.zeros(width))
+            if k == 4:  # a look at what another command would do
+                observe(handle, x, 2.0 * u, 0.04, np.zeros_like(x), np.zeros(scene.n_measurements))
+            u[0] += 1e3 * (k == 3)
+            x[State.ROTOR_SPEED] += 0.01 * (k == 5)
+            advance(handle, x, u, k, 1, 0.01)
+        ends.append(x)
+    assert np.array_equal(*ends), integrator
+    assert ends[0][State.VX] != 0.3
+
+scene, rates = build_scene(sea={"kind": "regular", "H": 4.0, "T": 10.0}, fidelity="reference"), []
+for times in ((0.0, 4.0), (4.0,)):
+    handle, x, u, dx = scene.handle(), np.zeros(scene.n_state), np.zeros(2), np.zeros(scene.n_state)
+    forget(handle)
+    for time in times:
+        output(handle, x, u, time, dx, np.zeros(len(scene.channels)))
+    rates.append(dx)
+assert np.allclose(*rates, rtol=1e-9) and rates[0].any()  # the lines start from their last solution
+"""
+
+
+def test_a_step_after_a_row_counts_what_the_row_does_not_know():
+    """A step takes over the rates of the row where it begins, not under another command, state or time."""
+    fresh_python(ROWS, paths=[Path(__file__).parents[1]], NUMBA_DISABLE_JIT="1")
+
+
 @pytest.mark.parametrize("name", ["ab4", pytest.param("abm4", marks=(pytest.mark.slow, pytest.mark.nightly))])
 def test_a_blade_pitch_that_jumps_to_its_command_leaves_the_step_its_accuracy(name):
     """Without lag each command is a jump, through which no polynomial over past derivatives goes."""

@@ -10,19 +10,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.compile.decorators import inlined_kernel, kernel
-from fowt_env.plant.compile.vector_sums import root
+from fowt_env.plant.compile.decorators import inlined_kernel, shared_kernel
+from fowt_env.plant.compile.vector_sums import SUM_LANES, root
 
 LANES = 4  # stations in a row of a table, as `placed` has it: fewer lanes than by 8 remain without a station
 # results: position (m) and normal of the blade axis, as in blade_shape.Station; velocity by bending along the
 # normal and along t, m/s; pitch of a section without bending less the blade pitch, rad; components of the
 # section's axes, against the rotation and downwind, on those of a coned blade; blade_shape.Lever but for the
-# normal; then for each mode its generalised force per unit of normal and tangential force and pitching moment
-X, R, T, NX, NR, V_NORMAL, V_T, CHANGE, ACROSS, ALONG, TURN, T_NX, T_NR, ARM_X, ARM_R, MODAL = (
-    LANES * k for k in range(16)
-)
-N_PLACE, N_MODAL = 15, 3  # results of a station, and further ones of each mode
+# normal; of bent_sweep.py; then for each mode its generalised force per unit of each row of BentShape.loads
+(
+    X, R, T, NX, NR, V_NORMAL, V_T, CHANGE, ACROSS, ALONG, TURN, T_NX, T_NR, ARM_X, ARM_R, SQUARE, DIRECTION,
+    ROW, MODAL,
+) = (LANES * k for k in range(19))  # fmt: skip
+N_PLACE = 18  # results of a station, and further ones of each mode
 N_REST, N_MODE, N_PAIR = 8, 8, 2  # constants of a station, of each mode, of each pair of modes
+# rows of BentShape.loads and modal: forces of a station along the normal and along t, and pitching moment
+NORMAL, TANGENTIAL, MOMENT, N_STATION_LOAD = 0, LANES, 2 * LANES, 3
+N_SUM = 6  # rows after those of all stations, for sums of lanes
 
 
 class StationModes(NamedTuple):
@@ -44,6 +48,7 @@ class StationModes(NamedTuple):
     load_axial: np.ndarray
     load_shortening: np.ndarray  # (m, n, n)
     table: np.ndarray  # these and the positions of the stations, see constants
+    size: int  # of BentShape.modal of a mode
     lanes: int = LANES
 
 
@@ -54,8 +59,9 @@ class BentShape(NamedTuple):
     modes: StationModes
     q: np.ndarray  # (n,) m, deflections
     v: np.ndarray  # (n,) m/s
-    loads: np.ndarray  # output: N_STATION_LOAD entries for each station, see put_station
+    loads: np.ndarray  # output: rows of each LANES stations, zero to the size of a mode, then rows of sums
     places: np.ndarray  # output of place_stations
+    modal: np.ndarray  # the same, of each mode the MODAL of all stations in the order of loads
 
 
 def constants(shape, modes):
@@ -82,16 +88,34 @@ def constants(shape, modes):
     return np.ascontiguousarray(rows.reshape(len(rows), groups, LANES).swapaxes(0, 1).ravel())
 
 
-def place_entries(modes):
-    """Return the number of entries of BentShape.places of a blade with StationModes."""
+def modal_size(stations):
+    """Return the number of entries of BentShape.modal of a mode, which fill the lanes of a sum."""
+    entries = LANES * N_STATION_LOAD * -(-stations // LANES)
+    return -(-entries // SUM_LANES) * SUM_LANES
+
+
+def blade_entries(modes):
+    """Return the number of entries of loads, places and modal of a BentShape with StationModes."""
     m, n = modes.x.shape
-    return -(-m // LANES) * LANES * (N_PLACE + N_MODAL * n)
+    return (1 + n) * modes.size + LANES * (N_SUM + (N_PLACE + N_STATION_LOAD * n) * -(-m // LANES))
+
+
+@inlined_kernel
+def loaded_at(j, row):
+    """Return the index in BentShape.loads of NORMAL, TANGENTIAL or MOMENT at station j."""
+    return np.uintp((j >> 2) * (LANES * N_STATION_LOAD) + (j & (LANES - 1)) + row)
+
+
+@inlined_kernel
+def sum_of_lanes(row, sums):
+    """Return the sum of LANES entries of sums from `row` on."""
+    return (sums[row] + sums[row + 2]) + (sums[row + 1] + sums[row + 3])
 
 
 @inlined_kernel
 def placed(j, result, shape):
     """Return a result of place_stations (X, R, ...) at station j of a BentShape."""
-    size = LANES * (N_PLACE + N_MODAL * len(shape.modes.count))
+    size = LANES * (N_PLACE + N_STATION_LOAD * len(shape.modes.count))
     at = (j >> 2) * size + (j & (LANES - 1)) + result
     return shape.places[np.uintp(at)]  # an unsigned index avoids the test for negative ones
 
@@ -170,7 +194,7 @@ def _place_lanes(c, out, q, v, n, turn, cone_cosine, cone_sine, lanes):
         out[np.uintp(T_NX + lane)], out[np.uintp(T_NR + lane)] = t * nx, t * nr
         out[np.uintp(ARM_X + lane)], out[np.uintp(ARM_R + lane)] = x, r
         for i in range(n):
-            at, to = LANES * (N_REST + N_MODE * i) + lane, MODAL + LANES * N_MODAL * i + lane
+            at, to = LANES * (N_REST + N_MODE * i) + lane, MODAL + LANES * N_STATION_LOAD * i + lane
             slope_x, slope_y, shorter = (
                 c[np.uintp(at + 2 * LANES)],
                 c[np.uintp(at + 3 * LANES)],
@@ -180,18 +204,21 @@ def _place_lanes(c, out, q, v, n, turn, cone_cosine, cone_sine, lanes):
                 shorter += c[np.uintp(loaded + LANES * (n * i + k) + lane)] * q[k]
             arm_x = c[np.uintp(at + 5 * LANES)] - back_load * slope_x
             arm_y = c[np.uintp(at + 6 * LANES)] - back_load * slope_y
-            out[np.uintp(to)] = up * (cos_pitch * arm_x + sin_pitch * arm_y) + lean * shorter
-            out[np.uintp(to + LANES)] = sin_pitch * arm_x - cos_pitch * arm_y
-            out[np.uintp(to + 2 * LANES)] = lean * (sin_pitch * slope_x - cos_pitch * slope_y)
+            out[np.uintp(to + NORMAL)] = up * (cos_pitch * arm_x + sin_pitch * arm_y) + lean * shorter
+            out[np.uintp(to + TANGENTIAL)] = sin_pitch * arm_x - cos_pitch * arm_y
+            out[np.uintp(to + MOMENT)] = lean * (sin_pitch * slope_x - cos_pitch * slope_y)
 
 
-@kernel
-def place_all(turn, modes, places, q, v, cone_cosine, cone_sine):
-    """Fill the places of a blade at a Turn; modes: StationModes."""
-    table, n = modes.table, len(modes.count)
-    known, found = LANES * (N_REST + N_MODE * n + N_PAIR * n * n), LANES * (N_PLACE + N_MODAL * n)
+@shared_kernel
+def place_all(turn, table, count, size, lanes, places, modal, q, v, cone_cosine, cone_sine):
+    """Fill places and modal of a blade at a Turn; table, count, size and lanes of its StationModes."""
+    n, each = len(count), LANES * N_STATION_LOAD
+    known, found = LANES * (N_REST + N_MODE * n + N_PAIR * n * n), LANES * N_PLACE + each * n
     for k in range(table.shape[0] // known):
+        out = places[k * found : (k + 1) * found]
         _place_lanes(
-            table[k * known : (k + 1) * known], places[k * found : (k + 1) * found], q, v, n, turn,
-            cone_cosine, cone_sine, modes.lanes,
+            table[k * known : (k + 1) * known], out, q, v, n, turn, cone_cosine, cone_sine, lanes
         )  # fmt: skip
+        for i in range(n):  # to one row of each mode, of which a sum makes the best use
+            for row in range(each):
+                modal[size * i + each * k + row] = out[MODAL + each * i + row]

@@ -18,10 +18,13 @@ from fowt_env.plant.aero.bent_blade import (
     ALONG,
     ARM_R,
     ARM_X,
+    MOMENT,
+    NORMAL,
     NR,
     NX,
     T_NR,
     T_NX,
+    TANGENTIAL,
     TURN,
     V_NORMAL,
     V_T,
@@ -31,6 +34,8 @@ from fowt_env.plant.aero.bent_blade import (
     T,
     X,
     constants,
+    loaded_at,
+    modal_size,
     place_all,
     placed,
 )
@@ -54,9 +59,6 @@ class BladeShape(NamedTuple):
     cone_cosine: float
     cone_sine: float  # positive: blades lean upwind
     reach: float  # m, largest distance of a station from the rotor centre
-
-
-N_STATION_LOAD = 3  # entries of the loads of a station
 
 
 class OnAxis(NamedTuple):
@@ -183,6 +185,12 @@ def turn_of(blade_pitch):
     return Turn(blade_pitch, cos(blade_pitch), sin(blade_pitch))
 
 
+@kernel
+def turn_like(turn, blade_pitch):
+    """Return the Turn of a blade pitch (rad), which may be that of another Turn."""
+    return turn if blade_pitch == turn.pitch else turn_of(blade_pitch)
+
+
 # ----------------------------------------------- variants for straight, curved and bent blades
 
 
@@ -231,7 +239,10 @@ def _already_placed(turn, shape):
 @inlined_kernel
 def _place_bent(turn, shape):
     modes, rest = shape.modes, shape.rest
-    place_all(turn, modes, shape.places, shape.q, shape.v, rest.cone_cosine, rest.cone_sine)
+    place_all(
+        turn, modes.table, modes.count, modes.size, modes.lanes, shape.places, shape.modal, shape.q, shape.v,
+        rest.cone_cosine, rest.cone_sine,
+    )  # fmt: skip
 
 
 @inlined_kernel
@@ -292,16 +303,17 @@ def _add_to_straight(load, part, j, turn, shape):
 
 @inlined_kernel
 def _add_to_curved(load, part, j, turn, shape):
-    return _add_by_lever(load, part, lever_of(j, turn, shape))
+    return add_by_lever(load, part, lever_of(j, turn, shape))
 
 
 @inlined_kernel
 def _add_to_bent(load, part, j, turn, shape):
-    return _add_by_lever(load, part, bent_lever(j, shape))
+    return add_by_lever(load, part, bent_lever(j, shape))
 
 
 @inlined_kernel
-def _add_by_lever(load, part, lever):
+def add_by_lever(load, part, lever):
+    """Return the BladeLoad of a curved blade plus a StationLoad with its Lever."""
     fn, ft, moment = part.length * part.normal, part.length * part.tangential, part.length * part.moment
     return BladeLoad(
         load.fx + fn * lever.nx,
@@ -320,12 +332,9 @@ def _keep_nothing(part, j, shape):
 
 @inlined_kernel
 def _keep_station(part, j, shape):
-    row = shape.loads[N_STATION_LOAD * j : N_STATION_LOAD * (j + 1)]
-    row[0], row[1], row[2] = (
-        part.length * part.normal,
-        part.length * part.tangential,
-        part.length * part.moment,
-    )
+    shape.loads[loaded_at(j, NORMAL)] = part.length * part.normal
+    shape.loads[loaded_at(j, TANGENTIAL)] = part.length * part.tangential
+    shape.loads[loaded_at(j, MOMENT)] = part.length * part.moment
 
 
 # (j, blade_pitch, shape) -> rotation of the section of station j about the local blade axis by pitch, rad
@@ -502,7 +511,7 @@ def build_station_modes(line, shapes, chosen, arms, shape):
     x, y, axial, shortening = here
     parts = (x, y, *slopes, axial, shortening, *_parts_of_columns(arms, count))
     parts = (np.ascontiguousarray(part, dtype=np.float64) for part in parts)
-    modes = StationModes(0, (0,) * count, *parts, np.zeros(0))
+    modes = StationModes(0, (0,) * count, *parts, np.zeros(0), modal_size(len(x)))
     return modes._replace(table=constants(shape, modes))
 
 

@@ -10,10 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.aero.bent_blade import BentShape, StationModes
+from fowt_env.plant.aero.bent_blade import LANES, N_SUM, BentShape, StationModes
 from fowt_env.plant.aero.blade_elements import smoothstep
 from fowt_env.plant.aero.blade_shape import (
-    N_STATION_LOAD,
     BladeLoad,
     BladeMotion,
     BladeShape,
@@ -387,15 +386,20 @@ def swept_together(winds, blades, radius):
 
 
 @inlined_kernel
-def sheared_forces(p, q, r, flow, reach, radius):
-    """Return the BladeForce of each of three Blades in a sheared wind; reach: rotor_reach."""
+def sheared_winds(p, q, r, flow, reach):
+    """Return the ShearedWind of each of three Blades; reach: rotor_reach."""
     profile = power_profile(flow.hub.Z - reach, flow.hub.Z + reach, flow.series)
-    winds = (
+    return (
         sheared_wind(flow, p.motion, profile),
         sheared_wind(flow, q.motion, profile),
         sheared_wind(flow, r.motion, profile),
     )
-    return swept_together(winds, (p, q, r), radius)
+
+
+@inlined_kernel
+def sheared_forces(p, q, r, flow, reach, radius):
+    """Return the BladeForce of each of three Blades in a sheared wind; reach: rotor_reach."""
+    return swept_together(sheared_winds(p, q, r, flow, reach), (p, q, r), radius)
 
 
 @kernel
@@ -437,8 +441,9 @@ def _bent_by_modes(number, x, shape, modes, blades):
     q = modes.first + n * number
     v = q + BLADES * n
     row = blades[number, N_BLADE_LOAD:]
-    m = N_STATION_LOAD * modes.x.shape[0]
-    return BentShape(shape, modes, x[q : q + n], x[v : v + n], row[:m], row[m:])
+    m = row.shape[0] - n * modes.size
+    k = modes.size + LANES * N_SUM
+    return BentShape(shape, modes, x[q : q + n], x[v : v + n], row[:k], row[k:m], row[m:])
 
 
 # (number, x, shape, modes, blades) -> shape of a blade (0, 1, ...) in a state

@@ -14,6 +14,8 @@ import numpy as np
 
 from fowt_env.caches import Cache
 from fowt_env.plant.aero.bem_rotor import rotor_load
+from fowt_env.plant.aero.bent_blade import BentShape
+from fowt_env.plant.aero.bent_sweep import bent_forces
 from fowt_env.plant.aero.blade_elements import (
     BladeElements,
     blade_section,
@@ -21,7 +23,7 @@ from fowt_env.plant.aero.blade_elements import (
     elements_key,
     pitching_moment,
 )
-from fowt_env.plant.aero.blade_shape import effective_pitch, place_stations, turn_of
+from fowt_env.plant.aero.blade_shape import BladeShape, effective_pitch, place_stations, turn_like, turn_of
 from fowt_env.plant.aero.blade_sweep import (
     NO_ROTOR_LOAD,
     UNKNOWN_FORCE,
@@ -58,6 +60,7 @@ from fowt_env.plant.aero.station_response import (
 )
 from fowt_env.plant.blade_pitches import pitch_of
 from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel
+from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.state import BLADES, NO_LOAD, State
 
 LEAST_NORMAL = 1e-9  # v_normal of the first direction: limit from upwind, since the load jumps at zero
@@ -152,9 +155,8 @@ def pitches_in_table(x, pitches):
 
 
 @inlined_kernel
-def turn_and_response(blade_pitch, shape, table):
-    """Return (Turn, Tabled) of a blade pitch (rad) within the table and the shape of the blade."""
-    turn = turn_of(blade_pitch)
+def turn_and_response(turn, shape, table):
+    """Return (Turn, Tabled) of a Turn within the table and the shape of the blade."""
     return turn, Tabled(rows_of(turn, table.load, shape), table.arm, shape)
 
 
@@ -163,7 +165,7 @@ def _blade_response(number, first, x, shape, table, pitches):
     """Return (Turn, Tabled) of a blade; first: (Turn, Tabled) of the first blade."""
     if pitches is None:
         return first
-    return turn_and_response(pitch_of(number, x, pitches), shape, table)
+    return turn_and_response(turn_like(first[0], pitch_of(number, x, pitches)), shape, table)
 
 
 @inlined_kernel
@@ -195,6 +197,24 @@ def sampled_force(blade, flow, elements, counters):
     return swept(SampledWind(flow, blade.motion), blade, elements.radius)
 
 
+@inlined_kernel
+def _swept_stations(p, q, r, flow, reach, radius, shape):
+    return sheared_forces(p, q, r, flow, reach, radius)
+
+
+@inlined_kernel
+def _bent_stations(p, q, r, flow, reach, radius, shape):
+    return bent_forces(p, q, r, flow, reach, radius, p.near)
+
+
+# (p, q, r, flow, reach, radius, shape) -> the three BladeForces of sheared_forces; shape: of p
+_forces_of_three = chosen_by_class(
+    "shape",
+    {type(None): _swept_stations, BladeShape: _swept_stations, BentShape: _bent_stations},
+    inlined=True,
+)
+
+
 @kernel
 def section_table_load(t, pose, x, now, series, field, table, counters, pitches, blades):
     """Return the RotorLoad of the state x at time t from the station tables; arguments as in rotor_load.
@@ -212,7 +232,7 @@ def section_table_load(t, pose, x, now, series, field, table, counters, pitches,
         return rotor_load(t, pose, x, now, series, field, elements, None, None, x, counters, pitches, blades)
     bent = shape_of(0, x, shape, elements.modes, blades)
     first, reach = (
-        turn_and_response(x[State.BLADE_PITCH], bent, table),
+        turn_and_response(turn_of(x[State.BLADE_PITCH]), bent, table),
         rotor_reach(elements.tip_radius, shape),
     )
     density = elements.air_density
@@ -220,7 +240,7 @@ def section_table_load(t, pose, x, now, series, field, table, counters, pitches,
         p = tabled_blade(0, first, x, flow, table, None, blades)
         q = tabled_blade(1, first, x, flow, table, pitches, blades)
         r = tabled_blade(2, first, x, flow, table, pitches, blades)
-        forces = sheared_forces(p, q, r, flow, reach, elements.radius)
+        forces = _forces_of_three(p, q, r, flow, reach, elements.radius, bent)
         if stations_outside(forces) == 0:
             return load_of_three(p, q, r, forces, elements, pitches, blades)
     total, boxed = NO_LOAD, is_boxed(flow, reach, shape, field)

@@ -214,9 +214,20 @@ def cell_of(v_normal, v_tangential, total, first):
 
     total: |v_normal| + |v_tangential|. All inputs are safe, also NaN.
     """
+    return cell_at(direction_of(v_normal, v_tangential, total, first), first)
+
+
+@inlined_kernel
+def direction_of(v_normal, v_tangential, total, first):
+    """Return the position in a table of a direction, in cells; arguments as in cell_of."""
     ahead = AHEAD * v_normal
     position = (ahead if v_tangential >= 0.0 else AHEAD * total - BEHIND * v_tangential) / total + first
-    position = position if position > 0.0 else 0.0  # also for NaN
+    return position if position > 0.0 else 0.0  # also for NaN
+
+
+@inlined_kernel
+def cell_at(position, first):
+    """Return the Cell of a position of direction_of."""
     k = min(int(position), first + AHEAD + BEHIND - 1)
     return Cell(np.uintp(k), position - k)  # unsigned indices avoid the test for negative indices
 
@@ -253,10 +264,21 @@ def _same_rows(j, rows, shape):
 def _rows_at_station(j, rows, shape):
     """Return the Rows at the pitch that gives a section without bending the effective pitch of station j."""
     turn, table, change = rows.turn, rows.table, placed(j, CHANGE, shape)
+    return rows_between(row_within(turn.pitch + change), table)
+
+
+@inlined_kernel
+def row_within(pitch):
+    """Return the fractional row index of a pitch (rad) in the table, of its nearest end outside."""
     low, high = DENSE_START * pi / 180.0, COARSE_END * pi / 180.0 - 1e-9
-    row = pitch_row(min(max(turn.pitch + change, low), high))
+    return pitch_row(min(max(pitch, low), high))
+
+
+@inlined_kernel
+def rows_between(row, table):
+    """Return the Rows at a fractional row index."""
     i = int(row) if row > 0.0 else 0
-    return Rows(table[i], table[i + 1], row - i)
+    return Rows(table[np.uintp(i)], table[np.uintp(i + 1)], row - i)
 
 
 # (turn, table, shape) -> Rows of a table that enclose a blade pitch within it, or PitchedRows

@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.blade_pitches import pitch_of
-from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel, shared_kernel
 from fowt_env.plant.compile.handle import by_reference
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.beam import Beam, reduce_beam
 from fowt_env.plant.state import BLADES, State
 
 APART_COSINE, APART_SINE = cos(2.0 * pi / BLADES), sin(2.0 * pi / BLADES)  # of the angle between blades
+COS_AZIMUTH, SIN_AZIMUTH, COS_PITCH, SIN_PITCH = range(4)  # columns of RotorScratch.turns
 
 
 class Point(NamedTuple):
@@ -88,13 +89,33 @@ class RotorFrame(NamedTuple):
     yz: float
 
 
-@kernel
-def fill_blade_axes(c, s, pitch, cone_cosine, cone_sine, frame, axes):
-    """Fill axes (3, 3) with the columns j1, j2, j3 of a blade, platform axes; c, s: of its azimuth."""
+@inlined_kernel
+def _turn_blades(x, pitches, turns):
+    """Fill the turns (3, 4) of RotorScratch: each cosine and sine is found once for loads and outputs."""
+    c, s, pitch = cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH]), x[State.BLADE_PITCH]
+    pitch_cosine, pitch_sine = cos(pitch), sin(pitch)
+    for number in range(BLADES):
+        own = pitch_of(number, x, pitches)
+        if own != pitch:
+            pitch, pitch_cosine, pitch_sine = own, cos(own), sin(own)
+        turn = turns[number]
+        turn[COS_AZIMUTH], turn[SIN_AZIMUTH], turn[COS_PITCH], turn[SIN_PITCH] = (
+            c,
+            s,
+            pitch_cosine,
+            pitch_sine,
+        )
+        c, s = APART_COSINE * c - APART_SINE * s, APART_SINE * c + APART_COSINE * s
+
+
+@inlined_kernel
+def fill_blade_axes(turn, cone_cosine, cone_sine, frame, axes):
+    """Fill axes (3, 3) with the columns j1, j2, j3 of a blade, platform axes; turn (4,): of its turns."""
+    c, s = turn[COS_AZIMUTH], turn[SIN_AZIMUTH]
     rx, ry, rz = c * frame.zx - s * frame.yx, c * frame.zy - s * frame.yy, c * frame.zz - s * frame.yz
     # against the direction of rotation
     kx, ky, kz = c * frame.yx + s * frame.zx, c * frame.yy + s * frame.zy, c * frame.yz + s * frame.zz
-    s, c = sin(pitch), cos(pitch)
+    c, s = turn[COS_PITCH], turn[SIN_PITCH]
     ix, iy, iz = (
         cone_cosine * frame.nx + cone_sine * rx,
         cone_cosine * frame.ny + cone_sine * ry,
@@ -126,12 +147,14 @@ def reduce_blade(number, x, wx, wy, wz, blades, work):
     )  # fmt: skip
 
 
-@inlined_kernel
-def _add_blade(number, x, ax, ay, az, bx, by, bz, wx, wy, wz, blades, work):
+@shared_kernel
+def _add_blade(number, x, frame, bx, by, bz, wx, wy, wz, blades, work):
     """Add a blade, its modes eliminated, to inertia (lower triangle) and bias of the rotor.
 
-    a, b, w: acceleration of the rotor centre, angular acceleration and velocity of the rotating hub.
+    b, w: angular acceleration and velocity of the rotating hub.
     """
+    ax, ay, az = frame.ax, frame.ay, frame.az
+    fill_blade_axes(work.turns[number], blades.cone_cosine, blades.cone_sine, frame, work.axes[number])
     reduce_blade(number, x, wx, wy, wz, blades, work)
     m, n = blades.beam.mass, len(blades.beam.count)
     E, h, M = work.axes[number], work.rest[number], work.mass
@@ -299,12 +322,9 @@ def _no_blades(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work):
 
 @inlined_kernel
 def _add_blades(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work):
-    c, s = cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH])
+    _turn_blades(x, pitches, work.turns)
     for number in range(BLADES):
-        pitch = pitch_of(number, x, pitches)
-        fill_blade_axes(c, s, pitch, blades.cone_cosine, blades.cone_sine, frame, work.axes[number])
-        c, s = APART_COSINE * c - APART_SINE * s, APART_SINE * c + APART_COSINE * s
-        _add_blade(number, x, frame.ax, frame.ay, frame.az, bx, by, bz, wx, wy, wz, blades, work)
+        _add_blade(number, x, frame, bx, by, bz, wx, wy, wz, blades, work)
 
 
 _add_bending = chosen_by_class("blades", {type(None): _no_blades, BladeModes: _add_blades}, inlined=True)

@@ -17,8 +17,8 @@ from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.elastic.tower import (
     Bend,
     TowerModes,
-    bend_of,
     from_nacelle,
+    kept_bend,
     push_modes,
     to_nacelle,
     top_bias,
@@ -513,7 +513,7 @@ def accelerate_elastic(
     their accelerations, and work the rotor (condense_elastic). matrix (6 + n, 6 + n) keeps its factors as in
     accelerate.
     """
-    bend = bend_of(x, tower)
+    bend = kept_bend(tower, work)
     top = top_of(pose, x, bend, tower)
     f, centre = rotor_frame(pose, top, bend, body.gravity, structure)
     first, n = modes_in_state(tower)

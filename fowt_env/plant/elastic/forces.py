@@ -1,10 +1,9 @@
 """Computes the generalised forces of structure and aerodynamics on the modes of bending blades."""
 
-from fowt_env.plant.aero.bent_blade import LANES, MODAL, N_MODAL, placed
-from fowt_env.plant.aero.blade_shape import N_STATION_LOAD
 from fowt_env.plant.aero.blade_sweep import shape_of
 from fowt_env.plant.compile.decorators import inlined_kernel
 from fowt_env.plant.compile.variants import chosen_by_class
+from fowt_env.plant.compile.vector_sums import lane_dot
 from fowt_env.plant.elastic.blades import BladeModes
 from fowt_env.plant.state import BLADES
 
@@ -12,16 +11,9 @@ from fowt_env.plant.state import BLADES
 @inlined_kernel
 def _add_aerodynamics(shape, force):
     """Add the forces of the station loads of a BentShape to force (n,)."""
-    loads = shape.loads
+    size = shape.modes.size
     for i in range(len(shape.modes.count)):
-        mode = MODAL + LANES * N_MODAL * i
-        normal = tangential = moment = 0.0  # sums of their own, which the processor forms at the same time
-        for j in range(shape.modes.x.shape[0]):
-            at = N_STATION_LOAD * j
-            normal += placed(j, mode, shape) * loads[at]
-            tangential += placed(j, mode + LANES, shape) * loads[at + 1]
-            moment += placed(j, mode + 2 * LANES, shape) * loads[at + 2]
-        force[i] += normal + tangential + moment
+        force[i] += lane_dot(shape.modal[size * i : size * (i + 1)], shape.loads[:size], size)
 
 
 @inlined_kernel

@@ -5,15 +5,22 @@ axes i of a blade: x normal to the cone, downwind; y against the rotation; z out
 turned by the blade pitch about z.
 """
 
-from math import cos, pi, sin, sqrt
+from math import sqrt
 from typing import NamedTuple
 
-from fowt_env.plant.aero.blade_shape import N_STATION_LOAD, bent_lever, turn_of
+from fowt_env.plant.aero.bent_blade import MOMENT, NORMAL, TANGENTIAL, loaded_at
+from fowt_env.plant.aero.blade_shape import bent_lever
 from fowt_env.plant.aero.blade_sweep import shape_of
-from fowt_env.plant.blade_pitches import pitch_of
-from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel, shared_kernel
 from fowt_env.plant.compile.variants import chosen_by_class
-from fowt_env.plant.elastic.blades import BladeModes, RotorFrame
+from fowt_env.plant.elastic.blades import (
+    COS_AZIMUTH,
+    COS_PITCH,
+    SIN_AZIMUTH,
+    SIN_PITCH,
+    BladeModes,
+    RotorFrame,
+)
 from fowt_env.plant.elastic.chain import rotor_frame, to_nacelle_axes, top_of
 from fowt_env.plant.elastic.structure import Structure
 from fowt_env.plant.state import BLADES, State, Wrench, cross
@@ -96,9 +103,9 @@ def _turned(E, x, y, z):
 
 
 @inlined_kernel
-def _with_aerodynamics(load, row, pitch, blades):
-    """Return a SectionLoad plus the BladeLoad in a row of Data.blades."""
-    c, s, p, q = blades.cone_cosine, blades.cone_sine, cos(pitch), sin(pitch)
+def _with_aerodynamics(load, row, turn, blades):
+    """Return a SectionLoad plus the BladeLoad in a row of Data.blades; turn: of RotorScratch.turns."""
+    c, s, p, q = blades.cone_cosine, blades.cone_sine, turn[COS_PITCH], turn[SIN_PITCH]
     fx, fy, mx, my = c * row[0] + s * row[1], -row[2], c * row[3] + s * row[4], -row[5]
     return SectionLoad(
         load.fx + p * fx - q * fy, load.fy + q * fx + p * fy, load.fz + c * row[1] - s * row[0],
@@ -118,10 +125,10 @@ def _about(load, x, y, z):
 
 
 @inlined_kernel
-def _outer_aerodynamics(number, x, turn, aero, blades, loads):
+def _outer_aerodynamics(number, x, c, s, aero, blades, loads):
     """Return the SectionLoads about the rotor centre, by the air, outside of the inner and the outer Section.
 
-    Pitched axes; of the station loads of a blade.
+    Pitched axes; of the station loads of a blade; c, s: cosine and sine of its pitch.
     """
     if aero is None:
         return NO_SECTION_LOAD, NO_SECTION_LOAD
@@ -131,8 +138,8 @@ def _outer_aerodynamics(number, x, turn, aero, blades, loads):
     for j in range(blades.inner.outside.shape[0]):
         near, far = blades.inner.outside[j], blades.outer.outside[j]
         if near != 0.0 or far != 0.0:
-            lever, at = bent_lever(j, shape), N_STATION_LOAD * j
-            normal, tangential, moment = shape.loads[at], shape.loads[at + 1], shape.loads[at + 2]
+            lever, normal = bent_lever(j, shape), shape.loads[loaded_at(j, NORMAL)]
+            tangential, moment = shape.loads[loaded_at(j, TANGENTIAL)], shape.loads[loaded_at(j, MOMENT)]
             load = SectionLoad(
                 normal * lever.nx,
                 normal * lever.nr,
@@ -143,7 +150,7 @@ def _outer_aerodynamics(number, x, turn, aero, blades, loads):
             )
             inner = _moved(_plus(inner, near, load), normal, tangential, blades.inner.further[j], lever)
             outer = _moved(_plus(outer, far, load), normal, tangential, blades.outer.further[j], lever)
-    return _pitched(inner, turn, shape.rest), _pitched(outer, turn, shape.rest)
+    return _pitched(inner, c, s, shape.rest), _pitched(outer, c, s, shape.rest)
 
 
 @inlined_kernel
@@ -167,9 +174,9 @@ def _plus(total, factor, load):
 
 
 @inlined_kernel
-def _pitched(load, turn, rest):
+def _pitched(load, c, s, rest):
     """Return the SectionLoad in pitched axes of one along the x, r and t of a BladeShape."""
-    cosine, sine, c, s = rest.cone_cosine, rest.cone_sine, turn.cosine, turn.sine
+    cosine, sine = rest.cone_cosine, rest.cone_sine
     fx, fz = cosine * load.fx + sine * load.fy, cosine * load.fy - sine * load.fx
     mx, mz = cosine * load.mx + sine * load.my, cosine * load.my - sine * load.mx
     return SectionLoad(
@@ -284,7 +291,7 @@ def _displaced(x, q, point):
 
 
 @inlined_kernel
-def _hub_load(x, frame, loads, work):
+def _hub_load(frame, loads, work):
     """Return the Wrench of the rotor on its shaft at the rotor centre, non-rotating rotor axes."""
     f, h = frame, work.hub_load
     fx = f.nx * h[0] + f.ny * h[1] + f.nz * h[2]
@@ -294,8 +301,8 @@ def _hub_load(x, frame, loads, work):
     my = f.yx * h[3] + f.yy * h[4] + f.yz * h[5]
     mz = f.zx * h[3] + f.zy * h[4] + f.zz * h[5]
     for number in range(BLADES):
-        psi, row = x[State.AZIMUTH] + 2.0 * pi * number / BLADES, loads[number]
-        ey, ez = -sin(psi), cos(psi)
+        row, turn = loads[number], work.turns[number]
+        ey, ez = -turn[SIN_AZIMUTH], turn[COS_AZIMUTH]
         fx += row[0]
         fy += row[1] * ey - row[2] * ez
         fz += row[1] * ez + row[2] * ey
@@ -305,32 +312,33 @@ def _hub_load(x, frame, loads, work):
     return Wrench(fx, fy, fz, mx, my, mz)
 
 
-@inlined_kernel
-def _root_load(number, x, dx, frame, pitches, loads, blades, work):
+@shared_kernel
+def _root_load(number, x, dx, frame, loads, blades, work):
     """Return the SectionLoad of the root of a blade (0, 1, 2), pitched axes."""
-    pitch = pitch_of(number, x, pitches)
-    load = _inertial_load(number, x, dx, frame, blades, work)
-    return _about(_with_aerodynamics(load, loads[number], pitch, blades), 0.0, 0.0, blades.hub_radius)
+    load = _with_aerodynamics(
+        _inertial_load(number, x, dx, frame, blades, work), loads[number], work.turns[number], blades
+    )
+    return _about(load, 0.0, 0.0, blades.hub_radius)
 
 
 @inlined_kernel
-def _no_bending(pose, bend, x, dx, pitches, body, structure, tower, blades, loads, work):
+def _no_bending(pose, bend, x, dx, body, structure, tower, blades, loads, work):
     return None
 
 
 @inlined_kernel
-def _bent_rotor(pose, bend, x, dx, pitches, body, structure, tower, blades, loads, work):
+def _bent_rotor(pose, bend, x, dx, body, structure, tower, blades, loads, work):
     frame, _ = rotor_frame(pose, top_of(pose, x, bend, tower), bend, body.gravity, structure)
     return BentRotor(
         frame,
-        _hub_load(x, frame, loads, work),
-        _root_load(0, x, dx, frame, pitches, loads, blades, work),
-        _root_load(1, x, dx, frame, pitches, loads, blades, work),
-        _root_load(2, x, dx, frame, pitches, loads, blades, work),
+        _hub_load(frame, loads, work),
+        _root_load(0, x, dx, frame, loads, blades, work),
+        _root_load(1, x, dx, frame, loads, blades, work),
+        _root_load(2, x, dx, frame, loads, blades, work),
     )
 
 
-# (pose, bend, x, dx, pitches, body, structure, tower, blades, loads, work) -> BentRotor of bending blades,
+# (pose, bend, x, dx, body, structure, tower, blades, loads, work) -> BentRotor of bending blades,
 # None of rigid ones; pose of the platform
 bent_rotor = chosen_by_class("blades", {type(None): _no_bending, BladeModes: _bent_rotor}, inlined=True)
 
@@ -396,18 +404,18 @@ shaft_load = chosen_by_class(
 )
 
 
-@inlined_kernel
-def _record_blade(number, root, x, dx, frame, pitches, aero, blades, loads, work, row):
+@shared_kernel
+def _record_blade(number, root, x, dx, frame, model, blades, loads, work, row):
     """Fill the channels of a blade (0, 1, 2) into the row of record_bending; root: its SectionLoad."""
-    turn, q = turn_of(pitch_of(number, x, pitches)), blades.first + len(blades.beam.count) * number
-    c, s = turn.cosine, turn.sine
+    c, s = work.turns[number, COS_PITCH], work.turns[number, SIN_PITCH]
+    q = blades.first + len(blades.beam.count) * number
     px, py, pz = _displaced(x, q, blades.tip)
     row[number], row[3 + number], row[6 + number] = c * px + s * py, c * py - s * px, pz
     row[9 + number], row[12 + number] = c * root.fx + s * root.fy, c * root.fy - s * root.fx
     row[15 + number], row[18 + number], row[21 + number] = root.fz, root.mx, root.my
     row[40 + number], row[43 + number], row[46 + number] = px, py, root.mz
     _put_particles(number, x, dx, frame, blades, work)
-    near, far = _outer_aerodynamics(number, x, turn, aero, blades, loads)
+    near, far = _outer_aerodynamics(number, x, c, s, model.aero, blades, loads)
     inner = _section_load(number, x, frame, near, blades.inner, blades, work)
     outer = _section_load(number, x, frame, far, blades.outer, blades, work)
     row[24 + number], row[27 + number] = _bending_moments(inner, x, q, blades.inner)
@@ -415,20 +423,20 @@ def _record_blade(number, root, x, dx, frame, pitches, aero, blades, loads, work
 
 
 @inlined_kernel
-def _none_bent(rotor, x, dx, pitches, aero, blades, loads, work, row):
+def _none_bent(rotor, x, dx, model, blades, loads, work, row):
     return
 
 
 @inlined_kernel
-def _record_bent(rotor, x, dx, pitches, aero, blades, loads, work, row):
+def _record_bent(rotor, x, dx, model, blades, loads, work, row):
     for number in range(BLADES):
         root = rotor.first if number == 0 else rotor.second if number == 1 else rotor.third
-        _record_blade(number, root, x, dx, rotor.frame, pitches, aero, blades, loads, work, row)
-    hub, c, s = rotor.hub, cos(x[State.AZIMUTH]), sin(x[State.AZIMUTH])
+        _record_blade(number, root, x, dx, rotor.frame, model, blades, loads, work, row)
+    hub, c, s = rotor.hub, work.turns[0, COS_AZIMUTH], work.turns[0, SIN_AZIMUTH]
     row[36], row[37] = c * hub.my + s * hub.mz, c * hub.mz - s * hub.my
     row[38], row[39] = hub.fy, hub.fz
     row[49], row[50] = c * hub.fy + s * hub.fz, c * hub.fz - s * hub.fy
 
 
-# (rotor, x, dx, pitches, aero, blades, loads, work, row): channels of a BentRotor into row
+# (rotor, x, dx, model, blades, loads, work, row): channels of a BentRotor into row
 record_bending = chosen_by_class("rotor", {type(None): _none_bent, BentRotor: _record_bent}, inlined=True)

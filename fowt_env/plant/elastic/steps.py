@@ -23,7 +23,7 @@ from fowt_env.plant.elastic.chain import answer
 from fowt_env.plant.elastic.in_phase import note_means, reaction_at, restore_means, twist_over
 from fowt_env.plant.elastic.oscillator import swung_by, turn_in
 from fowt_env.plant.elastic.shaft import Torsion, rate_by_twist
-from fowt_env.plant.elastic.tower import bend_by_modes
+from fowt_env.plant.elastic.tower import bend_by_modes, kept_bend
 from fowt_env.plant.state import BLADES, State
 
 IMPLICIT = 251.0 / 720.0  # factor on the fourth difference of a force: Adams-Moulton 4 less Adams-Bashforth 4
@@ -146,7 +146,7 @@ def swing_on(dt, x, order, history, body, tower, blades, shaft, matrix, work, st
     for i in range(tower.first, tower.first + len(tower.beam.count)):
         c = extrapolated(order, history[0, i], history[1, i], history[2, i], history[3, i])
         _swing_mode(i - tower.first, dt, x, y, c, twist, reaction, tower, shaft, work, still)
-    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
+    _move_tower(kept_bend(tower, work), body, tower, blades, matrix, work, still, extra, y)
 
 
 @kernel
@@ -159,7 +159,7 @@ def swing_again(dt, x, order, new, history, body, tower, blades, shaft, matrix, 
     for i in range(tower.first, tower.first + len(tower.beam.count)):
         c = interpolated(order, new[i], history[0, i], history[1, i], history[2, i])
         _swing_mode(i - tower.first, dt, x, y, c, twist, reaction, tower, shaft, work, still)
-    _move_tower(x, body, tower, blades, matrix, work, still, extra, y)
+    _move_tower(bend_by_modes(x, tower), body, tower, blades, matrix, work, still, extra, y)
 
 
 @inlined_kernel
@@ -205,10 +205,10 @@ _swing_mode = chosen_by_class("shaft", {type(None): _swing_alone, Torsion: _swin
 
 
 @inlined_kernel
-def _move_tower(x, body, tower, blades, matrix, work, still, extra, y):
+def _move_tower(bend, body, tower, blades, matrix, work, still, extra, y):
     """Give y the deflections of the own modes in still, and their velocities, by an impulse on the tower."""
     n, q = len(tower.beam.count), tower.first
-    v, bend = q + n, bend_by_modes(x, tower)
+    v = q + n
     for i in range(n):
         y[q + i] = 0.0
         for j in range(n):

@@ -39,6 +39,8 @@ class Structure(NamedTuple):
 class RotorScratch(NamedTuple):
     """Holds the work arrays of a turbine with elastic parts, in platform axes unless said otherwise."""
 
+    bend: np.ndarray  # (13,) tower.Bend of the last evaluation
+    turns: np.ndarray  # (3, 4) of each blade: cosine and sine of the azimuth, then of the pitch
     axes: np.ndarray  # (3, 3, 3) of each blade: columns j1, j2, j3
     # of each blade in its axes (reduce_beam)
     moment: np.ndarray  # (3, 3) first moment
@@ -92,7 +94,7 @@ def rotor_scratch(structure, tower, blades, shaft, n_state):
     n, m = (0 if part is None else len(part.beam.count) for part in (blades, tower))
     z = 0 if blades is None or shaft is None else 1 + n
     shapes = (
-        (3, 3, 3), (BLADES, 3), (BLADES, 6), (BLADES, n, 6), (BLADES, 6), (BLADES, n, 6),
+        13, (BLADES, 4), (3, 3, 3), (BLADES, 3), (BLADES, 6), (BLADES, n, 6), (BLADES, 6), (BLADES, n, 6),
         (n, n), (BLADES, n, n), (BLADES, n), (BLADES, n), (6, 6), 6,
         (6, 6), 6, 6, n, (4, 1 + 2 * n + n * (n + 1) // 2), 6, 6,
         3, 6, (m, 6), (m, m), 6, m, m, 7, 3, (6, m), (m, m), (m, m), (m, m), (2, n_state), 4,

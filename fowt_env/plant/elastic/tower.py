@@ -97,6 +97,30 @@ def bend_by_modes(x, tower):
 bend_of = chosen_by_class("tower", {type(None): _straight, TowerModes: bend_by_modes})
 
 
+@inlined_kernel
+def keep_bend(bend, work):
+    """Keep the Bend of an evaluation for kept_bend; no-op for a rigid tower."""
+    if bend is None:
+        return
+    work.bend[:] = bend
+
+
+@kernel
+def _still_straight(tower, work):
+    return None
+
+
+@inlined_kernel
+def _read_bend(tower, work):
+    x, y, z, height, vx, vy, vz, ca, sa, cb, sb, da, db = work.bend
+    return Bend(x, y, z, height, vx, vy, vz, ca, sa, cb, sb, da, db)
+
+
+# (tower, work) -> Bend of the last evaluation of the loads, None for a rigid tower: sines take longer to find
+# than to read
+kept_bend = chosen_by_class("tower", {type(None): _still_straight, TowerModes: _read_bend})
+
+
 @kernel
 def from_nacelle(bend, x, y, z):
     """Return the platform components of a vector in nacelle axes."""

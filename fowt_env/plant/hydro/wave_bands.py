@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.vector_sums import SUM_LANES, crossed_sums, lane_dot
 from fowt_env.plant.hydro.diffraction import TERMS, coefficient_series
 from fowt_env.plant.hydro.strip_quadrature import (
@@ -188,6 +188,19 @@ def band_scratch(bands, quadrature):
     )
 
 
+@inlined_kernel
+def _half_sine(r):
+    """Return the sine of r, within [-pi/2, pi/2], by its Taylor polynomial."""
+    q = r * r
+    s = 1.0 / 6227020800.0
+    s = -1.0 / 39916800.0 + q * s
+    s = 1.0 / 362880.0 + q * s
+    s = -1.0 / 5040.0 + q * s
+    s = 1.0 / 120.0 + q * s
+    s = -1.0 / 6.0 + q * s
+    return r * (1.0 + q * s)
+
+
 @kernel
 def phasors(t, distance, component, cosine, sine):
     """Fill cosine and sine (n,) of the phase of every component at a distance along the heading.
@@ -199,14 +212,7 @@ def phasors(t, distance, component, cosine, sine):
     for j in range(turn.shape[0]):
         phase = wave_turns[j] * distance - rate_turns[j] * t + turn[j]
         r = pi * (phase - np.rint(phase))
-        q = r * r
-        s = 1.0 / 6227020800.0
-        s = -1.0 / 39916800.0 + q * s
-        s = 1.0 / 362880.0 + q * s
-        s = -1.0 / 5040.0 + q * s
-        s = 1.0 / 120.0 + q * s
-        s = -1.0 / 6.0 + q * s
-        s = r * (1.0 + q * s)
+        q, s = r * r, _half_sine(r)
         c = -1.0 / 87178291200.0
         c = 1.0 / 479001600.0 + q * c
         c = -1.0 / 3628800.0 + q * c
@@ -216,6 +222,16 @@ def phasors(t, distance, component, cosine, sine):
         c = 1.0 - q * (0.5 - q * c)
         cosine[j] = 1.0 - 2.0 * s * s
         sine[j] = 2.0 * s * c
+
+
+@kernel
+def cosines(t, component, cosine):
+    """Fill cosine (n,) of the phase of every component at the origin, as phasors does to the last bit."""
+    rate_turns, turn = component[RATE_TURNS], component[TURN]
+    for j in range(turn.shape[0]):
+        phase = turn[j] - rate_turns[j] * t
+        s = _half_sine(pi * (phase - np.rint(phase)))
+        cosine[j] = 1.0 - 2.0 * s * s
 
 
 @kernel
@@ -236,7 +252,7 @@ def surface_elevation(t, waves, bands, scratch):
         return elevation(t, 0.0, 0.0, waves)
     if waves is None:
         return 0.0
-    phasors(t, 0.0, bands.component, scratch.phasor[0], scratch.phasor[1])
+    cosines(t, bands.component, scratch.phasor[0])
     return ramp_factor(t, bands.ramp) * _component_sum(waves.amplitude, scratch.phasor[0])
 
 

@@ -10,8 +10,9 @@ from fresh_python import fresh_python
 from plant_helpers import rates
 
 from fowt_env.plant.advance import advance, forget
+from fowt_env.plant.dynamics import respond
 from fowt_env.plant.elastic.in_phase import keep_twist
-from fowt_env.plant.elastic.steps import begin_swing, keep_blades, keep_swing
+from fowt_env.plant.elastic.steps import begin_swing, keep_blades, keep_swing, swing_on
 from fowt_env.plant.integrators import START_STEPS
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State
@@ -84,3 +85,35 @@ def test_it_converges_with_order_four(integrator, shaft):
     here = Path(__file__).parent
     found = json.loads(fresh_python(code, paths=(here, here.parents[1]), NUMBA_DISABLE_JIT="1"))
     assert np.log2(found[0] / found[1]) == pytest.approx(4.0, abs=0.35)
+
+
+def not_by_the_tower():
+    """Share of a step's correction for the tower that no force on the tower alone explains."""
+    case, rng = Case("iea15_volturnus_s", "modes", "modes2", wind=False), np.random.default_rng(6)
+    model, data, x = case.scene.model, case.scene.data(), case.random(rng)
+    still, extra = np.zeros((2, len(x)))
+    u, tower, work = commands(x, case), model.tower, data.rotor
+    rates(case.scene, x, u, 0.0, case.scene.handle(data))
+    n, moving = len(tower.beam.count), slice(State.VX, None)
+    answers = np.zeros((1 + n, len(x)))
+    for i, answer in enumerate(answers):
+        data.cache[LoadCache.MODAL + i - 1] += 1e6 * (i > 0)
+        respond(x, u, model, data, answer)
+    begin_swing(0, x, model.rigid_body, tower, model.blades, data.matrix, work, still)
+    y, history = x.copy(), rng.normal(size=(4, len(x)))
+    swing_on(
+        0.05, x, 4, history, model.rigid_body, tower, model.blades, model.shaft, data.matrix, work, still,
+        extra, y,
+    )  # fmt: skip
+    places = tower.first + np.arange(n)
+    change, pushed = y - x, np.diff(answers, axis=0)
+    change[places] = 0.0
+    by_tower = np.linalg.lstsq(pushed[:, moving].T, change[moving], rcond=None)[0] @ pushed
+    return float(np.linalg.norm((change - by_tower)[moving]) / np.linalg.norm(change[moving]))
+
+
+def test_a_step_moves_platform_and_blades_as_a_force_on_the_tower_does():
+    """The momentum of the whole turbine is then kept, however far the tower is bent."""
+    code = "import json, test_order; print(json.dumps(test_order.not_by_the_tower()))"
+    here = Path(__file__).parent
+    assert json.loads(fresh_python(code, paths=(here, here.parents[1]), NUMBA_DISABLE_JIT="1")) < 1e-9

@@ -135,6 +135,8 @@ def shaft_and_tower(case, twin, falling, air):
     if case.n:
         across = np.array([c * shaft[4] + s * shaft[5], c * shaft[5] - s * shaft[4]])
         found["shear force"] = "LSShftFys LSShftFzs", shaft[1:3]
+        turned = np.array([c * shaft[1] + s * shaft[2], c * shaft[2] - s * shaft[1]])
+        found["shear force of the turning shaft"] = "LSShftFya LSShftFza", turned
         found["moment of the turning shaft"] = "LSSTipMya LSSTipMza", across
     return found
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene
+from fowt_env.plant.adams import bashforth, moulton
 from fowt_env.plant.advance import advance, forget
 from fowt_env.plant.elastic.steps import ELASTIC_WEIGHT, IMPLICIT, correct_blades, keep_blades
 from fowt_env.plant.model import LoadCache
@@ -82,6 +83,13 @@ def test_differences_of_blades_are_corrected_for_fourth_differences_of_structure
     wanted = (y[v].reshape(BLADES, n) - dt * force).ravel()
     np.testing.assert_allclose(new[v], wanted, rtol=1e-12, atol=1e-12)
     assert np.array_equal(np.delete(new, np.r_[v]), np.delete(y, np.r_[v]))
+
+
+def test_corrections_are_weighted_by_what_the_formulas_miss():
+    past = (-np.arange(4.0)[:, None]) ** 4  # of s^4, whose fourth difference is 24, and its integral to 1 1/5
+    missed, over = 0.2 - bashforth(4, 0, past), 0.2 - moulton(4, 1.0, 0, past)
+    assert pytest.approx(missed, rel=1e-12) == 24.0 * IMPLICIT
+    assert pytest.approx(missed + over, rel=1e-12) == 24.0 * ELASTIC_WEIGHT
 
 
 def test_slow_loads_are_extrapolated_by_the_cubic_through_four_evaluations():
