@@ -346,7 +346,7 @@ Line LineType UnstrLen NodeAnch NodeFair Flags
 ---------------------- SOLVER OPTIONS -----------
 Option
 (-)
-repeat 120 240
+repeat 240 120
 """
 
 MOORDYN = """--------------------- MoorDyn Input File -------

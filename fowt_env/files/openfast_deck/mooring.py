@@ -231,11 +231,11 @@ def _map_lines(file, sea):
             if number_of(flag) is None:
                 value = number_of(words[i]) if i < len(words) else None
                 file.columns.setdefault(flag, []).append((number, "True" if value is None else value))
-    return [*lines, *(_turned(line, math.radians(angle)) for angle in angles for line in lines)], notes
+    return [*lines, *(_turned(line, -math.radians(angle)) for angle in angles for line in lines)], notes
 
 
 def _turned(line, angle):
-    """Return the line rotated about the vertical axis by an angle in rad."""
+    """Return the line rotated about the vertical axis by an angle in rad (MAP++ repeats clockwise)."""
     c, s = math.cos(angle), math.sin(angle)
     ends = ((round(c * x - s * y, 9), round(s * x + c * y, 9), z) for x, y, z in (line.anchor, line.fairlead))
     return line._replace(**dict(zip(("anchor", "fairlead"), ends, strict=True)))

@@ -525,7 +525,7 @@ def test_lines_of_several_types_keep_their_own_dynamics(tmp_path):
 
 def test_a_repetition_by_zero_doubles_the_lines(tmp_path):
     """As the tension-leg platform of OpenFAST/r-test has it: two tendons at each corner."""
-    path = write_deck(tmp_path, MAP=[("repeat 120 240", "repeat 270 180 90 0 270 180 90")])
+    path = write_deck(tmp_path, MAP=[("repeat 240 120", "repeat 270 180 90 0 270 180 90")])
     lines = read_deck(path).lines
     assert len(lines) == 8
     assert lines[0].anchor == pytest.approx(lines[4].anchor)

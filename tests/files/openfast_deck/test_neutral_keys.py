@@ -70,7 +70,7 @@ def test_a_comment_in_a_table_of_map_is_refused_as_map_takes_it_for_a_row(tmp_pa
     path = write_deck(tmp_path, MAP=[("1 chain 450.0", "!1 chain 300.0 1 2\n1 chain 450.0")])
     with pytest.raises(InputError, match="MAP\\+\\+ has no comments in this table"):
         read_deck(path)
-    other = write_deck(tmp_path, MAP=[("repeat 120 240", "! repeat 90\nrepeat 120 240")])
+    other = write_deck(tmp_path, MAP=[("repeat 240 120", "! repeat 90\nrepeat 240 120")])
     assert len(read_deck(other).lines) == 3  # where it has them
 
 
