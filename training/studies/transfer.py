@@ -476,6 +476,22 @@ def exchanged_table(table, names):
     return markdown_table(head, rows)
 
 
+def weather_table(rows, names):
+    """Return the Markdown table of each wind and seed alone: small differences, and the largest."""
+    lines = []
+    for (wind, seed), group in rows.groupby(["wind", "seed"]):
+        table, line = ratios(averages(group)), [f"{wind:g}", str(seed)]
+        theirs = table.loc[REFERENCE].drop(index=BASELINE)
+        for name in names[1:]:
+            gaps = (table.loc[name].drop(index=BASELINE) - theirs).stack()
+            law, figure = gaps.abs().idxmax()
+            line += [f"{int((gaps.abs() <= CLOSE).sum())} of {gaps.size}"]
+            line += [f"{gaps[(law, figure)]:+.1f}, {figure}, `{law}`"]
+        lines.append(line)
+    heads = [cell for name in names[1:] for cell in (f"{name}, within {CLOSE:g} points", "largest, points")]
+    return markdown_table(["one wind, m/s", "one seed", *heads], lines)
+
+
 def mixed_code(rows):
     """Return [text] that names the commits of the laws whose runs are of more than one; [] if none is."""
     if COMMIT not in rows:
@@ -513,6 +529,8 @@ def report(rows, platform, names=None, laws=None, winds=None):
     )
     parts = [f"{platform}, {words}; ratios to `{BASELINE}` in %", baseline_table(means, names)]
     parts += [make(table, names) for make in (ratio_table, order_table, exchanged_table)]
+    if len(weather) > 1:
+        parts.append(weather_table(rows, names))
     parts += mixed_code(rows)
     return "\n\n".join(parts)
 

@@ -202,6 +202,18 @@ def test_equal_runs_have_equal_ratios_and_order():
     assert "| tower base DEL | kN-m | 10 | 10 |" in text
 
 
+def test_each_wind_and_seed_alone_has_its_largest_difference():
+    rows = stored()
+    metric = FIGURES["fairlead DEL"]
+    here = (rows["model"] == "rigid") & (rows["wind"] == 18.0)
+    rows.loc[here & (rows["law"] == "lqr"), metric] *= 12.0 / 13.0  # 130 to 120 %
+    rows.loc[here & (rows["law"] == "mpc"), metric] *= 14.7 / 14.0  # 140 to 147 %
+    text = report(rows, "oc3_hywind")
+    assert "| 14 | 1 | 45 of 45 | +0.0, " in text
+    assert "| 18 | 1 | 43 of 45 | -10.0, fairlead DEL, `lqr` |" in text
+    assert "one seed" not in report(rows, "oc3_hywind", winds=[14.0])
+
+
 def test_averages_over_laws_of_different_commits_are_named():
     rows = stored()
     rows.loc[(rows["law"] == "mpc") & (rows["wind"] == 18.0), "commit"] = "0123456789"
