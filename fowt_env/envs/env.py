@@ -767,6 +767,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         data = scene.data()
         for name in CARRIED["data"]:
             getattr(data, name)[...] = getattr(run.data, name)
+        for array, carried_over in zip(data.rotor or (), run.data.rotor or (), strict=True):
+            array[...] = carried_over
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
         output(scene.handle(data), run.x, run.u, time, np.zeros_like(run.x), row)
