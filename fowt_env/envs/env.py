@@ -765,10 +765,10 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise ResetNeeded("call reset() first: there is no state yet")
         run, scene = self._episode, self.scene
         data = scene.data()
-        for name in CARRIED["data"]:
-            getattr(data, name)[...] = getattr(run.data, name)
-        for array, carried_over in zip(data.rotor or (), run.data.rotor or (), strict=True):
-            array[...] = carried_over
+        pairs = {"data": (data, run.data), "rotor": (data.rotor, run.data.rotor)}
+        for kind, (copy, source) in pairs.items():
+            for name in CARRIED[kind] if copy is not None else ():
+                getattr(copy, name)[...] = getattr(source, name)
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
         output(scene.handle(data), run.x, run.u, time, np.zeros_like(run.x), row)
