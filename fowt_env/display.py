@@ -1,9 +1,21 @@
-"""Formats HTML tables for objects displayed in notebooks."""
+"""Formats numbers of tables, and HTML tables for objects displayed in notebooks."""
 
 from html import escape
+from numbers import Integral
 
 CELL = 'style="text-align:left;padding:0.15em 0.8em 0.15em 0"'
 NUMBER = 'style="text-align:right;padding:0.15em 0.8em 0.15em 0"'
+
+
+def number_text(value):
+    """Return the text of a value: integers in full, other numbers with four significant digits.
+
+    Numbers below 1e9 have no exponent: 19790 kN-m.
+    """
+    if isinstance(value, str | Integral):
+        return str(value)
+    text = f"{value or 0.0:.4g}"
+    return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e9 else text
 
 
 def html_table(title, headings, rows):

@@ -6,11 +6,11 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from fowt_env.display import number_text
 from fowt_env.files.tables import TABLE_SUFFIXES, read_series
 from fowt_env.training.cli.arguments import parse_names
 from fowt_env.training.cli.console import command, note, output, save_table, wrote
 from fowt_env.training.cli.tables import out, print_table
-from fowt_env.training.reports.metric_words import number_text
 
 FILE = "Run: .outb or .out of OpenFAST, or .outb, .csv or .parquet of fowt."
 

@@ -8,10 +8,10 @@ from rich.text import Text
 from typer import Argument, Option
 
 from fowt_env.descriptions.checks import parse_number
+from fowt_env.display import number_text
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli.console import command, out
 from fowt_env.training.cli.tables import print_table
-from fowt_env.training.reports.metric_words import number_text
 
 SITE_HUB = 100.0  # m, height of the winds of sites
 LAST = ("DEMONSTRATION", "comparison only")  # marks of controllers not for use, which are listed last

@@ -8,11 +8,11 @@ import numpy as np
 from rich.markup import escape
 from typer import Argument, Option
 
+from fowt_env.display import number_text
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import command, note, output, progress_bar
 from fowt_env.training.cli.tables import out
-from fowt_env.training.reports.metric_words import number_text
 
 PLATFORM = "Deck of OpenFAST (.fst), platform file (.toml) or the name of a platform."
 THEIRS = "Run of OpenFAST (.outb, .out) of the first controller, to compare with; needs --controller."

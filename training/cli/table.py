@@ -5,12 +5,12 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.display import number_text
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.console import command, model, output, progress_bar, wrote
 from fowt_env.training.cli.simulate import CONTROLLER
 from fowt_env.training.cli.tables import print_table
-from fowt_env.training.reports.metric_words import number_text
 
 
 @command(model)

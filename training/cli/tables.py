@@ -14,7 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fowt_env.training.reports.metric_words import number_text
+from fowt_env.display import number_text
 
 out = Console(emoji=False, highlight=False, soft_wrap=True)  # no emoji for a controller module:Name:
 GAP = 2

@@ -1,7 +1,5 @@
 """Defines the wording of reports: short names and explanations of metrics, counts and lists of seeds."""
 
-from numbers import Integral
-
 from fowt_env.training.evaluation.metrics import TABLE, better
 from fowt_env.training.evaluation.seeds import ranges
 
@@ -29,17 +27,6 @@ def about_metric(metric):
     name, _, unit = metric.partition("_[")
     meaning = TABLE[metric].meaning if metric in TABLE else name.replace("_", " ")
     return f"{meaning[:1].upper()}{meaning[1:]}. Unit: {unit.removesuffix(']')}. {DIRECTIONS[better(metric)]}"
-
-
-def number_text(value):
-    """Return the text of a value: integers in full, other numbers with four significant digits.
-
-    Numbers below 1e9 have no exponent: 19790 kN-m.
-    """
-    if isinstance(value, str | Integral):
-        return str(value)
-    text = f"{value or 0.0:.4g}"
-    return f"{float(text):.0f}" if "e+0" in text and abs(value) < 1e9 else text
 
 
 def counted(count, noun):

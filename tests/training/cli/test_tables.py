@@ -8,9 +8,9 @@ import pytest
 from typer.testing import CliRunner
 
 import fowt_env
+from fowt_env.display import number_text
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import tables
-from fowt_env.training.reports.metric_words import number_text
 
 
 @pytest.fixture(params=[80, None], ids=["80 columns", "a pipe"])
