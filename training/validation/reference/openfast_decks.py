@@ -627,7 +627,7 @@ class Oc3(Deck):
         if case.get("moordyn"):
             text = moordyn_text(self.read("MoorDyn"))
         else:
-            text = self.read("MAP").replace("ˆ", "^").replace("repeat 240 120", "repeat 120 240")
+            text = self.read("MAP").replace("ˆ", "^")
         (folder / "mooring.dat").write_text(text)
         self._write_wind(folder, case, hub_wind)
         self._write_servodyn(folder, {"control_dt": '"default"', **case}, baseline)
