@@ -128,7 +128,7 @@ def linear_drag(scene, state, omega, sea, motion=AT_REST):
         if group.basis.shape[1] == 2:
             heights.append(group.position[:, 2])
             deviations.append(np.sqrt(np.trace(covariance, axis1=1, axis2=2)))
-    damping += _of_matrix(hydro.matrices, rotation, weight, motion)
+    damping += _of_matrix(hydro.matrices, weight, motion)
     return LinearDrag(damping, excitation, at_rest, np.concatenate(heights), np.concatenate(deviations))
 
 
@@ -166,15 +166,14 @@ def _of_members(members):
     return groups
 
 
-def _of_matrix(matrices, rotation, weight, motion):
-    """Return the (6, 6) linearised quadratic damping of BodyMatrices, which acts on inertial velocities."""
+def _of_matrix(matrices, weight, motion):
+    """Return the (6, 6) linearised quadratic damping of BodyMatrices, which acts on body velocities."""
     if matrices is None or not matrices.quadratic_damping.any():
         return np.zeros((6, 6))
-    turn = np.kron(np.eye(2), rotation)
     hull = np.broadcast_to(motion.waves, (weight.size, 6))
     covariance = np.einsum("n,ni,nj->ij", weight, hull, np.conj(hull)).real + motion.other * np.ones((6, 6))
-    deviation = np.sqrt(np.maximum(np.diag(turn @ covariance @ turn.T), 0.0))
-    return turn.T @ (matrices.quadratic_damping * np.sqrt(8.0 / pi) * deviation) @ turn
+    deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return matrices.quadratic_damping * np.sqrt(8.0 / pi) * deviation
 
 
 def with_drag(model, drag):

@@ -139,6 +139,7 @@ def _buoyancy_centre(hydro, water):
         part, _, _, first = displaced(pose_of(np.zeros(N_RIGID)), hydro.members.bodies)
         volume += part
         moment += first
-    known = hydro.matrices is None or not hydro.matrices.stiffness.any()
+    matrices = hydro.matrices
+    known = matrices is None or not (matrices.stiffness.any() or matrices.water_stiffness.any())
     z = moment / volume if known and volume > 0.0 else float("nan")
     return np.array([-water[4] / water[2], water[3] / water[2], z])

@@ -94,10 +94,10 @@ class HydroCoefficients(Record):
 
 
 class AdditionalLoads(Record):
-    """Holds constant and linear load terms about the body origin in inertial axes, and quadratic damping.
+    """Holds constant and linear load terms about the body origin, and quadratic damping.
 
-    Load = preload - stiffness q - linear_damping q' - quadratic_damping |q'| q', with q surge to yaw:
-    HydroDyn's AddF0, AddCLin, AddBLin and AddBQuad.
+    Load = preload - stiffness q in inertial axes, with q surge to yaw, and - linear_damping nu -
+    quadratic_damping |nu| nu in body axes: HydroDyn's AddF0, AddCLin, AddBLin and AddBQuad.
     """
 
     preload: SixNumbers = (0.0,) * 6  # N, N m

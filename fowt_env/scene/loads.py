@@ -92,7 +92,10 @@ LOADS = {
         "hydro/body_matrices.py", "5.7", "hydro.matrices", "HYDRO", keys=("additional",),
         strength=tuple(
             f"hydro.matrices.{name}"
-            for name in ("constant", "stiffness", "linear_damping", "quadratic_damping", "added_mass")
+            for name in (
+                "preload", "stiffness", "buoyancy", "water_stiffness", "linear_damping", "quadratic_damping",
+                "added_mass",
+            )
         ),
     ),
     "radiation memory": LoadFacts(

@@ -1,27 +1,34 @@
 """Applies constant matrices of a floating body about its undisplaced pose (theory.md, 5.7).
 
 Potential-flow hydrostatics and the added mass at infinite frequency, with the additional preload, stiffness
-and damping of the platform file. Linear theory assumes the undisplaced pose, so all matrices are in inertial
-axes about the body origin, as in HydroDyn:
+and damping of the platform file, about the body origin, each in the axes of HydroDyn:
 
-    F = constant - stiffness q - linear_damping q' - quadratic_damping |q'| q' - added_mass q''
+    inertial axes   preload - stiffness q - added_mass q''
+    heading         buoyancy - water_stiffness (heave, roll, pitch)
+    body axes       -linear_damping nu - quadratic_damping |nu| nu
+
+Heading: the inertial axes turned by the yaw angle, in which roll and pitch are the tilt of the waterplane. A
+stiffness in inertial axes would drive a yawed body in roll by its pitch, near the natural period of both.
 """
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.state import State, Wrench, add, to_body, to_inertial
+from fowt_env.plant.state import State, Wrench, add, to_body
 
 
 class BodyMatrices(NamedTuple):
-    """Holds matrices in inertial axes about the body origin; q: surge, sway, heave, roll, pitch, yaw."""
+    """Holds matrices about the body origin; q: surge, sway, heave, roll, pitch, yaw."""
 
-    constant: np.ndarray  # (6,) buoyancy of the undisplaced body and preload, N, N m
-    stiffness: np.ndarray  # (6, 6)
+    preload: np.ndarray  # (6,) N, N m
+    stiffness: np.ndarray  # (6, 6) additional
+    buoyancy: np.ndarray  # (6,) of the undisplaced body, N, N m
+    water_stiffness: np.ndarray  # (3, 3) hydrostatic, of heave, roll and pitch
     linear_damping: np.ndarray  # (6, 6)
-    quadratic_damping: np.ndarray  # (6, 6), on |q'| q' of each motion
+    quadratic_damping: np.ndarray  # (6, 6), on |nu| nu of each motion
     added_mass: np.ndarray  # (6, 6) at infinite frequency, symmetric
 
 
@@ -29,16 +36,16 @@ def build_body_matrices(potential, additional, density, gravity):
     """Return the BodyMatrices of a PotentialFlow and AdditionalLoads, each optional; None without both."""
     if potential is None and additional is None:
         return None
-    constant, stiffness, added = np.zeros(6), np.zeros((6, 6)), np.zeros((6, 6))
-    linear, quadratic = np.zeros((6, 6)), np.zeros((6, 6))
+    preload, buoyancy, water, added = np.zeros(6), np.zeros(6), np.zeros((3, 3)), np.zeros((6, 6))
+    stiffness, linear, quadratic = np.zeros((6, 6)), np.zeros((6, 6)), np.zeros((6, 6))
     if potential is not None:
         weight = density * gravity * potential.volume
         x, y = potential.centre_of_buoyancy
-        constant += [0.0, 0.0, weight, weight * y, -weight * x, 0.0]
-        stiffness += potential.stiffness
+        buoyancy += [0.0, 0.0, weight, weight * y, -weight * x, 0.0]
+        water += potential.stiffness[2:5, 2:5]
         added += 0.5 * (potential.added_mass_infinite + potential.added_mass_infinite.T)
     if additional is not None:
-        constant += additional.preload
+        preload += additional.preload
         for matrix, rows in (
             (stiffness, additional.stiffness),
             (linear, additional.linear_damping),
@@ -46,40 +53,70 @@ def build_body_matrices(potential, additional, density, gravity):
         ):
             if rows is not None:
                 matrix += np.array(rows)
-    return BodyMatrices(constant, stiffness, linear, quadratic, added)
+    return BodyMatrices(preload, stiffness, buoyancy, water, linear, quadratic, added)
 
 
 @kernel
 def add_body_matrices(pose, x, load, part, added):
     """Return load plus that of BodyMatrices except added mass times acceleration; add to added (6, 6).
 
-    part None: unchanged. Velocities and accelerations are of the body origin: R v and R w, and
-    R (v' + w x v) and R w'.
+    part None: unchanged. Accelerations of the added mass are those of the body origin: R (v' + w x v), R w'.
     """
     if part is None:
         return load
-    u = to_inertial(pose, pose.vx, pose.vy, pose.vz)
-    w = to_inertial(pose, pose.wx, pose.wy, pose.wz)
-    fx = _matrix_force(0, x, u, w, part)
-    fy = _matrix_force(1, x, u, w, part)
-    fz = _matrix_force(2, x, u, w, part)
-    mx = _matrix_force(3, x, u, w, part)
-    my = _matrix_force(4, x, u, w, part)
-    mz = _matrix_force(5, x, u, w, part)
-    force, moment = to_body(pose, fx, fy, fz), to_body(pose, mx, my, mz)
-    turned = Wrench(force[0], force[1], force[2], moment[0], moment[1], moment[2])
-    return add(add(load, turned), _add_turned_mass(pose, part.added_mass, added))
+    level = sqrt(pose.r11 * pose.r11 + pose.r21 * pose.r21)
+    c, s = pose.r11 / level, pose.r21 / level  # of the yaw angle
+    h = part.buoyancy
+    hz, hx, hy = _upright(0, x, part), _upright(1, x, part), _upright(2, x, part)
+    force = to_body(
+        pose,
+        _earth_force(0, x, part) + c * h[0] - s * h[1],
+        _earth_force(1, x, part) + s * h[0] + c * h[1],
+        _earth_force(2, x, part) + hz,
+    )
+    moment = to_body(
+        pose,
+        _earth_force(3, x, part) + c * hx - s * hy,
+        _earth_force(4, x, part) + s * hx + c * hy,
+        _earth_force(5, x, part) + h[5],
+    )
+    u, w = (pose.vx, pose.vy, pose.vz), (pose.wx, pose.wy, pose.wz)
+    held = Wrench(
+        force[0] - _damping(0, u, w, part),
+        force[1] - _damping(1, u, w, part),
+        force[2] - _damping(2, u, w, part),
+        moment[0] - _damping(3, u, w, part),
+        moment[1] - _damping(4, u, w, part),
+        moment[2] - _damping(5, u, w, part),
+    )
+    return add(add(load, held), _add_turned_mass(pose, part.added_mass, added))
 
 
 @kernel
-def _matrix_force(i, x, u, w, part):
-    """Return component i of the matrix load in inertial axes."""
-    total = part.constant[i]
+def _earth_force(i, x, part):
+    """Return component i of preload and additional stiffness, inertial axes."""
+    total = part.preload[i]
     for j in range(6):
         total -= part.stiffness[i, j] * x[State.SURGE + j]
+    return total
+
+
+@kernel
+def _upright(i, x, part):
+    """Return component i of heave, roll and pitch of the hydrostatic load, in the axes of the heading."""
+    total = part.buoyancy[2 + i]
     for j in range(3):
-        total -= (part.linear_damping[i, j] + part.quadratic_damping[i, j] * abs(u[j])) * u[j]
-        total -= (part.linear_damping[i, 3 + j] + part.quadratic_damping[i, 3 + j] * abs(w[j])) * w[j]
+        total -= part.water_stiffness[i, j] * x[State.HEAVE + j]
+    return total
+
+
+@kernel
+def _damping(i, u, w, part):
+    """Return component i of the damping times the velocities u, w of the body, body axes."""
+    total = 0.0
+    for j in range(3):
+        total += (part.linear_damping[i, j] + part.quadratic_damping[i, j] * abs(u[j])) * u[j]
+        total += (part.linear_damping[i, 3 + j] + part.quadratic_damping[i, 3 + j] * abs(w[j])) * w[j]
     return total
 
 
