@@ -23,8 +23,10 @@ class Channel:
     SURGE, HEAVE, PITCH = "PtfmSurge_[m]", "PtfmHeave_[m]", "PtfmPitch_[deg]"
     SPEED, BLADE = "RotSpeed_[rpm]", "BldPitch1_[deg]"
     THRUST, TORQUE, POWER = "RtFldFxh_[N]", "RtFldMxh_[N-m]", "GenPwr_[kW]"
+    SWAY, ROLL, YAW = "PtfmSway_[m]", "PtfmRoll_[deg]", "PtfmYaw_[deg]"
     PLANE = (SURGE, HEAVE, PITCH)
-    MOTIONS = (SURGE, "PtfmSway_[m]", HEAVE, "PtfmRoll_[deg]", PITCH, "PtfmYaw_[deg]")
+    LATERAL = (SWAY, ROLL, YAW)
+    MOTIONS = (SURGE, SWAY, HEAVE, ROLL, PITCH, YAW)
     TENSIONS = ("FAIRTEN1_[kN]", "FAIRTEN2_[kN]", "FAIRTEN3_[kN]")
 
 

@@ -19,6 +19,7 @@ from make_openfast import STEADY as HELD
 
 HERE = Path(__file__).resolve().parent / "iea15_volturnus_s"
 PLANE = ["surge_m", "heave_m", "pitch_deg"]
+LATERAL = ["sway_m", "roll_deg", "yaw_deg"]
 ROTOR = ["rotor_speed_rpm", "blade_pitch_deg", "gen_torque_kNm", "gen_power_elec_kW", "aero_thrust_N"]
 MODEL = (
     "OpenFAST v5.0.0 (2895884d2b), double precision, IEA 15 MW on VolturnUS-S, rigid: six platform motions,"
@@ -62,7 +63,7 @@ CASES = {  # case -> (columns, step, model, settings)
         _CONTROLLED, 0.1, MODEL,
         f"uniform steady 18 m/s, still water; rotor 7.56 rpm, blade pitch 15.4 deg; {ROSCO}",
     ),
-    "turb_18mps_Hs7.5_uniform": (_CONTROLLED, 0.1, MODEL, _TURBULENCE),
+    "turb_18mps_Hs7.5_uniform": ([*_CONTROLLED, *LATERAL], 0.1, MODEL, _TURBULENCE),
     "decay_pitch_tower": (
         [*PLANE, *TOWER], 0.1, BENDING, f"free decay from platform pitch 5 deg; {STILL}",
     ),
