@@ -514,14 +514,25 @@ def century_table(sample, years, extrapolated=None):
 
 
 def coverage_text(table):
-    """Return which values of a century_table the interval of the extrapolation covers, "" without any."""
+    """Return which values of a century_table the interval of the extrapolation covers, "" without any.
+
+    A sampled value has limits of its own, within which the true value may be covered: it is named twice then.
+    """
     known = table[table["covered"].notna()]
-    inside = known["covered"].astype(bool)
+    missed = known[~known["covered"].astype(bool)]
     if known.empty:
         return ""
-    names = ", ".join(f"{row.load} {row.side}" for row in known[~inside].itertuples())
-    count = f"{inside.sum()} of {len(known)}"
-    return f"the interval of the extrapolation covers {count} sampled values; not: {names or 'none'}"
+    above = missed["extrapolated_low"] > missed["high"]  # False for a limit that the sample does not reach
+    undecided = missed[~above & ~(missed["extrapolated_high"] < missed["low"])]
+    text = (
+        f"the interval of the extrapolation covers {len(known) - len(missed)} of {len(known)} sampled values;"
+        f" not: {_names(missed) or 'none'}"
+    )
+    return f"{text} (within the limits of the sample: {_names(undecided)})" if len(undecided) else text
+
+
+def _names(table):
+    return ", ".join(f"{row.load} {row.side}" for row in table.itertuples())
 
 
 def coverage_remarks(folder, labels):

@@ -1,6 +1,7 @@
 """Hours of a site: limits and values of known distributions, weights of strata, and folders."""
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 import pandas as pd
@@ -193,15 +194,21 @@ def test_an_hour_is_a_run_of_its_state(tmp_path):
 
 def test_the_page_names_the_values_that_the_extrapolation_does_not_cover(tmp_path):
     rows = [
-        ("TwrBsMyt", "max", 50.0, True),
-        ("RotThrust", "min", 50.0, False),
-        ("PtfmYaw", "max", 50.0, None),
+        ("TwrBsMyt", "max", 50.0, True, 8.0, 9.0, 7.0, 9.0),
+        ("RotThrust", "min", 50.0, False, -3.0, -2.0, -5.0, -4.0),
+        ("RotThrust", "max", 50.0, False, 3.0, nan, 4.0, 5.0),
+        ("PtfmRoll", "max", 50.0, False, 1.0, 3.0, 4.0, 5.0),
+        ("PtfmYaw", "max", 50.0, None, nan, nan, 4.0, 5.0),
     ]
-    table = pd.DataFrame(rows, columns=["load", "side", "years", "covered"])
-    words = "the interval of the extrapolation covers 1 of 2 sampled values; not: RotThrust min"
+    limits = ["low", "high", "extrapolated_low", "extrapolated_high"]
+    table = pd.DataFrame(rows, columns=["load", "side", "years", "covered", *limits])
+    words = (
+        "the interval of the extrapolation covers 1 of 4 sampled values; not: RotThrust min, RotThrust max,"
+        " PtfmRoll max (within the limits of the sample: RotThrust max)"
+    )
     assert coverage_text(table) == words
     assert coverage_text(table[:1]).endswith("1 of 1 sampled values; not: none")
-    assert coverage_text(table[2:]) == ""
+    assert coverage_text(table[4:]) == ""
     (tmp_path / "century" / "pi").mkdir(parents=True)
     table.to_csv(tmp_path / "century" / "pi" / "century.csv", index=False)
     assert coverage_remarks(tmp_path, ("pi", "lqr")) == (f"pi, once in 50 years: {words}",)
