@@ -157,17 +157,21 @@ def command(group=app):
     """Return a decorator that adds a function to a group of commands, with its errors `reported`.
 
     The command is named after the function, without the suffix "_command". The docstring is the help and,
-    below its line "Examples:", the epilog; lines that begin with "fowt" are examples.
+    below its line "Examples:", the epilog; lines that begin with "fowt" are examples, others are wrapped to
+    the width of the terminal.
     """
 
     def coloured(line):
         return f"[cyan]{escape(line[1])}[/cyan]{escape(line[2])}\n"
 
+    def wrapped(text):
+        return re.sub(r"(?<!\n)\n(?!\n)", " ", text)
+
     def add(function):
         text, _, examples = inspect.cleandoc(function.__doc__).partition("\n\nExamples:\n")
-        epilog = re.sub(r"^(fowt .*?)((?:  # .*)?)$", coloured, examples, flags=re.M)
+        epilog = wrapped(re.sub(r"^(fowt .*?)((?:  # .*)?)$", coloured, examples, flags=re.M))
         name = function.__name__.removesuffix("_command").replace("_", "-")
-        options = {"name": name, "help": text, "epilog": f"[bold]Examples[/bold]\n\n{epilog}"}
+        options = {"name": name, "help": wrapped(text), "epilog": f"[bold]Examples[/bold]\n\n{epilog}"}
         return group.command(**options)(reported(function))
 
     return add

@@ -7,7 +7,7 @@ from typer import Option
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import command, note, out
 
-LAW = "Controller: a name, or NAME[SETTING=VALUE,...] with settings of its sliders."
+LAW = "Controller: a name, also with settings of its sliders, as in pi[KP=1.5]."
 WEATHER = f"{shared.AS_SIMULATE} With a mean wind speed."
 
 

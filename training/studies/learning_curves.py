@@ -81,7 +81,7 @@ def zero_action(name):
 
 def plot(table, path):
     """Plot a panel for each task: validation rewards over the decisions, zero action, and what is solved."""
-    from fowt_env.visual.style import COLOURS, new_figure, save_figure, style_axes
+    from fowt_env.visual.style import COLOURS, head_of, new_figure, save_figure, style_axes
 
     names = list(dict.fromkeys(table["name"]))
     rows = -(-len(names) // ACROSS)
@@ -102,7 +102,7 @@ def plot(table, path):
         if i % ACROSS == 0:
             axis.set_ylabel("reward of a decision", fontsize=8)
         style_axes(axis)
-    figure.axes[0].legend(fontsize=7)
+    head_of(figure, figure.axes, (SB3, SINGLE_FILE, "zero action", "counted as solved"))
     save_figure(figure, path)
 
 

@@ -61,6 +61,22 @@ PLOTS = {  # platform: {case: (channels, time range in s, whether spectra are pl
         "waves_Hs7.5_qtf": (Channel.PLANE, LONG, True),
     },
 }
+TURBULENCE = "turbulence of 18 m/s, {}; waves, Hs 7.5 m"
+TITLES = {  # of the cases in PLOTS
+    "float_steady_8mps": "steady wind of 8 m/s", "float_steady_12mps": "steady wind of 12 m/s",
+    "float_steady_18mps": "steady wind of 18 m/s", "float_windsteps_12_24": "wind steps from 12 to 24 m/s",
+    "regwave_H3T5": "regular wave, H 3 m, T 5 s", "regwave_H4T9": "regular wave, H 4 m, T 9 s",
+    "regwave_H3T5_displaced": "regular wave, H 3 m, T 5 s, wave loads at the displaced position",
+    "waves_Hs7.5": "irregular waves, Hs 7.5 m",
+    "waves_Hs7.5_qtf": "irregular waves, Hs 7.5 m, with difference-frequency loads",
+    "turb_18mps_Hs7.5_uniform": TURBULENCE.format("uniform over the rotor"),
+    "turb_18mps_Hs7.5_uniform_flex": TURBULENCE.format("uniform over the rotor, bending tower"),
+    "turb_18mps_Hs7.5_uniform_tower": TURBULENCE.format("uniform over the rotor, bending tower"),
+    "turb_18mps_Hs7.5_box": TURBULENCE.format("full field"),
+    "wake_pitch_step": "dynamic inflow after a step of blade pitch",
+    "wake_wind_step_18mps": "dynamic inflow after a step of wind at 18 m/s",
+    "elastic, turb_18mps": TURBULENCE.format("bending blades, tower and shaft"),
+}  # fmt: skip
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
     "costs_rotor": ("rotor models, 18 m/s uniform turbulence and Hs 7.5 m", {
@@ -78,6 +94,12 @@ COST_PLOTS = {  # file -> (title, {legend: run})
 }  # fmt: skip
 
 
+def _words(channel):
+    """Return the name of a channel, up to the bracket of its unit, and the unit."""
+    name, _, unit = LABELS[channel].rpartition("(")
+    return name, unit.removesuffix(")")
+
+
 def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=False):
     """Plot stacked panels, one per (channel, {legend: frame}), save them to a path and return the figure.
 
@@ -91,8 +113,9 @@ def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=Fal
         for number, (legend, frame) in enumerate(frames.items()):
             style = {"color": COLOURS[number], "linewidth": 1.0, "label": legend}
             draw(axes, frame, channel, linestyle=LINES[number and (number - 1) % 3 + 1], **style)
-        label = LABELS[channel]
-        axes.set_ylabel(label.replace(")", "²/Hz)") if squared else label, fontsize=8, color=INK)
+        name, unit = _words(channel)
+        unit = f"{unit.replace(' ', '² ')}²/Hz" if squared else unit
+        axes.set_ylabel(f"{name}({unit})", fontsize=8, color=INK)
     ncols = len(panels[0][1])
     rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=ncols, fontsize=8, frameon=False)
     figure.align_ylabels(rows)
@@ -145,7 +168,9 @@ def _steady(study, path):
     style_axes(axes, "wind (m/s)", "difference from OpenFAST (%)")
     for number, (quantity, chosen) in enumerate(rows.groupby("quantity", sort=False)):
         wind = chosen["case"].str.extract(r"steady_(.*)mps")[0].astype(float)
-        style = {"color": COLOURS[number % len(COLOURS)], "markersize": 4, "label": quantity}
+        channel = f"{quantity}_[{chosen['unit'].iloc[0]}]"
+        label = _words(channel)[0].rstrip() if channel in LABELS else quantity
+        style = {"color": COLOURS[number % len(COLOURS)], "markersize": 4, "label": label}
         axes.plot(wind, chosen["error"], "o-", **style)
     axes.legend(fontsize=8, frameon=False)
     return save_figure(figure, path)
@@ -159,7 +184,8 @@ def _responses(study, path):
     names = list(ours.columns[1:])
     figure = new_figure(9.0, 3.2)
     for axes, name in zip(figure.subplots(1, len(names)), names, strict=True):
-        style_axes(axes, "rad/s", title=f"{name} ({'deg/m' if name == 'PtfmPitch' else 'm/m'})")
+        motion, unit = _words(f"{name}_[{'deg' if name == 'PtfmPitch' else 'm'}]")
+        style_axes(axes, "frequency (rad/s)", title=f"{motion.rstrip()} ({unit}/m)")
         axes.semilogy(smooth["omega"], smooth[name], "-", color=COLOURS[0], label="frequency domain")
         axes.semilogy(ours["omega"], ours[name], "o", color=COLOURS[1], markersize=4, label=HERE)
         axes.set_ylim(0.5 * ours[name].min(), 3.0 * ours[name].max())
@@ -235,10 +261,10 @@ def write_plots(study, folder):
         if case in study.runs:
             ours, theirs = study.runs[case]
             frames = {THERE: theirs, HERE: ours}
-            _overlay(frames, channels, window, path(_plot_name(case)), case)
+            _overlay(frames, channels, window, path(_plot_name(case)), TITLES[case])
             if spectra:
                 start = 400.0 if case.startswith("regwave") else 100.0
-                _spectra(frames, channels, path(f"{_plot_name(case)}_spectra"), case, start)
+                _spectra(frames, channels, path(f"{_plot_name(case)}_spectra"), TITLES[case], start)
     if "spectra of the wind" in study.runs:
         channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED)
         for name, (title, runs) in COST_PLOTS.items():

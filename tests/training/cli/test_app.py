@@ -304,6 +304,7 @@ def test_every_command_has_examples_that_can_be_parsed():
         examples = re.findall(r"\[cyan\](fowt .*?)\[/cyan\]", command.epilog or "", re.S)
         if not inner and not examples:
             missing.append(name)
+        assert not re.search(r"[^\n]\n[^\n]", f"{command.help}\n\n{command.epilog or ''}"), name  # wraps
         for example in examples:
             words, called = shlex.split(example)[1:], root
             while hasattr(called, "commands"):

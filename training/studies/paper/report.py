@@ -80,7 +80,7 @@ def spectra(runs, channel, natural, path=None):
             axes.axvline(natural[motion], color=INK, linestyle=":", linewidth=0.8)
         axes.set(xlim=(0.03, 3.0), ylim=(1e-10 * top, 4.0 * top))
         axes.set_title(f"{name}  (dotted: surge, pitch, heave)", fontsize=9, color=INK, loc="left")
-        axes.legend(fontsize=8, frameon=False, loc="upper right", ncols=4)
+        axes.legend(fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4)
     figure.supylabel(f"power density of {LABELS[channel]}, squared per Hz", fontsize=9, color=INK)
     return save_figure(figure, path)
 
