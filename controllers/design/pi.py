@@ -28,6 +28,14 @@ class PIDesign:
     table: list
 
 
+def check_aims(omega, zeta, schedule):
+    """Check the arguments of design_pi. Raises: InputError for omega or zeta outside their ranges."""
+    for key, value, high in (("omega", omega, 3.0), ("zeta", zeta, 5.0)):
+        check_number(key, value, 0.0, high, low_open=True)
+    if schedule not in SCHEDULES:
+        raise unknown("schedule", schedule, SCHEDULES)
+
+
 def design_pi(models, turbine, omega, zeta, schedule="loop"):
     """Return the PIDesign of a turbine for a rotor loop of frequency omega (rad/s) and damping ratio zeta.
 
@@ -35,12 +43,9 @@ def design_pi(models, turbine, omega, zeta, schedule="loop"):
     pitch is fitted by s (1 + pitch/p). With schedule "loop" the small-signal gain of the scheduled law
     follows the inverse of this fit: because the schedule multiplies the integral (theory.md, Eq. (A7)),
     gain_schedule_pitch = 2 p. "published" uses p, as Jonkman, and gives a loop slower than designed.
-    Raises: InputError for omega or zeta outside their ranges, or fewer than two winds above rated.
+    Raises: InputError as check_aims, and for fewer than two winds above rated.
     """
-    for key, value, high in (("omega", omega, 3.0), ("zeta", zeta, 5.0)):
-        check_number(key, value, 0.0, high, low_open=True)
-    if schedule not in SCHEDULES:
-        raise unknown("schedule", schedule, SCHEDULES)
+    check_aims(omega, zeta, schedule)
     ratio = turbine.drivetrain.gear_ratio
     winds, pitches, slopes = [], [], []
     for wind, model in models.items():

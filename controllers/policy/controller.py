@@ -60,7 +60,7 @@ def policy_path(name):
             raise InputError(f"controller 'policy:{name}': there is no such file")
         return path
     if name not in shipped_agents():
-        raise unknown("policy", name, shipped_agents() or ("a path that ends with .npz",))
+        raise unknown("policy", name, [*shipped_agents(), "the path of a .npz file"])
     return AGENTS / f"{name}.npz"
 
 

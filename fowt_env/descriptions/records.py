@@ -205,7 +205,8 @@ def _problem(model, item, origin):
     if isinstance(value, str) and kind == "literal_error":
         options = [option.strip("'") for option in allowed(model, loc).removeprefix("one of ").split(", ")]
         close = did_you_mean(value, options)
-    return [f"{key} = {short(value)}: must be {allowed(model, loc)}.{close}".rstrip(".")]
+    given = f"{key} = {short(value)}" if key else short(value)  # the whole record has no key
+    return [f"{given}: must be {allowed(model, loc)}.{close}".rstrip(".")]
 
 
 def unknown_key(key, name, known):

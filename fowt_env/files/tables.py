@@ -38,14 +38,27 @@ def write_table(frame, path):
 def read_series(path):
     """Return the DataFrame of a time series written by write_table, or of OpenFAST's output (.outb, .out).
 
-    Raises: InputError for a missing or broken file, or another suffix.
+    Raises: InputError for a missing or broken file, another suffix, and text in a column with a unit.
     """
     path = table_path(path, READ_SUFFIXES, "file")
     if path.suffix.lower() in TABLE_SUFFIXES:
-        return read_table(path)
+        return _of_numbers(read_table(path), path)
     from fowt_env.files.openfast import read_out, read_outb
 
     return read_outb(path) if path.suffix.lower() == ".outb" else read_out(path)
+
+
+def _of_numbers(table, path):
+    """Return the table. Raises: InputError for a value of a column with a unit that is no number."""
+    import pandas as pd
+
+    for name in (name for name in table.columns if "_[" in str(name)):
+        wrong = table[name].notna() & pd.to_numeric(table[name], errors="coerce").isna()
+        if wrong.any():
+            row = int(wrong.to_numpy().argmax())
+            found = f"column {name!r}, row {row + 1}: {table[name].iloc[row]!r}"
+            raise InputError(f"file {str(path)!r}: {found} is not a number")
+    return table
 
 
 def read_table(path):

@@ -122,7 +122,8 @@ def plot_schedule(points, path=None, title=None, *, rated_wind=None):
     tables = points if isinstance(points, dict) else {"": points}
     for label, table in tables.items():
         if WIND not in table.columns or len(table) < 2:
-            raise InputError(f"schedule {label!r}: needs a column {WIND!r} and at least two rows")
+            which = f"schedule {label!r}" if label else "the schedule"
+            raise InputError(f"{which}: needs a column {WIND!r} and at least two rows")
     panels = _shown(SCHEDULE, list(tables.values()), "table")
     figure, cells = _grid(panels, min(3, len(panels)), 3.6, 2.2)
     for axes, (name, channel) in zip(cells, panels, strict=True):

@@ -66,7 +66,8 @@ def named_runs(runs, skip=0.0):
         raise InputError("nothing to plot: there are no runs")
     for label, frame in runs.items():
         if TIME not in frame.columns or len(frame) < 2:
-            raise InputError(f"run {label!r}: needs a column {TIME!r} and at least two rows")
+            which = f"run {label!r}" if label else "the run"
+            raise InputError(f"{which}: needs a column {TIME!r} and at least two rows")
     if skip == 0.0:
         return runs
     return named_runs({label: f[f[TIME] >= f[TIME].iloc[0] + skip] for label, f in runs.items()})

@@ -159,11 +159,12 @@ def pi(
     """
     import pandas as pd
 
-    from fowt_env.controllers.design.pi import design_pi
+    from fowt_env.controllers.design.pi import check_aims, design_pi
     from fowt_env.controllers.design.saved_files import save_design
     from fowt_env.controllers.lqr.design import winds_above_rated
     from fowt_env.training.design.sweeps import models_over
 
+    check_aims(omega, zeta, schedule)  # before half a minute of linearising
     scene, speeds, winds = _scene_and_winds(platform, winds, winds_above_rated)
     with progress_bar("linearising", len(speeds)) as update:
         models = models_over(scene, speeds, update)

@@ -34,15 +34,22 @@ def plot(
 
     Runs are files of fowt simulate --out or of an evaluation's runs folder, or .outb files of OpenFAST.
     """
+    import numpy as np
+
+    from fowt_env.descriptions.checks import check_number
     from fowt_env.descriptions.platform import read_platform, turbine_of
     from fowt_env.descriptions.ratings import ratings
     from fowt_env.files.tables import read_series
     from fowt_env.visual import response, time_series
+    from fowt_env.visual.time_series import TIME
 
     if kind not in PLOTS:
         raise unknown("kind of plot", kind, PLOTS)
     path = f"{kind}.png" if out_path is None else out_path
     frames = {name: read_series(file) for name, file in _names(files).items()}
+    lengths = [np.ptp(frame[TIME]) for frame in frames.values() if TIME in frame and len(frame)]
+    if lengths:
+        check_number("skip", skip, 0.0, max(lengths), high_open=True)
     if len(frames) == 1:  # no legend
         frames = {"": next(iter(frames.values()))}
     known = None if platform.lower() == "none" else read_platform(platform)

@@ -21,12 +21,12 @@ def warmup(
     Examples:
     fowt warmup  # simulate and the environment, OC3-Hywind: later runs start at once
     fowt warmup --kinds standard,vector,linear --jobs 2  # other kinds, after the first in parallel
-    fowt warmup --kinds all  # standard, environment, vector, steady, linear, fast and reference
+    fowt warmup --kinds all  # standard, environment, easy, vector, steady, linear, fast and reference
     """
     from fowt_env.warmup import KINDS
     from fowt_env.warmup import warmup as compile_kinds
 
-    names = list(KINDS) if kinds == "all" else parse_names(kinds)
+    names = [kind for name in parse_names(kinds) for kind in (KINDS if name == "all" else (name,))]
     total = len(dict.fromkeys(names))
     if not err.is_terminal:
         note(f"compiling {total} kinds of scene: {', '.join(names)}")

@@ -85,13 +85,13 @@ class Weather:
     def __post_init__(self):
         check_whole_number("seed", self.seed, 0)
         check_number("duration", self.duration, *DURATIONS)
+        if wind_of(self.wind) is None:
+            raise InputError(f"wind = {self.wind!r}: a controller is tuned in a wind")
+        sea_of(self.sea)
 
     def scene(self) -> Scene:
         """Return the scene of the conditions, at fidelity standard. Raises: InputError."""
-        scene = _SCENES.get(self, self._build)
-        if scene.wind_speed is None:
-            raise InputError(f"wind = {self.wind!r}: a controller is tuned in a wind")
-        return scene
+        return _SCENES.get(self, self._build)
 
     def _build(self):
         weather = {"wind": wind_of(self.wind), "sea": sea_of(self.sea), "seed": self.seed}
@@ -114,9 +114,9 @@ class Law:
 
 def law_of(text: str) -> Law:
     """Return the Law of a text, NAME or NAME[KEY=VALUE,...]. Raises: InputError naming key, value, range."""
-    found = re.fullmatch(r"(.+?)(?:\[(.*)\])?", text.strip(), re.S)
+    found = re.fullmatch(r"([^\[]+)(?:\[(.*)\])?", text.strip(), re.S)
     if not found:
-        raise InputError("controller: the name is missing")
+        raise InputError(f"controller {text!r}: must be NAME or NAME[KEY=VALUE,...]")
     name, rest = found.groups()
     known, settings = tunable(name), {}
     for pair in (rest or "").split(",") if rest else ():

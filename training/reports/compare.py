@@ -114,7 +114,8 @@ def compare(mine, theirs, start=None, end=None, channels=()) -> Comparison:
     cut = [frame[(frame[TIME] >= low - 1e-6) & (frame[TIME] <= high + 1e-6)] for frame in frames]
     if min(map(len, cut)) < 16:
         spans = " and ".join(f"{f[TIME].iloc[0]:g} to {f[TIME].iloc[-1]:g} s" for f in frames)
-        raise InputError(f"from {low:g} to {high:g} s: fewer than 16 common rows; the runs cover {spans}")
+        asked = f"from {low if start is None else start:g} to {high if end is None else end:g} s"
+        raise InputError(f"{asked}: fewer than 16 common rows; the runs cover {spans}")
     steps = tuple(
         even_step(which, frame[TIME].to_numpy())
         for which, frame in zip(("first", "second"), cut, strict=True)

@@ -78,10 +78,13 @@ def test_trim_plots_the_schedule_and_plot_does_so_from_its_table(tmp_path):
         (("schedule", "run.csv"), "needs a column"),
         (("series", "run.csv", "--out", "run.what"), "unknown extension"),
         (("spectra", "run.csv", "--platform", "raft"), "raft"),
+        (("series", "run.csv", "--skip", "9999"), "skip = 9999"),
+        (("series", "text.csv"), "'text.csv': column 'RotSpeed_[rpm]', row 2: 'x' is not a number"),
     ],
 )
 def test_what_cannot_be_plotted_is_one_clear_line(arguments, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(tmp_path / "run.csv")
+    (tmp_path / "text.csv").write_text("Time_[s],RotSpeed_[rpm]\n0,12\n1,x\n")
     _, stderr = fowt("plot", *arguments, code=2)
     assert words in stderr.replace("\n", " ")

@@ -40,6 +40,8 @@ def test_a_law_is_read_back_from_its_text_and_holds_no_setting_at_its_start():
         ("pi[kp=1]", ("setting of pi", "'kp'", "KP")),
         ("pi[KP]", ("'KP'", "KEY=VALUE")),
         ("lqr[share=nan]", ("share",)),
+        ("pi[KP=1", ("'pi[KP=1'", "NAME[KEY=VALUE,...]")),
+        ("", ("''", "NAME")),
         ("rosco[kp=2]", ("rosco", "floating_feedback")),
     ],
 )
