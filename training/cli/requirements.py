@@ -50,10 +50,11 @@ def versions() -> list[Package]:
         needed = requirements().get("", [])
         pythons = metadata.metadata(DISTRIBUTION).get("Requires-Python", "")
     except (InputError, metadata.PackageNotFoundError):
-        needed, pythons = [_package(name) for name in ("numpy", "scipy", "numba", "gymnasium", "pandas")], ""
+        names = ("numpy", "scipy", "numba", "llvmlite", "gymnasium", "pandas")
+        needed, pythons = [_package(name) for name in names], ""
     needed = [_package("numba", NUMBA) if package.name == "numba" else package for package in needed]
     python = Package("Python", platform.python_version(), pythons)
-    return [Package(DISTRIBUTION, __version__), python, *needed, _package("llvmlite")]
+    return [Package(DISTRIBUTION, __version__), python, *needed]
 
 
 def optional_parts() -> dict[str, list[Package]]:

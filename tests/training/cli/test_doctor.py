@@ -40,6 +40,8 @@ def test_the_self_test_gives_its_figures_and_fails_with_code_1_on_a_wrong_one(mo
 
 
 def test_a_missing_part_is_told_with_how_to_install_it(monkeypatch):
+    named = [package.name for package in requirements.versions()]
+    assert len(named) == len(set(named)) and {"numba", "llvmlite"} < set(named)
     monkeypatch.setattr(metadata, "requires", lambda name: REQUIRES)
     assert {package.name: package.version for package in requirements.versions()}["numpy"] == np.__version__
     assert set(requirements.optional_parts()) == {"plot", "magic"}
