@@ -14,7 +14,7 @@ from fowt_env.training.cli.arguments import parse_fault, parse_pairs, parse_prot
 from fowt_env.training.cli.console import command, model, note, output, progress_bar, save_table, wrote
 from fowt_env.training.cli.tables import print_table
 
-ROUNDING = 1e-9  # fraction of the mean below which a standard deviation is rounding error
+ROUNDING = 1e-9  # fraction of a channel's largest value below which a statistic is rounding error
 OF_BLADES = ("RootMyc1_[kN-m]", "LSSTipMys_[kN-m]", "LSSTipMzs_[kN-m]")  # only with individual pitch
 LEAST_WAVES = 700.0  # s, weather duration of shorter runs
 WIND = (
@@ -151,10 +151,9 @@ def _print_channels(frame, title):
 
     main = (*(channel for _, channel in PANELS), "GenTq_[kN-m]", "RotThrust_[kN]", *OF_BLADES)
     x = frame[[channel for channel in dict.fromkeys(main) if channel in frame.columns]]
-    mean, deviation = x.mean(), x.std(ddof=0)
-    deviation[deviation < ROUNDING * mean.abs()] = 0.0  # rounding errors of a constant
-    names = [channel.replace("_", " ") for channel in x.columns]
-    rows = zip(names, mean, deviation, x.min(), x.max(), strict=True)
+    largest, names = x.abs().max(), [channel.replace("_", " ") for channel in x.columns]
+    shown = (s.where(s.abs() >= ROUNDING * largest, 0.0) for s in (x.mean(), x.std(ddof=0), x.min(), x.max()))
+    rows = zip(names, *shown, strict=True)
     print_table(("channel", "mean", "std", "min", "max"), rows, title)
 
 

@@ -11,6 +11,7 @@ import fowt_env
 from fowt_env.display import number_text
 from fowt_env.training.cli import app as cli
 from fowt_env.training.cli import tables
+from fowt_env.training.cli.simulate import _print_channels
 
 
 @pytest.fixture(params=[80, None], ids=["80 columns", "a pipe"])
@@ -132,3 +133,11 @@ def test_whole_numbers_are_whole_and_others_have_four_digits():
     ]
     texts = [number_text(x) for x in (1234567, np.int64(1234567), 1234.567, -0.0, float("nan"), "a")]
     assert texts == ["1234567", "1234567", "1235", "0", "nan", "a"]
+
+
+def test_rounding_errors_in_the_statistics_of_a_run_are_printed_as_zero(capsys):
+    run = pd.DataFrame({"BldPitch1_[deg]": [4.4e-10, 8.0], "GenTq_[kN-m]": [43.1, 43.1 + 1e-12]})
+    _print_channels(run, "run")
+    rows = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert ["BldPitch1", "[deg]", "4", "4", "0", "8"] in rows
+    assert ["GenTq", "[kN-m]", "43.1", "0", "43.1", "43.1"] in rows
