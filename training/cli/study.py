@@ -210,6 +210,7 @@ def _html_table(heads, rows):
 
 def _say(board, table, baseline):
     """Print what each controller does better and worse than the baseline, a line each."""
+    from fowt_env.training.evaluation.failures import lost_text
     from fowt_env.training.live.tuning import paired, verdict
 
     good = table[table["status"] == "ok"]
@@ -221,7 +222,7 @@ def _say(board, table, baseline):
         common = pair[0].index.intersection(pair[1].index)
         figures = [part.loc[common].to_dict("records") for part in pair]
         words = verdict(paired(*figures), 1) if len(common) else "no run in common"
-        lost = f", {entry['lost_text']} of {entry['runs']}" if entry["lost"] else ""
+        lost = f", {lost_text(entry)} of {entry['runs']}" if entry["lost"] else ""
         heading = f"[bold]{escape(name)}[/bold] against {escape(baseline)}"
         out.print(f"{heading}, {len(common)} runs each{escape(lost)}")
         for line in words.split("; "):

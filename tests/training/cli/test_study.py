@@ -1,12 +1,14 @@
 """fowt study: a platform and controllers in, one page with a verdict out."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from command_line import fowt
 
 import fowt_env
 from fowt_env.files.tables import write_table
-from fowt_env.training.cli.study import FILM, most_different
+from fowt_env.training.cli.study import FILM, _say, most_different
+from fowt_env.training.live.tuning import SHOWN
 
 SUITE = """\
 
@@ -72,3 +74,13 @@ def test_the_animation_shows_where_the_first_signal_swings_and_the_second_does_n
     first = np.where((time > 300.0) & (time < 300.0 + FILM), 3.0, 1.0) * second
     assert abs(most_different(first, second) - 300.0) <= 4.0
     assert most_different(first[:700], second[:700]) == 60.0
+
+
+def test_the_verdict_counts_the_lost_runs_of_a_controller(capsys):
+    table = pd.DataFrame({
+        "controller": ["gspi_oc3", "gspi_oc3", "mine", "mine"], "case": "ntm_18", "seed": [1, 2, 1, 2],
+        "status": ["ok", "ok", "ok", "failed"], **dict.fromkeys(SHOWN, 1.0),
+    })  # fmt: skip
+    entry = {"controller": "mine", "runs": 2, "lost": 1, "failed": 1, "tripped": 0, "lost_power": 0}
+    _say({"controllers": [entry]}, table, "gspi_oc3")
+    assert "mine against gspi_oc3, 1 runs each, 1 failed of 2" in capsys.readouterr().out
