@@ -1,22 +1,26 @@
-"""Searches for a better last layer of the network of mpc_clone by a population (CMA-ES) on an aim of its own.
+"""Searches for a better last layer of a network of clone_mpc by a population (CMA-ES) on an aim of its own.
 
     python -m fowt_env.training.studies.search_clone lulls --out runs/lulls_0 --seed 0
     python -m fowt_env.training.studies.search_clone gusts --out runs/gusts_0 --seed 0
+    python -m fowt_env.training.studies.search_clone above --out runs/oc4_0 --start runs/oc4/network_3.npz
 
-A candidate adds a linear function of the leading principal components of the second hidden layer to the two
-outputs, rates of torque and blade pitch: UNKNOWNS numbers. All candidates of a generation run the same
-episodes, in weather of training seeds; every RENEWED generations the weather is drawn anew. The cost of a
-candidate is that of the runs as a suite measures them:
+The network is that of mpc_clone or of the file --start, platform and turbine are its own. A candidate adds a
+linear function of the leading principal components of the second hidden layer to the two outputs, rates of
+torque and blade pitch: UNKNOWNS numbers. All candidates of a generation run the same episodes, in weather of
+training seeds; every RENEWED generations the weather is drawn anew. The cost of a candidate is that of the
+runs as a suite measures them:
 
 lulls   the score of the suite lulls.toml beside this file, turbulence of 11.5 to 14.5 m/s, whose limits
         have the aims for rotor speed and shaft
-gusts   the mean of the mean and the largest overspeed in the suite `gusts` over those of mpc_clone, and half
-        the score of the suite above_rated at NORMAL winds over that of mpc_clone, beyond 1; in each run the
-        power below LEAST_POWER of that of mpc_clone costs PRICE
+gusts   the mean of the mean and the largest overspeed in the suite `gusts` over those of the start, and half
+        the score of the suite above_rated at NORMAL winds over that of the start, beyond 1; in each run the
+        power below LEAST_POWER of that of the start costs PRICE
+above   the score of the suite above_rated at NORMAL winds
 
-What exceeds the limits of the suite (of runs, of their mean, and MARGIN of the relative ones) costs PRICE, a
-lost run LOST. The folder has clone.npz, the network at the mean of the last distribution, and search.csv, a
-row for each generation. Method: Hansen, "The CMA evolution strategy: a tutorial", 2016, by the library cma.
+What exceeds the limits of the suite (of runs, of their mean, and MARGIN of the relative ones) or falls below
+the energy of --energy costs PRICE, a lost run LOST. The folder has clone.npz, the network at the mean of the
+last distribution, and search.csv, a row for each generation. Method: Hansen, "The CMA evolution strategy: a
+tutorial", 2016, by the library cma.
 """
 
 import time
@@ -45,8 +49,8 @@ STEP = 0.1
 PRICE = 10.0  # per unit above a limit
 LOST = 10.0  # times the share of lost runs
 MARGIN = 0.96  # of a relative limit: other weather exceeds it by chance
-LEAST_POWER = 0.995  # capped power of a run, of that of mpc_clone
-NORMAL = (12, 16, 20, 24)  # m/s
+LEAST_POWER = 0.995  # capped power of a run, of that of the start
+NORMAL = slice(0, None, 2)  # every second wind of above_rated
 HOLD = {"hold": 100, "smoothing": 0.0, "history": 0}  # zero actions: the baseline alone, few calls
 LULLS = Path(__file__).with_name("lulls.toml")
 REFERENCE = "gspi_oc3"
@@ -80,7 +84,7 @@ class Episodes:
     def run(self, networks=None):
         """Return [{metric: value} or None of a lost run] of each case for each candidate.
 
-        networks: list of {name of SHAPES: array}; None: that of the shipped clone, or another controller.
+        networks: list of {name of SHAPES: array}; None: that of the file, or another controller.
         """
         self.env.set_state(self.start)
         for i, env in enumerate(self.env.envs if networks is not None else ()):
@@ -108,36 +112,45 @@ def mean_of(runs, metric):
     return float(np.mean([run[metric] ** p for run in runs]) ** (1.0 / p))
 
 
-def score_of(runs, reference, suite):
+def score_of(runs, reference, suite, energy=0.0):
     """Return (score, excess over the limits) of runs by a suite, relative to those of a reference.
 
-    None of the runs is lost.
+    energy: least one, of the reference's. None of the runs is lost.
     """
     limits, terms = suite.limits, {term.metric: term.weight for term in suite.score.term}
     names = {*terms, *limits.relative, suite.score.power}
     ratio = {name: mean_of(runs, name) / mean_of(reference, name) for name in names}
     score = np.average([ratio[name] for name in terms], weights=list(terms.values()))
     beyond = [ratio[name] - MARGIN * most for name, most in limits.relative.items()]
+    beyond.append(energy - ratio[suite.score.power])
     beyond += [mean_of(runs, name) / most - 1.0 for name, most in limits.lifetime.items()]
     beyond += [max(run[name] for run in runs) / most - 1.0 for name, most in limits.run.items()]
     return score / ratio[suite.score.power], sum(max(0.0, each) for each in beyond)
 
 
 class Aim:
-    """Computes the costs of candidates on an aim. name: lulls or gusts."""
+    """Computes the costs of candidates on an aim.
 
-    def __init__(self, name, candidates):
-        self.suite = read_suite(LULLS if name == "lulls" else "above_rated")
-        cases = [case for case in self.suite.cases if name == "lulls" or int(case.name[4:]) in NORMAL]
-        self.parts = {"normal": (cases * (2 if name == "lulls" else 1), NORMAL_TIME)}
+    name: lulls, gusts or above; start: file of the network to begin with; energy: least one, of the
+    reference's.
+    """
+
+    def __init__(self, name, candidates, start=FILE, energy=0.0):
+        self.energy, of = energy, read_clone(start)[0]
+        self.suite = read_suite(LULLS if name == "lulls" else "above_rated", of.platform)
+        cases = self.suite.cases * 2 if name == "lulls" else self.suite.cases[NORMAL]
+        self.parts = {"normal": (cases, NORMAL_TIME)}
         if name == "gusts":
-            self.parts["gusts"] = (read_suite("gusts").cases, GUST_TIME)
-        self.own = {part: Episodes(cases, candidates, *time) for part, (cases, time) in self.parts.items()}
-        self.start = {part: Episodes(cases, 1, *time) for part, (cases, time) in self.parts.items()}
+            self.parts["gusts"] = (read_suite("gusts", of.platform).cases, GUST_TIME)
+        law = {"controller": f"policy:{start}"}
+        self.own, self.start = (
+            {part: Episodes(cases, n, *time, **law) for part, (cases, time) in self.parts.items()}
+            for n in (candidates, 1)
+        )
         self.base = Episodes(*self.parts["normal"][:1], 1, *NORMAL_TIME, controller=REFERENCE)
 
     def weather(self, first):
-        """Draw weather by training seeds from number `first` on; run mpc_clone and the reference in it."""
+        """Draw weather by training seeds from number `first` on; run the start and the reference in it."""
         for part, (cases, _) in self.parts.items():
             seeds = seeds_for("training", first, len(cases))
             for episodes in (self.start[part], *([self.base] if part == "normal" else [])):
@@ -159,7 +172,7 @@ class Aim:
         kept = [(run, base) for run, base in zip(runs["normal"], self.reference, strict=True) if run and base]
         if not kept:
             return LOST
-        score, excess = score_of(*zip(*kept, strict=True), self.suite)
+        score, excess = score_of(*zip(*kept, strict=True), self.suite, self.energy)
         total = LOST * np.mean(lost) + PRICE * excess
         if "gusts" not in runs:
             return total + score
@@ -193,7 +206,7 @@ def optimiser(n, candidates, seed):
 
 
 def about_layer(episodes):
-    """Return (components, mean (HIDDEN,), spread (2,)) of the last run of mpc_clone, one in Episodes.
+    """Return (components, mean (HIDDEN,), spread (2,)) of the last run of the start, one in Episodes.
 
     components (COMPONENTS, HIDDEN): of the second hidden layer, of unit variance; spread: standard deviations
     of the outputs.
@@ -220,18 +233,20 @@ def changed(network, components, mean, spread, vector):
 
 
 def main(
-    aim: Annotated[Literal["lulls", "gusts"], typer.Argument(help="Aim of the search.")],
+    aim: Annotated[Literal["lulls", "gusts", "above"], typer.Argument(help="Aim of the search.")],
     out: Annotated[Path, typer.Option(help="Folder of the results.")],
     seed: Annotated[int, typer.Option(help="Seed of the search and of its weather.")] = 0,
     generations: Annotated[int, typer.Option(min=1, help="Generations.")] = 30,
     candidates: Annotated[int, typer.Option(min=4, help="Candidates of a generation.")] = 12,
+    start: Annotated[Path, typer.Option(help="Network to begin with, a file of clone_mpc.")] = FILE,
+    energy: Annotated[float, typer.Option(help="Least energy, of that of gspi_oc3.")] = 0.0,
 ):
     """Search, and write the network at the mean of the last distribution."""
     if (out / "clone.npz").exists():
         raise InputError(f"{out}: already contains a search: needs another folder")
     out.mkdir(parents=True, exist_ok=True)
-    network = read_clone(FILE)[1]
-    judged = Aim(aim, candidates)
+    settings, network = read_clone(start)
+    judged = Aim(aim, candidates, start, energy)
     first = FIRST + 10_000 * seed
     judged.weather(first)
     components, mean, spread = about_layer(judged.start["gusts" if aim == "gusts" else "normal"])
@@ -250,8 +265,12 @@ def main(
         })  # fmt: skip
         search.tell(vectors, costs[:-1])
         found = changed(network, components, mean, spread, search.mean)
-        about = {"aim": aim, "seed": seed, "generations": generation + 1, "candidates": candidates}
-        write_clone(out / "clone.npz", {name: found[name].astype(np.float32) for name in network}, about)
+        about = {
+            "aim": aim, "seed": seed, "generations": generation + 1, "candidates": candidates,
+            "start": settings.about, "energy": energy,
+        }  # fmt: skip
+        arrays = {name: found[name].astype(np.float32) for name in network}
+        write_clone(out / "clone.npz", arrays, settings.model_dump(exclude={"about"}), about)
         write_table(pd.DataFrame(rows), out / "search.csv")
         print({name: round(float(value), 4) for name, value in rows[-1].items()}, flush=True)
 

@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+from fowt_env import simulate
+
 pytest.importorskip("torch")
 pytest.importorskip("osqp")
 
@@ -40,11 +42,24 @@ def test_a_fit_finds_a_smooth_law_and_a_second_one_goes_on_from_it(data, monkeyp
 def test_a_file_is_read_as_it_was_written(data, monkeypatch, tmp_path):
     monkeypatch.setattr(clone_mpc, "STEPS", 1)
     network, _ = clone_mpc.fitted(*data, seed=1)
-    clone_mpc.write_clone(tmp_path / "a.npz", network, {"rounds": 3})
+    clone_mpc.write_clone(tmp_path / "a.npz", network, clone_mpc.settings_of(), {"rounds": 3})
     settings, arrays = read_clone(tmp_path / "a.npz")
     assert settings.about == {"rounds": 3} and settings.period == 0.5
     assert settings.integral_limit == pytest.approx(7.5 * 1.267109)  # of the present mpc
     assert all(np.array_equal(arrays[name], network[name]) for name in SHAPES)
+
+
+def test_settings_of_mpc_are_numbers_of_its_own():
+    assert clone_mpc.mpc_settings(["shaft=0.4", "travel=1"]).shaft == 0.4
+    wrong = (
+        ("shaft", "KEY=NUMBER"),
+        ("shaft=-1", "shaft = -1"),
+        ("shafts=1", "'shafts'"),
+        ("torque_low=0.5", "limit"),
+    )
+    for text, fault in wrong:
+        with pytest.raises(InputError, match=fault):
+            clone_mpc.mpc_settings([text])
 
 
 def test_episodes_are_kept_and_those_of_another_mpc_refused(tmp_path, monkeypatch):
@@ -56,6 +71,8 @@ def test_episodes_are_kept_and_those_of_another_mpc_refused(tmp_path, monkeypatc
     (tmp_path / "teacher.json").write_text(json.dumps({"teacher": {}, "code": "other"}))
     with pytest.raises(InputError, match="episodes are of another mpc"):
         clone_mpc.main(tmp_path)
+    with pytest.raises(InputError, match="--ship: needs platform 'oc3_hywind'"):
+        clone_mpc.main(tmp_path, ship=True, platform="iea15_volturnus_s")
 
 
 def test_the_first_round_is_driven_by_mpc_or_by_the_network_given(tmp_path):
@@ -66,14 +83,13 @@ def test_the_first_round_is_driven_by_mpc_or_by_the_network_given(tmp_path):
 
 @pytest.mark.slow
 def test_an_episode_records_what_mpc_would_do_in_weather_of_training():
+    scene, initial = clone_mpc.episode(3, 12.0, 14.0)
+    assert scene.seed in TRAINING and 12.0 <= scene.wind_speed <= 14.0 and len(initial) == 8
     records = clone_mpc.Records()
-    teacher = clone_mpc.Teacher(clone_mpc.turbine_of("oc3_hywind"), 0.1, records, read_clone()[1])
-    env = clone_mpc.environment(12.0, 14.0, teacher)
-    _, info = env.reset(seed=3)
-    assert info["sampled"]["weather_seed"] in TRAINING and 12.0 <= info["wind_speed"] <= 14.0
-    for _ in range(50):
-        env.step((0.0, 0.0))
+    teacher = clone_mpc.Teacher(scene.turbine, 0.1, records, read_clone()[1])
+    frame = simulate(scene, teacher, 5.0, initial=initial, sensors="standard")
+    assert frame.filter(like="PtfmPitch_[").iloc[0, 0] == pytest.approx(initial["PtfmPitch"])
     inputs, rates = (np.array(part) for part in zip(*records, strict=True))
-    assert inputs.shape == (10, N_INPUTS) and np.abs(rates).max() <= 1.0 and np.ptp(rates, axis=0).min() > 0.0
+    assert inputs.shape == (11, N_INPUTS) and np.abs(rates).max() <= 1.0 and np.ptp(rates, axis=0).min() > 0.0
     imitated = clone_mpc.outputs(read_clone()[1], inputs)
     assert np.corrcoef(imitated[:, 1], rates[:, 1])[0, 1] > 0.9

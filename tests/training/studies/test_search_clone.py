@@ -79,12 +79,15 @@ def test_a_lost_run_and_an_exceeded_limit_cost():
     far = better | {travel: margin + 0.1, "torque_travel_[kN-m/s]": 0.6}
     assert search_clone.score_of([far], [run], suite)[1] == pytest.approx(0.1 + 0.2)
     aim = object.__new__(search_clone.Aim)
-    aim.suite, aim.reference = suite, [run, run, None]
+    aim.suite, aim.reference, aim.energy = suite, [run, run, None], 0.0
     assert aim.cost({"normal": [better, better, better]}) == pytest.approx(0.75)
     assert aim.cost({"normal": [better, None, better]}) == pytest.approx(0.75 + search_clone.LOST / 3.0)
     score = (0.5 + margin + 0.1) / 2.0
     assert aim.cost({"normal": [far, far, far]}) == pytest.approx(score + search_clone.PRICE * 0.3)
     assert aim.cost({"normal": [None, None, better]}) == search_clone.LOST
+    aim.energy, low = 0.95, better | {search_clone.CAPPED: 0.9}
+    assert aim.cost({"normal": [low, low, low]}) == pytest.approx(0.75 / 0.9 + search_clone.PRICE * 0.05)
+    aim.energy = 0.0
     speed = "overspeed_[%]"
     aim.of_start = {"normal": [better, better, better], "gusts": [run | {speed: 10.0}, run | {speed: 30.0}]}
     gusts = [run | {speed: 5.0}, run | {speed: 9.0}]
