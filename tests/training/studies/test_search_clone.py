@@ -11,6 +11,7 @@ from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.studies import search_clone
+from fowt_env.training.studies.clone_mpc import write_clone
 
 
 def test_the_same_seed_searches_alike_from_zero():
@@ -96,3 +97,35 @@ def test_a_lost_run_and_an_exceeded_limit_cost():
     lacking = gusts[1] | {search_clone.CAPPED: search_clone.LEAST_POWER - 0.3}
     more = aim.cost(runs | {"gusts": [gusts[0], lacking]}) - aim.cost(runs)
     assert more == pytest.approx(search_clone.PRICE * 0.3)  # of a single run, not of a mean
+
+
+def test_what_is_found_has_the_settings_of_its_start(monkeypatch, tmp_path):
+    class Calm:
+        start = {"normal": None}
+        of_start = None
+
+        def __init__(self, *given):
+            self.given = given
+
+        def weather(self, first):
+            pass
+
+        def costs(self, networks):
+            return np.arange(len(networks), dtype=float)
+
+        def cost(self, runs):
+            return 1.0
+
+    rng = np.random.default_rng(0)
+    layer = (rng.normal(size=(search_clone.COMPONENTS, HIDDEN)), np.zeros(HIDDEN), np.ones(2))
+    monkeypatch.setattr(search_clone, "Aim", Calm)
+    monkeypatch.setattr(search_clone, "about_layer", lambda episodes: layer)
+    settings, network = read_clone(FILE)
+    own = settings.model_dump(exclude={"about"}) | {"platform": "elsewhere", "integral_limit": 1.5}
+    write_clone(tmp_path / "start.npz", network, own, {"rounds": 7})
+    search_clone.main("above", tmp_path / "out", generations=1, candidates=4, start=tmp_path / "start.npz")
+    found, arrays = read_clone(tmp_path / "out" / "clone.npz")
+    assert (found.platform, found.integral_limit, found.period) == ("elsewhere", 1.5, settings.period)
+    assert found.about["start"] == {"rounds": 7} and found.about["aim"] == "above"
+    assert not np.array_equal(arrays["weight_2"], network["weight_2"])
+    assert np.array_equal(arrays["weight_1"], network["weight_1"])
