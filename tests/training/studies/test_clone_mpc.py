@@ -87,9 +87,10 @@ def test_an_episode_records_what_mpc_would_do_in_weather_of_training():
     assert scene.seed in TRAINING and 12.0 <= scene.wind_speed <= 14.0 and len(initial) == 8
     records = clone_mpc.Records()
     teacher = clone_mpc.Teacher(scene.turbine, 0.1, records, read_clone()[1])
-    frame = simulate(scene, teacher, 5.0, initial=initial, sensors="standard")
+    frame = simulate(scene, teacher, 60.0, initial=initial, sensors="standard")
     assert frame.filter(like="PtfmPitch_[").iloc[0, 0] == pytest.approx(initial["PtfmPitch"])
     inputs, rates = (np.array(part) for part in zip(*records, strict=True))
-    assert inputs.shape == (11, N_INPUTS) and np.abs(rates).max() <= 1.0 and np.ptp(rates, axis=0).min() > 0.0
+    assert inputs.shape == (120, N_INPUTS)
+    assert np.abs(rates).max() <= 1.0 and np.ptp(rates, axis=0).min() > 0.0
     imitated = clone_mpc.outputs(read_clone()[1], inputs)
     assert np.corrcoef(imitated[:, 1], rates[:, 1])[0, 1] > 0.9
