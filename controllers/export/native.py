@@ -197,6 +197,7 @@ def _law(code, controller, table):
         code.enums |= {f"IPC_{entry.name}": int(entry) for entry in CyclicParameter}
         code.enums |= {f"IPC_M_{entry.name}": int(entry) for entry in CyclicMemory}
         code.enums |= {"IPC_TILT_NOTCHES": TILT_NOTCHES, "IPC_N_MEMORY": int(IPC_MEMORY)}
+        code.enums["IPC_IN_PLANE"] = code.enums.get("ROOT_IN_PLANE_1", 0)  # read by flapwise laws alone
         code.macros["IPC_HIGHEST_ANGLE"] = NYQUIST_SHARE * pi
     if name != "floating_feedback":
         code.add("pi_step.c")

@@ -10,7 +10,9 @@ at 1P, which decouples tilt and yaw.
 The cyclic amplitude is limited to `amplitude`, by the drive's rate at the present rotor speed, and by the
 distance of the mean pitch from the drive's limits, without windup. With a `bound` theta follows -(1 -
 bound/|M - G theta|) (M - G theta)/G, and zero within the bound: output-constrained control of the combined
-tilt and yaw, Hummel, Kober and Mulders, Wind Energ. Sci. 10, 2005-2024, 2025. The yaw moment, which yaws the
+tilt and yaw, Hummel, Kober and Mulders, Wind Energ. Sci. 10, 2005-2024, 2025. There M is that of the flapwise
+moments M_oop cos(pitch) + M_ip sin(pitch), which fatigue the blade root: to the load of shear they add the
+part sin(pitch) of the weight's in-plane moment at 1P. The yaw moment, which yaws the
 platform, is cancelled only below `yaw_corner`, and the tilt moment, whose control excites sway and roll,
 passes `tilt_notches`.
 """
@@ -37,7 +39,7 @@ TILT_NOTCHES = 3  # at most, in addition at 3P
 COEFFICIENTS = 5  # of a notch: b0, b1, b2, a1, a2
 NYQUIST_SHARE = 0.9  # of the Nyquist frequency, upper limit of notch frequencies
 BELOW_PLATFORM = 0.25  # of the slowest platform frequency: corner of the yaw moment of ipc_floating
-CONSTRAINED_BOUND = 0.14  # of the largest root moment in steady wind, bound of ipc_constrained
+CONSTRAINED_BOUND = 0.17  # of the largest root moment in steady wind, bound of ipc_constrained
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,8 @@ class CyclicParameter(IntEnum):
     LEAD_TIME = DECAY + 6  # s
     BOUND = DECAY + 7  # N m
     YAW_DECAY = DECAY + 8  # fraction of the yaw moment's low pass that remains after one period
-    NOTCHES = DECAY + 9  # coefficients of the tilt moment's notches
+    FLAPWISE = DECAY + 9  # 1: flapwise root moments, 0: moments out of the rotor plane
+    NOTCHES = DECAY + 10  # coefficients of the tilt moment's notches
 
 
 N_PARAMETERS = CyclicParameter.NOTCHES + TILT_NOTCHES * COEFFICIENTS
@@ -175,6 +178,10 @@ def cyclic_step(parameters, memory, measurement, command):
     for blade in range(BLADES):
         psi = azimuth + 2.0 * pi * blade / BLADES
         moment = measurement[N_MEASUREMENTS + BladeMeasure.ROOT_OUT_OF_PLANE_1 + blade]
+        if p[CyclicParameter.FLAPWISE] > 0.5:
+            pitch = measurement[N_MEASUREMENTS + BladeMeasure.BLADE_PITCH_1 + blade]
+            in_plane = measurement[N_MEASUREMENTS + BladeMeasure.ROOT_IN_PLANE_1 + blade]
+            moment = moment * cos(pitch) + in_plane * sin(pitch)
         tilt += 2.0 / BLADES * moment * cos(psi)
         yaw += 2.0 / BLADES * moment * sin(psi)
     slope = p[CyclicParameter.SLOPE] * (1.0 + mean / p[CyclicParameter.DOUBLING])
@@ -218,6 +225,7 @@ class IPC(PI):
 
     kernel = staticmethod(ipc_law)
     individual = True
+    flapwise = False  # whether it acts on flapwise moments
     inputs = (
         *PI.inputs, "azimuth", "blade_pitch_1", "blade_pitch_2", "blade_pitch_3",
         "root_out_of_plane_1", "root_out_of_plane_2", "root_out_of_plane_3",
@@ -247,6 +255,7 @@ class IPC(PI):
             lead_time(turbine, self.law_dt) if cyclic.lead else 0.0,
             cyclic.bound * slope.moment,
             exp(-self.law_dt * cyclic.yaw_corner),  # 0 without a corner
+            float(self.flapwise),
         )
         coefficients = np.zeros((TILT_NOTCHES, COEFFICIENTS))
         coefficients[:, 0] = 1.0  # all-pass
@@ -267,6 +276,13 @@ class IPC(PI):
         self.memory[CyclicMemory.BLADES : CyclicMemory.BLADES + BLADES] = pitches
 
 
+class FlapwiseIPC(IPC):
+    """Implements IPC on the flapwise moments of the blade roots."""
+
+    flapwise = True
+    inputs = (*IPC.inputs, "root_in_plane_1", "root_in_plane_2", "root_in_plane_3")
+
+
 class FloatingIPC(IPC):
     """Implements IPC without action at the platform's frequencies of sway, roll and yaw."""
 
@@ -285,9 +301,9 @@ def ipc(turbine, control_dt):
 
 
 def ipc_constrained(turbine, control_dt):
-    """Apply ipc to hub moments above a bound: most of its load reduction for a third of its travel."""
+    """Apply ipc to flapwise moments above a bound: most of its load reduction for a third of its travel."""
     settings = IPCSettings(bound=CONSTRAINED_BOUND)
-    return IPC(PISettings.published(turbine), settings, control_dt, "ipc_constrained")
+    return FlapwiseIPC(PISettings.published(turbine), settings, control_dt, "ipc_constrained")
 
 
 def ipc_floating(turbine, control_dt):

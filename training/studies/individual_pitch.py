@@ -1,15 +1,15 @@
 """Computes load reduction and pitch travel of individual pitch control, and its effect on platform motion.
 
-Runs the suite `ipc` with the controllers of NAMES and with `ipc` limited to BOUNDS. Prints metrics relative
-to the same law with collective pitch (lifetime means over winds and seeds),
-and the fractions of load reduction and of added travel of `ipc` that remain at each bound.
+Runs the suite `ipc` with the controllers of NAMES and `ipc_constrained` with other BOUNDS. Prints metrics
+relative to the same law with collective pitch (lifetime means over winds and seeds), and root load, travel
+and load of the pitch bearings over those of `pi`, over the lifetime and in each wind.
 """
 
 import argparse
 
 import pandas as pd
 
-from fowt_env.controllers.ipc.law import IPC, IPCSettings
+from fowt_env.controllers.ipc.law import FlapwiseIPC, IPCSettings
 from fowt_env.controllers.pi import PISettings
 from fowt_env.descriptions.platform import read_platform
 from fowt_env.descriptions.turbine import read_turbine
@@ -17,21 +17,26 @@ from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.metrics import mean_exponent
 from fowt_env.training.evaluation.run_case import CONTROL_DT
+from fowt_env.training.evaluation.seeds import with_drawn_seeds
 
 SUITE, PLATFORM = "ipc", "oc3_hywind"
 NAMES = {  # controller -> same law with collective pitch
     "pi": "pi", "ipc": "pi", "ipc_constrained": "pi", "ipc_floating": "pi",
     "rosco": "rosco", "rosco_ipc": "rosco",
 }  # fmt: skip
-BOUNDS = (0.05, 0.1, 0.14, 0.2, 0.3)  # of IPCSettings
+BOUNDS = (0.1, 0.14, 0.2, 0.3)  # of IPCSettings
 TRAVEL, ROOT, WEIGHT = "each_blade_travel_[deg/s]", "RootMyb_DEL_[kN-m]", "weight_[-]"
+OUT_OF_PLANE, BEARING = "RootMyc_DEL_[kN-m]", "PitchBrg_DEL_[kN-m]"
 SHOWN = {
-    "root flapwise": ROOT, "root edgewise": "RootMxb_DEL_[kN-m]",
-    "shaft bending": "LSSTipMya_DEL_[kN-m]", "pitch bearing": "PitchBrg_DEL_[kN-m]",
+    "root flapwise": ROOT, "root out of plane": OUT_OF_PLANE, "root edgewise": "RootMxb_DEL_[kN-m]",
+    "shaft bending": "LSSTipMya_DEL_[kN-m]", "pitch bearing": BEARING,
     "bearing tilt": "YawBrMyp_DEL_[kN-m]", "bearing yaw": "YawBrMzp_DEL_[kN-m]",
     "tower base": "TwrBsMyt_DEL_[kN-m]", "platform pitch": "PtfmPitch_std_[deg]",
     "platform yaw": "PtfmYaw_std_[deg]", "platform roll": "PtfmRoll_std_[deg]",
     "platform sway": "PtfmSway_std_[m]", "rotor speed": "RotSpeed_std_[rpm]", "power": "GenPwr_mean_[kW]",
+}  # fmt: skip
+PAID = {
+    "root flapwise": ROOT, "root out of plane": OUT_OF_PLANE, "travel": TRAVEL, "pitch bearing": BEARING,
 }  # fmt: skip
 
 
@@ -61,29 +66,32 @@ def ratios(figures):
 
 
 def trade_off(figures):
-    """Return a DataFrame of the fractions of load reduction and added travel of ipc at each bound."""
-    change = (figures[[ROOT, TRAVEL]] - figures.loc["pi", [ROOT, TRAVEL]]).filter(
-        regex="^ipc$|^bound", axis=0
-    )
-    fractions = change / change.loc["ipc"]
-    return fractions.set_axis(["fraction of relief", "fraction of travel"], axis=1).rename_axis(None)
+    """Return a DataFrame of PAID of the laws with the mean pitch of pi, over those of pi."""
+    chosen = figures.filter(regex="^ipc|^bound", axis=0)[list(PAID.values())]
+    return (chosen / figures.loc["pi"])[list(PAID.values())].set_axis([*PAID], axis=1).rename_axis(None)
 
 
 def main(arguments=None):
     """Run the suite and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--platform", default=PLATFORM)
-    parser.add_argument("--seeds", type=int, nargs="+", help="weather seeds; those of the suite by default")
+    seeds = parser.add_mutually_exclusive_group()
+    seeds.add_argument("--seeds", type=int, nargs="+", help="weather seeds; those of the suite by default")
+    seeds.add_argument("--draw-seeds", help="hash from which the seeds are drawn, as by fowt evaluate")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--out", help="results folder; a later run continues")
     args = parser.parse_args(arguments)
     published = PISettings.published(read_turbine(read_platform(args.platform).turbine))
     laws = {name: name for name in NAMES}
-    laws |= {f"bound {b:g}": IPC(published, IPCSettings(bound=b), CONTROL_DT) for b in BOUNDS}
+    laws |= {f"bound {b:g}": FlapwiseIPC(published, IPCSettings(bound=b), CONTROL_DT) for b in BOUNDS}
     options = {"jobs": args.jobs, "folder": args.out} | ({"seeds": args.seeds} if args.seeds else {})
-    figures = means(evaluate(laws, read_suite(SUITE, args.platform), **options))
-    print(ratios(figures).round(3).to_string())
-    print(trade_off(figures).round(3).to_string())
+    suite = read_suite(SUITE, args.platform)
+    if args.draw_seeds is not None:
+        suite = with_drawn_seeds(suite, args.draw_seeds)
+    table = evaluate(laws, suite, **options)
+    print(ratios(means(table)).round(3).to_string())
+    for name, part in [("lifetime", table), *table.groupby("case", sort=False)]:
+        print(f"{name}\n{trade_off(means(part)).round(3).to_string()}")
 
 
 if __name__ == "__main__":

@@ -63,8 +63,11 @@ static void ipc_step(const double *p, double *m, const double *reading, double *
     rotor_speed = m[PI_M_FILTERED_SPEED] / p[PI_GEAR_RATIO];
     for (i = 0; i < 3; i++) {
         double psi = reading[AZIMUTH] + TURN * i / 3;
-        tilt += 2.0 / 3 * reading[ROOT_OUT_OF_PLANE_1 + i] * cos(psi);
-        yaw += 2.0 / 3 * reading[ROOT_OUT_OF_PLANE_1 + i] * sin(psi);
+        double moment = reading[ROOT_OUT_OF_PLANE_1 + i], pitch = reading[BLADE_PITCH_1 + i];
+        if (p[IPC_FLAPWISE] > 0.5)
+            moment = moment * cos(pitch) + reading[IPC_IN_PLANE + i] * sin(pitch);
+        tilt += 2.0 / 3 * moment * cos(psi);
+        yaw += 2.0 / 3 * moment * sin(psi);
     }
     slope = p[IPC_SLOPE] * (1.0 + mean / p[IPC_DOUBLING]);
     along = m[IPC_M_TILT];

@@ -12,6 +12,7 @@ from fowt_env.controllers.ipc.design import BANDWIDTH, drive_lag, lead_time, roo
 from fowt_env.controllers.ipc.law import (
     IPC,
     CyclicMemory,
+    FlapwiseIPC,
     IPCSettings,
     greatest_amplitude,
     ipc,
@@ -51,11 +52,12 @@ def custom(**settings):
     return prepared(IPC(PISettings.published(TURBINE), IPCSettings(**settings), DT))
 
 
-def run(law, load, seconds=60.0, time_constant=0.2, measured=STILL):
+def run(law, load, seconds=60.0, time_constant=0.2, measured=STILL, weight=0.0):
     """(n, 4) of hub tilt and yaw moment (N m) and of the cyclic pitch in force (rad), at control instants.
 
     load(t): (tilt, yaw) moment without cyclic pitch, and the moment of a blade beyond that as a function of
-    its azimuth. The blades follow their commands with a first-order lag.
+    its azimuth; weight: in-plane moment of a level blade, N m. The blades follow their commands with a
+    first-order lag.
     """
     gain, azimuth = slope_at(MEAN), 0.3
     pitch, rows = np.full(3, MEAN), []
@@ -69,6 +71,7 @@ def run(law, load, seconds=60.0, time_constant=0.2, measured=STILL):
         blades[BladeMeasure.BLADE_PITCH_1 : BladeMeasure.BLADE_PITCH_1 + 3] = pitch
         blades[BladeMeasure.AZIMUTH] = azimuth % (2.0 * pi)
         blades[BladeMeasure.ROOT_OUT_OF_PLANE_1 : BladeMeasure.ROOT_OUT_OF_PLANE_1 + 3] = moment
+        blades[BladeMeasure.ROOT_IN_PLANE_1 : BladeMeasure.ROOT_IN_PLANE_1 + 3] = weight * np.sin(psi)
         found = [2.0 / 3.0 * np.sum(v * f(psi)) for v in (moment, pitch) for f in (np.cos, np.sin)]
         rows.append(found)
         command = np.array(law.act(whole_view(values)))
@@ -93,6 +96,16 @@ def test_steady_tilt_and_yaw_moments_are_taken_away_at_the_stated_bandwidth():
     rate = -np.polyfit(time[early], np.log(size[early]), 1)[0]
     # the lags of drive and notch make it faster than a lag of first order
     assert rate == pytest.approx(BANDWIDTH * SPEED, rel=0.2)
+
+
+def test_flapwise_control_cancels_the_part_of_the_weight_about_the_chord():
+    weight, mean_moment = 4e6, 4e6  # N m, the latter that of run
+    law = prepared(FlapwiseIPC(PISettings.published(TURBINE), IPCSettings(), DT))
+    rows = run(law, steady(0.0, 0.0), weight=weight)
+    # d/d pitch of (out of plane) cos(pitch) at the mean pitch; the weight's own derivative is at 2P
+    slope = slope_at(MEAN) * cos(MEAN) - mean_moment * sin(MEAN)
+    assert rows[-1, 2:] == pytest.approx([0.0, -weight * sin(MEAN) / slope], abs=1e-4)
+    assert np.abs(run(custom(), steady(0.0, 0.0), weight=weight)[:, 2:]).max() < 1e-9
 
 
 def test_the_lead_keeps_tilt_and_yaw_apart():
@@ -191,9 +204,9 @@ def test_before_prepare_it_cannot_start():
 
 def test_reset_forgets_the_cyclic_pitch():
     law = prepared(ipc_constrained(TURBINE, DT))
-    first = run(law, steady(2e6, 1e6), seconds=10.0)
+    first = run(law, steady(3e6, 1e6), seconds=10.0)
     assert law.memory[CyclicMemory.TILT] > 0.01
-    assert np.array_equal(run(prepared(law), steady(2e6, 1e6), seconds=10.0), first)
+    assert np.array_equal(run(prepared(law), steady(3e6, 1e6), seconds=10.0), first)
 
 
 def test_settings_outside_their_range_are_named():

@@ -40,11 +40,11 @@ def test_damage_adds_up_and_each_is_compared_with_its_own_law():
     assert found.loc["ipc", "travel"] == pytest.approx(0.9)
 
 
-def test_shares_are_those_of_the_control_without_a_bound():
-    figures = means(table(pi=10.0, ipc=6.0, **{"bound 0.1": 7.0}))
-    found = trade_off(figures)
-    assert found.loc["ipc"].tolist() == [1.0, 1.0]
-    assert found.loc["bound 0.1"].tolist() == pytest.approx([0.75, 0.75])
+def test_root_load_and_travel_are_over_those_of_the_collective_law():
+    found = trade_off(means(table(pi=10.0, ipc=6.0, rosco=5.0, **{"bound 0.1": 7.0})))
+    assert list(found.index) == ["ipc", "bound 0.1"]
+    assert found["root flapwise"].tolist() == pytest.approx([0.6, 0.7])
+    assert found["travel"].tolist() == pytest.approx([1.4, 1.3])
 
 
 def test_a_run_that_failed_is_named():
