@@ -32,7 +32,7 @@ from fowt_env.controllers.gspi import GSPI, LAST_SPEED, PERIODS
 from fowt_env.controllers.ipc.law import IPC, NYQUIST_SHARE, TILT_NOTCHES, CyclicMemory, CyclicParameter
 from fowt_env.controllers.ipc.law import N_MEMORY as IPC_MEMORY
 from fowt_env.controllers.lqr import design, estimator
-from fowt_env.controllers.lqr.law import FORGETTING, INTEGRAL_LIMIT, LQR
+from fowt_env.controllers.lqr.law import FORGETTING, INTEGRAL_LIMIT, LQR, STARTING
 from fowt_env.controllers.mpc import clone
 from fowt_env.controllers.mpc import law as mpc
 from fowt_env.controllers.mpc.clone import MPCClone
@@ -218,7 +218,9 @@ def _lqr_names(code):
         "LQR_BLOCKS": e.BLOCKS, "LQR_BLOCK": e.BLOCK, "LQR_ROTOR": e.ROTOR, "LQR_N_MEMORY": e.N_MEMORY,
         "LQR_WIND": design.WIND, "LQR_MOMENT": design.MOMENT,
     }  # fmt: skip
-    code.macros |= {"LQR_INTEGRAL_LIMIT": INTEGRAL_LIMIT, "LQR_FORGETTING": FORGETTING}
+    code.macros |= {
+        "LQR_INTEGRAL_LIMIT": INTEGRAL_LIMIT, "LQR_FORGETTING": FORGETTING, "LQR_STARTING": STARTING,
+    }  # fmt: skip
 
 
 def _clone_names(code):

@@ -52,6 +52,7 @@ TORQUE_RANGE = (0.5, 1.1)  # of rated, for the feedback's torque
 POWER_LIMIT = 1.15  # of rated, for the product of the feedback's torque and the estimated rotor speed
 INTEGRAL_LIMIT = 1.0  # rad, of the speed integral
 FORGETTING = 0.1  # 1/s, decay rate of the speed integral at minimum pitch
+STARTING = 0.7  # of rated speed, below which a rotor with pitched blades speeds up from a stop
 
 
 @kernel
@@ -212,7 +213,10 @@ class LQR(CompiledController):
         speed = measurement.generator_speed / p[Head.GEAR_RATIO]
         # speed plus pitch increases over all winds: speed below rated, pitch above
         known = table[:, TRIM + ROTOR] / p[Head.RATED_SPEED] + table[:, TRIM + ROTOR + 1]
-        wind = np.interp(speed / p[Head.RATED_SPEED] + measurement.blade_pitch, known, winds)
+        fraction = speed / p[Head.RATED_SPEED]
+        if fraction < STARTING and measurement.blade_pitch > HANDOVER[0]:
+            fraction = 1.0  # the pitch alone tells the wind: in a lull blades would be at the minimum
+        wind = np.interp(fraction + measurement.blade_pitch, known, winds)
         memory[:] = 0.0
         for i in range(N_PLANT):
             memory[i] = np.interp(wind, winds, table[:, TRIM + i])

@@ -104,8 +104,11 @@ static void estimator_start(const double *p, double *m, const double *reading)
 {
     int i, node = 0, count = (int)p[LQR_WINDS];
     double speed = reading[GENERATOR_SPEED] / p[LQR_GEAR_RATIO];
-    double known = speed / p[LQR_RATED_SPEED] + reading[BLADE_PITCH], share = 0.0, wind;
+    double fraction = speed / p[LQR_RATED_SPEED], share = 0.0, known, wind;
 
+    if (fraction < LQR_STARTING && reading[BLADE_PITCH] > p[LQR_HANDOVER_LOW])
+        fraction = 1.0;
+    known = fraction + reading[BLADE_PITCH];
     while (node < count - 2 && known >= known_at(p, node + 1))
         node++;
     if (known >= known_at(p, count - 1))
