@@ -56,6 +56,7 @@ def series(turbine, individual=False, instants=300, interval=0.1, seed=0):
     for blade in (1, 2, 3):
         values[f"blade_pitch_{blade}"] = wandering(-0.05, 0.4)
         values[f"root_out_of_plane_{blade}"] = wandering(0.5, 2.5) * moment
+        values[f"root_in_plane_{blade}"] = wandering(-1.0, 2.0) * moment
     return [
         records(turbine, {name: value[k] for name, value in values.items()}, min(k, 1), interval, individual)
         for k in range(instants)

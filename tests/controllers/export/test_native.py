@@ -97,9 +97,12 @@ def check_law(name, folder):
     law, command = ctypes.create_string_buffer(100_000), (ctypes.c_double * 4)()
     travelled = []
     again = series(turbine, controller.individual, instants=40, seed=1)
-    for blade in (1, 2, 3):  # a second run, from the lower limit of the pitch
+    slow = series(turbine, controller.individual, instants=10, seed=2)
+    slow[0][INDEX["generator_speed"]] *= 0.5
+    for blade in (1, 2, 3):  # further runs, from the lower limit of the pitch and from a start-up
         again[0][INDEX[f"blade_pitch_{blade}"]] = 0.0
-    for swap in series(turbine, controller.individual) + again:
+        slow[0][INDEX[f"blade_pitch_{blade}"]] = 0.25
+    for swap in series(turbine, controller.individual) + again + slow:
         ours, theirs = np.array(here.call(swap)), np.array(there.call(swap))
         np.testing.assert_allclose(theirs / SCALE, ours / SCALE, rtol=1.2e-7, atol=1e-9)  # records: float32
         reading = (ctypes.c_double * len(here.last))(*here.last.values())

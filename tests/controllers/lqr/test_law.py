@@ -28,6 +28,13 @@ def test_lqr_stays_at_the_steady_state(wind):
     assert frame["PtfmPitch_[deg]"].std() < 0.1
 
 
+@pytest.mark.parametrize("law", ["lqr", "mpc"])
+def test_a_slow_rotor_with_pitched_blades_comes_up_to_speed(law):
+    scene = build_scene("oc3_hywind", wind=18.0, fidelity="standard")
+    frame = simulate(scene, law, duration=60.0, initial={"RotSpeed": 6.0})
+    assert frame["RotSpeed_[rpm]"].max() < 1.05 * 12.1
+
+
 def test_power_is_limited_in_an_extreme_gust():
     """Torque falls while the rotor turns faster than at the limit of power; its speed is an estimate."""
     gust = {"kind": "eog", "speed": 24.0, "start": 60.0, "class": "A"}
