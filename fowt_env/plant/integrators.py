@@ -43,7 +43,8 @@ from fowt_env.plant.state import BLADES, State, Wrench, add, pose_in
 
 START_STEPS = 3  # steps before four past derivatives exist
 # rad of blade pitch (30.4 deg) above which the lift of the blades damps the speed of a free rotor: by up to
-# 4.5 1/s in 70 m/s, where Adams-Bashforth alone is stable to 0.3 over that and the corrected method to 1.3
+# 4.5 1/s in 70 m/s, where Adams-Bashforth alone is stable to 0.3 over that and the corrected method to 1.3;
+# and the edgewise swings of a held one, which shake the nacelle
 FEATHERING = 0.53
 
 
@@ -185,15 +186,17 @@ def heun(t, x, u, dt, model, method, data):
 
 @kernel
 def feathering(x, model):
-    """Return whether the blades of a free rotor are pitched above FEATHERING: its speed is heavily damped."""
-    return mean_pitch(x, model.pitches) > FEATHERING and not model.rigid_body.rotor_fixed
+    """Return whether the air damps blades pitched above FEATHERING heavily: if they turn freely, or bend."""
+    if model.blades is None and model.rigid_body.rotor_fixed:
+        return False
+    return mean_pitch(x, model.pitches) > FEATHERING
 
 
 @inlined_kernel
 def adams(t, x, u, dt, model, method, data):
     """Advance x by one step: velocities by Adams-Bashforth 4, then positions by Adams-Moulton 4.
 
-    With the corrector, in the first three steps, and while the blades of a free rotor are feathered,
+    With the corrector, in the first three steps, and while feathered blades are heavily damped,
     velocities are corrected by Adams-Moulton after an evaluation at the predicted state. Otherwise
     follow_rotor may correct them for the rotor load within the step.
     """

@@ -355,8 +355,6 @@ def fastest_motion(options, tower, mooring, body, structure):
     share = 1.0
     if INTEGRATORS[options["integrator"]].swings:
         # exact, but coupled by extrapolation to a shaft that twists: stable up to the limit itself, twice
-        # what a default step is allowed; with a rotor that is held in a storm, whose blades then shake the
-        # nacelle, to less than the limit
-        held = body.rotor_fixed and options["blades"] != "rigid"
-        share = 0.0 if options["shaft"] == "rigid" else 1.0 if held else 0.5
+        # what a default step is allowed
+        share = 0.0 if options["shaft"] == "rigid" else 0.5
     return max(share * tower_frequency(tower, body, structure), line_frequency(mooring, body.mass))

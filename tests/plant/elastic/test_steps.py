@@ -143,10 +143,15 @@ def test_the_default_step_is_stable(platform, case):
     scene = build_scene(platform, wind=wind, sea=SEA, seed=1, blades="modes2", **KIND | {"tower": "modes2"})
     scene = scene.with_model({"rigid_body.rotor_fixed": held})
     speed, torque = RATED[platform]
-    rows, status = states(scene, *start(scene, over * speed, pitch, share * torque), scene.dt, 60.0)
-    assert status == 0
+    begin = start(scene, over * speed, pitch, share * torque)
     blades = scene.model.blades
     size = BLADES * len(blades.beam.count)
-    swings = rows[:, blades.first + size : blades.first + 2 * size].std(axis=1)
-    assert swings[-100:].max() < 2.0 * swings[50:250].max()
-    assert np.abs(rows[:, blades.first : blades.first + size]).max() < 0.25 * scene.turbine.rotor.tip_radius
+    swings = []
+    for dt in (scene.dt, 0.5 * scene.dt):  # a swing that is limited by the air does not grow either
+        rows, status = states(scene, *begin, dt, 60.0)
+        assert status == 0
+        swings.append(rows[:, blades.first + size : blades.first + 2 * size].std(axis=1))
+        deflections = rows[:, blades.first : blades.first + size]
+        assert np.abs(deflections).max() < 0.25 * scene.turbine.rotor.tip_radius
+    assert swings[0][-100:].max() < 2.0 * swings[0][50:250].max()
+    assert swings[0][-100:].max() < 1.2 * swings[1][-100:].max()
