@@ -67,8 +67,8 @@ def ratios(figures):
 
 def trade_off(figures):
     """Return a DataFrame of PAID of the laws with the mean pitch of pi, over those of pi."""
-    chosen = figures.filter(regex="^ipc|^bound", axis=0)[list(PAID.values())]
-    return (chosen / figures.loc["pi"])[list(PAID.values())].set_axis([*PAID], axis=1).rename_axis(None)
+    found = figures.filter(regex="^ipc|^bound", axis=0) / figures.loc["pi"]
+    return found[list(PAID.values())].set_axis([*PAID], axis=1).rename_axis(None)
 
 
 def main(arguments=None):
