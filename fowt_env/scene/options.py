@@ -165,6 +165,8 @@ OPTIONS = {
     "surface": Option("instantaneous", ("instantaneous", "swl"),
         "water surface of buoyancy and waves: instantaneous, or still-water level (swl)"),
     "stretching": Option("wheeler", ("wheeler", "none"), "wave kinematics above still water"),
+    "strip_axis": Option("displaced", ("displaced", "undisplaced"),
+        "axes of the strips of hull and members: as they tilt, or at rest, as in HydroDyn"),
     "diffraction": Option(None, (None, "none", "maccamy_fuchs"),
         "correction of wave loads on a large column; None: the platform's"),
     "skewed_wake": Option(False, (False, True), "induction over the azimuth in yawed or tilted inflow"),

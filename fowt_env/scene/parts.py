@@ -287,6 +287,7 @@ def _kinematics(platform, options):
     return {
         "density": site.water_density, "depth": site.water_depth, "position": options["kinematics_position"],
         "surface": options["surface"], "stretching": options["stretching"], "cell": options["strip_length"],
+        "axis": options["strip_axis"],
     }  # fmt: skip
 
 

@@ -13,10 +13,10 @@ def cross_matrix(r):
     return np.array([[0.0, -r[2], r[1]], [r[2], 0.0, -r[0]], [-r[1], r[0], 0.0]])
 
 
-def load(t, r, R, v, w, members, sea, site, switches, current=None, points=40):
+def load(t, r, R, v, w, members, sea, site, switches, current=None, points=40, axis="displaced"):
     """(force and moment (6,) in body axes without the added mass, added mass (6, 6)).
 
-    switches: (position, surface, stretching).
+    switches: (position, surface, stretching). axis: of members as they tilt, or as at rest.
     """
     position, surface, stretching = switches
     rho = site.water_density
@@ -54,12 +54,13 @@ def load(t, r, R, v, w, members, sea, site, switches, current=None, points=40):
     for member in members:
         start, end = np.array(member.start), np.array(member.end)
         length = np.linalg.norm(end - start)
-        a = (end - start) / length
+        along = (end - start) / length
+        a = R.T @ along if axis == "undisplaced" else along
         across = np.eye(3) - np.outer(a, a)
         own = 0.0 if member.potential_flow else 1.0
 
-        def above(s, start=start, a=a):
-            at = inertial(start + s * a)
+        def above(s, start=start, along=along):
+            at = inertial(start + s * along)
             return at[2] - (eta_at(at) if surface == "instantaneous" else 0.0)
 
         low, high = 0.0, length
@@ -77,7 +78,7 @@ def load(t, r, R, v, w, members, sea, site, switches, current=None, points=40):
                     member.added_mass_coefficient, member.pressure_coefficient,
                 )
             )  # fmt: skip
-            p = start + s * a
+            p = start + s * along
             area, growth = (
                 0.25 * np.pi * d**2,
                 0.5 * np.pi * d * (member.diameter[1] - member.diameter[0]) / length,

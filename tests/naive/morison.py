@@ -25,15 +25,16 @@ class Spar:
     position: str = "instantaneous"
     surface: str = "instantaneous"
     stretching: str = "wheeler"
+    axis: str = "displaced"  # strips across and along the hull's axis, or the vertical (undisplaced)
 
 
-def spar_of(platform, *switches):
+def spar_of(platform, *switches, **named):
     """Spar of a descriptions.platform.Platform with the switches from position on."""
     hydro, site = platform.hydro, platform.environment
     return Spar(
         np.array(platform.hull.z), np.array(platform.hull.diameter),
         hydro.added_mass_coefficient, hydro.drag_coefficient, hydro.axial_drag_coefficient,
-        hydro.heave_added_mass, site.water_density, site.gravity, site.water_depth, *switches,
+        hydro.heave_added_mass, site.water_density, site.gravity, site.water_depth, *switches, **named,
     )  # fmt: skip
 
 
@@ -91,6 +92,8 @@ def load(t, r, R, v, w, sea, spar, current=None, at=None):
     z_all = nodes(spar, top) if at is None else at
     axis = np.array([0.0, 0.0, 1.0])
     F, M, S = np.zeros(3), np.zeros(3), np.zeros(3)
+    n = R.T @ axis if spar.axis == "undisplaced" else axis
+    across = np.eye(3) - np.outer(n, n)
 
     def at_section(z):
         where = np.array([0.0, 0.0, z]) if spar.position == "fixed" else r + R @ (z * axis)
@@ -103,19 +106,18 @@ def load(t, r, R, v, w, sea, spar, current=None, at=None):
     for z, weight, d, slope in z_all.T:
         u, a, p, own, convective = at_section(z)
         area = np.pi * d**2 / 4.0
-        relative = (u - own)[:2]
-        f = np.zeros(3)
-        f[:2] += spar.density * area * (1.0 + spar.added_mass) * a[:2]
-        f[:2] -= spar.density * area * spar.added_mass * convective[:2]
-        f[:2] += 0.5 * spar.density * spar.drag * d * np.linalg.norm(relative) * relative
-        f[2] = p * slope
+        relative = across @ (u - own)
+        f = spar.density * area * (1.0 + spar.added_mass) * across @ a
+        f -= spar.density * area * spar.added_mass * across @ convective
+        f += 0.5 * spar.density * spar.drag * d * np.linalg.norm(relative) * relative
+        f += p * slope * n
         F += weight * f
-        M += weight * np.cross(z * axis, np.r_[f[:2], 0.0])
+        M += weight * np.cross(z * axis, f)
         S += weight * spar.density * area * spar.added_mass * z ** np.arange(3)
     keel = spar.z[0]
     u, a, p, own, convective = at_section(keel)
     area = np.pi * spar.diameter[0] ** 2 / 4.0
-    relative = u[2] - own[2]
-    F[2] += p * area + spar.heave_added_mass * (a[2] - convective[2])
-    F[2] += 0.5 * spar.density * spar.axial_drag * area * abs(relative) * relative
-    return F, M, S
+    relative = n @ (u - own)
+    f = p * area + spar.heave_added_mass * n @ (a - convective)
+    f += 0.5 * spar.density * spar.axial_drag * area * abs(relative) * relative
+    return F + f * n, M + f * np.cross(keel * axis, n), S

@@ -3,7 +3,7 @@
 from math import pi, sqrt
 
 from fowt_env.plant.compile.decorators import kernel
-from fowt_env.plant.hydro.morison import StripLoad, current_at
+from fowt_env.plant.hydro.morison import NO_STRIP_LOAD, StripLoad, current_at
 from fowt_env.plant.hydro.strip_quadrature import (
     BLOCK,
     CU,
@@ -19,6 +19,7 @@ from fowt_env.plant.hydro.strip_quadrature import (
     Z,
     place_nodes,
 )
+from fowt_env.plant.hydro.undisplaced_axis import keel_force, side_force
 from fowt_env.plant.hydro.wave_bands import WAVE_NUMBER, chain_start, chain_sums, compress, phasors
 from fowt_env.plant.hydro.waves import ramp_factor
 from fowt_env.plant.state import NO_LOAD, Wrench, add
@@ -58,7 +59,7 @@ def block_current(pose, depth, current, node):
 
 @kernel
 def block_load(pose, quadrature, table, bands, current, node):
-    """Return the StripLoad of a block: Eq. (16) and the pressure on the taper, without the keel."""
+    """Return (Wrench, S_0, S_1, S_2) of a block: Eq. (16) and the pressure on the taper, without the keel."""
     added_line = 0.25 * pi * quadrature.density * quadrature.added_mass_coefficient
     froude_line = 0.25 * pi * quadrature.density * (1.0 + quadrature.added_mass_coefficient)
     drag_line = 0.5 * quadrature.density * quadrature.drag_coefficient
@@ -82,16 +83,29 @@ def block_load(pose, quadrature, table, bands, current, node):
             cu, cv = node[CU * BLOCK + n], node[CV * BLOCK + n]
             rx += pose.r11 * cu + pose.r21 * cv
             ry += pose.r12 * cu + pose.r22 * cv
-        drag = weight * drag_line * d * sqrt(rx * rx + ry * ry)
         added = weight * added_line * d * d
-        px = drag * rx - added * (pose.wy * pose.vz - pose.wz * sy)
-        py = drag * ry - added * (pose.wz * sx - pose.wx * pose.vz)
-        if bands is not None:
-            du, dw = node[DU * BLOCK + n], node[DW * BLOCK + n]
-            froude = weight * froude_line * d * d
-            px += froude * (along_x * du + pose.r31 * dw)
-            py += froude * (along_y * du + pose.r32 * dw)
-            fz += weight * 0.5 * pi * d * table[D1 * BLOCK + n] * node[P * BLOCK + n]
+        if quadrature.undisplaced_axis is not None:
+            u = v = du = dv = taper = 0.0
+            if bands is not None:
+                u, v = bands.cos_heading * node[U * BLOCK + n], bands.sin_heading * node[U * BLOCK + n]
+                du, dv = bands.cos_heading * node[DU * BLOCK + n], bands.sin_heading * node[DU * BLOCK + n]
+                taper = weight * 0.5 * pi * d * table[D1 * BLOCK + n] * node[P * BLOCK + n]
+            if current is not None:
+                u, v = u + node[CU * BLOCK + n], v + node[CV * BLOCK + n]
+            px, py, pz = side_force(
+                pose, z, u, v, du, dv, weight * drag_line * d, added, weight * froude_line * d * d, taper
+            )
+            fz += pz
+        else:
+            drag = weight * drag_line * d * sqrt(rx * rx + ry * ry)
+            px = drag * rx - added * (pose.wy * pose.vz - pose.wz * sy)
+            py = drag * ry - added * (pose.wz * sx - pose.wx * pose.vz)
+            if bands is not None:
+                du, dw = node[DU * BLOCK + n], node[DW * BLOCK + n]
+                froude = weight * froude_line * d * d
+                px += froude * (along_x * du + pose.r31 * dw)
+                py += froude * (along_y * du + pose.r32 * dw)
+                fz += weight * 0.5 * pi * d * table[D1 * BLOCK + n] * node[P * BLOCK + n]
         fx += px
         fy += py
         mx -= z * py
@@ -99,18 +113,26 @@ def block_load(pose, quadrature, table, bands, current, node):
         s0 += added
         s1 += added * z
         s2 += added * z * z
-    return StripLoad(Wrench(fx, fy, fz, mx, my, 0.0), s0, s1, s2, 0.0)
+    return Wrench(fx, fy, fz, mx, my, 0.0), s0, s1, s2
 
 
 @kernel
 def keel_load(pose, quadrature, bands, current, node):
-    """Return the axial force on the keel: dynamic pressure, added mass and drag (theory.md, 5.4)."""
+    """Return the Wrench of the axial force on the keel: pressure, added mass and drag (theory.md, 5.4)."""
     zk = quadrature.keel_z
+    n = quadrature.keel % BLOCK
+    if quadrature.undisplaced_axis is not None:
+        w = dw = pressure = 0.0
+        if bands is not None:
+            w, dw = node[W * BLOCK + n], node[DW * BLOCK + n]
+            pressure = quadrature.keel_area * node[P * BLOCK + n]
+        added = quadrature.heave_added_mass
+        fx, fy, fz = keel_force(pose, zk, w, dw, quadrature.axial_drag, added, pressure)
+        return Wrench(fx, fy, fz, -zk * fy, zk * fx, 0.0)
     sx = pose.vx + pose.wy * zk
     sy = pose.vy - pose.wx * zk
     force = -quadrature.heave_added_mass * (pose.wx * sy - pose.wy * sx)
     rz = -pose.vz
-    n = quadrature.keel % BLOCK
     if bands is not None:
         along = pose.r13 * bands.cos_heading + pose.r23 * bands.sin_heading
         rz += along * node[U * BLOCK + n] + pose.r33 * node[W * BLOCK + n]
@@ -118,7 +140,7 @@ def keel_load(pose, quadrature, bands, current, node):
         force += quadrature.heave_added_mass * az + quadrature.keel_area * node[P * BLOCK + n]
     if current is not None:
         rz += pose.r13 * node[CU * BLOCK + n] + pose.r23 * node[CV * BLOCK + n]
-    return force + quadrature.axial_drag * abs(rz) * rz
+    return Wrench(0.0, 0.0, force + quadrature.axial_drag * abs(rz) * rz, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -174,7 +196,7 @@ def banded_strip_load(t, pose, quadrature, bands, current, scratch, diffraction=
     diffraction: BandDiffraction, or None for the coefficient 1 + C_A.
     """
     if quadrature is None:
-        return StripLoad(NO_LOAD, 0.0, 0.0, 0.0, 0.0)
+        return NO_STRIP_LOAD
     eta = z_ref = 0.0
     if bands is None:
         z_surf = still_surface(pose, quadrature)
@@ -187,11 +209,11 @@ def banded_strip_load(t, pose, quadrature, bands, current, scratch, diffraction=
         place_nodes(z_surf, table, node)
         block_kinematics(pose, z_ref, eta, quadrature, bands, scratch.field, node, diffraction, block)
         block_current(pose, quadrature.depth, current, node)
-        part = block_load(pose, quadrature, table, bands, current, node)
-        load = add(load, part.wrench)
-        s0 += part.s0
-        s1 += part.s1
-        s2 += part.s2
-    fz = load.fz + keel_load(pose, quadrature, bands, current, scratch.nodes[quadrature.keel // BLOCK])
-    wrench = Wrench(load.fx, load.fy, fz, load.mx, load.my, 0.0)
-    return StripLoad(wrench, s0, s1, s2, quadrature.heave_added_mass)
+        part, of_block, first, second = block_load(pose, quadrature, table, bands, current, node)
+        load = add(load, part)
+        s0 += of_block
+        s1 += first
+        s2 += second
+    keel = scratch.nodes[quadrature.keel // BLOCK]
+    load = add(load, keel_load(pose, quadrature, bands, current, keel))
+    return StripLoad(load, s0, s1, s2, quadrature.heave_added_mass)

@@ -15,6 +15,7 @@ from fowt_env.plant.hydro.members import add_member_loads
 from fowt_env.plant.hydro.morison import NO_STRIP_LOAD, current_at, morison_load
 from fowt_env.plant.hydro.radiation import add_radiation
 from fowt_env.plant.hydro.strips import Strips
+from fowt_env.plant.hydro.undisplaced_axis import fill_undisplaced_mass
 from fowt_env.plant.hydro.wave_bands import surface_elevation
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
 from fowt_env.plant.state import NO_LOAD, Wrench, add
@@ -111,6 +112,24 @@ _elevation = chosen_by_class(
 )
 
 
+@inlined_kernel
+def _mass_of_strips(pose, load, strips, matrix):
+    fill_added_mass(pose, load, strips.shape, matrix)
+
+
+@inlined_kernel
+def _no_mass(pose, load, strips, matrix):
+    matrix[:] = 0.0
+
+
+# (pose, StripLoad, strips, matrix): fills the added mass (6, 6)
+fill_strip_mass = chosen_by_class(
+    "strips",
+    {ExactStrips: _mass_of_strips, BandedStrips: _mass_of_strips, type(None): _no_mass},
+    inlined=True,
+)
+
+
 @kernel
 def surface_at_origin(t, hydro, data):
     """Return the surface elevation at the inertial origin, m."""
@@ -144,7 +163,7 @@ def hydro_load(t, pose, x, hydro, data):
     buoyancy = hydrostatic_load(pose, hydro.hull, data.counters)
     buoyancy = add_member_buoyancy(pose, buoyancy, hydro.members)
     strips = strip_load(t, pose, hydro, hydro.strips, data)
-    fill_added_mass(strips, data.added_mass)
+    fill_strip_mass(pose, strips, hydro.strips, data.added_mass)
     wrench = add_inertia(pose, strips.wrench, hydro.added_inertia, data.added_mass)
     wrench = add_body_matrices(pose, x, wrench, hydro.matrices, data.added_mass)
     wrench = add_radiation(pose, x, wrench, hydro.radiation, data.radiation)
@@ -162,8 +181,11 @@ def hydro_rates(x, hydro, dx):
 
 
 @kernel
-def fill_added_mass(strips, matrix):
-    """Fill the symmetric (6, 6) added mass of a StripLoad, whose axis is the body's z."""
+def fill_added_mass(pose, strips, shape, matrix):
+    """Fill the symmetric (6, 6) added mass of a StripLoad, whose axis is the body's z or the vertical."""
+    if shape.undisplaced_axis is not None:
+        fill_undisplaced_mass(pose, strips, shape.keel_z, matrix)
+        return
     for i in range(6):
         for j in range(6):
             matrix[i, j] = 0.0

@@ -16,6 +16,7 @@ from fowt_env.plant.hydro.member_buoyancy import build_member_bodies
 from fowt_env.plant.hydro.member_series import N_WATER, VELOCITIES, WaterSeries, interpolate, no_series
 from fowt_env.plant.hydro.morison import current_at
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET
+from fowt_env.plant.hydro.undisplaced_axis import undisplaced
 from fowt_env.plant.hydro.waves import elevation, wave_kinematics
 from fowt_env.plant.state import N_RIGID, Wrench, add, pose_of, to_body, to_inertial
 
@@ -51,6 +52,7 @@ class Members(NamedTuple):
     instantaneous_position: bool
     instantaneous_surface: bool
     wheeler: bool
+    undisplaced_axis: object  # as strips.Strips
 
     @property
     def scratch_nodes(self):
@@ -59,7 +61,9 @@ class Members(NamedTuple):
         return int(np.sum(2 * self.cells + 2)) if moving else 0
 
 
-def build_members(members, *, density, gravity, depth, position, surface, stretching, cell=None):
+def build_members(
+    members, *, density, gravity, depth, position, surface, stretching, cell=None, axis="displaced"
+):
     """Return the Members of descriptions.platform.Member records with kinematics options; None without any.
 
     cell: longest cell, m; None: a fraction of the overall size. The series has no rows yet.
@@ -84,13 +88,14 @@ def build_members(members, *, density, gravity, depth, position, surface, stretc
         instantaneous_position=False,
         instantaneous_surface=False,
         wheeler=False,
+        undisplaced_axis=undisplaced(axis),
     )
     nodes = np.zeros((int(np.sum(2 * cells + 2)), N_NODE))
     lay_nodes(0.0, pose_of(np.zeros(N_RIGID)), still, None, nodes)
     nodes = np.ascontiguousarray(nodes[np.any(nodes[:, DRAG:] != 0.0, axis=1)])
     added = np.zeros((6, 6))
     for node in nodes:
-        add_node_mass(node, added)
+        add_node_mass(node, node[AX], node[AY], node[AZ], added)
     return still._replace(
         nodes=nodes,
         added_mass=added,
@@ -239,18 +244,26 @@ def _end_node(row, end, wet, node):
 
 
 @kernel
-def add_node_mass(node, added):
-    """Add the added mass of a node about the body origin to `added` (6, 6)."""
+def axis_of(pose, node, members):
+    """Return the axis (ax, ay, az) of a node in body axes."""
+    if members.undisplaced_axis is not None:
+        return to_body(pose, node[AX], node[AY], node[AZ])
+    return node[AX], node[AY], node[AZ]
+
+
+@kernel
+def add_node_mass(node, ax, ay, az, added):
+    """Add the added mass of a node with this axis about the body origin to `added` (6, 6)."""
     across, along = node[ADDED], node[AXIAL_ADDED]
     if across == 0.0 and along == 0.0:
         return
     x, y, z = node[X], node[Y], node[Z]
     for i in range(3):
         # column i of the node's mass across / (I - a a') + along a a', and its moment about the origin
-        scale = (along - across) * node[AX + i]
-        px = scale * node[AX] + (across if i == 0 else 0.0)
-        py = scale * node[AY] + (across if i == 1 else 0.0)
-        pz = scale * node[AZ] + (across if i == 2 else 0.0)
+        scale = (along - across) * (ax if i == 0 else ay if i == 1 else az)
+        px = scale * ax + (across if i == 0 else 0.0)
+        py = scale * ay + (across if i == 1 else 0.0)
+        pz = scale * az + (across if i == 2 else 0.0)
         kx, ky, kz = y * pz - z * py, z * px - x * pz, x * py - y * px
         added[0, i] += px
         added[1, i] += py
@@ -262,7 +275,7 @@ def add_node_mass(node, added):
         added[i, 4] += ky
         added[i, 5] += kz
     # moments by rotation: -[r] m [r] with m = across I + (along - across) a a'
-    bx, by, bz = y * node[AZ] - z * node[AY], z * node[AX] - x * node[AZ], x * node[AY] - y * node[AX]
+    bx, by, bz = y * az - z * ay, z * ax - x * az, x * ay - y * ax
     extra = along - across
     square = x * x + y * y + z * z
     added[3, 3] += across * (square - x * x) + extra * bx * bx
@@ -296,9 +309,10 @@ def add_member_loads(t, pose, load, members, waves, current, data):
 @kernel
 def _load_of(t, pose, nodes, moving, members, waves, current, data):
     """Return the Wrench of these nodes; add their added mass."""
-    if members.inertial and moving:
+    if members.inertial and (moving or members.undisplaced_axis is not None):
         for i in range(nodes.shape[0]):
-            add_node_mass(nodes[i], data.added_mass)
+            ax, ay, az = axis_of(pose, nodes[i], members)
+            add_node_mass(nodes[i], ax, ay, az, data.added_mass)
     elif members.inertial:
         for i in range(6):
             for j in range(6):
@@ -336,7 +350,7 @@ def node_loads(pose, nodes, members, waves, current, water):
     fx = fy = fz = mx = my = mz = 0.0
     for i in range(nodes.shape[0]):
         x, y, z = nodes[i, X], nodes[i, Y], nodes[i, Z]
-        ax, ay, az = nodes[i, AX], nodes[i, AY], nodes[i, AZ]
+        ax, ay, az = axis_of(pose, nodes[i], members)
         sx = pose.vx + pose.wy * z - pose.wz * y
         sy = pose.vy + pose.wz * x - pose.wx * z
         sz = pose.vz + pose.wx * y - pose.wy * x

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from fowt_env.plant.compile.decorators import kernel
 from fowt_env.plant.hydro.strip_kinematics import DU, DV, DW, P, U, V, W, strip_kinematics
 from fowt_env.plant.hydro.strips import GAUSS_OFFSET, axis_surface, wet_cell
+from fowt_env.plant.hydro.undisplaced_axis import keel_force, side_force
 from fowt_env.plant.hydro.waves import Kinematics
 from fowt_env.plant.state import NO_LOAD, Wrench
 
@@ -79,19 +80,30 @@ def morison_load(t, pose, strips, waves, current, kin, diffraction=None):
                     cu, cv = current_at(pose.z + pose.r33 * z, strips.depth, current)
                     u += cu
                     v += cv
-                rx = pose.r11 * u + pose.r21 * v + pose.r31 * w - sx
-                ry = pose.r12 * u + pose.r22 * v + pose.r32 * w - sy
                 area = 0.25 * pi * d * d
-                drag = 0.5 * rho * strips.drag_coefficient * d * hypot(rx, ry)
                 inertia = rho * area * ca
-                px = drag * rx - inertia * (pose.wy * pose.vz - pose.wz * sy)
-                py = drag * ry - inertia * (pose.wz * sx - pose.wx * pose.vz)
-                if waves is not None:
-                    du, dv, dw = kin[DU, n], kin[DV, n], kin[DW, n]
-                    froude = rho * area * (1.0 + ca)
-                    px += froude * (pose.r11 * du + pose.r21 * dv + pose.r31 * dw)
-                    py += froude * (pose.r12 * du + pose.r22 * dv + pose.r32 * dw)
-                    fz += weight * kin[P, n] * (0.5 * pi * d * strips.diameter_slope[section])
+                if strips.undisplaced_axis is not None:
+                    du = dv = taper = 0.0
+                    if waves is not None:
+                        du, dv = kin[DU, n], kin[DV, n]
+                        taper = kin[P, n] * (0.5 * pi * d * strips.diameter_slope[section])
+                    px, py, pz = side_force(
+                        pose, z, u, v, du, dv, 0.5 * rho * strips.drag_coefficient * d, inertia,
+                        rho * area * (1.0 + ca), taper,
+                    )  # fmt: skip
+                    fz += weight * pz
+                else:
+                    rx = pose.r11 * u + pose.r21 * v + pose.r31 * w - sx
+                    ry = pose.r12 * u + pose.r22 * v + pose.r32 * w - sy
+                    drag = 0.5 * rho * strips.drag_coefficient * d * hypot(rx, ry)
+                    px = drag * rx - inertia * (pose.wy * pose.vz - pose.wz * sy)
+                    py = drag * ry - inertia * (pose.wz * sx - pose.wx * pose.vz)
+                    if waves is not None:
+                        du, dv, dw = kin[DU, n], kin[DV, n], kin[DW, n]
+                        froude = rho * area * (1.0 + ca)
+                        px += froude * (pose.r11 * du + pose.r21 * dv + pose.r31 * dw)
+                        py += froude * (pose.r12 * du + pose.r22 * dv + pose.r32 * dw)
+                        fz += weight * kin[P, n] * (0.5 * pi * d * strips.diameter_slope[section])
                 fx += weight * px
                 s0 += weight * inertia
                 s1 += weight * inertia * z
@@ -107,9 +119,16 @@ def morison_load(t, pose, strips, waves, current, kin, diffraction=None):
         cu, cv = current_at(pose.z + pose.r33 * zk, strips.depth, current)
         u += cu
         v += cv
-    rz = pose.r13 * u + pose.r23 * v + pose.r33 * keel.w - pose.vz
-    az = pose.r13 * keel.du + pose.r23 * keel.dv + pose.r33 * keel.dw
-    fz += keel.pressure * strips.keel_area
-    fz += strips.heave_added_mass * (az - (pose.wx * sy - pose.wy * sx))
-    fz += 0.5 * rho * strips.axial_drag_coefficient * strips.keel_area * abs(rz) * rz
+    axial = 0.5 * rho * strips.axial_drag_coefficient * strips.keel_area
+    if strips.undisplaced_axis is not None:
+        px, py, pz = keel_force(
+            pose, zk, keel.w, keel.dw, axial, strips.heave_added_mass, keel.pressure * strips.keel_area
+        )
+        fx, fy, fz, mx, my = fx + px, fy + py, fz + pz, mx - zk * py, my + zk * px
+    else:
+        rz = pose.r13 * u + pose.r23 * v + pose.r33 * keel.w - pose.vz
+        az = pose.r13 * keel.du + pose.r23 * keel.dv + pose.r33 * keel.dw
+        fz += keel.pressure * strips.keel_area
+        fz += strips.heave_added_mass * (az - (pose.wx * sy - pose.wy * sx))
+        fz += axial * abs(rz) * rz
     return StripLoad(Wrench(fx, fy, fz, mx, my, 0.0), s0, s1, s2, strips.heave_added_mass)

@@ -40,6 +40,7 @@ class StripQuadrature(NamedTuple):
     instantaneous_position: bool
     instantaneous_surface: bool
     wheeler: bool
+    undisplaced_axis: object  # as Strips
 
 
 def build_quadrature(hull, strips, refinement=1):
@@ -81,6 +82,7 @@ def build_quadrature(hull, strips, refinement=1):
         strips.instantaneous_position,
         strips.instantaneous_surface,
         strips.wheeler,
+        strips.undisplaced_axis,
     )
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.hydro.undisplaced_axis import undisplaced
 from fowt_env.plant.hydro.waves import elevation
 
 CELLS_PER_DRAFT = 60  # minimum below the surface section (2 m of OC3): 1e-5 of the first harmonic at T = 5 s
@@ -42,9 +43,10 @@ class Strips(NamedTuple):
     instantaneous_position: bool
     instantaneous_surface: bool
     wheeler: bool
+    undisplaced_axis: object  # True: loads across and along the vertical, not the hull's axis; else None
 
 
-def build_strips(hull, hydro, *, density, depth, position, surface, stretching, cell=None):
+def build_strips(hull, hydro, *, density, depth, position, surface, stretching, cell=None, axis="displaced"):
     """Return the Strips of a Hull and HydroCoefficients (descriptions.platform) with the kinematics options.
 
     cell: longest cell below the surface section, m; None: a fraction of the draft, so that models of any
@@ -87,6 +89,7 @@ def build_strips(hull, hydro, *, density, depth, position, surface, stretching, 
         position == "instantaneous",
         surface == "instantaneous",
         stretching == "wheeler",
+        undisplaced(axis),
     )
 
 

@@ -14,6 +14,7 @@ from fowt_env.plant.hydro.member_series import N_WATER, VELOCITIES, build_water_
 from fowt_env.plant.hydro.members import (
     N_NODE,
     add_node_mass,
+    axis_of,
     build_members,
     fill_water,
     lay_nodes,
@@ -46,10 +47,10 @@ HULL = (
 )  # fmt: skip
 
 
-def build(members=HULL, position="fixed", surface="swl", stretching="none", site=SITE, cell=0.5):
+def build(members=HULL, position="fixed", surface="swl", stretching="none", site=SITE, cell=0.5, **options):
     return build_members(
         members, density=site.water_density, gravity=site.gravity, depth=site.water_depth,
-        position=position, surface=surface, stretching=stretching, cell=cell,
+        position=position, surface=surface, stretching=stretching, cell=cell, **options,
     )  # fmt: skip
 
 
@@ -61,15 +62,16 @@ def load_of(t, motion, members, waves, current=None):
         lay_nodes(t, pose, members, waves, nodes)
     water, added = np.zeros(N_WATER * len(nodes)), np.zeros((6, 6))
     for node in nodes:
-        add_node_mass(node, added)
+        add_node_mass(node, *axis_of(pose, node, members), added)
     fill_water(t, pose, nodes, members, waves, water)
     return np.array(node_loads(pose, nodes, members, waves, current, water)), added
 
 
+@pytest.mark.parametrize("axis", ["displaced", "undisplaced"])
 @pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
-def test_loads_match_the_plain_twin(switches):
+def test_loads_match_the_plain_twin(switches, axis):
     rng = np.random.default_rng(4)
-    members, waves = build(HULL, *switches), waves_of(SEA, SITE)
+    members, waves = build(HULL, *switches, axis=axis), waves_of(SEA, SITE)
     for t in (0.0, 31.7):
         where = motion(rng)
         current = Current(0.6, -0.2, 1.0 / 7.0)
@@ -78,7 +80,7 @@ def test_loads_match_the_plain_twin(switches):
         def stream(z):
             return np.array([0.6, -0.2]) * np.clip(1.0 + z / SITE.water_depth, 0.0, 1.0) ** (1.0 / 7.0)
 
-        wanted, mass = naive.load(t, *where, HULL, SEA, SITE, switches, stream)
+        wanted, mass = naive.load(t, *where, HULL, SEA, SITE, switches, stream, axis=axis)
         scale = np.repeat([np.abs(wanted[:3]).max(), np.abs(wanted[3:]).max()], 3)
         assert np.abs(found - wanted) == pytest.approx(np.zeros(6), abs=2e-5 * scale.max())
         assert np.abs((found - wanted) / scale).max() < 2e-5

@@ -13,6 +13,7 @@ from fowt_env.plant.hydro.waves import wave_kinematics
 
 pytestmark = pytest.mark.installation
 
+AXES = ["displaced", "undisplaced"]
 # omega, amplitude, phase, heading: from kh = 0.5 (felt at the seabed) to 158 (spent above the keel)
 SEA = [
     (0.09, 0.8, 0.3, 0.0),
@@ -62,9 +63,12 @@ def test_strip_kinematics_are_the_plain_sum_at_the_nodes(switches, platform, sit
         assert np.all(np.abs(got - expected[:, -1]) < 1e-11 * scale)
 
 
+@pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("switches", SWITCHES, ids="-".join)
-def test_load_is_the_plain_integral_for_any_motion(switches, platform, site):
-    strips, waves, spar = strips_of(platform, *switches), waves_of(SEA, site), spar_of(platform, *switches)
+def test_load_is_the_plain_integral_for_any_motion(switches, axis, platform, site):
+    strips, spar = (make(platform, *switches, axis=axis) for make in (strips_of, spar_of))
+    strips, spar.axial_drag = strips._replace(axial_drag_coefficient=1.5), 1.5
+    waves = waves_of(SEA, site)
     rng = np.random.default_rng(2)
     for _ in range(3):
         t, moving = rng.uniform(0.0, 100.0), motion(rng)
@@ -82,9 +86,10 @@ def test_load_is_the_plain_integral_for_any_motion(switches, platform, site):
             assert np.allclose((got.s0, got.s1, got.s2), S, rtol=1e-5, atol=0.0)
 
 
+@pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("with_waves", [False, True])
-def test_load_in_a_current_is_the_plain_integral(with_waves, platform, site):
-    strips, spar = strips_of(platform), spar_of(platform)
+def test_load_in_a_current_is_the_plain_integral(with_waves, axis, platform, site):
+    strips, spar = strips_of(platform, axis=axis), spar_of(platform, axis=axis)
     sea = SEA if with_waves else None
     waves = waves_of(SEA, site) if with_waves else None
     current = Current(0.8, -0.4, 1.0 / 7.0)
@@ -132,15 +137,20 @@ def test_added_mass_has_the_published_entries(platform):
     assert got.a33 == platform.hydro.heave_added_mass
 
 
-def test_the_matrix_of_the_added_mass_is_that_of_slices_that_take_water_across_the_axis_along(platform):
-    got = load(0.0, STILL, strips_of(platform), None)
-    matrix, expected = np.ones((6, 6)), np.diag([0.0, 0.0, got.a33, 0.0, 0.0, 0.0])
-    fill_added_mass(got, matrix)
+@pytest.mark.parametrize("axis", AXES)
+def test_the_matrix_of_the_added_mass_is_that_of_slices_that_take_water_across_the_axis_along(axis, platform):
+    moving = motion(np.random.default_rng(8))
+    strips = strips_of(platform, axis=axis)
+    got = load(0.0, moving, strips, None)
+    n = moving[1][2] if axis == "undisplaced" else np.array([0.0, 0.0, 1.0])  # the vertical in body axes
+    matrix, keel = np.ones((6, 6)), np.r_[n, np.cross([0.0, 0.0, platform.hull.z[0]], n)]
+    fill_added_mass(make_pose(*moving), got, strips, matrix)
+    expected = got.a33 * np.outer(keel, keel)
     centre = got.s1 / got.s0
     apart = np.sqrt(got.s2 / got.s0 - centre**2)
     for z in (centre - apart, centre + apart):  # two slices with the same three integrals
-        moved = np.vstack([np.eye(3), np.cross(np.eye(3), [0.0, 0.0, z])])[:, :2]
-        expected += 0.5 * got.s0 * moved @ moved.T
+        moved = np.vstack([np.eye(3), np.cross([0.0, 0.0, z], np.eye(3)).T])
+        expected += 0.5 * got.s0 * moved @ (np.eye(3) - np.outer(n, n)) @ moved.T
     assert matrix == pytest.approx(expected, rel=1e-12, abs=1e-12 * got.s2)
 
 
