@@ -51,9 +51,10 @@ EXPONENTS = {  # of damage-equivalent loads
     "RootMyb1_[kN-m]": 10, "RootMxb1_[kN-m]": 10, "TwrBsMyt_[kN-m]": 4, "RotTorq_[kN-m]": 4, SHAFT: 4,
 }  # fmt: skip
 FURTHER = {"RootMyc1_[kN-m]": 10, "RootMxc1_[kN-m]": 10, "Spn2MLyb1_[kN-m]": 10, "TwrBsMxt_[kN-m]": 4}
-# Runs with and without individual pitch control: exponent of the shear; s between calls of ROSCO, one at each
-# step of OpenFAST: at every second step it would read an acceleration biased by ServoDyn's extrapolation
-SHEAR, SHEAR_CONTROL_DT = 0.2, 0.0125
+SHEAR = 0.2  # exponent, of runs with and without individual pitch control
+# s between calls of a controller at each step of OpenFAST. With individual pitch, at every second step ROSCO
+# would read an acceleration biased by ServoDyn's extrapolation
+EACH_STEP = 0.0125
 # allowed errors, %
 MEAN, AMPLITUDE, FREQUENCY, DEVIATION, SPEED_RMS, DAMAGE = 1.0, 3.0, 1.0, 2.0, 6.0, 5.0
 RELIEF = 2.0  # percentage points
@@ -287,14 +288,14 @@ def _damage(frame, channel, exponent):
     return damage_equivalent_load(frame[channel].to_numpy(), time[-1] - time[0], exponent)
 
 
-def compare_turbulence(study, machine, case, ours):
+def compare_turbulence(study, machine, case, ours, words="elastic"):
     """Add the rows of a turbulent run, and keep its series for the plots."""
     stored = table(f"{PLACE}/{machine.name}_turbulent.csv.gz", study.folder)
     stored = stored[stored["case"] == f"{machine.name}/{case}"].set_index("channel")
     theirs = reference(f"{machine.name}_{case}", study.folder, PLACE)
     ours = ours[ours[TIME] >= SETTLED - 1e-6].reset_index(drop=True)
     coarse = ours.iloc[:: (len(ours) - 1) // (len(theirs) - 1)].reset_index(drop=True)
-    words = f"elastic, {case}"
+    words = f"{words}, {case}"
     study.runs[words] = coarse, theirs
     for channel in (*STANDARD_DEVIATIONS, *REPORTED):
         (name, unit), there, here = name_and_unit(channel), stored.loc[channel], ours[channel]
@@ -315,15 +316,19 @@ def compare_turbulence(study, machine, case, ours):
         study.add(words, quantity, unit, *both, allowed=allowed)
 
 
-def turbulence(study, machine):
-    """Compare turbulence and waves at 8 to 24 m/s: deviations 2 %, rotor speed 6 % rms, damage 5 %."""
+def turbulence(study, machine, words="elastic", **options):
+    """Compare turbulence and waves at 8 to 24 m/s: deviations 2 %, rotor speed 6 % rms, damage 5 %.
+
+    words: before the names of the cases. options: of build_scene.
+    """
     if machine.under_rosco and without_rosco():
         study.say("without ROSCO: its library is not installed")
         return
     for wind in WINDS:
         case = f"turb_{wind}mps"
         study.say(f"{machine.name}, {case}, bending blades and tower")
-        compare_turbulence(study, machine, case, turbulent_run(machine, wind, 600.0, study.folder))
+        frame = turbulent_run(machine, wind, 600.0, study.folder, **options)
+        compare_turbulence(study, machine, case, frame, words)
 
 
 def _of_each_blade(channel):
@@ -343,7 +348,7 @@ def relief(study, machine):
     stored = table(f"{PLACE}/{machine.name}_turbulent.csv.gz", study.folder)
     stored = stored.set_index(["case", "channel"])
     cases = "turb_18mps_shear", "turb_18mps_shear_ipc"
-    machine, frames = replace(machine, control_dt=SHEAR_CONTROL_DT), []
+    machine, frames = replace(machine, control_dt=EACH_STEP), []
     for case in cases:
         study.say(f"{machine.name}, {case}")
         individual = case.endswith("ipc")
@@ -382,4 +387,9 @@ def groups(machine):
         "blade_decays": (partial(blade_decays, machine=machine), len(DECAY_CASES)),
         "elastic": (partial(turbulence, machine=machine), len(WINDS)),
     }
-    return found | ({"relief": (partial(relief, machine=machine), 2)} if machine is IEA15 else {})
+    if machine is IEA15:  # whose hull has no strips
+        return found | {"relief": (partial(relief, machine=machine), 2)}
+    as_openfast = partial(
+        turbulence, machine=replace(machine, control_dt=EACH_STEP), words="as OpenFAST", strip_axis="undisplaced"
+    )
+    return found | {"as_openfast": (as_openfast, len(WINDS))}

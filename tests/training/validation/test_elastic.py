@@ -103,10 +103,11 @@ def test_blade_frequencies_are_within_1_percent(name):
 
 @pytest.mark.slow
 @pytest.mark.nightly
-def test_turbulence_is_within_2_percent_of_deviations_and_5_percent_of_damage_at_18_mps():
-    """The 5 MW under its DISCON law; heave, of 0.3 m, has strips that tilt with the platform here."""
+@pytest.mark.parametrize("axis", ["displaced", "undisplaced"])
+def test_turbulence_is_within_2_percent_of_deviations_and_5_percent_of_damage_at_18_mps(axis):
+    """The 5 MW under its DISCON law; heave, of 0.3 m, is that of HydroDyn with strips that do not tilt."""
     machine = elastic.NREL5
-    frame = elastic.turbulent_run(machine, 18, 600.0)
+    frame = elastic.turbulent_run(machine, 18, 600.0, strip_axis=axis)
     study = Study()
     elastic.compare_turbulence(study, machine, "turb_18mps", frame)
     late = frame[frame[TIME] >= 100.0 - 1e-6]
@@ -117,8 +118,9 @@ def test_turbulence_is_within_2_percent_of_deviations_and_5_percent_of_damage_at
         (row,) = [r for r in study.rows if r.quantity == f"{name}, standard deviation"]
         error = 100.0 * (np.std(late[channel].to_numpy()) / table.loc[channel, "std"] - 1.0)
         assert row.error == pytest.approx(error, abs=1e-9)
-    missed = {row.quantity for row in study.rows if row.verdict == "MISSED"}
-    assert missed <= {"PtfmHeave, standard deviation"}
+    assert all(row.verdict != "MISSED" for row in study.rows)
+    (heave,) = [row for row in study.rows if row.quantity == "PtfmHeave, normalised rms error"]
+    assert heave.error < 1.0 if axis == "undisplaced" else 15.0 < heave.error < 25.0
 
 
 @pytest.mark.slow
