@@ -390,6 +390,9 @@ def groups(machine):
     if machine is IEA15:  # whose hull has no strips
         return found | {"relief": (partial(relief, machine=machine), 2)}
     as_openfast = partial(
-        turbulence, machine=replace(machine, control_dt=EACH_STEP), words="as OpenFAST", strip_axis="undisplaced"
+        turbulence,
+        machine=replace(machine, control_dt=EACH_STEP),
+        words="as OpenFAST",
+        strip_axis="undisplaced",
     )
     return found | {"as_openfast": (as_openfast, len(WINDS))}

@@ -1,5 +1,6 @@
 """Members against a plain twin, the spar's own strips, HydroDyn's convention by hand, and closed forms."""
 
+from collections import namedtuple
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -13,6 +14,7 @@ from fowt_env.plant.hydro.member_buoyancy import add_member_buoyancy, displaced
 from fowt_env.plant.hydro.member_series import N_WATER, VELOCITIES, build_water_series, interpolate, no_series
 from fowt_env.plant.hydro.members import (
     N_NODE,
+    add_member_loads,
     add_node_mass,
     axis_of,
     build_members,
@@ -92,6 +94,16 @@ def test_still_members_keep_the_added_mass_of_their_nodes():
     _, added = load_of(0.0, motion(np.random.default_rng(1)), members, None)
     assert members.added_mass == pytest.approx(added, rel=1e-12)
     assert np.linalg.eigvalsh(added)[0] > 0.0
+
+
+@pytest.mark.parametrize("axis", ["displaced", "undisplaced"])
+def test_the_added_mass_of_a_tilted_platform_is_that_of_the_plain_twin(axis):
+    Scratch = namedtuple("Scratch", "added_mass, member_nodes, member_water")
+    members, where = build(axis=axis), motion(np.random.default_rng(6))
+    data = Scratch(np.zeros((6, 6)), np.zeros((0, N_NODE)), np.zeros(N_WATER * len(members.nodes)))
+    add_member_loads(0.0, make_pose(*where), NO_LOAD, members, None, None, data)
+    mass = naive.load(0.0, *where, HULL, None, SITE, ("fixed", "swl", "none"), axis=axis)[1]
+    assert np.abs(data.added_mass - mass).max() < 1e-6 * np.abs(mass).max()
 
 
 def test_one_inclined_cylinder_has_the_drag_of_hydrodyn():
