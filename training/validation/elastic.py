@@ -389,10 +389,6 @@ def groups(machine):
     }
     if machine is IEA15:  # whose hull has no strips
         return found | {"relief": (partial(relief, machine=machine), 2)}
-    as_openfast = partial(
-        turbulence,
-        machine=replace(machine, control_dt=EACH_STEP),
-        words="as OpenFAST",
-        strip_axis="undisplaced",
-    )
+    at_each_step = replace(machine, control_dt=EACH_STEP)
+    as_openfast = partial(turbulence, machine=at_each_step, words="as OpenFAST", strip_axis="undisplaced")
     return found | {"as_openfast": (as_openfast, len(WINDS))}
