@@ -114,7 +114,10 @@ _elevation = chosen_by_class(
 
 @inlined_kernel
 def _mass_of_strips(pose, load, strips, matrix):
-    fill_added_mass(pose, load, strips.shape, matrix)
+    if strips.shape.undisplaced_axis is not None:  # decided here: a call would pass the arrays of the shape
+        fill_undisplaced_mass(pose, load, strips.shape.keel_z, matrix)
+    else:
+        fill_added_mass(load, matrix)
 
 
 @inlined_kernel
@@ -181,11 +184,8 @@ def hydro_rates(x, hydro, dx):
 
 
 @kernel
-def fill_added_mass(pose, strips, shape, matrix):
-    """Fill the symmetric (6, 6) added mass of a StripLoad, whose axis is the body's z or the vertical."""
-    if shape.undisplaced_axis is not None:
-        fill_undisplaced_mass(pose, strips, shape.keel_z, matrix)
-        return
+def fill_added_mass(strips, matrix):
+    """Fill the symmetric (6, 6) added mass of a StripLoad, whose axis is the body's z."""
     for i in range(6):
         for j in range(6):
             matrix[i, j] = 0.0

@@ -5,7 +5,7 @@ from naive.morison import spar_of
 from plant_helpers import make_pose
 from spar_in_waves import STILL, SWITCHES, motion, nodes_of, strips_of, waves_of
 
-from fowt_env.plant.hydro.load import fill_added_mass
+from fowt_env.plant.hydro.load import ExactStrips, fill_strip_mass
 from fowt_env.plant.hydro.morison import Current, morison_load
 from fowt_env.plant.hydro.strip_kinematics import strip_kinematics
 from fowt_env.plant.hydro.strips import axis_surface
@@ -144,7 +144,7 @@ def test_the_matrix_of_the_added_mass_is_that_of_slices_that_take_water_across_t
     got = load(0.0, moving, strips, None)
     n = moving[1][2] if axis == "undisplaced" else np.array([0.0, 0.0, 1.0])  # the vertical in body axes
     matrix, keel = np.ones((6, 6)), np.r_[n, np.cross([0.0, 0.0, platform.hull.z[0]], n)]
-    fill_added_mass(make_pose(*moving), got, strips, matrix)
+    fill_strip_mass(make_pose(*moving), got, ExactStrips(strips, None), matrix)
     expected = got.a33 * np.outer(keel, keel)
     centre = got.s1 / got.s0
     apart = np.sqrt(got.s2 / got.s0 - centre**2)
