@@ -23,6 +23,8 @@ from fowt_env.registration import ENVIRONMENTS, LADDER
 SEA = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 DRAWN = ("90%", "drawn")
 EASY = next(iter(LADDER))
+SEMI = "fowt_env/VolturnUS15MW-v1"
+OTHERS = [name for name in ENVIRONMENTS if name != SEMI]
 FIXED = {"wind": NTM, "sea": SEA, "weather_seed": 7, "offsets": {}}
 
 
@@ -51,7 +53,9 @@ def test_gymnasium_and_sb3_checkers_find_nothing(settings):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*ENVIRONMENTS, *ladder()])
+@pytest.mark.parametrize(
+    "name", [*ladder(), SEMI, *(pytest.param(name, marks=pytest.mark.nightly) for name in OTHERS)]
+)
 def test_the_checkers_find_nothing_in_any_name(name):
     check({"id": name})
 

@@ -157,6 +157,7 @@ def test_the_baseline_reads_the_lidar_that_it_would_in_simulate():
     np.testing.assert_allclose(read[:, 0], wanted[: len(read), 0], atol=0.1)  # without the nacelle's motion
 
 
+NIGHTLY = (pytest.mark.slow, pytest.mark.nightly)
 SLOW = {"kind": "ntm", "speed": 8.0, "class": "B"}
 DRIVES = {"pitch_drive": "second_order", "fidelity": "fast", "wind": 16.0}
 
@@ -164,11 +165,11 @@ DRIVES = {"pitch_drive": "second_order", "fidelity": "fast", "wind": 16.0}
 @pytest.mark.parametrize(
     ("law", "as_baseline", "settings"),
     [
-        ("pi", False, {"rotor": "bem", "fidelity": "reference", "wind": SLOW}),
-        ("pi", False, {"rotor": "table", "fidelity": "reference"}),
+        pytest.param("pi", False, {"rotor": "bem", "fidelity": "reference", "wind": SLOW}, marks=NIGHTLY),
+        pytest.param("pi", False, {"rotor": "table", "fidelity": "reference"}, marks=NIGHTLY),
         ("pi", False, {"fidelity": "standard"}),
         ("pi", True, {"fidelity": "fast"}),
-        ("pi", True, DRIVES),
+        pytest.param("pi", True, DRIVES, marks=NIGHTLY),
         ("lqr", True, {"rotor": "table"}),
     ],
 )

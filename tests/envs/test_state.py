@@ -27,8 +27,8 @@ WAKE = {"rotor": "bem", "dynamic_inflow": True, "wind": 18.0, "sea": "still"}  #
         ON_LQR | {"sensors": DEGRADED},
         {"task": "shutdown", "duration": 60.0},
         INDIVIDUAL,
-        WATCHED,
-        BOX,
+        pytest.param(WATCHED, marks=(pytest.mark.slow, pytest.mark.nightly)),
+        pytest.param(BOX, marks=(pytest.mark.slow, pytest.mark.nightly)),
         pytest.param(WAKE, marks=(pytest.mark.slow, pytest.mark.nightly)),
     ],
 )

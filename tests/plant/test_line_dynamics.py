@@ -200,6 +200,7 @@ OPENFAST = {  # line: mean, standard deviation, damage-equivalent loads of expon
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_fairlead_fatigue_of_volturnus_in_waves_is_that_of_openfast_with_moordyn():
     """OpenFAST v5.0.0, MoorDyn file of the deck, Hs 7.5 m, no wind, 100 to 600 s."""
     scene = build_scene("iea15_volturnus_s", sea=wave_components(), mooring="dynamic")
@@ -212,6 +213,7 @@ def test_fairlead_fatigue_of_volturnus_in_waves_is_that_of_openfast_with_moordyn
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("integrator", ["rk4", "heun", "abm4"])
 def test_integrators_advance_lines_alike(integrator):
     """Each step method gives the tensions of the default one in waves."""

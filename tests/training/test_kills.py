@@ -18,10 +18,8 @@ SHARES = {"evaluate": 0.36, "ppo": 0.28, "sac": 0.12, "validate": 0.24}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "study",
-    ["evaluate", *(pytest.param(name, marks=pytest.mark.nightly) for name in ("ppo", "sac", "validate"))],
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("study", SHARES)
 def test_killed_runs_stay_readable_and_end_as_if_they_had_not_been(tmp_path, study):
     if study in ("ppo", "sac"):
         pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")

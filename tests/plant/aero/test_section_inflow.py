@@ -33,6 +33,7 @@ WAKE, SKEW = build_dynamic_inflow(), build_skewed_wake()
 STRAIGHT = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 CURVED = build_fewer_elements(read_turbine("iea15"), 1.225, 18)
 ROTORS = {"straight": STRAIGHT, "curved": CURVED}
+NAMES = ["straight", pytest.param("curved", marks=(pytest.mark.slow, pytest.mark.nightly))]
 # wind m/s, tip-speed ratio and blade pitch (deg) of operation
 SCHEDULE = np.array(
     [(5, 9.0, 0), (8, 8.3, 0), (11.4, 7.0, 0), (14, 5.7, 8.7), (18, 4.4, 14.9), (24, 3.3, 22.5)]
@@ -113,7 +114,7 @@ def outer(rates, rotor):
     return rates[:, N_RIGID : N_RIGID + wakes].reshape(shape)[:, :, 2:].reshape(len(rates), -1)
 
 
-@pytest.fixture(scope="module", params=ROTORS)
+@pytest.fixture(scope="module", params=NAMES)
 def rotor(request):
     return build_dynamic_sections(ROTORS[request.param], WAKE)
 
@@ -129,7 +130,7 @@ def test_loads_and_rates_are_those_of_blade_element_momentum(rotor):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("wake", [None, WAKE], ids=["quasi-steady", "lagging"])
-@pytest.mark.parametrize("name", ROTORS)
+@pytest.mark.parametrize("name", NAMES)
 def test_a_skewed_wake_is_that_of_blade_element_momentum(name, wake):
     skewed = build_dynamic_sections(ROTORS[name], wake, SKEW)
     states, winds = operating(100, skewed, seed=10)

@@ -168,6 +168,7 @@ def test_a_cylinder_has_no_unsteady_lift():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(config.DISABLE_JIT, reason="tables take minutes without the compiler")
 def test_the_look_up_has_the_airfoils_of_blade_element_momentum():
     states, winds = moving(60)

@@ -131,7 +131,7 @@ PARTS = [
     pytest.param({"tower": "modes2"}, marks=NIGHTLY),
     pytest.param({"tower": "modes", "pitch": "individual"}, marks=NIGHTLY),
     pytest.param({"blades": "modes"}, marks=NIGHTLY),
-    pytest.param({"blades": "modes", "tower": "modes"}, marks=pytest.mark.slow),
+    pytest.param({"blades": "modes", "tower": "modes"}, marks=NIGHTLY),
 ]
 
 

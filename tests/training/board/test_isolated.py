@@ -155,6 +155,8 @@ def test_kernels_come_from_a_run_without_weather_and_are_those_of_each_run(tmp_p
     assert warmed_up(made, pytest.fail, "a").kernels == made.kernels
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_kernels_may_take_long_to_compile_in_the_first_call_of_act(tmp_path, monkeypatch):
     monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "cache"))
     source = SOUND.replace(

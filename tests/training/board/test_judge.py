@@ -228,7 +228,13 @@ def first(tmp_path_factory):
 
 @pytest.mark.parametrize(
     "change",
-    ["a byte", *(pytest.param(change, marks=pytest.mark.slow) for change in ("its card", "a limit"))],
+    [
+        "a byte",
+        *(
+            pytest.param(change, marks=(pytest.mark.slow, pytest.mark.nightly))
+            for change in ("its card", "a limit")
+        ),
+    ],
 )
 def test_what_was_changed_is_run_again(first, tmp_path, change):
     """A submission that never works keeps no rank of the one whose name it has; neither do a card's words."""

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pandas as pd
+import pytest
 import scipy.io
 from command_line import fowt
 
@@ -89,6 +90,8 @@ def test_a_sweep_of_settings_refuses_seeds_for_scoring_and_settings_that_there_a
     assert "unknown setting of lqr 'torque_rat'. Did you mean 'torque_rate'" in " ".join(stderr.split())
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sweep_of_settings_shows_and_writes_every_variant_beside_gspi(tmp_path):
     path = tmp_path / "sweep.csv"
     words = ("--vary", "travel=1,0.6", "--cases", "steady_16", "--seeds", "1001", "--out", str(path))

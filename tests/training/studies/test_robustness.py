@@ -55,12 +55,10 @@ def test_default_step_keeps_a_factor_of_two_from_blow_up(name, integrator):
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "name",
-    [
-        name if name == "full, look-up rotor" else pytest.param(name, marks=pytest.mark.nightly)
-        for name in step_limits.LIMIT_SCENES  # half a minute each
-    ],
+    step_limits.LIMIT_SCENES,  # half a minute each
 )
 def test_default_step_keeps_a_factor_of_two_on_the_whole_map(name):
     table = step_limits.stability_map([name], duration=150.0)

@@ -48,6 +48,7 @@ def test_a_candidate_adds_its_vector_times_the_components():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_episodes_are_the_runs_of_a_suite_and_candidates_differ():
     suite = read_suite(search_clone.LULLS)
     case = suite.cases[1]

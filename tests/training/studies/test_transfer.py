@@ -301,6 +301,7 @@ def test_an_unknown_platform_or_model_is_named():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_run_here_blows_the_box_and_keeps_its_figures(tmp_path, monkeypatch):
     turbsim = pytest.importorskip("openfast_io.turbsim_file")
     file, path = turbsim.TurbSimFile(), transfer.box_path(tmp_path, "oc3_hywind", 14.0, 1)

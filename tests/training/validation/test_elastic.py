@@ -69,7 +69,8 @@ def test_every_stored_case_is_compared():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["nrel5mw", pytest.param("iea15", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["nrel5mw", "iea15"])
 def test_steady_deflections_and_moments_are_within_1_percent_and_3_percent(name):
     """Missed: means in strong wind where AeroDyn's node at the very tip has a load, without induction."""
     rows = rows_of(elastic.bending, MACHINES[name])
@@ -91,7 +92,8 @@ def test_steady_deflections_and_moments_are_within_1_percent_and_3_percent(name)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["nrel5mw", pytest.param("iea15", marks=pytest.mark.nightly)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", ["nrel5mw", "iea15"])
 def test_blade_frequencies_are_within_1_percent(name):
     rows = rows_of(elastic.blade_decays, MACHINES[name])
     table = stored("blade_modes")

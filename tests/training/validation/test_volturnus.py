@@ -219,6 +219,7 @@ def test_floating_under_rosco_misses_the_deviation_of_heave_at_12_mps_alone():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_linear_models_miss_the_damping_of_heave_alone():
     rows = judged("linear", "heave mode, damping ratio")
     assert len([row for row in rows if row.verdict == "met"]) == 5 * 6
