@@ -404,7 +404,7 @@ class Training:
             self.model, state = self._load(kind, self.env)
         else:
             self.env.seed(settings["seed"])
-            self.model = _new_model(kind, settings, self.env)
+            self.model = new_model(kind, settings, self.env)
         return validation, state
 
     def _learn(self, validation, state, report):
@@ -584,7 +584,7 @@ def _schedules(settings):
     return {key: LinearSchedule(*pair, 1.0) for key, pair in pairs.items()}
 
 
-def _new_model(kind, settings, env):
+def new_model(kind, settings, env, device="cpu"):
     """Return an untrained model. Raises: InputError for settings that the algorithm does not accept."""
     import torch
 
@@ -593,6 +593,6 @@ def _new_model(kind, settings, env):
     if "activation" in policy:
         policy["activation_fn"] = {"tanh": torch.nn.Tanh, "relu": torch.nn.ReLU}[policy.pop("activation")]
     try:
-        return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device="cpu", **arguments)
+        return kind("MlpPolicy", env, policy_kwargs=policy, seed=settings["seed"], device=device, **arguments)
     except (AssertionError, TypeError, ValueError) as error:
         raise InputError(f"algorithm: {settings['algo']} does not accept these settings: {error}") from error
