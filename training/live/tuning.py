@@ -260,6 +260,7 @@ class Linear(NamedTuple):
     poles: np.ndarray  # rad/s, complex
     margins: Margins | None  # None: the law moves no command
     note: str  # why there is no linear loop, "" where there is one
+    motions: Mapping[str, float] = {}  # frequency (rad/s) of each mode of the plant without control
 
 
 def linear(weather: Weather, law: Law) -> Linear:
@@ -277,7 +278,7 @@ def linear(weather: Weather, law: Law) -> Linear:
         loop = sampled_loop(model, controller, CONTROL_DT)
     except (InputError, SimulationStopped) as error:
         return Linear(np.empty(0, complex), None, str(error))
-    return Linear(loop.poles(), loop.margins(), "")
+    return Linear(loop.poles(), loop.margins(), "", {mode.name: mode.frequency for mode in model.modes()})
 
 
 def loop_words(loop: Linear) -> list[tuple[str, str]]:
@@ -293,18 +294,26 @@ def loop_words(loop: Linear) -> list[tuple[str, str]]:
     if loop.margins is None:
         return [(key, loop.note if key == "stable" else "–") for key in keys]
     found, poles = loop.margins, loop.poles
-    pitch = found.loops.get("blade_pitch_command")
+    pitch = found.loops.get("blade_pitch_command") if found.stable else None  # else there are no margins
     swinging = poles[(poles.imag > 1e-3) & (np.abs(poles) < 3.0)]
     least = min(swinging, key=lambda pole: -pole.real / abs(pole))
+    motion = min(loop.motions, key=lambda name: abs(np.log(loop.motions[name] / abs(least))), default="")
     values = (
         "yes" if found.stable else "NO",
-        f"{pitch.gain:.3g} at {pitch.gain_frequency:.2g} rad/s" if pitch else "–",
-        f"{pitch.phase:.1f} at {pitch.phase_frequency:.2g} rad/s" if pitch else "–",
-        f"{pitch.delay:.2f}" if pitch else "–",
-        f"{found.sensitivity_peak:.2f} at {found.peak_frequency:.2g} rad/s",
-        f"{-least.real / abs(least):.3f} at {abs(least):.3f} rad/s",
+        _margin(pitch.gain, ".3g", pitch.gain_frequency) if pitch else "–",
+        _margin(pitch.phase, ".1f", pitch.phase_frequency) if pitch else "–",
+        _margin(pitch.delay, ".2f") if pitch else "–",
+        _margin(found.sensitivity_peak, ".2f", found.peak_frequency) if found.stable else "–",
+        f"{_margin(-least.real / abs(least), '.2g', abs(least))}, {motion.replace('_', ' ')}",
     )
     return list(zip(keys, values, strict=True))
+
+
+def _margin(value, style, frequency=None):
+    """Return a margin as a text, with the frequency (rad/s) at which it is found."""
+    if np.isinf(value):
+        return "unlimited"
+    return f"{value:{style}}" if frequency is None else f"{value:{style}} at {frequency:.2g} rad/s"
 
 
 def responses(weather: Weather, law: Law) -> dict[str, np.ndarray]:
