@@ -22,6 +22,8 @@ SHEAR = "Shear exponent of the wind of --compare (None: the site's), which its f
 MINE = "Controllers to study: names, policy:NAME, design:FILE, dll:FILE.so, module:Name, comma-separated."
 SHOWN_WIND = 14.0  # m/s, nearest case of the suite for margins and the animation
 START = 200.0  # s of a run that are not compared, as in suites: surge settles slowly
+LEAST_COMPARED = 120.0  # s, some periods of platform pitch; less is said to be too little
+ROUNDING = 1e-9  # of the mean: a smaller deviation is none
 FILM = 48.0  # s of the animation, where the motions of the platforms differ most
 COMPARED = ("RotSpeed", "BldPitch1", "GenTq", "GenPwr", "PtfmPitch", "PtfmSurge", "TwrBsMyt")
 
@@ -161,8 +163,11 @@ def _compared(platform, name, label, path, shear):
     result = compare(run, theirs, start, None, tuple(known))
     rows = []
     for row in result.rows:
-        values = map(number_text, (row.mean, row.mean_other, row.std, row.std_other))
-        rows.append((f"{row.channel} ({row.unit})", *values, f"{row.correlation:.3f}"))
+        least = ROUNDING * max(abs(row.mean), abs(row.mean_other))
+        stds = (0.0 if std < least else std for std in (row.std, row.std_other))
+        values = map(number_text, (row.mean, row.mean_other, *stds))
+        alike = f"{row.correlation:.3f}" if np.isfinite(row.correlation) else "–"
+        rows.append((f"{row.channel} ({row.unit})", *values, alike))
     heads = ("channel", "mean here", "mean there", "std here", "std there", "correlation")
     texts = (f"{which}: {text.removesuffix(' (--from)')}" for which, text in result.notes)
     notes = "".join(f"<li>{html.escape(text)}</li>" for text in texts)
@@ -171,6 +176,8 @@ def _compared(platform, name, label, path, shear):
         f"{html.escape(label)} in the wind of {html.escape(Path(path).name)}, {water}, from {start:.0f} s on"
     )
     remark = f"{where}; shear exponent {shear:g} (--shear), which moves the mean platform pitch."
+    if time[-1] - start < LEAST_COMPARED:
+        remark += f" Only {time[-1] - start:.0f} s are compared: too few for means and deviations."
     return "Beside your own run", f"<p>{remark}</p>{_html_table(heads, rows)}<ul>{notes}</ul>"
 
 

@@ -54,6 +54,7 @@ def test_a_study_says_the_verdict_and_writes_one_page_with_all_parts(tmp_path, m
     page = re.sub("<[^>]+>", "", text)
     assert said.keys() == {"pi", "pi_land"} and all(line in page for line in said.values())
     assert "pi in the wind of run.outb, with its waves, towards +x" in text and "shear exponent 0.14" in text
+    assert "Only 63 s are compared" in text  # of the 90 s, without the first 30 %
     assert "RotSpeed (rpm)" in text and "phase margin (deg)" in text
 
 
