@@ -20,7 +20,8 @@ from fowt_env.errors import ControllerError, InputError, unknown
 DLL_PREFIX = "dll:"
 SYMBOL = "DISCON"  # name of the function, as DLL_ProcName of OpenFAST
 PITCH = ("collective", "individual")
-ROOT = "fowt"  # root name of the library's own outputs, in the folder of the run
+# root name of the library's outputs in the folder of the run; ROSCO cuts the extension that OpenFAST gives it
+ROOT = "fowt.SrvD"
 TIME_LIMIT = 5.0  # s of one call
 START_LIMIT = 60.0  # s of loading and of the first call, which may read files
 MOST_MESSAGES = 100  # different messages of a run that are kept

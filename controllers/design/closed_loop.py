@@ -5,7 +5,7 @@ from math import isinf, pi
 import numpy as np
 
 from fowt_env.analysis.linear_model import LinearModel, linearize, modes
-from fowt_env.analysis.reduced_model import platform_frequency, with_pitch_lag
+from fowt_env.analysis.reduced_model import platform_frequency
 from fowt_env.analysis.trim import trim
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.pi import PISettings, schedule_gain
@@ -26,7 +26,6 @@ def closed_loop_matrix(model: LinearModel, settings: PISettings):
     the measured pitch it adds -(1 - GK) times this pitch to the command.
     Raises: InputError if the pitch is at a limit (below rated the loop is open).
     """
-    model = with_pitch_lag(model)
     point = model.point
     pitch = float(point.state[State.BLADE_PITCH])
     if not settings.pitch_minimum < pitch < settings.pitch_maximum:
@@ -84,7 +83,7 @@ def platform_pitch_damping(winds, gain_sets, platform="oc3_hywind", **options):
     table = {name: [] for name in gain_sets}
     for wind in winds:
         scene = build_scene(platform, wind=float(wind), **options)
-        model = with_pitch_lag(linearize(scene, trim(scene)))
+        model = linearize(scene, trim(scene))
         for name, changes in gain_sets.items():
             settings = PISettings.published(with_gains(scene), **changes)
             table[name].append(platform_damping(model, settings))

@@ -18,7 +18,7 @@ from scipy.linalg import expm, solve_discrete_are
 from scipy.optimize import least_squares
 
 from fowt_env.analysis.linear_model import linearize, sampled
-from fowt_env.analysis.reduced_model import residualised, with_pitch_lag
+from fowt_env.analysis.reduced_model import residualised
 from fowt_env.analysis.trim import water_key, without_fluctuations
 from fowt_env.analysis.trim_cache import plant_key
 from fowt_env.analysis.wave_excitation import wave_force
@@ -180,7 +180,7 @@ def design_model(scene, speed):
         raise InputError(
             f"no design of lqr or mpc controllers for turbine {name!r} in wind of {speed:g} m/s: {error}"
         ) from error
-    model = with_pitch_lag(residualised(linearize(scene_at(scene, speed))))
+    model = residualised(linearize(scene_at(scene, speed)))
     rows = [model.index(name) for name in PLANT]
     sensors = [model.output_index(name) for name in SENSORS]
     peak = 2.0 * pi / sea.Tp

@@ -45,6 +45,7 @@ INPUT_STEPS = np.array([1.0, 1e-5, 1e-3])
 FREQUENCY_ROUNDS = 4  # iterations of a period and the added mass at that period
 # internal blocks that linearize supports; the filtered position has no effect in flat water
 LINEAR = ("radiation", "filtered position", "wake")
+LEAST_LAG = 0.05  # s, of the blade pitch of a drive without lag: a step of the plant, no rate, sets its state
 DRIVE = ("blade_pitch", "pitch_rate")  # states of a pitch drive with inertia
 MEMORY = "radiation_"  # prefix of the states of radiation memory
 FORCES = ("fx", "fy", "fz", "mx", "my", "mz")  # on the hull, body components about the body origin
@@ -448,8 +449,9 @@ def linearize(scene, operating_point=None, *, wind=None):
     first-order force. Drag has no linear part at rest in still water, so viscous damping is absent there.
     Radiation memory is included exactly, for the convolution by the fit of the state-space option. Dynamic
     inflow has four states per annulus: wake_1 to 4 are those of the innermost station (aero/wake.py).
-    Deadband and friction of a pitch drive are omitted. blade_pitch is the collective pitch. Bending blades
-    are in multi-blade coordinates about their periodic state; variations at three per turn are omitted.
+    Deadband and friction of a pitch drive are omitted; one without lag has LEAST_LAG. blade_pitch is the
+    collective pitch. Bending blades are in multi-blade coordinates about their periodic state; variations at
+    three per turn are omitted.
 
     Raises: InputError for a scene with other internal states, for a wind in a scene without aerodynamics, and
     for a wind together with an operating point.
@@ -461,7 +463,19 @@ def linearize(scene, operating_point=None, *, wind=None):
             raise InputError(f"wind = {short(wind)}: an operating point has a wind already; give one only")
         scene = scene.with_weather(wind=check_number("wind", wind, 0.0))
     point = trim(scene) if operating_point is None else operating_point
-    return differentiated(scene, point, bending_names(scene))
+    return with_pitch_lag(differentiated(scene, point, bending_names(scene)))
+
+
+def with_pitch_lag(model):
+    """Return the LinearModel with a lag of LEAST_LAG in the blade pitch; unchanged if its drive has a lag."""
+    if model.scene.turbine.pitch_drive.lag > 0.0:
+        return model
+    a, b = model.A.copy(), model.B.copy()
+    for column, name in enumerate(model.inputs):
+        if name.endswith("pitch_command"):  # collective, or a component of the cyclic pitch
+            row = model.index(name.removesuffix("_command"))
+            a[row, row], b[row, column] = -1.0 / LEAST_LAG, 1.0 / LEAST_LAG
+    return replace(model, A=a, B=b)
 
 
 def differentiated(scene, point, bladed, inputs=(), outputs=()):

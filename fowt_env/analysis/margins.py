@@ -13,6 +13,7 @@ from math import atan, degrees, inf
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.linalg import schur
 from scipy.optimize import brentq, minimize_scalar
 
 from fowt_env.analysis.linear_model import LinearModel, chosen
@@ -211,21 +212,34 @@ def closed_loop(plant: tuple, law: LinearLaw) -> np.ndarray:
 
 def _sensitivity(plant, law):
     """Return the sensitivity S (k, m, m) as a function of frequencies (k,)."""
-    a, b, c, d = plant
-    m = b.shape[1]
-
-    def response(matrices, s):
-        a, b, c, d = matrices
-        if not len(a):
-            return np.broadcast_to(d, (len(s), *d.shape))
-        left = s[:, None, None] * np.eye(len(a)) - a
-        return c @ np.linalg.solve(left, np.broadcast_to(b, (len(s), *b.shape))) + d
+    of_plant, of_law, one = _response(*plant), _response(*law[:4]), np.eye(plant[1].shape[1])
 
     def sensitivity(omega):
         s = 1j * np.asarray(omega)
-        return np.linalg.inv(np.eye(m) - response(law[:4], s) @ response((a, b, c, d), s))
+        return np.linalg.inv(one - of_law(s) @ of_plant(s))
 
     return sensitivity
+
+
+def _response(a, b, c, d):
+    """Return C (sI - A)^-1 B + D (k, outputs, inputs) as a function of s (k,).
+
+    In the coordinates of the complex Schur form of A, whose triangle is solved for all s a row at a time:
+    with the hundred states of radiation memory a solution by matrices takes minutes and gigabytes.
+    """
+    if not len(a):
+        return lambda s: np.broadcast_to(d, (len(s), *d.shape))
+    triangle, vectors = schur(a, output="complex")
+    into, out, n = vectors.conj().T @ b, c @ vectors, len(a)
+
+    def response(s):
+        x = np.empty((n, len(s) * b.shape[1]), complex)
+        for i in range(n - 1, -1, -1):
+            row = (triangle[i, i + 1 :] @ x[i + 1 :]).reshape(len(s), -1)
+            x[i] = ((into[i] + row) / (s - triangle[i, i])[:, None]).ravel()
+        return (out @ x).reshape(len(out), len(s), -1).swapaxes(0, 1) + d
+
+    return response
 
 
 def _frequencies(poles):

@@ -5,7 +5,7 @@ transformed to them; the derivatives are averaged over the azimuth. Variations a
 omitted.
 """
 
-from fowt_env.analysis.linear_model import LINEAR, check_linear, differentiated
+from fowt_env.analysis.linear_model import LINEAR, check_linear, differentiated, with_pitch_lag
 from fowt_env.analysis.linear_plant import MOMENTS, bending_names, plant_states
 from fowt_env.analysis.trim import trim
 from fowt_env.errors import InputError
@@ -31,4 +31,5 @@ def linearize_blades(scene, operating_point=None):
     check_linear(scene, [name for name in LINEAR if name != "wake"])  # cyclic wake states are not implemented
     point = trim(scene) if operating_point is None else operating_point
     pitches = [name for name in ("blade_pitch", "pitch_rate") if name in plant_states(scene)[0]]
-    return differentiated(scene, point, (*pitches, *bending_names(scene)), CYCLIC_INPUTS, MOMENTS)
+    bladed = (*pitches, *bending_names(scene))
+    return with_pitch_lag(differentiated(scene, point, bladed, CYCLIC_INPUTS, MOMENTS))

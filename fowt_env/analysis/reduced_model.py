@@ -1,4 +1,4 @@
-"""Reduces linear models to the rigid-body states, with a lag of the blade pitch, for controller design.
+"""Reduces linear models to the rigid-body states, for controller design.
 
 The other states z, z' = A_zz z + A_zx x + B_z u + E_z f, are residualised (Kokotovic, Khalil and O'Reilly,
 Singular Perturbation Methods in Control, 1986), because truncation would remove their steady effect:
@@ -8,8 +8,6 @@ Singular Perturbation Methods in Control, 1986), because truncation would remove
   and a pitch drive with the same lag for slow commands;
 - radiation memory, as slow as the platform, is replaced by its complex gain at a frequency w: the real part
   multiplies x, the imaginary part over w multiplies dx/dt, which gives added mass and damping at w.
-
-Blades without a pitch actuator have no pitch state: designs use LEAST_LAG.
 """
 
 from dataclasses import replace
@@ -22,20 +20,9 @@ from fowt_env.analysis.linear_plant import WAKE
 from fowt_env.errors import InputError
 from fowt_env.plant.state import MOTIONS, STATES
 
-LEAST_LAG = 0.05  # s, assigned to an ideal pitch drive
 SETTLES = 1e-6  # 1/s, slowest decay of a state that is replaced by its equilibrium
 NAMES = ("platform_pitch", "surge", "heave")  # names that the platform-pitch mode may have, likeliest first
 FAR = 0.3  # tolerance of the platform-pitch mode's frequency, as a fraction of the undamped one
-
-
-def with_pitch_lag(model):
-    """Return the LinearModel with a lag of LEAST_LAG in the blade pitch; unchanged if its drive has a lag."""
-    if model.scene.turbine.pitch_drive.lag > 0.0:
-        return model
-    a, b, blade = model.A.copy(), model.B.copy(), model.index("blade_pitch")
-    a[blade], b[blade] = 0.0, 0.0
-    a[blade, blade], b[blade, model.inputs.index("blade_pitch_command")] = -1.0 / LEAST_LAG, 1.0 / LEAST_LAG
-    return replace(model, A=a, B=b)
 
 
 def platform_frequency(model):

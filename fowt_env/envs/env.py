@@ -70,12 +70,12 @@ from fowt_env.envs.settings import (
     PlantSettings,
     read_settings,
 )
-from fowt_env.envs.snapshot import CARRIED, Snapshot, carried, fill_carried
+from fowt_env.envs.snapshot import Snapshot, carried, fill_carried
 from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Task, draw_faults, task_of
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import InputError, unknown, warn_once
 from fowt_env.loop.interface import Interface, interface_data
-from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START, Watch
+from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START, SUNK, SUNK_REASON, Watch
 from fowt_env.loop.sensing import open_sensors
 from fowt_env.plant.advance import STOP_REASONS, TRIPPED, output
 from fowt_env.plant.compile.handle import Handle
@@ -225,6 +225,9 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
         if by_goals and task.shutdown is not None:
             raise InputError(f"reward = {reward!r}: is of operation: task {task.name!r} has a shutdown")
         self.action_mode, self.baseline = control.action_mode, control.baseline
+        if mode not in ADDING and task.shutdown is None and self.baseline != ControlSettings.baseline:
+            unused = f"baseline = {self.baseline!r}: is not used with action_mode = {self.action_mode!r}"
+            warn_once(unused, f"{unused}; allowed: residual, individual_residual, or a task with a shutdown")
         control_dt = control.control_dt
         steps_in("duration", task.duration, control_dt, "control_dt")
         first = task.draw(np.random.default_rng(0))
@@ -633,7 +636,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _reason(self, status):
         """Return the reason of a termination, with the user load that caused the termination, if any."""
-        reason = STOP_REASONS[status]
+        reason = SUNK_REASON if status == SUNK else STOP_REASONS[status]
         if status == TRIPPED:
             reason = f"{trip_name(self._episode.link.watch)} ({reason})"
         fault = self.scene.first_nonfinite_load(self._episode.data)
@@ -765,10 +768,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
             raise ResetNeeded("call reset() first: there is no state yet")
         run, scene = self._episode, self.scene
         data = scene.data()
-        pairs = {"data": (data, run.data), "rotor": (data.rotor, run.data.rotor)}
-        for kind, (copy, source) in pairs.items():
-            for name in CARRIED[kind] if copy is not None else ():
-                getattr(copy, name)[...] = getattr(source, name)
+        fill_carried(run._replace(data=data), carried(run))
         row = np.empty(len(scene.channels))
         time = run.counts[STEP] * self.dt
         output(scene.handle(data), run.x, run.u, time, np.zeros_like(run.x), row)

@@ -23,7 +23,7 @@ from fowt_env.envs.observations import ObservationMap, fill_observation, fill_si
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.loop.interface import Interface, InterfaceData
 from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
-from fowt_env.loop.protection import has_ended, is_supervised, supervise_turbine
+from fowt_env.loop.protection import SUNK, has_ended, is_sunk, is_supervised, supervise_turbine
 from fowt_env.loop.sensing import WindAhead, read_wind_ahead
 from fowt_env.plant.advance import (
     NON_FINITE,
@@ -234,6 +234,8 @@ def advance_period(config, episode, estimator_law):
             status = begun
     if status == RUNNING and link.measurement[Measure.ROTOR_SPEED] > config.overspeed:
         status = OVERSPEED
+    if status == RUNNING and is_sunk(episode.x, model, config.interface.guard):
+        status = SUNK
     update_estimate(estimator_law, config, episode)
     write_observation(config, episode)
     rate_period(config.goals, status != RUNNING, config.scales, episode)

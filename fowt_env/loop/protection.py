@@ -78,6 +78,10 @@ class Part(IntEnum):
     BACKUP = 4  # 1: in an emergency stop the blade still feathers, by its backup drive
 
 
+SUNK = 7  # status of a run, in addition to those of plant/advance.py
+SUNK_REASON = "sunk (the foot of the tower is below still water)"
+
+
 class Flood(IntEnum):
     """Enumerates the columns of Guard.floods."""
 
@@ -397,6 +401,14 @@ def water_in(k, t, floods):
     if late >= duration:
         return floods[k, Flood.MASS]
     return max(late, 0.0) / duration * floods[k, Flood.MASS]
+
+
+@kernel
+def is_sunk(x, model, guard):
+    """Return whether flooded compartments have drawn the foot of the tower below still water."""
+    if guard is None:
+        return False
+    return guard.floods.shape[0] > 0 and model.layout.base_height + x[State.HEAVE] < 0.0
 
 
 @kernel

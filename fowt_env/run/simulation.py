@@ -36,7 +36,7 @@ from fowt_env.errors import (
     unknown_keyword,
 )
 from fowt_env.loop.interface import interface_data
-from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START
+from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START, SUNK_REASON
 from fowt_env.loop.rollout import Schedule, begin_command, rollout
 from fowt_env.plant.advance import BAD_COMMAND, RUNNING, STOP_REASONS, TRIPPED
 from fowt_env.plant.channels import Out
@@ -58,7 +58,6 @@ FIRST_CHUNK = 20.0  # simulated seconds
 CHUNK_TIME = 0.05  # s of wall-clock time
 GIB = 2.0**30
 MOST_MEMORY = 0.8  # fraction of the machine's memory that a table may take
-SUNK = "sunk (the foot of the tower is below still water)"
 LIMITED = 0.5  # fraction of a run with limited generator torque that causes a warning
 REPLACED = {  # former keywords of simulate
     "stop_overspeed": "protection='end_at_overspeed'",
@@ -445,7 +444,7 @@ class Run:
             self.filled += int(np.argmax(foot < 0.0)) + 1 - count
             frame = self.frame()
             time = float(frame.iloc[-1, 0])
-            raise SimulationStopped(f"stopped at t = {time:.3f} s: {SUNK}", SUNK, time, frame)
+            raise SimulationStopped(f"stopped at t = {time:.3f} s: {SUNK_REASON}", SUNK_REASON, time, frame)
 
     def _stop(self, status, step):
         """Raise SimulationStopped with the reason of a status."""

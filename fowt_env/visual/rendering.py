@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from fowt_env.descriptions.ratings import OVERSPEED, RATED_POWER, RATED_SPEED, ratings
+from fowt_env.display import number_text
 from fowt_env.errors import InputError
 from fowt_env.plant.hydro.waves import ramp_factor
 from fowt_env.plant.mooring import catenary, line_shape
@@ -598,7 +599,7 @@ class TracePanel:
         for index, value in reversed(list(enumerate(last))):
             colour = RGB_COLOURS[index % len(RGB_COLOURS)]
             right = put(picture, format(value, trace.form), (right, top + 3), 18, colour, right=True) - 12
-        levels = ", ".join(f"{name} {level:.4g}" for name, level in self._levels(trace))
+        levels = ", ".join(f"{name} {number_text(level)}" for name, level in self._levels(trace))
         if levels and left + self._writer.render(levels, 14, LEVEL).get_width() <= right:
             put(picture, levels, (left, top + 6), 14, LEVEL)
 

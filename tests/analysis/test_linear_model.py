@@ -3,7 +3,7 @@ import pytest
 from plant_helpers import rates
 
 import fowt_env
-from fowt_env.analysis.linear_model import WAKE, linearize, natural_periods
+from fowt_env.analysis.linear_model import LEAST_LAG, WAKE, linearize, natural_periods
 from fowt_env.analysis.reduced_model import residualised
 from fowt_env.analysis.trim import trim
 from fowt_env.errors import InputError
@@ -108,6 +108,21 @@ def test_inputs_act_where_they_should(storm_scene, turbine):
     assert model.A[i, model.index("blade_pitch")] == pytest.approx(-5.1768e7 / row, rel=0.03)
     assert model.A[i, i] == pytest.approx(-1.0552e7 / row, rel=0.03)
     assert model.B[model.index("vx"), 2] > 0.0
+
+
+def test_blades_that_follow_at_once_lag_by_the_least_lag():
+    """A drive without lag sets its state between steps: differences of the plant alone see no command."""
+    plain = linearize(fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="standard"))
+    turbine = plain.scene.turbine
+    drive = turbine.pitch_drive.model_copy(update={"time_constant": 0.0})
+    turbine = turbine.model_copy(update={"pitch_drive": drive})
+    scene = fowt_env.build_scene("oc3_hywind", wind=18.0, fidelity="standard", turbine=turbine)
+    model = linearize(scene)
+    blade, command = model.index("blade_pitch"), model.inputs.index("blade_pitch_command")
+    assert model.A[blade, blade] == -1.0 / LEAST_LAG and model.B[blade, command] == 1.0 / LEAST_LAG
+    omega, row = 0.2, model.output_index("rotor_speed")
+    lagged, whole = model.response(omega)[0, row, command], plain.response(omega)[0, row, command]
+    assert lagged * (1.0 + 1j * omega * LEAST_LAG) == pytest.approx(whole * (1.0 + 0.2j * omega), rel=1e-4)
 
 
 def test_linear_model_of_a_fixed_platform_has_no_platform_motion(storm_scene):

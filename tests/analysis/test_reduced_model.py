@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fowt_env import build_scene, linearize
-from fowt_env.analysis.reduced_model import LEAST_LAG, platform_frequency, residualised, with_pitch_lag
+from fowt_env.analysis.reduced_model import platform_frequency, residualised
 from fowt_env.errors import InputError
 
 
@@ -56,27 +56,8 @@ def test_about_the_platforms_frequency_the_response_is_near(model, remembering):
         )
 
 
-def test_a_model_residualised_and_with_a_lag_is_left_as_it_is(model):
+def test_a_residualised_model_is_left_as_it_is(model):
     assert residualised(model) is model
-    assert with_pitch_lag(model) is model
-
-
-def test_blades_that_follow_at_once_lag_by_the_least_lag():
-    plain = linearize(build_scene("oc3_hywind", wind=18.0, fidelity="standard"))
-    turbine = plain.scene.turbine
-    drive = turbine.pitch_drive.model_copy(update={"time_constant": 0.0})
-    scene = build_scene(
-        "oc3_hywind",
-        wind=18.0,
-        fidelity="standard",
-        turbine=turbine.model_copy(update={"pitch_drive": drive}),
-    )
-    model = with_pitch_lag(linearize(scene))
-    blade, command = model.index("blade_pitch"), model.inputs.index("blade_pitch_command")
-    assert model.A[blade, blade] == -1.0 / LEAST_LAG and model.B[blade, command] == 1.0 / LEAST_LAG
-    omega, row = 0.2, model.output_index("rotor_speed")
-    lagged, whole = model.response(omega)[0, row, command], plain.response(omega)[0, row, command]
-    assert lagged * (1.0 + 1j * omega * LEAST_LAG) == pytest.approx(whole * (1.0 + 0.2j * omega), rel=1e-4)
 
 
 @pytest.mark.parametrize("rate", [0.0, 0.01])

@@ -208,3 +208,25 @@ def test_records_and_keywords_are_the_same_settings():
         FowtEnv(**plain, episode=20.0)
     with pytest.raises(TypeError, match="protecton.*protection"):
         FowtEnv(**STILL, protecton="turbine")
+
+
+def test_a_platform_that_sinks_ends_the_episode_where_it_ends_the_run():
+    """As in simulate: at the first control instant with the tower's foot below still water."""
+    flood = {"kind": "flooded_compartment", "time": 5.0, "mass": 4e6, "point": [0.0, 0.0, -100.0]}
+    scene = fowt_env.build_scene("oc3_hywind", wind=16.0, fidelity="fast")
+    with pytest.raises(fowt_env.SimulationStopped, match="sunk") as caught:
+        fowt_env.simulate(scene, "pi", 20.0, output_dt=0.1, faults=flood)
+    env = FowtEnv(**STILL, action_mode="residual", faults=flood)
+    env.reset(seed=1)
+    for _ in range(round(caught.value.time / 0.1)):
+        *_, terminated, truncated, info = env.step(np.zeros(2))
+        assert not truncated and terminated == ("sunk" in info.get("termination", ""))
+        assert terminated == (10.0 + env.channels()["PtfmHeave"] < 0.0)
+    assert terminated
+
+
+def test_a_baseline_that_nothing_reads_is_announced():
+    with pytest.warns(
+        fowt_env.PlantWarning, match="baseline = 'lqr': is not used with action_mode = 'setpoint'"
+    ):
+        FowtEnv(**STILL, action_mode="setpoint", baseline="lqr")

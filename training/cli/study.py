@@ -1,6 +1,8 @@
 """Implements fowt study: a deck or platform and a controller in, one page with a verdict out."""
 
 import html
+import json
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -16,8 +18,12 @@ from fowt_env.training.cli.tables import out
 
 PLATFORM = "Deck of OpenFAST (.fst), platform file (.toml) or the name of a platform."
 THEIRS = "Run of OpenFAST (.outb, .out) of the first controller, to compare with; needs --controller."
+SHEAR = "Shear exponent of the wind of --compare (None: the site's), which its file does not tell."
 MINE = "Controllers to study: names, policy:NAME, design:FILE, dll:FILE.so, module:Name, comma-separated."
 SHOWN_WIND = 14.0  # m/s, nearest case of the suite for margins and the animation
+START = 200.0  # s of a run that are not compared, as in suites: surge settles slowly
+LEAST_COMPARED = 120.0  # s, some periods of platform pitch; less is said to be too little
+ROUNDING = 1e-9  # of the mean: a smaller deviation is none
 FILM = 48.0  # s of the animation, where the motions of the platforms differ most
 COMPARED = ("RotSpeed", "BldPitch1", "GenTq", "GenPwr", "PtfmPitch", "PtfmSurge", "TwrBsMyt")
 
@@ -30,6 +36,7 @@ def study(
         str, Option(help="Controllers to compare with; the first is the baseline.")
     ] = "gspi_oc3",
     compare: Annotated[str | None, Option(help=THEIRS)] = None,
+    shear: Annotated[float | None, Option(help=SHEAR)] = None,
     suite: shared.SuiteOption = "above_rated",
     seeds: Annotated[str, Option(help=f"Seeds: {shared.WHOLE}.")] = "1:4:1",
     jobs: shared.JobsOption = 1,
@@ -46,76 +53,92 @@ def study(
     fowt study deck/5MW_OC4Semi.fst --controller dll:my.so --compare deck/run.outb --seeds 1
     fowt study --controller mymodule:Mine  # OC3-Hywind, against its published PI law, four seeds
 
-    [bold]Files written[/bold]: platform/ (of a deck), those of fowt evaluate, animation.gif, report.html.
+    [bold]Files written[/bold]: the imported deck, those of fowt evaluate, animation.gif, report.html.
     """
-    from fowt_env.controllers import controller_names
+    from fowt_env.controllers import controller_names, make
     from fowt_env.descriptions.checks import parse_whole_numbers
+    from fowt_env.descriptions.platform import turbine_of
     from fowt_env.training.evaluation.cases import chosen_cases, mean_speed
     from fowt_env.training.evaluation.evaluate import evaluate
     from fowt_env.training.evaluation.leaderboard_file import write_leaderboard
+    from fowt_env.training.evaluation.run_case import CONTROL_DT
     from fowt_env.training.reports.html_page import write_report
+    from fowt_env.visual.style import short_names
 
     mine, others = controller_names(controller), controller_names(against)
     if not mine or not others:
         raise InputError("--controller and --against: must each name a controller")
-    names, folder = list(dict.fromkeys([*others, *mine])), Path(output(out_folder, folder=True))
+    labels, folder = short_names([*others, *mine]), Path(output(out_folder, folder=True))
+    named = {label: name for name, label in labels.items()}
+    first, second = labels[others[0]], labels[mine[0]]
     numbers = parse_whole_numbers(seeds, "seeds")
-    platform, sections = _checked(platform, folder)
+    platform, sections = _imported(platform, folder)
+    turbine = turbine_of(platform)
+    for name in labels:
+        make(name, turbine, CONTROL_DT)  # an unknown name is refused before the first kernel is compiled
+    sections += _checked(platform)
     usual = platform == "oc3_hywind"
     chosen = chosen_cases(suite, None, None if usual else platform)
     if compare is not None:
-        sections.append(_compared(platform, mine[0], compare))
+        sections.append(_compared(platform, mine[0], second, compare, shear))
     with progress_bar("evaluating") as update:
         table = evaluate(
-            names, chosen, seeds=numbers, jobs=jobs, folder=folder,
+            named, chosen, seeds=numbers, jobs=jobs, folder=folder,
             progress=lambda done, total, _: update(done, total, f"evaluating, {done} of {total} runs done"),
         )  # fmt: skip
-    board = write_leaderboard(table, folder, others[0])
+    write_leaderboard(table, folder, first)
     windy = [each for each in getattr(chosen, "cases", chosen) if mean_speed(each) is not None]
     if not windy:
         raise InputError(f"--suite {suite}: has no case with a mean wind speed")
     case = min(windy, key=lambda each: abs(mean_speed(each) - SHOWN_WIND))
     with progress_bar("margins and animation"):
-        sections.append(_margins(platform, case, names))
-        if animation and (film := _film(case, (others[0], mine[0]), numbers[0], folder)):
+        sections.append(_margins(platform, case, named))
+        if animation and (film := _film(case, (first, second), numbers[0], folder)):
             sections.insert(0, film)
     with progress_bar("report") as update:
         page = write_report(folder, schedule=False, progress=update, sections=sections)
-    _say(board, table, others[0])
+    for line in _verdict(folder / "leaderboard.json", len(numbers)):
+        out.print(escape(line), soft_wrap=True)
     out.print(f"open {escape(str(page))}", soft_wrap=True)
 
 
-def _checked(platform, folder):
-    """Return (name or path of the platform, sections of the report on import and check)."""
-    from fowt_env.analysis.check import check_platform
-    from fowt_env.descriptions.platform import platform_names
+def _imported(platform, folder):
+    """Return (name or path of the platform, [section of the report on what differs from a deck])."""
     from fowt_env.files.openfast_deck.importer import import_deck
 
-    sections = []
-    if platform.lower().endswith(".fst"):
-        report = import_deck(platform, folder / "platform", replace_files=True)
-        platform = str(folder / "platform" / "platform.toml")
-        rows = [*report.differences, *report.contradictions]
-        sections.append(
-            ("The deck", _html_table(("in the deck", "here"), rows) if rows else "nothing differs")
-        )
-        out.print(f"imported {escape(report.title)}: {len(report.differences)} differences from the deck")
-    elif platform in platform_names():  # checked by the tests of the package
-        return platform, sections
+    if not platform.lower().endswith(".fst"):
+        return platform, []
+    made = folder / Path(platform).stem
+    report = import_deck(platform, made, replace_files=True)
+    rows = [*report.differences, *report.contradictions]
+    table = _html_table(("in the deck", "here"), rows, texts=2)
+    differing = f"<details><summary>{len(rows)} differences</summary>{table}</details>"
+    where = f"{len(report.differences)} differences, listed in {made / 'report.md'}"
+    out.print(escape(f"imported {platform}: {where}"), soft_wrap=True)
+    return str(made / "platform.toml"), [("The deck", differing if rows else "nothing differs")]
+
+
+def _checked(platform):
+    """Return the sections of the report on the check of a platform at rest."""
+    from fowt_env.analysis.check import check_platform
+    from fowt_env.descriptions.platform import platform_names
+
+    if platform in platform_names():  # checked by the tests of the package
+        return []
     faults = check_platform(platform).faults
     text = (
         "<br>".join(map(html.escape, faults))
         or "no contradictions found: weight, buoyancy, stability, periods"
     )
-    sections.append(("Check of the platform at rest", text))
     for fault in faults:
         out.print(f"[yellow]{escape(fault)}[/yellow]")
-    return platform, sections
+    return [("Check of the platform at rest", text)]
 
 
-def _compared(platform, name, path):
+def _compared(platform, name, label, path, shear):
     """Return the section that compares a run of OpenFAST with one in its recorded wind and waves."""
     import fowt_env
+    from fowt_env.descriptions.platform import read_platform
     from fowt_env.files.tables import read_series
     from fowt_env.run.initial_conditions import INITIAL
     from fowt_env.training.reports.compare import compare
@@ -128,40 +151,55 @@ def _compared(platform, name, path):
     time = theirs[TIME].to_numpy() - theirs[TIME].iloc[0]
     series = {"kind": "series", "time": time.tolist(), "speed": theirs[wind].tolist()}
     sea = recorded_sea(time, theirs[waves].to_numpy()) if waves in theirs.columns else None
-    scene = fowt_env.build_scene(platform, wind=series, sea=sea)
+    shear = read_platform(platform).environment.shear_exponent if shear is None else shear
+    scene = fowt_env.build_scene(platform, wind=series, sea=sea, shear_exponent=shear)
     begun = {
         column: float(value) for column, value in theirs.iloc[0].items() if column.split("_[")[0] in INITIAL
     }
     run = fowt_env.simulate(scene, name, duration=float(np.floor(time[-1])), output_dt=0.1, initial=begun)
     theirs = theirs.assign(**{TIME: time})
     known = [one for one in COMPARED if any(column.startswith(f"{one}_[") for column in theirs.columns)]
-    result = compare(run, theirs, min(60.0, 0.2 * time[-1]), None, tuple(known))
+    start = min(START, 0.3 * time[-1])
+    result = compare(run, theirs, start, None, tuple(known))
     rows = []
     for row in result.rows:
-        values = map(number_text, (row.mean, row.mean_other, row.std, row.std_other))
-        rows.append((f"{row.channel} {row.unit}", *values, f"{row.correlation:.3f}"))
+        least = ROUNDING * max(abs(row.mean), abs(row.mean_other))
+        stds = (0.0 if std < least else std for std in (row.std, row.std_other))
+        values = map(number_text, (row.mean, row.mean_other, *stds))
+        alike = f"{row.correlation:.3f}" if np.isfinite(row.correlation) else "–"
+        rows.append((f"{row.channel} ({row.unit})", *values, alike))
     heads = ("channel", "mean here", "mean there", "std here", "std there", "correlation")
-    notes = "".join(f"<li>{html.escape(f'{which}: {text}')}</li>" for which, text in result.notes)
+    texts = (f"{which}: {text.removesuffix(' (--from)')}" for which, text in result.notes)
+    notes = "".join(f"<li>{html.escape(text)}</li>" for text in texts)
     water = "with its waves, towards +x" if sea else f"no waves: the file has no {waves}"
-    remark = f"{html.escape(name)} in the wind of {html.escape(Path(path).name)}, {water}."
+    where = (
+        f"{html.escape(label)} in the wind of {html.escape(Path(path).name)}, {water}, from {start:.0f} s on"
+    )
+    remark = f"{where}; shear exponent {shear:g} (--shear), which moves the mean platform pitch."
+    if time[-1] - start < LEAST_COMPARED:
+        remark += f" Only {time[-1] - start:.0f} s are compared: too few for means and deviations."
     return "Beside your own run", f"<p>{remark}</p>{_html_table(heads, rows)}<ul>{notes}</ul>"
 
 
-def _margins(platform, case, names):
+def _margins(platform, case, named):
     """Return the section of the linear margins at the mean wind of a case."""
     from fowt_env.training.evaluation.cases import mean_speed
     from fowt_env.training.live.tuning import Law, Weather, linear, loop_words
 
     speed, rows = mean_speed(case), []
     weather = Weather(platform, f"{speed:g}", "none")
-    for name in names:
+    for label, name in named.items():
         try:
             words = loop_words(linear(weather, Law(name)))
         except (InputError, SimulationStopped) as error:
             words = [("stable", str(error))]
-        rows.append((name, *(text for _, text in words)))
+        rows.append((label, *(text for _, text in words)))
     heads = ("controller", *(key for key, _ in words))
-    return f"Linear margins at {speed:g} m/s", _html_table(heads, rows)
+    water = (
+        "<p>In still water, where quadratic drag damps no small motion: surge, sway and heave of a hull"
+        " without other damping are better damped in the runs.</p>"
+    )
+    return f"Linear margins at {speed:g} m/s", water + _html_table(heads, rows, texts=len(heads))
 
 
 def _film(case, pair, seed, folder):
@@ -189,7 +227,7 @@ def _film(case, pair, seed, folder):
     words = f"{html.escape(' and '.join(runs))} in the same wind and waves, {case.name}, at 4 times real time"
     return (
         "Motion",
-        f'<p>{words}</p><img alt="{words}" style="max-width:100%" src="data:image/gif;base64,{picture}">',
+        f'<p>{words}</p><img alt="{words}" style="width:100%" src="data:image/gif;base64,{picture}">',
     )
 
 
@@ -200,30 +238,21 @@ def most_different(first, second, step=0.1):
     return step * max(starts, key=lambda i: first[i : i + least].std() - second[i : i + least].std())
 
 
-def _html_table(heads, rows):
+def _html_table(heads, rows, texts=1):
+    """Return the HTML of a table of texts, the first columns, and numbers."""
     from fowt_env.training.reports.page_words import table_rows
 
     cells = [[html.escape(str(cell)) for cell in row] for row in rows]
-    body = table_rows(map(html.escape, heads), cells, texts=range(len(heads)))
-    return f'<div class="scroll"><div tabindex="0"><table class="figures texts">{body}</table></div></div>'
+    body = table_rows(map(html.escape, heads), cells, texts=range(texts))
+    kind = "figures texts" if texts > 1 else "figures"
+    return f'<div class="scroll"><div tabindex="0"><table class="{kind}">{body}</table></div></div>'
 
 
-def _say(board, table, baseline):
-    """Print what each controller does better and worse than the baseline, a line each."""
-    from fowt_env.training.evaluation.failures import lost_text
-    from fowt_env.training.live.tuning import paired, verdict
+def _verdict(path, seeds):
+    """Return the lines of the verdict of the page, from the file of a leaderboard."""
+    from fowt_env.training.evaluation.leaderboard_file import check_leaderboard
+    from fowt_env.training.reports.verdict import verdict
 
-    good = table[table["status"] == "ok"]
-    for entry in board["controllers"]:
-        name = entry["controller"]
-        if name == baseline:
-            continue
-        pair = [good[good["controller"] == each].set_index(["case", "seed"]) for each in (baseline, name)]
-        common = pair[0].index.intersection(pair[1].index)
-        figures = [part.loc[common].to_dict("records") for part in pair]
-        words = verdict(paired(*figures), 1) if len(common) else "no run in common"
-        lost = f", {lost_text(entry)} of {entry['runs']}" if entry["lost"] else ""
-        heading = f"[bold]{escape(name)}[/bold] against {escape(baseline)}"
-        out.print(f"{heading}, {len(common)} runs each{escape(lost)}")
-        for line in words.split("; "):
-            out.print(f"  {escape(line)}")
+    board = check_leaderboard(json.loads(path.read_text(encoding="utf-8")), path)
+    text = verdict(board, seeds, board.interval.least_seeds)
+    return [html.unescape(re.sub("<[^>]+>", "", line)) for line in text.replace("<li>", "\n  ").splitlines()]

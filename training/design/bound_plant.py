@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 from fowt_env.analysis.linear_drag import HullMotion, elevation_spectrum, linear_drag, with_drag
 from fowt_env.analysis.linear_model import linearize
 from fowt_env.analysis.linear_plant import WAKE
-from fowt_env.analysis.reduced_model import residualised, with_pitch_lag, with_reduced_wake
+from fowt_env.analysis.reduced_model import residualised, with_reduced_wake
 from fowt_env.analysis.wave_excitation import wave_force
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LAST_SEA_WIND, SENSORS, SITE, TURBULENCE_CLASS, scene_at
@@ -114,7 +114,7 @@ class BoundPlant:
         further = [name for name in whole.states if name in BENDING or name.startswith(WAKE)]
         self.states = (*PLANAR, *further)
         self.n = len(self.states)
-        model = with_pitch_lag(residualised(whole, keep=further))
+        model = residualised(whole, keep=further)
         if model.pitch_rests:
             raise InputError(
                 f"wind = {wind:g}: the blade pitch is at its limit, so no controller can move it"

@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.linalg import eigvals
 
 from fowt_env.analysis.linear_model import FORCES, linearize, modes
-from fowt_env.analysis.reduced_model import platform_frequency, platform_mode, with_pitch_lag
+from fowt_env.analysis.reduced_model import platform_frequency, platform_mode
 from fowt_env.controllers.design.closed_loop import closed_loop_matrix
 from fowt_env.controllers.gains import with_gains
 from fowt_env.controllers.lqr.design import LQGSettings, scene_at, winds_above_rated
@@ -36,7 +36,7 @@ def models_over(scene, winds, progress=None):
     """Return {wind m/s: LinearModel} of a scene in steady winds; the pitch lag is at least LEAST_LAG."""
     models = {}
     for number, wind in enumerate(winds, 1):
-        models[float(wind)] = with_pitch_lag(linearize(scene_at(scene, wind)))
+        models[float(wind)] = linearize(scene_at(scene, wind))
         if progress is not None:
             progress(number, len(winds))
     return models

@@ -255,7 +255,8 @@ class Page:
         for label, channel in tuning.SPECTRA:
             plot = self._plot(170, "frequency (Hz)", x_axis_type="log", y_axis_type="log")
             self._lines(plot, "spectra", "frequency", channel)
-            plots.append((plot, f"PSD of {label}"))
+            quantity, _, unit = label.removesuffix(")").rpartition(" (")
+            plots.append((plot, f"spectrum of {quantity} ({unit.replace(' ', '² ')}²/Hz)"))
         self._grid("spectra", plots)
         plots = []
         for event, words in (("step", f"step of {tuning.STEP:g} m/s"), ("gust", "extreme operating gust")):

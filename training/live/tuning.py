@@ -29,6 +29,7 @@ from fowt_env.descriptions.checks import check_number, check_whole_number, parse
 from fowt_env.descriptions.sea_state import sea_of
 from fowt_env.descriptions.wind import wind_of
 from fowt_env.errors import InputError, PlantWarning, SimulationStopped, unknown
+from fowt_env.plant.state import MOTIONS
 from fowt_env.run.simulation import simulate
 from fowt_env.scene.build import build_scene
 from fowt_env.scene.scene import Scene
@@ -260,6 +261,8 @@ class Linear(NamedTuple):
     poles: np.ndarray  # rad/s, complex
     margins: Margins | None  # None: the law moves no command
     note: str  # why there is no linear loop, "" where there is one
+    least: complex = 0.0  # rad/s, pole of the least damped slow oscillation
+    motion: str = ""  # its largest motion of the hull
 
 
 def linear(weather: Weather, law: Law) -> Linear:
@@ -277,7 +280,13 @@ def linear(weather: Weather, law: Law) -> Linear:
         loop = sampled_loop(model, controller, CONTROL_DT)
     except (InputError, SimulationStopped) as error:
         return Linear(np.empty(0, complex), None, str(error))
-    return Linear(loop.poles(), loop.margins(), "")
+    z, vectors = np.linalg.eig(loop.matrix())
+    poles = np.log(np.where(np.abs(z) > 1e-6, z, 1e-6).astype(complex)) / loop.dt
+    swinging = np.flatnonzero((poles.imag > 1e-3) & (np.abs(poles) < 3.0))
+    least = min(swinging, key=lambda i: -poles[i].real / abs(poles[i]))
+    sizes = np.abs(vectors[: len(MOTIONS), least]) * ([1.0] * 3 + [model.arm] * 3)  # positions come first
+    motion = MOTIONS[int(np.argmax(sizes))].replace("_", " ")
+    return Linear(loop.poles(), loop.margins(), "", poles[least], motion)
 
 
 def loop_words(loop: Linear) -> list[tuple[str, str]]:
@@ -292,19 +301,24 @@ def loop_words(loop: Linear) -> list[tuple[str, str]]:
     )
     if loop.margins is None:
         return [(key, loop.note if key == "stable" else "–") for key in keys]
-    found, poles = loop.margins, loop.poles
-    pitch = found.loops.get("blade_pitch_command")
-    swinging = poles[(poles.imag > 1e-3) & (np.abs(poles) < 3.0)]
-    least = min(swinging, key=lambda pole: -pole.real / abs(pole))
+    found, least = loop.margins, loop.least
+    pitch = found.loops.get("blade_pitch_command") if found.stable else None  # else there are no margins
     values = (
         "yes" if found.stable else "NO",
-        f"{pitch.gain:.3g} at {pitch.gain_frequency:.2g} rad/s" if pitch else "–",
-        f"{pitch.phase:.1f} at {pitch.phase_frequency:.2g} rad/s" if pitch else "–",
-        f"{pitch.delay:.2f}" if pitch else "–",
-        f"{found.sensitivity_peak:.2f} at {found.peak_frequency:.2g} rad/s",
-        f"{-least.real / abs(least):.3f} at {abs(least):.3f} rad/s",
+        _margin(pitch.gain, ".3g", pitch.gain_frequency) if pitch else "–",
+        _margin(pitch.phase, ".1f", pitch.phase_frequency) if pitch else "–",
+        _margin(pitch.delay, ".2f") if pitch else "–",
+        _margin(found.sensitivity_peak, ".2f", found.peak_frequency) if found.stable else "–",
+        f"{_margin(-least.real / abs(least), '.2g', abs(least))}, {loop.motion}",
     )
     return list(zip(keys, values, strict=True))
+
+
+def _margin(value, style, frequency=None):
+    """Return a margin as a text, with the frequency (rad/s) at which it is found."""
+    if np.isinf(value):
+        return "unlimited"
+    return f"{value:{style}}" if frequency is None else f"{value:{style}} at {frequency:.2g} rad/s"
 
 
 def responses(weather: Weather, law: Law) -> dict[str, np.ndarray]:

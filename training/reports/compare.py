@@ -268,8 +268,8 @@ FAMILIES = (  # names of channels: (cause of another mean, causes of other varia
     ),
     (
         r"Ptfm",
-        "thrust and torque of the rotor, mooring stiffness and pretension, weights and their centres, or mean"
-        " drift of the waves",
+        "thrust and torque of the rotor, wind shear, mooring stiffness and pretension, weights and their"
+        " centres, or mean drift of the waves",
         (
             "wind, second-order wave loads, linear damping, mooring, or the controller (negative damping)",
             "wave loads: components, stretching, drag, strips or potential flow",
@@ -278,7 +278,7 @@ FAMILIES = (  # names of channels: (cause of another mean, causes of other varia
     ),
     (
         r"TwrBs|YawBr|TTDsp|NcIMU|TwHt",
-        "thrust, weight of the rotor-nacelle assembly, or the height of the section",
+        "thrust, wind shear, weight of the rotor-nacelle assembly, or the height of the section",
         (
             "wind, or the motion of the platform",
             "wave loads, the motion of the platform, or a flexible tower, which amplifies both",

@@ -9,6 +9,7 @@ from fowt_env.descriptions.ratings import ratings
 from fowt_env.errors import InputError
 from fowt_env.files.tables import read_table
 from fowt_env.training.design.linear_bound import efficient
+from fowt_env.training.evaluation.cases import Case, mean_speed
 from fowt_env.training.evaluation.failures import known_figures, lost_text
 from fowt_env.training.evaluation.metrics import mean_exponent
 from fowt_env.training.evaluation.results import file_name, run_file
@@ -109,11 +110,12 @@ TRADE = {  # what a controller gives and takes, a column each: {theme: {metric: 
 }
 
 
-def plot_trade(table, baseline, path=None, title=None):
+def plot_trade(table, baseline, path=None, title=None, winds=None):
     """Plot motions, loads, power and pitch travel of each controller over those of the baseline, per case.
 
     table: as of plot_evaluation. Each ratio is of means over the seeds that both controllers finished, with
-    the exponents of mean_exponent. Raises: InputError if no controller shares a case with the baseline.
+    the exponents of mean_exponent. winds: {case: mean wind speed in m/s}, the axis if it has all cases once
+    each; None: names of the cases. Raises: InputError if no controller shares a case with the baseline.
     """
     cases = list(dict.fromkeys(table["case"]))
     good = table[table["status"] == OK].set_index(["controller", "case", "seed"])
@@ -121,6 +123,9 @@ def plot_trade(table, baseline, path=None, title=None):
     base = good.xs(baseline) if baseline in good.index else good.iloc[:0].droplevel(0)
     figure = new_figure(12.5, 5.6)
     panels = figure.subplots(2, len(TRADE), sharex=True, squeeze=False)
+    speeds = [(winds or {}).get(case) for case in cases]
+    windy = None not in speeds and len(set(speeds)) == len(cases)
+    places, ticks = (speeds, [f"{speed:g}" for speed in speeds]) if windy else (np.arange(len(cases)), cases)
     drawn = False
     for column, (theme, metrics) in enumerate(TRADE.items()):
         for axes, metric in zip(panels[:, column], metrics, strict=True):
@@ -136,11 +141,13 @@ def plot_trade(table, baseline, path=None, title=None):
                 ratio = (means[0] / means[1]).reindex(cases) ** (1.0 / power)
                 drawn = drawn or bool(np.isfinite(ratio).any())
                 axes.plot(
-                    np.arange(len(cases)), ratio, color=COLOURS[number % len(COLOURS)], linewidth=1.4,
+                    places, ratio, color=COLOURS[number % len(COLOURS)], linewidth=1.4,
                     marker=MARKS[number % len(MARKS)], markersize=4, label=name,
                 )  # fmt: skip
             axes.set_title(f"{theme}: {metrics[metric]}", fontsize=9, color=INK, loc="left")
-            axes.set_xticks(np.arange(len(cases)), cases, fontsize=8, rotation=30)
+            axes.set_xticks(places, ticks, fontsize=8, rotation=0 if windy else 30)
+        if windy:
+            axes.set_xlabel("mean wind speed (m/s)", fontsize=8, color=SOFT)
     if not drawn:
         raise InputError(f"nothing to plot: no controller shares a case with the baseline {baseline!r}")
     names = short_names(others)
@@ -355,7 +362,10 @@ def evaluation_plots(table, board, folder):
     several = good["controller"].nunique() > 1 and good["case"].nunique() > 1
     if several and baseline in set(good["controller"]):
         paths.append(folder / "trade.png")
-        plot_trade(table, baseline, paths[-1])
+        winds = {
+            case: mean_speed(Case(case, wind=about["wind"])) for case, about in manifest["cases"].items()
+        }
+        plot_trade(table, baseline, paths[-1], winds=winds)
     names = [name for _, name, *_ in PRINTED_METRICS]
     plot_evaluation(table, names, paths[1], "Mean over seeds, with their range")
     boxes = {}

@@ -14,12 +14,17 @@ SHORT = {
     "GenPwr_capped_mean_[kW]": "power up to rated",
     "GenPwr_max_[kW]": "maximum power",
 }
+FURTHER = {  # of metrics that are no columns of the page from the start
+    "RotSpeed_max_[rpm]": "maximum rotor speed",
+    "FAIRTEN_DEL_[kN]": "mooring DEL",
+    "RootMyb_DEL_[kN-m]": "blade-root DEL",
+}
 DIRECTIONS = {-1: "Less is better.", 0: "Neither direction is better.", 1: "More is better."}
 
 
 def short_name(metric):
     """Return the short name of a metric, such as "rotor-speed std", else the metric's name in words."""
-    return SHORT.get(metric, metric.partition("_[")[0].replace("_", " "))
+    return (SHORT | FURTHER).get(metric, metric.partition("_[")[0].replace("_", " "))
 
 
 def about_metric(metric):

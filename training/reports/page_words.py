@@ -37,7 +37,9 @@ def page_title(manifest, cases):
     """Return the title of the page: the platform, and the suite or the cases by name or number."""
     about = described_cases(manifest)
     platforms = {str(about[name].get("platform")) for name in cases if name in about} - {"None"}
-    where = f"{len(platforms)} platforms" if len(platforms) > 1 else Path(min(platforms, default="")).stem
+    path = Path(min(platforms, default=""))
+    one = path.parent.name if path.name == "platform.toml" else path.stem  # an imported deck is a folder
+    where = f"{len(platforms)} platforms" if len(platforms) > 1 else one
     suite = manifest.get("suite")
     named = suite if isinstance(suite, dict) else {"name": suite} if isinstance(suite, str) else {}
     if named.get("name"):

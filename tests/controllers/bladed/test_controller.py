@@ -2,6 +2,7 @@
 
 import os
 import pickle
+import re
 import shutil
 import signal
 import subprocess
@@ -185,7 +186,7 @@ def test_the_root_name_of_outputs_is_a_folder_of_the_run(started):
     folder = controller.controller._process.folder
     controller.finish()
     name, length, size, capacity = controller.console_output.splitlines()[0].split()
-    assert Path(name).parent == folder and not folder.exists()
+    assert Path(name).parent == folder and Path(name).suffix == ".SrvD" and not folder.exists()
     assert int(size) == int(length) + 1 and int(capacity) == 300 * 2 * 21 + 1
 
 
@@ -368,8 +369,11 @@ def test_rosco_by_its_path_has_the_bits_of_rosco(scene, turbine, tmp_path):
     rosco.prepare(scene)
     for name in ("DISCON.IN", "rotor.txt"):
         shutil.copyfile(Path(rosco.controller._files, name), tmp_path / name)
+    deck = tmp_path / "DISCON.IN"  # at level 2, as in public decks, it opens two files of the root name
+    deck.write_text(re.sub(r"^\d+(\s+! LoggingLevel)", r"2\1", deck.read_text(), flags=re.M))
+    assert re.search(r"^2\s+! LoggingLevel", deck.read_text(), flags=re.M)
     path = find_library()[0]  # it needs libraries beside it
-    frames = [simulate(scene, name, duration=30.0) for name in ("rosco", f"dll:{path},{tmp_path}/DISCON.IN")]
+    frames = [simulate(scene, name, duration=30.0) for name in ("rosco", f"dll:{path},{deck}")]
     assert np.array_equal(*(frame.to_numpy() for frame in frames))
 
 

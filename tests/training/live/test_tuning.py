@@ -166,6 +166,20 @@ def test_the_linear_loop_says_why_there_is_none():
     assert with_one.note == "" and with_one.margins.stable and len(with_one.poles) > 10
 
 
+def test_blades_that_follow_at_once_have_margins_and_the_least_damped_motion_is_named():
+    """VolturnUS-S has no drag in still water, so heave decays by radiation alone."""
+    loop = tuning.linear(Weather("iea15_volturnus_s", "15", "none"), Law("lqr"))
+    words = dict(tuning.loop_words(loop))
+    assert words["stable"] == "yes" and "heave" in words["least damping"]
+    assert 1.0 < loop.margins.loops["blade_pitch_command"].gain < 100.0
+
+
+def test_a_loop_that_is_unstable_has_no_margins():
+    """Land gains make platform and rotor speed oscillate."""
+    words = dict(tuning.loop_words(tuning.linear(replace(SHORT, wind="14"), Law("pi_land"))))
+    assert words["stable"] == "NO" and words["gain margin"] == words["sensitivity peak"] == "–"
+
+
 @pytest.mark.parametrize(
     "text", ["pi[KP=1.3]", "gspi_oc3[KI=0.7]", "floating_feedback[pitch_gain=0.05]", "mpc[surge=0.5]"]
 )

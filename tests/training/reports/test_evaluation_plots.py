@@ -50,6 +50,10 @@ def test_the_trade_is_of_runs_that_both_finished_with_damage_averaged_by_its_exp
     damage = ((0.5**4 + 2.0**4) / (1.0 + 2.0**4)) ** 0.25
     np.testing.assert_allclose(drawn["fatigue loads: shaft torque"], [damage, 0.5])
     np.testing.assert_allclose(drawn["power and pitch drive: blade-pitch travel"], [2.5 / 3.0, 0.5])
+    assert [tick.get_text() for tick in figure.axes[-1].get_xticklabels()] == ["x", "y"]
+    bottom = evaluation_plots.plot_trade(table, "a", winds={"x": 12.0, "y": 16.5}).axes[-1]
+    assert bottom.get_xlabel() == "mean wind speed (m/s)"
+    assert list(bottom.lines[1].get_xdata()) == [12.0, 16.5]
     with pytest.raises(InputError, match="shares a case with the baseline 'c'"):
         evaluation_plots.plot_trade(table, "c")
 
