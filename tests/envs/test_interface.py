@@ -168,7 +168,7 @@ DRIVES = {"pitch_drive": "second_order", "fidelity": "fast", "wind": 16.0}
         pytest.param("pi", False, {"rotor": "bem", "fidelity": "reference", "wind": SLOW}, marks=NIGHTLY),
         pytest.param("pi", False, {"rotor": "table", "fidelity": "reference"}, marks=NIGHTLY),
         ("pi", False, {"fidelity": "standard"}),
-        ("pi", True, {"fidelity": "fast"}),
+        pytest.param("pi", True, {"fidelity": "fast"}, marks=NIGHTLY),
         pytest.param("pi", True, DRIVES, marks=NIGHTLY),
         ("lqr", True, {"rotor": "table"}),
     ],

@@ -37,6 +37,7 @@ def test_advantages_are_discounted_sums_of_errors_up_to_the_end_of_an_episode(sc
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_a_rollout_ends_episodes_and_gives_a_policy_of_bounded_actions(script):
     seen = []
     args = script["arguments"](["--total-timesteps", "2440", "--num-envs", "4", "--num-steps", "610"])

@@ -135,6 +135,7 @@ def test_a_process_starts_anew_for_each_run_and_leaves_nothing(tmp_path, tempora
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_kernels_come_from_a_run_without_weather_and_are_those_of_each_run(tmp_path, monkeypatch):
     monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "cache"))
     source = SOUND.replace(RESET, f"""{RESET}

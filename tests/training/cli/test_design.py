@@ -66,6 +66,8 @@ def test_a_designed_lqr_is_saved_with_its_settings(tmp_path):
     assert "must end with .json" in fowt("design", "lqr", "--out", str(tmp_path / "sweep.csv"), code=2)[1]
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_bound_writes_and_front_reads_its_fronts(tmp_path):
     bound, runs = tmp_path / "bound.csv", tmp_path / "runs.csv"
     picture, share = tmp_path / "bound.png", tmp_path / "front.png"

@@ -149,6 +149,8 @@ def test_a_file_of_another_run_is_refused(table, tmp_path):
         first.write_bytes(content)
 
 
+@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_table_that_was_killed_goes_on_and_ends_with_the_same_statistics(table, tmp_path):
     script, folder = tmp_path / "script.py", tmp_path / "out"
     script.write_text(SCRIPT)

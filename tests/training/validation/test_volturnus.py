@@ -179,6 +179,7 @@ def test_a_tower_that_bends_rings_and_loads_its_base_as_openfast_s():
 
 
 @pytest.mark.slow
+@pytest.mark.nightly
 def test_irregular_waves_miss_the_deviation_of_slow_surge_alone():
     """2.3 % of surge instead of 2 %: a slow oscillation of 0.06 m from the start (validation.md)."""
     rows = judged("waves", "waves_Hs7.5: PtfmSurge, standard deviation")
