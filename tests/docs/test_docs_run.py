@@ -108,8 +108,8 @@ def test_every_block_of_export_runs_in_this_package_as_host(folder):
 
 WHOLE = ("index.md", "reference/environment.md")
 PROGRAMS = (
-    "guides/from-control-design.md", "guides/from-gymnasium.md", "guides/hardware-in-the-loop.md",
-    "tutorials/first-agent.md",
+    "guides/faults.md", "guides/from-control-design.md", "guides/from-gymnasium.md",
+    "guides/hardware-in-the-loop.md", "tutorials/first-agent.md",
 )  # fmt: skip
 
 

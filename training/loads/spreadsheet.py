@@ -40,12 +40,16 @@ def write_spreadsheets(folder, name, results, controller=None):
         for row in extreme_table(runs, columns, controller, results.extrapolations)
     }
     sheets = {}
-    if extremes:  # none of load cases for fatigue alone
+    # none of load cases for fatigue alone; DLC 1.1 alone has values of the extrapolated directions only
+    directed = extremes and all(
+        _at_angle(pair, angle) in extremes for pair in rose.values() for angle in ANGLES
+    )
+    if directed:
         sheets["extreme_loads"] = {"Sheet1": _extreme_rows(rose, extremes)}
     fatigue = lifetime_table(runs, EXPONENTS, results.years, results.reference_cycles, controller)
     if fatigue:
         sheets["equivalent_loads"] = {"Sheet1": _fatigue_rows(rose, fatigue)}
-    if extremes and (blades := _blade_sheets(rose, extremes)):
+    if directed and (blades := _blade_sheets(rose, extremes)):
         sheets["extreme_loads_blade_full"] = blades
     paths = []
     for kind, tables in sheets.items():

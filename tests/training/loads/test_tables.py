@@ -204,3 +204,10 @@ def test_load_cases_for_fatigue_alone_have_the_sheet_of_fatigue(tmp_path):
     alone = load_tables([case for case in cases if case.analysis == "fatigue"], finished)
     (path,) = write_spreadsheets(tmp_path, "oc3", alone)
     assert "equivalent_loads" in path.name
+
+
+def test_extrapolated_loads_alone_have_no_spreadsheet_of_directions(tmp_path):
+    cases, finished = small_table()
+    alone = load_tables([case for case in cases if case.dlc == "1.1"], finished)
+    assert alone.extremes
+    assert write_spreadsheets(tmp_path, "oc3", alone) == []
