@@ -77,6 +77,7 @@ int main(int argc, char **argv)
             return head.kind == END ? 0 : 1;
         }
     }
+    fputs("no server answers\n", stderr);
     close(server);
     return 2;
 }
