@@ -40,8 +40,13 @@ class SampledLoop(NamedTuple):
 
     def poles(self) -> np.ndarray:
         """Return the poles of the closed loop in continuous time, rad/s: log(z)/dt without those at z = 0."""
-        z = np.linalg.eigvals(self.matrix())
-        return np.log(z[np.abs(z) > 1e-6].astype(complex)) / self.dt
+        return self.modes()[0]
+
+    def modes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return (poles (k,), eigenvectors (states, k)) of the closed loop."""
+        z, vectors = np.linalg.eig(self.matrix())
+        kept = np.abs(z) > 1e-6
+        return np.log(z[kept].astype(complex)) / self.dt, vectors[:, kept]
 
     def margins(self) -> Margins | None:
         """Return the margins at the commands that the law moves; None if it moves none of them."""

@@ -280,13 +280,12 @@ def linear(weather: Weather, law: Law) -> Linear:
         loop = sampled_loop(model, controller, CONTROL_DT)
     except (InputError, SimulationStopped) as error:
         return Linear(np.empty(0, complex), None, str(error))
-    z, vectors = np.linalg.eig(loop.matrix())
-    poles = np.log(np.where(np.abs(z) > 1e-6, z, 1e-6).astype(complex)) / loop.dt
+    poles, vectors = loop.modes()
     swinging = np.flatnonzero((poles.imag > 1e-3) & (np.abs(poles) < 3.0))
     least = min(swinging, key=lambda i: -poles[i].real / abs(poles[i]))
     sizes = np.abs(vectors[: len(MOTIONS), least]) * ([1.0] * 3 + [model.arm] * 3)  # positions come first
     motion = MOTIONS[int(np.argmax(sizes))].replace("_", " ")
-    return Linear(loop.poles(), loop.margins(), "", poles[least], motion)
+    return Linear(poles, loop.margins(), "", poles[least], motion)
 
 
 def loop_words(loop: Linear) -> list[tuple[str, str]]:

@@ -163,9 +163,8 @@ def test_load_agrees_with_morison_load_while_the_surface_stays_on_its_section(se
     strips = strips_for(axis=axis)._replace(axial_drag_coefficient=1.5)
     waves = None if sea is None else waves_of(sea)
     current = SHEARED if sea is None else None
-    quadrature, sea = build_quadrature(PLATFORM.hull, strips), None
-    if waves is not None:
-        sea = build_wave_bands(waves, strips)
+    quadrature = build_quadrature(PLATFORM.hull, strips)
+    sea = None if waves is None else build_wave_bands(waves, strips)
     scratch, nodes = band_scratch(sea, quadrature), np.zeros((7, strips.nodes))
     fast, exact = [], []
     for t, x in random_states(100, 4.0, seed=6):
