@@ -43,6 +43,12 @@ def pytest_xdist_make_scheduler(config, log):
     return LoadKindScheduling(config, log)
 
 
+def pytest_itemcollected(item):
+    """What is left to the night is slow too."""
+    if item.get_closest_marker("nightly"):
+        item.add_marker("slow")
+
+
 def pytest_collection_modifyitems(items):
     """Longest first, so that no worker is left with it at the end: kinds, files with slow tests, others."""
     slow = {file_of(item.nodeid) for item in items if item.get_closest_marker("slow")}

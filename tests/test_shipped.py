@@ -102,7 +102,6 @@ def test_this_processor_is_named_as_llvm_names_it():
     assert set(shipped.INSTRUCTIONS) <= set(llvm.get_host_cpu_features())
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_with_the_pack_of_a_wheel_the_readme_s_runs_compile_nothing(tmp_path):
     pack = compile_pack(tmp_path / "kernels")

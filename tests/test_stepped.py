@@ -48,7 +48,7 @@ def run_of(scene, commands, **settings):
         pytest.param(
             "iea15_volturnus_s",
             {"wind": "ntm:14:B", "sea": "jonswap:4:9", "tower": "modes2", "pitch": "individual"},
-            marks=(pytest.mark.slow, pytest.mark.nightly),
+            marks=pytest.mark.nightly,
         ),
     ],
 )

@@ -60,7 +60,6 @@ def test_a_process_that_fails_is_named(kinds, monkeypatch):
         warmup(kinds=["fast", "linear"], jobs=2)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_after_it_the_same_kinds_compile_nothing(tmp_path):
     """Among them the run that README begins with."""

@@ -81,7 +81,6 @@ def test_modes_have_the_names_of_deflections_each_once(model):
     assert modes["flap_1_regressive"].damping_ratio > 0.3 > 0.03 > modes["edge_1_regressive"].damping_ratio
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_reduced_models_are_those_of_stiff_blades(elastic_scene, model, stiff):
     bent, rigid = residualised(model), residualised(linearize(stiff))

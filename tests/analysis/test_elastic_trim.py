@@ -90,7 +90,6 @@ def test_a_bent_rotor_needs_more_pitch_and_holds_rated_power(elastic_scene, poin
     assert point["OoPDefl1"] == pytest.approx(1.49, abs=0.05)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_run_in_steady_wind_stays_at_the_periodic_state(elastic_scene):
     calm = elastic_scene.with_weather(sea=None)

@@ -103,7 +103,6 @@ def test_a_rotor_that_never_reaches_rated_torque_is_refused(scene):
         derived_gains(weak, 0.2)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_on_a_tower_that_bends_the_platform_pitches_as_slowly():
     """With the mass of nacelle and rotor; radiation memory is held, which makes it 3 % quicker."""

@@ -87,7 +87,6 @@ def test_above_rated_oc3_holds_torque_and_land_holds_power():
     assert commands["land"] == pytest.approx(5296610.0 / (1.05 * RATED), rel=1e-9)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_on_the_deck_without_actuator_it_does_what_the_openfast_law_does():
     """Two codings of one published law: they differ by one 0.0125 s sample of delay and by their start."""

@@ -109,7 +109,6 @@ def test_gusts_cost_less_speed_than_without_preview():
     assert most["preview"] < 0.7 * most["pi"]
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_of_a_full_field_it_sees_the_rotor_average():
     """A wave of wind that repeats every 64 s, and a shear over the rotor that averages out."""

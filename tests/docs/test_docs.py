@@ -374,7 +374,6 @@ def site(tmp_path_factory):
     return folder
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_search_of_a_site_in_a_folder_finds_a_page(site, browser):  # noqa: F811
     with offline_page(browser, site / "guides" / "faq.html", ".md-search__input") as page:
@@ -386,7 +385,6 @@ def test_the_search_of_a_site_in_a_folder_finds_a_page(site, browser):  # noqa: 
     assert found.endswith("guides/leaderboard.html")
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_site_is_built_without_a_warning_and_needs_no_network(site):
     pages = list(site.rglob("*.html"))

@@ -23,7 +23,6 @@ def actions(env, count):
     return rng.uniform(-0.2, 0.2, (count, *env.action_space.shape))
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_snapshot_continues_bit_for_bit_also_in_another_environment(env):
     env.reset(seed=1)

@@ -126,7 +126,6 @@ def test_other_names_of_rewards_and_other_vectors_are_refused():
         FowtEnv("shutdown", reward="score")
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_returns_rank_ten_controllers_in_each_wind_as_scores_do():
     """All pairs whose scores differ by 2 %; seeds 1001 and 1002, on which the weights were chosen."""

@@ -157,7 +157,7 @@ def test_the_baseline_reads_the_lidar_that_it_would_in_simulate():
     np.testing.assert_allclose(read[:, 0], wanted[: len(read), 0], atol=0.1)  # without the nacelle's motion
 
 
-NIGHTLY = (pytest.mark.slow, pytest.mark.nightly)
+NIGHTLY = pytest.mark.nightly
 SLOW = {"kind": "ntm", "speed": 8.0, "class": "B"}
 DRIVES = {"pitch_drive": "second_order", "fidelity": "fast", "wind": 16.0}
 

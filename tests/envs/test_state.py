@@ -27,9 +27,9 @@ WAKE = {"rotor": "bem", "dynamic_inflow": True, "wind": 18.0, "sea": "still"}  #
         ON_LQR | {"sensors": DEGRADED},
         {"task": "shutdown", "duration": 60.0},
         INDIVIDUAL,
-        pytest.param(WATCHED, marks=(pytest.mark.slow, pytest.mark.nightly)),
-        pytest.param(BOX, marks=(pytest.mark.slow, pytest.mark.nightly)),
-        pytest.param(WAKE, marks=(pytest.mark.slow, pytest.mark.nightly)),
+        pytest.param(WATCHED, marks=pytest.mark.nightly),
+        pytest.param(BOX, marks=pytest.mark.nightly),
+        pytest.param(WAKE, marks=pytest.mark.nightly),
     ],
 )
 def test_continuing_after_restore_is_the_uninterrupted_run_bit_for_bit(settings):

@@ -55,7 +55,7 @@ OWN = [
         (ON_LQR | {"sensors": {"noise": 0.01}}, 1),
         (INDIVIDUAL, 1),
         (WATCHED, 1),
-        pytest.param(BOX, 2, marks=(pytest.mark.slow, pytest.mark.nightly)),
+        pytest.param(BOX, 2, marks=pytest.mark.nightly),
     ],
 )
 def test_each_of_the_batch_is_the_single_environment_bit_for_bit(settings, threads):

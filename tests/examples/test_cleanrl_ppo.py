@@ -36,7 +36,6 @@ def test_advantages_are_discounted_sums_of_errors_up_to_the_end_of_an_episode(sc
             assert found[t, env].item() == pytest.approx(expected, abs=1e-6)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_rollout_ends_episodes_and_gives_a_policy_of_bounded_actions(script):
     seen = []
@@ -48,7 +47,6 @@ def test_a_rollout_ends_episodes_and_gives_a_policy_of_bounded_actions(script):
     assert actions.shape == (50, 2) and np.abs(actions).max() <= 1.0 and np.ptp(actions) > 0.0
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_it_learns_the_easiest_task(script):
     from fowt_env.training.studies.acceptance import EASY, returns

@@ -43,7 +43,7 @@ NEEDS = {  # example: modules without which its claims are not met
     "17_state_feedback": ("control",),
 }
 # they start Ray, and torch
-SLOW = {"12_ray": [pytest.mark.slow], "13_resume": [pytest.mark.slow, pytest.mark.nightly]}
+SLOW = {"12_ray": [pytest.mark.slow], "13_resume": pytest.mark.nightly}
 TRAINED = ("10_train_small_agent", "18_cleanrl_ppo")  # take minutes: tests/examples has a test of each
 
 

@@ -30,7 +30,6 @@ def test_a_notebook_is_stored_without_outputs(name):
     )
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", SHOWN)
 def test_a_notebook_runs_and_shows_its_pictures_and_tables(name, tmp_path):

@@ -10,7 +10,6 @@ pytest.importorskip("stable_baselines3")
 EXAMPLE = Path(__file__).parents[2] / "examples" / "10_train_small_agent.py"
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_minute_of_training_learns_what_the_platform_needs(tmp_path, capsys):
     main = runpy.run_path(str(EXAMPLE))["main"]

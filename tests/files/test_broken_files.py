@@ -47,7 +47,6 @@ def test_hundreds_of_broken_files_load_or_are_refused(tmp_path):
     assert len(judged(tmp_path, 500, seed=7)) > 30
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_ten_thousand_broken_files_load_or_are_refused(tmp_path):
     judged(tmp_path, FILES, seed=3)
@@ -317,7 +316,7 @@ ODD_VALUES = (None, -1, 10**400, "x", [{}], {"a": {}})
 
 
 # every fifth change: of each odd value in turn
-@pytest.mark.parametrize("every", [5, pytest.param(1, marks=(pytest.mark.slow, pytest.mark.nightly))])
+@pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("name", ["manifest.json", "leaderboard.json"])
 def test_every_value_of_a_results_folder_s_files_may_be_any_other(tmp_path, monkeypatch, name, every):
     pytest.importorskip("openfast_io", reason="openfast_io is not installed")

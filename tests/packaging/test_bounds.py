@@ -82,7 +82,6 @@ def test_every_library_that_is_imported_at_the_top_of_a_module_is_declared():
     assert not missing
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_lowest_declared_versions_run_what_users_run_first(tmp_path, record_property):
     """Every direct dependency at its lower bound, theirs as pip chooses."""

@@ -177,7 +177,7 @@ def test_a_step_after_a_row_counts_what_the_row_does_not_know():
     fresh_python(ROWS, paths=[Path(__file__).parents[1]], NUMBA_DISABLE_JIT="1")
 
 
-@pytest.mark.parametrize("name", ["ab4", pytest.param("abm4", marks=(pytest.mark.slow, pytest.mark.nightly))])
+@pytest.mark.parametrize("name", ["ab4", pytest.param("abm4", marks=pytest.mark.nightly)])
 def test_a_blade_pitch_that_jumps_to_its_command_leaves_the_step_its_accuracy(name):
     """Without lag each command is a jump, through which no polynomial over past derivatives goes."""
     turbine = read_turbine("nrel5mw")

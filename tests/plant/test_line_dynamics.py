@@ -199,7 +199,6 @@ OPENFAST = {  # line: mean, standard deviation, damage-equivalent loads of expon
 }
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_fairlead_fatigue_of_volturnus_in_waves_is_that_of_openfast_with_moordyn():
     """OpenFAST v5.0.0, MoorDyn file of the deck, Hs 7.5 m, no wind, 100 to 600 s."""
@@ -212,7 +211,6 @@ def test_fairlead_fatigue_of_volturnus_in_waves_is_that_of_openfast_with_moordyn
         np.testing.assert_allclose(ours, expected, rtol=0.02)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("integrator", ["rk4", "heun", "abm4"])
 def test_integrators_advance_lines_alike(integrator):

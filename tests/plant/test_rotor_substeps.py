@@ -85,7 +85,6 @@ def test_samples_of_another_integrator_are_refused():
         build_scene(wind=9.0, integrator="heun", rotor_samples=3, fidelity="reference")
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_step_of_standard_in_a_box_errs_by_less_than_a_thousandth_and_a_sixth_of_one_sample():
     """Against Runge-Kutta steps an eighth as long; rms over standard deviation, the worst channel."""

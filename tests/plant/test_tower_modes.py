@@ -279,7 +279,6 @@ def test_a_load_aloft_moves_with_the_nacelle(platform, turbine):
         assert row[columns] == pytest.approx(np.r_[force, moment], rel=1e-10)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_default_step_errs_by_less_than_a_hundredth_at_the_tower_base():
     """Of both moments there, whose side-side one rings with a third of a per cent of damping."""

@@ -156,7 +156,6 @@ def test_the_wave_filter_fits_the_force_within_its_stated_error():
     assert np.linalg.eigvals(model.A).real.max() < 0.0
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_filtered_position_follows_a_trim_and_leaves_linear_models_as_they_are():
     sea = {"kind": "regular", "H": 2.0, "T": 9.0}

@@ -17,7 +17,6 @@ KILLS = int(os.environ.get("FOWT_KILLS", "8"))
 SHARES = {"evaluate": 0.36, "ppo": 0.28, "sac": 0.12, "validate": 0.24}
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("study", SHARES)
 def test_killed_runs_stay_readable_and_end_as_if_they_had_not_been(tmp_path, study):

@@ -47,7 +47,6 @@ def moments(frame, name="RootMyc", unit="kN-m"):
     return 2.0 / 3.0 * np.stack([(values * f(psi)).sum(axis=1) for f in (np.cos, np.sin)], axis=1)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_rotor_answers_to_cyclic_pitch_with_the_slope_of_the_design(scene):
     fixed = scene.with_model({"rigid_body.platform_fixed": True, "rigid_body.rotor_fixed": True})

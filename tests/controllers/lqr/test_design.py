@@ -68,7 +68,6 @@ def test_a_turbine_whose_winds_have_no_sea_at_the_site_is_named():
         )
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["lqr", "mpc"])
 def test_on_a_tower_that_bends_the_laws_do_as_on_a_rigid_one(name):

@@ -67,7 +67,6 @@ def test_it_is_a_baseline_of_a_batch_of_environments():
     assert 0.5 < np.mean(rewards) < 1.0
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_another_platform_is_refused_and_so_is_a_reset_without_one():
     scene = build_scene("iea15_volturnus_s", wind=14.0)

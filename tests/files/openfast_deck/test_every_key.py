@@ -268,7 +268,6 @@ def tried(tmp_path_factory):
     return Tried(moved, still - moved, unlike)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_every_key_that_is_read_moves_what_is_written_or_is_refused(tried):
     assert tried.still == WITHOUT_EFFECT

@@ -76,7 +76,6 @@ WITHOUT_EFFECT = {  # what is read and changes nothing in these decks: why, and 
 }
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_every_key_of_the_public_decks_changes_the_files_or_the_report_or_is_refused(tmp_path, monkeypatch):
     """All but those that are listed as without effect, each in at least one of the decks that have it."""

@@ -33,7 +33,7 @@ WAKE, SKEW = build_dynamic_inflow(), build_skewed_wake()
 STRAIGHT = build_blade_elements(read_turbine("nrel5mw"), 1.225)
 CURVED = build_fewer_elements(read_turbine("iea15"), 1.225, 18)
 ROTORS = {"straight": STRAIGHT, "curved": CURVED}
-NAMES = ["straight", pytest.param("curved", marks=(pytest.mark.slow, pytest.mark.nightly))]
+NAMES = ["straight", pytest.param("curved", marks=pytest.mark.nightly)]
 # wind m/s, tip-speed ratio and blade pitch (deg) of operation
 SCHEDULE = np.array(
     [(5, 9.0, 0), (8, 8.3, 0), (11.4, 7.0, 0), (14, 5.7, 8.7), (18, 4.4, 14.9), (24, 3.3, 22.5)]

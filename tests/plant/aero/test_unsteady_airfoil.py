@@ -167,7 +167,6 @@ def test_a_cylinder_has_no_unsteady_lift():
     assert linear_range(cylinder) is None and airfoil_dynamics(cylinder).lift_slope == 0.0
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.skipif(config.DISABLE_JIT, reason="tables take minutes without the compiler")
 def test_the_look_up_has_the_airfoils_of_blade_element_momentum():
@@ -198,7 +197,6 @@ def test_the_look_up_has_the_airfoils_of_blade_element_momentum():
     assert np.sqrt(np.mean((table - exact) ** 2)) < 5e-3 * exact.std()
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_run_has_the_trim_of_quasi_steady_airfoils_and_the_loads_of_half_the_step():
     plain = build_scene(wind=14.0, sea="regular:6:9", rotor="bem", fidelity="standard")

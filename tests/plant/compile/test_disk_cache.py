@@ -452,7 +452,6 @@ def test_the_plant_imports_nothing_of_this_project_that_could_be_compiled_into_i
     assert outside == {"fowt_env.errors", "fowt_env.folders", "fowt_env.caches", "fowt_env.layout"}
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_broken_files_are_compiled_anew(tmp_path):
     folder = tmp_path / "cache"
@@ -498,7 +497,6 @@ def test_processes_that_keep_code_at_once_keep_all_of_it_under_the_right_keys(tm
         assert all(file.load((name, number)) == f"code of {name} {number}" for number in range(100))
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_two_processes_that_compile_at_once_give_the_same_bits_as_one_that_loads(tmp_path):
     folder = tmp_path / "cache"

@@ -130,7 +130,6 @@ def simulated(root, cache=None):
     return done.stdout
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     "changes",

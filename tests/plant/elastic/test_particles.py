@@ -155,9 +155,7 @@ def measured(name, states, seed=1):
 
 
 @pytest.mark.parametrize("name", PLATFORMS)
-@pytest.mark.parametrize(
-    "states", [len(KINDS), pytest.param(STATES, marks=(pytest.mark.slow, pytest.mark.nightly))]
-)
+@pytest.mark.parametrize("states", [len(KINDS), pytest.param(STATES, marks=pytest.mark.nightly)])
 def test_motion_and_loads_are_those_of_particles_on_their_paths(name, states):
     code = f"import json, test_particles; print(json.dumps(test_particles.measured({name!r}, {states})))"
     here = Path(__file__).parent

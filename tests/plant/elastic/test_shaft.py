@@ -22,7 +22,7 @@ BARE = {"wind": None, "hydrodynamics": False, "mooring": False, "shaft": "torsio
 HELD = {"rigid_body.platform_fixed": True}
 ELASTIC = Path(__file__).parents[3] / "training/validation/reference/elastic"
 TURBINES = ("oc3_hywind", "iea15_volturnus_s")
-NIGHTLY = (pytest.mark.slow, pytest.mark.nightly)
+NIGHTLY = pytest.mark.nightly
 
 
 def inertias(turbine):

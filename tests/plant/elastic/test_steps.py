@@ -99,7 +99,6 @@ def test_slow_loads_are_extrapolated_by_the_cubic_through_four_evaluations():
     assert FIRST == 7  # evaluations at the steps 0, 2, 4 and 6
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_loads_at_every_second_step_are_as_good_as_at_every_step(waves, moved):
     exact, _ = states(waves, *moved, FINE, T)

@@ -270,7 +270,6 @@ def first_harmonic(frame, column, period):
     return 2.0 * np.mean(rows[column].to_numpy() * turn)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_regular_wave_of_five_seconds_lags_more_than_the_panel_model():
     """OpenFAST's panels have both 9.1 deg behind its strips, 0.3 and 0.8 % longer (model-choices.md)."""

@@ -134,7 +134,6 @@ def test_a_process_starts_anew_for_each_run_and_leaves_nothing(tmp_path, tempora
     assert not (submission / "left").exists() and not list(temporary.iterdir())
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_kernels_come_from_a_run_without_weather_and_are_those_of_each_run(tmp_path, monkeypatch):
     monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "cache"))
@@ -156,7 +155,6 @@ def test_kernels_come_from_a_run_without_weather_and_are_those_of_each_run(tmp_p
     assert warmed_up(made, pytest.fail, "a").kernels == made.kernels
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_kernels_may_take_long_to_compile_in_the_first_call_of_act(tmp_path, monkeypatch):
     monkeypatch.setenv("FOWT_CACHE_DIR", str(tmp_path / "cache"))
@@ -246,7 +244,6 @@ def test_what_a_controller_starts_ends_with_its_run(tmp_path):
     assert gone(int(Path(note).read_text()))
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_what_a_controller_starts_ends_with_a_judge_that_is_killed(tmp_path, temporary):
     note, submission = str(tmp_path / "pid"), tmp_path / "submission"

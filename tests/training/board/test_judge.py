@@ -230,10 +230,7 @@ def first(tmp_path_factory):
     "change",
     [
         "a byte",
-        *(
-            pytest.param(change, marks=(pytest.mark.slow, pytest.mark.nightly))
-            for change in ("its card", "a limit")
-        ),
+        *(pytest.param(change, marks=pytest.mark.nightly) for change in ("its card", "a limit")),
     ],
 )
 def test_what_was_changed_is_run_again(first, tmp_path, change):

@@ -66,7 +66,6 @@ def test_a_designed_lqr_is_saved_with_its_settings(tmp_path):
     assert "must end with .json" in fowt("design", "lqr", "--out", str(tmp_path / "sweep.csv"), code=2)[1]
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_bound_writes_and_front_reads_its_fronts(tmp_path):
     bound, runs = tmp_path / "bound.csv", tmp_path / "runs.csv"
@@ -92,7 +91,6 @@ def test_a_sweep_of_settings_refuses_seeds_for_scoring_and_settings_that_there_a
     assert "unknown setting of lqr 'torque_rat'. Did you mean 'torque_rate'" in " ".join(stderr.split())
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_sweep_of_settings_shows_and_writes_every_variant_beside_gspi(tmp_path):
     path = tmp_path / "sweep.csv"

@@ -95,7 +95,7 @@ def check_command(arguments, odd):
 
 def often(count):
     """Parameters of a search: a quick one, and one of `count` examples that runs at night."""
-    marks = (pytest.mark.slow, pytest.mark.nightly)
+    marks = pytest.mark.nightly
     return pytest.mark.parametrize("count", [None, pytest.param(count, marks=marks)])
 
 

@@ -90,7 +90,6 @@ def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on
 
 
 @pytest.mark.nightly
-@pytest.mark.slow
 def test_benchmark_training_writes_a_row_per_kind_of_environment(tmp_path):
     path = tmp_path / "training.csv"
     done = call("dev", "benchmark", "training", "--envs", "8", "--steps", "1024", "--out", path)

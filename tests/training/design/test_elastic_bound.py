@@ -56,7 +56,6 @@ def scene(factor):
 
 
 @pytest.mark.nightly
-@pytest.mark.slow
 def test_the_limit_of_stiff_blades_and_tower_is_that_of_the_rigid_turbine():
     """The difference falls with the stiffness, to half a per cent at ten times that of the turbine."""
     rigid = limit(build_scene("oc3_hywind", 18.0, SEA, duration=60.0, wave_components=20))[0]
@@ -69,7 +68,6 @@ def test_the_limit_of_stiff_blades_and_tower_is_that_of_the_rigid_turbine():
 
 
 @pytest.mark.nightly
-@pytest.mark.slow
 def test_faster_modes_of_the_structure_change_nothing(monkeypatch):
     few, plant = limit(scene(1.0))
     monkeypatch.setattr(

@@ -62,7 +62,6 @@ def test_information_is_every_combination_of_what_is_known_ahead_and_moved():
     )
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_with_the_wind_known_exactly_sensors_change_little(windy):
     """Why the usual table has previews for all states alone."""

@@ -111,7 +111,6 @@ def test_a_search_continues_from_its_files(tmp_path, monkeypatch, suite):
     ]  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_what_has_no_optimum_is_named(tmp_path, suite):
     with pytest.raises(InputError, match=r"seeds = \[1\]: must be 1000 or more"):

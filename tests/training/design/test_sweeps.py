@@ -115,7 +115,6 @@ def test_a_sweep_refuses_scoring_seeds_and_unknown_settings():
         sweep([{"torque_rat": 1.0}], "ntm_18", [1001])
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_sweep_scores_each_variant_beside_the_baseline(tmp_path):
     out = tmp_path / "sweep.csv"

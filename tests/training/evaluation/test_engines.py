@@ -66,7 +66,6 @@ def test_a_killed_worker_process_costs_its_task_a_retry(tmp_path, engine):
 
 
 @pytest.mark.nightly
-@pytest.mark.slow
 def test_a_task_on_which_workers_always_die_is_given_up_alone_and_with_its_exit_code():
     with pytest.raises(RuntimeError, match="ended 3 times, the last time alone, with exit code 9"):
         list(outcomes(dies_on_odd, [1, 2], jobs=2))

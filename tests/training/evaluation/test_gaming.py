@@ -429,7 +429,7 @@ def on_rigid_turbine(suite):
     scope="module",
     params=[
         pytest.param(on_rigid_turbine, marks=pytest.mark.slow),
-        pytest.param(lambda suite: suite, marks=[pytest.mark.slow, pytest.mark.nightly]),
+        pytest.param(lambda suite: suite, marks=pytest.mark.nightly),
     ],
     ids=["rigid", "elastic"],
 )

@@ -70,8 +70,8 @@ def wait_for_runs(process, folder, count, delay):
     ("jobs", "kills"),
     [
         (1, 1),
-        pytest.param(1, 5, marks=[pytest.mark.slow, pytest.mark.nightly]),
-        pytest.param(2, 5, marks=[pytest.mark.slow, pytest.mark.nightly]),
+        pytest.param(1, 5, marks=pytest.mark.nightly),
+        pytest.param(2, 5, marks=pytest.mark.nightly),
     ],
 )
 def test_an_evaluation_that_was_killed_goes_on_where_it_was(tmp_path, jobs, kills):

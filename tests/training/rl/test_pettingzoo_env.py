@@ -62,7 +62,6 @@ def test_agents_together_are_the_environment_and_each_moves_its_own_blade():
     assert truncated == dict.fromkeys(AGENTS, True) and not any(terminated.values()) and env.agents == []
 
 
-@pytest.mark.slow
 @pytest.mark.nightly  # the elastic turbine takes minutes to compile
 def test_random_actions_survive_and_lower_no_blade_s_load_for_free():
     """A reward for equal root moments: less with additions at random than without."""

@@ -10,7 +10,6 @@ NAME = "fowt_env/OC3HywindEasy-v0"
 DECISIONS = {"ppo": 2000, "sac": 5200, "tqc": 5200}  # the others learn from 5000 on
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_the_zoo_trains_with_the_files_of_settings(tmp_path):
     python = installed(tmp_path, "rl_zoo3")

@@ -43,7 +43,6 @@ def test_a_finished_variant_is_left_alone_and_a_longer_one_goes_on(table, tmp_pa
     assert ablation.decisions_done(folder) == 128
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_run_killed_before_its_first_checkpoint_starts_anew_and_its_folder_keeps_what_is_in_it(
     table, tmp_path

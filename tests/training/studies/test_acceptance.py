@@ -30,7 +30,6 @@ def test_ppo_with_default_settings_is_above_the_baseline_after_a_minute(tmp_path
     assert "generator_torque" in information(f"policy:{tmp_path / 'policy_0.npz'}")
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("algo", ["sac", "tqc"])
 def test_other_algorithms_with_default_settings_are_above_the_baseline(algo):

@@ -21,7 +21,7 @@ TABLE_1 = {"surge": 10.24, "sway": 10.24, "heave": 3.66, "roll": 4.27, "platform
 
 def study(test):
     """Leave a claim of the paper to the nightly tests: it needs runs of all load cases."""
-    return pytest.mark.slow(pytest.mark.nightly(test))
+    return pytest.mark.nightly(test)
 
 
 @pytest.fixture(scope="module")

@@ -33,7 +33,6 @@ from fowt_env.training.studies.robustness import (
 FOUND = Path(__file__).parents[2] / "reference" / "stability"
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     ("name", "integrator"),
@@ -54,7 +53,6 @@ def test_default_step_keeps_a_factor_of_two_from_blow_up(name, integrator):
     assert step_limits.stays(scene, point, fine, step, 100.0)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize(
     "name",
@@ -67,7 +65,7 @@ def test_default_step_keeps_a_factor_of_two_on_the_whole_map(name):
     assert (both["measured_s"] > 0.8 * both["theory_s"]).all()
 
 
-NIGHTLY = [pytest.mark.slow, pytest.mark.nightly]  # `fowt dev benchmark stability --cases N` runs more
+NIGHTLY = pytest.mark.nightly  # `fowt dev benchmark stability --cases N` runs more
 ALL = ("standard", "fast", "standard", "standard", "reference")
 
 
@@ -113,9 +111,7 @@ def test_hostile_actions_leave_everything_finite_or_end_with_the_reason(mode):
     assert table["finite"].all()
 
 
-@pytest.mark.parametrize(
-    "steps", [10_000, pytest.param(10_000_000, marks=(pytest.mark.slow, pytest.mark.nightly))]
-)
+@pytest.mark.parametrize("steps", [10_000, pytest.param(10_000_000, marks=pytest.mark.nightly)])
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_free_body_keeps_energy_and_momenta_at_the_default_step(integrator, steps):
     drift = long_runs.free_drift(integrator, steps)
@@ -124,7 +120,6 @@ def test_free_body_keeps_energy_and_momenta_at_the_default_step(integrator, step
         assert drift[key] <= most
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("integrator, most", study.FLOATING_DRIFT.items())
 def test_undamped_floating_body_keeps_its_energy(integrator, most):
@@ -133,14 +128,12 @@ def test_undamped_floating_body_keeps_its_energy(integrator, most):
     assert drift["status"] == RUNNING and drift["energy"] <= 0.1 * most
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_memory_does_not_grow():
     assert long_runs.plant_memory(1_000_000)["growth_MB"] <= study.MEMORY_MB
     assert long_runs.environment_memory(50_000)["growth_MB"] <= study.MEMORY_MB
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_every_integrator_converges_at_its_order():
     for integrator, order in long_runs.measured_orders().items():
@@ -168,7 +161,6 @@ def test_euler_angles_of_a_tumbling_body_follow_a_quaternion_and_bodies_one_by_o
     assert np.abs(rigid_body.rotation(*x[3:6]) - R).max() < 1e-6
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_without_the_compiler_a_scene_gives_the_same_numbers():
     jobs = without_compiler.jobs(
@@ -177,7 +169,6 @@ def test_without_the_compiler_a_scene_gives_the_same_numbers():
     assert max(without_compiler.differences(jobs).values()) <= study.PLAIN
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_without_the_compiler_every_scene_and_environment_gives_the_same_numbers():
     assert max(without_compiler.differences().values()) <= study.PLAIN

@@ -47,7 +47,6 @@ def test_a_candidate_adds_its_vector_times_the_components():
     assert all(np.array_equal(same[name], network[name]) for name in network)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_episodes_are_the_runs_of_a_suite_and_candidates_differ():
     suite = read_suite(search_clone.LULLS)

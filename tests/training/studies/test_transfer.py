@@ -300,7 +300,6 @@ def test_an_unknown_platform_or_model_is_named():
             transfer.main(["here", "runs", *options])
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_run_here_blows_the_box_and_keeps_its_figures(tmp_path, monkeypatch):
     turbsim = pytest.importorskip("openfast_io.turbsim_file")

@@ -68,7 +68,6 @@ def test_every_stored_case_is_compared():
 # --------------------------------------------------------------------------- slow
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["nrel5mw", "iea15"])
 def test_steady_deflections_and_moments_are_within_1_percent_and_3_percent(name):
@@ -91,7 +90,6 @@ def test_steady_deflections_and_moments_are_within_1_percent_and_3_percent(name)
             assert row.verdict == "met", row
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("name", ["nrel5mw", "iea15"])
 def test_blade_frequencies_are_within_1_percent(name):
@@ -103,7 +101,6 @@ def test_blade_frequencies_are_within_1_percent(name):
     assert max(abs(row.error) for row in found) < 1.0
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 @pytest.mark.parametrize("axis", ["displaced", "undisplaced"])
 def test_turbulence_is_within_2_percent_of_deviations_and_5_percent_of_damage_at_18_mps(axis):
@@ -125,7 +122,6 @@ def test_turbulence_is_within_2_percent_of_deviations_and_5_percent_of_damage_at
     assert heave.error < 1.0 if axis == "undisplaced" else 15.0 < heave.error < 25.0
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_individual_pitch_relieves_the_roots_as_in_openfast():
     if without_rosco():

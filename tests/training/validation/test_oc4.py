@@ -15,7 +15,6 @@ def by_name(targets):
     return lambda row: next(percent for part, percent in targets.items() if part in row.quantity)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_heave_of_a_hull_with_heave_plates_decays_as_with_openfasts_members():
     """Most of the damping is that of the plates; without members' drag the decay is far off."""
@@ -25,7 +24,6 @@ def test_heave_of_a_hull_with_heave_plates_decays_as_with_openfasts_members():
     assert normalised_rms(ours["PtfmHeave_[m]"], theirs["PtfmHeave_[m]"]) < 0.01
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_decays_with_members_are_openfasts():
     targets = {"published": None, "period": 0.2, "decrement": 2.0, "rms error": 1.0}
@@ -36,7 +34,6 @@ def test_decays_with_members_are_openfasts():
     assert published.error == pytest.approx(-0.77, abs=0.05)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_motions_of_a_hull_with_members_in_a_sea_are_openfasts():
     targets = {"waves_Hs7.5": 2.0, "waves_Hs7.5_qtf": 5.0, "waves_Hs7.5_moordyn": None}
@@ -46,7 +43,6 @@ def test_motions_of_a_hull_with_members_in_a_sea_are_openfasts():
 
 
 @pytest.mark.nightly
-@pytest.mark.slow
 def test_the_wake_answers_steps_of_wind_and_blade_pitch_as_aerodyns_dbemt_does():
     targets = by_name({"before": 0.5, "long after": 0.5, "time of": 10.0, ", overshoot": 5.0, "rms": None})
     assert sum(volturnus.WAKES.values()) == 3

@@ -182,7 +182,6 @@ def test_the_report_has_every_figure_and_its_plots(tmp_path):
 # --------------------------------------------------------------------------- slow
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_floating_steady_winds_are_within_3_percent_but_for_pitch_at_18_mps_after_100_s():
     """Missed with 3.9 %: 0.003 deg of a record whose deviation is 0.08 deg.
@@ -196,7 +195,6 @@ def test_floating_steady_winds_are_within_3_percent_but_for_pitch_at_18_mps_afte
     assert row.error == pytest.approx(3.88, abs=0.2)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_regular_wave_second_harmonics_come_from_position_and_surface_as_in_openfast():
     rows = judged(validate_cases(["waves"]), target)
@@ -226,13 +224,11 @@ def test_the_first_minutes_of_turbulence_with_irregular_waves_are_openfasts():
         assert normalised_rms(ours[channel][late], theirs[channel][: len(ours)][late]) < 0.10
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_turbulence_with_irregular_waves_meets_every_figure_in_both_winds():
     assert len(judged(validate_cases(["turbulence"]), target)) == 2 * 21
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_cheaper_choices_cost_what_the_documentation_says():
     study = validate_cases(["costs"])

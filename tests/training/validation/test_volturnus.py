@@ -167,7 +167,6 @@ def test_rest_decays_and_the_regular_wave_meet_every_figure():
         assert judged(group)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_tower_that_bends_rings_and_loads_its_base_as_openfast_s():
     rows = judged("tower")
@@ -178,7 +177,6 @@ def test_a_tower_that_bends_rings_and_loads_its_base_as_openfast_s():
         assert all(abs(row.error) < 1.0 for row in bands)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_irregular_waves_miss_the_deviation_of_slow_surge_alone():
     """2.3 % of surge instead of 2 %: a slow oscillation of 0.06 m from the start (validation.md)."""
@@ -198,7 +196,6 @@ def test_rotor_loads_in_steady_wind_miss_small_hub_moments_alone():
             assert abs(row.here - row.openfast) < 1e-3 * torque, f"{row.case}: {row.quantity}"
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_blades_one_by_one_miss_with_the_look_up_alone_what_a_skewed_wake_makes():
     """Every figure is met by bem, which has that wake; the look-up has the loads of bem without it."""
@@ -210,7 +207,6 @@ def test_blades_one_by_one_miss_with_the_look_up_alone_what_a_skewed_wake_makes(
             assert abs(row.error) < 0.01, f"{row.case}: {row.quantity}"
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_floating_under_rosco_misses_the_deviation_of_heave_at_12_mps_alone():
     if without_rosco():
@@ -219,14 +215,12 @@ def test_floating_under_rosco_misses_the_deviation_of_heave_at_12_mps_alone():
     assert len(rows) == 3 * 7 * 3 + 3 * 3  # sway, roll and yaw in turbulence
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_linear_models_miss_the_damping_of_heave_alone():
     rows = judged("linear", "heave mode, damping ratio")
     assert len([row for row in rows if row.verdict == "met"]) == 5 * 6
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_states_of_the_radiation_memory_stay_within_1_percent_of_convolution():
     assert len(judged("memory")) == 6
