@@ -192,7 +192,9 @@ class ResultsFolder:
             "seeds": sorted({*old["seeds"], *settings["seeds"]}),
             **{key: old[key] | dict(settings[key]) for key in ("cases", "controllers")},
         }
-        write_json(self.manifest, self.folder / "manifest.json")
+        path = self.folder / "manifest.json"
+        self._before = path.read_bytes() if path.exists() else None
+        write_json(self.manifest, path)
 
     def _manifest(self):
         path = self.folder / "manifest.json"
@@ -263,6 +265,15 @@ class ResultsFolder:
         faulty = {name for name, case in self.manifest["cases"].items() if case.get("fault") is not None}
         return with_lost_power(table, faulty)
 
+    def withdraw(self):
+        """Restore manifest.json as it was before these settings, or remove it if there was none."""
+        path = self.folder / "manifest.json"
+        if self._before is None:
+            path.unlink()
+        else:
+            with replacing(path) as temporary:
+                temporary.write_bytes(self._before)
+
     def write(self):
         """Write results.csv."""
         write_table(self.table(), self.folder / "results.csv")
@@ -282,13 +293,20 @@ def _short(value):
 def open_results(folder, settings, columns, again=()):
     """Yield the ResultsFolder, locked against other processes; results.csv is written at the end.
 
+    If the block raises InputError before a run is added, as for a controller that refuses the cases, the
+    folder is left as it was.
     Raises: InputError if the folder is in use, or has runs of another version or other settings.
     """
     what = f"results folder {str(folder)!r}"
     with locked(Path(folder).absolute(), what, "another evaluation is writing to it"):
         results = ResultsFolder(folder, settings, columns, again)
+        finished = len(results.rows)
         try:
             yield results
+        except InputError:
+            if len(results.rows) == finished:
+                results.withdraw()
+            raise
         finally:
             if results.rows:
                 results.write()

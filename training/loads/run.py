@@ -352,6 +352,7 @@ def expected_seconds(matrix, controllers, jobs=1):
     A run of SAMPLE s of each controller and of the parked turbine is timed, with its statistics, after a
     first run that loads or compiles the kernels; and a box of wind of BOX_SAMPLE s, from which the time of
     the others follows in proportion to their points.
+    Raises: InputError with the reason if a timed run fails, since the runs of its controller would, too.
     """
     runs = list(matrix.runs.values())
     rates, total = {}, 0.0
@@ -379,13 +380,21 @@ def expected_seconds(matrix, controllers, jobs=1):
 
 
 def _timed(load, controller):
-    """Return the s that a run of SAMPLE s of a LoadCase takes, once its kernels are loaded."""
+    """Return the s that a run of SAMPLE s of a LoadCase takes, once its kernels are loaded.
+
+    Raises: InputError if the run fails.
+    """
     fault = load.case.fault
     early = None if fault is None else fault.model_copy(update={"time": 0.5 * SAMPLE})
     short = replace(load, case=replace(load.case, fault=early), duration=SAMPLE, skip=0.1 * SAMPLE)
     task = Task(replace(short, case=with_box(short, None)), controller, None, TIME_LIMIT)
     for _ in range(2):
         began = time.perf_counter()
-        simulated(task)
+        finished, _ = simulated(task)
         seconds = time.perf_counter() - began
+        if finished.status == FAILED:
+            raise InputError(
+                f"controllers: {load.controller!r} failed in a run of {SAMPLE:g} s of {load.name!r}, by which the"
+                f" time is measured: {finished.reason}"
+            )
     return seconds

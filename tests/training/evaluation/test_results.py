@@ -184,3 +184,24 @@ def test_a_folder_in_use_and_a_file_are_refused(tmp_path):
         evaluate("pi", suite(), folder=tmp_path / "b")
     with pytest.raises(InputError, match="out and runs_folder"):
         evaluate("pi", suite(), folder=tmp_path / "c", out=tmp_path / "x.csv")
+
+
+class Unmeasured(Repaired):
+    """Reads a channel that does not exist."""
+
+    information = ("rotor_colour",)
+
+
+def test_a_refused_controller_leaves_the_folder_as_it_was(tmp_path):
+    folder = tmp_path / "new" / "folder"
+    with pytest.raises(InputError, match="rotor_colour"):
+        went(folder, {"bad": Unmeasured()}, [CALM])
+    assert not list(tmp_path.iterdir())
+    folder.mkdir(parents=True)
+    (folder / "notes.txt").write_text("of the user")
+    went(folder, {"good": Repaired()}, [CALM])
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert len(before) == 4
+    with pytest.raises(InputError, match="rotor_colour"):
+        went(folder, {"good": Repaired(), "bad": Unmeasured()}, [CALM])
+    assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before

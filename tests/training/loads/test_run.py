@@ -149,7 +149,6 @@ def test_a_file_of_another_run_is_refused(table, tmp_path):
         first.write_bytes(content)
 
 
-@pytest.mark.slow
 @pytest.mark.nightly
 def test_a_table_that_was_killed_goes_on_and_ends_with_the_same_statistics(table, tmp_path):
     script, folder = tmp_path / "script.py", tmp_path / "out"
@@ -206,6 +205,11 @@ def test_the_expected_time_is_proportional_to_the_hours_and_less_with_more_proce
     seconds, rates, per_box = run.expected_seconds(matrix, {"pi": "pi"}, 2)
     assert rates == {"pi": pytest.approx(3000.0)} and per_box == 0.0
     assert seconds == pytest.approx(11 * 200.0 / 3000.0 / 2)
+
+
+def test_a_controller_that_fails_where_the_time_is_measured_is_refused_with_the_reason():
+    with pytest.raises(InputError, match="'broken' failed in a run of 300 s of '.*measured: .*no law"):
+        run.expected_seconds(quick("broken", dlc="5.1"), {"broken": Broken()})
 
 
 def test_a_bad_controller_or_an_empty_table_is_refused_before_anything_runs(tmp_path):
