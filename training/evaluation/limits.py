@@ -10,10 +10,12 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.training.evaluation.bootstrap import LEVEL, interval, lifetime_means
+from fowt_env.training.evaluation.metric_names import short_name
 from fowt_env.training.evaluation.metrics import EXPONENTS, METRICS, better, never_negative
 
 HELD, UNDECIDED, EXCEEDED = "held", "not decided", "exceeded"
 TWO_SIDED = 2.0 * LEVEL - 1.0  # level of the interval whose ends are the one-sided bounds
+LIFETIME = " over the lifetime"  # of a limited mean
 
 
 class Decision(NamedTuple):
@@ -65,7 +67,7 @@ def decide(limits, part, weights):
             most_of_all = float(values.max())
             found.append(Decision(name, "", "", *[most_of_all] * 3, -np.inf, most))
     over = f" over {limits.baseline}"
-    whole = [(name, " over the lifetime", (-np.inf, most), _mean) for name, most in limits.lifetime.items()]
+    whole = [(name, LIFETIME, (-np.inf, most), _mean) for name, most in limits.lifetime.items()]
     whole += [(name, over, (-np.inf, most), _ratio) for name, most in limits.relative.items()]
     each = [(name, "", (-np.inf, most), _mean) for name, most in limits.case.items()]
     each += [(name, over, allowed_range(name, bound), _ratio) for name, bound in limits.case_relative.items()]
@@ -117,7 +119,7 @@ def _decision(part, case, weights, name, what, allowed, of):
 
 
 def limit_texts(decisions, state):
-    """Return the limits in one state, a text per limit: "metric over pi = 1.3 in ntm_16, allowed 1.25"."""
+    """Return the limits in one state, a text each: "shaft-torque DEL over pi = 1.3 in u_16, allowed 1.25"."""
     texts = {}
     for each in decisions:
         if each.state == state:
@@ -127,9 +129,15 @@ def limit_texts(decisions, state):
                 f"{each.value:.4g}{ends}{where}"
             )
     return [
-        f"{metric}{what} = {', '.join(values)}, allowed {allowed}"
+        f"{limited(metric, what)} = {', '.join(values)}, allowed {allowed}"
         for (metric, what, allowed), values in texts.items()
     ]
+
+
+def limited(metric, what):
+    """Return what a limit is on, such as "pitch travel over gspi_oc3"; a mean itself has its unit."""
+    unit = metric.partition("_[")[2].removesuffix("]")
+    return f"{short_name(metric)}{f' ({unit})' if what in ('', LIFETIME) else ''}{what}"
 
 
 def _allowed(decision):

@@ -139,11 +139,11 @@ TABLE = {  # metric -> definition, in the order of columns
         BEARING_EXPONENT,
     ),
     "PtfmSway_std_[m]": _deviation("standard deviation of the platform's sway"),
-    "blade_pitch_rate_beyond_[s]": _size("time with a blade-pitch rate above 10 deg/s"),
+    "blade_pitch_rate_above_limit_[s]": _size("time with a blade-pitch rate above 10 deg/s"),
     "blade_pitch_rate_violations_[-]": _size("exceedances of 10 deg/s by the blade-pitch rate"),
-    "tower_top_acceleration_beyond_[s]": _size("time with a tower-top acceleration above 3.3 m/s2"),
+    "tower_top_acceleration_above_limit_[s]": _size("time with a tower-top acceleration above 3.3 m/s2"),
     "tower_top_acceleration_violations_[-]": _size("exceedances of 3.3 m/s2 by the tower-top acceleration"),
-    "rotor_speed_beyond_[s]": _size("time with a rotor speed above 1.3 times rated"),
+    "rotor_speed_above_limit_[s]": _size("time with a rotor speed above 1.3 times rated"),
     "rotor_speed_violations_[-]": _size("exceedances of 1.3 times rated by the rotor speed"),
     "RotSpeed_offset_[%]": _size("steady wind: deviation of the final mean rotor speed from rated"),
     "BldPitch_oscillation_[deg]": _size("steady wind: peak-to-peak blade pitch of the last 100 s"),
@@ -361,5 +361,5 @@ def _violations(time, speed, axes, blade_pitch, rated_speed_rpm):
         ("tower_top_acceleration", time, acceleration, TOWER_TOP_ACCELERATION_LIMIT),
         ("rotor_speed", time, speed, ROTOR_SPEED_LIMIT * rated_speed_rpm),
     ):
-        result[f"{name}_beyond_[s]"], result[f"{name}_violations_[-]"] = beyond(times, values, limit)
+        result[f"{name}_above_limit_[s]"], result[f"{name}_violations_[-]"] = beyond(times, values, limit)
     return result

@@ -39,10 +39,11 @@ from fowt_env.descriptions.checks import parse_number
 from fowt_env.descriptions.platform import platform_names
 from fowt_env.display import number_text
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation.metric_names import SHORT, short_name
 from fowt_env.training.evaluation.metrics import better
 from fowt_env.training.live import tuning
 from fowt_env.training.live.tuning import Law, Weather
-from fowt_env.training.reports.metric_words import SHORT, about_metric, short_name
+from fowt_env.training.reports.metric_words import about_metric
 from fowt_env.training.reports.verdict import percent_text
 from fowt_env.visual.rendering import DEPTH_SHIFT, solids
 from fowt_env.visual.style import COLOURS

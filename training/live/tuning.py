@@ -35,9 +35,9 @@ from fowt_env.scene.build import build_scene
 from fowt_env.scene.scene import Scene
 from fowt_env.training.design.tune import FACTORS, Space, scaled_pi, spaces
 from fowt_env.training.evaluation.bootstrap import case_means, interval, resample_weights
+from fowt_env.training.evaluation.metric_names import SHORT
 from fowt_env.training.evaluation.metrics import METRICS, better, mean_exponent, turbine_metrics
 from fowt_env.training.evaluation.seeds import VALIDATION
-from fowt_env.training.reports.metric_words import SHORT
 from fowt_env.training.reports.verdict import percent_text
 from fowt_env.visual.time_series import TIME, spectrum
 

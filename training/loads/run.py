@@ -394,7 +394,7 @@ def _timed(load, controller):
         seconds = time.perf_counter() - began
         if finished.status == FAILED:
             raise InputError(
-                f"controllers: {load.controller!r} failed in a run of {SAMPLE:g} s of {load.name!r}, by which the"
-                f" time is measured: {finished.reason}"
+                f"controllers: {load.controller!r} failed in a run of {SAMPLE:g} s of {load.name!r}, by which"
+                f" the time is measured: {finished.reason}"
             )
     return seconds

@@ -22,12 +22,13 @@ from fowt_env.training.evaluation.evaluate import run_file
 from fowt_env.training.evaluation.failures import known_figures, lost_counts, lost_text
 from fowt_env.training.evaluation.leaderboard import SCORES
 from fowt_env.training.evaluation.leaderboard_file import Interval, check_leaderboard
+from fowt_env.training.evaluation.metric_names import SHORT, short_name
 from fowt_env.training.evaluation.metrics import better, mean_exponent
 from fowt_env.training.evaluation.results_table import KEY, WEIGHT, WORDS, case_shares, read_results
 from fowt_env.training.evaluation.run_case import OK
 from fowt_env.training.reports import page_words
 from fowt_env.training.reports.evaluation_plots import platform_pitch_period
-from fowt_env.training.reports.metric_words import SHORT, about_metric, counted, seeds_text, short_name
+from fowt_env.training.reports.metric_words import about_metric, counted, seeds_text
 from fowt_env.training.reports.own_limits import OF_LIMIT, read_limits
 from fowt_env.training.reports.page_file import PAGE, page_path, plotly_source, write_page
 from fowt_env.training.reports.verdict import TESTED, corrected_p, verdict

@@ -1,30 +1,9 @@
-"""Defines the wording of reports: short names and explanations of metrics, counts and lists of seeds."""
+"""Defines the wording of reports: explanations of metrics, counts and lists of seeds."""
 
 from fowt_env.training.evaluation.metrics import TABLE, better
 from fowt_env.training.evaluation.seeds import ranges
 
-SHORT = {
-    "RotSpeed_std_[rpm]": "rotor-speed std",
-    "PtfmPitch_std_[deg]": "platform-pitch std",
-    "blade_pitch_travel_[deg/s]": "pitch travel",
-    "GenPwr_std_[kW]": "power std",
-    "torque_travel_[kN-m/s]": "torque travel",
-    "RotTorq_DEL_[kN-m]": "shaft-torque DEL",
-    "TwrBsMyt_DEL_[kN-m]": "tower-base DEL",
-    "GenPwr_capped_mean_[kW]": "power up to rated",
-    "GenPwr_max_[kW]": "maximum power",
-}
-FURTHER = {  # of metrics that are no columns of the page from the start
-    "RotSpeed_max_[rpm]": "maximum rotor speed",
-    "FAIRTEN_DEL_[kN]": "mooring DEL",
-    "RootMyb_DEL_[kN-m]": "blade-root DEL",
-}
 DIRECTIONS = {-1: "Less is better.", 0: "Neither direction is better.", 1: "More is better."}
-
-
-def short_name(metric):
-    """Return the short name of a metric, such as "rotor-speed std", else the metric's name in words."""
-    return (SHORT | FURTHER).get(metric, metric.partition("_[")[0].replace("_", " "))
 
 
 def about_metric(metric):

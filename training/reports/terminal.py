@@ -3,6 +3,7 @@
 from fowt_env.training.evaluation.bootstrap import holm
 from fowt_env.training.evaluation.failures import KINDS, lost_text
 from fowt_env.training.evaluation.leaderboard import SCORES, limits_text, score_text
+from fowt_env.training.evaluation.metric_names import short_name
 from fowt_env.training.reports.metric_words import counted, seeds_text
 
 # printed columns: heading, metric, format, order of removal on a narrow terminal (None: kept), plot title
@@ -133,7 +134,8 @@ def _remarks(board, intervals):
             "seeds not drawn from a hash (--draw-seeds): for development, as a controller can recognise them"
         )
     if board["unchecked"]:
-        lines.append(f"limits of {', '.join(board['unchecked'])} not checked: their baseline was not run")
+        names = ", ".join(map(short_name, board["unchecked"]))
+        lines.append(f"limits of {names} not checked: their baseline was not run")
     return lines
 
 

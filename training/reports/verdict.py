@@ -8,8 +8,8 @@ import html
 import math
 
 from fowt_env.training.evaluation.bootstrap import holm
+from fowt_env.training.evaluation.metric_names import short_name
 from fowt_env.training.evaluation.metrics import better
-from fowt_env.training.reports.metric_words import short_name
 from fowt_env.training.reports.terminal import LEADERBOARD
 
 TESTED = tuple(metric for _, metric, _, _, different in LEADERBOARD if different)

@@ -32,50 +32,50 @@ ELASTIC = (
 )  # fmt: skip
 WAKE = (Channel.THRUST, Channel.TORQUE)
 WHOLE, LONG, SHORT = (0.0, 600.0), (100.0, 400.0), (100.0, 200.0)  # s
-PLOTS = {  # platform: {case: (channels, time range in s, whether spectra are plotted)}
-    "oc3_hywind": {
-        "float_steady_8mps": (OPERATING, WHOLE, False),
-        "float_steady_18mps": (OPERATING, WHOLE, False),
-        "float_windsteps_12_24": (OPERATING, (0.0, 1300.0), False),
-        "regwave_H3T5": (WAVE, (560.0, 600.0), True),
-        "regwave_H3T5_displaced": (WAVE, (560.0, 600.0), True),
-        "turb_18mps_Hs7.5_uniform": (OPERATING, LONG, True),
-        "turb_18mps_Hs7.5_uniform_flex": (BENDING, SHORT, True),
-        "turb_18mps_Hs7.5_box": (OPERATING, LONG, True),
-        "elastic, turb_18mps": (ELASTIC, SHORT, True),
-    },
-    "iea15_volturnus_s": {
-        "regwave_H4T9": (Channel.PLANE, (410.0, 500.0), False),
-        "waves_Hs7.5": (Channel.PLANE, LONG, True),
-        "waves_Hs7.5_qtf": (Channel.PLANE, LONG, True),
-        "float_steady_12mps": (TURNING, WHOLE, False),
-        "float_steady_18mps": (TURNING, WHOLE, False),
-        "turb_18mps_Hs7.5_uniform": (TURNING, LONG, True),
-        "turb_18mps_Hs7.5_uniform_tower": (BENDING, SHORT, True),
-        "wake_pitch_step": (WAKE, (10.0, 100.0), False),
-        "wake_wind_step_18mps": (WAKE, (10.0, 100.0), False),
-        "elastic, turb_18mps": (ELASTIC, SHORT, True),
-    },
-    "nrel5mw_oc4_semi": {
-        "waves_Hs7.5": (Channel.PLANE, LONG, True),
-        "waves_Hs7.5_qtf": (Channel.PLANE, LONG, True),
-    },
-}
 TURBULENCE = "turbulence of 18 m/s, {}; waves, Hs 7.5 m"
-TITLES = {  # of the cases in PLOTS
-    "float_steady_8mps": "steady wind of 8 m/s", "float_steady_12mps": "steady wind of 12 m/s",
-    "float_steady_18mps": "steady wind of 18 m/s", "float_windsteps_12_24": "wind steps from 12 to 24 m/s",
-    "regwave_H3T5": "regular wave, H 3 m, T 5 s", "regwave_H4T9": "regular wave, H 4 m, T 9 s",
-    "regwave_H3T5_displaced": "regular wave, H 3 m, T 5 s, wave loads at the displaced position",
-    "waves_Hs7.5": "irregular waves, Hs 7.5 m",
-    "waves_Hs7.5_qtf": "irregular waves, Hs 7.5 m, with difference-frequency loads",
-    "turb_18mps_Hs7.5_uniform": TURBULENCE.format("uniform over the rotor"),
-    "turb_18mps_Hs7.5_uniform_flex": TURBULENCE.format("uniform over the rotor, bending tower"),
-    "turb_18mps_Hs7.5_uniform_tower": TURBULENCE.format("uniform over the rotor, bending tower"),
-    "turb_18mps_Hs7.5_box": TURBULENCE.format("full field"),
-    "wake_pitch_step": "dynamic inflow after a step of blade pitch",
-    "wake_wind_step_18mps": "dynamic inflow after a step of wind at 18 m/s",
-    "elastic, turb_18mps": TURBULENCE.format("bending blades, tower and shaft"),
+STEADY, UNIFORM = "steady wind of {} m/s", TURBULENCE.format("uniform over the rotor")
+TOWER = TURBULENCE.format("uniform over the rotor, bending tower")
+ALL_BEND = ("elastic, turb_18mps", TURBULENCE.format("bending blades, tower and shaft"), ELASTIC, SHORT, True)
+WAVES = (
+    ("waves_Hs7.5", "irregular waves, Hs 7.5 m", Channel.PLANE, LONG, True),
+    (
+        "waves_Hs7.5_qtf",
+        "irregular waves, Hs 7.5 m, with difference-frequency loads",
+        Channel.PLANE,
+        LONG,
+        True,
+    ),
+)
+PLOTS = {  # platform: ((case, title, channels, time range in s, whether spectra are plotted), ...)
+    "oc3_hywind": (
+        ("float_steady_8mps", STEADY.format(8), OPERATING, WHOLE, False),
+        ("float_steady_18mps", STEADY.format(18), OPERATING, WHOLE, False),
+        ("float_windsteps_12_24", "wind steps from 12 to 24 m/s", OPERATING, (0.0, 1300.0), False),
+        ("regwave_H3T5", "regular wave, H 3 m, T 5 s", WAVE, (560.0, 600.0), True),
+        (
+            "regwave_H3T5_displaced", "regular wave, H 3 m, T 5 s, wave loads at the displaced position",
+            WAVE, (560.0, 600.0), True,
+        ),
+        ("turb_18mps_Hs7.5_uniform", UNIFORM, OPERATING, LONG, True),
+        ("turb_18mps_Hs7.5_uniform_flex", TOWER, BENDING, SHORT, True),
+        ("turb_18mps_Hs7.5_box", TURBULENCE.format("full field"), OPERATING, LONG, True),
+        ALL_BEND,
+    ),
+    "iea15_volturnus_s": (
+        ("regwave_H4T9", "regular wave, H 4 m, T 9 s", Channel.PLANE, (410.0, 500.0), False),
+        *WAVES,
+        ("float_steady_12mps", STEADY.format(12), TURNING, WHOLE, False),
+        ("float_steady_18mps", STEADY.format(18), TURNING, WHOLE, False),
+        ("turb_18mps_Hs7.5_uniform", UNIFORM, TURNING, LONG, True),
+        ("turb_18mps_Hs7.5_uniform_tower", TOWER, BENDING, SHORT, True),
+        ("wake_pitch_step", "dynamic inflow after a step of blade pitch", WAKE, (10.0, 100.0), False),
+        (
+            "wake_wind_step_18mps", "dynamic inflow after a step of wind at 18 m/s",
+            WAKE, (10.0, 100.0), False,
+        ),
+        ALL_BEND,
+    ),
+    "nrel5mw_oc4_semi": WAVES,
 }  # fmt: skip
 HERE, THERE = "fowt_env", "OpenFAST"
 COST_PLOTS = {  # file -> (title, {legend: run})
@@ -257,14 +257,14 @@ def write_plots(study, folder):
     ):  # fmt: skip
         if any(case.startswith(words) for case in cases):
             draw(study, path(name))
-    for case, (channels, window, spectra) in PLOTS.get(study.platform, {}).items():
+    for case, title, channels, window, spectra in PLOTS.get(study.platform, ()):
         if case in study.runs:
             ours, theirs = study.runs[case]
             frames = {THERE: theirs, HERE: ours}
-            _overlay(frames, channels, window, path(_plot_name(case)), TITLES[case])
+            _overlay(frames, channels, window, path(_plot_name(case)), title)
             if spectra:
                 start = 400.0 if case.startswith("regwave") else 100.0
-                _spectra(frames, channels, path(f"{_plot_name(case)}_spectra"), TITLES[case], start)
+                _spectra(frames, channels, path(f"{_plot_name(case)}_spectra"), title, start)
     if "spectra of the wind" in study.runs:
         channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED)
         for name, (title, runs) in COST_PLOTS.items():

@@ -4,6 +4,7 @@ The first part judges figures by the headline suite, the second runs laws (gamin
 turbine, and with the mark nightly on the elastic one of the suite.
 """
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from fowt_env.training.evaluation.cases import Case, Limits, read_suite
 from fowt_env.training.evaluation.evaluate import COLUMNS, evaluate
 from fowt_env.training.evaluation.failures import PENALTY, penalised, with_lost_power
 from fowt_env.training.evaluation.leaderboard import leaderboard
+from fowt_env.training.evaluation.metric_names import short_name
 from fowt_env.training.evaluation.metrics import METRICS, better
 from fowt_env.training.evaluation.run_case import REFERENCE
 from fowt_env.training.evaluation.seeds import drawn_seeds
@@ -39,7 +41,7 @@ HEADLINE = read_suite("above_rated_elastic")
 SPEED, LEAN, ENERGY = "RotSpeed_std_[rpm]", "PtfmPitch_std_[deg]", "GenPwr_capped_mean_[kW]"
 TRAVEL, TORQUE, SHAFT = "blade_pitch_travel_[deg/s]", "torque_travel_[kN-m/s]", "RotTorq_DEL_[kN-m]"
 TOWER, ROOT = "TwrBsMyt_DEL_[kN-m]", "RootMyb_DEL_[kN-m]"
-POWER, PEAK, PAST = "GenPwr_mean_[kW]", "GenPwr_max_[kW]", "rotor_speed_beyond_[s]"
+POWER, PEAK, PAST = "GenPwr_mean_[kW]", "GenPwr_max_[kW]", "rotor_speed_above_limit_[s]"
 HELD_SPEED, HELD_TORQUE = "RotSpeed_mean_[rpm]", "GenTq_mean_[kN-m]"
 LOADS = (SHAFT, TOWER, ROOT)
 TYPICAL = dict.fromkeys(METRICS, 1.0) | {
@@ -134,7 +136,8 @@ def test_rotor_speed_that_is_bought_with_torque_or_pitch_or_power_is_beyond_a_li
     runs = table(honest=good, gamer=buys)
     assert ranks(runs)["honest"] < ranks(runs)["gamer"]
     beyond = {name: entry["beyond"] for name, entry in entries(runs).items()}
-    assert len(beyond["gamer"]) == 1 and next(iter(spent)) in beyond["gamer"][0] and not beyond["honest"]
+    (text,) = beyond["gamer"]
+    assert text.startswith(short_name(next(iter(spent)))) and not beyond["honest"]
 
 
 CALM = dict.fromkeys((SPEED, LEAN, TRAVEL, TORQUE, *LOADS), 0.5)
@@ -334,7 +337,8 @@ def test_what_an_engineer_would_not_sign_is_beyond_the_limits_that_say_why(name)
     figures, barred = (AUDITED | OTHERS)[name]
     found = entries(table(honest=good, gamer=lambda wind, seed: good(wind, seed) | figures(wind, seed)))
     gamer, honest = found["gamer"], found["honest"]
-    assert {text.split(" over ")[0].split(",")[0].split(" = ")[0] for text in gamer["beyond"]} == set(barred)
+    named = {re.split(r" over |,| = | \(", text)[0] for text in gamer["beyond"]}
+    assert named == set(map(short_name, barred))
     assert honest["held"] and not gamer["held"] and not gamer["score"]["valid"]
     assert honest["rank"] < found["gspi_oc3"]["rank"] < gamer["rank"]
 
@@ -448,7 +452,7 @@ def test_a_law_that_games_the_score_is_beyond_a_limit_that_its_twin_is_not(playe
     gamer, twin = played[law.__name__], played[TWIN]
     assert not twin["beyond"] and twin["lost"] == 0 and twin["score"]["mean"] < 1.0
     for metric in GAMERS[law]:
-        assert any(text.startswith(metric) for text in gamer["beyond"]), gamer["beyond"]
+        assert any(text.startswith(short_name(metric)) for text in gamer["beyond"]), gamer["beyond"]
     assert twin["rank"] == 1 < gamer["rank"]
 
 
@@ -491,7 +495,7 @@ def test_a_lower_set_point_loses_energy_and_is_beyond_the_limit_of_settling():
     assert runs.loc["gspi_oc3", "RotSpeed_offset_[%]"] < 0.5 < 2.5 < runs.loc["low", "RotSpeed_offset_[%]"]
     board = leaderboard(runs.reset_index(), limits=settling.limits)
     assert [entry["controller"] for entry in board["controllers"]] == ["gspi_oc3", "low"]
-    assert "RotSpeed_offset" in board["controllers"][1]["beyond"][0]
+    assert "settled rotor-speed offset" in board["controllers"][1]["beyond"][0]
 
 
 def test_limits_of_the_headline_are_of_metrics_that_there_are_and_hold_for_the_baseline():

@@ -192,13 +192,13 @@ def test_a_score_is_the_weighted_mean_ratio_to_the_baseline_over_relative_power(
 
 def test_one_run_beyond_a_limit_is_enough_however_low_the_mean():
     frame = table({("pi", "a", seed): 1.0 for seed in range(6)}, "pi")
-    frame.loc[3, "rotor_speed_beyond_[s]"] = 2.5  # the mean is 1.25
-    rules = {"score": SPEED_SCORE, "limits": Limits(run={"rotor_speed_beyond_[s]": 2.0})}
+    frame.loc[3, "rotor_speed_above_limit_[s]"] = 2.5  # the mean is 1.25
+    rules = {"score": SPEED_SCORE, "limits": Limits(run={"rotor_speed_above_limit_[s]": 2.0})}
     score = entry(leaderboard(frame, **rules), "pi")["score"]
-    assert not score["valid"] and score["why"] == "rotor_speed_beyond_[s] = 2.5, allowed 2"
-    frame.loc[3, "rotor_speed_beyond_[s]"] = 2.0
+    assert not score["valid"] and score["why"] == "time above 1.3 times rated speed (s) = 2.5, allowed 2"
+    frame.loc[3, "rotor_speed_above_limit_[s]"] = 2.0
     assert entry(leaderboard(frame, **rules), "pi")["score"]["valid"]
-    frame["rotor_speed_beyond_[s]"] = np.nan  # what runs do not say is not within it
+    frame["rotor_speed_above_limit_[s]"] = np.nan  # what runs do not say is not within it
     assert not entry(leaderboard(frame, **rules), "pi")["score"]["valid"]
 
 

@@ -47,7 +47,8 @@ def test_a_limit_is_decided_in_each_case_by_the_mean_and_by_its_bound():
     entry = board({"a": QUIET, "b": WIDE, "c": BAD}, case_relative={SHAFT: (1.25,)})
     assert states(entry) == {"a": HELD, "b": UNDECIDED, "c": EXCEEDED}
     assert entry["held"] is False and len(entry["beyond"]) == len(entry["undecided"]) == 1
-    assert entry["beyond"][0].startswith(f"{SHAFT} over gspi_oc3 = 1.3 [1.2") and "in c" in entry["beyond"][0]
+    (text,) = entry["beyond"]
+    assert text.startswith("shaft-torque DEL over gspi_oc3 = 1.3 [1.2") and "in c" in text
     assert "in b" in entry["undecided"][0] and "in a" not in entry["undecided"][0]
     held = board({"a": QUIET, "b": QUIET}, case_relative={SHAFT: (1.25,)})
     assert held["held"] is True and not held["beyond"] and not held["undecided"]
@@ -105,7 +106,8 @@ def test_a_set_point_is_held_as_well_as_by_the_reference_and_half_a_percent(base
 
 def test_a_limit_of_each_run_and_one_of_the_mean_of_a_case_are_in_their_own_unit():
     entry = board({"a": [1.0, 1.0, 1.0, 1.3], "b": [1.0] * 4}, base=5000.0, run={SHAFT: 6000.0})
-    assert states(entry) == {"": EXCEEDED} and entry["beyond"] == [f"{SHAFT} = 6500, allowed 6000"]
+    assert states(entry) == {"": EXCEEDED}
+    assert entry["beyond"] == ["shaft-torque DEL (kN-m) = 6500, allowed 6000"]
     entry = board({"a": [1.01] * 4, "b": [1.0] * 4}, base=5000.0, case={SHAFT: 5025.0})
     assert states(entry) == {"a": EXCEEDED, "b": HELD}
     entry = board({"a": [1.0] * 4}, ENERGY, 5000.0, case={ENERGY: 5025.0})  # at most, though more is better

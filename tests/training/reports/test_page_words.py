@@ -1,8 +1,9 @@
 import pandas as pd
 import pytest
 
+from fowt_env.training.evaluation.metric_names import SHORT, short_name
 from fowt_env.training.evaluation.metrics import METRICS
-from fowt_env.training.reports.metric_words import SHORT, about_metric, short_name
+from fowt_env.training.reports.metric_words import about_metric
 from fowt_env.training.reports.page_words import (
     case_conditions,
     conditions_table,

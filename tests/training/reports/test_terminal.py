@@ -10,9 +10,9 @@ from fowt_env.training.cli import scores as scores_command
 from fowt_env.training.design import sweeps
 from fowt_env.training.evaluation.evaluate import COLUMNS
 from fowt_env.training.evaluation.leaderboard import SHOWN, leaderboard
+from fowt_env.training.evaluation.metric_names import SHORT
 from fowt_env.training.evaluation.metrics import METRICS, PAID
 from fowt_env.training.reports.evaluation_plots import evaluation_plots
-from fowt_env.training.reports.metric_words import SHORT
 from fowt_env.training.reports.scores import figures_named
 from fowt_env.training.reports.terminal import (
     LEADERBOARD,

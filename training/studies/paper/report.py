@@ -95,10 +95,11 @@ def static_pulls(path=None):
             offset = table["offset_[m]"]
             axes.plot(offset, factor * table["force_[N]"], color=INK, label="restoring force")
             for number, column in enumerate(c for c in table if c.startswith("tension")):
+                # lines of equal tension lie on each other
                 style = {
-                    "color": COLOURS[number % 3],
-                    "linewidth": 0.9,
-                    "linestyle": ("-", "--")[number // 3],
+                    "color": COLOURS[number],
+                    "linewidth": 1.2,
+                    "linestyle": ("-", "--", ":")[number % 3],
                 }
                 label = column.removesuffix("_[N]").replace("_", " ")
                 axes.plot(offset, factor * table[column], label=label, **style)
@@ -126,17 +127,21 @@ def regular_waves(full, path=None):
     panels = _axes(figure, len(channels), 2)
     for (series, spectral), channel in zip(panels, channels, strict=True):
         for combination, colour in zip(load_cases.COMBINATIONS, COLOURS, strict=False):
-            frame, label = full[combination], f"{combination[0]} position, {combination[1]} surface"
+            surface = combination[1].replace("swl", "still-water")
+            frame, label = full[combination], f"{combination[0]} position, {surface} surface"
             part = frame[frame[TIME].between(420.0, 450.0)]
             series.plot(part[TIME], part[channel], color=colour, linewidth=0.9, label=label)
             part = frame[frame[TIME] >= 260.0]
             frequency, density = spectrum(part[TIME], part[channel], segment=100.0)
             spectral.semilogy(frequency[1:], density[1:], color=colour, linewidth=0.9)
         spectral.set_xlim(0.0, 0.7)
+        spectral.set_ylim(1e-18 * density.max(), 10.0 * density.max())
+        unit = channel.partition("_[")[2].removesuffix("]")
+        style_axes(spectral, ylabel=f"{unit}²/Hz")
         style_axes(series, ylabel=LABELS[channel])
         series.margins(x=0.0)
     style_axes(series, "time (s)")
-    style_axes(spectral, "frequency (Hz), power density per Hz")
+    style_axes(spectral, "frequency (Hz)")
     lines, labels = series.get_legend_handles_labels()
     figure.legend(lines, labels, fontsize=8, frameon=False, loc="outside upper center", ncols=2)
     return save_figure(figure, path)
