@@ -20,6 +20,7 @@ import tempfile
 import weakref
 from _ctypes import dlclose
 from dataclasses import dataclass
+from importlib.metadata import version
 from math import pi
 from pathlib import Path
 from typing import NamedTuple
@@ -42,7 +43,7 @@ from fowt_env.controllers.tuned import tuned_for
 from fowt_env.descriptions.checks import check_one_of
 from fowt_env.descriptions.files import read_text
 from fowt_env.descriptions.units import DEGREE
-from fowt_env.errors import InputError, unknown
+from fowt_env.errors import InputError, unknown, warn_once
 from fowt_env.plant.aero.blade_elements import build_blade_elements
 from fowt_env.plant.aero.coefficient_table import performance
 from fowt_env.plant.state import N_COMMANDS, N_INDIVIDUAL_COMMANDS
@@ -72,6 +73,8 @@ STARTS = {
     "SU_LoadRampDuration": (100.0, 100.0),
     "SU_LoadHoldDuration": (200.0, 100.0),
 }
+# entries that ROSCO 2.10 requires and files of 2.9 lack, with the default of its toolbox
+ADDED = {"F_VSRefSpdCornerFreq": 0.20944}  # rad/s, low pass of the reference speed of the torque loop
 SILENT = {"LoggingLevel": 0, "Echo": 0, "Ext_Interface": 0}  # no log files, standard interface
 ENTRY = re.compile(r"^(?P<value>[^!]*?)(?P<gap>\s*!\s*)(?P<name>\w+)\b")
 BLADES_READ = (
@@ -110,6 +113,7 @@ class RoscoSettings(Settings):
 class Discon:
     """Reads and modifies the DISCON.IN of a turbine for ROSCO.
 
+    A file of ROSCO 2.9 gets the entries of ADDED, with a warning.
     individual: whether to control the pitch of each blade; switched on if disabled in the file.
     Raises: InputError for other files, and for modes that need inputs not provided to the library.
     """
@@ -131,10 +135,17 @@ class Discon:
         if self.values["Fl_Mode"] not in ("0", "1", "2"):
             raise InputError(f"{where}: Fl_Mode = {self.values['Fl_Mode']}: must be 0, 1 or 2")
         self.mode = int(self.values["Fl_Mode"])  # determines which acceleration the library receives
+        self.added = {key: value for key, value in ADDED.items() if key not in self.values}
+        if self.added:
+            named = ", ".join(f"{key} = {value:g}" for key, value in self.added.items())
+            warn_once(
+                ("DISCON.IN", self.path),
+                f"{where}: of ROSCO 2.9, without an entry that 2.10 needs: {named} is used, its default",
+            )
 
     def texts(self, changes, table):
         """Return the texts of DISCON.IN with changes and rotor table; table(): Table if there is no file."""
-        _check_entries(changes, self.values)
+        _check_entries(changes, self.values | self.added)
         changes = SILENT | {"PerfFileName": f'"{ROTOR_FILE}"'} | self.switched | changes
         named = self.path.parent / self.values["PerfFileName"].strip("\"'")
         if named.is_file():
@@ -149,6 +160,7 @@ class Discon:
             if match and match["name"] in changes:
                 line = f"{_words(changes[match['name']])}{line[match.end('value') :]}"
             lines.append(line)
+        lines += [f"{_words(changes.get(key, value))} ! {key}" for key, value in self.added.items()]
         return "\n".join([*lines, ""]), rows
 
 
@@ -327,7 +339,10 @@ class Rosco:
         """Return the ControllerError of a last call, at a time in s, that failed; None if it did not."""
         if self._swap.failure >= 0:
             return None
-        return call_error(self.name, f"ROSCO reports {self._swap.message!r}", float(time))
+        what = f"ROSCO reports {self._swap.message!r}"
+        if isinstance(self.settings, Discon) and "SetParameters" in what:  # while it reads its file
+            what += f" for {str(self.settings.path)!r}; installed is ROSCO {version('rosco')}"
+        return call_error(self.name, what, float(time))
 
 
 class _Copy(Library):

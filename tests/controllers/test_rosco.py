@@ -17,6 +17,7 @@ from fowt_env.controllers.rosco import (
     Discon,
     Rosco,
     RoscoSettings,
+    Table,
     deck,
     find_library,
     pitch_gains,
@@ -24,7 +25,7 @@ from fowt_env.controllers.rosco import (
     rotor_table,
 )
 from fowt_env.descriptions.turbine import read_turbine
-from fowt_env.errors import InputError
+from fowt_env.errors import ControllerError, InputError, PlantWarning
 from fowt_env.plant.measurement import Measurement
 
 needs_library = pytest.mark.skipif(
@@ -250,6 +251,32 @@ def test_a_deck_that_needs_more_than_it_is_given_is_refused(tmp_path, discon, ol
     with pytest.raises(InputError) as caught:
         Discon(path)
     assert part in str(caught.value)
+
+
+def test_a_deck_of_rosco_2_9_gets_what_2_10_needs_with_a_warning_and_a_change_of_it(tmp_path, discon):
+    path = tmp_path / "DISCON.IN"
+    lines = [line for line in discon.text.splitlines() if "F_VSRefSpdCornerFreq" not in line]
+    assert len(lines) == len(discon.text.splitlines()) - 1
+    path.write_text("\n".join(lines))
+    with pytest.warns(PlantWarning, match="of ROSCO 2.9, .*F_VSRefSpdCornerFreq = 0.20944 is used"):
+        old = Discon(path)
+    assert not discon.added
+
+    def entry(text):
+        return [match["value"] for line in text.splitlines() if (match := ENTRY.match(line))
+                and match["name"] == "F_VSRefSpdCornerFreq"]  # fmt: skip
+
+    for changes, value in (({}, "0.20944"), ({"F_VSRefSpdCornerFreq": 0.3}, "0.3")):
+        assert entry(old.texts(changes, lambda: Table(*np.ones((2, 2)), *np.ones((3, 2, 2))))[0]) == [value]
+
+
+def test_an_entry_that_rosco_misses_is_named_with_its_file_and_the_installed_version(tmp_path, discon, scene):
+    path = tmp_path / "DISCON.IN"
+    path.write_text("\n".join(line for line in discon.text.splitlines() if "! PC_RefSpd" not in line))
+    controller = Rosco(Discon(path), 0.1)
+    controller.prepare(scene)
+    with pytest.raises(ControllerError, match=f"PC_RefSpd.* for '{path}'; installed is ROSCO 2"):
+        controller.reset(RATED)
 
 
 def test_the_individual_variant_switches_a_decks_own_gains_on_and_nothing_else(tmp_path, discon):
