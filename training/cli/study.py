@@ -68,6 +68,10 @@ def study(
     mine, others = controller_names(controller), controller_names(against)
     if not mine or not others:
         raise InputError("--controller and --against: must each name a controller")
+    if both := [name for name in mine if name in others]:
+        raise InputError(f"--against {both[0]}: is also a --controller: a study compares different ones")
+    if shear is not None and compare is None:
+        raise InputError("--shear: is used with --compare alone")
     labels, folder = short_names([*others, *mine]), Path(output(out_folder, folder=True))
     named = {label: name for name, label in labels.items()}
     first, second = labels[others[0]], labels[mine[0]]
@@ -79,6 +83,9 @@ def study(
     sections += _checked(platform)
     usual = platform == "oc3_hywind"
     chosen = chosen_cases(suite, None, None if usual else platform)
+    windy = [each for each in getattr(chosen, "cases", chosen) if mean_speed(each) is not None]
+    if not windy:
+        raise InputError(f"--suite {suite}: has no case with a mean wind speed")
     if compare is not None:
         sections.append(_compared(platform, mine[0], second, compare, shear))
     with progress_bar("evaluating") as update:
@@ -87,9 +94,6 @@ def study(
             progress=lambda done, total, _: update(done, total, f"evaluating, {done} of {total} runs done"),
         )  # fmt: skip
     write_leaderboard(table, folder, first)
-    windy = [each for each in getattr(chosen, "cases", chosen) if mean_speed(each) is not None]
-    if not windy:
-        raise InputError(f"--suite {suite}: has no case with a mean wind speed")
     case = min(windy, key=lambda each: abs(mean_speed(each) - SHOWN_WIND))
     with progress_bar("margins and animation"):
         sections.append(_margins(platform, case, named))

@@ -66,6 +66,8 @@ def test_what_cannot_be_studied_is_refused_before_anything_is_evaluated(tmp_path
         (("--controller", "pi", "--compare", "nowhere.outb"), "nowhere.outb"),
         (("oc3_hywin",), "oc3_hywind"),
         (("--against", "gspi"), "gspi_oc3"),
+        (("--controller", "mpc,pi", "--against", "gspi_oc3,pi"), "--against pi: is also a --controller"),
+        (("--shear", "0.1"), "--shear: is used with --compare"),
     ):
         assert said in fowt("study", *words, code=2)[1]
     assert not (tmp_path / "results" / "study" / "results.csv").exists()
