@@ -44,7 +44,7 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 def pytest_itemcollected(item):
-    """What is left to the night is slow too."""
+    """Mark nightly tests as slow, too."""
     if item.get_closest_marker("nightly"):
         item.add_marker("slow")
 

@@ -243,7 +243,12 @@ def check_dataset(dataset_id, replays=1, progress=None):
     library = minari()
     try:
         dataset = library.load_dataset(dataset_id)
-    except (FileNotFoundError, ValueError) as error:
+    except FileNotFoundError:
+        known = ", ".join(library.list_local_datasets()) or "none"
+        raise InputError(
+            f"id = {dataset_id!r}: is not among the datasets on this machine ({known}): fowt dataset make"
+        ) from None
+    except ValueError as error:
         raise InputError(f"id = {dataset_id!r}: cannot be loaded: {error}") from None
     env = dataset.recover_environment()
     told = list(dataset.storage.get_episode_metadata(range(dataset.total_episodes)))

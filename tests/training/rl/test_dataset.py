@@ -134,3 +134,8 @@ def test_bad_requests_and_a_missing_library_are_named(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "minari.dataset.minari_storage", None)
     with pytest.raises(InputError, match=r"pip install 'fowt-env\[minari\]'"):
         make_dataset("medium", 1.0)
+
+
+def test_a_set_that_is_not_here_is_named_with_the_command_that_makes_one(folder):
+    with pytest.raises(InputError, match=r"oc3hywind/none-v0.*on this machine \(none\): fowt dataset make"):
+        check_dataset("oc3hywind/none-v0")
