@@ -75,7 +75,7 @@ from fowt_env.envs.tables import task_tables
 from fowt_env.envs.tasks import TASKS, Task, draw_faults, task_of
 from fowt_env.errors import InputError, unknown, warn_once
 from fowt_env.loop.interface import Interface, interface_data
-from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START, SUNK, SUNK_REASON, Watch
+from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START, Watch
 from fowt_env.loop.sensing import open_sensors
 from fowt_env.plant.advance import STOP_REASONS, TRIPPED, output
 from fowt_env.plant.compile.handle import Handle
@@ -636,7 +636,7 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _reason(self, status):
         """Return the reason of a termination, with the user load that caused the termination, if any."""
-        reason = SUNK_REASON if status == SUNK else STOP_REASONS[status]
+        reason = STOP_REASONS[status]
         if status == TRIPPED:
             reason = f"{trip_name(self._episode.link.watch)} ({reason})"
         fault = self.scene.first_nonfinite_load(self._episode.data)

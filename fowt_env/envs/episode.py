@@ -23,12 +23,13 @@ from fowt_env.envs.observations import ObservationMap, fill_observation, fill_si
 from fowt_env.envs.rewards import Scales, fill_terms, weighted_sum
 from fowt_env.loop.interface import Interface, InterfaceData
 from fowt_env.loop.period import all_finite, apply_command, begin_period, show_command
-from fowt_env.loop.protection import SUNK, has_ended, is_sunk, is_supervised, supervise_turbine
+from fowt_env.loop.protection import has_ended, is_sunk, is_supervised, supervise_turbine
 from fowt_env.loop.sensing import WindAhead, read_wind_ahead
 from fowt_env.plant.advance import (
     NON_FINITE,
     OVERSPEED,
     RUNNING,
+    SUNK,
     TRIPPED,
     advance_plant,
     observe_plant,

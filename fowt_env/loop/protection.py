@@ -78,10 +78,6 @@ class Part(IntEnum):
     BACKUP = 4  # 1: in an emergency stop the blade still feathers, by its backup drive
 
 
-SUNK = 7  # status of a run, in addition to those of plant/advance.py
-SUNK_REASON = "sunk (the foot of the tower is below still water)"
-
-
 class Flood(IntEnum):
     """Enumerates the columns of Guard.floods."""
 

@@ -13,7 +13,7 @@ from fowt_env.plant.integrators import keep_rates, rates, take_step
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import State
 
-RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP, BAD_COMMAND, TRIPPED = 0, 1, 2, 3, 4, 5, 6
+RUNNING, NON_FINITE, CAPSIZED, OVERSPEED, BLOWN_UP, BAD_COMMAND, TRIPPED, SUNK = range(8)
 CAPSIZE = 1.4  # rad (80 deg) of platform pitch: the Euler angles are singular at 90 deg
 # No floating platform moves as fast: higher speeds come from the time step, not from the sea. A hull that
 # capsizes passes 80 deg at some 0.5 rad/s.
@@ -25,6 +25,7 @@ STOP_REASONS = {
     BLOWN_UP: f"numerical blow-up (platform faster than {FASTEST:g} m/s or {FASTEST_TURN:g} rad/s): loads too"
     " stiff for the time step",
     TRIPPED: "above the limit that ends the run",
+    SUNK: "sunk (the foot of the tower is below still water)",
     BAD_COMMAND: "the controller's command is not finite (fields that its information does not declare are"
     " NaN)",
 }

@@ -36,9 +36,9 @@ from fowt_env.errors import (
     unknown_keyword,
 )
 from fowt_env.loop.interface import interface_data
-from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START, SUNK_REASON
+from fowt_env.loop.protection import LOADING, PRODUCTION, READY, START
 from fowt_env.loop.rollout import Schedule, begin_command, rollout
-from fowt_env.plant.advance import BAD_COMMAND, RUNNING, STOP_REASONS, TRIPPED
+from fowt_env.plant.advance import BAD_COMMAND, RUNNING, STOP_REASONS, SUNK, TRIPPED
 from fowt_env.plant.channels import Out
 from fowt_env.plant.compile.decorators import control_kernel
 from fowt_env.plant.compile.handle import Handle
@@ -428,7 +428,7 @@ class Run:
         if not self.schedule.external and abs(pitch := self.u[Command.BLADE_PITCH]) > pi:
             self.units.warn(0.0, float(pitch))
         if status != RUNNING:
-            self._stop(status, step)
+            self._stop(status, step * self.schedule.dt)
         return step
 
     def _check_afloat(self, count):
@@ -442,13 +442,11 @@ class Run:
         foot = self.scene.model.layout.base_height + rows[:, Out.PTFMHEAVE]
         if count and foot.min() < 0.0:
             self.filled += int(np.argmax(foot < 0.0)) + 1 - count
-            frame = self.frame()
-            time = float(frame.iloc[-1, 0])
-            raise SimulationStopped(f"stopped at t = {time:.3f} s: {SUNK_REASON}", SUNK_REASON, time, frame)
+            self._stop(SUNK, float(self.rows[self.filled - 1, Out.TIME]))
 
-    def _stop(self, status, step):
-        """Raise SimulationStopped with the reason of a status."""
-        reason, time = STOP_REASONS[status], step * self.schedule.dt
+    def _stop(self, status, time):
+        """Raise SimulationStopped with the reason of a status at a time in s."""
+        reason = STOP_REASONS[status]
         if status == BAD_COMMAND and self.checked:
             size = N_INDIVIDUAL_COMMANDS if self.schedule.individual else N_COMMANDS
             raise self.controller.failure(time, self.link.command[:size])
