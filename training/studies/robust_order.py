@@ -62,6 +62,7 @@ VARIATIONS = {
     "noise of 2 % of the range": _shifted(noise=0.02),
     "dynamic inflow": Variation(options={"dynamic_inflow": True}),
     "rotor bem": Variation(options={"rotor": "bem"}),
+    "elastic": Variation(options={"fidelity": "elastic"}),
     "upper mass +10 %": _shifted(upper_mass=1.1),
     "upper mass -10 %": _shifted(upper_mass=0.9),
     "drag +10 %": _shifted(drag=1.1),

@@ -18,6 +18,7 @@ def test_each_variation_changes_what_its_name_says_and_keeps_the_winds():
     assert cases["exact sensors"][0].sensors == "exact" != plain.cases[0].sensors
     assert cases["drag -10 %"][0].shift.factors == {"drag": 0.9}
     assert cases["dynamic inflow"][0].options == plain.cases[0].options | {"dynamic_inflow": True}
+    assert cases["elastic"][0].options == plain.cases[0].options | {"fidelity": "elastic"}
     assert [case.wind["speed"] for case in cases["extreme turbulence"]] == [12.0, 14.0, 18.0, 22.0]
     assert [case.wind["speed"] for case in cases["iea15_volturnus_s"]] == [11.0, 13.0, 17.0, 21.0]
 
