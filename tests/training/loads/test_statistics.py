@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import rainflow
 from load_runs import SCENE, frame_of
-from pCrunch import AeroelasticOutput
+from pCrunch import AeroelasticOutput, FatigueParams
 
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.metrics import damage_equivalent_load
@@ -106,10 +106,23 @@ def test_moments_and_extremes_are_those_of_pcrunch(frame, found):
         assert at["Wind1VelX_[m/s]"] == largest[column.partition("_[")[0]]["Wind1VelX"]
 
 
-def test_damage_is_near_that_of_pcrunch_which_bins(frame, found):
-    """pCrunch counts with 256 classes and 100 bins, so it is no reference to more than a per cent."""
-    from pCrunch import FatigueParams
+@pytest.mark.parametrize("exponent", [3, 4, 10])
+def test_damage_is_that_of_pcrunch_where_its_classes_and_bins_are_exact(exponent):
+    """Its 257 classes have their middles at the values, its bins at the ranges.
 
+    The series is closed, as pCrunch counts the residue as cycles of a repeated series, and the standard as
+    half cycles.
+    """
+    levels = np.random.default_rng(4).integers(0, 257, 4000)
+    levels[[0, 1, -1]] = 256, 0, 256
+    values, edges = 10.0 * levels, 10.0 * (np.arange(258) - 0.5)
+    theirs = FatigueParams(slope=float(exponent), bins=edges).compute_del(values, 600.0)
+    ours = (cycles_of(values).sums[EXPONENTS.index(exponent)] / 600.0) ** (1.0 / exponent)
+    assert ours == pytest.approx(theirs, rel=1e-9)
+
+
+def test_damage_is_near_that_of_pcrunch_which_bins(frame, found):
+    """By default pCrunch counts with 256 classes and 100 bins: no reference to more than a per cent."""
     kept = frame[frame["Time_[s]"] >= 60.0]["TwrBsMyt_[kN-m]"].to_numpy()
     theirs = FatigueParams(slope=4.0, ultimate_stress=1e9).compute_del(kept, found.duration)
     ours = (found.cycles["TwrBsMyt_[kN-m]"].sums[EXPONENTS.index(4)] / found.duration) ** 0.25
