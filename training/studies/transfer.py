@@ -258,18 +258,24 @@ def named(frame):
     return kept.assign(**{f"FAIRTEN{line}_[kN]": 1e-3 * frame[column] for column, line in tensions.items()})
 
 
+def run_deck(program, place):
+    """Run model.fst in a folder, and return the s it took. Raises: RuntimeError with its last words."""
+    began = time.perf_counter()
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    done = subprocess.run([program, "model.fst"], cwd=place, capture_output=True, text=True, env=environment)
+    text = done.stdout + done.stderr
+    if done.returncode or "terminated normally" not in text:
+        raise RuntimeError(f"OpenFAST failed: {text.strip()[-1000:]}")
+    return time.perf_counter() - began
+
+
 def run_openfast(case, folder, decks, program, duration, dt, begin, commit):
     """Run OpenFAST in a case and keep its series. Raises: RuntimeError with the end of its messages."""
     path, library = case.path(folder), library_path(folder, case)
     place = path.with_suffix("")
     shutil.rmtree(place, ignore_errors=True)
     write_deck(case, folder, decks, library, duration, dt, begin, place)
-    began = time.perf_counter()
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    done = subprocess.run([program, "model.fst"], cwd=place, capture_output=True, text=True, env=environment)
-    seconds, text = time.perf_counter() - began, done.stdout + done.stderr
-    if done.returncode or "terminated normally" not in text:
-        raise RuntimeError(f"OpenFAST failed: {text.strip()[-1000:]}")
+    seconds = run_deck(program, place)
     about = {"seconds": seconds, "duration": duration, "dt": dt, COMMIT: commit}
     keep_series(path, named(read_series(place / "model.out")), **about)
     shutil.rmtree(place)
