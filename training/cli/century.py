@@ -87,7 +87,7 @@ def _show_century(century, years, period, sample, folder, runs, *, jobs, engine,
         f"{simulated:,} h simulated in {wall:.0f} s with {jobs} processes; {found.hours:,} h in all,"
         f" {found.lost} lost, {found.tripped} with a trip"
     )
-    table = century_table(found, period, extrapolations(runs, period) if runs else None)
+    table = century_table(found, period, extrapolations(runs, period, century.climate) if runs else None)
     path = folder / FILE
     table.to_csv(path, index=False)
     shown = table[table["load"].isin(SHOWN) & table["value"].notna()]

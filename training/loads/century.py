@@ -546,11 +546,14 @@ def coverage_remarks(folder, labels):
     return tuple(remarks)
 
 
-def extrapolations(runs, years):
-    """Return {(load without unit, side): Extrapolation} of runs [(LoadCase, RunStatistics)] of DLC 1.1."""
+def extrapolations(runs, years, climate):
+    """Return {(load without unit, side): Extrapolation} of runs [(LoadCase, RunStatistics)] of DLC 1.1.
+
+    climate: site.Climate of the runs.
+    """
     found = {}
     for name in runs[0][1].peaks:
         for side in ("max", "min"):
             conditions = conditions_of_runs(runs, name, side)
-            found[name.partition("_[")[0], side] = extrapolate(conditions, side, years)
+            found[name.partition("_[")[0], side] = extrapolate(conditions, side, years, climate)
     return found

@@ -17,6 +17,15 @@ over the wind speed and is that of the likelihood of conditions within POOL, wei
 likelihood), since six hours alone do not define it. A Gumbel distribution of the runs' largest values is the
 check.
 
+Load cases have a few classes of Hs in each wind. Rarer, higher seas belong to none of them: with the climate
+of the site the long-term rate is integrated over all Hs of a wind (the full long-term method of Naess and
+Moan, Stochastic Dynamics of Marine Structures, 2013, chapter 12), with the scale of the tail
+
+    a^2 = alpha + beta Hs^2,  beta >= 0,
+
+as wind and waves add their variances; alpha and beta are least squares over the classes. The exponent, the
+rate of peaks and the threshold in scales are means of the classes, the mean load is interpolated.
+
 For the sea, `environmental_contour` and `inverse_form` search the states of the same return period
 (Winterstein et al., ICOSSAR 1993).
 """
@@ -38,6 +47,8 @@ YEARS = 50.0  # return period
 POOL = 6.0  # m/s: conditions of which a wind speed further away has no part in the exponent c
 SHAPES = np.exp(np.linspace(log(0.4), log(5.0), 81))  # values of c that are searched
 BISECTIONS = 40
+STEPS = 14  # of regula falsi
+EXCEEDED = np.logspace(0.0, -9.0, 28)  # probabilities between which Hs has one value in the long-term rate
 EULER = 0.5772156649015329
 
 
@@ -58,6 +69,8 @@ class Condition:
     hours: np.ndarray
     mean: float
     wind_speed: float = nan  # m/s
+    Hs: float = nan  # m
+    family: tuple = ()
 
 
 @dataclass(frozen=True)
@@ -89,8 +102,9 @@ def conditions_of_runs(runs, column, side, shares=None):
     share are left out. Raises: InputError if none is left.
     """
     sign = 1.0 if side == "max" else -1.0
-    found = []
-    for key, members in conditions_of(runs).items():
+    found, together = [], conditions_of(runs)
+    families = _families({key: members[0][0] for key, members in together.items()})
+    for key, members in together.items():
         hours = sum(case.hours_per_year for case, _ in members)
         share = hours / YEAR if shares is None else shares.get(key, 0.0)
         if share <= 0.0 or any(column not in each.peaks for _, each in members):
@@ -103,7 +117,7 @@ def conditions_of_runs(runs, column, side, shares=None):
                 np.array([sign * each.value(column, side) for _, each in members]),
                 np.array([each.duration / HOUR for _, each in members]),
                 sign * float(np.mean([each.value(column, "mean") for _, each in members])),
-                nan if speed is None else float(speed),
+                nan if speed is None else float(speed), float(members[0][0].Hs), families[key],
             )
         )  # fmt: skip
     if not found:
@@ -112,6 +126,23 @@ def conditions_of_runs(runs, column, side, shares=None):
             " this channel"
         )
     return found
+
+
+def _families(cases):
+    """Return {key: family} of {key: LoadCase}: of one wind, directions and order of the Tp at an Hs.
+
+    () for a case without a wind.
+    """
+    groups = {key: (each.wind_speed, each.yaw_error, each.misalignment) for key, each in cases.items()}
+    periods = {}
+    for key, each in cases.items():
+        periods.setdefault((groups[key], each.Hs), set()).add(each.Tp)
+    return {
+        key: ()
+        if each.wind_speed is None
+        else (*groups[key], sorted(periods[groups[key], each.Hs]).index(each.Tp))
+        for key, each in cases.items()
+    }
 
 
 # --------------------------------------------------------------------------- peaks over threshold
@@ -180,8 +211,69 @@ def _pooling(conditions):
     return np.where(np.isfinite(distance), np.maximum(1.0 - distance / POOL, 0.0), 1.0)
 
 
-def _long_term(conditions, draws, years):
-    """Return (values (k,), fits, exceedances per hour) of the load of a return period, for k samples."""
+class _Classes:
+    """Holds the tails of single conditions; parts(load) (k, conditions): exceedances per hour of loads (k,).
+
+    owners: number of the condition of each part.
+    """
+
+    def __init__(self, share, mean, level, rate, spread, shape):
+        self.owners = np.arange(len(share))
+        self._of = share * rate, mean, level - mean, spread, shape
+
+    def parts(self, load):
+        rate, mean, reach, spread, shape = self._of
+        height = np.maximum((load[:, None] - mean) / reach, 1.0)
+        return rate * np.exp(-(height**shape - 1.0) / spread)
+
+
+class _Seas:
+    """Holds the tails of a family of conditions as functions of Hs over all seas of its wind, as _Classes."""
+
+    def __init__(self, at, conditions, mean, reach, rate, scale, shape, climate):
+        """Take the conditions at the numbers `at`; mean, reach (conditions,), others (k, conditions)."""
+        at = at[np.argsort([conditions[number].Hs for number in at])]
+        Hs = np.array([conditions[number].Hs for number in at])
+        below = 1.0 - EXCEEDED
+        likely = np.diff(np.append(below, 1.0))
+        # geometric middle of the exceedance of each class
+        middle = 1.0 - np.sqrt(EXCEEDED * np.append(EXCEEDED[1:], 0.1 * EXCEEDED[-1]))
+        heights = climate.height_at(middle, conditions[at[0]].wind_speed)
+        self.owners = at[np.abs(heights[:, None] - Hs).argmin(axis=1)]
+        square, away = scale[:, at] ** 2, Hs**2 - np.mean(Hs**2)
+        slope = np.maximum(square @ away, 0.0) / max(away @ away, 1e-300)
+        least = np.maximum(square.mean(axis=1) - slope * np.mean(Hs**2), 0.0)
+        self._scale = np.sqrt(least[:, None] + slope[:, None] * heights**2)
+        self._shape = shape[:, at].mean(axis=1)[:, None]
+        self._least = (reach[at] / scale[:, at]).mean(axis=1)[:, None]  # threshold, in scales
+        self._mean = np.interp(heights, Hs, mean[at])
+        share = sum(conditions[number].share for number in at)
+        self._rate = share * likely * rate[:, at].mean(axis=1)[:, None]
+
+    def parts(self, load):
+        height = np.maximum((load[:, None] - self._mean) / self._scale, self._least)
+        return self._rate * np.exp(self._least**self._shape - height**self._shape)
+
+
+def _members(conditions, used, climate):
+    """Return arrays of the numbers of conditions whose tails are functions of Hs; None: of single conditions.
+
+    used: whether each condition has peaks.
+    """
+    if climate is None or not all(condition.family for condition in conditions):
+        return None
+    families = {}
+    for number, condition in enumerate(conditions):
+        if used[number]:
+            families.setdefault(condition.family, []).append(number)
+    return [np.array(numbers) for numbers in families.values()]
+
+
+def _long_term(conditions, draws, years, climate=None):
+    """Return (values (k,), fits, tails) of the load of a return period, for k samples.
+
+    tails: list of _Classes and _Seas, whose parts add up to the exceedances per hour.
+    """
     tails = [_Tail(condition, draws[len(condition.peaks)]) for condition in conditions]
     likelihood = np.tensordot(_pooling(conditions), np.array([tail.likelihood() for tail in tails]), 1)
     shape = np.array([_best_shape(each) for each in likelihood]).T  # (k, conditions)
@@ -189,30 +281,47 @@ def _long_term(conditions, draws, years):
     rate = np.array([tail.rate if tail.used else 0.0 * tail.rate for tail in tails]).T
     share = np.array([condition.share for condition in conditions])
     mean, level = (np.array([getattr(tail, name) for tail in tails]) for name in ("mean", "level"))
+    scale = (level - mean) * spread ** (1.0 / shape)
+    fits = (level, rate, scale, shape)
+    members = _members(conditions, [tail.used for tail in tails], climate)
+    if members is None:
+        found = [_Classes(share, mean, level, rate, spread, shape)]
+    else:
+        found = [_Seas(at, conditions, mean, level - mean, rate, scale, shape, climate) for at in members]
 
-    def parts(load):  # exceedances per hour (k, conditions) of loads (k,)
-        height = np.maximum((load[:, None] - mean) / (level - mean), 1.0)
-        return share * rate * np.exp(-(height**shape - 1.0) / spread)
+    def total(load):
+        return sum((each.parts(load).sum(axis=1) for each in found), np.zeros(len(load)))
 
-    fits = (level, rate, (level - mean) * spread ** (1.0 / shape), shape)
     target = 1.0 / (years * YEAR)
     low = np.full(len(rate), min(level))
-    if not (parts(low).sum(axis=1) > target).all():
-        return np.full(len(rate), nan), fits, parts
+    if not (total(low) > target).all():
+        return np.full(len(rate), nan), fits, found
     reach = np.max(level) - np.min(level) + np.max(level - mean)
     high = low + reach
-    while (beyond := parts(high).sum(axis=1) > target).any():
+    while (beyond := total(high) > target).any():
         high = np.where(beyond, high + (high - low), high)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        above = parts(middle).sum(axis=1) > target
-        low, high = np.where(above, middle, low), np.where(above, high, middle)
-    return 0.5 * (low + high), fits, parts
+    return _root(lambda load: np.log(np.maximum(total(load), 1e-300) / target), low, high), fits, found
 
 
-def extrapolate(conditions, side="max", years=YEARS):
+def _root(excess, low, high):
+    """Return the zeros (k,) of a falling function between low and high (k,): regula falsi, Illinois."""
+    above, below = excess(low), excess(high)
+    last = np.zeros(len(low), dtype=bool), np.zeros(len(low), dtype=bool)
+    for _ in range(STEPS):
+        middle = (low * below - high * above) / (below - above)
+        value = excess(middle)
+        left, right = value > 0.0, value <= 0.0
+        # an end that stays for the second time counts half
+        above = np.where(left, value, np.where(last[1], 0.5 * above, above))
+        below = np.where(right, value, np.where(last[0], 0.5 * below, below))
+        low, high, last = np.where(left, middle, low), np.where(right, middle, high), (left, right)
+    return np.where(np.abs(above) < np.abs(below), low, high)
+
+
+def extrapolate(conditions, side="max", years=YEARS, climate=None):
     """Return the Extrapolation of the Conditions of a channel and side; NaN for a load without peaks.
 
+    climate: site.Climate with the distribution of Hs in a wind; None: the seas of the conditions alone.
     The interval is a bootstrap over the runs of each condition (seeds), with the same draws for conditions of
     equally many runs, widened for few seeds as in training.evaluation.bootstrap; none for fewer than four.
     Raises: InputError for a return period that is not positive.
@@ -222,13 +331,18 @@ def extrapolate(conditions, side="max", years=YEARS):
     random = np.random.default_rng(RANDOM_SEED)
     counts = sorted({len(condition.peaks) for condition in conditions})
     draws = {n: random.multinomial(n, np.full(n, 1.0 / n), size=RESAMPLES) for n in counts}
-    (value,), fits, parts = _long_term(conditions, {n: np.ones((1, n)) for n in counts}, years)
-    drawn = _long_term(conditions, draws, years)[0]
+    (value,), fits, tails = _long_term(conditions, {n: np.ones((1, n)) for n in counts}, years, climate)
+    drawn = _long_term(conditions, draws, years, climate)[0]
+    owners = np.concatenate([each.owners for each in tails]) if tails else []
+
+    def parts(load):
+        return np.concatenate([each.parts(np.array([load]))[0] for each in tails])
+
     low, high = interval(np.array([value]), drawn[:, None], counts[-1])
     largest = max(float(condition.largest.max()) for condition in conditions)
     governing = ""
     if np.isfinite(value):
-        governing = conditions[int(np.argmax(parts(np.array([value]))[0]))].name
+        governing = conditions[int(owners[np.argmax(parts(value))])].name
     level, rate, scale, shape = fits
     rows = zip(conditions, sign * level, rate[0], scale[0], shape[0], strict=True)
     curve = _curve(value, largest, parts)
@@ -247,7 +361,7 @@ def _curve(value, largest, parts):
         return np.empty((0, 2))
     span = max(abs(value - largest), 0.1 * abs(value), 1e-12)
     loads = np.linspace(min(value, largest) - 3.0 * span, max(value, largest) + 0.5 * span, 80)
-    rates = np.array([float(parts(np.array([load])).sum()) for load in loads]) * YEAR
+    rates = np.array([float(parts(load).sum()) for load in loads]) * YEAR
     kept = (rates > 1e-4) & (rates < 1e4)
     return np.stack([loads[kept], rates[kept]], axis=1)
 

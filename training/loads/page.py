@@ -324,10 +324,11 @@ def _extrapolation():
         '<label>load <select id="extrapolation-what"></select></label></div>'
         '<details class="help"><summary aria-label="Method">?</summary><div><p>Peaks over threshold in each'
         " condition, with the tail of a Weibull distribution about the mean load, integrated over the winds"
-        " and seas of the site; the exponent is estimated from neighbouring winds together. Interval: a"
-        " bootstrap over the seeds. Inverse FORM: the largest load on the 50-year contour of wind, Hs and"
-        " largest load of a run, from runs in usual and severe seas, with its wind and sea. Cross: Gumbel"
-        " distributions of the largest values of the runs, as a check. Without partial factor.</p></div>"
+        " and all seas of the site, with a scale whose square is linear in Hs squared; the exponent is"
+        " estimated from neighbouring winds together. Interval: a bootstrap over the seeds. Inverse FORM: the"
+        " largest load on the 50-year contour of wind, Hs and largest load of a run, from runs in usual and"
+        " severe seas, with its wind and sea. Cross: Gumbel distributions of the largest values of the runs,"
+        " as a check. Without partial factor.</p></div>"
         "</details>"
         '<div class="plot" id="extrapolation-plot"></div><div class="scroll"><div tabindex="0" role="region"'
         ' aria-label="50-year loads"><table class="figures" id="extrapolation-table"><thead></thead><tbody>'

@@ -132,7 +132,7 @@ def load_tables(
                 continue
             for side in SIDES:
                 conditions = conditions_of_runs(own, column, side)
-                extrapolations[label, column, side] = extrapolate(conditions, side)
+                extrapolations[label, column, side] = extrapolate(conditions, side, climate=climate)
                 if climate is not None and severe:
                     in_seas = own + runs_of(severe, label)
                     forms[label, column, side] = form_load(in_seas, column, side, climate)

@@ -24,6 +24,7 @@ from fowt_env.training.loads.extrapolation import (
     states_of,
 )
 from fowt_env.training.loads.site import YEAR, climate_of, read_site
+from fowt_env.training.studies import long_term_seas as seas
 
 RATE = 150.0  # peaks per hour above the threshold
 WINDS = np.arange(4.0, 25.0, 3.0)
@@ -151,6 +152,60 @@ def test_conditions_of_runs_take_hours_peaks_and_means():
 def test_a_load_without_peaks_has_no_value():
     flat = Condition("u8", 1.0, (np.empty(0),) * 4, (0,) * 4, np.zeros(4), np.ones(4), 0.0, 8.0)
     assert np.isnan(extrapolate([flat]).value) and extrapolate([flat]).governing == ""
+
+
+# --------------------------------------------------------------------------- all seas of a wind
+
+
+@pytest.fixture(scope="module")
+def climate():
+    return seas.climate()
+
+
+@pytest.mark.parametrize("load", ["wind", "waves"])
+def test_the_value_of_all_seas_is_not_that_of_the_classes(load, climate):
+    """The mean of the upper third of Hs is far below the sea of 50 years."""
+    weight = seas.LOADS[load]
+    found = seas.compared("gauss", weight, 50.0, range(8), climate)
+    ratios, inside = found["all seas"]
+    assert inside >= 7 and np.mean(ratios) == pytest.approx(1.0, abs=0.03)
+    classes, _ = found["classes"]
+    assert np.mean(classes) == pytest.approx(1.0, abs=0.03) if load == "wind" else np.mean(classes) < 0.92
+    # of the highest class of Hs, which the rare seas are nearest to
+    conditions = seas.sampled("gauss", weight, 1, climate)
+    governing = extrapolate(conditions, climate=climate).governing
+    assert governing.startswith("u24") if load == "wind" else governing in [c.name for c in conditions[2::3]]
+
+
+def test_many_runs_give_the_known_value_of_all_seas(climate, monkeypatch):
+    monkeypatch.setattr(seas, "RUNS", 60)
+    for kind in seas.KINDS:
+        found = extrapolate(seas.sampled(kind, 0.5, 3, climate), climate=climate)
+        assert found.value == pytest.approx(seas.known_value(kind, 0.5, 50.0, climate), rel=0.03)
+
+
+def test_one_class_of_each_wind_is_all_that_is_known(climate):
+    """Without classes, as with joint tables, the sea of a condition is that of its wind."""
+    conditions = seas.sampled("gauss", 0.5, 1, climate)
+    alone = [each for number, each in enumerate(conditions) if number % 3 == 1]
+    assert extrapolate(alone, climate=climate).value == pytest.approx(extrapolate(alone).value, rel=1e-6)
+    unknown = [replace(each, family=()) for each in conditions]
+    assert extrapolate(unknown, climate=climate).value == extrapolate(unknown).value
+
+
+def test_conditions_of_one_family_differ_in_their_sea_alone():
+    runs = []
+    for wind in (8.0, 12.0):
+        for yaw in (0.0, 8.0):
+            for Hs, Tp in ((1.0, 7.0), (1.0, 9.0), (3.0, 8.0), (3.0, 11.0)):
+                about = {"hours_per_year": 100.0, "wind_speed": wind, "characteristic": "extrapolated",
+                         "yaw_error": yaw, "Hs": Hs, "Tp": Tp}  # fmt: skip
+                runs.append(run_of(load_case("1.1", f"u{wind:g}y{yaw:g}h{Hs:g}t{Tp:g}", "pi", 1, **about)))
+    families = {}
+    for each in conditions_of_runs(runs, "TwrBsMyt_[kN-m]", "max"):
+        families.setdefault(each.family, []).append(each.name)
+    assert len(families) == 8 and all(len(names) == 2 for names in families.values())
+    assert ["u8y0h1t7", "u8y0h3t8"] in families.values() and ["u8y0h1t9", "u8y0h3t11"] in families.values()
 
 
 # --------------------------------------------------------------------------- inverse FORM
