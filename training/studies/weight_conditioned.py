@@ -2,7 +2,6 @@
 
     python -m fowt_env.training.studies.weight_conditioned imitate --out runs/imitated
     python -m fowt_env.training.studies.weight_conditioned search runs/imitated/clone.npz --out runs/found_0
-    python -m fowt_env.training.studies.weight_conditioned train runs/imitated/clone.npz --out runs/ppo_0
     python -m fowt_env.training.studies.weight_conditioned sweep runs/found_0/clone.npz --out runs/all
     python -m fowt_env.training.studies.weight_conditioned sweep mpc --out runs/all
     python -m fowt_env.training.studies.weight_conditioned front found_0 lqr mpc --out runs/all
@@ -14,10 +13,6 @@ each episode and is an input. clone.npz is the network of clone_mpc at the middl
 point_weight has the first layer's weights of the point, with which at_point writes the file of any other.
 
 search: a population moves the last layer (search_clone.py) for the hypervolume of the front of FRONT.
-
-train: PPO corrects the network of `imitate` by decisions of 0.5 s; every episode draws a point, which sets
-the weights of REWARD_TERMS. policy.npz is a policy file with point_weight of its own; clone.npz beside it is
-the baseline. On a GPU: --device cuda, with many environments and threads.
 
 sweep: runs a network at POINTS, or a law at its settings in `swept`, on the suite above_rated and validation
 seeds; with --draw-seeds at most MOST of them, chosen by the hypervolumes on the validation seeds, on seeds
@@ -33,12 +28,9 @@ import itertools
 import json
 import shutil
 from concurrent.futures import ProcessPoolExecutor
-from copy import deepcopy
-from dataclasses import replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Annotated, Literal
 
 import numpy as np
@@ -47,32 +39,25 @@ import typer
 
 from fowt_env.controllers.lqr.design import LQGSettings
 from fowt_env.controllers.lqr.law import LQR
-from fowt_env.controllers.mpc.clone import BIAS_0, HIDDEN, N_INPUTS, read_clone
+from fowt_env.controllers.mpc.clone import N_INPUTS, read_clone
 from fowt_env.controllers.mpc.law import MPC
 from fowt_env.controllers.mpc.settings import MPCSettings
-from fowt_env.controllers.policy.network_file import read_policy
 from fowt_env.descriptions.array_files import read_arrays
-from fowt_env.envs import FowtVectorEnv
-from fowt_env.envs.rewards import REWARD_TERMS
-from fowt_env.envs.tasks import JOINT, TASKS
+from fowt_env.envs.tasks import TASKS
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.files.atomic import replacing
 from fowt_env.files.tables import read_table, write_table
 from fowt_env.run.simulation import simulate
 from fowt_env.training.design.linear_bound import efficient
 from fowt_env.training.evaluation.bootstrap import interval, lifetime_means, resample_weights
-from fowt_env.training.evaluation.case_environment import environment_settings as case_settings
 from fowt_env.training.evaluation.cases import read_suite
 from fowt_env.training.evaluation.evaluate import evaluate
 from fowt_env.training.evaluation.leaderboard import decisions
 from fowt_env.training.evaluation.limits import EXCEEDED, limit_texts
-from fowt_env.training.evaluation.metrics import mean_exponent, metrics
-from fowt_env.training.evaluation.results_table import WEIGHT, case_shares
-from fowt_env.training.evaluation.run_case import OK, REFERENCE, TRIPPED
+from fowt_env.training.evaluation.metrics import mean_exponent
+from fowt_env.training.evaluation.results_table import case_shares
+from fowt_env.training.evaluation.run_case import OK, REFERENCE
 from fowt_env.training.evaluation.seeds import seeds_for, with_drawn_seeds
-from fowt_env.training.rl.export import export_policy
-from fowt_env.training.rl.settings import TASK_FIELDS
-from fowt_env.training.rl.train import environment_settings, inner_env, make_algorithm, new_model, resolve
 from fowt_env.training.studies.clone_mpc import (
     CONTROL_DT,
     WINDS,
@@ -90,37 +75,8 @@ MPC_PRICES = tuple(
     {"speed": speed, "platform_pitch": pitch}
     for speed, pitch in ((0.3, 1.5), (0.6, 1.4), (1.0, 1.2), (1.6, 0.9), (2.4, 0.4))
 )
-SHAFT, TRAVEL = (
-    (0.1, 1.0 / 3.0),
-    (0.9, 0.2),
-)  # price and its factor per unit; limit and what is added per unit
-# weight at the middle point, and exponents of BASES by the point: weight * prod(base ** (exponent * point))
-BASES = np.array([4.0, 3.0, 3.0])
-PRICED = {
-    "rotor_speed": (6.0, (1, 0, 0)),
-    "platform_motion": (14.0, (-1, 0, 0)),
-    "pitch_travel": (85.0, (0, 0, -1)),
-    "torque_travel": (20.0, (0, -1, 0)),
-    "power_shortfall": (6.0, (0, 0, 0)),
-}
-# what mpc_clone misses of the best value of each term (rotor_speed, platform_motion: 1; the others: 0)
-USUAL = np.array([0.167, 0.0354, 0.0142, 0.0208, 0.0413])
-BEST = np.array([max(REWARD_TERMS[name].high, 0.0) for name in PRICED])
-COLUMNS = np.array([list(REWARD_TERMS).index(name) for name in PRICED])
-FAILURE_COST = 50.0  # usual costs of a decision
-REWARD_SCALE = 0.1
-WIND = tuple(  # as a lifetime, in which strong wind is rare
-    (share, {"kind": "ntm", "speed": speed, "class": "B", "sigma": "drawn"}, JOINT)
-    for share, speed in ((0.5, (11.5, 15.0)), (0.3, (15.0, 19.0)), (0.2, (19.0, 24.5)))
-)
-SETTINGS = {
-    "environment.baseline": "mpc_clone",  # stands for the network that is corrected
-    "environment.sensors": "standard",
-    "algorithm.n_steps": 64,
-    "algorithm.batch_size": 8192,
-    "algorithm.learning_rate": [6.0e-4, 5.0e-5],
-    "algorithm.policy_kwargs": {"net_arch": [128, 128], "activation": "tanh", "log_std_init": -3.5},
-}
+SHAFT = (0.1, 1.0 / 3.0)  # price at the middle point, factor per unit
+TRAVEL = (0.9, 0.2)  # limit at the middle point, change per unit
 POINTS = tuple(itertools.product((-0.5, 0.0, 0.4, 0.8), (0.0, 0.4, 0.8), (0.3, 0.8)))
 LAWS = {"lqr": (LQR, LQGSettings), "mpc": (MPC, MPCSettings)}
 SUITE = "above_rated"
@@ -146,114 +102,8 @@ def settings_at(point):
     return MPCSettings().changed(**{key: float(x) for key, x in prices.items()}, shaft=shaft, travel=travel)
 
 
-def weights_at(points):
-    """Return the weights (n, terms of PRICED) at points (n, TRADES)."""
-    middle = np.array([weight for weight, _ in PRICED.values()])
-    exponents = np.array([exponent for _, exponent in PRICED.values()])
-    return middle * np.exp((np.asarray(points) * np.log(BASES)) @ exponents.T)
-
-
-def rewards_at(points, terms, failed):
-    """Return the rewards (n,) of REWARD_TERMS (n, terms) at points: 0 if all costs are as usual.
-
-    Costs are divided by those that are usual at the point, so that no point outweighs another in learning.
-    """
-    weights = weights_at(points)
-    cost = (weights * (BEST - terms[:, COLUMNS])).sum(axis=1) / (weights @ USUAL)
-    return REWARD_SCALE * (1.0 - cost - FAILURE_COST * failed)
-
-
-def trained_environment(source, seed=0, steps=1):
-    """Return (settings of a run that corrects the network of a file, settings of its FowtEnv)."""
-    settings = resolve("ppo", "above_rated", seed, steps, SETTINGS)
-    chosen = environment_settings(settings) | {"baseline": f"policy:{source}"}
-    return settings, chosen | {"task": replace(chosen["task"], wind=WIND, sea=None)}
-
-
-class Points:
-    """Sets points of the network of a file of imitate or search that is the baseline of environments."""
-
-    def __init__(self, source):
-        self.bias = read_clone(source)[1]["bias_0"]
-        self.by_point = read_arrays(source, 1 << 26)["point_weight"].astype(np.float64)
-
-    def set(self, env, point):
-        """Set the point of a FowtEnv from its next decision to the end of its episode."""
-        env._baseline.parameters[BIAS_0 : BIAS_0 + HIDDEN] = self.bias + self.by_point @ point
-
-
-def trading(env, seed, points):
-    """Return a VecEnv that draws a point for each episode, pays by it and appends it to the observation.
-
-    env: a FowtSB3VecEnv, or in VecNormalize without norm_reward; points: Points of its baselines.
-    """
-    from gymnasium.spaces import Box
-    from stable_baselines3.common.vec_env import VecEnvWrapper
-
-    n, size = env.num_envs, len(TRADES)
-    space, batch = env.observation_space, inner_env(env).env
-
-    class Trading(VecEnvWrapper):
-        def __init__(self):
-            low, high = (
-                np.append(end, np.full(size, side)) for end, side in ((space.low, -1), (space.high, 1))
-            )
-            super().__init__(env, observation_space=Box(low.astype(np.float32), high.astype(np.float32)))
-            self.rng = np.random.default_rng(seed)
-            self.points, self.returns, self.lengths = np.zeros((n, size)), np.zeros(n), np.zeros(n, dtype=int)
-
-        def with_points(self, observations):
-            return np.hstack([observations, self.points]).astype(np.float32)
-
-        def reset(self):
-            observations = self.venv.reset()
-            for i in range(n):
-                self.draw(i)
-            return self.with_points(observations)
-
-        def draw(self, i):
-            self.points[i] = self.rng.uniform(-1.0, 1.0, size)
-            points.set(batch.envs[i], self.points[i])
-
-        def step_wait(self):
-            observations, _, dones, infos = self.venv.step_wait()
-            truncated = np.array([info["TimeLimit.truncated"] for info in infos])
-            rewards = rewards_at(self.points, batch.terms, dones & ~truncated)
-            self.returns += rewards
-            self.lengths += 1
-            for i in np.flatnonzero(dones):
-                infos[i]["terminal_observation"] = np.append(
-                    infos[i]["terminal_observation"], self.points[i]
-                ).astype(np.float32)
-                infos[i]["episode"] = {"r": self.returns[i], "l": self.lengths[i], "failed": not truncated[i]}
-                self.draw(i)
-                self.returns[i] = self.lengths[i] = 0
-            return self.with_points(observations), rewards.astype(np.float32), dones, infos
-
-    return Trading()
-
-
-def export(model, path, about):
-    """Write the policy file of the middle point with the array point_weight; return the path."""
-    env = model.get_env()
-    n = len(TRADES)
-    layers = deepcopy(model.policy.mlp_extractor.policy_net)
-    of_point = layers[0].weight.data[:, -n:].cpu().numpy()
-    layers[0].weight.data = layers[0].weight.data[:, :-n]
-    actor = SimpleNamespace(
-        mlp_extractor=SimpleNamespace(policy_net=layers), action_net=model.policy.action_net
-    )
-    export_policy(SimpleNamespace(policy=actor), inner_env(env).env.envs[0], path, about, env.venv)
-    arrays = read_arrays(path, 1 << 26)
-    settings = json.loads(str(arrays["settings"]))
-    settings["baseline"] = (
-        "mpc_clone"  # a policy file names a law: clone.npz beside it is a network for this one
-    )
-    return write_arrays(path, arrays | {"settings": np.array(json.dumps(settings)), "point_weight": of_point})
-
-
 def at_point(source, point, path):
-    """Write the file of `source`, of `imitated` or `export`, at a point; return the path."""
+    """Write the file of `source`, of imitate or search, at a point; return the path."""
     arrays = read_arrays(source, 1 << 26)
     arrays["bias_0"] = (arrays["bias_0"] + arrays.pop("point_weight") @ np.asarray(point)).astype(np.float32)
     settings = json.loads(str(arrays["settings"]))
@@ -366,41 +216,6 @@ class Front:
         return [over(name) + EXCESS * excess for name in AXES[:2]]
 
 
-def recorder(folder, about, seconds=np.inf, every=60.0):
-    """Return a callback that writes curve.csv, a row for each rollout, and policy.npz every `every` s.
-
-    seconds: time after which it ends the training.
-    """
-    import time
-
-    from stable_baselines3.common.callbacks import BaseCallback
-
-    class Recorder(BaseCallback):
-        def _on_training_start(self):
-            self.rows, self.last, self.began = [], 0.0, time.monotonic()
-
-        def _on_step(self):
-            return time.monotonic() - self.began < seconds
-
-        def _on_rollout_end(self):
-            passed, episodes = time.monotonic() - self.began, self.model.ep_info_buffer
-            row = {"decisions": self.num_timesteps, "seconds": passed}
-            row["reward"] = float(self.model.rollout_buffer.rewards.mean())
-            row["failed"] = np.mean([each["failed"] for each in episodes]) if episodes else np.nan
-            self.rows.append(row)
-            if passed - self.last > every:
-                self.last = passed
-                self.write()
-
-        def write(self):
-            write_table(pd.DataFrame(self.rows), folder / "curve.csv")
-            export(self.model, folder / "policy.npz", about | {"steps": int(self.num_timesteps)})
-            for row in self.rows[-1:]:
-                print({name: round(float(value), 4) for name, value in row.items()}, flush=True)
-
-    return Recorder()
-
-
 app = typer.Typer(add_completion=False)
 Out = Annotated[Path, typer.Option(help="Folder of the results.")]
 Source = Annotated[Path, typer.Argument(help="File of imitate or search.")]
@@ -464,44 +279,6 @@ def search(
     improve(judged, judged.network, judged.start, seed, generations, candidates, out, write)
 
 
-@app.command()
-def train(
-    source: Source,
-    out: Out,
-    seed: Annotated[int, typer.Option(min=0, help="Training seed.")] = 0,
-    steps: Annotated[int, typer.Option(min=1, help="Decisions.")] = 10_000_000,
-    envs: Annotated[int, typer.Option(min=1, help="Environments.")] = 1024,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of the environments.")] = 1,
-    device: Annotated[str, typer.Option(help="Device of torch: cpu or cuda.")] = "cpu",
-    seconds: Annotated[float, typer.Option(help="Time after which it ends, too.")] = np.inf,
-):
-    """Correct the network of a file by PPO, at all points."""
-    import torch
-    from stable_baselines3.common.utils import set_random_seed
-    from stable_baselines3.common.vec_env import VecNormalize
-
-    from fowt_env.training.rl.sb3_env import FowtSB3VecEnv
-
-    if (out / "policy.npz").exists():
-        raise InputError(f"{out}: already contains a policy: needs another folder")
-    out.mkdir(parents=True, exist_ok=True)
-    own = out / "clone.npz"
-    shutil.copyfile(source, own)
-    settings, chosen = trained_environment(own, seed, steps)
-    base = FowtSB3VecEnv(envs, threads=threads, **chosen)
-    normalised = VecNormalize(base, norm_reward=False, gamma=settings["algorithm"]["gamma"])
-    env = trading(normalised, seed, Points(own))
-    set_random_seed(seed)
-    env.seed(seed)
-    model = new_model(make_algorithm("ppo"), settings, env, device)
-    torch.nn.init.zeros_(model.policy.action_net.weight)  # begins with what it corrects
-    about = {"algo": "ppo", "name": "weight_conditioned", "seed": seed}
-    record = recorder(out, about, seconds)
-    model.learn(steps, callback=record)
-    record.write()
-    model.save(out / "model.zip")
-
-
 def swept(law):
     """Return the list of changed settings {name: value} of a law; the first are the shipped ones."""
     if law == "lqr":
@@ -511,6 +288,15 @@ def swept(law):
     found = [{}, *(prices | {"shaft": shaft, "travel": 1.0} for shaft, prices in pairs)]
     others = ({"travel": 1.0, "shaft_near_rated": 0.03}, {"travel": 0.7})
     return found + [prices | {"shaft": 0.08} | more for more in others for prices in MPC_PRICES[::2]]
+
+
+def networks_of(source, out):
+    """Return {label: controller} of a file of imitate or search at POINTS, as files in the folder `out`."""
+    name, found = Path(source).parent.name, {}
+    for point in POINTS:
+        label = f"{name} " + ",".join(f"{x:g}" for x in point)
+        found[label] = f"policy:{at_point(source, point, out / f'{label}.npz'.replace(' ', '_'))}"
+    return found
 
 
 def laws_of(law):
@@ -524,52 +310,13 @@ def laws_of(law):
     }
 
 
-def law_runs(laws, suite, seeds):
+def runs_of(controllers, suite, seeds):
     """Return the table of the runs of {label: controller}, as evaluate without the reference."""
-    labels, tables = list(laws), []
+    labels, tables = list(controllers), []
     for first in range(0, len(labels), DESIGNS):
-        some = {label: laws[label] for label in labels[first : first + DESIGNS]}
+        some = {label: controllers[label] for label in labels[first : first + DESIGNS]}
         tables.append(evaluate(some, suite, seeds=seeds, reference=False))
     return pd.concat(tables)
-
-
-def policy_runs(source, points, suite, seeds):
-    """Return the table of the runs of a file at {label: point}, all runs at a point in one batch.
-
-    source: file of imitate, search or train; that of train has its baseline beside it.
-    """
-    baseline = Path(source).with_name("clone.npz")
-    correction = None if Path(source) == baseline else read_policy(source)[1]
-    middle, by_point = (read_arrays(source, 1 << 26)[name] for name in ("bias_0", "point_weight"))
-    chosen, at = trained_environment(baseline)[1], Points(baseline)
-    pairs = list(itertools.product(suite.cases, seeds))
-    decisions = {key: chosen[key] for key in ("action_mode", "baseline", "decisions", "observation")}
-    reach = {name: getattr(chosen["task"], name) for name in TASK_FIELDS}
-    cases = {case.name: case_settings(case, suite.duration) | decisions for case in suite.cases}
-    for settings in cases.values():
-        settings["task"] = replace(settings["task"], **reach)
-    per_env = [cases[case.name] for case, _ in pairs]
-    env = FowtVectorEnv(len(pairs), "Disabled", per_env=per_env, threads=1)
-    env.reset(options=[{"weather_seed": seed} for _, seed in pairs])
-    start, features, rows = env.get_state(), env.envs[0].features, []
-    actions = np.zeros((len(pairs), 2))
-    for label, point in points.items():
-        if correction is not None:
-            correction.biases[0] = (middle + by_point @ point).astype(np.float32)
-        env.set_state(start)
-        for single in env.envs:
-            at.set(single, np.asarray(point))
-        observations, ended = env.observations, np.zeros(len(pairs), dtype=bool)
-        while not ended.all():
-            if correction is not None:
-                actions = correction(observations * features.scale + features.mean)
-            observations, _, terminated, truncated, _ = env.step(actions)
-            ended = terminated | truncated
-        for (case, seed), single in zip(pairs, env.envs, strict=True):
-            head = {"controller": label, "case": case.name, "seed": seed, WEIGHT: suite.weights[case.name]}
-            head["status"] = TRIPPED if single.is_stopping else OK
-            rows.append(head | metrics(single.frame(), skip=suite.skip))
-    return pd.DataFrame(rows)
 
 
 def area(points, corner):
@@ -645,7 +392,7 @@ def chosen(table):
 
 @app.command()
 def sweep(
-    source: Annotated[str, typer.Argument(help="lqr, mpc or a file of train.")],
+    source: Annotated[str, typer.Argument(help="lqr, mpc or a file of imitate or search.")],
     out: Out,
     draw_seeds: Annotated[str, typer.Option(help="Hash of test seeds; empty: validation.")] = "",
 ):
@@ -653,8 +400,8 @@ def sweep(
     law = source in LAWS
     name = source if law else Path(source).parent.name
     suite, seeds, stage = read_suite(SUITE), seeds_for("validation", *SEEDS), "validation"
-    names = {f"{name} " + ",".join(f"{x:g}" for x in point): point for point in POINTS}
-    subjects = laws_of(source) if law else names
+    (out / "networks").mkdir(parents=True, exist_ok=True)
+    subjects = laws_of(source) if law else networks_of(source, out / "networks")
     if draw_seeds:
         subjects = {label: subjects[label] for label in chosen(read_stage(out, stage, name))}
         suite, stage = with_drawn_seeds(suite, draw_seeds), "test"
@@ -664,8 +411,7 @@ def sweep(
     base = folder / f"{REFERENCE}.csv"
     if not base.exists():
         write_table(evaluate({suite.reference: suite.reference}, suite, seeds=seeds), base)
-    runs = law_runs if law else partial(policy_runs, source)
-    write_table(runs(subjects, suite, seeds), folder / f"{name}.csv")
+    write_table(runs_of(subjects, suite, seeds), folder / f"{name}.csv")
 
 
 def read_stage(out, stage, name):
@@ -677,7 +423,7 @@ def read_stage(out, stage, name):
 @app.command()
 def front(
     names: Annotated[
-        list[str], typer.Argument(help="Policy (its folder), then the laws to compare it with.")
+        list[str], typer.Argument(help="Network (its folder), then the laws to compare it with.")
     ],
     out: Out,
     stage: Annotated[Literal["validation", "test"], typer.Option(help="Seeds.")] = "test",
