@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
+from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.training.cli.arguments import parse_pairs
 from fowt_env.training.cli.benchmark import benchmarks
@@ -18,13 +19,16 @@ from fowt_env.training.cli.console import (
     note,
     output,
     progress_bar,
+    resumable,
     wrote,
 )
-from fowt_env.training.cli.options import CsvOption
+from fowt_env.training.cli.options import WHOLE, AddressOption, CsvOption, EngineOption, JobsOption
 from fowt_env.training.cli.tables import print_table, show
 
 TrustOption = Annotated[bool, Option("--trust-zip", help="Load the checkpoint; this executes code from it.")]
 CHANGE = "Change a setting; repeatable."
+SWEEP = "Values of a setting, an agent for each combination; repeatable."
+RATIOS = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio", "failed")
 LINE_EVERY = 10.0  # s between lines of progress without a terminal
 WRITTEN = ("best.npz", "last.npz", "validation.csv", "learning_curve.png")
 
@@ -39,6 +43,11 @@ def train(
     resume: Annotated[bool, Option("--resume", help="Continue from the newest checkpoint.")] = False,
     trust_zip: TrustOption = False,
     change: Annotated[list[str] | None, Option("--set", metavar="KEY=VALUE", help=CHANGE)] = None,
+    seeds: Annotated[str | None, Option(help=f"Several seeds, {WHOLE}, one agent each.")] = None,
+    sweep: Annotated[list[str] | None, Option(metavar="KEY=[V1,V2]", help=SWEEP)] = None,
+    jobs: JobsOption = 1,
+    engine: EngineOption = "processes",
+    address: AddressOption = None,
 ):
     """Train an agent with stable-baselines3 (PPO, SAC, TQC).
 
@@ -49,13 +58,23 @@ def train(
     fowt train --algo ppo --steps 4000000 --seed 0 --out runs/ppo_0
     fowt train --out runs/ppo_0 --resume  # continue after Ctrl-C, kill or a crash
     fowt train --set environment.observation=preview --set environment.reward.pitch_travel=20
+    fowt train --seeds 0,1,2 --sweep algorithm.gamma=[0.98,0.99] --jobs 2 --out runs/six  # side by side
 
     [bold]Steps[/bold] are decisions of the agent, each over several control periods (decisions.hold).
     [bold]Files written[/bold]: best.npz, last.npz (policies), validation.csv, learning_curve.png,
     settings.yml, versions.json, checkpoints/, tensorboard/. To use a policy: policy:runs/ppo_0/best.npz.
+    With --seeds or --sweep each run has a folder in --out, beside trainings.csv; the same command continues.
     """
     from fowt_env.training.rl.train import Training, resolve
 
+    if seeds is not None or sweep:
+        if resume or trust_zip:
+            raise InputError("--seeds, --sweep: the same command continues, without --resume and --trust-zip")
+        numbers = [seed] if seeds is None else parse_whole_numbers(seeds, "seeds")
+        chosen = (algo, task, numbers, 2_000_000 if steps is None else steps, parse_pairs(change, "set"))
+        folder = Path(out_folder or f"runs/{task}_{algo}")
+        _train_several(chosen, parse_pairs(sweep, "sweep"), folder, jobs, engine, address)
+        return
     folder = Path(out_folder or f"runs/{task}_{algo}_{seed}")
     if resume:
         if change:
@@ -91,14 +110,28 @@ def train(
     note(f"next: fowt evaluate {shlex.join(words)}")
 
 
+def _train_several(chosen, sweep, folder, jobs, engine, address):
+    """Train agents side by side, print their best validations, and the command that compares them."""
+    from fowt_env.training.rl.side_by_side import TABLE, members, train_all
+
+    found = members(*chosen, sweep, folder)
+    output(folder, folder=True)
+    where = f"in {folder}; the same command continues"
+    with resumable("training", lambda done: f"the {done} finished runs are {where}") as update:
+        table = train_all(
+            found, jobs, engine, address, lambda done, total: update(done, total, f"{done} of {total} done")
+        )
+    show(table[["folder", "decisions", "score", *RATIOS]].round(3))
+    note(f"wrote {TABLE} and {len(table)} runs in {folder}; score: of the best validation, less is better")
+
+
 def _print_validations(run):
     """Print the best and the last validation of a Training, and the reference of the score."""
     best, last = run.best(), run.rows[-1]
     chosen = {"best": best} | ({} if last is best else {"last": last})
-    ratios = ("rotor_speed_std_ratio", "platform_pitch_std_ratio", "blade_pitch_travel_ratio", "failed")
-    headings = ("validation", "decisions", "score", *ratios)
+    headings = ("validation", "decisions", "score", *RATIOS)
     rows = [
-        (name, f"{row['decisions']:,}", *(row[key] for key in ("score", *ratios)))
+        (name, f"{row['decisions']:,}", *(row[key] for key in ("score", *RATIOS)))
         for name, row in chosen.items()
     ]
     print_table(headings, rows, f"relative to {run.reference_name} (score 1); less is better")

@@ -24,7 +24,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from fowt_env.controllers.mpc.clone import FILE, FORMAT, HIDDEN, N_INPUTS, SHAPES, inputs_of, read_clone
+from fowt_env.controllers.mpc.clone import FILE, FORMAT, HIDDEN, SHAPES, inputs_of, read_clone
 from fowt_env.controllers.mpc.law import MPC, PERIOD, Entry, Memory
 from fowt_env.controllers.mpc.settings import MPCSettings
 from fowt_env.descriptions.platform import read_platform, turbine_of
@@ -131,6 +131,7 @@ def record(number, round_, folder, start, platform=PLATFORM, settings=None):
 def fitted(inputs, rates, seed, start=None):
     """Fit a network from {name of SHAPES: array} `start`, or from random weights.
 
+    inputs: (n, N_INPUTS), or with further columns; rates: (n, 2), over their limits.
     Return ({name of SHAPES: float32 array}, (R2 of torque rate, of pitch rate) on a tenth of the blocks of
     BLOCK decisions, left out).
     """
@@ -150,7 +151,7 @@ def fitted(inputs, rates, seed, start=None):
         torch.as_tensor(array, dtype=torch.float32)
         for array in ((inputs - mean) / scale, (rates - centre) / spread)
     )
-    sizes = (N_INPUTS, HIDDEN, HIDDEN, 2)
+    sizes = (inputs.shape[1], HIDDEN, HIDDEN, 2)
     linear = [torch.nn.Linear(*pair) for pair in zip(sizes[:-1], sizes[1:], strict=True)]
     net = torch.nn.Sequential(linear[0], torch.nn.Tanh(), linear[1], torch.nn.Tanh(), linear[2])
     if start is not None:

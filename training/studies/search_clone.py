@@ -62,13 +62,13 @@ FIRST = 50_000  # number of the first training seed
 class Episodes:
     """Runs candidates of a network in the same episodes of load cases, in one batch.
 
-    cases: Cases; candidates: number of networks; duration, skip: s.
+    cases: Cases; candidates: number of networks; duration, skip: s; threads: of the batch.
     """
 
-    def __init__(self, cases, candidates, duration, skip, controller="mpc_clone"):
+    def __init__(self, cases, candidates, duration, skip, controller="mpc_clone", threads=1):
         self.cases, self.candidates, self.skip = cases, candidates, skip
         settings = [environment_settings(case, duration) for case in cases]
-        common = {"action_mode": "residual", "baseline": controller, "decisions": HOLD, "threads": 1}
+        common = {"action_mode": "residual", "baseline": controller, "decisions": HOLD, "threads": threads}
         self.env = FowtVectorEnv(len(cases) * candidates, "Disabled", per_env=settings * candidates, **common)
         self.start = None
 
@@ -232,24 +232,15 @@ def changed(network, components, mean, spread, vector):
     }
 
 
-def main(
-    aim: Annotated[Literal["lulls", "gusts", "above"], typer.Argument(help="Aim of the search.")],
-    out: Annotated[Path, typer.Option(help="Folder of the results.")],
-    seed: Annotated[int, typer.Option(help="Seed of the search and of its weather.")] = 0,
-    generations: Annotated[int, typer.Option(min=1, help="Generations.")] = 30,
-    candidates: Annotated[int, typer.Option(min=4, help="Candidates of a generation.")] = 12,
-    start: Annotated[Path, typer.Option(help="Network to begin with, a file of clone_mpc.")] = FILE,
-    energy: Annotated[float, typer.Option(help="Least energy, of that of gspi_oc3.")] = 0.0,
-):
-    """Search, and write the network at the mean of the last distribution."""
-    if (out / "clone.npz").exists():
-        raise InputError(f"{out}: already contains a search: needs another folder")
-    out.mkdir(parents=True, exist_ok=True)
-    settings, network = read_clone(start)
-    judged = Aim(aim, candidates, start, energy)
+def improve(judged, network, episodes, seed, generations, candidates, out, write):
+    """Search; write search.csv in the folder `out` and the network at the mean of each distribution.
+
+    judged: Aim, or has its methods; network: to begin with; episodes: those of the start; write: called with
+    {name of SHAPES: array} and the number of generations.
+    """
     first = FIRST + 10_000 * seed
     judged.weather(first)
-    components, mean, spread = about_layer(judged.start["gusts" if aim == "gusts" else "normal"])
+    components, mean, spread = about_layer(episodes)
     search, rows = optimiser(UNKNOWNS, candidates - 1, seed), []
     began = time.process_time()
     for generation in range(generations):
@@ -265,14 +256,36 @@ def main(
         })  # fmt: skip
         search.tell(vectors, costs[:-1])
         found = changed(network, components, mean, spread, search.mean)
-        about = {
-            "aim": aim, "seed": seed, "generations": generation + 1, "candidates": candidates,
-            "start": settings.about, "energy": energy,
-        }  # fmt: skip
-        arrays = {name: found[name].astype(np.float32) for name in network}
-        write_clone(out / "clone.npz", arrays, settings.model_dump(exclude={"about"}), about)
+        write({name: found[name].astype(np.float32) for name in network}, generation + 1)
         write_table(pd.DataFrame(rows), out / "search.csv")
         print({name: round(float(value), 4) for name, value in rows[-1].items()}, flush=True)
+
+
+def main(
+    aim: Annotated[Literal["lulls", "gusts", "above"], typer.Argument(help="Aim of the search.")],
+    out: Annotated[Path, typer.Option(help="Folder of the results.")],
+    seed: Annotated[int, typer.Option(help="Seed of the search and of its weather.")] = 0,
+    generations: Annotated[int, typer.Option(min=1, help="Generations.")] = 30,
+    candidates: Annotated[int, typer.Option(min=4, help="Candidates of a generation.")] = 12,
+    start: Annotated[Path, typer.Option(help="Network to begin with, a file of clone_mpc.")] = FILE,
+    energy: Annotated[float, typer.Option(help="Least energy, of that of gspi_oc3.")] = 0.0,
+):
+    """Search, and write the network at the mean of the last distribution."""
+    if (out / "clone.npz").exists():
+        raise InputError(f"{out}: already contains a search: needs another folder")
+    out.mkdir(parents=True, exist_ok=True)
+    settings, network = read_clone(start)
+    judged = Aim(aim, candidates, start, energy)
+    episodes = judged.start["gusts" if aim == "gusts" else "normal"]
+
+    def write(found, generation):
+        about = {
+            "aim": aim, "seed": seed, "generations": generation, "candidates": candidates,
+            "start": settings.about, "energy": energy,
+        }  # fmt: skip
+        write_clone(out / "clone.npz", found, settings.model_dump(exclude={"about"}), about)
+
+    improve(judged, network, episodes, seed, generations, candidates, out, write)
 
 
 if __name__ == "__main__":

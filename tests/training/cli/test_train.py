@@ -68,6 +68,24 @@ def test_a_run_is_validated_by_quarters_and_the_command_that_it_prints_works(tmp
     assert set(scored["controller"]) == {"policy:run of mine/best.npz", "lqr"}
 
 
+def test_seeds_and_settings_are_trained_side_by_side_and_the_same_command_keeps_what_is_there(tmp_path):
+    folder = tmp_path / "both"
+    several = ("--seeds", "0", "--sweep", "algorithm.gamma=[0.9,0.99]")
+    done = train(folder, 32, *several)
+    assert done.exit_code == 0, done.output
+    table = pd.read_csv(folder / "trainings.csv")
+    assert set(table["folder"]) == {"gamma=0.9_seed_0", "gamma=0.99_seed_0"} and set(table["last"]) == {32}
+    assert "gamma=0.9_seed_0" in done.output and "wrote trainings.csv and 2 runs" in done.output
+    paths = sorted(folder.glob("*/last.npz"))
+    written = [path.stat().st_mtime_ns for path in paths]
+    assert len(paths) == 2 and train(folder, 32, *several).exit_code == 0
+    assert [path.stat().st_mtime_ns for path in paths] == written
+    other = train(folder, 64, *several)
+    assert other.exit_code == EXIT_INPUT and "other settings" in other.output
+    refused = train(folder, 32, "--seeds", "0", "--resume")
+    assert refused.exit_code == EXIT_INPUT and "the same command continues" in refused.output
+
+
 def test_an_interrupted_run_ends_with_a_checkpoint_its_own_exit_code_and_goes_on(tmp_path, monkeypatch):
     folder = tmp_path / "run"
     whole = Training.save
