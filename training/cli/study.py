@@ -18,7 +18,7 @@ from fowt_env.training.cli.tables import out
 
 PLATFORM = "Deck of OpenFAST (.fst), platform file (.toml) or the name of a platform."
 THEIRS = "Run of OpenFAST (.outb, .out) of the first controller, to compare with; needs --controller."
-SHEAR = "Shear exponent of the wind of --compare (None: the site's), which its file does not tell."
+SHEAR = "Shear exponent of the wind of --compare, which its file does not tell; default: the site's."
 MINE = "Controllers to study: names, policy:NAME, design:FILE, dll:FILE.so, module:Name, comma-separated."
 SHOWN_WIND = 14.0  # m/s, nearest case of the suite for margins and the animation
 START = 200.0  # s of a run that are not compared, as in suites: surge settles slowly
