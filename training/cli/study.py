@@ -56,6 +56,8 @@ def study(
     [bold]Files written[/bold]: the imported deck, those of fowt evaluate, animation.gif, report.html.
     """
     from fowt_env.controllers import controller_names, make
+    from fowt_env.controllers.bladed.check import start_once
+    from fowt_env.controllers.bladed.controller import DLL_PREFIX, named_library
     from fowt_env.descriptions.checks import parse_whole_numbers
     from fowt_env.descriptions.platform import turbine_of
     from fowt_env.training.evaluation.cases import chosen_cases, mean_speed
@@ -78,8 +80,10 @@ def study(
     numbers = parse_whole_numbers(seeds, "seeds")
     platform, sections = _imported(platform, folder)
     turbine = turbine_of(platform)
-    for name in labels:
-        make(name, turbine, CONTROL_DT)  # an unknown name is refused before the first kernel is compiled
+    for name in labels:  # what cannot run is refused before the first kernel is compiled
+        make(name, turbine, CONTROL_DT)
+        if name.startswith(DLL_PREFIX):
+            start_once(named_library(name), turbine, CONTROL_DT)
     sections += _checked(platform)
     usual = platform == "oc3_hywind"
     chosen = chosen_cases(suite, None, None if usual else platform)
