@@ -94,8 +94,8 @@ def unknown_keyword(function: str, name: str, known: Iterable[object]) -> Keywor
 def nearest(name: object, known: Iterable[object], most: int, cutoff: float = 0.6) -> list[str]:
     """Return the known names most similar to a name, ignoring case, the nearest first.
 
-    Names that begin with it, if it has three or more letters, come before, the shortest first: of a name that is cut
-    short the ratio of difflib prefers another short one.
+    Names that begin with it, if it has three or more letters, come before, the shortest first: for a name
+    that is cut short difflib prefers another short one.
     """
     lowered, typed = {str(k).lower(): str(k) for k in known}, str(name).lower()
     begun = sorted((k for k in lowered if len(typed) > 2 and k.startswith(typed)), key=len)

@@ -94,8 +94,8 @@ def _factory(content, where, name="design"):
     def factory(turbine, control_dt):
         if turbine.name != turbine_name:
             raise InputError(
-                f"{where}: turbine = {turbine_name!r}: cannot control {turbine.name!r}; it was designed for the"
-                f" platform {content['platform']!r}"
+                f"{where}: turbine = {turbine_name!r}: cannot control {turbine.name!r}; it was designed for"
+                f" the platform {content['platform']!r}"
             )
         try:
             return make(turbine, control_dt, name)
