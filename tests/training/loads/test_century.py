@@ -144,7 +144,7 @@ def test_a_sample_is_resumed_extended_and_weighted_over_its_stages(tmp_path, qui
     assert more.hours + more.lost == 160
     assert more.weight.min() < 0.9 and more.weight.mean() == pytest.approx(1.0, abs=0.2)
     assert np.average(more.states["Hs"] > 8.0) > np.average(sample.states["Hs"] > 8.0)
-    with pytest.raises(InputError, match="stage 1 has 100 hours for all years: cannot become 50"):
+    with pytest.raises(InputError, match="1 has 100 hours of plain sampling, which cannot become 50"):
         run_century(CENTURY, tmp_path, [(50, None)])
     other = Century("oc3_hywind", CENTURY.site, "pi", sensors="exact", seed=2)
     with pytest.raises(InputError, match="was made with another seed"):
