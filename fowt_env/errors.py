@@ -92,9 +92,15 @@ def unknown_keyword(function: str, name: str, known: Iterable[object]) -> Keywor
 
 
 def nearest(name: object, known: Iterable[object], most: int, cutoff: float = 0.6) -> list[str]:
-    """Return the known names most similar to a name, ignoring case, the nearest first."""
-    lowered = {str(k).lower(): str(k) for k in known}
-    return [lowered[k] for k in difflib.get_close_matches(str(name).lower(), lowered, n=most, cutoff=cutoff)]
+    """Return the known names most similar to a name, ignoring case, the nearest first.
+
+    Names that begin with it, if it has three or more letters, come before, the shortest first: for a name
+    that is cut short difflib prefers another short one.
+    """
+    lowered, typed = {str(k).lower(): str(k) for k in known}, str(name).lower()
+    begun = sorted((k for k in lowered if len(typed) > 2 and k.startswith(typed)), key=len)
+    alike = difflib.get_close_matches(typed, lowered, n=most, cutoff=cutoff)
+    return [lowered[k] for k in dict.fromkeys([*begun, *alike])][:most]
 
 
 def did_you_mean(name: object, known: Iterable[object], most: int = 1) -> str:

@@ -81,6 +81,18 @@ def check_dll(
     return result
 
 
+def start_once(library: BladedLibrary, turbine: Any, control_dt: float) -> None:
+    """Load a library, which reads its input file at its first call, and end it, without a plant.
+
+    Raises: ControllerError if it cannot be loaded, or if this call fails.
+    """
+    controller = library(turbine, control_dt)
+    try:
+        controller.reset(_OperatingPoint(turbine, control_dt).at(0))
+    finally:
+        controller.finish()
+
+
 class _OperatingPoint:
     """Provides the measurements of the series, which follow the demands."""
 

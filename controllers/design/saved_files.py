@@ -93,7 +93,10 @@ def _factory(content, where, name="design"):
 
     def factory(turbine, control_dt):
         if turbine.name != turbine_name:
-            raise InputError(f"{where}: turbine = {turbine_name!r}: cannot control {turbine.name!r}")
+            raise InputError(
+                f"{where}: turbine = {turbine_name!r}: cannot control {turbine.name!r}; it was designed for"
+                f" the platform {content['platform']!r}"
+            )
         try:
             return make(turbine, control_dt, name)
         except InputError as error:

@@ -22,6 +22,7 @@ ALWAYS = (
     "The gains have the small-signal values of the law at each pitch, since ROSCO integrates gain x error.",
     "They follow a low pass of the pitch commands; below rated, PI control of the speed replaces two lines of"
     " the torque curve.",
+    "Entries of modes that are off are left out; ROSCO names each in a warning at its start.",
 )
 
 

@@ -157,6 +157,11 @@ def test_an_unknown_name_gets_a_suggestion():
         make("pi_lnad", turbine(), 0.1)
 
 
+def test_a_name_that_is_cut_short_gets_the_one_that_it_begins():
+    with pytest.raises(InputError, match="unknown controller 'gspi'. Did you mean 'gspi_oc3'"):
+        make("gspi", turbine(), 0.1)
+
+
 @pytest.mark.parametrize("name", shipped_agents())
 def test_the_bare_name_of_an_agent_gets_its_full_one_as_suggestion(name):
     with pytest.raises(InputError, match=f"unknown controller '{name}'. Did you mean 'policy:{name}'"):

@@ -12,6 +12,11 @@ SHOWN = ("TwrBsMyt", "TwrBsMxyt", "YawBrMyp", "RootMyc1", "RotThrust", "PtfmPitc
 PILOT = 200  # hours of plain sampling from which the states of importance sampling are chosen
 
 
+def cells(frame):
+    """Return the rows of a table as texts and numbers, "–" where a value is missing."""
+    return frame.astype(object).where(frame.notna(), "–").values.tolist()
+
+
 def show_centuries(platform, site, labels, years, period, sample, folder, settings, table, **machine):
     """Simulate the hours of some years for each controller, and print what the extrapolation makes of them.
 
@@ -106,7 +111,7 @@ def _show_century(century, years, period, sample, folder, runs, *, jobs, engine,
     )
     columns = ["load", "side", "value", "low", "high", "exceedances", "wind", "Hs", "extrapolated",
                "extrapolated_low", "extrapolated_high"]  # fmt: skip
-    print_table(headings, shown[columns].values.tolist(), f"once in {period:g} years", left=(0, 1))
+    print_table(headings, cells(shown[columns]), f"once in {period:g} years", left=(0, 1))
     missing = table["value"].isna().sum()
     if missing:
         out.print(f"{missing} of {len(table)} values are beyond what {found.hours:,} h can show")

@@ -29,7 +29,7 @@ DRAWN = "Hash from which the suite's seeds are drawn, e.g. of the commit that fr
 PREVIEW = "Wind preview: exact, or measured by the lidar four_beam_pulsed or circular_cw."
 SENSORS = "Sensors: exact, or the name of a sensor chain. Default: that of each case."
 BASELINE = "Controller of the paired differences. Default: gspi_oc3, else pi."
-OF_LIMIT = "Compute the limit of linear control at each controller's own spending (some seconds each)."
+OF_LIMIT = "Compute the limit of linear control at each controller's travel, power and torque (seconds each)."
 TEXT = str | None
 
 

@@ -18,7 +18,7 @@ from fowt_env.training.cli.tables import out
 
 PLATFORM = "Deck of OpenFAST (.fst), platform file (.toml) or the name of a platform."
 THEIRS = "Run of OpenFAST (.outb, .out) of the first controller, to compare with; needs --controller."
-SHEAR = "Shear exponent of the wind of --compare (None: the site's), which its file does not tell."
+SHEAR = "Shear exponent of the wind of --compare, which its file does not tell; default: the site's."
 MINE = "Controllers to study: names, policy:NAME, design:FILE, dll:FILE.so, module:Name, comma-separated."
 SHOWN_WIND = 14.0  # m/s, nearest case of the suite for margins and the animation
 START = 200.0  # s of a run that are not compared, as in suites: surge settles slowly
@@ -56,6 +56,8 @@ def study(
     [bold]Files written[/bold]: the imported deck, those of fowt evaluate, animation.gif, report.html.
     """
     from fowt_env.controllers import controller_names, make
+    from fowt_env.controllers.bladed.check import start_once
+    from fowt_env.controllers.bladed.controller import DLL_PREFIX, named_library
     from fowt_env.descriptions.checks import parse_whole_numbers
     from fowt_env.descriptions.platform import turbine_of
     from fowt_env.training.evaluation.cases import chosen_cases, mean_speed
@@ -78,8 +80,10 @@ def study(
     numbers = parse_whole_numbers(seeds, "seeds")
     platform, sections = _imported(platform, folder)
     turbine = turbine_of(platform)
-    for name in labels:
-        make(name, turbine, CONTROL_DT)  # an unknown name is refused before the first kernel is compiled
+    for name in labels:  # what cannot run is refused before the first kernel is compiled
+        make(name, turbine, CONTROL_DT)
+        if name.startswith(DLL_PREFIX):
+            start_once(named_library(name), turbine, CONTROL_DT)
     sections += _checked(platform)
     usual = platform == "oc3_hywind"
     chosen = chosen_cases(suite, None, None if usual else platform)

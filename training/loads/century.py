@@ -344,6 +344,11 @@ def _quadratic(wind, Hs):
 # --------------------------------------------------------------------------------------- the folder
 
 
+def _sampling(hours, years):
+    """Return the text of a stage: its hours, and how they are drawn."""
+    return f"{hours} hours of " + ("plain sampling" if years is None else f"sampling for {years:g} years")
+
+
 def run_century(century, folder, stages, *, jobs=1, engine="processes", address=None, progress=None):
     """Simulate what is not finished of the stages of a Century in a folder; return (Sample, seconds, hours).
 
@@ -366,8 +371,9 @@ def run_century(century, folder, stages, *, jobs=1, engine="processes", address=
             stage = plan["stages"][number]
             if stage["years"] != years or hours < stage["hours"]:
                 raise InputError(
-                    f"century {str(folder)!r}: its stage {number + 1} has {stage['hours']} hours for"
-                    f" {stage['years'] or 'all'} years: cannot become {hours} for {years or 'all'} years"
+                    f"century {str(folder)!r}: its stage {number + 1} has"
+                    f" {_sampling(stage['hours'], stage['years'])}, which cannot become"
+                    f" {_sampling(hours, years)}: remove this folder, or choose another (--out)"
                 )
             stage["hours"] = hours
             write_json(plan, folder / "century.json")

@@ -89,7 +89,7 @@ def test_evaluate_scores_a_design_by_its_file_and_notices_its_edit(pi_file):
         ({"version": 1}, "version = 1: must be 2"),
         ({"format": "other"}, "is not a controller design"),
         ({"kind": "pid"}, "unknown kind 'pid'. Did you mean 'pi'"),
-        ({"turbine": "iea15mw"}, "turbine = 'iea15mw': cannot control 'nrel5mw'"),
+        ({"turbine": "iea15mw"}, "cannot control 'nrel5mw'; it was designed for the platform 'oc3_hywind'"),
         ({"settings": GOOD | {"KP": "x"}}, "settings.KP = x: must be a finite number"),
         ({"settings": GOOD | {"KP": -1.0}}, "KP = -1.0: must be non-negative"),
         ({"settings": {"KP": 1.0, "KI": 1.0}}, "settings.gain_schedule_pitch is missing"),

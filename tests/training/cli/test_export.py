@@ -14,7 +14,7 @@ def test_each_output_is_written_and_the_library_runs(tmp_path, monkeypatch):
     words = ("connect", "export", "gspi_oc3", "--dll", "libgspi.so", "--c", "plc", "--rosco", "DISCON.IN")
     _, stderr = fowt(*words, "--control-dt", "0.05")
     assert "wrote libgspi.so" in stderr and "the law runs in C" in stderr and "divides 0.05 s" in stderr
-    assert "plc/law.h" in stderr and "small-signal values" in stderr
+    assert "plc/law.h" in stderr and "small-signal values" in stderr and "modes that are off" in stderr
     assert "PC_GS_KP" in (tmp_path / "DISCON.IN").read_text()
     here, there = hosted("gspi_oc3", "oc3_hywind", 0.05), Library(tmp_path / "libgspi.so")
     for swap in series(read_turbine("nrel5mw"), instants=20, interval=0.05):

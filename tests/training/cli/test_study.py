@@ -1,9 +1,11 @@
 """fowt study: a platform and controllers in, one page with a verdict out."""
 
 import re
+import subprocess
 
 import numpy as np
 import pytest
+from bladed_library import needs_gcc
 from command_line import fowt
 
 import fowt_env
@@ -71,6 +73,19 @@ def test_what_cannot_be_studied_is_refused_before_anything_is_evaluated(tmp_path
     ):
         assert said in fowt("study", *words, code=2)[1]
     assert not (tmp_path / "results" / "study" / "results.csv").exists()
+
+
+@needs_gcc
+def test_a_library_that_refuses_its_input_file_stops_a_study_at_the_start(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "old.c").write_text(
+        "#include <string.h>\nvoid DISCON(float *swap, int *fail, char *in, char *out, char *message)\n"
+        '{ *fail = -1; strcpy(message, "made for another version"); }\n'
+    )
+    subprocess.run(["gcc", "-shared", "-fPIC", "-o", "old.so", "old.c"], check=True)
+    (tmp_path / "short.toml").write_text(SUITE)
+    words = ("--controller", "dll:old.so", "--suite", "short.toml", "--seeds", "1", "--no-animation")
+    assert "made for another version" in " ".join(fowt("study", *words, code=1)[1].split())
 
 
 def test_the_animation_shows_where_the_first_signal_swings_and_the_second_does_not():

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import gumbel_r
 
 from fowt_env.errors import InputError
+from fowt_env.training.cli.century import cells
 from fowt_env.training.loads import century as module
 from fowt_env.training.loads.century import (
     BLOCK,
@@ -144,7 +145,7 @@ def test_a_sample_is_resumed_extended_and_weighted_over_its_stages(tmp_path, qui
     assert more.hours + more.lost == 160
     assert more.weight.min() < 0.9 and more.weight.mean() == pytest.approx(1.0, abs=0.2)
     assert np.average(more.states["Hs"] > 8.0) > np.average(sample.states["Hs"] > 8.0)
-    with pytest.raises(InputError, match="stage 1 has 100 hours for all years: cannot become 50"):
+    with pytest.raises(InputError, match="1 has 100 hours of plain sampling, which cannot become 50"):
         run_century(CENTURY, tmp_path, [(50, None)])
     other = Century("oc3_hywind", CENTURY.site, "pi", sensors="exact", seed=2)
     with pytest.raises(InputError, match="was made with another seed"):
@@ -212,3 +213,9 @@ def test_the_page_names_the_values_that_the_extrapolation_does_not_cover(tmp_pat
     (tmp_path / "century" / "pi").mkdir(parents=True)
     table.to_csv(tmp_path / "century" / "pi" / "century.csv", index=False)
     assert coverage_remarks(tmp_path, ("pi", "lqr")) == (f"pi, once in 50 years: {words}",)
+
+
+def test_a_limit_that_the_hours_do_not_give_is_a_dash_in_the_printed_table():
+    assert cells(pd.DataFrame({"load": ["RotThrust"], "low": [np.nan], "high": [1.5]})) == [
+        ["RotThrust", "–", 1.5]
+    ]
