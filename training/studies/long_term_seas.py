@@ -90,8 +90,9 @@ def sampled(kind, weight, seed, site):
 def compared(kind, weight, years, seeds, site):
     """Return {estimator: (ratios to the known value (seeds,), how many intervals contain it)}."""
     known, found = known_value(kind, weight, years, site), {}
+    samples = [sampled(kind, weight, seed, site) for seed in seeds]
     for name, seas in (("classes", None), ("all seas", site)):
-        values = [extrapolate(sampled(kind, weight, seed, site), years=years, climate=seas) for seed in seeds]
+        values = [extrapolate(sample, years=years, climate=seas) for sample in samples]
         ratios = np.array([each.value / known for each in values])
         found[name] = ratios, sum(each.low <= known <= each.high for each in values)
     return found
