@@ -274,6 +274,14 @@ def test_links_between_files_hold():
     assert not broken
 
 
+def test_every_picture_is_shown_on_a_page():
+    shown = set()
+    for page in PROSE:
+        found = re.findall(r"\]\(([^)\s]+\.(?:png|gif))\)", (ROOT / page).read_text())
+        shown.update(((ROOT / page).parent / target).resolve() for target in found)
+    assert not {path.resolve() for path in (*DOCS.rglob("*.png"), *DOCS.rglob("*.gif"))} - shown
+
+
 NOT_FILES = {"fowt_env/OC3Hywind-v0", *ENVIRONMENTS, *LADDER, *OBJECTIVES}  # names of environments
 NOT_FILES |= {"fowt_env/kernels"}  # which a command makes
 LIVING = [page for page in PROSE if page != "CHANGELOG.md"]  # which keeps the names of its day

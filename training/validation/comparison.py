@@ -71,6 +71,7 @@ class Study:
     total: int = 0  # runs
     done: int = 0
     platform: str = "oc3_hywind"  # a name of validate.PLATFORMS
+    groups: tuple = ()  # of comparisons, named in the report
     cases: dict = field(default_factory=lambda: RUNS)  # case -> ReferenceRun
     rows: list = field(default_factory=list)
     runs: dict = field(default_factory=dict)  # case -> (this project's frame, OpenFAST's frame)

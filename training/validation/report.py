@@ -134,17 +134,17 @@ def _overlay(frames, channels, window, path, title):
     return _stack([(c, frames) for c in channels], partial(_series, window=window), path, title)
 
 
-def _spectra(frames, channels, path, title, start=100.0):
-    """Plot power spectra of {legend: frame} on logarithmic axes, one panel per channel."""
+def _spectra(frames, channels, path, title, start=100.0, segment=None):
+    """Plot power spectra of {legend: frame} on logarithmic axes, one panel per channel; segment: s."""
     tops = {}
 
     def draw(axes, frame, channel, **style):
         part = frame[frame[TIME] >= start]
-        frequency, density = spectrum(part[TIME], part[channel])
+        frequency, density = spectrum(part[TIME], part[channel], segment)
         axes.loglog(frequency[1:], density[1:], **style)
         top = tops[channel] = max(tops.get(channel, 0.0), density[1:].max())
         axes.set_ylim(1e-8 * top, 4.0 * top)
-        axes.set_xlim(0.004, 0.7)
+        axes.set_xlim(frequency[1] / 1.5, 0.7)
 
     return _stack([(c, frames) for c in channels], draw, path, title, "frequency (Hz)", 1.5, squared=True)
 
@@ -263,8 +263,9 @@ def write_plots(study, folder):
             frames = {THERE: theirs, HERE: ours}
             _overlay(frames, channels, window, path(_plot_name(case)), title)
             if spectra:
-                start = 400.0 if case.startswith("regwave") else 100.0
-                _spectra(frames, channels, path(f"{_plot_name(case)}_spectra"), title, start)
+                # of a regular wave: whole periods, so that its harmonics do not leak
+                record = (400.0, 100.0) if case.startswith("regwave") else (100.0, None)
+                _spectra(frames, channels, path(f"{_plot_name(case)}_spectra"), title, *record)
     if "spectra of the wind" in study.runs:
         channels = (Channel.PITCH, Channel.SURGE, Channel.SPEED)
         for name, (title, runs) in COST_PLOTS.items():
@@ -294,7 +295,8 @@ def markdown(study, plots=()):
     lines = [
         f"# All results of {study.platform}", "",
         f"{datetime.now(UTC):%Y-%m-%d}, version {fowt_env.__version__}: `fowt dev validate --platform"
-        f" {study.platform}`. Quantities without an allowed error are reported only.", "",
+        f" {study.platform} --case {','.join(study.groups)}`. Quantities without an allowed error are"
+        " reported only.", "",
         *images(others),
     ]  # fmt: skip
     for case in cases:

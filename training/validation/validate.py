@@ -141,7 +141,7 @@ def validate_cases(groups=None, folder=None, bts=None, report=None, platform="oc
         if name not in known:
             raise unknown("validation case", name, known)
     total = sum(known[name][1] for name in names)
-    study = Study(folder, bts, report, total, platform=platform, cases=runs)
+    study = Study(folder, bts, report, total, platform=platform, groups=tuple(names), cases=runs)
     for name in names:
         known[name][0](study)
     return study

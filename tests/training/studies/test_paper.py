@@ -179,13 +179,17 @@ def test_case_names_are_checked():
         load_cases.wanted_cases("LC13")
 
 
-def test_the_command_writes_series_statistics_and_claims(tmp_path):
-    result = CliRunner().invoke(app, ["dev", "paper", "LC5", "--out", str(tmp_path), "--no-plot"])
+def test_the_command_writes_series_statistics_claims_and_plots(tmp_path):
+    pytest.importorskip("matplotlib")
+    result = CliRunner().invoke(app, ["dev", "paper", "LC5", "--out", str(tmp_path)])
     assert result.exit_code == 0
     assert "twice the wave frequency" in result.output
     assert (tmp_path / "runs" / "LC5.parquet").exists()
     assert (tmp_path / "statistics.csv").exists()
-    assert "| 9 |" in (tmp_path / "paper.md").read_text()
+    text = (tmp_path / "paper.md").read_text()
+    assert "| 9 |" in text
+    assert all(f"]({path.name})" in text for path in tmp_path.glob("*.png"))
+    assert (tmp_path / "spectra_surge.png").exists()
 
 
 @study

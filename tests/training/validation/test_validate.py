@@ -173,6 +173,7 @@ def test_the_report_has_every_figure_and_its_plots(tmp_path):
     paths = write_validation_report(study, tmp_path)
     text = (tmp_path / "validation.md").read_text()
     assert text.count("\n| ") == len(study.rows) + 6 == 30  # heads of 6 tables
+    assert "`fowt dev validate --platform oc3_hywind --case decays`" in text
     assert "missed" not in text and text.index("![decays](decays.png)") < text.index("## decay_surge")
     study.rows[0] = replace(study.rows[0], error=50.0)
     assert "| **50, missed** | 0.2 |" in markdown(study)

@@ -23,7 +23,7 @@ LABELS = {
     "FAIRTEN2_[kN]": "tension 2 (kN)",
 }
 # platform, largest offset m
-PULLS = {"model": (load_cases.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0)}
+PULLS = {"1:50 model": (load_cases.PLATFORM, 0.25), "OC3-Hywind": ("oc3_hywind", 20.0)}
 
 
 def _axes(figure, rows, columns=1, xlabel=None, **options):
@@ -81,7 +81,7 @@ def spectra(runs, channel, natural, path=None):
         axes.set(xlim=(0.03, 3.0), ylim=(1e-10 * top, 4.0 * top))
         axes.set_title(f"{name}  (dotted: surge, pitch, heave)", fontsize=9, color=INK, loc="left")
         axes.legend(fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4)
-    figure.supylabel(f"power density of {LABELS[channel]}, squared per Hz", fontsize=9, color=INK)
+    figure.supylabel(f"power density of {LABELS[channel][:-1]}²/Hz)", fontsize=9, color=INK)
     return save_figure(figure, path)
 
 
@@ -103,7 +103,7 @@ def static_pulls(path=None):
                 }
                 label = column.removesuffix("_[N]").replace("_", " ")
                 axes.plot(offset, factor * table[column], label=label, **style)
-            style_axes(axes, f"{direction} (m)", unit)
+            style_axes(axes, f"{direction} (m)", f"force, tension ({unit})")
             axes.set_title(f"{name}: {direction}", fontsize=9, color=INK, loc="left")
             axes.legend(fontsize=7, frameon=False)
     return save_figure(figure, path)
@@ -201,10 +201,12 @@ def write_paper_report(study, folder, plot=True):
         text += ["## Statistics, model scale", "", statistics_table(study.runs), ""]
     if study.full:
         text += ["## Double frequency, H 3 m, T 5 s, full scale", "", double_frequency_table(study.full), ""]
+    images = _plots(study, folder) if plot else []
+    if images:
+        text += ["## Plots", "", *(f"![{path.stem.replace('_', ' ')}]({path.name})" for path in images), ""]
     with replacing(folder / "paper.md") as temporary:
         temporary.write_text("\n".join(text))
-    paths.append(folder / "paper.md")
-    return paths + (_plots(study, folder) if plot else [])
+    return [*paths, folder / "paper.md", *images]
 
 
 def _plots(study, folder):
