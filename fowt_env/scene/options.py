@@ -126,8 +126,9 @@ FIDELITIES = {
 SLOW_GROWTH = 0.7
 LAG_MARGIN = 1.25  # ratio of the shortest lag to the limit of stability
 # s, largest default step with bending blades: errors below 1e-3 in the deviations of root moments. Half of it
-# for a method of order 2, which feeds the lightly damped edgewise modes, and for a Runge-Kutta method on a
-# shaft that twists, with which edgewise modes swing at 24 rad/s
+# for a method of order 2, which feeds the lightly damped edgewise modes, and where blades that swing edgewise
+# in phase, at 11 to 24 rad/s, are not advanced exactly (plant/elastic/in_phase.py): on a rigid shaft, and by
+# Runge-Kutta methods
 ELASTIC_STEP = 0.05
 FIELD_SAMPLES = 3  # rotor loads per step in a wind box, whose cells the blades cross in 0.1 s
 
@@ -290,7 +291,7 @@ def default_step(options, fastest=0.0):
     default = level.dt is not None and options["integrator"] == level.integrator
     dt = level.dt if default else method.dt
     if options["blades"] != "rigid":
-        short = method.order < 4 or (options["shaft"] != "rigid" and not method.swings)
+        short = method.order < 4 or options["shaft"] == "rigid" or not method.swings
         dt = min(dt, 0.5 * ELASTIC_STEP if short else ELASTIC_STEP)
     while dt * fastest > 0.5 * (method.oscillation_limit or SLOW_GROWTH):
         dt *= 0.5
