@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from command_line import fowt
 
 from fowt_env import InputError
 from fowt_env import warmup as module
@@ -43,6 +44,16 @@ def test_what_is_wrong_is_said_before_anything_runs(kinds, words, message):
     with pytest.raises(InputError, match=message):
         warmup(**words)
     assert kinds == []
+
+
+@pytest.mark.parametrize("words", [("--kinds", "standard,sport"), ("--jobs", "0"), ("--platform", "raft")])
+def test_a_refused_command_does_not_say_that_it_compiles(words):
+    assert "compiling" not in fowt("warmup", *words, code=2)[1]
+
+
+def test_the_command_says_once_what_it_compiles_and_then_each_kind(kinds):
+    lines = fowt("warmup", "--kinds", "fast,linear,fast")[1].splitlines()
+    assert lines == ["compiling 2 kinds of scene: fast, linear", "1 of 2: fast", "2 of 2: linear"]
 
 
 def test_others_are_compiled_in_processes_of_their_own(kinds, monkeypatch):

@@ -35,17 +35,28 @@ def write_table(frame, path):
     return path
 
 
-def read_series(path):
+def read_series(path, timed=True):
     """Return the DataFrame of a time series written by write_table, or of OpenFAST's output (.outb, .out).
 
-    Raises: InputError for a missing or broken file, another suffix, and text in a column with a unit.
+    timed: whether it must have a column Time_[s] (FAST 7: Time_[sec], renamed) and at least two rows.
+    Raises: InputError for a missing, empty or broken file, another suffix, text in a column with a unit, and
+    a series without time.
     """
     path = table_path(path, READ_SUFFIXES, "file")
+    if path.is_file() and path.stat().st_size == 0:
+        raise InputError(f"file {str(path)!r}: is empty (0 bytes)")
     if path.suffix.lower() in TABLE_SUFFIXES:
-        return _of_numbers(read_table(path), path)
-    from fowt_env.files.openfast import read_out, read_outb
+        table = _of_numbers(read_table(path), path)
+    else:
+        from fowt_env.files.openfast import read_out, read_outb
 
-    return read_outb(path) if path.suffix.lower() == ".outb" else read_out(path)
+        table = read_outb(path) if path.suffix.lower() == ".outb" else read_out(path)
+    table = table.rename(columns={"Time_[sec]": "Time_[s]"})
+    if timed and ("Time_[s]" not in table.columns or len(table) < 2):
+        columns = ", ".join(map(str, table.columns))
+        found = f"has {len(table)} rows of {columns:.200}"
+        raise InputError(f"file {str(path)!r}: needs a column 'Time_[s]' and at least two rows; {found}")
+    return table
 
 
 def _of_numbers(table, path):

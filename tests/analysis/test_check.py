@@ -184,6 +184,9 @@ def test_the_command_prints_figures_and_ends_well_where_all_fits():
         r"weight +79100 +kN",
         r"natural period, heave +30\.83 +s",
         r"tension of line 3 +911\.1 +kN",
+        r"rest, sway +0 +m",
+        r"rest, heave +0\.0001253 +m",
+        r"rest, yaw +0 +deg",
     ):
         assert re.search(words, result.stdout), result.stdout
 

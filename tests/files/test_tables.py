@@ -11,7 +11,7 @@ from fowt_env import build_scene, linearize
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import is_leftover, remove_leftovers, replacing
 from fowt_env.files.matlab import write_mat
-from fowt_env.files.tables import read_table, write_table
+from fowt_env.files.tables import read_series, read_table, write_table
 
 FRAME = pd.DataFrame({"Time_[s]": [0.0, 0.1], "PtfmPitch_[deg]": [1.0 / 3.0, -2e-7]})
 
@@ -20,6 +20,12 @@ FRAME = pd.DataFrame({"Time_[s]": [0.0, 0.1], "PtfmPitch_[deg]": [1.0 / 3.0, -2e
 def test_a_written_table_reads_back(tmp_path, name, tolerance):
     path = write_table(FRAME, tmp_path / "a" / name)
     pd.testing.assert_frame_equal(read_table(path), FRAME, rtol=tolerance, atol=0.0)
+
+
+def test_the_time_of_fast_7_is_that_of_other_runs(tmp_path):
+    path = tmp_path / "run.out"
+    path.write_text("Time\tRotSpeed\n(sec)\t(rpm)\n0.0\t12.1\n0.1\t12.2\n")
+    assert list(read_series(path).columns) == ["Time_[s]", "RotSpeed_[rpm]"]
 
 
 def test_a_failed_write_keeps_the_old_file_and_leaves_nothing_else(tmp_path):

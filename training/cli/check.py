@@ -13,6 +13,7 @@ from fowt_env.training.cli.console import EXIT_STOPPED, command, model, out
 from fowt_env.training.cli.options import OptionOption
 from fowt_env.training.cli.tables import print_table
 
+SETTLED = 1e-8  # m or deg: what the search for rest leaves of a displacement that is zero
 SPEEDS = ("at rest", "at rated speed")  # of a check.RotorFrequency
 
 
@@ -72,7 +73,8 @@ def _rows(result):
         *((f"tension of line {i}", value / 1e3, "kN") for i, value in enumerate(still.tension, 1)),
     ]
     units = dict.fromkeys(("surge", "sway", "heave"), "m")
-    rows += [(f"rest, {motion}", x, units.get(motion, "deg")) for motion, x in (result.rest or {}).items()]
+    settled = {motion: x if abs(x) > SETTLED else 0.0 for motion, x in (result.rest or {}).items()}
+    rows += [(f"rest, {motion}", x, units.get(motion, "deg")) for motion, x in settled.items()]
     rows += [(f"natural period, {motion}", period, "s") for motion, period in (result.periods or {}).items()]
     for mode, values in result.tower.items():
         rows += [(f"tower, {mode}, {base}", value, "Hz") for base, value in values._asdict().items()]

@@ -46,7 +46,7 @@ def plot(
     if kind not in PLOTS:
         raise unknown("kind of plot", kind, PLOTS)
     path = f"{kind}.png" if out_path is None else out_path
-    frames = {name: read_series(file) for name, file in _names(files).items()}
+    frames = {name: read_series(file, timed=kind != "schedule") for name, file in _names(files).items()}
     lengths = [np.ptp(frame[TIME]) for frame in frames.values() if TIME in frame and len(frame)]
     if lengths:
         check_number("skip", skip, 0.0, max(lengths), high_open=True)

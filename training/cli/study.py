@@ -3,6 +3,9 @@
 import html
 import json
 import re
+import shutil
+import tempfile
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -24,6 +27,7 @@ SHOWN_WIND = 14.0  # m/s, nearest case of the suite for margins and the animatio
 START = 200.0  # s of a run that are not compared, as in suites: surge settles slowly
 LEAST_COMPARED = 120.0  # s, some periods of platform pitch; less is said to be too little
 ROUNDING = 1e-9  # of the mean: a smaller deviation is none
+RUNS = "runs/*/*.parquet"  # finished runs in the folder of a study
 FILM = 48.0  # s of the animation, where the motions of the platforms differ most
 COMPARED = ("RotSpeed", "BldPitch1", "GenTq", "GenPwr", "PtfmPitch", "PtfmSurge", "TwrBsMyt")
 
@@ -78,25 +82,34 @@ def study(
     named = {label: name for name, label in labels.items()}
     first, second = labels[others[0]], labels[mine[0]]
     numbers = parse_whole_numbers(seeds, "seeds")
-    platform, sections = _imported(platform, folder)
-    turbine = turbine_of(platform)
-    for name in labels:  # what cannot run is refused before the first kernel is compiled
-        make(name, turbine, CONTROL_DT)
-        if name.startswith(DLL_PREFIX):
-            start_once(named_library(name), turbine, CONTROL_DT)
-    sections += _checked(platform)
-    usual = platform == "oc3_hywind"
-    chosen = chosen_cases(suite, None, None if usual else platform)
-    windy = [each for each in getattr(chosen, "cases", chosen) if mean_speed(each) is not None]
-    if not windy:
-        raise InputError(f"--suite {suite}: has no case with a mean wind speed")
-    if compare is not None:
-        sections.append(_compared(platform, mine[0], second, compare, shear))
-    with progress_bar("evaluating") as update:
-        table = evaluate(
-            named, chosen, seeds=numbers, jobs=jobs, folder=folder,
-            progress=lambda done, total, _: update(done, total, f"evaluating, {done} of {total} runs done"),
-        )  # fmt: skip
+
+    def cases_on(platform):
+        """Return the suite on a platform, and its cases with a mean wind."""
+        suite_on = chosen_cases(suite, None, None if platform == "oc3_hywind" else platform)
+        windy = [each for each in getattr(suite_on, "cases", suite_on) if mean_speed(each) is not None]
+        if not windy:
+            raise InputError(f"--suite {suite}: has no case with a mean wind speed")
+        return suite_on, windy
+
+    with _imported(platform, folder) as (platform, sections, keep):
+        turbine = turbine_of(platform)
+        for name in labels:  # what cannot run is refused before the first kernel is compiled
+            make(name, turbine, CONTROL_DT)
+            if name.startswith(DLL_PREFIX):
+                start_once(named_library(name), turbine, CONTROL_DT)
+        sections += _checked(platform)
+        cases_on(platform)
+        if compare is not None:
+            sections.append(_compared(platform, mine[0], second, compare, shear))
+        platform = keep()
+        chosen, windy = cases_on(platform)
+        with progress_bar("evaluating") as update:
+            table = evaluate(
+                named, chosen, seeds=numbers, jobs=jobs, folder=folder,
+                progress=lambda done, total, _: update(
+                    done, total, f"evaluating, {done} of {total} runs done"
+                ),
+            )  # fmt: skip
     write_leaderboard(table, folder, first)
     case = min(windy, key=lambda each: abs(mean_speed(each) - SHOWN_WIND))
     with progress_bar("margins and animation"):
@@ -110,20 +123,43 @@ def study(
     out.print(f"open {escape(str(page))}", soft_wrap=True)
 
 
+@contextmanager
 def _imported(platform, folder):
-    """Return (name or path of the platform, [section of the report on what differs from a deck])."""
+    """Yield (name or path of the platform, sections of the report on what differs from a deck, keep).
+
+    A deck is imported into a temporary folder; keep() copies the platform into the folder of the study and
+    returns its path there. If the block raises before a run is finished, folders that are new are removed.
+    """
     from fowt_env.files.openfast_deck.importer import import_deck
 
     if not platform.lower().endswith(".fst"):
-        return platform, []
+        yield platform, [], lambda: platform
+        return
     made = folder / Path(platform).stem
-    report = import_deck(platform, made, replace_files=True)
-    rows = [*report.differences, *report.contradictions]
-    table = _html_table(("in the deck", "here"), rows, texts=2)
-    differing = f"<details><summary>{len(rows)} differences</summary>{table}</details>"
-    where = f"{len(report.differences)} differences, listed in {made / 'report.md'}"
-    out.print(escape(f"imported {platform}: {where}"), soft_wrap=True)
-    return str(made / "platform.toml"), [("The deck", differing if rows else "nothing differs")]
+    with tempfile.TemporaryDirectory(prefix="fowt-study-") as temporary:
+        trial = Path(temporary, made.name)
+        report = import_deck(platform, trial)
+        rows = [*report.differences, *report.contradictions]
+        table = _html_table(("in the deck", "here"), rows, texts=2)
+        differing = f"<details><summary>{len(rows)} differences</summary>{table}</details>"
+        new = [path for path in (made, folder, *folder.parents) if not path.exists()]
+        runs = set(folder.glob(RUNS))
+
+        def keep():
+            shutil.copytree(trial, made, dirs_exist_ok=True)
+            where = f"{len(report.differences)} differences, listed in {made / 'report.md'}"
+            out.print(escape(f"imported {platform}: {where}"), soft_wrap=True)
+            return str(made / "platform.toml")
+
+        try:
+            yield str(trial / "platform.toml"), [("The deck", differing if rows else "nothing differs")], keep
+        except Exception:
+            if made in new and set(folder.glob(RUNS)) == runs:
+                shutil.rmtree(made, ignore_errors=True)
+                with suppress(OSError):  # a folder that is not empty, and its parents
+                    for path in new[1:]:
+                        path.rmdir()
+            raise
 
 
 def _checked(platform):

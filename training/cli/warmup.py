@@ -26,19 +26,19 @@ def warmup(
     from fowt_env.warmup import KINDS
     from fowt_env.warmup import warmup as compile_kinds
 
-    names = [kind for name in parse_names(kinds) for kind in (KINDS if name == "all" else (name,))]
-    total = len(dict.fromkeys(names))
-    if not err.is_terminal:
-        note(f"compiling {total} kinds of scene: {', '.join(names)}")
-    with progress_bar("compiling", total) as update:
+    named = [kind for name in parse_names(kinds) for kind in (KINDS if name == "all" else (name,))]
+    names, said = list(dict.fromkeys(named)), -1  # said: kinds done in the last line; -1: no line yet
+    with progress_bar("compiling", len(names)) as update:
 
-        def show(kind, done, kernels):
+        def show(kind, done, kernels):  # not called for arguments that are refused
+            nonlocal said
             update(done, text=f"{kind}: {kernels} kernels" if kernels else kind)
-            if not err.is_terminal and done > show.done:
-                note(f"{done} of {total}: {kind}")
-            show.done = done
+            if not err.is_terminal and said < 0:
+                note(f"compiling {len(names)} kinds of scene: {', '.join(names)}")
+            if not err.is_terminal and done > max(said, 0):
+                note(f"{done} of {len(names)}: {kind}")
+            said = done
 
-        show.done = 0
         table = compile_kinds(platform, names, jobs, show)
     rows = [(row.kind, KINDS[row.kind][0], row.kernels, f"{row.seconds:.1f}") for row in table.itertuples()]
     print_table(("kind", "used for", "compiled", "s"), rows, platform, left=(0, 1))

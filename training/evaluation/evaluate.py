@@ -26,7 +26,7 @@ from fowt_env.training.evaluation.cases import Case, Suite, check_sensors, descr
 from fowt_env.training.evaluation.engines import check_engine, outcomes
 from fowt_env.training.evaluation.failures import KINDS, known_figures, lost_counts, with_lost_power
 from fowt_env.training.evaluation.guard import attempt
-from fowt_env.training.evaluation.metrics import METRICS, metrics
+from fowt_env.training.evaluation.metrics import EXPONENTS, METRICS, metrics
 from fowt_env.training.evaluation.provenance import controller_code, version_gap, versions
 from fowt_env.training.evaluation.results import check_name, open_results, run_content, run_file, write_run
 from fowt_env.training.evaluation.results_table import KEY
@@ -336,11 +336,11 @@ def mean_ratios(table, over, columns):
 def summary(table):
     """Return a DataFrame by controller and case: runs, lost runs by kind, means of the metrics over seeds.
 
-    Means are over the runs that were not lost; NaN if all were lost.
+    Means are over the runs that were not lost, with the exponents of metrics.mean_exponent as in a
+    leaderboard; NaN if all were lost.
     """
-    groups = known_figures(table[table["controller"] != REFERENCE]).groupby(
-        ["controller", "case"], sort=False
-    )
+    known, names = known_figures(table[table["controller"] != REFERENCE]), list(METRICS)
+    groups = known.assign(**known[names] ** EXPONENTS).groupby(["controller", "case"], sort=False)
     lost = {name: lambda statuses, name=name: lost_counts(statuses)[name] for name in KINDS}
     counts = groups["status"].agg(runs="size", **lost)
-    return counts.join(groups[list(METRICS)].mean()).reset_index()
+    return counts.join(groups[names].mean() ** (1.0 / EXPONENTS)).reset_index()

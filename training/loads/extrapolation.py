@@ -34,6 +34,7 @@ from dataclasses import dataclass, field
 from math import inf, log, nan, pi, sqrt
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import norm
 
 from fowt_env.descriptions.checks import check_number
@@ -46,7 +47,6 @@ from fowt_env.training.loads.site import YEAR
 YEARS = 50.0  # return period
 POOL = 6.0  # m/s: conditions of which a wind speed further away has no part in the exponent c
 SHAPES = np.exp(np.linspace(log(0.4), log(5.0), 81))  # values of c that are searched
-BISECTIONS = 40
 STEPS = 14  # of regula falsi
 EXCEEDED = np.logspace(0.0, -9.0, 28)  # probabilities between which Hs has one value in the long-term rate
 EULER = 0.5772156649015329
@@ -378,7 +378,7 @@ def block_maxima(conditions, years=YEARS):
     """Return the load of a return period from the largest values of the runs: Gumbel by L-moments.
 
     The rate of exceedance per hour is the share-weighted sum of 1 - F(x)^(1 h / length of the run).
-    NaN if a condition has fewer than two runs.
+    NaN if a condition has fewer than two runs, or the conditions are rarer than the return period.
     """
     fits = []
     for condition in conditions:
@@ -389,17 +389,17 @@ def block_maxima(conditions, years=YEARS):
         fits.append((condition.share, mode - scale * log(condition.hours.mean()), scale))
     share, mode, scale = np.array(fits).T
     target = 1.0 / (years * YEAR)
+    if share.sum() <= target:
+        return nan
 
-    def rate(load):
-        return float(np.sum(share * -np.expm1(-np.exp(np.minimum(-(load - mode) / scale, 700.0)))))
+    def excess(load):
+        below = np.exp(np.minimum(-(load - mode) / scale, 700.0))
+        return log(np.sum(share * -np.expm1(-below)) / target)
 
     low, high = float(mode.max()), float(np.max(mode + 60.0 * scale))
-    while rate(low) < target:
+    while excess(low) < 0.0:
         low -= float(scale.max())
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if rate(middle) > target else (low, middle)
-    return 0.5 * (low + high)
+    return brentq(excess, low, high)
 
 
 # --------------------------------------------------------------------------- inverse FORM

@@ -102,10 +102,16 @@ def settings_at(point):
     return MPCSettings().changed(**{key: float(x) for key, x in prices.items()}, shaft=shaft, travel=travel)
 
 
+def moved(network, by_point, point):
+    """Return a network with the bias of the first layer at a point; by_point: weights (hidden, TRADES)."""
+    return network | {"bias_0": network["bias_0"] + by_point @ np.asarray(point)}
+
+
 def at_point(source, point, path):
     """Write the file of `source`, of imitate or search, at a point; return the path."""
     arrays = read_arrays(source, 1 << 26)
-    arrays["bias_0"] = (arrays["bias_0"] + arrays.pop("point_weight") @ np.asarray(point)).astype(np.float32)
+    arrays = moved(arrays, arrays.pop("point_weight"), point)
+    arrays["bias_0"] = arrays["bias_0"].astype(np.float32)
     settings = json.loads(str(arrays["settings"]))
     settings["about"]["point"] = [float(x) for x in point]
     arrays["settings"] = np.array(json.dumps(settings))
@@ -139,7 +145,7 @@ def record(number, round_, folder):
     network = None
     if round_:
         arrays = read_arrays(folder / f"network_{round_ - 1}.npz", 1 << 26)
-        network = arrays | {"bias_0": arrays["bias_0"] + arrays["point_weight"] @ point}
+        network = moved(arrays, arrays["point_weight"], point)
     records = Records()
     scene, initial = episode(seed, *WINDS[number % len(WINDS)])
     teacher = Teacher(scene.turbine, CONTROL_DT, records, network, settings_at(point))
@@ -183,7 +189,7 @@ class Front:
 
     def at_points(self, network):
         """Return the networks of FRONT."""
-        return [network | {"bias_0": network["bias_0"] + self.by_point @ point} for point in FRONT]
+        return [moved(network, self.by_point, point) for point in FRONT]
 
     def costs(self, networks):
         """Return the costs (candidates,) of networks."""

@@ -100,22 +100,23 @@ def _words(channel):
     return name, unit.removesuffix(")")
 
 
-def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=False):
+def _stack(panels, draw, path, title, xlabel="time (s)", height=1.2, squared=False, notes=()):
     """Plot stacked panels, one per (channel, {legend: frame}), save them to a path and return the figure.
 
-    draw(axes, frame, channel, **style): draws one line. squared: label axes as power densities.
+    draw(axes, frame, channel, **style): draws one line. squared: label axes as power densities. notes: what
+    tells each panel from another of the same channel, "" or a line for its label.
     """
     figure = new_figure(9.0, 0.8 + height * len(panels))
     shared = all(frames is panels[0][1] for _, frames in panels)
     rows = figure.subplots(len(panels), 1, sharex=shared, squeeze=False)[:, 0]
-    for axes, (channel, frames) in zip(rows, panels, strict=True):
+    for axes, (channel, frames), remark in zip(rows, panels, notes or [""] * len(panels), strict=True):
         style_axes(axes, xlabel=xlabel if axes is rows[-1] else None)
         for number, (legend, frame) in enumerate(frames.items()):
             style = {"color": COLOURS[number], "linewidth": 1.0, "label": legend}
             draw(axes, frame, channel, linestyle=LINES[number and (number - 1) % 3 + 1], **style)
         name, unit = _words(channel)
         unit = f"{unit.replace(' ', '² ')}²/Hz" if squared else unit
-        axes.set_ylabel(f"{name}({unit})", fontsize=8, color=INK)
+        axes.set_ylabel(f"{name}{remark}({unit})", fontsize=8, color=INK)
     ncols = len(panels[0][1])
     rows[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=ncols, fontsize=8, frameon=False)
     figure.align_ylabels(rows)
@@ -151,12 +152,13 @@ def _spectra(frames, channels, path, title, start=100.0, segment=None):
 
 def _decays(study, path):
     """Plot the free decays, each in the displaced motion."""
-    panels = []
+    panels, notes = [], []
     for case, run in study.cases.items():
         if case in study.runs and case.startswith("decay_"):
             ours, theirs = study.runs[case]
             panels.append((*run.initial, {THERE: theirs, HERE: ours}))
-    return _stack(panels, _series, path, "free decays", height=1.4)
+            notes.append("bending tower\n" if "tower" in run.options else "")
+    return _stack(panels, _series, path, "free decays", height=1.4, notes=notes)
 
 
 def _steady(study, path):

@@ -80,11 +80,18 @@ def test_trim_plots_the_schedule_and_plot_does_so_from_its_table(tmp_path):
         (("spectra", "run.csv", "--platform", "raft"), "raft"),
         (("series", "run.csv", "--skip", "9999"), "skip = 9999"),
         (("series", "text.csv"), "'text.csv': column 'RotSpeed_[rpm]', row 2: 'x' is not a number"),
+        (("series", "run.csv", "rotor.csv"), "'rotor.csv': needs a column 'Time_[s]' and at least two rows;"),
+        (("series", "rotor.csv"), "has 2 rows of RotSpeed_[rpm]"),
+        (("series", "short.csv"), "'short.csv': needs a column 'Time_[s]' and at least two rows; has 1 rows"),
+        (("series", "empty.outb"), "file 'empty.outb': is empty (0 bytes)"),
     ],
 )
 def test_what_cannot_be_plotted_is_one_clear_line(arguments, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run(tmp_path / "run.csv")
     (tmp_path / "text.csv").write_text("Time_[s],RotSpeed_[rpm]\n0,12\n1,x\n")
+    (tmp_path / "rotor.csv").write_text("RotSpeed_[rpm]\n12\n13\n")
+    (tmp_path / "short.csv").write_text("Time_[s],RotSpeed_[rpm]\n0,12\n")
+    (tmp_path / "empty.outb").touch()
     _, stderr = fowt("plot", *arguments, code=2)
     assert words in stderr.replace("\n", " ")

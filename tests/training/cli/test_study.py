@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from bladed_library import needs_gcc
 from command_line import fowt
+from small_deck import write_deck
 
 import fowt_env
+from fowt_env.errors import InputError
 from fowt_env.files.tables import write_table
-from fowt_env.training.cli.study import FILM, most_different
+from fowt_env.training.cli.study import FILM, _imported, most_different
 
 SUITE = """\
 
@@ -73,6 +75,29 @@ def test_what_cannot_be_studied_is_refused_before_anything_is_evaluated(tmp_path
     ):
         assert said in fowt("study", *words, code=2)[1]
     assert not (tmp_path / "results" / "study" / "results.csv").exists()
+
+
+def test_a_refused_study_of_a_deck_leaves_nothing_and_what_was_there_untouched(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "deck").mkdir()
+    deck, made = str(write_deck(tmp_path / "deck")), tmp_path / "a" / "study" / "small"
+    before = set(tmp_path.rglob("*"))
+    assert "'pie'" in fowt("study", deck, "--against", "pie", "--out", "a/study", code=2)[1]
+    with pytest.raises(InputError), _imported(deck, made.parent) as (_, _, keep):
+        assert keep() == str(made / "platform.toml")  # evaluate refuses the folder
+        raise InputError
+    assert set(tmp_path.rglob("*")) == before
+    with pytest.raises(InputError), _imported(deck, made.parent) as (_, _, keep):
+        keep()
+        (made.parent / "runs" / "pi").mkdir(parents=True)
+        (made.parent / "runs" / "pi" / "ntm_16_seed1.parquet").touch()
+        raise InputError  # after a run on the platform
+    assert (made / "platform.toml").exists()
+    (made / "platform.toml").write_text("mine")
+    fowt("study", deck, "--against", "pie", "--out", "a/study", code=2)
+    with pytest.raises(InputError), _imported(deck, made.parent):
+        raise InputError
+    assert (made / "platform.toml").read_text() == "mine" and (made / "report.md").exists()
 
 
 @needs_gcc

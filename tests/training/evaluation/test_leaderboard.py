@@ -6,7 +6,7 @@ import pytest
 
 from fowt_env.errors import InputError
 from fowt_env.training.evaluation.cases import Limits, Score, ScoreTerm
-from fowt_env.training.evaluation.evaluate import COLUMNS
+from fowt_env.training.evaluation.evaluate import COLUMNS, summary
 from fowt_env.training.evaluation.failures import PENALTY
 from fowt_env.training.evaluation.leaderboard import leaderboard
 from fowt_env.training.evaluation.metrics import METRICS, never_negative
@@ -51,6 +51,16 @@ def test_means_count_every_case_alike_however_many_seeds_it_has():
     figures = {("pi", "a", seed): 1.0 for seed in range(5)} | {("pi", "b", 0): 3.0}
     figure = entry(leaderboard(table(figures)), "pi")["metrics"][TRAVEL]
     assert figure["mean"] == pytest.approx(2.0) and figure["worst"] == 3.0
+
+
+def test_means_by_case_are_those_of_a_leaderboard_of_the_case():
+    """A mean of standard deviations or fatigue loads has one value, in whichever table it stands."""
+    runs = table({("pi", "a", 1): 1.0, ("pi", "a", 2): 3.0, ("pi", "a", 3): None})
+    means, metrics = summary(runs).iloc[0], entry(leaderboard(runs), "pi")["metrics"]
+    assert {name: means[name] for name in METRICS} == pytest.approx(
+        {name: metrics[name]["mean"] for name in METRICS}
+    )
+    assert means["RotSpeed_std_[rpm]"] == pytest.approx(5.0**0.5) and means[TRAVEL] == pytest.approx(2.0)
 
 
 def test_an_interval_is_that_of_the_mean_over_cases_whose_seeds_are_drawn_together():

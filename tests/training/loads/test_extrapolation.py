@@ -97,6 +97,8 @@ def test_block_maxima_of_many_runs_give_the_known_value():
         for c in sample("exponential", 2, runs=3000)
     ]  # the largest of six hours each
     assert block_maxima(blocks) == pytest.approx(truth("exponential"), rel=0.04)
+    # a load of less than the conditions' own time is exceeded always
+    assert np.isnan(block_maxima(sample("exponential", 2), years=1e-5))
     mode, scale = gumbel_fit(np.random.default_rng(1).gumbel(3.0, 2.0, 200_000))
     assert (mode, scale) == (pytest.approx(3.0, abs=0.02), pytest.approx(2.0, abs=0.02))
 

@@ -200,6 +200,8 @@ def test_the_command_prints_the_table_and_the_notes_and_writes_both_files(tmp_pa
     assert len(pd.read_csv(table)) == len(CHANNELS) and plot.read_bytes().startswith(b"\x89PNG")
     assert "table.csv" in stderr and "plot.png" in stderr
     fowt("compare", str(paths[0]), str(tmp_path / "none.outb"), code=2)
+    write_table(run().rename(columns={TIME: "Tiem_[s]"}), paths[1])
+    assert "theirs.csv': needs a column 'Time_[s]'" in fowt("compare", *map(str, paths), code=2)[1]
 
 
 def test_the_plot_has_both_series_and_their_spectra():

@@ -1,6 +1,7 @@
 """VolturnUS-S against OpenFAST: the figures of each group, and what is allowed, apart from what judges it."""
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -9,8 +10,9 @@ import series_figures as figures
 
 from fowt_env.training.validation import linear_cases
 from fowt_env.training.validation.openfast_cases import FOLDER, ReferenceRun, without_rosco
+from fowt_env.training.validation.report import _decays
 from fowt_env.training.validation.validate import validate_cases
-from fowt_env.training.validation.volturnus import PLATFORM, _structural_flap
+from fowt_env.training.validation.volturnus import PLATFORM, RUNS, _structural_flap
 
 REFERENCES = FOLDER / PLATFORM
 # group, part of the case, part of the quantity, what is allowed (%, None: nothing is); the first that fits
@@ -156,6 +158,17 @@ def test_the_older_deck_has_the_masses_of_its_files():
     assert turbine.rotor.tip_radius == 120.0 and turbine.rotor.hub_height == pytest.approx(150.0, abs=0.01)
     assert turbine.blade.radius[0] > turbine.rotor.hub_radius
     assert platform.environment.gravity == 9.80665
+
+
+def test_panels_of_two_decays_of_one_motion_say_which_has_the_bending_tower(tmp_path):
+    pytest.importorskip("matplotlib")
+    frame = pd.DataFrame({figures.TIME: [0.0, 1.0]}).assign(
+        **{channel: [1.0, 0.0] for run in RUNS.values() for channel in run.initial}
+    )
+    study = SimpleNamespace(cases=RUNS, runs=dict.fromkeys(RUNS, (frame, frame)))
+    labels = [axes.get_ylabel() for axes in _decays(study, tmp_path / "decays.png").axes]
+    assert len(set(labels)) == len(labels) == 5
+    assert labels[-1] == "platform pitch\nbending tower\n(deg)" and "platform pitch\n(deg)" in labels
 
 
 # --------------------------------------------------------------------------- slow
