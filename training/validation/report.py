@@ -35,7 +35,7 @@ WHOLE, LONG, SHORT = (0.0, 600.0), (100.0, 400.0), (100.0, 200.0)  # s
 TURBULENCE = "turbulence of 18 m/s, {}; waves, Hs 7.5 m"
 STEADY, UNIFORM = "steady wind of {} m/s", TURBULENCE.format("uniform over the rotor")
 TOWER = TURBULENCE.format("uniform over the rotor, bending tower")
-ALL_BEND = ("elastic, turb_18mps", TURBULENCE.format("bending blades, tower and shaft"), ELASTIC, SHORT, True)
+ALL_BEND = ("elastic, turb_18mps", TURBULENCE.format("bending blades and tower"), ELASTIC, SHORT, True)
 WAVES = (
     ("waves_Hs7.5", "irregular waves, Hs 7.5 m", Channel.PLANE, LONG, True),
     (
