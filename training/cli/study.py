@@ -129,6 +129,7 @@ def _imported(platform, folder):
 
     A deck is imported into a temporary folder; keep() copies the platform into the folder of the study and
     returns its path there. If the block raises before a run is finished, folders that are new are removed.
+    keep raises InputError for files there that differ, which somebody may have edited.
     """
     from fowt_env.files.openfast_deck.importer import import_deck
 
@@ -146,6 +147,13 @@ def _imported(platform, folder):
         runs = set(folder.glob(RUNS))
 
         def keep():
+            for file in (path for path in trial.rglob("*") if path.is_file()):
+                there = made / file.relative_to(trial)
+                if there.exists() and there.read_bytes() != file.read_bytes():
+                    raise InputError(
+                        f"{there}: differs from what {platform} gives now; if it was edited, study"
+                        f" {made / 'platform.toml'} itself, or name another --out"
+                    )
             shutil.copytree(trial, made, dirs_exist_ok=True)
             where = f"{len(report.differences)} differences, listed in {made / 'report.md'}"
             out.print(escape(f"imported {platform}: {where}"), soft_wrap=True)

@@ -93,7 +93,14 @@ def test_a_refused_study_of_a_deck_leaves_nothing_and_what_was_there_untouched(t
         (made.parent / "runs" / "pi" / "ntm_16_seed1.parquet").touch()
         raise InputError  # after a run on the platform
     assert (made / "platform.toml").exists()
+    with _imported(deck, made.parent) as (_, _, keep):
+        keep()  # the same again
     (made / "platform.toml").write_text("mine")
+    with (
+        pytest.raises(InputError, match="platform.toml: differs"),
+        _imported(deck, made.parent) as (*_, keep),
+    ):
+        keep()
     fowt("study", deck, "--against", "pie", "--out", "a/study", code=2)
     with pytest.raises(InputError), _imported(deck, made.parent):
         raise InputError
