@@ -56,7 +56,7 @@ def test_every_engine_refuses_what_it_cannot_do():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["processes", "ray"])
+@pytest.mark.parametrize("engine", ["processes", pytest.param("ray", marks=pytest.mark.nightly)])
 def test_a_killed_worker_process_costs_its_task_a_retry(tmp_path, engine):
     if engine == "ray":
         pytest.importorskip("ray", reason="Ray is not installed: pip install 'fowt-env[ray]'")
@@ -105,7 +105,7 @@ def cluster():
     ray.shutdown()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_ray_gives_the_bits_of_the_serial_evaluation(cluster, tmp_path):
     arguments = ("pi,pi_land", [GUSTY, CALM])
     serial = evaluate(*arguments, seeds=(3, 4), folder=tmp_path / "serial", **SHORT)
