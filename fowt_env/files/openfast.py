@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fowt_env.errors import InputError
+from fowt_env.files.tables import TIME
 
-TIME = "Time_[s]"
 # OpenFAST's FileIDs. 3 is double precision, with start and step of the time; the others are packed (16 bits)
 WITH_TIME, WITHOUT_TIME, UNCOMPRESSED, WITH_LENGTH = 1, 2, 3, 4
 NAME_LENGTH = 10  # characters of a channel name and of a unit with brackets

@@ -8,6 +8,7 @@ from fowt_env.files.atomic import replacing
 TABLE_SUFFIXES = (".csv", ".parquet")
 SERIES_SUFFIXES = (*TABLE_SUFFIXES, ".outb")  # of a time series
 READ_SUFFIXES = (*SERIES_SUFFIXES, ".out")  # of a time series that is read
+TIME = "Time_[s]"
 
 
 def table_path(path, allowed=TABLE_SUFFIXES, what="output file"):
@@ -51,11 +52,11 @@ def read_series(path, timed=True):
         from fowt_env.files.openfast import read_out, read_outb
 
         table = read_outb(path) if path.suffix.lower() == ".outb" else read_out(path)
-    table = table.rename(columns={"Time_[sec]": "Time_[s]"})
-    if timed and ("Time_[s]" not in table.columns or len(table) < 2):
+    table = table.rename(columns={"Time_[sec]": TIME})
+    if timed and (TIME not in table.columns or len(table) < 2):
         columns = ", ".join(map(str, table.columns))
         found = f"has {len(table)} rows of {columns:.200}"
-        raise InputError(f"file {str(path)!r}: needs a column 'Time_[s]' and at least two rows; {found}")
+        raise InputError(f"file {str(path)!r}: needs a column {TIME!r} and at least two rows; {found}")
     return table
 
 

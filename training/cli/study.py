@@ -1,5 +1,6 @@
 """Implements fowt study: a deck or platform and a controller in, one page with a verdict out."""
 
+import filecmp
 import html
 import json
 import re
@@ -129,7 +130,7 @@ def _imported(platform, folder):
 
     A deck is imported into a temporary folder; keep() copies the platform into the folder of the study and
     returns its path there. If the block raises before a run is finished, folders that are new are removed.
-    keep raises InputError for files there that differ, which somebody may have edited.
+    Raises: InputError for files there that differ, which somebody may have edited.
     """
     from fowt_env.files.openfast_deck.importer import import_deck
 
@@ -140,6 +141,15 @@ def _imported(platform, folder):
     with tempfile.TemporaryDirectory(prefix="fowt-study-") as temporary:
         trial = Path(temporary, made.name)
         report = import_deck(platform, trial)
+        if made.exists() and not made.is_dir():
+            raise InputError(f"folder {str(made)!r} is a file; must be a folder, or not exist")
+        for file in (path for path in trial.rglob("*") if path.is_file()):
+            there = made / file.relative_to(trial)
+            if there.exists() and not filecmp.cmp(file, there, shallow=False):
+                raise InputError(
+                    f"{there}: differs from what {platform} gives now; if it was edited, study"
+                    f" {made / 'platform.toml'} itself, or name another --out"
+                )
         rows = [*report.differences, *report.contradictions]
         table = _html_table(("in the deck", "here"), rows, texts=2)
         differing = f"<details><summary>{len(rows)} differences</summary>{table}</details>"
@@ -147,13 +157,6 @@ def _imported(platform, folder):
         runs = set(folder.glob(RUNS))
 
         def keep():
-            for file in (path for path in trial.rglob("*") if path.is_file()):
-                there = made / file.relative_to(trial)
-                if there.exists() and there.read_bytes() != file.read_bytes():
-                    raise InputError(
-                        f"{there}: differs from what {platform} gives now; if it was edited, study"
-                        f" {made / 'platform.toml'} itself, or name another --out"
-                    )
             shutil.copytree(trial, made, dirs_exist_ok=True)
             where = f"{len(report.differences)} differences, listed in {made / 'report.md'}"
             out.print(escape(f"imported {platform}: {where}"), soft_wrap=True)

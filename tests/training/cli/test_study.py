@@ -87,6 +87,10 @@ def test_a_refused_study_of_a_deck_leaves_nothing_and_what_was_there_untouched(t
         assert keep() == str(made / "platform.toml")  # evaluate refuses the folder
         raise InputError
     assert set(tmp_path.rglob("*")) == before
+    made.parent.mkdir(parents=True)
+    made.touch()
+    assert "is a file" in fowt("study", deck, "--against", "pi", "--out", "a/study", code=2)[1]
+    made.unlink()
     with pytest.raises(InputError), _imported(deck, made.parent) as (_, _, keep):
         keep()
         (made.parent / "runs" / "pi").mkdir(parents=True)
