@@ -7,6 +7,8 @@ BIN := $(VENV)/bin
 PROJECT := pyproject.toml constraints.txt
 # one worker per core, each with some 2 GB; tests/conftest.py says which files share a worker, and their order
 TESTS = $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+# test files with the mark: importing all others takes a minute of each worker
+PROOFS = $(shell grep -rl 'mark\.installation' tests --include='test_*.py')
 INSTALL = $(BIN)/python -m pip install --quiet --constraint constraints.txt --editable
 
 .PHONY: help demo test test-all test-rest test-rest-plant test-rest-envs test-rest-training test-rest-others test-nightly test-quick coverage lint docs figures format clean
@@ -42,7 +44,7 @@ demo: $(VENV)/.installed-demo
 
 test: $(VENV)/.installed-dev
 	@echo "minutes, most of them for compiling kernels, which are kept"
-	$(TESTS) -m installation --durations=10
+	$(TESTS) -m installation --durations=10 $(PROOFS)
 
 test-all: test test-rest test-nightly
 

@@ -242,7 +242,8 @@ def _margins(platform, case, named):
     from fowt_env.training.live.tuning import Law, Weather, linear, loop_words
 
     speed, rows = mean_speed(case), []
-    weather = Weather(platform, f"{speed:g}", "none")
+    # linear models leave the sea of this weather out; without one, kernels of still water would be compiled
+    weather = Weather(platform, f"{speed:g}")
     for label, name in named.items():
         try:
             words = loop_words(linear(weather, Law(name)))
