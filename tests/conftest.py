@@ -122,4 +122,4 @@ def elastic_scene():
     """The weather of storm_scene with blades, tower and shaft that bend, at the default fidelity."""
     sea = {"kind": "jonswap", "Hs": 6.0, "Tp": 10.0, "gamma": 3.3}
     settings = {"seed": 3, "duration": 60.0, "wave_components": 20}
-    return build_scene("oc3_hywind", 18.0, sea, blades="modes", tower="modes2", shaft="torsion", **settings)
+    return build_scene("oc3_hywind", 18.0, sea, blades="modes2", tower="modes2", shaft="torsion", **settings)

@@ -87,7 +87,7 @@ def test_a_bent_rotor_needs_more_pitch_and_holds_rated_power(elastic_scene, poin
     assert 14.0 < point["BldPitch1"] < 16.0
     for number in (1, 2, 3):  # means over a turn are equal
         assert point[f"OoPDefl{number}"] == pytest.approx(point["OoPDefl1"], rel=1e-9)
-    assert point["OoPDefl1"] == pytest.approx(1.49, abs=0.05)
+    assert point["OoPDefl1"] == pytest.approx(1.31, abs=0.1)  # of OpenFAST with a fixed platform
 
 
 @pytest.mark.nightly
@@ -113,7 +113,7 @@ def test_a_run_in_steady_wind_stays_at_the_periodic_state(elastic_scene):
 
 
 @pytest.mark.installation
-@pytest.mark.parametrize("case", ["steady_12mps_2modes"])
+@pytest.mark.parametrize("case", ["steady_12mps"])
 def test_tips_and_roots_in_steady_wind_are_openfasts(elastic_scene, case):
     known = table("elastic/steady.csv.gz").set_index(["case", "channel"]).loc[f"nrel5mw/{case}"]
     scene = elastic_scene.with_weather(12.0, None).with_model({"aero.wind.shear_exponent": 0.0})
@@ -168,7 +168,8 @@ def test_initial_tip_displacements_are_those_asked_for(elastic_scene):
     found, x = tips({"OoPDefl": 2.0, "IPDefl2": -0.5, "BldPitch3": 30.0})
     assert [found[f"OoPDefl{i}"] for i in (1, 2, 3)] == pytest.approx([2.0, 2.0, 2.0])
     assert [found[f"IPDefl{i}"] for i in (1, 2, 3)] == pytest.approx([0.0, -0.5, 0.0], abs=1e-12)
-    assert np.all(x[bending_states(elastic_scene)[2:]] == 0.0)
+    states = bending_states(elastic_scene)  # first and second flap, edge, and their rates
+    assert np.all(x[states[[0, 2]]] != 0.0) and np.all(x[states[[1, 3, 4, 5]]] == 0.0)
     straight, _ = tips("zero")
     assert set(straight.values()) == {0.0}
     bent, x = tips({"Azimuth": 90.0})

@@ -33,7 +33,7 @@ def record(env, given):
         {},
         {"action_mode": "setpoint"},
         {"action_mode": "residual", "baseline": "lqr", "sensors": DEGRADED},
-        {"task": "shutdown"},
+        pytest.param({"task": "shutdown"}, marks=pytest.mark.nightly),
         pytest.param(WATCHED, marks=pytest.mark.nightly),
         {"guard": {"overspeed": 1.01, "calm": 1.0}},
     ],

@@ -37,15 +37,19 @@ EVERY_CHANNEL = QUICK | {"observation": KNOWN, "wind_preview": (1.0, 5.0)}
 OF_BLADES = ("default", "azimuth", "previous_action", *BLADE_CHANNELS)
 
 
-@pytest.mark.installation
 @pytest.mark.parametrize(
     "settings",
     [
-        *({"id": NAME, "task": task} for task in TASKS),
-        {"id": EASY},
+        *(
+            pytest.param(settings, marks=pytest.mark.installation)
+            for settings in (*({"id": NAME, "task": task} for task in TASKS), {"id": EASY})
+        ),
         *(EVERY_CHANNEL | {"action_mode": mode} for mode in ("direct", "setpoint", "residual")),
         QUICK | ON_LQR,
-        INDIVIDUAL | {"observation": OF_BLADES, "sensors": {"noise": 0.01, "delay": 1}},
+        pytest.param(
+            INDIVIDUAL | {"observation": OF_BLADES, "sensors": {"noise": 0.01, "delay": 1}},
+            marks=pytest.mark.nightly,
+        ),
     ],
 )
 def test_gymnasium_and_sb3_checkers_find_nothing(settings):

@@ -22,7 +22,7 @@ STILL = {"task": "steady", "wind": 16.0, "duration": 20.0, "fidelity": "fast"}
 RUNAWAY = {"kind": "pitch_runaway", "time": 0.0, "towards": "fine"}
 
 
-@pytest.mark.parametrize("protection", [None, "turbine"])
+@pytest.mark.parametrize("protection", [pytest.param(None, marks=pytest.mark.nightly), "turbine"])
 @pytest.mark.parametrize("commands", [(), ("generator_torque", "blade_pitch")])
 def test_the_baseline_of_an_environment_reads_nan_where_it_does_not_declare(protection, commands):
     law = Recorder(("rotor_speed", *commands))
@@ -64,7 +64,15 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(
+            case, id=case.name, marks=() if case.name in ("turbulent", "grid") else pytest.mark.nightly
+        )
+        for case in CASES
+    ],
+)
 def test_a_case_through_an_environment_gives_the_rows_and_metrics_of_evaluate(case):
     row, frame = scored(Run("pi", "pi", case, 3, case.duration, case.skip, {}, None))
     settings = environment_settings(case, case.duration)

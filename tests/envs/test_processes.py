@@ -74,7 +74,7 @@ def test_threads_that_each_step_their_own_batch_give_the_bits_of_one_after_the_o
         np.testing.assert_array_equal(found[seed], rewards(seed))
 
 
-@pytest.mark.parametrize("method", ["fork", "spawn", pytest.param("forkserver", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("method", ["fork", "spawn", pytest.param("forkserver", marks=pytest.mark.nightly)])
 def test_processes_of_every_kind_give_the_bits_of_this_one(serial, method):
     """Forked ones have this process's kernels and environments, the others nothing."""
     with multiprocessing.get_context(method).Pool(2) as pool:
@@ -98,7 +98,7 @@ def test_an_environment_goes_on_in_a_forked_process_as_it_does_here():
     np.testing.assert_array_equal(there, here)
 
 
-@pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.nightly)])
 def test_stable_baselines3_s_processes_give_the_bits_of_its_dummy(method):
     vec_env = pytest.importorskip("stable_baselines3.common.vec_env", reason="needs stable_baselines3")
     plain = vec_env.DummyVecEnv([make] * 2)

@@ -22,11 +22,12 @@ WAKE = {"rotor": "bem", "dynamic_inflow": True, "wind": 18.0, "sea": "still"}  #
         {"action_mode": "direct"},
         {"action_mode": "setpoint"},
         {"action_mode": "residual"},
-        {"action_mode": "direct", "fidelity": "fast"},  # Adams-Bashforth: past derivatives carry over
+        # Adams-Bashforth: past derivatives carry over
+        pytest.param({"action_mode": "direct", "fidelity": "fast"}, marks=pytest.mark.nightly),
         ON_LQR,
         ON_LQR | {"sensors": DEGRADED},
         {"task": "shutdown", "duration": 60.0},
-        INDIVIDUAL,
+        pytest.param(INDIVIDUAL, marks=pytest.mark.nightly),
         pytest.param(WATCHED, marks=pytest.mark.nightly),
         pytest.param(BOX, marks=pytest.mark.nightly),
         pytest.param(WAKE, marks=pytest.mark.nightly),

@@ -126,6 +126,7 @@ def readme_example(duration):
     return code.replace("duration=600.0", f"duration={duration}")
 
 
+@pytest.mark.nightly
 def test_the_wheel_runs_the_readme_example_in_an_empty_environment_without_torch(built, tmp_path):
     _, wheel = built["sdist"]
     run(sys.executable, "-m", "venv", tmp_path / "venv")

@@ -223,7 +223,7 @@ def test_integrators_advance_lines_alike(integrator):
     assert error < 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_linear_model_has_the_lines_as_catenaries():
     moving, hanging = (build_scene("oc3_hywind", wind=18.0, mooring=kind) for kind in ("dynamic", True))
     ours, theirs = linearize(moving), linearize(hanging)
@@ -231,7 +231,7 @@ def test_a_linear_model_has_the_lines_as_catenaries():
     np.testing.assert_allclose(ours.A, theirs.A, rtol=1e-6, atol=1e-9 * np.abs(theirs.A).max())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_an_environment_with_moving_lines_returns_to_a_snapshot():
     env = FowtEnv("above_rated", mooring="dynamic")
     env.reset(seed=1)

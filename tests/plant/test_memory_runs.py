@@ -1,5 +1,7 @@
 """Runs with radiation memory: decays against OpenFAST, both forms against each other, and integrators."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -19,6 +21,8 @@ MOTIONS = {  # motion: (channel of the reference, entry of the state, offset, th
     "yaw": ("PtfmYaw_[deg]", State.YAW, 8.0, np.pi / 180.0),
 }
 
+CONVOLUTION = pytest.param("convolution", marks=pytest.mark.nightly)
+
 
 @pytest.fixture(scope="module")
 def platform():
@@ -30,22 +34,23 @@ def platform():
 
 @pytest.fixture(scope="module")
 def decays(platform):
-    """{(form, motion): its channel every second}, and the reference under "openfast"."""
-    found = {}
-    for form in ("state_space", "convolution"):
+    """Function of a form of the memory and a motion: its channel every second, here and in OpenFAST."""
+
+    @cache
+    def both(form, name):
         scene = build_scene(platform, fidelity="standard", radiation=form)
-        steps = round(1.0 / scene.dt)
-        for name, (channel, entry, offset, unit) in MOTIONS.items():
-            run = reference(f"decay_{name}", place="iea15_volturnus_s")
-            every = round(1.0 / run["Time_[s]"][1])
-            found["openfast", name] = run[channel].to_numpy()[: 300 * every + 1 : every]
-            handle, x, rows = scene.handle(), np.zeros(scene.n_state), [offset]
-            x[entry] = offset * unit
-            for second in range(found["openfast", name].size - 1):
-                assert advance(handle, x, np.zeros(2), second * steps, steps, scene.dt) == 0
-                rows.append(x[entry] / unit)
-            found[form, name] = np.array(rows)
-    return found
+        steps, (channel, entry, offset, unit) = round(1.0 / scene.dt), MOTIONS[name]
+        run = reference(f"decay_{name}", place="iea15_volturnus_s")
+        every = round(1.0 / run["Time_[s]"][1])
+        theirs = run[channel].to_numpy()[: 300 * every + 1 : every]
+        handle, x, rows = scene.handle(), np.zeros(scene.n_state), [offset]
+        x[entry] = offset * unit
+        for second in range(theirs.size - 1):
+            assert advance(handle, x, np.zeros(2), second * steps, steps, scene.dt) == 0
+            rows.append(x[entry] / unit)
+        return np.array(rows), theirs
+
+    return both
 
 
 def miss(one, other):
@@ -53,15 +58,16 @@ def miss(one, other):
 
 
 @pytest.mark.parametrize("name", MOTIONS)
-@pytest.mark.parametrize("form", ["state_space", "convolution"])
+@pytest.mark.parametrize("form", ["state_space", CONVOLUTION])
 def test_free_decays_are_openfasts(decays, form, name):
     """HydroDyn's convolution of the same coefficients over 60 s; measured 0.2 to 1.0 % of the record."""
-    assert miss(decays[form, name], decays["openfast", name]) < 0.015
+    assert miss(*decays(form, name)) < 0.015
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", MOTIONS)
 def test_the_state_space_decays_as_the_convolution_does(decays, name):
-    assert miss(decays["state_space", name], decays["convolution", name]) < 0.01
+    assert miss(decays("state_space", name)[0], decays("convolution", name)[0]) < 0.01
 
 
 def test_natural_periods_are_openfasts(platform):
@@ -120,7 +126,7 @@ def test_integrators_converge_with_memory_to_second_order_or_better(platform, in
     assert misses[0] > 3.3 * misses[1] and misses[1] < 2e-4
 
 
-@pytest.mark.parametrize("form", ["state_space", "convolution"])
+@pytest.mark.parametrize("form", ["state_space", CONVOLUTION])
 def test_a_snapshot_carries_the_memory(platform, form):
     scene = build_scene(platform, fidelity="standard", radiation=form)
     x, u, data = np.zeros(scene.n_state), np.zeros(2), scene.data()

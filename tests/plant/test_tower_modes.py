@@ -91,7 +91,7 @@ class Bending:
         return falling, np.concatenate(list(self.twin.accelerations(falling).values()))
 
 
-@pytest.mark.parametrize("n", [2, 4])
+@pytest.mark.parametrize("n", [2, pytest.param(4, marks=pytest.mark.nightly)])
 def test_accelerations_are_those_of_particles_on_their_paths(platform, turbine, n):
     rng = np.random.default_rng(n)
     case = Bending(platform, turbine, n, CONSTANT)
@@ -224,7 +224,7 @@ def test_it_converges_with_order_four(pinned, integrator):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.35)
 
 
-@pytest.mark.parametrize("second", [False, True])
+@pytest.mark.parametrize("second", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_a_clamped_tower_keeps_its_period_at_the_default_step(second):
     """0.1 s is 0.4 of the first mode's period over two pi, and 1.8 of the second's: five and 25 turns."""
     start = [0.0, 0.0, 0.02, 0.01] if second else [0.3, -0.2, 0.0, 0.0]

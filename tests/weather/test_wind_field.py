@@ -203,6 +203,7 @@ def scenes():
     )
 
 
+@pytest.mark.nightly
 def test_a_uniform_box_gives_the_motion_and_the_trim_of_the_same_steady_wind():
     box, steady = scenes()
     points = [fowt_env.trim(scene, platform="fixed") for scene in (box, steady)]

@@ -102,7 +102,12 @@ def test_a_tilted_shaft_is_a_pitched_platform():
 @pytest.mark.parametrize(
     ("kind", "blades"),
     # three blades in a sheared wind are taken together, two one by one
-    [("sheared", 3), ("sheared", 2), ("box", 3), ("still lower edge", 3)],
+    [
+        ("sheared", 3),
+        ("sheared", 2),
+        pytest.param("box", 3, marks=pytest.mark.nightly),
+        ("still lower edge", 3),
+    ],
 )
 def test_the_table_of_stations_gives_what_is_solved(kind, blades):
     turbine = curved(STRAIGHT, blades=blades)
@@ -309,7 +314,10 @@ def rotors(request):
     return turbine, [(solved, elements), (looked_up, build_section_table(elements))]
 
 
-fields = pytest.mark.parametrize("field", [None, rough_field()], ids=["series", "box"])
+fields = pytest.mark.parametrize(
+    "field",
+    [pytest.param(None, id="series"), pytest.param(rough_field(), id="box", marks=pytest.mark.nightly)],
+)
 
 
 @compiled

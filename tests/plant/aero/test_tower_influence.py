@@ -89,7 +89,13 @@ def test_loads_are_those_of_the_wind_with_the_tower_by_plain_vectors(potential, 
 
 
 @compiled
-@pytest.mark.parametrize("turbine", [STRAIGHT, CURVED], ids=["straight", "curved"])
+@pytest.mark.parametrize(
+    "turbine",
+    [
+        pytest.param(STRAIGHT, id="straight"),
+        pytest.param(CURVED, id="curved", marks=pytest.mark.nightly),
+    ],
+)
 def test_the_look_up_has_the_same_influence(turbine):
     states, winds = moving(60)
     elements, tilt = with_tower(turbine, "bak", "powles"), turbine.rotor.shaft_tilt

@@ -17,7 +17,7 @@ from naive.flexible_turbine import Path as Course
 from naive.flexible_turbine import value_of
 
 STATES = 200  # of each platform
-PLATFORMS = ("oc3_hywind", "iea15_volturnus_s")
+PLATFORMS = ("oc3_hywind", pytest.param("iea15_volturnus_s", marks=pytest.mark.nightly))
 KINDS = [
     {"blades": blades, "tower": tower, "shaft": shaft, "fixed": fixed}
     for fixed in ((), ("platform",), ("rotor",))

@@ -21,8 +21,8 @@ from fowt_env.plant.state import State, pose_of
 BARE = {"wind": None, "hydrodynamics": False, "mooring": False, "shaft": "torsion"}
 HELD = {"rigid_body.platform_fixed": True}
 ELASTIC = Path(__file__).parents[3] / "training/validation/reference/elastic"
-TURBINES = ("oc3_hywind", "iea15_volturnus_s")
 NIGHTLY = pytest.mark.nightly
+TURBINES = ("oc3_hywind", pytest.param("iea15_volturnus_s", marks=NIGHTLY))
 
 
 def inertias(turbine):
@@ -164,7 +164,7 @@ def test_a_stiff_shaft_is_a_rigid_one(parts):
         assert y == pytest.approx(x, rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.parametrize(("tower", "step"), [("modes", 0.1), ("modes2", 0.05)])
+@pytest.mark.parametrize(("tower", "step"), [pytest.param("modes", 0.1, marks=NIGHTLY), ("modes2", 0.05)])
 def test_a_tower_with_a_twisting_shaft_swings_no_further_at_the_default_step(tower, step):
     """At 0.1 s, 1.8 over the frequency, the second modes would grow without limit within two seconds."""
     scene = build_scene("oc3_hywind", **BARE, tower=tower)
@@ -179,7 +179,7 @@ def test_a_tower_with_a_twisting_shaft_swings_no_further_at_the_default_step(tow
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("turbine", ["nrel5mw", pytest.param("iea15", marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("turbine", ["nrel5mw", pytest.param("iea15", marks=NIGHTLY)])
 def test_blades_on_a_twisting_shaft_swing_no_further_at_the_default_step(turbine):
     """Without air: with an extrapolated torque of the blades the NREL 5 MW would swing ten times as far."""
     scene = build_scene("oc3_hywind", turbine=turbine, **BARE, blades="modes").with_model(HELD)
@@ -235,7 +235,10 @@ def test_refusals_name_key_and_remedy():
         build_scene("oc3_hywind", shaft="torsion", planar=True)
 
 
-@pytest.mark.parametrize(("case", "platform"), [("nrel5mw", "oc3_hywind"), ("iea15", "iea15_volturnus_s")])
+@pytest.mark.parametrize(
+    ("case", "platform"),
+    [("nrel5mw", "oc3_hywind"), pytest.param("iea15", "iea15_volturnus_s", marks=NIGHTLY)],
+)
 def test_a_lost_torque_rings_as_in_openfast(case, platform):
     """OpenFAST v5.0.0, rigid blades, 12 m/s, tower and platform held, generator torque lost at 20 s.
 

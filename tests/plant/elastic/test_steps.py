@@ -42,12 +42,12 @@ def states(scene, x, u, dt, seconds, every=False):
     return np.array(rows), status
 
 
-KIND = {"duration": 100.0, "fidelity": "standard", "tower": "modes", "shaft": "torsion"}
+KIND = {"duration": 100.0, "blades": "modes2", "tower": "modes2", "shaft": "torsion"}  # as elastic_scene
 
 
 @pytest.fixture(scope="module")
 def waves():
-    return build_scene("oc3_hywind", wind=18.0, sea=SEA, seed=1, blades="modes", **KIND)
+    return build_scene("oc3_hywind", wind=18.0, sea=SEA, seed=1, **KIND)
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ LIMITS = {
 @pytest.mark.parametrize("case", LIMITS)
 def test_the_default_step_is_stable(platform, case):
     wind, over, pitch, share, held = LIMITS[case]
-    scene = build_scene(platform, wind=wind, sea=SEA, seed=1, blades="modes2", **KIND | {"tower": "modes2"})
+    scene = build_scene(platform, wind=wind, sea=SEA, seed=1, **KIND)
     scene = scene.with_model({"rigid_body.rotor_fixed": held})
     speed, torque = RATED[platform]
     begin = start(scene, over * speed, pitch, share * torque)

@@ -355,6 +355,7 @@ def codes(code, folder):
     return dict(zip(words[::2], words[1::2], strict=True))
 
 
+@pytest.mark.nightly
 def test_an_edit_of_a_text_or_a_plot_voids_no_results_and_one_of_what_shapes_a_run_does(tmp_path):
     code = copied_code(tmp_path)
     (tmp_path / "own.py").write_text(OWN)
