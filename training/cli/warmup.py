@@ -19,7 +19,7 @@ def warmup(
     """Compile kernels of the usual scenes in advance.
 
     Examples:
-    fowt warmup  # simulate and the environment, OC3-Hywind: later runs start at once
+    fowt warmup  # one to three minutes: simulate and the environment, OC3-Hywind; later runs start at once
     fowt warmup --kinds standard,vector,linear --jobs 2  # other kinds, after the first in parallel
     fowt warmup --kinds all  # standard, environment, easy, vector, steady, linear, fast and reference
     """

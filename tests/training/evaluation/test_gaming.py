@@ -49,6 +49,8 @@ TYPICAL = dict.fromkeys(METRICS, 1.0) | {
     HELD_SPEED: 12.1, HELD_TORQUE: 43.09355,
 }  # fmt: skip
 
+KNOWN = {}  # hashes of runs: what entries() has found
+
 
 def table(**controllers):
     """An evaluation of the headline suite: {name: function of (wind, seed) that changes typical figures}.
@@ -79,9 +81,12 @@ def table(**controllers):
 
 
 def entries(runs):
-    """{controller: entry} of the leaderboard of the headline suite."""
-    board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
-    return {entry["controller"]: entry for entry in board["controllers"]}
+    """{controller: entry} of the leaderboard of the headline suite, which takes seconds and is kept."""
+    key = tuple(pd.util.hash_pandas_object(runs))
+    if key not in KNOWN:
+        board = leaderboard(runs, score=HEADLINE.score, limits=HEADLINE.limits)
+        KNOWN[key] = {entry["controller"]: entry for entry in board["controllers"]}
+    return KNOWN[key]
 
 
 def ranks(runs):
