@@ -28,6 +28,7 @@ from fowt_env.scene.parts import (
     build_moorings,
     check_symmetry,
     fastest_motion,
+    nacelle_swing,
     wake_states,
     with_airfoil_step,
     with_blade_states,
@@ -111,7 +112,8 @@ def build_scene(
     next_state += 0 if shaft is None else 2
     body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
     structure = build_structure(platform, turbine, tower, blades, shaft)
-    dt = default_step(options, fastest_motion(options, tower, mooring, body, structure))
+    fastest = fastest_motion(options, tower, mooring, body, structure)
+    dt = default_step(options, fastest, nacelle_swing(options, tower, body, structure, turbine))
     aero = with_airfoil_step(aero, dt)
     pitches = None
     if options["pitch"] == "individual":

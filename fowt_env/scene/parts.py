@@ -1,6 +1,6 @@
 """Builds parts of the plant's model from the descriptions: rotor, hull, moorings, current."""
 
-from math import cos, radians, sin
+from math import cos, radians, sin, sqrt
 
 import numpy as np
 
@@ -38,7 +38,7 @@ from fowt_env.plant.tilt import build_tilt
 from fowt_env.scene.blade_beam import station_bending
 from fowt_env.scene.options import ROTORS, chosen_stations
 from fowt_env.scene.radiation_fit import build_radiation
-from fowt_env.scene.tower import tower_frequency
+from fowt_env.scene.tower import nacelle_mobility, tower_frequency
 from fowt_env.scene.weather import IN_PLANE
 from fowt_env.weather.excitation import build_excitation, still_excitation
 from fowt_env.weather.waves import flat_waves, is_flat
@@ -359,3 +359,15 @@ def fastest_motion(options, tower, mooring, body, structure):
         # what a default step is allowed
         share = 0.0 if options["shaft"] == "rigid" else 0.5
     return max(share * tower_frequency(tower, body, structure), line_frequency(mooring, body.mass))
+
+
+def nacelle_swing(options, tower, body, structure, turbine):
+    """Return sqrt(k m), rad/s, of the stiffness of a shaft and the mobility of the nacelle by its torque.
+
+    By so much the nacelle speeds up blades that bend in phase on the shaft, which steps advance as beside a
+    nacelle at rest. 0 where they do not. The nacelle feels what the gearbox does not pass on.
+    """
+    if "rigid" in (options["blades"], options["shaft"]) or not INTEGRATORS[options["integrator"]].swings:
+        return 0.0
+    mobility = nacelle_mobility(tower, body, structure, turbine)
+    return (1.0 - 1.0 / turbine.drivetrain.gear_ratio) * sqrt(turbine.shaft_torsion.stiffness * mobility)

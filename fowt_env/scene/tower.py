@@ -111,6 +111,26 @@ def tower_frequency(modes, body, structure):
     """
     if modes is None:
         return 0.0
+    mass, _ = _masses(modes, body, structure)
+    flexibility = np.linalg.inv(mass)[6:, 6:]
+    return float(np.sqrt(np.linalg.eigvals(flexibility @ modes.beam.stiffness).real.max()))
+
+
+def nacelle_mobility(modes, body, structure, turbine):
+    """Return the angular acceleration about the shaft of a nacelle by a torque on it, 1/(kg m2).
+
+    On the dry floater, with a straight tower and a rotor that is free to turn. modes: TowerModes, or None.
+    """
+    rotor = turbine.rotor
+    mass, moved = _masses(modes, body, structure)
+    about = np.cos(rotor.shaft_tilt) * moved[3] - np.sin(rotor.shaft_tilt) * moved[5]
+    return float(about @ np.linalg.solve(mass - rotor.inertia * np.outer(about, about), about))
+
+
+def _masses(modes, body, structure):
+    """Return (mass matrix (6 + n, 6 + n) of platform and tower, (6, 6 + n) velocities of the nacelle)."""
+    if modes is None:
+        return body.mass_matrix, np.eye(6)
     beam, n, height, slope = modes.beam, len(modes.slope), modes.top_height, modes.slope
     along = np.arange(n) % 2 == 0
     # velocity of the body origin as a point of the nacelle, and angular velocity
@@ -120,9 +140,7 @@ def tower_frequency(modes, body, structure):
     lower, coupling = structure.lower.mass_matrix, np.zeros((6, n))
     coupling[0], coupling[1], coupling[3], coupling[4] = beam.a, beam.b, -beam.f, beam.e
     mass = moved.T @ (body.mass_matrix - lower) @ moved
-    mass += np.block([[lower, coupling], [coupling.T, beam.A + beam.B]])
-    flexibility = np.linalg.inv(mass)[6:, 6:]
-    return float(np.sqrt(np.linalg.eigvals(flexibility @ beam.stiffness).real.max()))
+    return mass + np.block([[lower, coupling], [coupling.T, beam.A + beam.B]]), moved
 
 
 def _stiffness(bending, middle, curvature, fore_aft, cell, count):

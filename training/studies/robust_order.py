@@ -93,7 +93,7 @@ def scores_of(suite, table):
     texts, values = {}, {}
     for entry in entries:
         score = entry["score"]
-        values[entry["controller"]] = score["mean"]
+        values[entry["controller"]] = np.nan if score["mean"] is None else score["mean"]  # no run has ended
         texts[entry["controller"]] = score_text(score | {which: score}, which)
     return texts, values
 

@@ -13,7 +13,8 @@ from fowt_env.plant.state import BLADES, State
 
 FINE, T = 0.00625, 20.0
 SEA = {"kind": "jonswap", "Hs": 7.5, "Tp": 10.0}
-RATED = {"oc3_hywind": (1.267, 43_093.0), "iea15_volturnus_s": (0.79, 19.8e6)}  # rad/s, N m
+RATED = dict.fromkeys(("oc3_hywind", "nrel5mw_oc4_semi"), (1.267, 43_093.0))  # rad/s, N m
+RATED["iea15_volturnus_s"] = (0.79, 19.8e6)
 
 
 def start(scene, speed, pitch, torque):
@@ -108,7 +109,8 @@ def test_loads_at_every_second_step_are_as_good_as_at_every_step(waves, moved):
     deviation = exact.std(axis=0)
     here = deviation > 0.0
     errors = [np.sqrt(((rows - exact) ** 2).mean(axis=0))[here] / deviation[here] for rows in (every, second)]
-    assert np.all(errors[1] < errors[0] + 3e-4)
+    # both are off by 43 % of the rate of a second tower mode, which moves by millimetres
+    assert np.all(errors[1] < 1.001 * errors[0] + 3e-4)
 
 
 def test_the_default_step_converges_with_order_four(waves):
@@ -136,7 +138,7 @@ LIMITS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "platform", ["oc3_hywind", pytest.param("iea15_volturnus_s", marks=pytest.mark.nightly)]
+    "platform", ["oc3_hywind", *(pytest.param(name, marks=pytest.mark.nightly) for name in list(RATED)[1:])]
 )
 @pytest.mark.parametrize("case", LIMITS)
 def test_the_default_step_is_stable(platform, case):
@@ -156,6 +158,22 @@ def test_the_default_step_is_stable(platform, case):
         assert np.abs(deflections).max() < 0.25 * scene.turbine.rotor.tip_radius
     assert swings[0][-100:].max() < 2.0 * swings[0][50:250].max()
     assert swings[0][-100:].max() < 1.2 * swings[1][-100:].max()
+
+
+@pytest.mark.parametrize(
+    ("platform", "parts", "step"),
+    [
+        ("oc3_hywind", {}, 0.05),
+        ("oc3_hywind", {"shaft": "rigid"}, 0.025),
+        ("nrel5mw_oc4_semi", {}, 0.025),  # whose nacelle the torque of the shaft moves more
+        ("nrel5mw_oc4_semi", {"turbine": "nrel5mw"}, 0.025),
+        ("nrel5mw_iti_barge", {}, 0.05),
+        ("iea15_volturnus_s", {}, 0.05),  # without a gearbox, whose torque would move the nacelle
+    ],
+)
+def test_the_default_step_is_halved_where_blades_in_phase_move_the_nacelle(platform, parts, step):
+    """0.05 s on the OC4 semi-submersible: the speed of the rotor grew fivefold each second in any wind."""
+    assert build_scene(platform, fidelity="elastic", **parts).dt == step
 
 
 @pytest.mark.slow
