@@ -519,7 +519,8 @@ def report(rows, platform, names=None, laws=None, winds=None):
     have, known = set(rows["model"]), [*OPENFAST, *models(platform)]
     names = [name for name in known if name in have] if names is None else [REFERENCE, *names]
     names = list(dict.fromkeys(names))
-    laws = [law for law in LAWS if law in set(rows["law"])] if laws is None else list(laws)
+    made = sorted(set(rows["law"]))
+    laws = [law for law in dict.fromkeys((*LAWS, *made)) if law in made] if laws is None else list(laws)
     rows = comparable(rows, names, laws)
     if rows.empty or REFERENCE not in names or BASELINE not in laws:
         raise InputError(
