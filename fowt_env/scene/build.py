@@ -18,7 +18,7 @@ from fowt_env.scene.actuators import build_actuator, build_converter, drive_stat
 from fowt_env.scene.blade_beam import blade_states, build_blade_modes
 from fowt_env.scene.geometry import warn_of_geometry
 from fowt_env.scene.mass import build_layout, build_rigid_body
-from fowt_env.scene.options import checked_options, choose_parts, default_step, samples_per_step
+from fowt_env.scene.options import checked_options, choose_parts, samples_per_step
 from fowt_env.scene.parts import (
     airfoil_states,
     build_aero,
@@ -27,8 +27,7 @@ from fowt_env.scene.parts import (
     build_hydro,
     build_moorings,
     check_symmetry,
-    fastest_motion,
-    nacelle_swing,
+    step_of,
     wake_states,
     with_airfoil_step,
     with_blade_states,
@@ -112,8 +111,7 @@ def build_scene(
     next_state += 0 if shaft is None else 2
     body = build_rigid_body(platform, turbine, plane=True if options["planar"] else None)
     structure = build_structure(platform, turbine, tower, blades, shaft)
-    fastest = fastest_motion(options, tower, mooring, body, structure)
-    dt = default_step(options, fastest, nacelle_swing(options, tower, body, structure, turbine))
+    dt = step_of(options, tower, mooring, body, structure, turbine)
     aero = with_airfoil_step(aero, dt)
     pitches = None
     if options["pitch"] == "individual":

@@ -36,7 +36,7 @@ from fowt_env.plant.mooring import build_mooring
 from fowt_env.plant.state import BLADES, N_RIGID
 from fowt_env.plant.tilt import build_tilt
 from fowt_env.scene.blade_beam import station_bending
-from fowt_env.scene.options import ROTORS, chosen_stations
+from fowt_env.scene.options import ROTORS, chosen_stations, default_step
 from fowt_env.scene.radiation_fit import build_radiation
 from fowt_env.scene.tower import nacelle_mobility, tower_frequency
 from fowt_env.scene.weather import IN_PLANE
@@ -349,6 +349,12 @@ def build_moorings(platform, options):
     dynamics = build_line_dynamics(platform.lines, own, *fluid)
     # moving lines have no friction on the bed, and their states of rest none either
     return mooring._replace(dynamics=dynamics, friction=np.zeros_like(mooring.friction))
+
+
+def step_of(options, tower, mooring, body, structure, turbine):
+    """Return the default physics step (s) of a scene with these parts."""
+    fastest = fastest_motion(options, tower, mooring, body, structure)
+    return default_step(options, fastest, nacelle_swing(options, tower, body, structure, turbine))
 
 
 def fastest_motion(options, tower, mooring, body, structure):

@@ -41,8 +41,8 @@ from fowt_env.plant.state import (
 from fowt_env.plant.user_loads import user_data_size
 from fowt_env.scene.actuators import drive_states
 from fowt_env.scene.blade_beam import blade_states, kept_states
-from fowt_env.scene.options import FIDELITIES, LEVEL_PARTS, OPTIONS, default_step, least_lag
-from fowt_env.scene.parts import airfoil_states, fastest_motion, hydro_in_waves, nacelle_swing, wake_states
+from fowt_env.scene.options import FIDELITIES, LEVEL_PARTS, OPTIONS, least_lag
+from fowt_env.scene.parts import airfoil_states, hydro_in_waves, step_of, wake_states
 from fowt_env.scene.radiation_fit import memory_for_step
 from fowt_env.scene.tower import tower_states
 from fowt_env.scene.user_loads import Load, first_nonfinite_load
@@ -256,11 +256,8 @@ class Scene:
     def dt(self) -> float:
         """Return the default physics step (s) of the integrator; finer for fidelity, tower or lines."""
         model = self.model
-        body = model.rigid_body, model.structure
-        fastest = fastest_motion(self.options, model.tower, model.mooring, *body)
-        return default_step(
-            self.options, fastest, nacelle_swing(self.options, model.tower, *body, self.turbine)
-        )
+        parts = model.tower, model.mooring, model.rigid_body, model.structure
+        return step_of(self.options, *parts, self.turbine)
 
     def with_step(self, dt: float) -> "Scene":
         """Return this scene for the time step dt (s).
