@@ -87,7 +87,7 @@ def test_a_bent_rotor_needs_more_pitch_and_holds_rated_power(elastic_scene, poin
     assert 14.0 < point["BldPitch1"] < 16.0
     for number in (1, 2, 3):  # means over a turn are equal
         assert point[f"OoPDefl{number}"] == pytest.approx(point["OoPDefl1"], rel=1e-9)
-    assert point["OoPDefl1"] == pytest.approx(1.31, abs=0.1)  # of OpenFAST with a fixed platform
+    assert point["OoPDefl1"] == pytest.approx(1.37, abs=0.05)  # OpenFAST 1.31, on a fixed platform
 
 
 @pytest.mark.nightly

@@ -51,11 +51,6 @@ def waves():
     return build_scene("oc3_hywind", wind=18.0, sea=SEA, seed=1, **KIND)
 
 
-@pytest.fixture(scope="module")
-def moved(waves):
-    return start(waves, *RATED["oc3_hywind"][:1], 0.26, RATED["oc3_hywind"][1])
-
-
 def test_differences_of_blades_are_corrected_for_fourth_differences_of_structure_and_damping(waves):
     """Not their mean, which is exact on a shaft that twists."""
     blades, work, rng, dt = waves.model.blades, waves.data().rotor, np.random.default_rng(4), 0.05
@@ -101,7 +96,9 @@ def test_slow_loads_are_extrapolated_by_the_cubic_through_four_evaluations():
 
 
 @pytest.mark.nightly
-def test_loads_at_every_second_step_are_as_good_as_at_every_step(waves, moved):
+def test_loads_at_every_second_step_are_as_good_as_at_every_step():
+    waves = build_scene("oc3_hywind", 18.0, SEA, seed=1, **KIND | {"blades": "modes", "tower": "modes"})
+    moved = start(waves, *RATED["oc3_hywind"][:1], 0.26, RATED["oc3_hywind"][1])
     exact, _ = states(waves, *moved, FINE, T)
     every, _ = states(waves, *moved, waves.dt, T, every=True)
     second, _ = states(waves, *moved, waves.dt, T)
@@ -109,8 +106,7 @@ def test_loads_at_every_second_step_are_as_good_as_at_every_step(waves, moved):
     deviation = exact.std(axis=0)
     here = deviation > 0.0
     errors = [np.sqrt(((rows - exact) ** 2).mean(axis=0))[here] / deviation[here] for rows in (every, second)]
-    # both are off by 43 % of the rate of a second tower mode, which moves by millimetres
-    assert np.all(errors[1] < 1.001 * errors[0] + 3e-4)
+    assert np.all(errors[1] < errors[0] + 3e-4)
 
 
 def test_the_default_step_converges_with_order_four(waves):
@@ -172,7 +168,7 @@ def test_the_default_step_is_stable(platform, case):
     ],
 )
 def test_the_default_step_is_halved_where_blades_in_phase_move_the_nacelle(platform, parts, step):
-    """0.05 s on the OC4 semi-submersible: the speed of the rotor grew fivefold each second in any wind."""
+    """With 0.05 s runs of the OC4 semi-submersible at 14 and 18 m/s ended as not finite, one at 8.5 s."""
     assert build_scene(platform, fidelity="elastic", **parts).dt == step
 
 
