@@ -212,9 +212,7 @@ def _bearing_of_elastic(pose, rates, x, speed, rate, wrench, model, structure, d
 
 
 # -> moment (3) of nacelle and rotor on the tower top, see bearing_moments
-_bearing = chosen_by_class(
-    "structure", {type(None): _bearing_of_rigid, Structure: _bearing_of_elastic}, inlined=True
-)
+_bearing = chosen_by_class("structure", {type(None): _bearing_of_rigid, Structure: _bearing_of_elastic})
 
 
 @inlined_kernel
@@ -242,7 +240,7 @@ def _of_rigid(pose, rates, x, dx, rotor, model, data):
 
 # (pose, rates, x, dx, rotor, model, data) -> BladeMoments at a state with its last loads; pose and rates of
 # the nacelle frame; rotor: BentRotor, or None
-blade_moments = chosen_by_class("rotor", {type(None): _of_rigid, BentRotor: _of_bending}, inlined=True)
+blade_moments = chosen_by_class("rotor", {type(None): _of_rigid, BentRotor: _of_bending})
 
 
 @kernel

@@ -10,7 +10,7 @@ from fowt_env.plant.aero.load import wind_of
 from fowt_env.plant.aero.wind import wind_at, wind_now
 from fowt_env.plant.blade_outputs import measure_blades, record_blades
 from fowt_env.plant.blade_pitches import mean_pitch
-from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel, separate_kernel
 from fowt_env.plant.drivetrain import torque_in_force
 from fowt_env.plant.elastic.chain import weighed_body
 from fowt_env.plant.elastic.outputs import add_upper_load, bent_rotor, record_bending, shaft_load
@@ -201,7 +201,7 @@ def elevation_now(t, hydro, data):
     return cache[LoadCache.ELEVATION]
 
 
-@inlined_kernel
+@separate_kernel
 def measure(model, data, x, dx, u, t, m):
     """Fill the measurement array m (Scene.n_measurements,) from a state, its loads in data and its rates."""
     layout, sines = model.layout, data.cache[LoadCache.SINES :]
@@ -226,7 +226,7 @@ def measure(model, data, x, dx, u, t, m):
     measure_blades(nacelle, moving, x, dx, model.pitches, model, data, m)
 
 
-@inlined_kernel
+@separate_kernel
 def record(model, data, x, dx, u, t, loads, row):
     """Fill one output row (n_channels,), SI, in the order of channels()."""
     layout = model.layout

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from fowt_env.plant.aero.blade_sweep import RotorLoad
 from fowt_env.plant.aero.load import aero_load
 from fowt_env.plant.blade_pitches import fill_pitch_rates
-from fowt_env.plant.compile.decorators import inlined_kernel, kernel, shared_kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel, separate_kernel
 from fowt_env.plant.drivetrain import fill_torque_rate, shaft_torque, torque_in_force
 from fowt_env.plant.elastic.blades import fill_deflection_rates
 from fowt_env.plant.elastic.chain import accelerate_all, condense_elastic, weighed_body
@@ -46,7 +46,7 @@ class Loads(NamedTuple):
     mooring: Wrench
 
 
-@shared_kernel
+@separate_kernel
 def evaluate_loads(t, x, model, data, dx):
     """Evaluate all loads at a state into data; of dx only the rates of internal states are written."""
     cache, plane = data.cache, model.rigid_body.plane
@@ -88,7 +88,7 @@ def evaluate_loads(t, x, model, data, dx):
     cache[LoadCache.THRUST] = aero.rotor.thrust
 
 
-@shared_kernel
+@separate_kernel
 def respond(x, u, model, data, dx):
     """Fill dx with the rates of the state under the command u, from the loads of the last evaluation."""
     cache, body = data.cache, model.rigid_body

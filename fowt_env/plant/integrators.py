@@ -14,7 +14,7 @@ from fowt_env.plant.adams import bashforth, moulton
 from fowt_env.plant.aero.load import rotor_part, step_air
 from fowt_env.plant.aero.wind import wind_now
 from fowt_env.plant.blade_pitches import advance_actuators, mean_pitch, pitches_jump, set_followed
-from fowt_env.plant.compile.decorators import inlined_kernel, kernel
+from fowt_env.plant.compile.decorators import inlined_kernel, kernel, separate_kernel
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.dynamics import derivative, evaluate_loads, respond, store, stored
 from fowt_env.plant.elastic.in_phase import (
@@ -402,10 +402,8 @@ INTEGRATORS = {
         part=Adams(corrector=False), step=adams, samples_rotor=True, swings=True,
     ),
 }  # fmt: skip
-method_step = chosen_by_class("method", {type(m.part): m.step for m in INTEGRATORS.values()}, inlined=True)
-jump_pitch = chosen_by_class(
-    "method", {RungeKutta: set_pitch, Heun: set_pitch, Adams: set_pitch_and_history}, inlined=True
-)
+method_step = chosen_by_class("method", {type(m.part): m.step for m in INTEGRATORS.values()})
+jump_pitch = chosen_by_class("method", {RungeKutta: set_pitch, Heun: set_pitch, Adams: set_pitch_and_history})
 
 
 def build_integrator(name, rotor_samples=1):
@@ -428,7 +426,7 @@ def rotor_samples(method):
     return 0 if substeps is None else substeps.samples
 
 
-@inlined_kernel
+@separate_kernel
 def take_step(t, x, u, dt, model, method, data):
     """Advance x in place by one step of the integrator of the scene."""
     if pitches_jump(x, u, dt, model.actuator, model.pitches):  # an actuator without lag

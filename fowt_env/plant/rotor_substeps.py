@@ -137,7 +137,7 @@ def _push_elastic(dt, x, load, torque, model, structure, data, y):
 
 # (dt, x, load, torque, model, structure, data, y): velocities y plus those by a Wrench on the nacelle and a
 # torque on the shaft over dt, with the mass matrix of the last evaluation, at x
-_push = chosen_by_class("structure", {type(None): _push_rigid, Structure: _push_elastic}, inlined=True)
+_push = chosen_by_class("structure", {type(None): _push_rigid, Structure: _push_elastic})
 
 
 @inlined_kernel

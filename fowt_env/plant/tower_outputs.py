@@ -86,4 +86,4 @@ def _bent(pose, x, dx, loads, bend, body, layout, tower, work):
 # (pose, x, dx, loads, bend, body, layout, tower, work) -> Wrench on the tower base, body axes about body
 # origin: aerodynamics, user loads and weight above the base less the rate of momentum there; without nacelle
 # and rotor where parts are elastic
-carried_at_base = chosen_by_class("tower", {type(None): _rigid, TowerModes: _bent}, inlined=True)
+carried_at_base = chosen_by_class("tower", {type(None): _rigid, TowerModes: _bent})

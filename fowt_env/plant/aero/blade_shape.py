@@ -343,43 +343,35 @@ effective_pitch = chosen_by_class(
 )
 # (turn, shape): positions of all stations of a blade that bends at a Turn, which the functions below read
 place_stations = chosen_by_class(
-    "shape",
-    {type(None): _already_placed, BladeShape: _already_placed, BentShape: _place_bent},
-    inlined=True,
+    "shape", {type(None): _already_placed, BladeShape: _already_placed, BentShape: _place_bent}
 )
 # (j, turn, radius, shape) -> position of station j: OnAxis, Station or BentStation
 station_at = chosen_by_class(
-    "shape",
-    {type(None): _station_on_axis, BladeShape: curved_station, BentShape: _bent_station},
-    inlined=True,
+    "shape", {type(None): _station_on_axis, BladeShape: curved_station, BentShape: _bent_station}
 )
 # (part, j, shape): StationLoad of a blade that bends into its loads: normal, tangential, pitching moment
 put_station = chosen_by_class(
-    "shape", {type(None): _keep_nothing, BladeShape: _keep_nothing, BentShape: _keep_station}, inlined=True
+    "shape", {type(None): _keep_nothing, BladeShape: _keep_nothing, BentShape: _keep_station}
 )
 # (plane, at) -> value of a Plane at the position of a station
 value_at = chosen_by_class(
-    "at",
-    {OnAxis: _value_on_axis, Station: _value_at_station, BentStation: _value_at_station},
-    inlined=True,
+    "at", {OnAxis: _value_on_axis, Station: _value_at_station, BentStation: _value_at_station}
 )
 # (along, out, at) -> component normal to the blade axis of a vector (along, out) in x and r
 normal_part = chosen_by_class(
-    "at", {OnAxis: _along_shaft, Station: _along_normal, BentStation: _along_normal}, inlined=True
+    "at", {OnAxis: _along_shaft, Station: _along_normal, BentStation: _along_normal}
 )
 # the same of a relative wind, with that of bending
 relative_normal_part = chosen_by_class(
-    "at", {OnAxis: _along_shaft, Station: _along_normal, BentStation: _along_bent_normal}, inlined=True
+    "at", {OnAxis: _along_shaft, Station: _along_normal, BentStation: _along_bent_normal}
 )
 # (tangential, at) -> relative wind against the motion, the same
 relative_tangential_part = chosen_by_class(
-    "at", {OnAxis: _against_motion, Station: _against_motion, BentStation: _against_bending}, inlined=True
+    "at", {OnAxis: _against_motion, Station: _against_motion, BentStation: _against_bending}
 )
 # (load, part, j, turn, shape) -> BladeLoad with the StationLoad of station j added
 add_station = chosen_by_class(
-    "shape",
-    {type(None): _add_to_straight, BladeShape: _add_to_curved, BentShape: _add_to_bent},
-    inlined=True,
+    "shape", {type(None): _add_to_straight, BladeShape: _add_to_curved, BentShape: _add_to_bent}
 )
 
 

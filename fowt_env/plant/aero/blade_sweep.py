@@ -172,7 +172,7 @@ def _disturbed(flow, tower):
 
 
 # (flow, tower) -> the RotorFlow where the tower disturbs the wind, else None
-near_tower = chosen_by_class("tower", {type(None): _undisturbed, TowerInfluence: _disturbed}, inlined=True)
+near_tower = chosen_by_class("tower", {type(None): _undisturbed, TowerInfluence: _disturbed})
 
 
 @kernel
@@ -319,9 +319,7 @@ def _boxed(wind, at):
 
 
 # (wind, at) -> (v_normal, v_tangential)
-relative_wind = chosen_by_class(
-    "wind", {SampledWind: _sampled, ShearedWind: _sheared, BoxWind: _boxed}, inlined=True
-)
+relative_wind = chosen_by_class("wind", {SampledWind: _sampled, ShearedWind: _sheared, BoxWind: _boxed})
 
 
 # --------------------------------------------------------------------------------- the sweep
@@ -424,9 +422,7 @@ def _scale_stations(factor, shape):
 
 
 _scale_loads = chosen_by_class(
-    "shape",
-    {type(None): _nothing_to_scale, BladeShape: _nothing_to_scale, BentShape: _scale_stations},
-    inlined=True,
+    "shape", {type(None): _nothing_to_scale, BladeShape: _nothing_to_scale, BentShape: _scale_stations}
 )
 
 
@@ -447,7 +443,7 @@ def _bent_by_modes(number, x, shape, modes, blades):
 
 
 # (number, x, shape, modes, blades) -> shape of a blade (0, 1, ...) in a state
-shape_of = chosen_by_class("modes", {type(None): _at_rest, StationModes: _bent_by_modes}, inlined=True)
+shape_of = chosen_by_class("modes", {type(None): _at_rest, StationModes: _bent_by_modes})
 
 
 @inlined_kernel

@@ -79,7 +79,6 @@ _rotor_model = chosen_by_class(
         DynamicSections: _by_dynamic_sections,
         CoefficientTable: _by_coefficients,
     },
-    inlined=True,
 )
 
 
@@ -102,7 +101,6 @@ _step_airfoils = chosen_by_class(
         DynamicSections: _step_rotor,
         CoefficientTable: _step_no_rotor,
     },
-    inlined=True,
 )
 
 

@@ -172,9 +172,9 @@ def _lagging(number, induced, load, shape, skewed, airfoils, rate, rotor, x, dx)
 
 
 # (wind_speed, elements, wake) -> WakeRate in a wind relative to the hub, m/s; None without dynamic inflow
-_wake_rate = chosen_by_class("wake", {type(None): _no_rate, DynamicInflow: _rate}, inlined=True)
+_wake_rate = chosen_by_class("wake", {type(None): _no_rate, DynamicInflow: _rate})
 # (number, induced, load, shape, skewed, airfoils, rate, rotor, x, dx) -> response of a blade
-_response = chosen_by_class("rate", {type(None): _induced, WakeRate: _lagging}, inlined=True)
+_response = chosen_by_class("rate", {type(None): _induced, WakeRate: _lagging})
 
 
 @inlined_kernel

@@ -209,9 +209,7 @@ def _bent_stations(p, q, r, flow, reach, radius, shape):
 
 # (p, q, r, flow, reach, radius, shape) -> the three BladeForces of sheared_forces; shape: of p
 _forces_of_three = chosen_by_class(
-    "shape",
-    {type(None): _swept_stations, BladeShape: _swept_stations, BentShape: _bent_stations},
-    inlined=True,
+    "shape", {type(None): _swept_stations, BladeShape: _swept_stations, BentShape: _bent_stations}
 )
 
 

@@ -283,11 +283,11 @@ def rows_between(row, table):
 
 # (turn, table, shape) -> Rows of a table that enclose a blade pitch within it, or PitchedRows
 rows_of = chosen_by_class(
-    "shape", {type(None): _straight_rows, BladeShape: _straight_rows, BentShape: _bent_rows}, inlined=True
+    "shape", {type(None): _straight_rows, BladeShape: _straight_rows, BentShape: _bent_rows}
 )
 # (j, rows, shape) -> Rows of station j
 _station_rows = chosen_by_class(
-    "shape", {type(None): _same_rows, BladeShape: _same_rows, BentShape: _rows_at_station}, inlined=True
+    "shape", {type(None): _same_rows, BladeShape: _same_rows, BentShape: _rows_at_station}
 )
 
 
@@ -430,5 +430,4 @@ station_load = chosen_by_class(
         Induced: _induced_table_load,
         Lagging: _lagging_load,
     },
-    inlined=True,
 )

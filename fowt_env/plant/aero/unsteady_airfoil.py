@@ -176,7 +176,7 @@ def _unsteady(number, pitch, shape, elements, airfoils, x, dx):
 
 
 # (number, pitch, shape, elements, airfoils, x, dx) -> AirfoilBlade of a blade, None: quasi-steady
-airfoil_blade = chosen_by_class("airfoils", {type(None): _steady, UnsteadyAirfoils: _unsteady}, inlined=True)
+airfoil_blade = chosen_by_class("airfoils", {type(None): _steady, UnsteadyAirfoils: _unsteady})
 
 
 @kernel

@@ -107,7 +107,7 @@ def _with_skew(skewed, skew, motion, elements):
 
 
 # (skewed, skew, motion, elements) -> BladeSkew of a blade with this BladeMotion, None without a skew model
-blade_skew = chosen_by_class("skew", {type(None): _no_skew, SkewedWake: _with_skew}, inlined=True)
+blade_skew = chosen_by_class("skew", {type(None): _no_skew, SkewedWake: _with_skew})
 
 
 @inlined_kernel

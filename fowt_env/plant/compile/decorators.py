@@ -28,7 +28,12 @@ from numba.core.ccallback import CFunc  # noqa: E402
 from fowt_env.folders import cache_root, distrust, make_private  # noqa: E402
 from fowt_env.layout import PACKAGE, installed_path  # noqa: E402
 from fowt_env.plant.compile.disk_cache import KernelCache  # noqa: E402
-from fowt_env.plant.compile.linked import LinkedCompiler, LinkedDispatcher, SharedCompiler  # noqa: E402
+from fowt_env.plant.compile.linked import (  # noqa: E402
+    LinkedCompiler,
+    LinkedDispatcher,
+    SeparateCompiler,
+    SharedCompiler,
+)
 from fowt_env.plant.compile.notice import NOTICE  # noqa: E402, F401  # registers its listener
 from fowt_env.plant.compile.sources import imported_at_top, keep_sources, read_source  # noqa: E402
 
@@ -169,6 +174,10 @@ inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=Linke
 # copies of all loads take most of the time to compile, and of that to run, in which the processor then waits
 # for instructions.
 shared_kernel = _decorator(**_HOUSE, _nrt=False, linked=SharedCompiler)
+
+# A kernel with machine code of its own, which every entry calls: the steps of a scene and its outputs. With a
+# copy of the whole plant in each entry, compiling took two to three times as long.
+separate_kernel = _decorator(**_HOUSE, _nrt=False, linked=SeparateCompiler)
 
 # Functions called from Python, which take Handles (counted references) or allocate.
 entry = _decorator(**_HOUSE)

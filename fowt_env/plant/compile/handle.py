@@ -8,13 +8,15 @@ A Reference does not keep its target alive: it is made in an entry, whose caller
 """
 
 import numba
+import numpy as np
 from numba import types
 from numba.core import cgutils, imputils
 from numba.core.datamodel import models, register_default
 from numba.core.extending import infer_getattr, intrinsic, lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate
 
-from fowt_env.plant.compile.decorators import entry
+from fowt_env.caches import Cache
+from fowt_env.plant.compile.payload import payload_writer
 
 
 def by_reference(kind):
@@ -41,6 +43,8 @@ if numba.config.DISABLE_JIT:
         return handle.data
 
 else:
+    from numba._dispatcher import compute_fingerprint
+    from numba.core.runtime import rtsys
     from numba.experimental import structref
 
     class Reference(types.Type):
@@ -90,14 +94,27 @@ else:
         """
 
         def __new__(cls, model, data):
-            return _filled_handle(model, data)
+            values = model, data
+            kind, size, write = _payload(values)
+            payload = np.zeros(size, dtype=np.uint8)
+            write(payload, 0, values)
+            owner = payload, values  # all memory that the payload refers to
+            return cls._numba_box_(kind, rtsys.meminfo_new(payload.ctypes.data, owner))
 
-    structref.define_proxy(Handle, _HandleType, ["model", "data"])
+    structref.define_boxing(_HandleType, Handle)
+    _payloads = Cache(64)  # by numba's fingerprint of a type: determining the type takes a ms
 
-    @entry
-    def _filled_handle(model, data):
-        """Return a Handle; numba's constructor is not cached and would take a second in every process."""
-        return Handle(model, data)
+    def _payload(values):
+        """Return (type of the Handle, size of its payload in bytes, writer) of (model, data)."""
+
+        def payload():
+            kinds, size, write = payload_writer(values)
+            return _HandleType(list(zip(("model", "data"), kinds, strict=True))), size, write
+
+        try:
+            return _payloads.get(compute_fingerprint(values), payload)
+        except NotImplementedError:  # it has none for a compiled function
+            return payload()
 
     def _reference_to(name):
         """Return the intrinsic that takes a Handle and returns a Reference to its field of this name."""

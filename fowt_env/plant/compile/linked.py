@@ -1,11 +1,16 @@
-"""Compiles kernels called by kernels to LLVM bitcode, which is linked into their callers.
+"""Compiles kernels called by kernels: to LLVM bitcode that callers link, or to machine code that they call.
 
 Numba generates machine code for each kernel. Where kernels alone call a kernel, that code is never run, as
 each caller has a copy, but takes 40 % of the compile time of a scene. Such a kernel is compiled to bitcode
 only, which callers link and the disk cache stores; calls from Python, as in tests, compile it separately.
+
+A large kernel with many callers is compiled to machine code once instead, and callers have its name only.
 """
 
+import hashlib
 from functools import cached_property
+from importlib import import_module
+from typing import NamedTuple
 
 import llvmlite.binding as llvm
 import numba
@@ -57,6 +62,26 @@ def place_environment(codegen, name, environment):
     codegen.set_env(name, environment)
 
 
+class SeparateLibrary(JITCodeLibrary):
+    """Holds the machine code of a kernel that callers call by name: they link nothing."""
+
+    def _get_module_for_linking(self):
+        return llvm.parse_assembly(str(self._codegen._create_empty_module(self.name)))
+
+    def serialized(self):
+        """Return (name, object code) of the library for the disk cache."""
+        return self.name, self._get_compiled_object()
+
+    @classmethod
+    def rebuilt(cls, codegen, name, code):
+        """Return the SeparateLibrary of a serialized name and object code."""
+        library = cls(codegen, name)
+        library.enable_object_caching()
+        library._set_compiled_object(code)
+        library._finalize_final_module()
+        return library
+
+
 class Key:
     """Identifies a linked kernel where numba has the function that Python calls."""
 
@@ -66,16 +91,19 @@ class LinkedLowering(NativeLowering):
     """Runs numba's lowering pass with a LinkedLibrary as its target."""
 
     _name = "linked_lowering"
+    library: type = LinkedLibrary
 
     def run_pass(self, state):
-        state.library = LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
         state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
         super().run_pass(state)
         lowered, key = state["cr"], Key()
         state.targetctx.insert_user_function(key, lowered.fndesc, [state.library])
-        state.reload_init.extend(state.library._reload_init)
         state["cr"] = lowered._replace(cfunc=key)
         place_environment(state.library.codegen, state.targetctx.get_env_name(lowered.fndesc), lowered.env)
+        state.library.finalize()
+        state.reload_init.extend(state.library._reload_init)  # of the kernels that it links
         return True
 
 
@@ -112,6 +140,40 @@ class SharedCompiler(LinkedCompiler):
     """Runs numba's compiler pipeline with SharedLowering as its last pass."""
 
     lowering = SharedLowering
+
+
+class Load(NamedTuple):
+    """Loads a separate kernel, or compiles it, before the code of a caller is loaded from disk."""
+
+    module: str
+    name: str
+    arguments: tuple  # numba types
+
+    def __call__(self):
+        getattr(import_module(self.module), self.name).compile(self.arguments)
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class SeparateLowering(LinkedLowering):
+    """Runs numba's lowering pass with a SeparateLibrary, of one name in all processes."""
+
+    _name = "separate_lowering"
+    library = SeparateLibrary
+
+    def run_pass(self, state):
+        state.flags.forceinline = False  # as in SharedLowering
+        function = state.func_id
+        # numba's number of a function depends on what a process has compiled before
+        function.unique_id = hashlib.sha256(repr(state.args).encode()).hexdigest()[:16]
+        super().run_pass(state)
+        state.library._reload_init = {Load(function.modname, function.func_qualname, state.args)}
+        return True
+
+
+class SeparateCompiler(LinkedCompiler):
+    """Runs numba's compiler pipeline with SeparateLowering as its last pass."""
+
+    lowering = SeparateLowering
 
 
 class LinkedDispatcher(CPUDispatcher):
@@ -154,19 +216,22 @@ class LinkedDispatcher(CPUDispatcher):
 
 
 def reduced(cres):
-    """Return the parts of a linked kernel's CompileResult that can be pickled."""
-    descriptor = cres.fndesc
+    """Return the parts of a linked or separate kernel's CompileResult that can be pickled."""
+    descriptor, library = cres.fndesc, cres.library
     descriptor.typemap = descriptor.calltypes = None
-    return cres.library.serialized(), descriptor, cres.environment, cres.signature, cres.reload_init
+    return type(library), library.serialized(), descriptor, cres.environment, cres.signature, cres.reload_init
 
 
 def rebuilt(target_context, parts):
-    """Return the CompileResult of a linked kernel from its reduced parts."""
-    (name, code), descriptor, environment, signature, reload_init = parts
+    """Return the CompileResult of a linked or separate kernel from its reduced parts."""
+    kind, (name, code), descriptor, environment, signature, reload_init = parts
     for function in reload_init:
         function()
-    library = LinkedLibrary.rebuilt(target_context.codegen(), name, code)
-    place_environment(library.codegen, target_context.get_env_name(descriptor), environment)
+    codegen = target_context.codegen()
+    place_environment(codegen, target_context.get_env_name(descriptor), environment)
+    library = kind.rebuilt(codegen, name, code)
+    load = Load(descriptor.modname, descriptor.qualname, signature.args)
+    library._reload_init = {load} if kind is SeparateLibrary else set(reload_init)
     empty = dict.fromkeys(CompileResult._fields)
     return CompileResult(
         **empty

@@ -9,29 +9,56 @@ import inspect
 
 import numba
 from numba import types
-from numba.core.extending import overload
+from numba.core.datamodel import models, register_default
 
 
-def chosen_by_class(argument, cases, inlined=False):
+class Variants:
+    """Calls the kernel of the class of an argument: in Python at each call, in kernels when compiled."""
+
+    def __init__(self, argument, cases):
+        first = next(iter(cases.values()))
+        self.argument = argument
+        self.position = list(inspect.signature(getattr(first, "py_func", first)).parameters).index(argument)
+        self.cases = cases
+        self._numba_type_ = VariantsType(self)
+
+    def __call__(self, *arguments):
+        return self.cases[type(arguments[self.position])](*arguments)
+
+    def kernel_for(self, kinds):
+        """Return the numba type of the kernel for the numba types of positional arguments."""
+        return numba.typeof(self.cases[_class_of(kinds[self.position])])
+
+
+class VariantsType(types.Callable, types.Dummy):
+    """Represents Variants: a call is typed and lowered as one of the chosen kernel."""
+
+    def __init__(self, variants):
+        self.variants = variants
+        super().__init__(f"Variants({variants.argument}, {variants.cases})")
+
+    def get_call_type(self, context, args, kws):
+        """Return the signature of a call of the chosen kernel."""
+        return self.variants.kernel_for(args).get_call_type(context, args, kws)
+
+    def get_call_signatures(self):
+        """Return the signatures known before a call: none."""
+        return (), True
+
+    def get_impl_key(self, sig):
+        """Return the key under which numba has the chosen kernel."""
+        return self.variants.kernel_for(sig.args).get_impl_key(sig)
+
+
+register_default(VariantsType)(models.OpaqueModel)
+
+
+def chosen_by_class(argument, cases):
     """Return a function that calls one of cases {class: kernel}, by the class of the named argument.
 
-    All kernels take arguments of the same names. inlined: inline into the caller whatever the size.
+    All kernels take arguments of the same names, passed by position.
     """
-    plain = {kind: getattr(kernel, "py_func", kernel) for kind, kernel in cases.items()}
-    names = list(inspect.signature(next(iter(plain.values()))).parameters)
-    position = names.index(argument)
-
-    def called(*arguments):
-        return cases[type(arguments[position])](*arguments)
-
-    if numba.config.DISABLE_JIT:
-        return called
-    text = ", ".join(names)
-    scope = {"called": called, "chosen": lambda kind: plain.get(_class_of(kind))}
-    exec(f"def function({text}): return called({text})\ndef choose({text}): return chosen({argument})", scope)
-    options = {"error_model": "numpy", "nogil": True, "_nrt": False, "forceinline": inlined}
-    overload(scope["function"], jit_options=options)(scope["choose"])
-    return scope["function"]
+    return Variants(argument, cases)
 
 
 def _class_of(kind):

@@ -327,7 +327,7 @@ def _add_blades(x, frame, wx, wy, wz, bx, by, bz, pitches, blades, work):
         _add_blade(number, x, frame, bx, by, bz, wx, wy, wz, blades, work)
 
 
-_add_bending = chosen_by_class("blades", {type(None): _no_blades, BladeModes: _add_blades}, inlined=True)
+_add_bending = chosen_by_class("blades", {type(None): _no_blades, BladeModes: _add_blades})
 
 
 @inlined_kernel
@@ -387,5 +387,5 @@ def _accelerations(acceleration, forced, blades, work, dx):
 # (acceleration, forced, blades, work, dx): modal accelerations of blades into dx, from the acceleration (6,)
 # of the hub, platform axes; forced: factor on all other forces
 fill_blade_accelerations = chosen_by_class(
-    "blades", {type(None): _no_accelerations, BladeModes: _accelerations}, inlined=True
+    "blades", {type(None): _no_accelerations, BladeModes: _accelerations}
 )

@@ -121,13 +121,11 @@ def _below_nacelle(body, structure):
 
 
 # (body, structure) -> RigidBody whose weight is a load: with elastic parts without nacelle and rotor
-weighed_body = chosen_by_class("structure", {type(None): _whole, Structure: _below_nacelle}, inlined=True)
+weighed_body = chosen_by_class("structure", {type(None): _whole, Structure: _below_nacelle})
 
 
 # (pose, x, bend, body, pitches, structure, tower, blades, work): inertia of the rotor into work; None: no-op
-condense_elastic = chosen_by_class(
-    "structure", {type(None): _nothing_elastic, Structure: _condense}, inlined=True
-)
+condense_elastic = chosen_by_class("structure", {type(None): _nothing_elastic, Structure: _condense})
 
 
 @inlined_kernel
@@ -234,7 +232,7 @@ def _deflected(pose, gravity, tower, work, b, modal):
 
 
 # (pose, gravity, tower, work, b, modal): velocity terms and weight of the deflected tower off b and modal
-_subtract_tower = chosen_by_class("tower", {type(None): _no_deflection, TowerModes: _deflected}, inlined=True)
+_subtract_tower = chosen_by_class("tower", {type(None): _no_deflection, TowerModes: _deflected})
 
 
 @inlined_kernel
@@ -254,9 +252,7 @@ def _from_tower(top, fx, fy, fz, mx, my, mz, bend, tower, work, b, modal):
 
 
 # (top, fx, fy, fz, mx, my, mz, bend, tower, work, b, modal): a wrench at the origin of Top off b and modal
-_subtract_wrench = chosen_by_class(
-    "tower", {type(None): _from_platform, TowerModes: _from_tower}, inlined=True
-)
+_subtract_wrench = chosen_by_class("tower", {type(None): _from_platform, TowerModes: _from_tower})
 
 
 @inlined_kernel
@@ -313,7 +309,7 @@ def _with_modes(top, upper, bend, tower, work, matrix):
 
 
 # (top, upper, bend, tower, work, matrix): upper and the rows of the tower modes into matrix (lower triangle)
-_add_upper = chosen_by_class("tower", {type(None): _only_platform, TowerModes: _with_modes}, inlined=True)
+_add_upper = chosen_by_class("tower", {type(None): _only_platform, TowerModes: _with_modes})
 
 
 @inlined_kernel
@@ -322,7 +318,7 @@ def _no_tower_motion(b, modal, bend, tower, work):
 
 
 # (b, modal, bend, tower, work) -> accelerations (6) of the origin of Top and the nacelle, without their bias
-_top_motion = chosen_by_class("tower", {type(None): _no_tower_motion, TowerModes: top_motion}, inlined=True)
+_top_motion = chosen_by_class("tower", {type(None): _no_tower_motion, TowerModes: top_motion})
 
 
 @kernel
@@ -491,7 +487,7 @@ def _twist(
 
 
 # -> accelerations of rotor and twist; see _twist
-_add_twist = chosen_by_class("shaft", {type(None): _no_twist, Torsion: _twist}, inlined=True)
+_add_twist = chosen_by_class("shaft", {type(None): _no_twist, Torsion: _twist})
 
 
 @inlined_kernel
@@ -595,6 +591,4 @@ def _with_rigid_parts(
 
 # (pose, x, load, torque, added, body, structure, tower, blades, shaft, matrix, work, cache, dx):
 # accelerations into dx
-accelerate_all = chosen_by_class(
-    "structure", {type(None): _with_rigid_parts, Structure: accelerate_elastic}, inlined=True
-)
+accelerate_all = chosen_by_class("structure", {type(None): _with_rigid_parts, Structure: accelerate_elastic})

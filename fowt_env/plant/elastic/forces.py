@@ -47,6 +47,4 @@ def _modal_forces(x, aero, blades, loads, work):
 
 
 # (x, aero, blades, loads, work): generalised forces on the blade modes into work.force
-fill_blade_forces = chosen_by_class(
-    "blades", {type(None): _no_forces, BladeModes: _modal_forces}, inlined=True
-)
+fill_blade_forces = chosen_by_class("blades", {type(None): _no_forces, BladeModes: _modal_forces})

@@ -452,21 +452,19 @@ def _swing_again(dt, x, u, order, new, history, blades, shaft, model, work, y):
 
 # (x, blades, shaft, work) -> acceleration of the twist, 1/s2, less its sign, by the stiffness of blades in
 # phase: what the rigid shaft of the last solution passes on to the nacelle from a rotor that is held
-reaction_at = chosen_by_class("blades", {type(None): _no_reaction, BladeModes: _reaction}, inlined=True)
+reaction_at = chosen_by_class("blades", {type(None): _no_reaction, BladeModes: _reaction})
 # (dt, x, blades, shaft, work) -> coefficients (4) in s, 0 to 1 over the step from x, of the twist, rad, and
 # of reaction_at: by z of twist_on beside a rotor that is held, else at the rate at x, and none
-twist_over = chosen_by_class("blades", {type(None): _slow_twist_over, BladeModes: _twist_over}, inlined=True)
+twist_over = chosen_by_class("blades", {type(None): _slow_twist_over, BladeModes: _twist_over})
 # (x, blades, shaft, past, work, dx): after an evaluation of the rates dx at x, keeps what twist_on needs of
 # it, before what past steps left
-keep_twist = chosen_by_class("blades", {type(None): _keep_torque, BladeModes: _keep_twist}, inlined=True)
+keep_twist = chosen_by_class("blades", {type(None): _keep_torque, BladeModes: _keep_twist})
 # (y, blades, shaft, work, new): the same for twist_again, of the rates new at the predicted end y of a step
-keep_twist_after = chosen_by_class(
-    "blades", {type(None): _keep_torque_after, BladeModes: _keep_rest_after}, inlined=True
-)
+keep_twist_after = chosen_by_class("blades", {type(None): _keep_torque_after, BladeModes: _keep_rest_after})
 # (steps, dt, x, u, order, history, past, blades, shaft, model, matrix, work, still, y): advances the twist,
 # and blades in phase, by the loads of the last `order` steps; y has the velocities of Adams-Bashforth; still:
 # work array
-twist_on = chosen_by_class("blades", {type(None): _twist_on, BladeModes: _swing_on}, inlined=True)
+twist_on = chosen_by_class("blades", {type(None): _twist_on, BladeModes: _swing_on})
 # (dt, x, u, order, new, history, blades, shaft, model, work, y): by the load at the end of the step, too; y
 # has the velocities of Adams-Moulton
-twist_again = chosen_by_class("blades", {type(None): _twist_again, BladeModes: _swing_again}, inlined=True)
+twist_again = chosen_by_class("blades", {type(None): _twist_again, BladeModes: _swing_again})

@@ -340,7 +340,7 @@ def _bent_rotor(pose, bend, x, dx, body, structure, tower, blades, loads, work):
 
 # (pose, bend, x, dx, body, structure, tower, blades, loads, work) -> BentRotor of bending blades,
 # None of rigid ones; pose of the platform
-bent_rotor = chosen_by_class("blades", {type(None): _no_bending, BladeModes: _bent_rotor}, inlined=True)
+bent_rotor = chosen_by_class("blades", {type(None): _no_bending, BladeModes: _bent_rotor})
 
 
 @inlined_kernel
@@ -399,9 +399,7 @@ def _shaft_of_bending(thrust, torque, rotor):
 
 # (thrust, torque, rotor) -> thrust (N) and torque (N m) of the shaft: those of the rigid rotor, given, or of
 # a BentRotor
-shaft_load = chosen_by_class(
-    "rotor", {type(None): _shaft_of_rigid, BentRotor: _shaft_of_bending}, inlined=True
-)
+shaft_load = chosen_by_class("rotor", {type(None): _shaft_of_rigid, BentRotor: _shaft_of_bending})
 
 
 @shared_kernel
@@ -439,4 +437,4 @@ def _record_bent(rotor, x, dx, model, blades, loads, work, row):
 
 
 # (rotor, x, dx, model, blades, loads, work, row): channels of a BentRotor into row
-record_bending = chosen_by_class("rotor", {type(None): _none_bent, BentRotor: _record_bent}, inlined=True)
+record_bending = chosen_by_class("rotor", {type(None): _none_bent, BentRotor: _record_bent})

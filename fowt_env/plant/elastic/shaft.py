@@ -154,4 +154,4 @@ def _twist(x, u, after, c0, c1, c2, c3, shaft, model, work, y):
 # (x, u, after, c0, c1, c2, c3, shaft, model, work, y): twist and its rate in y, a time `after` (s) from x,
 # and its share in all velocities of y, which hold the quadrature of their rates. The smooth torque (N m) is
 # c0 + c1 s + c2 s2 + c3 s3, s from 0 to 1 over the time
-advance_twist = chosen_by_class("shaft", {type(None): _no_twist, Torsion: _twist}, inlined=True)
+advance_twist = chosen_by_class("shaft", {type(None): _no_twist, Torsion: _twist})

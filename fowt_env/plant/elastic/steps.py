@@ -201,7 +201,7 @@ def _swing_with_twist(i, dt, x, y, c, twist, reaction, tower, shaft, work, still
 # still, with the coefficients c (4) of g. A twist that bends the tower by its share alone leaves the rest
 # p - share q, which is smooth: the spring of the tower pulls it back by all of p. twist, reaction: of
 # twist_over
-_swing_mode = chosen_by_class("shaft", {type(None): _swing_alone, Torsion: _swing_with_twist}, inlined=True)
+_swing_mode = chosen_by_class("shaft", {type(None): _swing_alone, Torsion: _swing_with_twist})
 
 
 @inlined_kernel
@@ -242,7 +242,7 @@ def _keep(x, blades, past):
 
 
 # (x, blades, past): puts the deflections before those of past steps
-keep_blades = chosen_by_class("blades", {type(None): _no_deflections, BladeModes: _keep}, inlined=True)
+keep_blades = chosen_by_class("blades", {type(None): _no_deflections, BladeModes: _keep})
 
 
 @kernel
@@ -292,6 +292,4 @@ def _correct(dt, x, history, past, blades, shaft, work, y):
 # (dt, x, history, past, blades, shaft, work, y): velocities of the deflections in y, by Adams-Bashforth 4
 # from x, corrected, but not their means on a shaft that twists; history of the derivatives of four steps and
 # past of keep_blades, latest first
-correct_blades = chosen_by_class(
-    "blades", {type(None): _nothing_to_correct, BladeModes: _correct}, inlined=True
-)
+correct_blades = chosen_by_class("blades", {type(None): _nothing_to_correct, BladeModes: _correct})

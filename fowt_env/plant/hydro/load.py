@@ -85,9 +85,7 @@ def _without(t, pose, hydro, strips, data):
 
 
 # (t, pose, hydro, strips, data) -> morison.StripLoad
-strip_load = chosen_by_class(
-    "strips", {ExactStrips: _exact, BandedStrips: _banded, type(None): _without}, inlined=True
-)
+strip_load = chosen_by_class("strips", {ExactStrips: _exact, BandedStrips: _banded, type(None): _without})
 
 
 @inlined_kernel
@@ -106,9 +104,7 @@ def _free_elevation(t, waves, strips, excitation, data):
 
 
 _elevation = chosen_by_class(
-    "strips",
-    {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation, type(None): _free_elevation},
-    inlined=True,
+    "strips", {ExactStrips: _plain_elevation, BandedStrips: _banded_elevation, type(None): _free_elevation}
 )
 
 
@@ -127,9 +123,7 @@ def _no_mass(pose, load, strips, matrix):
 
 # (pose, StripLoad, strips, matrix): fills the added mass (6, 6)
 fill_strip_mass = chosen_by_class(
-    "strips",
-    {ExactStrips: _mass_of_strips, BandedStrips: _mass_of_strips, type(None): _no_mass},
-    inlined=True,
+    "strips", {ExactStrips: _mass_of_strips, BandedStrips: _mass_of_strips, type(None): _no_mass}
 )
 
 

@@ -315,6 +315,49 @@ def test_another_way_of_numba_to_keep_code_is_noticed(monkeypatch, tmp_path):
         disk_cache.KernelCache(kernel_folder, tmp_path)
 
 
+PARTS = """
+from fowt_env.plant.compile.decorators import entry, kernel, separate_kernel
+
+@kernel
+def doubled(x):
+    return 2.0 * x
+
+@separate_kernel
+def inner(x):
+    return doubled(x) + 1.0
+
+@separate_kernel
+def outer(x):
+    return inner(x) * 10.0
+
+@entry
+def whole(x):
+    return outer(x) + inner(x)
+"""
+CALL_PARTS = """
+from fowt_env.plant import parts
+{}
+print(parts.whole(1.0), *(sum(f.stats.cache_hits.values()) for f in (parts.whole, parts.outer, parts.inner)))
+"""
+
+
+def test_a_separate_kernel_is_loaded_or_compiled_before_code_that_calls_it_by_name(tmp_path):
+    code = copied_code(tmp_path)
+    (code / "fowt_env" / "plant" / "parts.py").write_text(PARTS)
+
+    def called(first=""):
+        return output(start(CALL_PARTS.format(first), tmp_path / "cache", root=code))
+
+    assert called() == ["33.0", "0", "0", "0"]
+    assert called() == ["33.0", "1", "1", "1"]
+    for lost in ("inner", "outer"):
+        for path in (tmp_path / "cache").rglob(f"parts.{lost}*.nbc"):
+            path.unlink()
+        hits = [str(int(name != lost)) for name in ("whole", "outer", "inner")]
+        assert called("parts.doubled(3)") == ["33.0", *hits]  # numba has numbered other functions first
+        assert called() == ["33.0", "1", "1", "1"]
+
+
 def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_path):
     """Their sources do not shape the name of the folder."""
     code = copied_code(tmp_path)

@@ -11,7 +11,13 @@ from copied_code import copied_code
 from numba.core.registry import CPUDispatcher
 
 from fowt_env.layout import PACKAGE
-from fowt_env.plant.compile.decorators import entry, inlined_kernel, kernel, shared_kernel
+from fowt_env.plant.compile.decorators import (
+    entry,
+    inlined_kernel,
+    kernel,
+    separate_kernel,
+    shared_kernel,
+)
 from fowt_env.plant.compile.linked import LinkedLibrary
 
 
@@ -65,6 +71,28 @@ def test_a_caller_has_one_copy_of_a_shared_kernel_and_of_others_as_many_as_it_ca
     defined = [line for line in code.splitlines() if line.startswith("_Z") and line.endswith(":")]
     assert sum("square" in name and "squares" not in name for name in defined) == 1
     assert not any("squares" in name or "slope" in name or "cubic" in name for name in defined)
+
+
+@separate_kernel
+def summed(values):
+    total = 0.0
+    for value in values:
+        total += squares(value)
+    return total
+
+
+@entry
+def twice_summed(values):
+    return 2.0 * summed(values)
+
+
+def test_a_caller_has_no_copy_of_a_separate_kernel():
+    values = np.linspace(0.0, 1.0, 5)
+    assert twice_summed(values) == 2.0 * summed.py_func(values) == 2.0 * summed(values)
+    (result,), (compiled,) = summed.overloads.values(), twice_summed.overloads.values()
+    assert f"{result.fndesc.mangled_name}:" in result.library.get_asm_str().splitlines()
+    code = compiled.library.get_asm_str()
+    assert f"{result.fndesc.mangled_name}:" not in code.splitlines() and result.fndesc.mangled_name in code
 
 
 def test_python_calls_it_with_the_same_bits():
@@ -134,8 +162,12 @@ def simulated(root, cache=None):
 @pytest.mark.parametrize(
     "changes",
     [
-        {"linked=LinkedCompiler": "linked=None", "linked=SharedCompiler": "linked=None"},
-        {"_nrt=False": "_nrt=True", '"_nrt": False': '"_nrt": True'},
+        {
+            "linked=LinkedCompiler": "linked=None",
+            "linked=SharedCompiler": "linked=None",
+            "linked=SeparateCompiler": "linked=None",
+        },
+        {"_nrt=False": "_nrt=True"},
     ],
     ids=["not linked", "with counted references"],
 )
