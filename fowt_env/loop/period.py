@@ -17,14 +17,14 @@ from fowt_env.loop.protection import (
     watch_turbine,
 )
 from fowt_env.loop.sensing import inform_law, take_reading
-from fowt_env.plant.compile.decorators import kernel
+from fowt_env.plant.compile.decorators import kernel, separate_kernel
 from fowt_env.plant.drivetrain import followed_torque, lose_torque, torque_was_limited
 from fowt_env.plant.measurement import N_MEASUREMENTS, BladeMeasure, Measure
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.state import BLADES, Command
 
 
-@kernel
+@separate_kernel
 def begin_period(period, t, x, model, interface, link):
     """Begin a control period after its measurement. Returns whether the turbine is being stopped or started.
 
@@ -79,7 +79,7 @@ def hide_pitches(hidden, individual, pitches, command):
     return individual
 
 
-@kernel
+@separate_kernel
 def apply_command(t, x, u, model, data, interface, link):
     """Fill u with link.command after faults and torque limits, for the control period from t (s).
 

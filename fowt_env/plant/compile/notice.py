@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 
 from numba.core import event
 
-COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 5 s to 1 min) ..."
+COMPILING_MESSAGE = "compiling kernels (first run of this kind of scene only, 10 s to 2 min) ..."
 NAME = "fowt_env: "
 DELAY = 1.0  # s of compiling before the first line: a kernel or two take less
 PAUSE = 2.0  # s without compiling after which compilation counts as finished

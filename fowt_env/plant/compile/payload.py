@@ -10,8 +10,8 @@ from functools import partial
 import numba
 from llvmlite import ir
 from numba import types
-from numba.core.ccallback import CFunc
 from numba.core.registry import cpu_target
+from numba.experimental import function_type
 
 SCALARS = {types.float64: "d", types.float32: "f", types.int64: "q", types.boolean: "?"}
 ARRAYS = [struct.Struct(f"{5 + 2 * dimensions}q") for dimensions in range(9)]
@@ -75,7 +75,7 @@ def _writer(kind, structure):
     if isinstance(kind, types.BaseTuple):
         return _writer_of_fields(list(kind), structure)
     if isinstance(kind, types.FunctionType):
-        return _write_function
+        return partial(_write_function, kind.signature)
     if kind in SCALARS:
         return partial(_write_scalar, struct.Struct(SCALARS[kind]).pack_into)
     raise TypeError(f"a model cannot hold a {kind}")
@@ -103,8 +103,8 @@ def _write_array(memory, offset, array):
     pack(memory, offset, 0, 0, array.size, array.itemsize, address, *array.shape, *array.strides)
 
 
-def _write_function(memory, offset, function):
-    """Write a first-class function: address of the C function, and of the Python object."""
-    if not isinstance(function, CFunc):
-        raise TypeError(f"a model cannot hold {function!r}")
-    struct.pack_into("3q", memory, offset, function.address, id(function), 0)
+def _write_function(signature, memory, offset, function):
+    """Write a first-class function: addresses of the C function, the Python object and numba's function."""
+    address = function_type._get_wrapper_address(function, signature)
+    own = function_type._get_jit_address(function, signature)
+    struct.pack_into("3q", memory, offset, address, id(function), own)
