@@ -175,8 +175,8 @@ inlined_kernel = _decorator(**_HOUSE, _nrt=False, forceinline=True, linked=Linke
 # for instructions.
 shared_kernel = _decorator(**_HOUSE, _nrt=False, linked=SharedCompiler)
 
-# A kernel with machine code of its own, which every entry calls: steps and outputs of a scene, control periods. With
-# a copy of all in each entry, a scene took half as long again to compile.
+# A kernel with machine code of its own, which all entries call: steps, outputs, periods. With a copy in each
+# entry, a scene took half as long again to compile.
 separate_kernel = _decorator(**_HOUSE, _nrt=False, linked=SeparateCompiler)
 
 # Functions called from Python, which take Handles (counted references) or allocate.
