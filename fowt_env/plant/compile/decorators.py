@@ -134,7 +134,7 @@ def _keep(compiled, function):
     """Attach the disk cache to a compiled function if its key covers all sources that it depends on."""
     stamp = CACHE_FOLDER and _stamp(os.path.abspath(function.__code__.co_filename))
     if stamp is not None:
-        compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, isinstance(compiled, LinkedDispatcher))
+        compiled._cache = KernelCache(function, CACHE_FOLDER, stamp, getattr(compiled, "stored", None))
 
 
 def _decorator(linked=None, **options):

@@ -113,11 +113,11 @@ class _Files(caching.CompileResultCacheImpl):
 
 
 class _LinkedFiles(_Files):
-    """Stores kernels that are linked into their callers, as LLVM bitcode instead of machine code."""
+    """Stores kernels of linked.py; stored: end of the names of their files."""
 
-    def __init__(self, function, folder, stamp):
+    def __init__(self, function, folder, stamp, stored):
         super().__init__(function, folder, stamp)
-        self._filename_base += ".linked"
+        self._filename_base += f".{stored}"
 
     def reduce(self, cres):
         return linked.reduced(cres)
@@ -130,11 +130,12 @@ class KernelCache(caching.FunctionCache):
     """Caches one compiled function in a folder; set as the attribute _cache of the compiled function.
 
     stamp: hash of further dependencies, in addition to the key and the folder's name.
-    links: whether the function is a kernel of linked.py.
+    stored: end of the names of files of a kernel of linked.py, "linked" or "separate"; None: of another.
     """
 
-    def __init__(self, function, folder, stamp="", links=False):
-        self._impl_class = partial(_LinkedFiles if links else _Files, folder=folder, stamp=stamp)
+    def __init__(self, function, folder, stamp="", stored=None):
+        files = partial(_LinkedFiles, stored=stored) if stored else _Files
+        self._impl_class = partial(files, folder=folder, stamp=stamp)
         super().__init__(function)
         file = getattr(self, "_cache_file", None)
         if type(file) is not caching.IndexDataCacheFile:

@@ -111,6 +111,7 @@ class LinkedCompiler(CompilerBase):
     """Runs numba's compiler pipeline with LinkedLowering as its last pass."""
 
     lowering: type = LinkedLowering
+    stored: str = "linked"  # in the names of files of the disk cache
 
     def define_pipelines(self):
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
@@ -174,6 +175,7 @@ class SeparateCompiler(LinkedCompiler):
     """Runs numba's compiler pipeline with SeparateLowering as its last pass."""
 
     lowering = SeparateLowering
+    stored = "separate"
 
 
 class LinkedDispatcher(CPUDispatcher):
@@ -181,6 +183,7 @@ class LinkedDispatcher(CPUDispatcher):
 
     def __init__(self, py_func, locals=None, targetoptions=None, pipeline_class=LinkedCompiler):
         super().__init__(py_func, locals, targetoptions, pipeline_class)
+        self.stored = pipeline_class.stored
         self.keep = None  # keep(compiled, function): attaches the disk cache to the twin
         self._called_from_python = False
 
