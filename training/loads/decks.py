@@ -225,9 +225,11 @@ def put_control(servo, folder, case, first, rosco, scene):
         for name, text in rosco.inputs(scene).items():
             with replacing(folder / name) as temporary:
                 temporary.write_text(text, encoding="utf-8")
+        # DLL_DT: at every step. OpenFAST extrapolates what a library reads; at longer intervals accelerations
+        # are biased, and floating feedback with them.
         for key, value in (("PCMode", 5), ("VSContrl", 5), ("DLL_FileName", f'"{find_library()[0]}"'),
                            ("DLL_InFile", f'"{INPUT_FILE}"'), ("DLL_ProcName", f'"{SYMBOL}"'),
-                           ("DLL_DT", CONTROL_DT)):  # fmt: skip
+                           ("DLL_DT", '"default"')):  # fmt: skip
             servo.put(value, key)
 
 

@@ -62,9 +62,6 @@ TOGETHER = ("blade root",)  # parts whose channels are taken together
 MOST = 10  # blades or lines
 SITES = {"oc3_hywind": "norway_5", "iea15_volturnus_s": "gulf_of_maine"}
 OPTIONS = {"oc3_hywind": {"strip_axis": "undisplaced"}}  # of build_scene, beside those of transfer.SUBJECTS
-# of the deck, beside those of transfer.SUBJECTS. A deck begins with a straight second tower mode, and ROSCO's
-# feedback of the nacelle's rotation remembers for minutes how it springs back; the plant has first modes only.
-DECK_SETTINGS = {"iea15_volturnus_s": {"tower": 1}}
 CONTROLLER = "rosco"
 STEP = 0.025  # s, of OpenFAST
 HEAVE = "PtfmHeave_[m]"
@@ -137,7 +134,6 @@ def write_base_deck(decks, platform, folder):
     settings = {
         "t": 0.0, "dt": STEP, "dtout": transfer.OUTPUT_DT, "dbemt": 2, "wind": 12.0, "sea": (2.0, 8.0),
         "control": True, "control_dt": f"{STEP:g}", "channels": transfer.CHANNELS, **subject.elastic,
-        **DECK_SETTINGS.get(platform, {}),
     }  # fmt: skip
     getattr(openfast_decks, subject.deck)(decks).write(folder, settings)
     return folder / "model.fst"
