@@ -97,7 +97,7 @@ else:
             values = model, data
             kind, size, write = _payload(values)
             payload = np.zeros(size, dtype=np.uint8)
-            write(payload, 0, values)
+            write(memoryview(payload), 0, values)  # much faster than to the array itself
             owner = payload, values  # all memory that the payload refers to
             return cls._numba_box_(kind, rtsys.meminfo_new(payload.ctypes.data, owner))
 
