@@ -44,6 +44,7 @@ if numba.config.DISABLE_JIT:
 
 else:
     from numba._dispatcher import compute_fingerprint
+    from numba.core.registry import cpu_target
     from numba.core.runtime import rtsys
     from numba.experimental import structref
 
@@ -108,6 +109,7 @@ else:
         """Return (type of the Handle, size of its payload in bytes, writer) of (model, data)."""
 
         def payload():
+            rtsys.initialize(cpu_target.target_context)  # as numba does before it compiles
             kinds, size, write = payload_writer(values)
             return _HandleType(list(zip(("model", "data"), kinds, strict=True))), size, write
 

@@ -1,6 +1,8 @@
 """The payload of a Handle against numba's own unboxing of the same tuple."""
 
 import gc
+import subprocess
+import sys
 from typing import NamedTuple
 
 import numba
@@ -69,6 +71,11 @@ def test_a_kernel_reads_what_numba_unboxes():
     gc.collect()  # the handle alone refers to the arrays
     by_handle(handle, got)
     assert np.array_equal(got, wanted) and wanted[0, 5] == outer(0).inner.rows[1, 4] and wanted[0, 9] == 6.0
+
+
+def test_a_handle_may_come_before_anything_is_compiled():
+    code = "from fowt_env.plant.compile.handle import Handle; Handle(1.0, None)"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
 
 
 @pytest.mark.parametrize("value", [1j, "text", np.float64], ids=["complex", "text", "class"])
