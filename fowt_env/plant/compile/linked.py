@@ -65,6 +65,10 @@ def place_environment(codegen, name, environment):
 class SeparateLibrary(JITCodeLibrary):
     """Holds the machine code of a kernel that callers call by name: they link nothing."""
 
+    def __init__(self, codegen, name):
+        super().__init__(codegen, name)
+        self.enable_object_caching()
+
     def _get_module_for_linking(self):
         return llvm.parse_assembly(str(self._codegen._create_empty_module(self.name)))
 
@@ -76,7 +80,6 @@ class SeparateLibrary(JITCodeLibrary):
     def rebuilt(cls, codegen, name, code):
         """Return the SeparateLibrary of a serialized name and object code."""
         library = cls(codegen, name)
-        library.enable_object_caching()
         library._set_compiled_object(code)
         library._finalize_final_module()
         return library
@@ -95,7 +98,6 @@ class LinkedLowering(NativeLowering):
 
     def run_pass(self, state):
         state.library = self.library(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
         state.flags.no_compile = state.flags.no_cpython_wrapper = state.flags.no_cfunc_wrapper = True
         super().run_pass(state)
         lowered, key = state["cr"], Key()

@@ -27,43 +27,29 @@ def payload_writer(values):
     kinds = [types.unliteral(numba.typeof(value)) for value in values]
     models = [context.data_model_manager[kind].get_value_type() for kind in kinds]
     structure = ir.LiteralStructType(models)
-    size, _ = _extent(structure)
+    size, _, _ = _layout(structure)
     if size != context.get_abi_sizeof(structure):
         raise TypeError(f"{size} bytes instead of {context.get_abi_sizeof(structure)} for {kinds}")
     return kinds, size, _writer_of_fields(kinds, structure)
 
 
-def _extent(kind):
-    """Return (size, alignment), bytes, of an LLVM type."""
-    if isinstance(kind, ir.ArrayType):
-        size, alignment = _extent(kind.element)
-        return kind.count * size, alignment
-    if isinstance(kind, ir.LiteralStructType):
-        end, most = 0, 1
-        for offset, (size, alignment) in zip(_offsets(kind), map(_extent, kind.elements), strict=True):
-            end, most = offset + size, max(most, alignment)
-        return _aligned(end, most), most
+def _layout(kind):
+    """Return (size, alignment, offsets of the elements) of an LLVM type, bytes; a number has no elements."""
+    if isinstance(kind, ir.LiteralStructType | ir.ArrayType):
+        offsets, end, most = [], 0, 1
+        for size, alignment, _ in map(_layout, kind.elements):
+            offsets.append(_aligned(end, alignment))
+            end, most = offsets[-1] + size, max(most, alignment)
+        return _aligned(end, most), most, offsets
     if isinstance(kind, ir.IntType):
         size = (kind.width + 7) // 8
     else:
         size = 4 if isinstance(kind, ir.FloatType) else 8
-    return size, size
+    return size, size, []
 
 
 def _aligned(offset, alignment):
     return -(-offset // alignment) * alignment
-
-
-def _offsets(structure):
-    """Return the offsets, bytes, of the elements of an LLVM structure or array."""
-    if isinstance(structure, ir.ArrayType):
-        size, _ = _extent(structure.element)
-        return [i * size for i in range(structure.count)]
-    offsets, end = [], 0
-    for size, alignment in map(_extent, structure.elements):
-        offsets.append(_aligned(end, alignment))
-        end = offsets[-1] + size
-    return offsets
 
 
 def _writer(kind, structure):
@@ -77,23 +63,20 @@ def _writer(kind, structure):
     if isinstance(kind, types.FunctionType):
         return partial(_write_function, kind.signature)
     if kind in SCALARS:
-        return partial(_write_scalar, struct.Struct(SCALARS[kind]).pack_into)
+        return struct.Struct(SCALARS[kind]).pack_into
     raise TypeError(f"a model cannot hold a {kind}")
 
 
 def _writer_of_fields(kinds, structure):
-    pairs = zip(range(len(kinds)), _offsets(structure), map(_writer, kinds, structure.elements), strict=True)
-    fields = [(i, offset, write) for i, offset, write in pairs if write is not None]
+    _, _, offsets = _layout(structure)
+    writers = map(_writer, kinds, structure.elements)
+    fields = [(i, offsets[i], write) for i, write in enumerate(writers) if write is not None]
 
     def write_fields(memory, offset, values):
         for i, start, write in fields:
             write(memory, offset + start, values[i])
 
     return write_fields
-
-
-def _write_scalar(pack, memory, offset, value):
-    pack(memory, offset, value)
 
 
 def _write_array(memory, offset, array):
