@@ -111,6 +111,15 @@ class _Files(caching.CompileResultCacheImpl):
         module = os.path.splitext(os.path.basename(path))[0]
         self._filename_base = self.get_filename_base(f"{module}.{function.__qualname__}", "")
 
+    def rebuild(self, target_context, payload):
+        """Return the stored CompileResult; a caller compiled from it loads first what it loads first.
+
+        Numba forgets this: such a caller, in a process that has loaded nothing else, called address 0.
+        """
+        cres = super().rebuild(target_context, payload)
+        cres.library._reload_init.update(cres.reload_init)
+        return cres
+
 
 class _LinkedFiles(_Files):
     """Stores kernels of linked.py; stored: end of the names of their files."""

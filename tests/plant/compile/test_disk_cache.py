@@ -333,6 +333,14 @@ def outer(x):
 @entry
 def whole(x):
     return outer(x) + inner(x)
+
+@entry
+def batch(x):
+    return whole(x) + 1.0
+
+@entry
+def batches(x):
+    return batch(x) + 1.0
 """
 CALL_PARTS = """
 from fowt_env.plant import parts
@@ -356,6 +364,15 @@ def test_a_separate_kernel_is_loaded_or_compiled_before_code_that_calls_it_by_na
         hits = [str(int(name != lost)) for name in ("whole", "outer", "inner")]
         assert called("parts.doubled(3)") == ["33.0", *hits]  # numba has numbered other functions first
         assert called() == ["33.0", "1", "1", "1"]
+
+
+def test_code_compiled_with_an_entry_from_disk_loads_the_kernels_that_the_entry_calls_by_name(tmp_path):
+    """As a batch of environments after an environment: each here in a process of its own."""
+    code = copied_code(tmp_path)
+    (code / "fowt_env" / "plant" / "parts.py").write_text(PARTS)
+    for name, result in (("whole", 33), ("batch", 34), ("batches", 35), ("batches", 35), ("batch", 34)):
+        program = f"from fowt_env.plant import parts\nprint(parts.{name}(1.0))\n"
+        assert output(start(program, tmp_path / "cache", root=code)) == [f"{result}.0"]
 
 
 def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_path):
@@ -385,7 +402,7 @@ KEYS = """
 import re
 from fowt_env.layout import FOLDERS, PACKAGE, installed_path
 from fowt_env.plant.compile.decorators import CACHE_FOLDER, PLANT, _stamp
-compiled = re.compile("^@(inlined_kernel|kernel|entry|parallel_entry|control_kernel)$", re.MULTILINE)
+compiled = re.compile("^@(|inlined_|shared_|separate_|control_)kernel$|^@(|parallel_)entry$", re.MULTILINE)
 for room in (PACKAGE, *FOLDERS.values()):
     for path in room.rglob("*.py"):
         if PLANT not in path.parents and compiled.search(path.read_text()):
