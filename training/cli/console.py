@@ -191,6 +191,8 @@ def reported(function):
                 for name, rules in OUTPUTS.items():
                     if isinstance(kwargs.get(name), str):
                         output(kwargs[name], **rules)
+                if isinstance(kwargs.get("plot"), str):
+                    kwargs["plot"] = plot_file(kwargs["plot"])
                 return function(*args, **kwargs)
         except (SimulationStopped, ControllerError) as error:
             fail(error, EXIT_STOPPED)
@@ -207,6 +209,13 @@ def reported(function):
             announce_folders()
 
     return run
+
+
+def plot_file(path):
+    """Return the path of a plot with its extension. Raises: InputError for an unknown one, before a run."""
+    from fowt_env.visual.style import plot_path
+
+    return str(plot_path(path))
 
 
 def announce_folders():

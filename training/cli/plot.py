@@ -6,7 +6,7 @@ from typing import Annotated
 from typer import Argument, Option
 
 from fowt_env.errors import InputError, unknown
-from fowt_env.training.cli.console import command, wrote
+from fowt_env.training.cli.console import command, plot_file, wrote
 
 PLOTS = ("series", "spectra", "boxes", "raos", "schedule")
 
@@ -45,7 +45,7 @@ def plot(
 
     if kind not in PLOTS:
         raise unknown("kind of plot", kind, PLOTS)
-    path = f"{kind}.png" if out_path is None else out_path
+    path = plot_file(kind if out_path is None else out_path)
     frames = {name: read_series(file, timed=kind != "schedule") for name, file in _names(files).items()}
     lengths = [np.ptp(frame[TIME]) for frame in frames.values() if TIME in frame and len(frame)]
     if lengths:

@@ -74,10 +74,6 @@ def simulate(
     import fowt_env
 
     output(out_path, endings=SERIES_SUFFIXES)  # before the run
-    if plot is not None:
-        from fowt_env.visual.style import plot_path
-
-        plot_path(plot)
     scene = scene_of(platform, wind, sea, duration, seed, fidelity, option, rotor)
     title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
     with progress_bar("simulating", 1.0) as update:

@@ -38,6 +38,8 @@ def test_every_kind_is_one_call_on_saved_runs(kind, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     fowt("plot", kind, files[0])
     assert (tmp_path / f"{kind}.png").read_bytes().startswith(PNG)
+    _, stderr = fowt("plot", kind, files[0], "--out", "a")  # the name of a folder, too
+    assert "wrote a.png" in stderr and (tmp_path / "a.png").read_bytes().startswith(PNG)
 
 
 def test_an_outb_is_plotted_as_the_same_run_in_a_csv(tmp_path):
