@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
+import numpy.typing as npt
 
+from fowt_env.descriptions.checks import short
 from fowt_env.envs.episode import STEP
 from fowt_env.envs.snapshot import CARRIED
 from fowt_env.errors import InputError
@@ -54,6 +56,7 @@ class PeriodJacobian(NamedTuple):
     command: np.ndarray  # (n, m) with respect to the command in force
     # (n,) with respect to a uniform change of the longitudinal wind; None without aerodynamics and in a box
     wind: np.ndarray | None
+    end: np.ndarray  # (n,) the state at the end of the period
 
 
 class PeriodJacobians(gymnasium.Wrapper):
@@ -96,14 +99,38 @@ class PeriodJacobians(gymnasium.Wrapper):
         plant: Any = self.env.unwrapped
         return self._followed(plant.step_physical, *command)
 
-    def _followed(self, step, *arguments):
-        """Return the result of a step with the Jacobian in info."""
+    def shift(self, changes: npt.ArrayLike) -> None:
+        """Change the state of the plant between two steps, as the correction of a Kalman filter does.
+
+        changes (n,): of the states that PeriodJacobian names, SI, radians. What the time step keeps of past
+        steps changes along, to first order, so that the next Jacobian is known as before. Observation and
+        measurement follow with the next step.
+
+        Raises: InputError for another number of changes or one that is not finite, and where the Jacobian of
+        the next step would be None.
+        """
         plant: Any = self.env.unwrapped
+        columns = self._met(plant)
+        values = np.asarray(changes, dtype=float)
+        if values.shape != (columns.n,) or not np.isfinite(values).all():
+            raise InputError(f"changes = {short(values)}: must be {columns.n} finite numbers, one per state")
+        if not columns.known:
+            raise InputError(f"changes: no Jacobian is known until {SETTLING} steps after set_state")
+        columns.shift(plant, values)
+
+    def _met(self, plant):
+        """Return the columns at the state of the plant."""
         if self._columns is None or self._columns.scene is not plant.scene:
             self._columns = _Columns(plant, self.memories)
         self._columns.meet(plant)
+        return self._columns
+
+    def _followed(self, step, *arguments):
+        """Return the result of a step with the Jacobian in info."""
+        plant: Any = self.env.unwrapped
+        columns = self._met(plant)
         result = step(*arguments)
-        result[-1]["jacobian"] = self._columns.follow(plant)
+        result[-1]["jacobian"] = columns.follow(plant)
         return result
 
 
@@ -218,6 +245,21 @@ class _Columns:
         self.vectors[:] = 0.0
         self.vectors[range(self.n), self.moving] = 1.0
 
+    @property
+    def known(self):
+        """Return whether the columns know the past of the plant, so that they give its Jacobian."""
+        return self.anchored and self.first >= self.settled
+
+    def shift(self, env, changes):
+        """Change the states of the environment, and what belongs to them, by changes (n,)."""
+        run = env._episode
+        self.base.vector[: self.base.extent] += changes @ self.vectors[: self.n]
+        run.x[:] = self.base.x
+        for own, array in zip(_parts(self.base.data), _parts(run.data), strict=True):
+            array[...] = own
+        run.data.cache[LoadCache.VALID] = 0.0
+        self._anchor(env)
+
     def _anchor(self, env):
         """Copy the state of the environment."""
         run = env._episode
@@ -234,7 +276,7 @@ class _Columns:
             self.anchored = False
             return None
         period = (self.first, int(run.counts[STEP]) - self.first, env.dt)
-        known = self.first >= self.settled
+        known = self.known
         end = self.base.advance(self.start, run.u, *period)[:extent].copy()
         differences = (DIFFERENCE * self.sizes)[:, None]
         begun, commands = np.tile(self.start, (len(self.sizes), 1)), np.tile(run.u, (len(self.sizes), 1))
@@ -251,7 +293,8 @@ class _Columns:
         if not known:
             return None
         wind = None if self.windy is None else moved[:, -1]
-        return PeriodJacobian(self.names, self.commands, moved[:, :n], moved[:, n : n + m], wind)
+        effects = moved[:, :n], moved[:, n : n + m], wind
+        return PeriodJacobian(self.names, self.commands, *effects, run.x[self.moving].copy())
 
     def _combined(self, changed):
         """Return the combinations of changed vectors (n + inputs, extent) that each change one entry by 1."""

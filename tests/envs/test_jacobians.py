@@ -106,6 +106,42 @@ def test_the_wind_column_is_the_effect_of_a_faster_wind():
     np.testing.assert_allclose(effect, (ends[0] - ends[1]) / 2e-4, atol=1e-7)
 
 
+def test_a_shifted_plant_moves_away_as_the_jacobians_of_the_other_say():
+    """Also what the time step keeps of past steps: without it the first step would be wrong by a half."""
+    env, other = PeriodJacobians(quick(), memories=True), PeriodJacobians(quick(), memories=True)
+    given = commands(env)
+    for followed in (env, other):
+        begun(followed)
+        for values in given[:4]:
+            jacobian = followed.step_physical(*values)[-1]["jacobian"]
+    np.testing.assert_array_equal(jacobian.end, env.unwrapped._episode.x[env._columns.moving])
+    change = np.random.default_rng(1).normal(size=len(jacobian.states)) * 1e-5
+    moving = env._columns.moving
+    env.shift(change)
+    left = change
+    for values in given[4:]:
+        left = other.step_physical(*values)[-1]["jacobian"].state @ left
+        assert env.step_physical(*values)[-1]["jacobian"] is not None
+        found = env.unwrapped._episode.x - other.unwrapped._episode.x
+        np.testing.assert_allclose(found[moving], left, atol=2e-9)
+
+
+def test_changes_that_cannot_be_made_are_refused():
+    env = PeriodJacobians(quick())
+    env.reset(seed=4)
+    n = len(env.step(env.unwrapped.last_action)[-1]["jacobian"].states)
+    for wrong in (np.zeros(n + 1), np.full(n, np.nan)):
+        with pytest.raises(InputError, match=f"{n} finite numbers"):
+            env.shift(wrong)
+    env.unwrapped.set_state(env.unwrapped.get_state())
+    env.step(env.unwrapped.last_action)
+    other = PeriodJacobians(quick())
+    other.reset(seed=5)
+    other.unwrapped.set_state(env.unwrapped.get_state())
+    with pytest.raises(InputError, match="no Jacobian is known"):
+        other.shift(np.zeros(n))
+
+
 def test_a_jacobian_is_missing_until_the_columns_know_the_past_and_then_the_same():
     """After set_state the multistep scheme has a past that the columns did not follow."""
     env, other = PeriodJacobians(quick()), PeriodJacobians(quick())

@@ -32,6 +32,7 @@ CLAIMS = {  # example: what its output must match, and the files it must write
     "14_tune": (r"least mean of both deviations: omega 0\.(12|2) rad/s", []),
     "15_record_video": (r"200 pictures of 960 x 640\nwrote ", ["video"]),
     "17_state_feedback": (r"stable: True(.|\n)*state_feedback +rotor speed std 0\.[0-4]", []),
+    "19_extended_kalman_filter": (r"deviates by 2\.\d+ m/s, estimated within 0\.[45]", []),
     "16_what_if": (r"same bits\nreward of an episode", []),
 }
 NEEDS = {  # example: modules without which its claims are not met

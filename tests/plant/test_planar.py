@@ -33,6 +33,7 @@ def worst(planar, full, columns):
     return max(np.abs(planar[c] - full[c]).max() / np.abs(full[c]).max() for c in columns)
 
 
+@pytest.mark.nightly
 def test_a_decay_in_still_water_is_that_of_the_full_model():
     planar, full = both(initial=OFFSET)
     assert worst(planar, full, IN_PLANE) < 1e-10
@@ -48,6 +49,7 @@ def test_waves_along_the_plane_move_it_as_the_full_model(heading):
     assert worst(planar, full, IN_PLANE) < 1e-9
 
 
+@pytest.mark.nightly
 def test_in_operation_the_torque_of_the_rotor_is_what_differs():
     planar, full = both("pi", 120.0, wind=18.0, sea=SEA, fidelity="fast")
     assert np.all(planar[ACROSS] == 0.0)

@@ -41,9 +41,13 @@ def without(line):
 
 
 @pytest.mark.parametrize(
-    ("line", "options"), [(2, {}), (1, {"fidelity": "fast"}), (3, {"mooring": "dynamic"})],
-    ids=["catenaries", "tables", "moving"],
-)  # fmt: skip
+    ("line", "options"),
+    [
+        pytest.param(2, {}, id="catenaries"),
+        pytest.param(1, {"fidelity": "fast"}, id="tables", marks=pytest.mark.nightly),
+        pytest.param(3, {"mooring": "dynamic"}, id="moving"),
+    ],
+)
 def test_a_platform_that_loses_a_line_at_once_is_one_without_it(line, options):
     start = {"initial": "zero", "duration": 20.0}
     broken = run(scene_of(**options), {"kind": "line_loss", "time": 0.0, "line": line}, **start)

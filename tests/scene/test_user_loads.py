@@ -108,6 +108,7 @@ def test_without_loads_there_is_no_part_and_no_channel():
     assert scene.data().user.size == 0
 
 
+@pytest.mark.nightly
 def test_a_force_at_the_fairleads_is_held_by_the_lines_alone():
     """theory.md 5.5: the lines pull 380.67 kN back at 10 m of surge; weight and buoyancy feel no lean."""
     point = trim(still(Load("Tug", push, Push(fx=380.67e3), point=(0.0, 0.0, -70.0))))
@@ -148,6 +149,7 @@ def test_at_a_loaded_trim_the_rest_of_the_plant_balances_the_load_exactly():
     assert np.abs(left + expected).max() < 1e-8 * np.abs(expected).max()
 
 
+@pytest.mark.nightly
 def test_a_yaw_spring_is_the_same_stiffness_of_the_platform_file():
     own = still(Load("Delta", yaw_spring, [5e7], axes="body"))
     same = still(platform=with_hydro(yaw_stiffness=98.34e6 + 5e7))
@@ -503,7 +505,7 @@ def integral(parameters, motion, force):
     force[Force.RATE] = parameters[0]
 
 
-@pytest.mark.parametrize("fidelity", ["standard", "reference"])
+@pytest.mark.parametrize("fidelity", ["standard", pytest.param("reference", marks=pytest.mark.nightly)])
 def test_loads_with_states_follow_the_solution_of_their_equations(fidelity):
     cases = {"Winch": (4.0, 2e5, 1e5, 0.4), "Jet": (1.0, -1e5, 5e4, 0.9)}
     loads = [Load(name, lagged_push, values, states=1) for name, values in cases.items()]

@@ -129,7 +129,13 @@ def test_loads_and_rates_are_those_of_blade_element_momentum(rotor):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wake", [None, WAKE], ids=["quasi-steady", "lagging"])
+@pytest.mark.parametrize(
+    "wake",
+    [
+        pytest.param(None, id="quasi-steady", marks=pytest.mark.nightly),
+        pytest.param(WAKE, id="lagging"),
+    ],
+)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_skewed_wake_is_that_of_blade_element_momentum(name, wake):
     skewed = build_dynamic_sections(ROTORS[name], wake, SKEW)

@@ -61,7 +61,10 @@ def test_the_flow_stagnates_in_front_and_doubles_beside_and_the_shadow_is_half_t
         assert disturbance(-3.0, 0.1, 3.0, 0.1, part_of(False, shadow)) == (0.0, 0.0)
 
 
-@pytest.mark.parametrize(("potential", "shadow"), [("bak", "eames"), ("potential", "powles")])
+@pytest.mark.parametrize(
+    ("potential", "shadow"),
+    [pytest.param("bak", "eames", marks=pytest.mark.nightly), ("potential", "powles")],
+)
 def test_loads_are_those_of_the_wind_with_the_tower_by_plain_vectors(potential, shadow):
     """Also with wind from behind, in which the rotor is in the shadow, and at the ends of the tower."""
     states, winds = moving(6)
