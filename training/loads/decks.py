@@ -4,9 +4,9 @@
         run.outb       the series here, as an output of OpenFAST
         wind.bts       the box of wind of this run, or wind.wnd
         waves.Elev     elevation of the sea at the origin (WaveMod 5)
-        model.fst      with --deck: the user's deck with this wind, sea, current, length and initial state,
-                       parked or with ROSCO as in the run; its other files are those of the deck, by relative
-                       paths
+        model.fst      with --deck: the user's deck with this wind, sea, current, length, initial state and
+                       place of the accelerometer, parked or with ROSCO as in the run; its other files are
+                       those of the deck, by relative paths
         DISCON.IN, rotor.txt   of ROSCO, which ServoDyn then loads from the installed wheel
         README.md      case, factor, what the deck lacks of the case (events, controller, sensors)
 
@@ -268,6 +268,9 @@ def write_deck(folder, deck, case, scene, frame, wind, wave_time, rosco=None):
     for key, channel in INITIAL:
         own = channel if not key.startswith("BlPitch") else f"BldPitch{key[-2]}_[deg]"
         elastodyn.put(f"{first[own if own in frame else channel]:.8g}", key)
+    for key in ("NcIMUxn", "NcIMUyn", "NcIMUzn"):  # accelerometer of the run: at the yaw bearing
+        if elastodyn.has(key):
+            elastodyn.put(0.0, key)
     if case.case.parked:
         elastodyn.put(True, "GenDOF")
     if "servodyn" in parts:
@@ -386,8 +389,8 @@ def _write_readme(folder, case, deck, rosco):
     if deck is not None:
         control = ", parked turbine" if case.case.parked else ", ROSCO" if rosco else ""
         lines.append(
-            f"- model.fst: wind, sea, current, length, initial state{control} are those of the run,"
-            " all else is the deck's"
+            f"- model.fst: wind, sea, current, length, initial state, place of the accelerometer{control} are"
+            " those of the run, all else is the deck's"
         )
     with replacing(folder / "README.md") as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -197,6 +197,7 @@ def test_a_parked_deck_idles_and_has_the_current_of_its_storm(run, tmp_path):
     fst = write_deck(held, FST, LOAD, scene, frame, *weather)
     elastodyn = EditedPart(PartFile(fst, "OpenFAST").other("EDFile"), "ElastoDyn")
     elastodyn.put(False, "GenDOF")
+    elastodyn.put(2.2, "NcIMUzn")  # and an accelerometer elsewhere than that of the run
     elastodyn.write(elastodyn.file.path)
     main = PartFile(write_deck(tmp_path, fst, parked, scene, frame, *weather), "OpenFAST")
     servo, elastodyn = (
@@ -205,6 +206,7 @@ def test_a_parked_deck_idles_and_has_the_current_of_its_storm(run, tmp_path):
     assert servo.path.parent == elastodyn.path.parent == tmp_path
     assert servo.whole("PCMode") == servo.whole("VSContrl") == 0 and servo.number("TimGenOn") > 9000.0
     assert elastodyn.text("GenDOF").lower() == "true" and elastodyn.number("BlPitch(3)") == 90.0
+    assert elastodyn.number("NcIMUzn") == 0.0
     sea = PartFile(main.other("SeaStFile"), "SeaState")
     assert sea.whole("CurrMod") == 1 and sea.number("CurrSSV0") == 1.2 and sea.number("CurrDIV") == 0.0
     assert sea.number("CurrSSDir") == 30.0 and sea.number("CurrNSV0") == 0.0
