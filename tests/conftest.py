@@ -2,6 +2,8 @@
 
 import os
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: each worker has one core
+
 import pytest
 
 from fowt_env.descriptions.platform import read_platform

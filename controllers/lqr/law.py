@@ -13,6 +13,7 @@ from math import exp
 
 import numpy as np
 
+from fowt_env.analysis.threads import one_thread
 from fowt_env.caches import Cache
 from fowt_env.control import CompiledController, check_control_dt
 from fowt_env.controllers.gains import with_gains
@@ -157,6 +158,7 @@ class LQR(CompiledController):
         if self.designed:
             self.take(models)
 
+    @one_thread
     def prepare(self, scene):
         """Linearise the scene's platform over the winds and design the gains (cached per platform).
 
@@ -173,6 +175,7 @@ class LQR(CompiledController):
             self._plant = models
             self.take(models)
 
+    @one_thread
     def take(self, models):
         """Design and install the gains for DesignModels of winds 1 m/s apart."""
         known = (id(models), self.settings, self.control_dt)

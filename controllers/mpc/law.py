@@ -13,6 +13,7 @@ from math import exp, nan
 
 import numpy as np
 
+from fowt_env.analysis.threads import one_thread
 from fowt_env.caches import Cache
 from fowt_env.control import USUAL_LIDAR, check_control_dt, wind_ahead
 from fowt_env.control.views import LidarReading
@@ -241,6 +242,7 @@ class MPC:
         }
         return np.array([values[entry] for entry in Entry], dtype=np.float64)
 
+    @one_thread
     def prepare(self, scene):
         """Compute the models of the scene's plant over the winds (cached per plant).
 

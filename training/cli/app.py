@@ -1,5 +1,6 @@
 """Assembles the `fowt` command; each subcommand parses its options, calls the library and prints."""
 
+import os
 from importlib import import_module
 
 from fowt_env.training.cli.console import MODULES, app
@@ -10,4 +11,5 @@ for module in MODULES:
 
 def main():
     """Run the console script `fowt`."""
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of worker processes; here commands see to it
     app()

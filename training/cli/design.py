@@ -6,6 +6,7 @@ from typing import Annotated
 
 from typer import Argument, Option
 
+from fowt_env.analysis.threads import one_thread
 from fowt_env.descriptions.checks import parse_numbers, parse_whole_numbers
 from fowt_env.errors import InputError
 from fowt_env.files.tables import TABLE_SUFFIXES
@@ -76,6 +77,7 @@ def _balanced(table):
 
 
 @command(model)
+@one_thread
 def linearize(
     platform: shared.PlatformOption = "oc3_hywind",
     winds: Annotated[str | None, Option(help=SWEPT)] = None,
@@ -138,6 +140,7 @@ def linearize(
 
 
 @command(design)
+@one_thread
 def pi(
     omega: Annotated[float, Option(help="Frequency of the rotor loop, rad/s.")] = 0.2,
     zeta: Annotated[float, Option(help="Damping ratio of the rotor loop.")] = 0.7,
@@ -185,6 +188,7 @@ def pi(
 
 
 @command(design)
+@one_thread
 def bound(
     wind: Annotated[
         str | None, Option(help=f"Winds above rated, m/s: {shared.RANGE}; default: even m/s.")
@@ -264,6 +268,7 @@ def bound(
 
 
 @command(design)
+@one_thread
 def optimum(
     cases: Annotated[str, Option(help="Cases of the suite, comma-separated.")] = "ntm_12",
     seeds: shared.ValidationSeeds = "1001,1002",
@@ -313,6 +318,7 @@ def optimum(
 
 
 @command(design)
+@one_thread
 def zeros(
     platform: shared.PlatformOption = "oc3_hywind",
     winds: WindsOption = None,
@@ -342,6 +348,7 @@ def zeros(
 
 
 @command(design)
+@one_thread
 def front(
     runs: Annotated[str, Option(help="Output table of fowt design lqr-sweep.")],
     bound_path: Annotated[str, Option("--bound", help="Output table of fowt design bound.")],
@@ -368,6 +375,7 @@ def front(
 
 
 @command(design)
+@one_thread
 def lqr(
     setting: SettingOption = None,
     platform: shared.PlatformOption = "oc3_hywind",
@@ -408,6 +416,7 @@ def lqr(
 
 
 @command(design)
+@one_thread
 def lqr_sweep(
     vary: Annotated[list[str] | None, Option(metavar="SETTING=A,B,C", help=VARIED)] = None,
     setting: SettingOption = None,
@@ -439,6 +448,7 @@ def lqr_sweep(
 
 
 @command(design)
+@one_thread
 def search(
     name: Annotated[str, Argument(help="Controller: pi_tuned, rosco_float, lqr, mpc, ...")],
     budget: Annotated[int, Option(help="Number of settings tried.")] = 40,

@@ -7,6 +7,7 @@ from typing import Annotated
 from rich.markup import escape
 from typer import Option
 
+from fowt_env.analysis.threads import one_thread
 from fowt_env.descriptions.checks import parse_whole_numbers
 from fowt_env.errors import InputError, unknown
 from fowt_env.files.tables import write_table
@@ -34,6 +35,7 @@ TEXT = str | None
 
 
 @command()
+@one_thread
 def evaluate_command(
     controllers: Annotated[str, Option(help=CONTROLLERS)] = "pi",
     suite: Annotated[TEXT, Option(help="Suite: a name of fowt list suites, or a TOML file.")] = None,

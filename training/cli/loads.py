@@ -6,6 +6,7 @@ from typing import Annotated
 from rich.markup import escape
 from typer import Argument, Option
 
+from fowt_env.analysis.threads import one_thread
 from fowt_env.descriptions.checks import check_number, check_whole_number, parse_number
 from fowt_env.errors import InputError, unknown
 from fowt_env.training.cli import options as shared
@@ -38,6 +39,7 @@ MOST_LOST = 10  # runs without result that are printed
 
 
 @command()
+@one_thread
 def loads_command(
     platform: Annotated[str, Argument(metavar="PLATFORM|DECK.fst", help=PLATFORM)] = "oc3_hywind",
     site: Annotated[str, Option(help=SITE)] = "norway_5",

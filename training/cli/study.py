@@ -14,6 +14,7 @@ import numpy as np
 from rich.markup import escape
 from typer import Argument, Option
 
+from fowt_env.analysis.threads import one_thread
 from fowt_env.display import number_text
 from fowt_env.errors import InputError, SimulationStopped
 from fowt_env.training.cli import options as shared
@@ -34,6 +35,7 @@ COMPARED = ("RotSpeed", "BldPitch1", "GenTq", "GenPwr", "PtfmPitch", "PtfmSurge"
 
 
 @command()
+@one_thread
 def study(
     platform: Annotated[str, Argument(help=PLATFORM)] = "oc3_hywind",
     controller: Annotated[str, Option(help=MINE)] = "mpc",

@@ -4,6 +4,7 @@ from typing import Annotated
 
 from typer import Option
 
+from fowt_env.analysis.threads import one_thread
 from fowt_env.training.cli import options as shared
 from fowt_env.training.cli.console import command, note, out
 
@@ -12,6 +13,7 @@ WEATHER = f"{shared.AS_SIMULATE} With a mean wind speed."
 
 
 @command()
+@one_thread
 def tune_command(
     controller: Annotated[str, Option(help=LAW)] = "pi",
     against: Annotated[str, Option(help="Controller beside it, in the same form.")] = "pi",
