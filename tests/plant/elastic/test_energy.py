@@ -77,7 +77,12 @@ def drifts(working, shaft):
 
 
 @pytest.mark.parametrize(
-    ("working", "shaft", "small"), [(False, "rigid", 1e-8), (True, "rigid", 1e-7), (False, "torsion", 1e-5)]
+    ("working", "shaft", "small"),
+    [
+        (False, "rigid", 1e-8),
+        pytest.param(True, "rigid", 1e-7, marks=pytest.mark.nightly),
+        (False, "torsion", 1e-5),
+    ],
 )
 def test_energy_changes_by_the_work_alone_but_for_the_fourth_order_of_the_step(working, shaft, small):
     """The amplitude of a free oscillation even converges with one order more.

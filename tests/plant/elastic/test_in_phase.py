@@ -149,7 +149,7 @@ def test_momentum_about_the_shaft_is_kept(integrator):
     assert in_plain_python(f"momentum_change({integrator!r})") < 1e-7
 
 
-@pytest.mark.parametrize("lag", [None, 0.1])
+@pytest.mark.parametrize("lag", [None, pytest.param(0.1, marks=pytest.mark.nightly)])
 def test_a_lost_torque_swings_the_shaft_as_in_short_steps(lag):
     found = in_plain_python(f"swing_after_lost_torque('ab4', 0.05, {lag})")
     wanted = in_plain_python(f"swing_after_lost_torque('rk4', 0.005, {lag})")

@@ -79,7 +79,14 @@ def errors(integrator, shaft):
     return found
 
 
-@pytest.mark.parametrize(("integrator", "shaft"), [("ab4", "rigid"), ("ab4", "torsion"), ("abm4", "torsion")])
+@pytest.mark.parametrize(
+    ("integrator", "shaft"),
+    [
+        pytest.param("ab4", "rigid", marks=pytest.mark.nightly),
+        ("ab4", "torsion"),
+        pytest.param("abm4", "torsion", marks=pytest.mark.nightly),
+    ],
+)
 def test_it_converges_with_order_four(integrator, shaft):
     code = f"import json, test_order; print(json.dumps(test_order.errors({integrator!r}, {shaft!r})))"
     here = Path(__file__).parent
