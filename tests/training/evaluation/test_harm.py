@@ -326,7 +326,7 @@ def test_what_a_run_imports_is_in_the_hash_of_the_plant_and_what_people_look_at_
     # of the program above, of agents, and of controllers, whose own hash has it
     others = (
         "training.evaluation.cases", "training.evaluation.carried", "training.evaluation.scaling",
-        "envs.decisions", "analysis.reduced_model",
+        "envs.decisions", "analysis.reduced_model", "analysis.threads",
     )  # fmt: skip
     used = set(words) - {str(module_path(f"fowt_env.{name}")) + ".py" for name in others}
     assert used <= files and len(used) > 40
