@@ -4,17 +4,20 @@ BLAS spreads products of matrices of some tens of rows over all cores. Its threa
 other processes a design of mpc took four times as long as on one thread (17 and 4.3 s on two busy cores).
 """
 
-from functools import cache, wraps
+from functools import wraps
 
 from threadpoolctl import ThreadpoolController
 
+from fowt_env.caches import Cache
 
-@cache
+_controllers = Cache(1)  # to look for the libraries takes milliseconds
+
+
 def _libraries():
     """Return the ThreadpoolController of the loaded libraries, of which NumPy and SciPy have one each."""
     import scipy.linalg  # noqa: F401  # loads that of SciPy
 
-    return ThreadpoolController()
+    return _controllers.get("blas", ThreadpoolController)
 
 
 def one_thread(function):
