@@ -258,7 +258,7 @@ class _Columns:
         for own, array in zip(_parts(self.base.data), _parts(run.data), strict=True):
             array[...] = own
         run.data.cache[LoadCache.VALID] = 0.0
-        self._anchor(env)
+        self.start = self.base.vector.copy()
 
     def _anchor(self, env):
         """Copy the state of the environment."""

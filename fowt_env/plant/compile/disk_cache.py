@@ -114,7 +114,7 @@ class _Files(caching.CompileResultCacheImpl):
     def rebuild(self, target_context, payload):
         """Return the stored CompileResult; a caller compiled from it loads first what it loads first.
 
-        Numba forgets this: such a caller, in a process that has loaded nothing else, called address 0.
+        Numba forgets this: such a caller, in a process that has loaded nothing else, would call address 0.
         """
         cres = super().rebuild(target_context, payload)
         cres.library._reload_init.update(cres.reload_init)
