@@ -141,12 +141,13 @@ def _write_gif(pictures, path, pause):
     with open(path, "wb") as file:
         file.writelines(GifImagePlugin.getheader(whole, info=settings)[0])
         file.writelines(GifImagePlugin.getdata(whole, **settings))
-        shown = shown.astype(np.int16)
+        shown = shown.copy()
         for picture in pictures:
             indices = reduced(picture)
-            gap = np.abs(picture - shown).max(axis=2)
-            changed = (indices != before) & (gap > UNSEEN)
-            before, shown = np.where(changed, indices, before), np.where(changed[..., None], picture, shown)
+            changed = indices != before
+            gap = np.abs(picture[changed].astype(np.int16) - shown[changed]).max(axis=1)
+            changed[changed] = gap > UNSEEN
+            before[changed], shown[changed] = indices[changed], picture[changed]
             rows, columns = (np.flatnonzero(changed.any(axis=axis)) for axis in (1, 0))
             if not rows.size:  # a frame needs at least one pixel
                 rows = columns = np.zeros(1, dtype=int)
