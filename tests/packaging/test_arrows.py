@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import fowt_env
-from fowt_env.plant.compile.sources import all_imports
+from fowt_env.plant.compile.sources import read_source
 
 ROOT = Path(fowt_env.__file__).resolve().parent.parent
 # from the ground up; a layer imports itself and what stands before it
@@ -42,8 +42,8 @@ def layer_of(module):
 def imports(path):
     """Modules of this project that a source imports, at its top or inside a function."""
     found = set()
-    for level, name in all_imports(path):
-        assert not level, f"{path}: imports are absolute"
+    for name in read_source(path).imports:
+        assert not name.startswith("."), f"{path}: imports are absolute"
         top, _, inner = name.partition(".")
         found |= {inner} & set(MODULES) if top == "fowt_env" else set()
     return sorted(found - {""})

@@ -27,6 +27,7 @@ class Source(NamedTuple):
 
     code: str  # hash of its code, 32 hexadecimal digits
     top: tuple[str, ...]  # modules of this project imported at module level
+    imports: tuple[str, ...]  # modules of every import, also inside functions; relative ones with their dots
 
 
 def read_source(path):
@@ -44,19 +45,19 @@ def _read_source(path, time, size):
     if key not in known:
         known[key] = _parsed_source(content)
         _unsaved.add(key)
-    code, top = known[key]
-    return Source(code, tuple(top))
+    code, top, imports = known[key]
+    return Source(code, tuple(top), tuple(imports))
 
 
 def _parsed_source(content):
-    """Return [hash of the code, modules of this project imported at module level] of a file's bytes."""
+    """Return [hash of the code, top, imports] of a file's bytes, as in Source; no imports if not Python."""
     try:
         tree = ast.parse(content)
     except (SyntaxError, ValueError, RecursionError):
-        return [hashlib.sha256(content).hexdigest()[:32], []]
-    names = {name for level, name in _imported_names(tree.body) if not level}
-    top = sorted(name for name in names if name.partition(".")[0] == PACKAGE.name)
-    return [hashlib.sha256(code_text(tree).encode()).hexdigest()[:32], top]
+        return [hashlib.sha256(content).hexdigest()[:32], [], []]
+    top = sorted(name for name in _imported_names(tree.body) if name.partition(".")[0] == PACKAGE.name)
+    imports = sorted(_imported_names(ast.walk(tree)))
+    return [hashlib.sha256(code_text(tree).encode()).hexdigest()[:32], top, imports]
 
 
 def code_text(tree):
@@ -71,29 +72,16 @@ def code_text(tree):
 
 
 def _imported_names(nodes):
-    """Return {(level, module)} of the import statements in nodes; `from a import b` gives a and a.b."""
+    """Return the modules of the import statements in nodes; `from .a import b` gives .a and .a.b."""
     names = set()
     for node in nodes:
         if isinstance(node, ast.Import):
-            names |= {(0, alias.name) for alias in node.names}
+            names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            module = node.module or ""
-            names.add((node.level, module))
-            names |= {(node.level, f"{module}.{alias.name}".strip(".")) for alias in node.names}
+            dots, module = "." * node.level, node.module or ""
+            names.add(dots + module)
+            names |= {dots + f"{module}.{alias.name}".strip(".") for alias in node.names}
     return names
-
-
-def all_imports(path):
-    """Return (level, module) of every import in a file, also inside functions; () if not valid Python."""
-    return _all_imports(path, path.stat().st_mtime_ns)
-
-
-@cached(4096)
-def _all_imports(path, time):
-    try:
-        return tuple(sorted(_imported_names(ast.walk(ast.parse(path.read_bytes())))))
-    except (SyntaxError, ValueError, RecursionError):
-        return ()
 
 
 def imported_files(starts, roots, inside):
@@ -104,14 +92,27 @@ def imported_files(starts, roots, inside):
     inside   inside(path) -> whether to include a file; imports of excluded files are not followed
     """
 
-    def imported(path):
-        files = []
-        for level, name in all_imports(path):
-            folders = [path.parents[level - 1]] if level else roots
-            files += next(filter(None, (_module_files(folder, name) for folder in folders)), [])
-        return files
+    return in_order(_followed(map(Path, starts), inside, lambda path: _imported_by(path, tuple(roots))))
 
-    return in_order(_followed(map(Path, starts), inside, imported))
+
+def _imported_by(path, roots):
+    """Return the files of the modules that a file imports, and of their parent packages."""
+    return _imported_by_source(path, roots) if installed_path(path) else _found(path, roots)
+
+
+@cached(4096)  # sources of this project do not change during a run
+def _imported_by_source(path, roots):
+    return _found(path, roots)
+
+
+def _found(path, roots):
+    files = []
+    for dotted in read_source(path).imports:
+        name = dotted.lstrip(".")
+        level = len(dotted) - len(name)
+        folders = [path.parents[level - 1]] if level else roots
+        files += next(filter(None, (_module_files(folder, name) for folder in folders)), [])
+    return list(dict.fromkeys(files))
 
 
 def imported_at_top(path, but):
@@ -174,14 +175,14 @@ def _store():
 
 @cache
 def _kept_sources():
-    """Return {hash of a source's bytes: [code, top]} as stored on disk; {} if the file is unusable."""
+    """Return {hash of a source's bytes: [code, top, imports]} as on disk; {} if the file is unusable."""
     path = _store()
     try:
         if path is None or distrust(path.parent) or distrust(path, stat.S_ISREG):
             return {}
         return {
-            str(key): [str(code), list(map(str, top))]
-            for key, (code, top) in json.loads(path.read_bytes()).items()
+            str(key): [str(code), list(map(str, top)), list(map(str, imports))]
+            for key, (code, top, imports) in json.loads(path.read_bytes()).items()
         }
     except (OSError, ValueError, TypeError, AttributeError):  # the file is missing or broken
         return {}

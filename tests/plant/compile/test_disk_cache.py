@@ -462,7 +462,7 @@ def test_a_broken_list_of_parsed_sources_is_made_anew_and_one_of_others_is_not_r
     (used,) = output(start(WHERE, tmp_path / "cache"))
     (kept,) = (tmp_path / "cache" / "sources").iterdir()
     sound = json.loads(kept.read_bytes())
-    wrong = json.dumps({key: ["0" * 32, top] for key, (_, top) in sound.items()})
+    wrong = json.dumps({key: ["0" * 32, *rest] for key, (_, *rest) in sound.items()})
     for content, mode in (("{", 0o600), ('{"a": 1}', 0o600), (wrong, 0o666)):
         kept.write_text(content)
         kept.chmod(mode)
