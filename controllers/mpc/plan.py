@@ -58,6 +58,8 @@ class Work(NamedTuple):
     gain: np.ndarray  # (2, 3)
     by_load: np.ndarray  # (2, moves)
     row: np.ndarray  # (moves,)
+    closed: np.ndarray  # (n, n) A - B K
+    factors: np.ndarray  # (moves, moves) of H
 
 
 def grid_of(settings, period):
@@ -76,7 +78,7 @@ def work_of(grid):
     rows = 2 * RATED_BLOCKS + BLOCK_ROWS * len(grid.ends)
     shapes = (
         (steps + 1, N_FEEDBACK), (steps + 1, N_FEEDBACK, moves), (moves, moves), moves, (rows, moves), rows,
-        rows, 8, 2, (2, 3), (2, moves), moves,
+        rows, 8, 2, (2, 3), (2, moves), moves, (N_FEEDBACK, N_FEEDBACK), (moves, moves),
     )  # fmt: skip
     return Work(*map(np.zeros, shapes))
 
@@ -102,13 +104,16 @@ def _extra_loads(model, wind, table, x, loads, excess, gain):
 
 
 @kernel
-def _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed):
+def _foresee(model, feedback, wind, table, nonlinear, ahead, grid, moves, work):
     """Predict the states under the moves from the first state, with their slopes over the moves.
 
     ahead: (n, 2) states of the wind filter at the first n periods, minus the operating wind.
     """
     n, width = N_FEEDBACK, len(moves)
-    x, s = work.states, work.slopes
+    x, s, closed = work.states, work.slopes, work.closed
+    for i in range(n):
+        for j in range(n):
+            closed[i, j] = model.A[i, j] - model.B[i, 0] * feedback[0, j] - model.B[i, 1] * feedback[1, j]
     excess, gain, by_load = work.excess, work.gain, work.by_load
     excess[:] = 0.0
     s[0] = 0.0
@@ -236,6 +241,33 @@ def _limit(limits, units, trim, grid, moves, work, gain):
         row += 1
 
 
+@kernel
+def _minimise(h, g, factors, step):
+    """Fill step with the minimum of step'H step/2 + g'step, H positive definite, by H = L D L'.
+
+    numpy.linalg.solve would take a third of the time in which this module compiles.
+    """
+    size = len(step)
+    for i in range(size):
+        for j in range(i):
+            total = h[i, j]
+            for k in range(j):
+                total -= factors[i, k] * factors[j, k]
+            factors[i, j] = total  # L D
+        pivot, total = h[i, i], -g[i]
+        for j in range(i):
+            scaled = factors[i, j] / factors[j, j]
+            pivot -= scaled * factors[i, j]
+            factors[i, j] = scaled  # L
+            total -= scaled * step[j]
+        factors[i, i] = pivot
+        step[i] = total
+    for i in range(size - 1, -1, -1):
+        step[i] /= factors[i, i]
+        for k in range(i + 1, size):
+            step[i] -= factors[k, i] * step[k]
+
+
 @entry
 def newton_step(
     model, gain, wind, table, nonlinear, references, end, ahead, limits, units, grid, moves, work, step
@@ -244,11 +276,10 @@ def newton_step(
 
     Returns whether this step satisfies all limits. The present state is work.states[0], the feedback -gain x.
     """
-    closed = model.A - model.B @ gain
-    _foresee(model, wind, table, nonlinear, ahead, grid, moves, work, closed)
+    _foresee(model, gain, wind, table, nonlinear, ahead, grid, moves, work)
     _condense(model, references, end, grid, moves, work, gain)
     _limit(limits, units, model.trim, grid, moves, work, gain)
-    step[:] = np.linalg.solve(work.H, -work.g)
+    _minimise(work.H, work.g, work.factors, step)
     kept = True
     for row in range(len(work.low)):
         value = 0.0

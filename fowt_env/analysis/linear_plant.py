@@ -126,8 +126,10 @@ def _mean_response(
     blocks = blade_states.shape[0]
     for i in range(azimuths):
         azimuth = x[State.AZIMUTH] + i * (2.0 * pi / 3.0) / azimuths
-        y[:] = x
-        v[:] = u
+        for j in range(len(x)):  # `y[:] = x` would compile the text of its error for seconds
+            y[j] = x[j]
+        for j in range(len(u)):
+            v[j] = u[j]
         y[State.AZIMUTH] = azimuth
         for blade in range(BLADES):
             psi = azimuth + blade * 2.0 * pi / BLADES
@@ -136,9 +138,9 @@ def _mean_response(
             if v.shape[0] > N_COMMANDS:
                 v[Command.BLADE_PITCH + blade] += cyclic[blocks, 0] * cos(psi) + cyclic[blocks, 1] * sin(psi)
         fill_response(y, v, force, model, data, dx, measurement, row)
-        rates += dx / azimuths
-        measured += measurement / azimuths
-        recorded += row / azimuths
+        for means, values in ((rates, dx), (measured, measurement), (recorded, row)):
+            for j in range(len(values)):
+                means[j] += values[j] / azimuths
         for blade in range(BLADES):
             psi = azimuth + blade * 2.0 * pi / BLADES
             c, s = 2.0 * cos(psi) / BLADES / azimuths, 2.0 * sin(psi) / BLADES / azimuths
