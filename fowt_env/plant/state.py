@@ -123,6 +123,13 @@ def cross(ax, ay, az, bx, by, bz):
 
 
 @kernel
+def assign(values, array):
+    """Copy a tuple of floats to an array; `array[:] = values` takes most of a second to compile."""
+    for i in range(len(values)):
+        array[i] = values[i]
+
+
+@kernel
 def add(a, b):
     """Return the sum of two wrenches."""
     return Wrench(a.fx + b.fx, a.fy + b.fy, a.fz + b.fz, a.mx + b.mx, a.my + b.my, a.mz + b.mz)

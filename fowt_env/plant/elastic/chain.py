@@ -26,7 +26,7 @@ from fowt_env.plant.elastic.tower import (
 )
 from fowt_env.plant.model import LoadCache
 from fowt_env.plant.rigid_body import momentum_rate
-from fowt_env.plant.state import State, cross
+from fowt_env.plant.state import State, assign, cross
 
 FREE = (
     6  # entry of RotorScratch.place: inverse of the inertia of rotor and generator, 1/(kg m2), zero if held
@@ -537,8 +537,8 @@ def accelerate_elastic(
         _factor_modes(matrix, n)
         if not body.platform_fixed:
             factor_spd(matrix)
-        work.place[:] = (top.x, top.y, top.z, centre[0], centre[1], centre[2], free)
-        work.axis[:] = (f.nx, f.ny, f.nz)
+        assign((top.x, top.y, top.z, centre[0], centre[1], centre[2], free), work.place)
+        assign((f.nx, f.ny, f.nz), work.axis)
         cache[LoadCache.FACTORED] = 1.0
     spin = gear * generator_speed(x, shaft)
     gx, gy, gz = cross(f.wx, f.wy, f.wz, f.nx, f.ny, f.nz)

@@ -15,7 +15,7 @@ from fowt_env.plant.compile.decorators import inlined_kernel, kernel
 from fowt_env.plant.compile.handle import by_reference
 from fowt_env.plant.compile.variants import chosen_by_class
 from fowt_env.plant.elastic.beam import Beam, reduce_beam
-from fowt_env.plant.state import Pose, State, Wrench, cross
+from fowt_env.plant.state import Pose, State, Wrench, assign, cross
 
 MOST_MODES = 4
 
@@ -102,7 +102,7 @@ def keep_bend(bend, work):
     """Keep the Bend of an evaluation for kept_bend; no-op for a rigid tower."""
     if bend is None:
         return
-    work.bend[:] = bend
+    assign(bend, work.bend)
 
 
 @kernel
