@@ -369,7 +369,7 @@ def view_of(platform):
 @pytest.mark.parametrize(
     ("platform", "beside"),
     [
-        pytest.param("iea15_volturnus_s", (-90.0, 0.0, 2.0), marks=pytest.mark.nightly),
+        ("iea15_volturnus_s", (-90.0, 0.0, 2.0)),
         ("nrel5mw_iti_barge", (-90.0, 0.0, 2.0)),
         (floaters.semi(), (60.0, 0.0, 3.0)),
         (floaters.tension_leg(), (60.0, 0.0, 3.0)),
