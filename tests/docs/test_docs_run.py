@@ -68,6 +68,7 @@ def test_every_block_of_getting_started_runs(folder):
     assert (folder / "results" / "first" / "leaderboard.json").exists()
 
 
+@pytest.mark.nightly
 def test_every_block_of_extending_runs(folder):
     run_blocks(blocks("guides/extending.md"), folder)
     table = pd.read_csv(folder / "results" / "damper" / "results.csv").set_index("controller")

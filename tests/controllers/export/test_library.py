@@ -175,7 +175,7 @@ def test_the_process_ends_with_a_host_that_is_killed(hangs, own, tmp_path):
     wait_for_end(pid)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_cannot_be_started_is_said_at_the_first_call(own, tmp_path, monkeypatch):
     path = own("gone")
     (tmp_path / "gone.py").unlink()
