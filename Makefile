@@ -44,7 +44,7 @@ demo: $(VENV)/.installed-demo
 
 test: $(VENV)/.installed-dev
 	@echo "minutes, most of them for compiling kernels, which are kept"
-	$(TESTS) -m installation --durations=10 $(PROOFS)
+	$(TESTS) -m "installation and not nightly" --durations=10 $(PROOFS)
 
 test-all: test test-rest test-nightly
 

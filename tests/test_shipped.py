@@ -66,6 +66,7 @@ def test_a_pack_is_used_once_with_the_bits_of_kernels_that_are_compiled_here(pac
     assert used(pack, tmp_path / "with")[1][0] == "0"  # it is there already
 
 
+@pytest.mark.nightly
 def test_a_pack_is_left_alone_on_a_processor_without_its_instructions(packed, tmp_path):
     lesser = "features = llvm.get_host_cpu_features(); features['fma'] = False\n"
     lesser += "llvm.get_host_cpu_features = lambda: features\n"
@@ -74,7 +75,10 @@ def test_a_pack_is_left_alone_on_a_processor_without_its_instructions(packed, tm
     assert used(packed[0], tmp_path / "b", **other) == (packed[1], COMPILED)
 
 
-@pytest.mark.parametrize("key", ["numba", "python", "triple", "sources"])
+@pytest.mark.parametrize(
+    "key",
+    ["numba", *(pytest.param(key, marks=pytest.mark.nightly) for key in ("python", "triple")), "sources"],
+)
 def test_a_pack_of_other_sources_or_versions_is_left_alone(key, packed, tmp_path):
     with tarfile.open(packed[0]) as archive:
         files = {member.name: archive.extractfile(member).read() for member in archive.getmembers()}

@@ -63,6 +63,7 @@ def test_periods_are_those_of_the_linear_model(oc3):
         assert oc3.periods[motion.replace("platform_", "platform ")] == pytest.approx(period, rel=2e-3)
 
 
+@pytest.mark.nightly
 def test_a_spar_of_members_floats_as_the_spar_does(oc3):
     found = check_platform(spar())
     assert found.faults == ()

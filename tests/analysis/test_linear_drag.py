@@ -97,6 +97,7 @@ def test_the_linear_force_has_the_least_error_in_a_random_sea(scene):
         assert 0.1 < 1.0 - product**2 / (linear @ linear) / (drag[:, column] @ drag[:, column]) < 0.2
 
 
+@pytest.mark.nightly
 def test_the_damping_is_the_mean_drag_on_a_hull_that_moves_slowly(scene):
     seas = random_seas(scene)
     found = linear_drag(scene, state(), OMEGA, SEA)

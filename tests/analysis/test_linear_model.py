@@ -53,6 +53,7 @@ def test_free_decay_has_the_natural_period(motion, periods, still_scene):
     assert np.all(np.diff(peaks) < 0.0)
 
 
+@pytest.mark.nightly
 def test_motions_without_restoring_have_no_period(platform):
     periods = natural_periods(fowt_env.build_scene("oc3_hywind", mooring=False, fidelity="reference"))
     assert periods["surge"] == periods["sway"] == np.inf
@@ -149,6 +150,7 @@ def test_unknown_state_name_is_refused(still_scene):
         linearize(still_scene).index("surg")
 
 
+@pytest.mark.nightly
 def test_the_wake_decays_at_its_own_lags_and_at_rest_is_the_quasi_steady_one():
     wind, settings = 18.0, {"fidelity": "standard", "shear_exponent": 0.0}
     scene = fowt_env.build_scene(wind=wind, dynamic_inflow=True, **{"fidelity": "reference"} | settings)

@@ -59,6 +59,7 @@ def test_an_unstable_plant_has_a_gain_reduction(model):
     assert loop.modulus == pytest.approx(1.0, abs=1e-4) and loop.gain == inf
 
 
+@pytest.mark.nightly
 def test_margins_of_the_pitch_loop_are_those_of_python_control(model):
     control = pytest.importorskip("control")
     settings = PISettings.published(model.scene.turbine)

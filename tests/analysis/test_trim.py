@@ -301,7 +301,15 @@ def test_the_command_prints_a_warning_as_one_line(tmp_path, warned):
     assert "UserWarning" not in result.stderr
 
 
-@pytest.mark.parametrize("name", names("platforms"))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.nightly)
+        if name in ("nrel5mw_iti_barge", "nrel5mw_oc4_semi")
+        else name
+        for name in names("platforms")
+    ],
+)
 def test_built_in_platforms_rest_in_wind_without_a_warning(name, warned):
     platform = read_platform(name)
     rated = read_turbine(platform.turbine).rated_wind_speed

@@ -68,6 +68,7 @@ def test_every_block_of_getting_started_runs(folder):
     assert (folder / "results" / "first" / "leaderboard.json").exists()
 
 
+@pytest.mark.nightly
 def test_every_block_of_extending_runs(folder):
     run_blocks(blocks("guides/extending.md"), folder)
     table = pd.read_csv(folder / "results" / "damper" / "results.csv").set_index("controller")
@@ -98,7 +99,7 @@ def test_the_statistics_that_the_readme_shows_are_those_of_its_program():
         assert abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(b.partition(".")[2]), again
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @needs_compiler
 def test_every_block_of_export_runs_in_this_package_as_host(folder):
     run_blocks([block for block in blocks("guides/export.md") if block.language in RUN], folder)

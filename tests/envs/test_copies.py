@@ -31,7 +31,7 @@ def record(env, given):
     "settings",
     [
         {},
-        {"action_mode": "setpoint"},
+        pytest.param({"action_mode": "setpoint"}, marks=pytest.mark.nightly),
         {"action_mode": "residual", "baseline": "lqr", "sensors": DEGRADED},
         pytest.param({"task": "shutdown"}, marks=pytest.mark.nightly),
         pytest.param(WATCHED, marks=pytest.mark.nightly),

@@ -67,9 +67,7 @@ CASES = [
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param(
-            case, id=case.name, marks=() if case.name in ("turbulent", "grid") else pytest.mark.nightly
-        )
+        pytest.param(case, id=case.name, marks=() if case.name == "turbulent" else pytest.mark.nightly)
         for case in CASES
     ],
 )
@@ -178,7 +176,7 @@ DRIVES = {"pitch_drive": "second_order", "fidelity": "fast", "wind": 16.0}
         ("pi", False, {"fidelity": "standard"}),
         pytest.param("pi", True, {"fidelity": "fast"}, marks=NIGHTLY),
         pytest.param("pi", True, DRIVES, marks=NIGHTLY),
-        ("lqr", True, {"rotor": "table"}),
+        pytest.param("lqr", True, {"rotor": "table"}, marks=NIGHTLY),
     ],
 )
 def test_the_commands_of_a_law_and_none_beside_a_baseline_give_the_rows_of_simulate(

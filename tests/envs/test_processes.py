@@ -115,6 +115,7 @@ def test_stable_baselines3_s_processes_give_the_bits_of_its_dummy(method):
         apart.close()
 
 
+@pytest.mark.nightly
 def test_gymnasium_s_processes_give_the_bits_of_its_serial_environments():
     from gymnasium.vector import AsyncVectorEnv, SyncVectorEnv
 

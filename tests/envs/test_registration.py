@@ -90,7 +90,10 @@ USES = {
 }
 
 
-@pytest.mark.parametrize("use", USES)
+@pytest.mark.parametrize(
+    "use",
+    [pytest.param(use, marks=pytest.mark.nightly) if use in ("import", "simulate") else use for use in USES],
+)
 def test_modules_of_a_user_s_folder_do_not_hide_the_installed_ones(tmp_path, use):
     (tmp_path / "controllers.py").write_text(LAW)
     (tmp_path / "training").mkdir()

@@ -43,8 +43,9 @@ NEEDS = {  # example: modules without which its claims are not met
     "15_record_video": ("pygame", "moviepy"),
     "17_state_feedback": ("control",),
 }
-# they start Ray, and torch
-SLOW = {"12_ray": [pytest.mark.slow], "13_resume": pytest.mark.nightly}
+# they start Ray, and torch; what the others show has tests of its own
+OTHERS = ("05_own_sea_state", "08_vector_env", "11_report", "13_resume", "15_record_video")
+SLOW = {"12_ray": [pytest.mark.slow], **dict.fromkeys(OTHERS, pytest.mark.nightly)}
 TRAINED = ("10_train_small_agent", "18_cleanrl_ppo")  # take minutes: tests/examples has a test of each
 
 

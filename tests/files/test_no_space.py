@@ -110,6 +110,7 @@ def test_animate_without_space_names_the_file_and_keeps_the_old_one(tmp_path, en
     assert contents(tmp_path) == {path: b"old"}
 
 
+@pytest.mark.nightly
 def test_train_without_space_keeps_the_checkpoint_before_and_goes_on_later(tmp_path):
     pytest.importorskip("stable_baselines3", reason="stable_baselines3 is not installed")
     folder = tmp_path / "run"

@@ -36,15 +36,21 @@ READY = {"fowt_env/controllers/export/c/bridge.so"}  # what setup.py builds
 pytestmark = pytest.mark.slow
 
 
+class Built(dict):
+    """{form: (sources, wheel)}, each made where it is first asked for."""
+
+    def __init__(self, folder):
+        self.folder, self.origin = folder, repository(folder / "origin")
+
+    def __missing__(self, form):
+        place = sources(form, self.origin, self.folder)
+        self[form] = place, wheel_of(place, self.folder / "wheels" / form)
+        return self[form]
+
+
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
-    """Return {form: (sources, wheel)}."""
-    folder = tmp_path_factory.mktemp("built")
-    origin, found = repository(folder / "origin"), {}
-    for form in FORMS:
-        place = sources(form, origin, folder)
-        found[form] = place, wheel_of(place, folder / "wheels" / form)
-    return found
+    return Built(tmp_path_factory.mktemp("built"))
 
 
 def package_files():
@@ -57,7 +63,12 @@ def package_files():
     }
 
 
-@pytest.mark.parametrize("form", FORMS)
+NIGHTLY = ("tar", "zip")
+
+
+@pytest.mark.parametrize(
+    "form", [pytest.param(form, marks=pytest.mark.nightly if form in NIGHTLY else ()) for form in FORMS]
+)
 def test_each_form_of_the_sources_gives_a_wheel_with_the_package_without_the_studies(form, built):
     in_wheel = set(zipfile.ZipFile(built[form][1]).namelist())
     wanted = {path for path in package_files() if not path.startswith(LEFT_OUT)}
@@ -79,7 +90,8 @@ def test_the_sdist_has_the_pages_and_the_versions_that_they_name_and_no_tests(bu
 def test_sources_without_a_package_are_not_built(built, tmp_path):
     """As a ZIP of symbolic links had, which installed without a word."""
     place = tmp_path / "sources"
-    zipfile.ZipFile(built["zip"][0].parent / "archive.zip").extractall(place)
+    sources("zip", built.origin, tmp_path)
+    zipfile.ZipFile(tmp_path / "archive.zip").extractall(place)
     (place / "controllers").rename(tmp_path / "controllers")
     (place / "controllers").write_text("../controllers")
     with pytest.raises(AssertionError, match="the sources are incomplete: without controllers"):

@@ -54,7 +54,13 @@ def grows(scene, dt, steps):
     return status != RUNNING or max(abs(x[State.SURGE]), abs(x[State.VX])) > 1e-4
 
 
-@pytest.mark.parametrize("name", INTEGRATORS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.nightly) if name in ("heun", "abm4") else name
+        for name in INTEGRATORS
+    ],
+)
 def test_it_converges_at_its_order(name):
     scene = free_body(name, 4e6, 1e5, 1e5)
     x0 = state(surge=2.0, sway=-1.0, roll=0.2, yaw=0.4, vx=1.0, wy=0.03, rotor_speed=1.2671)

@@ -178,7 +178,9 @@ def measured(form):
 # What is compared
 
 
-@pytest.fixture(scope="module", params=FORMS)
+@pytest.fixture(
+    scope="module", params=[FORMS[0], *(pytest.param(form, marks=pytest.mark.nightly) for form in FORMS[1:])]
+)
 def figures(request):
     """(form, {scene: {block: array}})."""
     code = f"import json, test_loads; print(json.dumps(test_loads.measured({request.param!r})))"

@@ -70,6 +70,7 @@ def test_the_state_space_decays_as_the_convolution_does(decays, name):
     assert miss(decays("state_space", name)[0], decays("convolution", name)[0]) < 0.01
 
 
+@pytest.mark.nightly
 def test_natural_periods_are_openfasts(platform):
     """Of its decays: 134.0, 20.45, 28.2 and 88.3 s, amplitudes of metres included."""
     periods = natural_periods(build_scene(platform, fidelity="standard"))

@@ -41,6 +41,7 @@ def test_a_decay_in_still_water_is_that_of_the_full_model():
     assert np.all(planar[ACROSS] == 0.0)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("heading", [0.0, 180.0])
 def test_waves_along_the_plane_move_it_as_the_full_model(heading):
     planar, full = both(

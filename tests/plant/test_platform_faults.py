@@ -45,7 +45,7 @@ def without(line):
     [
         pytest.param(2, {}, id="catenaries"),
         pytest.param(1, {"fidelity": "fast"}, id="tables", marks=pytest.mark.nightly),
-        pytest.param(3, {"mooring": "dynamic"}, id="moving"),
+        pytest.param(3, {"mooring": "dynamic"}, id="moving", marks=pytest.mark.nightly),
     ],
 )
 def test_a_platform_that_loses_a_line_at_once_is_one_without_it(line, options):

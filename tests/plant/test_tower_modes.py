@@ -95,7 +95,7 @@ class Bending:
 def test_accelerations_are_those_of_particles_on_their_paths(platform, turbine, n):
     rng = np.random.default_rng(n)
     case = Bending(platform, turbine, n, CONSTANT)
-    for _ in range(200):
+    for _ in range(60):
         x = case.random(rng)
         found = case.accelerations(rates(case.scene, x, u=(2e4, 0.0)))
         _, expected = case.fall(x, 2e4, acting(case.twin))
@@ -155,7 +155,7 @@ def swinging(case):
     return x
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_energy_is_kept_over_a_million_steps(platform, turbine):
     case = Bending(platform, turbine, 2, SPRINGS, damped=False, integrator="rk4")
     x, u, dt, parts = swinging(case), np.zeros(2), 0.001, 20
@@ -224,6 +224,7 @@ def test_it_converges_with_order_four(pinned, integrator):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.35)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("second", [pytest.param(False, marks=pytest.mark.nightly), True])
 def test_a_clamped_tower_keeps_its_period_at_the_default_step(second):
     """0.1 s is 0.4 of the first mode's period over two pi, and 1.8 of the second's: five and 25 turns."""

@@ -187,6 +187,7 @@ def test_a_linear_damper_takes_the_decay_down_as_the_formula_says():
     assert ratio == pytest.approx(exp(-b / (2.0 * mass) * peaks[0][0]), rel=1e-2)
 
 
+@pytest.mark.nightly
 def test_a_load_of_no_strength_is_the_plant_without_it():
     loaded = simulate(stormy(Load("Nothing", push, Push())), "pi", 30.0)
     bare = simulate(stormy(), "pi", 30.0)
@@ -364,6 +365,7 @@ def test_another_load_in_another_process_compiles_no_kernel_of_the_package():
     assert len({first[0], first[1], other[1]}) == 3
 
 
+@pytest.mark.nightly
 def test_without_the_jit_a_load_gives_the_same_figures():
     compiled, plain = process("1", "0.5"), process("1", "0.5", NUMBA_DISABLE_JIT="1")
     assert float(plain[1]) == pytest.approx(float(compiled[1]), rel=1e-9)

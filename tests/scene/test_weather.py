@@ -154,7 +154,7 @@ def test_still_water_in_a_scene_with_a_sea_has_no_elevation_and_numbers_of_its_o
     assert scene.model.hydro.strips.quadrature.table.size < still.quadrature.table.size
 
 
-@pytest.mark.parametrize("fidelity", ["standard", "reference"])
+@pytest.mark.parametrize("fidelity", ["standard", pytest.param("reference", marks=pytest.mark.nightly)])
 def test_still_water_in_a_scene_with_a_sea_loads_as_a_scene_of_still_water(fidelity):
     """Accelerations of random motions, by two kernels that add the same terms, one of them zeros besides.
 

@@ -90,7 +90,7 @@ def test_the_process_commands_as_here_and_ends_with_the_run(own, tmp_path):
     assert not running(pid) and time.monotonic() - began < 4.0  # s, by itself: killed after 5 s
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_library_runs_again_and_its_process_ends_when_it_is_unloaded(own, tmp_path):
     arrays, there = series(TURBINE, instants=2), Library(own("plain"))
     first, pid = there.call(arrays[0]), pid_of(tmp_path)
@@ -126,7 +126,7 @@ def test_an_error_of_the_controller_ends_the_run_with_its_words(own, tmp_path):
         there.call(arrays[12])
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_controller_that_leaves_or_hangs_is_a_message_and_no_endless_wait(own, tmp_path, monkeypatch):
     arrays = series(TURBINE, instants=25)
     times = ("-DLONGEST_START=900.0", "-DLONGEST_STEP=0.5", "-DLONGEST_END=0.2")
@@ -158,7 +158,7 @@ time.sleep(60)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hangs", (False, True))
+@pytest.mark.parametrize("hangs", (pytest.param(False, marks=pytest.mark.nightly), True))
 def test_the_process_ends_with_a_host_that_is_killed(hangs, own, tmp_path):
     path = own("orphan", "while True: pass")
     code = HOST.format(path=sys.path, library=str(path), calls=12 if hangs else 3)
@@ -175,7 +175,7 @@ def test_the_process_ends_with_a_host_that_is_killed(hangs, own, tmp_path):
     wait_for_end(pid)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_cannot_be_started_is_said_at_the_first_call(own, tmp_path, monkeypatch):
     path = own("gone")
     (tmp_path / "gone.py").unlink()

@@ -82,7 +82,13 @@ def test_a_policy_of_another_mode_commands_in_c_what_it_does_here(mode, other_po
     check_law(other_policies[mode], folder)
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.nightly) if name in ("mpc_clone", "ipc_floating") else name
+        for name in LAWS
+    ],
+)
 def test_a_law_in_c_commands_what_the_compiled_law_commands(name, folder):
     check_law(name, folder)
 

@@ -43,6 +43,7 @@ def test_the_filter_is_that_of_python_control(wind):
     assert found == pytest.approx(gain, rel=1e-4, abs=1e-6 * np.abs(gain).max())
 
 
+@pytest.mark.nightly
 def test_the_design_has_what_a_tower_that_bends_passes_on():
     """Platform pitch and rotor speed that a lasting wind asks for: those of the whole linear model.
 

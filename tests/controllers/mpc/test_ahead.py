@@ -194,7 +194,7 @@ def test_ages_reach_as_far_at_every_period(period):
     assert module.MEMORY - 2.0 * module.STEP < readings[-1] * period <= module.MEMORY + 0.5 * period
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_page_has_the_errors_of_the_shipped_lidars():
     page = (Path(__file__).parents[3] / "docs" / "results" / "linear-design.md").read_text(encoding="utf-8")
     scene, ahead = drawn(1), [2, 6, 12, 20]
@@ -222,6 +222,7 @@ def gusty():
     return build_scene("oc3_hywind", wind=series, fidelity="standard")
 
 
+@pytest.mark.nightly
 def test_with_a_lidar_the_rotor_speed_varies_less_and_with_a_blind_one_as_without(gusty):
     seen = lidar_gates(gusty)
     values = seen.series.values.copy()

@@ -124,7 +124,7 @@ def section_of(station, blade_pitch):
     return blade.twist[station] + blade_pitch, blade.radius[station], blade.chord[station], polar, ROTOR
 
 
-@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [100, pytest.param(300, marks=pytest.mark.nightly)])
 def test_sections_agree_with_the_naive_twin(count):
     rng = np.random.default_rng(2)
     several = 0

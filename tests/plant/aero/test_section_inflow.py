@@ -128,7 +128,7 @@ def test_loads_and_rates_are_those_of_blade_element_momentum(rotor):
     assert not rates[:, :N_RIGID].any()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     "wake",
     [
@@ -286,6 +286,7 @@ def test_a_wake_that_blows_back_a_little_is_looked_up():
     assert worst(solved[:, 6:], found[:, 6:]) < 5e-4
 
 
+@pytest.mark.nightly
 def test_blades_with_pitches_of_their_own(rotor):
     states, winds = operating(100, rotor, seed=8, more=2)
     first = states.shape[1] - 2

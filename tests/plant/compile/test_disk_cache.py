@@ -170,7 +170,9 @@ def run_as_another(code, place, **variables):
     return stdout.split(), stderr
 
 
-@pytest.mark.parametrize("whose", ["kernels", "sources", "files"])
+@pytest.mark.parametrize(
+    "whose", ["kernels", *(pytest.param(whose, marks=pytest.mark.nightly) for whose in ("sources", "files"))]
+)
 def test_no_code_of_another_user_is_read(whose, tmp_path):
     folder, mark = tmp_path / "cache", tmp_path / "mark"
     _, used = output(start(SMALL + WHERE, folder))
@@ -189,7 +191,9 @@ def test_no_code_of_another_user_is_read(whose, tmp_path):
         assert stderr.count("belongs to user") == 1 and "Set FOWT_CACHE_DIR" in stderr
 
 
-@pytest.mark.parametrize("fault", ["inner 0o702", "outer 0o1777", "link"])
+@pytest.mark.parametrize(
+    "fault", ["inner 0o702", pytest.param("outer 0o1777", marks=pytest.mark.nightly), "link"]
+)
 def test_a_folder_that_others_can_write_or_a_link_is_not_used(fault, tmp_path):
     (used,) = output(start(WHERE, tmp_path / "cache"))
     place, said = Path(used) if "inner" in fault else Path(used).parent, "is a symbolic link"
@@ -214,7 +218,7 @@ def test_folders_and_files_are_private_and_read_again_whatever_the_umask(tmp_pat
     assert output(start(code, tmp_path / "unused", FOWT_CACHE_DIR=str(folder))) == ["0.25", "1"]
 
 
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("ending", ["nbi", pytest.param("nbc", marks=pytest.mark.nightly)])
 def test_a_file_that_others_can_write_is_not_read(ending, tmp_path):
     output(start(SMALL, tmp_path / "cache"))
     (path,) = (tmp_path / "cache").rglob(f"waves.ramp*.{ending}")
@@ -366,6 +370,7 @@ def test_a_separate_kernel_is_loaded_or_compiled_before_code_that_calls_it_by_na
         assert called() == ["33.0", "1", "1", "1"]
 
 
+@pytest.mark.nightly
 def test_code_compiled_with_an_entry_from_disk_loads_the_kernels_that_the_entry_calls_by_name(tmp_path):
     """As a batch of environments after an environment: each here in a process of its own."""
     code = copied_code(tmp_path)
@@ -375,6 +380,7 @@ def test_code_compiled_with_an_entry_from_disk_loads_the_kernels_that_the_entry_
         assert output(start(program, tmp_path / "cache", root=code)) == [f"{result}.0"]
 
 
+@pytest.mark.nightly
 def test_kernels_outside_the_plant_are_kept_until_what_they_import_changes(tmp_path):
     """Their sources do not shape the name of the folder."""
     code = copied_code(tmp_path)
@@ -418,6 +424,7 @@ def keys(code, cache):
     return dict(zip(words[::2], words[1::2], strict=True))
 
 
+@pytest.mark.nightly
 def test_an_edit_of_a_text_or_a_plot_compiles_nothing(tmp_path):
     code, cache = copied_code(tmp_path), tmp_path / "cache"
     before = keys(code, cache)
@@ -544,6 +551,7 @@ for number in range(100):
 """
 
 
+@pytest.mark.nightly
 def test_processes_that_keep_code_at_once_keep_all_of_it_under_the_right_keys(tmp_path):
     """Of these 300 entries numba's own file was seen to lose 27 and to have 6 under another's key."""
     ready = tmp_path / "ready"  # where each says that it can begin

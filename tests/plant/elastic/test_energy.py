@@ -79,7 +79,7 @@ def drifts(working, shaft):
 @pytest.mark.parametrize(
     ("working", "shaft", "small"),
     [
-        (False, "rigid", 1e-8),
+        pytest.param(False, "rigid", 1e-8, marks=pytest.mark.nightly),
         pytest.param(True, "rigid", 1e-7, marks=pytest.mark.nightly),
         (False, "torsion", 1e-5),
     ],

@@ -136,15 +136,22 @@ def growth(platform, pitch):
     return [float(moved[-60:, part].std() / moved[:60, part].std()) for part in parts]
 
 
-@pytest.mark.parametrize("platform", ["oc3_hywind", "iea15_volturnus_s"])
-@pytest.mark.parametrize("pitch", [0.0, 1.57])
+@pytest.mark.parametrize(
+    ("platform", "pitch"),
+    [
+        ("oc3_hywind", 1.57),
+        ("iea15_volturnus_s", 0.0),
+        pytest.param("oc3_hywind", 0.0, marks=pytest.mark.nightly),
+        pytest.param("iea15_volturnus_s", 1.57, marks=pytest.mark.nightly),
+    ],
+)
 def test_a_held_rotor_on_a_tower_with_second_modes_is_stable_without_air(platform, pitch):
     """At 0.05 s; its blades shake the nacelle through the shaft. Platform and tower drift."""
     blades, twist, tower = in_plain_python(f"growth({platform!r}, {pitch})")
     assert max(blades, twist) < 1.0 and tower < 2.0
 
 
-@pytest.mark.parametrize("integrator", ["ab4", "abm4"])
+@pytest.mark.parametrize("integrator", ["ab4", pytest.param("abm4", marks=pytest.mark.nightly)])
 def test_momentum_about_the_shaft_is_kept(integrator):
     assert in_plain_python(f"momentum_change({integrator!r})") < 1e-7
 

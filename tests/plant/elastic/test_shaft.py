@@ -45,7 +45,7 @@ def test_an_oscillator_under_a_cubic_load_is_exact(square, decay):
 @pytest.mark.parametrize("platform", TURBINES)
 @pytest.mark.parametrize(
     "integrator",
-    [pytest.param(name, marks=() if name in ("rk4", "ab4") else NIGHTLY) for name in INTEGRATORS],
+    [pytest.param(name, marks=() if name == "ab4" else NIGHTLY) for name in INTEGRATORS],
 )
 def test_a_free_shaft_decays_as_two_masses_at_the_default_step(platform, integrator):
     scene = build_scene(platform, integrator=integrator, **BARE)
@@ -178,7 +178,7 @@ def test_a_tower_with_a_twisting_shaft_swings_no_further_at_the_default_step(tow
     assert max(far[30:]) <= max(far[:30]) < 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("turbine", ["nrel5mw", pytest.param("iea15", marks=NIGHTLY)])
 def test_blades_on_a_twisting_shaft_swing_no_further_at_the_default_step(turbine):
     """Without air: with an extrapolated torque of the blades the NREL 5 MW would swing ten times as far."""

@@ -109,6 +109,7 @@ def test_loads_at_every_second_step_are_as_good_as_at_every_step():
     assert np.all(errors[1] < errors[0] + 3e-4)
 
 
+@pytest.mark.nightly
 def test_the_default_step_converges_with_order_four(waves):
     scene = waves.with_weather(wind=12.0, sea=None)
     x, u = start(scene, 1.2, 0.1, 40_000.0)
@@ -161,10 +162,12 @@ def test_the_default_step_is_stable(platform, case):
     [
         ("oc3_hywind", {}, 0.05),
         ("oc3_hywind", {"shaft": "rigid"}, 0.025),
-        ("nrel5mw_oc4_semi", {}, 0.025),  # whose nacelle the torque of the shaft moves more
+        # whose nacelle the torque of the shaft moves more
+        pytest.param("nrel5mw_oc4_semi", {}, 0.025, marks=pytest.mark.nightly),
         ("nrel5mw_oc4_semi", {"turbine": "nrel5mw"}, 0.025),
         ("nrel5mw_iti_barge", {}, 0.05),
-        ("iea15_volturnus_s", {}, 0.05),  # without a gearbox, whose torque would move the nacelle
+        # without a gearbox, whose torque would move the nacelle
+        pytest.param("iea15_volturnus_s", {}, 0.05, marks=pytest.mark.nightly),
     ],
 )
 def test_the_default_step_is_halved_where_blades_in_phase_move_the_nacelle(platform, parts, step):
@@ -172,7 +175,7 @@ def test_the_default_step_is_halved_where_blades_in_phase_move_the_nacelle(platf
     assert build_scene(platform, fidelity="elastic", **parts).dt == step
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_blades_in_phase_keep_their_swing_on_a_rigid_shaft():
     """Against the rotor, at 3 Hz in still air: half of 0.05 s, at which it dies within seconds."""
     parts = {"hydrodynamics": False, "mooring": False, "blades": "modes", "tower": "rigid", "shaft": "rigid"}

@@ -72,6 +72,7 @@ def test_commands_are_those_of_the_same_controller_here(tmp_path):
     assert there["BldPitch1_[deg]"].std() > 0.0
 
 
+@pytest.mark.nightly
 @needs_gcc
 def test_a_library_of_a_submission_runs_as_it_does_here_and_its_crash_ends_its_run_alone(tmp_path):
     folder = tmp_path / "mine"
@@ -99,7 +100,7 @@ def test_a_library_of_a_submission_runs_as_it_does_here_and_its_crash_ends_its_r
             "raised a custom exception$",
             marks=pytest.mark.nightly,
         ),
-        ("import os; os._exit(3)", "its process ended in act"),
+        pytest.param("import os; os._exit(3)", "its process ended in act", marks=pytest.mark.nightly),
         ("import time; time.sleep(60)", "act.. took longer than 3 s"),
         pytest.param("raise SystemExit(0)", "raised SystemExit", marks=pytest.mark.nightly),
         pytest.param("return 1.0, float('nan')", "raised ControllerError$", marks=pytest.mark.nightly),
@@ -198,6 +199,7 @@ def test_a_first_run_for_kernels_that_is_interrupted_is_made_again(tmp_path, mon
     assert asked == ["scenes"] and [kept] == [str(path) for path in (tmp_path / "submissions").iterdir()]
 
 
+@pytest.mark.nightly
 def test_the_slowest_call_is_noted_where_it_is_the_one_beyond_the_limit(tmp_path):
     log = tmp_path / "log.csv"
     made = factory(tmp_path, SOUND.replace(LINE, "import time; time.sleep(60)"), call=1.5)
@@ -207,6 +209,7 @@ def test_the_slowest_call_is_noted_where_it_is_the_one_beyond_the_limit(tmp_path
     assert 1.5 <= float(line.rpartition(",")[2]) < 5.0
 
 
+@pytest.mark.nightly
 def test_a_process_that_reads_no_more_does_not_hold_the_judge(tmp_path):
     """The scene is larger than a pipe, and the answer to the first request is there before it is asked."""
     source = """
@@ -290,6 +293,7 @@ def test_files_that_have_changed_since_they_were_read_are_not_run(tmp_path):
         run(made, 1.0)
 
 
+@pytest.mark.nightly
 def test_a_process_is_started_by_the_command_of_a_container(tmp_path):
     """The command stands before that of Python and is told the folder of the process."""
     script = tmp_path / "box"

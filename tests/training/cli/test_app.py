@@ -198,6 +198,7 @@ def laws(tmp_path, monkeypatch):
     monkeypatch.delitem(sys.modules, "broken_law", raising=False)
 
 
+@pytest.mark.nightly
 def test_evaluate_says_which_runs_failed_and_why_and_scores_the_others(tmp_path, laws):
     words = "evaluate --controllers pi,broken_law:BreaksDown,broken_law:Degrees --cases ntm_18 --seeds 1,2,3"
     stdout, stderr = fowt(*words.split(), "--duration", "15", "--skip", "5", "--out", "out")

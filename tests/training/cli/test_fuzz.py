@@ -101,7 +101,7 @@ def often(count):
 
 @often(1000)
 def test_simulate_works_or_names_what_is_wrong(count):
-    @examples(count or 150)
+    @examples(count or 60)
     @given(simulate_arguments())
     def search(case):
         check_command(["simulate", *case[0]], case[1])
@@ -184,4 +184,4 @@ def check_scene(arguments):
 
 @often(5000)
 def test_a_scene_is_built_or_refused_by_name(count):
-    examples(count or 200)(given(SCENE)(check_scene))()
+    examples(count or 100)(given(SCENE)(check_scene))()

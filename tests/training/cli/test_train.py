@@ -46,6 +46,7 @@ def test_a_run_ends_goes_on_and_its_checkpoint_becomes_a_policy_on_request_only(
     assert (tmp_path / "p.npz").stat().st_size == pytest.approx((folder / "last.npz").stat().st_size, abs=50)
 
 
+@pytest.mark.nightly
 def test_a_run_is_validated_by_quarters_and_the_command_that_it_prints_works(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(cli_train, "LINE_EVERY", 0.0)

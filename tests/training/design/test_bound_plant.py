@@ -89,6 +89,7 @@ def test_still_water_has_drag_of_the_platform_s_own_motion_alone(windy, plant):
     assert calm.travel < rough.travel
 
 
+@pytest.mark.nightly
 def test_a_pitch_drive_without_lag_counts_as_a_quick_one(plant):
     """OpenFAST's own turbine has none; its closed loop is nearly that of the other."""
     quick = BoundPlant(build_scene("oc3_hywind_openfast", wind=18.0, fidelity="reference"), 18.0)
@@ -113,7 +114,7 @@ def test_what_has_no_limit_is_named(windy, plant):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wind", [16, 20, 24])
+@pytest.mark.parametrize("wind", [16, *(pytest.param(wind, marks=pytest.mark.nightly) for wind in (20, 24))])
 def test_the_linear_baseline_is_the_simulated_one(windy, wind):
     """Means over six seeds of the headline suite's weather: pitch within 6 %, rotor 5 %, travel 7 %."""
     plant = BoundPlant(windy, float(wind))

@@ -73,6 +73,7 @@ def test_with_the_wind_known_exactly_sensors_change_little(windy):
             np.testing.assert_allclose(other, all_states, rtol=0.01)
 
 
+@pytest.mark.nightly
 def test_limits_and_noise_shape_the_front(windy):
     def least(**settings):
         table = bound_table(windy, (18.0,), ("measured",), fractions=(0.5,), **settings)

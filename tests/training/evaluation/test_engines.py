@@ -55,7 +55,7 @@ def test_every_engine_refuses_what_it_cannot_do():
     assert list(outcomes(square, [], jobs=3)) == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("engine", ["processes", pytest.param("ray", marks=pytest.mark.nightly)])
 def test_a_killed_worker_process_costs_its_task_a_retry(tmp_path, engine):
     if engine == "ray":

@@ -213,7 +213,7 @@ def test_the_reference_of_a_suite_runs_to_its_end_where_its_law_as_an_entry_trip
         evaluate({"reference": "pi"}, [CALM], **SHORT)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_worker_processes_give_the_same_table_and_warn_of_units_once_for_each_controller():
     controllers = {"pi": "pi", "frozen": Frozen(), "one": Degrees(), "two": Degrees()}
     tables = []

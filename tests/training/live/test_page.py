@@ -178,6 +178,7 @@ def test_a_page_of_another_origin_is_refused_its_connection(server):
     assert answers[1] == 403 and answers[0] != 403
 
 
+@pytest.mark.nightly
 def test_a_notebook_shows_the_page_in_a_frame_while_its_own_loop_runs():
     async def cell():
         return tune("pi", **SHORT)

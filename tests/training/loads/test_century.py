@@ -74,6 +74,7 @@ def test_the_interval_covers_the_value_of_a_known_distribution(weighted):
     assert np.mean(estimates) == pytest.approx(truth, rel=0.01)
 
 
+@pytest.mark.nightly
 def test_shares_of_a_stage_follow_the_states_that_matter_and_reduce_the_error():
     """A load that follows the sea: most of the hours of its 1-year value are of high Hs."""
     century, random = CENTURY, np.random.default_rng(7)

@@ -67,7 +67,7 @@ def sample(kind, seed, runs=6, stored=60):
     return found
 
 
-@pytest.mark.parametrize("kind", ["gauss", "exponential"])
+@pytest.mark.parametrize("kind", ["gauss", pytest.param("exponential", marks=pytest.mark.nightly)])
 def test_the_interval_contains_the_known_value(kind):
     known, inside, ratios = truth(kind), 0, []
     for seed in range(40):
@@ -164,7 +164,7 @@ def climate():
     return seas.climate()
 
 
-@pytest.mark.parametrize("load", ["wind", "waves"])
+@pytest.mark.parametrize("load", [pytest.param("wind", marks=pytest.mark.nightly), "waves"])
 def test_the_value_of_all_seas_is_not_that_of_the_classes(load, climate):
     """The mean of the upper third of Hs is far below the sea of 50 years."""
     weight = seas.LOADS[load]

@@ -132,6 +132,7 @@ def test_csv_files_have_every_row(results, tmp_path):
     assert len(pd.read_csv(paths["extrapolation"])) == len(results.extrapolations)
 
 
+@pytest.mark.nightly
 def test_other_limits_of_constraints_need_no_other_runs():
     cases, finished = small_table()
     wide = load_tables(cases, finished, limits={"platform pitch": 1e3, "overspeed": None})

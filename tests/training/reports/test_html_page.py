@@ -430,6 +430,7 @@ def test_what_slips_in_as_markup_is_not_run(browser, page_file, tmp_path):  # no
     context.close()
 
 
+@pytest.mark.nightly
 def test_nothing_is_wider_than_a_telephone_and_a_wide_table_says_that_it_scrolls(browser, page_file):  # noqa: F811
     with offline_page(browser, page_file, SERIES, viewport={"width": 390, "height": 800}) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 390

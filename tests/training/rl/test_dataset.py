@@ -25,7 +25,10 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+@pytest.mark.parametrize(
+    "behaviour",
+    [pytest.param(name, marks=pytest.mark.nightly) if name == "expert" else name for name in BEHAVIOURS],
+)
 def test_a_set_is_loaded_by_minari_and_replays_bit_for_bit(behaviour, folder):
     make_dataset(behaviour, HOURS, duration=DURATION)
     dataset = minari.load_dataset(f"oc3hywind/{behaviour}-v0")

@@ -55,7 +55,7 @@ def stopped_run(settings, folder, monkeypatch, after):
     return run
 
 
-@pytest.mark.parametrize("algo", ["ppo", "sac", "tqc"])
+@pytest.mark.parametrize("algo", ["ppo", "sac", pytest.param("tqc", marks=pytest.mark.nightly)])
 def test_a_stopped_and_resumed_run_ends_with_the_bits_of_one_that_went_through(algo, tmp_path, monkeypatch):
     through = Training(small(algo), tmp_path / "through")
     assert through.run()

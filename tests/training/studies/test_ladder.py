@@ -11,6 +11,7 @@ from fowt_env.training.studies.ladder import earned
 FAULTS, UNKNOWN = "fowt_env/OC3HywindFaults-v0", "fowt_env/OC3HywindUnknown-v0"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", [FAULTS, pytest.param(UNKNOWN, marks=pytest.mark.nightly)])
 def test_the_baseline_earns_what_zero_action_earns(name):
     """With the same sensors, faults and plants in each episode: the table compares like with like."""

@@ -34,7 +34,7 @@ def test_rates_of_two_decaying_modes_are_found_from_three_signals():
     assert found == pytest.approx(rates, rel=1e-6)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("platform", "exceptions"),
     # surge of the barge all but vanishes at 0.6 rad/s, between two steep slopes

@@ -210,7 +210,7 @@ def test_regular_wave_second_harmonics_come_from_position_and_surface_as_in_open
     assert both.here == pytest.approx(moved.here + surface.here, rel=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_wind_steps_are_within_5_percent_rms_at_every_wind_speed():
     assert len(judged(validate_cases(["steps"]), target)) == 39
 

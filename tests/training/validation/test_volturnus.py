@@ -196,7 +196,7 @@ def test_motions_in_irregular_waves_have_openfast_s_deviations():
     assert {row.allowed for row in rows if "standard" in row.quantity} == {2.0, 5.0}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_rotor_loads_in_steady_wind_miss_small_hub_moments_alone():
     """Thrust, torque and root moments within 0.06 %; moments about the hub that are 0.1 % of the torque."""
     rows = judged("rotor", "moment at the hub")
