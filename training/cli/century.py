@@ -37,9 +37,13 @@ def show_centuries(platform, site, labels, years, period, sample, folder, settin
 
 
 def _extrapolated_runs(platform, site, label, folder, table):
-    """Return [(LoadCase, RunStatistics)] of DLC 1.1 in a folder, with rotor-averaged turbulence; or []."""
+    """Return [(LoadCase, RunStatistics)] of DLC 1.1 in a folder, with rotor-averaged turbulence; or [].
+
+    Without runs that a trip ended.
+    """
     from fowt_env.training.loads.matrix import expanded
     from fowt_env.training.loads.run import finished_runs
+    from fowt_env.training.loads.tables import joined
 
     manifest = folder / "manifest.json"
     if not manifest.exists():
@@ -48,14 +52,14 @@ def _extrapolated_runs(platform, site, label, folder, table):
     matrix = expanded(platform, site, (label,), dlc="1.1", wind="rotor-averaged", **table)
     plain = {name for name, case in stored.items() if case.get("wind", {}).get("kind") == "ntm"}
     found = [
-        (case, run.statistics)
+        run
         for case, run in finished_runs(matrix, folder)
         if case.name in plain and run.statistics is not None
     ]
     if len(found) < len(matrix.cases):
         note(f"{folder} has {len(found)} of {len(matrix.cases)} runs of DLC 1.1: nothing is compared")
         return []
-    return found
+    return joined(matrix.cases, {run.key: run for run in found if run.status == "ok"})[0]
 
 
 def _show_century(century, years, period, sample, folder, runs, *, jobs, engine, address):
@@ -90,7 +94,7 @@ def _show_century(century, years, period, sample, folder, runs, *, jobs, engine,
         )
     note(
         f"{simulated:,} h simulated in {wall:.0f} s with {jobs} processes; {found.hours:,} h in all,"
-        f" {found.lost} lost, {found.tripped} with a trip"
+        f" {found.lost} lost, {found.tripped} with a trip, which are left out"
     )
     table = century_table(found, period, extrapolations(runs, period, century.climate) if runs else None)
     path = folder / FILE

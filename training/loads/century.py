@@ -219,7 +219,7 @@ class Sample:
     states: dict  # {key of STATE: (n,)}
     production: float  # fraction of time
     lost: int  # hours without result, which are left out
-    tripped: int  # hours in which a trip stopped the turbine, with the extremes of the stop
+    tripped: int  # hours in which a trip stopped the turbine, left out: the extremes of the stop are others
 
     @property
     def sides(self):
@@ -465,7 +465,7 @@ def read_sample(century, folder):
     # what a stratum is drawn with, over its probability
     drawn = counts @ np.array([stage["share"] for stage in stages]) / counts.sum() / century.probabilities
     status = np.concatenate([part["status"] for part in parts])
-    good = status != FAILED
+    good = status == OK
 
     def stacked(name):
         blank = [np.full((len(part["stratum"]), len(columns)), nan, dtype=np.float32) for part in parts]
@@ -477,7 +477,7 @@ def read_sample(century, folder):
     return Sample(
         tuple(columns.tolist()), stacked("low"), stacked("high"), 1.0 / drawn[stratum[good]], stratum[good],
         {key: np.concatenate([part[key] for part in parts])[good] for key in STATE},
-        century.production, int((~good).sum()), int((status != OK)[good].sum()),
+        century.production, int((status == FAILED).sum()), int((~good & (status != FAILED)).sum()),
     )  # fmt: skip
 
 

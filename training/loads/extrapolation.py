@@ -1,21 +1,24 @@
-"""Extrapolates loads of normal operation to a value that is exceeded once in 50 years on average (DLC 1.1).
+"""Extrapolates loads of normal operation to a value that is exceeded in an hour once in 50 years (DLC 1.1).
 
 Peaks over threshold: in each condition k (a wind bin with its sea), which takes the fraction p_k of the time,
-independent peaks exceed a threshold u_k at a rate, and above it they are distributed as the tail of a Weibull
+peaks exceed a threshold u_k at a rate, and above it they are distributed as the tail of a Weibull
 distribution about the mean b_k of the load,
 
     P(peak > x | peak > u) = exp(((u - b) / a)^c - ((x - b) / a)^c),
 
 with c = 2 for peaks of a Gaussian process (Rayleigh) and c = 1 for exponential ones: the family that IEC
 61400-1 and Moriarty, Holley and Butterfield (NREL/TP-500-34421, 2004) fit to peaks, and of the tails of mean
-upcrossing rates of Naess and Gaidai (Journal of Engineering Mechanics 134(8), 2008). The long-term rate is
+upcrossing rates of Naess and Gaidai (Journal of Engineering Mechanics 134(8), 2008). Peaks come in clusters,
+as in gusts; the extremal index theta_k is the fraction that begins one. The fraction of hours with a larger
+load is
 
-    rate(x) = sum over k of p_k rate_k P_k(peak > x),
+    exceeded(x) = sum over k of p_k (1 - exp(-theta_k rate_k P_k(peak > x))),
 
-and the value of N years solves rate(x) = 1 / N. a and c are maximum likelihood estimates; c varies slowly
-over the wind speed and is that of the likelihood of conditions within POOL, weighted by their distance (local
-likelihood), since six hours alone do not define it. A Gumbel distribution of the runs' largest values is the
-check.
+and the value of N years solves exceeded(x) = 1 h / N years. a and c are maximum likelihood estimates, theta
+is that from the largest values of the runs, of which each has an exponent whose distribution is exponential
+with mean 1. c and theta vary slowly over the wind speed: they are those of the likelihood of conditions
+within POOL, weighted by their distance (local likelihood), since six hours alone do not define them. A Gumbel
+distribution of the runs' largest values is the check.
 
 Load cases have a few classes of Hs in each wind. Rarer, higher seas belong to none of them: with the climate
 of the site the long-term rate is integrated over all Hs of a wind (the full long-term method of Naess and
@@ -77,10 +80,10 @@ class Condition:
 class Extrapolation:
     """Holds a long-term load of a channel and side: value, 95 % interval, check by block maxima, curve.
 
-    largest: of all runs. curve: (n, 2) load and number of its exceedances per year. fits: per condition
-    (name, wind speed, threshold, rate per hour, scale a, exponent c). governing: name of the condition with
-    the largest part of the exceedances. drawn: (RESAMPLES,) values of resampled seeds. Values have the sign
-    of the channel.
+    largest: of all runs. curve: (n, 2) load and number of hours per year in which it is exceeded. fits: per
+    condition (name, wind speed, threshold, clusters per hour, scale a, exponent c). governing: name of the
+    condition with the largest part of the exceedances. drawn: (RESAMPLES,) values of resampled seeds. Values
+    have the sign of the channel.
     """
 
     value: float
@@ -212,19 +215,25 @@ def _pooling(conditions):
 
 
 class _Classes:
-    """Holds the tails of single conditions; parts(load) (k, conditions): exceedances per hour of loads (k,).
+    """Holds the tails of single conditions.
 
-    owners: number of the condition of each part.
+    owners: number of the condition of each part. parts(load) (k, conditions): fraction of all hours in which
+    loads (k,) are exceeded in each condition.
     """
 
     def __init__(self, share, mean, level, rate, spread, shape):
         self.owners = np.arange(len(share))
-        self._of = share * rate, mean, level - mean, spread, shape
+        self._share, self.level = share, level
+        self._of = rate, mean, level - mean, spread, shape
+
+    def expected(self, load):
+        """Return the number of exceedances (k, conditions) in an hour of each condition."""
+        rate, mean, reach, spread, shape = self._of
+        height = np.maximum((load - mean) / reach, 1.0)
+        return rate * np.exp(-(height**shape - 1.0) / spread)
 
     def parts(self, load):
-        rate, mean, reach, spread, shape = self._of
-        height = np.maximum((load[:, None] - mean) / reach, 1.0)
-        return rate * np.exp(-(height**shape - 1.0) / spread)
+        return self._share * -np.expm1(-self.expected(load[:, None]))
 
 
 class _Seas:
@@ -247,12 +256,13 @@ class _Seas:
         self._shape = shape[:, at].mean(axis=1)[:, None]
         self._least = (reach[at] / scale[:, at]).mean(axis=1)[:, None]  # threshold, in scales
         self._mean = np.interp(heights, Hs, mean[at])
-        share = sum(conditions[number].share for number in at)
-        self._rate = share * likely * rate[:, at].mean(axis=1)[:, None]
+        self._share = sum(conditions[number].share for number in at) * likely
+        self._rate = rate[:, at].mean(axis=1)[:, None]
 
     def parts(self, load):
         height = np.maximum((load[:, None] - self._mean) / self._scale, self._least)
-        return self._rate * np.exp(self._least**self._shape - height**self._shape)
+        expected = self._rate * np.exp(self._least**self._shape - height**self._shape)
+        return self._share * -np.expm1(-expected)
 
 
 def _members(conditions, used, climate):
@@ -269,19 +279,42 @@ def _members(conditions, used, climate):
     return [np.array(numbers) for numbers in families.values()]
 
 
+def _separate(conditions, draws, pooling, tails):
+    """Return the extremal index (k, conditions): the fraction of peaks that begin a cluster.
+
+    If clusters are independent, the number of peaks expected beyond the largest value of a run, times the
+    index, is exponential with mean 1: the index is the inverse of the mean over the runs, weighted as the
+    exponents.
+    """
+    events, expected = [], []
+    for number, condition in enumerate(conditions):
+        weights = draws[len(condition.peaks)]
+        beyond = np.stack([
+            tails.expected(np.full(len(conditions), value))[:, number] * hours
+            for value, hours in zip(condition.largest, condition.hours, strict=True)
+        ], axis=1)  # fmt: skip
+        above = condition.largest > tails.level[number]
+        events.append(weights @ above.astype(np.float64))
+        expected.append((weights * beyond).sum(axis=1))
+    events, expected = (pooling @ np.array(each) for each in (events, expected))
+    return np.where(expected > 0.0, events / np.maximum(expected, 1e-300), 1.0).T
+
+
 def _long_term(conditions, draws, years, climate=None):
     """Return (values (k,), fits, tails) of the load of a return period, for k samples.
 
-    tails: list of _Classes and _Seas, whose parts add up to the exceedances per hour.
+    tails: list of _Classes and _Seas, whose parts add up to the fraction of hours with an exceedance.
     """
     tails = [_Tail(condition, draws[len(condition.peaks)]) for condition in conditions]
-    likelihood = np.tensordot(_pooling(conditions), np.array([tail.likelihood() for tail in tails]), 1)
+    pooling = _pooling(conditions)
+    likelihood = np.tensordot(pooling, np.array([tail.likelihood() for tail in tails]), 1)
     shape = np.array([_best_shape(each) for each in likelihood]).T  # (k, conditions)
     spread = np.array([tail.spread(c) for tail, c in zip(tails, shape.T, strict=True)]).T
     rate = np.array([tail.rate if tail.used else 0.0 * tail.rate for tail in tails]).T
     share = np.array([condition.share for condition in conditions])
     mean, level = (np.array([getattr(tail, name) for tail in tails]) for name in ("mean", "level"))
     scale = (level - mean) * spread ** (1.0 / shape)
+    rate = rate * _separate(conditions, draws, pooling, _Classes(share, mean, level, rate, spread, shape))
     fits = (level, rate, scale, shape)
     members = _members(conditions, [tail.used for tail in tails], climate)
     if members is None:
@@ -356,7 +389,7 @@ def extrapolate(conditions, side="max", years=YEARS, climate=None):
 
 
 def _curve(value, largest, parts):
-    """Return (n, 2) loads and exceedances per year, from 1e4 per year to beyond the value."""
+    """Return (n, 2) loads and hours per year that exceed them, from 1e4 per year to beyond the value."""
     if not np.isfinite(value):
         return np.empty((0, 2))
     span = max(abs(value - largest), 0.1 * abs(value), 1e-12)

@@ -120,7 +120,9 @@ def load_tables(
     columns = [name for name in columns_of([(c, s) for c, s in runs]) if name != TIME]
     labels = controllers_of(runs)
     baseline = labels[0] if baseline is None else baseline
-    production = [run for run in runs if run[0].characteristic == EXTRAPOLATED]
+    # the loads of a stop are no peaks of production
+    whole, _, _ = joined(cases, {key: run for key, run in finished.items() if run.status == "ok"})
+    production = [run for run in whole if run[0].characteristic == EXTRAPOLATED]
     peaked = [name for name in columns if production and all(name in each.peaks for _, each in production)]
     severe = [run for run in runs if run[0].dlc == SEVERE]
     extrapolations, forms = {}, {}

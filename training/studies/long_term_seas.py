@@ -45,7 +45,7 @@ def deviation(weight, wind, Hs):
 
 
 def known_value(kind, weight, years, site):
-    """Return the load that is exceeded once in some years, integrated over winds and seas of a Climate."""
+    """Return the load exceeded in an hour once in some years, integrated over winds and seas of a Climate."""
     exceeded = np.append(np.logspace(0.0, -10.0, 401), 0.0)
     middle = 1.0 - np.sqrt(exceeded[:-1] * np.append(exceeded[1:-1], 0.5 * exceeded[-2]))
     scale = deviation(weight, WINDS[:, None], site.height_at(middle, WINDS[:, None]))
@@ -54,7 +54,8 @@ def known_value(kind, weight, years, site):
     def excess(load):
         height = np.maximum(load / scale, LEVEL)
         power = 0.5 * (height**2 - LEVEL**2) if kind == "gauss" else (height - LEVEL) / EXPONENTIAL
-        return log(max(float(np.sum(likely * RATE * np.exp(-power))), 1e-300) * years * YEAR)
+        hours = float(np.sum(likely * -np.expm1(-RATE * np.exp(-power))))
+        return log(max(hours, 1e-300) * years * YEAR)
 
     return brentq(excess, 1.0, 200.0)
 

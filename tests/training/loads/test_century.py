@@ -125,8 +125,10 @@ def quick(monkeypatch):
         height = run.case.sea["Hs"]
         if run.seed % 10 == 0:
             return {"status": "failed"}, None
-        ends = {"low": np.array([-height]), "high": np.array([height])}
-        return {"status": "ok", "columns": ["load"], **ends}, None
+        status = "tripped" if run.seed % 10 == 1 else "ok"
+        stop = 1e3 if status == "tripped" else 0.0
+        ends = {"low": np.array([-height - stop]), "high": np.array([height + stop])}
+        return {"status": status, "columns": ["load"], **ends}, None
 
     monkeypatch.setattr(module, "scored", scored)
     return calls
@@ -134,7 +136,8 @@ def quick(monkeypatch):
 
 def test_a_sample_is_resumed_extended_and_weighted_over_its_stages(tmp_path, quick):
     sample, _, hours = run_century(CENTURY, tmp_path, [(90, None)])
-    assert hours == 90 == len(quick) and sample.hours + sample.lost == 90 and 0 < sample.lost < 30
+    assert hours == 90 == len(quick) and sample.hours + sample.lost + sample.tripped == 90
+    assert 0 < sample.lost < 30 and 0 < sample.tripped < 30
     np.testing.assert_allclose(sample.weight, 1.0)
     np.testing.assert_array_equal(sample.high[:, 0], sample.states["Hs"].astype(np.float32))
     (tmp_path / "hours" / "0_00001.npz").unlink()  # as if interrupted
@@ -143,7 +146,7 @@ def test_a_sample_is_resumed_extended_and_weighted_over_its_stages(tmp_path, qui
     np.testing.assert_array_equal(again.high, sample.high)
     more, _, hours = run_century(CENTURY, tmp_path, [(100, None), (60, 1.0)])
     assert hours == 20 + 60  # the last block of the first stage was not full
-    assert more.hours + more.lost == 160
+    assert more.hours + more.lost + more.tripped == 160
     assert more.weight.min() < 0.9 and more.weight.mean() == pytest.approx(1.0, abs=0.2)
     assert np.average(more.states["Hs"] > 8.0) > np.average(sample.states["Hs"] > 8.0)
     with pytest.raises(InputError, match="1 has 100 hours of plain sampling, which cannot become 50"):

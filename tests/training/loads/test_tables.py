@@ -62,6 +62,20 @@ def test_hours_of_lost_runs_go_to_the_other_seeds():
     assert joined(cases, finished)[1] == [(case, None) for case in cases if case.key == lost]
 
 
+def test_runs_that_a_trip_ended_have_no_part_in_the_extrapolation():
+    """The loads of a stop are no peaks of production."""
+    cases, finished = small_table()
+    key = ("pi", "dlc1.2_u16", 3)
+    case = next(each for each in cases if each.key == key)
+    finished[key] = FinishedRun(*key, "tripped", statistics=run_of(case, 50.0)[1])
+    found = load_tables(cases, finished)
+    del finished[key]
+    without = load_tables(cases, finished)
+    for each, other in zip(found.extrapolations.values(), without.extrapolations.values(), strict=True):
+        assert (each.value, each.low, each.high) == (other.value, other.low, other.high)
+    assert key in {ended.key for ended, _ in found.ended}
+
+
 def test_loads_by_inverse_form_need_runs_in_the_severe_sea():
     cases, finished = small_table()
     climate = climate_of(read_site("norway_5"), SCENE.turbine)

@@ -205,7 +205,7 @@ function drawExtrapolation() {
   });
   draw("extrapolation-plot", traces, {
     height: 380, xaxis: { title: { text: plain(`${chosen.name} (${chosen.unit}), ${chosen.side}`) } },
-    yaxis: { type: "log", exponentformat: "power", title: { text: "exceedances per year" }, range: [Math.log10(0.3 / DATA.return_years), 4] },
+    yaxis: { type: "log", exponentformat: "power", title: { text: "hours per year beyond it" }, range: [Math.log10(0.3 / DATA.return_years), 4] },
     shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, yref: "y", y0: 1 / DATA.return_years, y1: 1 / DATA.return_years, line: { width: 1, dash: "dot", color: css("--soft") } }],
   });
   const head = element("tr");
