@@ -233,8 +233,8 @@ def _compared(platform, name, label, path, shear):
         f"{html.escape(label)} in the wind of {html.escape(Path(path).name)}, {water}, from {start:.0f} s on"
     )
     remark = (
-        f"{where}; shear exponent {shear:g} (--shear), which moves the mean platform pitch. The recorded wind is"
-        " that of one point and acts on the whole rotor here: of a full-field wind, this one varies more."
+        f"{where}; shear exponent {shear:g} (--shear), which moves the mean platform pitch. The recorded wind"
+        " is that of one point and acts on the whole rotor here: of a full-field wind, this one varies more."
     )
     if time[-1] - start < LEAST_COMPARED:
         remark += f" Only {time[-1] - start:.0f} s are compared: too few for means and deviations."

@@ -284,7 +284,7 @@ def _separate(conditions, draws, pooling, tails):
 
     If clusters are independent, the number of peaks expected beyond the largest value of a run, times the
     index, is exponential with mean 1: the index is the inverse of the mean over the runs, weighted as the
-    exponents.
+    exponents, and at most 1.
     """
     events, expected = [], []
     for number, condition in enumerate(conditions):
@@ -297,7 +297,7 @@ def _separate(conditions, draws, pooling, tails):
         events.append(weights @ above.astype(np.float64))
         expected.append((weights * beyond).sum(axis=1))
     events, expected = (pooling @ np.array(each) for each in (events, expected))
-    return np.where(expected > 0.0, events / np.maximum(expected, 1e-300), 1.0).T
+    return np.minimum(events / np.maximum(expected, 1e-300), 1.0).T
 
 
 def _long_term(conditions, draws, years, climate=None):
