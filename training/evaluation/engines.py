@@ -136,8 +136,10 @@ def _end(pool, patience):
     for process in processes:
         process.join(patience)
         process.kill()
-    pool.shutdown()
-    return [process.exitcode for process in processes]
+    deadline = time.monotonic() + PATIENCE
+    while any(process.exitcode is None for process in processes) and time.monotonic() < deadline:
+        time.sleep(0.01)  # the pool's own thread reads it, too: of two, the second has none for a moment
+    return [-signal.SIGKILL if process.exitcode is None else process.exitcode for process in processes]
 
 
 def _start_worker(parent, begun):

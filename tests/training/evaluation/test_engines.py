@@ -12,6 +12,7 @@ import pytest
 
 from fowt_env.controllers import make
 from fowt_env.errors import InputError
+from fowt_env.training.evaluation import engines
 from fowt_env.training.evaluation.cases import Case
 from fowt_env.training.evaluation.engines import outcomes, session
 from fowt_env.training.evaluation.evaluate import evaluate
@@ -125,3 +126,29 @@ def test_ray_takes_controllers_of_every_kind(cluster, turbine):
     table = evaluate(laws, [CALM], engine="ray", jobs=2, **SHORT).set_index("controller")
     assert table["reason"].tolist() == [""] * len(laws)
     assert table.loc["compiled", "BldPitch1_mean_[deg]"] == table.loc["name", "BldPitch1_mean_[deg]"]
+
+
+def test_an_exit_code_that_another_thread_is_reading_is_waited_for():
+    """On a busy machine it can be missing after the worker has ended: what reads it would raise."""
+
+    class Ended:
+        read = 0
+
+        @property
+        def exitcode(self):
+            self.read += 1
+            return None if self.read < 4 else 3
+
+        def join(self, timeout):
+            """Return at once, as of a process whose end somebody else has seen."""
+
+        def kill(self):
+            """Return at once."""
+
+    class Pool:
+        _processes = {1: Ended()}
+
+        def shutdown(self, **_):
+            """Return at once."""
+
+    assert engines._end(Pool(), 0.0) == [3]
