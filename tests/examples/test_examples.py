@@ -33,6 +33,7 @@ CLAIMS = {  # example: what its output must match, and the files it must write
     "15_record_video": (r"200 pictures of 960 x 640\nwrote ", ["video"]),
     "17_state_feedback": (r"stable: True(.|\n)*state_feedback +rotor speed std 0\.[0-4]", []),
     "19_extended_kalman_filter": (r"deviates by 2\.\d+ m/s, estimated within 0\.[45]", []),
+    "20_short_horizon_actor_critic": (r"gspi_oc3: cost 5\.(.|\n)*trained in \d+ periods: cost [34]\.", []),
     "16_what_if": (r"same bits\nreward of an episode", []),
 }
 NEEDS = {  # example: modules without which its claims are not met
@@ -42,9 +43,13 @@ NEEDS = {  # example: modules without which its claims are not met
     "13_resume": ("stable_baselines3", "matplotlib"),
     "15_record_video": ("pygame", "moviepy"),
     "17_state_feedback": ("control",),
+    "20_short_horizon_actor_critic": ("torch",),
 }
 # they start Ray, and torch; what the others show has tests of its own
-OTHERS = ("05_own_sea_state", "08_vector_env", "11_report", "13_resume", "15_record_video")
+OTHERS = (
+    "05_own_sea_state", "08_vector_env", "11_report", "13_resume", "15_record_video",
+    "20_short_horizon_actor_critic",
+)  # fmt: skip
 SLOW = {"12_ray": [pytest.mark.slow], **dict.fromkeys(OTHERS, pytest.mark.nightly)}
 TRAINED = ("10_train_small_agent", "18_cleanrl_ppo")  # take minutes: tests/examples has a test of each
 
