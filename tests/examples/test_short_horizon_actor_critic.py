@@ -16,7 +16,7 @@ def test_the_gradient_of_a_window_is_that_of_differences_of_its_outcome():
     drive, outcome = script["drive"], script["outcome"]
     torch.manual_seed(3)
     actor, critic = script["Actor"](), script["network"](1)
-    for values in actor.network[-1].parameters():
+    for values in actor.network.parameters():
         torch.nn.init.normal_(values, std=0.05)
     settings = {"wind": script["WIND"], "sea": script["SEA"], "duration": 60.0, "action_mode": "direct"}
     env = script["FowtEnv"](**settings, observation=("rotor_speed",), dt=0.025)
