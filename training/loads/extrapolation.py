@@ -226,9 +226,9 @@ class _Classes:
         self._share, self.level = share, level
         self._of = rate, mean, level - mean, spread, shape
 
-    def expected(self, load):
-        """Return the number of exceedances (k, conditions) in an hour of each condition."""
-        rate, mean, reach, spread, shape = self._of
+    def expected(self, load, at=slice(None)):
+        """Return exceedances in an hour of conditions `at`: (k, conditions), or (k, n) in one of n loads."""
+        rate, mean, reach, spread, shape = (each[..., at] for each in self._of)
         height = np.maximum((load - mean) / reach, 1.0)
         return rate * np.exp(-(height**shape - 1.0) / spread)
 
@@ -289,12 +289,9 @@ def _separate(conditions, draws, pooling, tails):
     events, expected = [], []
     for number, condition in enumerate(conditions):
         weights = draws[len(condition.peaks)]
-        beyond = np.stack([
-            tails.expected(np.full(len(conditions), value))[:, number] * hours
-            for value, hours in zip(condition.largest, condition.hours, strict=True)
-        ], axis=1)  # fmt: skip
         above = condition.largest > tails.level[number]
         events.append(weights @ above.astype(np.float64))
+        beyond = tails.expected(condition.largest, [number]) * condition.hours
         expected.append((weights * beyond).sum(axis=1))
     events, expected = (pooling @ np.array(each) for each in (events, expected))
     return np.minimum(events / np.maximum(expected, 1e-300), 1.0).T
