@@ -62,8 +62,11 @@ def _extrapolated_runs(platform, site, label, folder, table):
     return joined(matrix.cases, {run.key: run for run in found if run.status == "ok"})[0]
 
 
-def _show_century(century, years, period, sample, folder, runs, *, jobs, engine, address):
-    """Simulate the hours of a Century and write century.csv in a folder; print its main loads."""
+def _show_century(century, years, period, sample, folder, runs, *, dry_run, **machine):
+    """Simulate the hours of a Century and write century.csv in a folder; print its main loads.
+
+    dry_run: print hours and time alone. machine: options of run_century.
+    """
     from fowt_env.training.loads.century import (
         FILE,
         century_table,
@@ -83,18 +86,18 @@ def _show_century(century, years, period, sample, folder, runs, *, jobs, engine,
         f" {hours:,} h are simulated at {3600.0 / seconds:,.0f} times real time:"
         f" {hours * seconds / 3600.0:.2g} core-hours, all hours {total * seconds / 3600.0:.3g}"
     )
+    if dry_run:
+        return
     where = f"in {folder}; the same command resumes the sample"
     with resumable("sampling", lambda done: f"{done} blocks of this stage are {where}") as update:
 
         def report(finished, blocks, left):
             update(finished, blocks, f"{finished} of {blocks} blocks, {left / 60.0:.0f} min left")
 
-        found, wall, simulated = run_century(
-            century, folder, stages, jobs=jobs, engine=engine, address=address, progress=report
-        )
+        found, wall, simulated = run_century(century, folder, stages, progress=report, **machine)
     note(
-        f"{simulated:,} h simulated in {wall:.0f} s with {jobs} processes; {found.hours:,} h in all,"
-        f" {found.lost} lost, {found.tripped} with a trip, which are left out"
+        f"{simulated:,} h simulated in {wall:.0f} s with {machine['jobs']} processes;"
+        f" {found.hours:,} h in all, {found.lost} lost, {found.tripped} with a trip, which are left out"
     )
     table = century_table(found, period, extrapolations(runs, period, century.climate) if runs else None)
     path = folder / FILE

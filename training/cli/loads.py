@@ -34,6 +34,7 @@ FLOOD = "Compartment that may be flooded: water in it, kg, and its centre from t
 PLOT_SITE = "Plot of the site's climate, e.g. site.png; nothing is run."
 CENTURY = "Simulate the hours of production of so many years instead, with rotor-averaged turbulence."
 PERIOD = "With --century: return period of the values, years."
+DRY_RUN = "Print the matrix, or the hours of --century, and the time; run nothing."
 SAMPLE = "With --century: hours of importance sampling instead of all hours."
 MOST_LOST = 10  # runs without result that are printed
 
@@ -51,7 +52,7 @@ def loads_command(
     fidelity: Annotated[str, Option(help="Fidelity: standard, elastic or reference.")] = "standard",
     sensors: Annotated[str, Option(help="Sensors: exact, or the name of a sensor chain.")] = "standard",
     flood: Annotated[list[str] | None, Option(metavar="MASS:X:Y:Z", help=FLOOD)] = None,
-    dry_run: Annotated[bool, Option("--dry-run", help="Print the matrix and its time; run nothing.")] = False,
+    dry_run: Annotated[bool, Option("--dry-run", help=DRY_RUN)] = False,
     baseline: Annotated[
         str | None, Option(help="Controller of the paired differences. Default: first.")
     ] = None,
@@ -115,11 +116,14 @@ def loads_command(
     if century is not None:
         from fowt_env.training.cli.century import show_centuries
 
+        for option, value in (("--dlc", dlc), ("--flood", flood), ("--retry-failed", retry_failed)):
+            if value:
+                raise InputError(f"{option} is for the load cases: not with --century")
         settings = {"fidelity": fidelity, "sensors": sensors}
         table = {"seeds": seeds, "hours": hours, **settings}
         show_centuries(
-            platform, site, labels, century, return_period, sample, folder, settings, table,
-            jobs=jobs, engine=engine, address=address,
+            platform, site, labels, century, return_period, sample, folder, settings, table, dry_run=dry_run,
+            jobs=jobs, engine=engine, address=address, time_limit=time_limit or None,
         )  # fmt: skip
         return
     matrix = expanded(

@@ -168,28 +168,30 @@ def simulated(block):
 
     Extremes of an hour without result are NaN.
     """
-    share = np.array(block.share)
-    rows, columns = [], None
-    for number in range(block.first, block.first + block.count):
-        state, stratum, seed = block.century.state(share, block.stage, number)
-        skip = block.century.site.design.transient
-        run = Run(
-            block.century.controller, block.century.controller, block.century.case(state), seed, skip + HOUR,
-            skip, {}, None, block.time_limit,
-        )  # fmt: skip
-        run = replace(run, case=replace(run.case, options={**run.case.options, "duration": skip + HOUR}))
-        row, _ = scored(run, _extremes)
-        columns = row.get("columns", columns)
-        rows.append((state, stratum, row["status"], row.get("low"), row.get("high")))
-    missing = np.full(0 if columns is None else len(columns), nan)
-    found = {key: np.array([state[key] for state, *_ in rows]) for key in STATE}
+    hours = [_hour(block, number) for number in range(block.first, block.first + block.count)]
+    columns = next((row["columns"] for *_, row in hours if "columns" in row), [])
+    missing = np.full(len(columns), nan)
+    found = {key: np.array([state[key] for state, *_ in hours]) for key in STATE}
     return found | {
-        "stratum": np.array([row[1] for row in rows]),
-        "status": np.array([row[2] for row in rows]),
-        "columns": np.array([] if columns is None else columns),
-        "low": np.array([missing if row[3] is None else row[3] for row in rows], dtype=np.float32),
-        "high": np.array([missing if row[4] is None else row[4] for row in rows], dtype=np.float32),
+        "stratum": np.array([stratum for _, stratum, _ in hours]),
+        "status": np.array([row["status"] for *_, row in hours]),
+        "columns": np.array(columns),
+        "low": np.array([row.get("low", missing) for *_, row in hours], dtype=np.float32),
+        "high": np.array([row.get("high", missing) for *_, row in hours], dtype=np.float32),
     }
+
+
+def _hour(block, number):
+    """Return (state, stratum, row of `scored`) of one simulated hour of a Block."""
+    century = block.century
+    state, stratum, seed = century.state(np.array(block.share), block.stage, number)
+    skip = century.site.design.transient
+    case = century.case(state)
+    case = replace(case, options={**case.options, "duration": skip + HOUR})
+    run = Run(
+        century.controller, century.controller, case, seed, skip + HOUR, skip, {}, None, block.time_limit
+    )
+    return state, stratum, scored(run, _extremes)[0]
 
 
 def _extremes(frame, case, scene, skip):
@@ -349,11 +351,14 @@ def _sampling(hours, years):
     return f"{hours} hours of " + ("plain sampling" if years is None else f"sampling for {years:g} years")
 
 
-def run_century(century, folder, stages, *, jobs=1, engine="processes", address=None, progress=None):
+def run_century(
+    century, folder, stages, *, jobs=1, engine="processes", address=None, time_limit=TIME_LIMIT, progress=None
+):
     """Simulate what is not finished of the stages of a Century in a folder; return (Sample, seconds, hours).
 
     stages: [(hours, years)]: years None for plain sampling, else importance sampling for the values of so
     many years, from the stages before. seconds of this call, in which so many hours were simulated.
+    time_limit: s of wall clock of an hour, or None.
     Raises: InputError for a folder of other settings or in use.
     """
     folder = Path(folder).absolute()
@@ -379,7 +384,7 @@ def run_century(century, folder, stages, *, jobs=1, engine="processes", address=
             write_json(plan, folder / "century.json")
             share = tuple(stage["share"])
             blocks = [
-                Block(century, number, share, first, min(BLOCK, hours - first))
+                Block(century, number, share, first, min(BLOCK, hours - first), time_limit)
                 for first in range(0, hours, BLOCK)
             ]
             left = [block for block in blocks if not _holds(block, folder)]
@@ -482,11 +487,16 @@ def read_sample(century, folder):
 
 
 def seconds_per_hour(century):
-    """Return the s of wall clock that one hour takes in one process, measured on the second of two hours."""
-    share = tuple(century.probabilities)
-    simulated(Block(century, 0, share, 0, 1))  # compiles, or loads what is compiled
+    """Return the s of wall clock that one hour takes in one process, measured on the second of two hours.
+
+    Raises: InputError with the reason if both fail.
+    """
+    block = Block(century, 0, tuple(century.probabilities), 0, 2)
+    *_, first = _hour(block, 0)  # compiles, or loads what is compiled
     began = time.perf_counter()
-    simulated(Block(century, 0, share, 1, 1))
+    *_, second = _hour(block, 1)
+    if first["status"] == second["status"] == FAILED:
+        raise InputError(f"century with {century.controller!r}: its first hours fail: {second['reason']}")
     return time.perf_counter() - began
 
 

@@ -87,3 +87,32 @@ def test_bad_options_are_refused_before_anything_runs(tmp_path, option, value, m
 def test_a_deck_that_is_missing_is_refused(tmp_path):
     _, errors = fowt("loads", str(tmp_path / "none.fst"), "--out", str(tmp_path / "out"), code=2)
     assert "none.fst" in errors
+
+
+def test_a_century_is_announced_sampled_and_resumed(tmp_path, site):
+    folder = tmp_path / "out"
+    command = (
+        *("loads", "--site", site, "--controllers", "pi", "--century", "0.0008", "--out", str(folder)),
+        *("--return-period", "0.0002"),
+    )
+    text, _ = fowt(*command, "--dry-run")
+    assert re.search(r"0\.0008 years: 6 h of production .* 6 h are simulated", text)
+    assert not folder.exists()
+    _, notes = fowt(*command)
+    assert "6 h simulated" in notes
+    table = read_table(folder / "century" / "pi" / "century.csv")
+    assert table["value"].notna().all() and len(table) > 20
+    _, notes = fowt(*command)
+    assert "0 h simulated" in notes
+
+
+@pytest.mark.parametrize("options, message", [
+    (("--dlc", "1.1"), "--dlc is for the load cases"),
+    (("--flood", "1e6:0:0:-60"), "--flood is for the load cases"),
+    (("--controllers", "ipc"), "'ipc': commands the pitch of each blade, and the scene has one pitch"),
+])  # fmt: skip
+def test_a_century_refuses_what_it_cannot_use_before_it_runs(tmp_path, site, options, message):
+    command = ("loads", "--site", site, "--century", "0.001", "--out", str(tmp_path / "out"))
+    _, text = fowt(*command, *options, code=2)
+    assert re.search(message, " ".join(text.split()))
+    assert not (tmp_path / "out").exists()

@@ -158,6 +158,13 @@ def test_a_sample_is_resumed_extended_and_weighted_over_its_stages(tmp_path, qui
         read_sample(CENTURY, tmp_path / "empty")
 
 
+def test_a_sample_whose_first_hours_fail_is_refused_with_the_reason(monkeypatch):
+    failed = {"status": "failed", "reason": "no gain"}
+    monkeypatch.setattr(module, "scored", lambda run, measure: (failed, None))
+    with pytest.raises(InputError, match="century with 'pi': its first hours fail: no gain"):
+        module.seconds_per_hour(CENTURY)
+
+
 def test_extremes_are_those_after_the_transient_with_magnitudes_of_their_largest_value_alone():
     frame = pd.DataFrame(
         {
