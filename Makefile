@@ -1,7 +1,10 @@
 # Targets work from a fresh clone with only Python 3.11 to 3.13 and make; the environment is made once.
-# The first of these that runs is taken. Another: make PYTHON=python3.13 VENV=.venv313 test
-PYTHON ?= $(firstword $(foreach name,python3.11 python3.12 python3.13 python3,$(shell \
-	$(name) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $(name))))
+# The first of these that can make an environment is taken: those of a distribution come first, since they are
+# compiled with profiles and compile kernels in a sixth less time than those of pyenv without.
+# Another: make PYTHON=python3.13 VENV=.venv313 test
+PYTHON ?= $(firstword $(foreach name,$(wildcard /usr/bin/python3.11 /usr/bin/python3.12 /usr/bin/python3.13) \
+	python3.11 python3.12 python3.13 python3,$(shell \
+	$(name) -c 'import sys, ensurepip; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))' 2>/dev/null && echo $(name))))
 VENV ?= .venv
 BIN := $(VENV)/bin
 PROJECT := pyproject.toml constraints.txt
