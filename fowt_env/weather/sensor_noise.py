@@ -3,7 +3,6 @@
 from math import exp, sqrt
 
 import numpy as np
-from scipy.signal import lfilter
 
 from fowt_env.descriptions.sensors import SensorChain
 from fowt_env.loop.sensing import Sensors, Setting, open_chain
@@ -39,6 +38,8 @@ def draw_drift(sensor, field: int, control_dt: float, seed: int, readings: int) 
     kept = exp(-control_dt / sensor.drift_time)
     steps = np.random.default_rng([seed, DRIFT_STREAM, field]).normal(size=readings)
     steps[1:] *= sqrt(1.0 - kept**2)
+    from scipy.signal import lfilter  # takes half a second
+
     return sensor.drift * lfilter([1.0], [1.0, -kept], steps)
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from fowt_env.caches import cached
 from fowt_env.folders import cache_root, distrust, make_private, replaced_privately
-from fowt_env.layout import FOLDERS, PACKAGE, installed_path
+from fowt_env.layout import FOLDERS, PACKAGE, installed_path, module_path
 
 MOST_KEPT = 1000  # sources in the file of results, the latest
 _unsaved: set[str] = set()  # keys of sources parsed since the file was written
@@ -117,13 +117,30 @@ def _found(path, roots):
 
 def imported_at_top(path, but):
     """Return a source of this project and its direct and indirect module-level imports outside `but`."""
-    return _followed([path], lambda file: but not in file.parents, _imported_at_top)
+    return _followed([path], lambda file: True, lambda file: _imported_at_top(file, but))
 
 
 @cache  # some twenty modules with kernels outside the plant share most imports
-def _imported_at_top(path):
-    """Return the source files imported by a source at module level, without their parent packages."""
-    return [file for name in read_source(path).top for file in _module_files(PACKAGE.parent, name)[-1:]]
+def _imported_at_top(path, but):
+    """Return the source files outside `but` imported by a source at module level, without parent packages."""
+    return [file for file in map(_project_file, read_source(path).top) if but not in file.parents]
+
+
+@cache  # modules of this project do not change during a run
+def _project_file(name):
+    """Return the file of a module of this project, or of the package or module that an object is from."""
+    while name != PACKAGE.name:
+        path = module_path(name)
+        for file in (path.with_suffix(".py"), path / "__init__.py"):
+            if file.is_file():
+                return _same(file)
+        name = name.rpartition(".")[0]
+    return _same(PACKAGE / "__init__.py")
+
+
+@cache  # sets compare a path with another object of it by its parts, and with itself at once
+def _same(path):
+    return path
 
 
 def _followed(starts, inside, imported):
