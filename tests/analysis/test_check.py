@@ -93,6 +93,7 @@ def test_a_tension_leg_platform_rests_on_its_tendons():
     assert found.periods["yaw"] == pytest.approx(10.3, rel=0.05)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("wind", [8.0, 11.4, 24.0])
 def test_a_tension_leg_platform_finds_its_rest_in_wind(wind):
     point = fowt_env.trim(fowt_env.build_scene(tension_leg(), wind=wind, fidelity="standard"))

@@ -44,8 +44,12 @@ OF_BLADES = ("default", "azimuth", "previous_action", *BLADE_CHANNELS)
             pytest.param(settings, marks=pytest.mark.installation)
             for settings in (*({"id": NAME, "task": task} for task in TASKS), {"id": EASY})
         ),
-        *(EVERY_CHANNEL | {"action_mode": mode} for mode in ("direct", "setpoint", "residual")),
-        QUICK | ON_LQR,
+        EVERY_CHANNEL | {"action_mode": "residual"},
+        *(
+            pytest.param(EVERY_CHANNEL | {"action_mode": mode}, marks=pytest.mark.nightly)
+            for mode in ("direct", "setpoint")
+        ),
+        pytest.param(QUICK | ON_LQR, marks=pytest.mark.nightly),
         pytest.param(
             INDIVIDUAL | {"observation": OF_BLADES, "sensors": {"noise": 0.01, "delay": 1}},
             marks=pytest.mark.nightly,

@@ -72,7 +72,10 @@ def central(env, given, size, **which):
     return (ends[0] - ends[1]) / (2.0 * size)
 
 
-@pytest.mark.parametrize("settings", [{}, INDIVIDUAL], ids=["collective", "individual"])
+@pytest.mark.parametrize("settings", [
+    pytest.param({}, id="collective"),
+    pytest.param(INDIVIDUAL, id="individual", marks=pytest.mark.nightly),
+])  # fmt: skip
 def test_products_of_jacobians_are_central_differences_of_runs(settings):
     env = quick(**settings)
     given = commands(env)

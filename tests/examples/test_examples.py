@@ -47,7 +47,7 @@ NEEDS = {  # example: modules without which its claims are not met
 }
 # they start Ray, and torch; what the others show has tests of its own
 OTHERS = (
-    "05_own_sea_state", "08_vector_env", "11_report", "13_resume", "15_record_video",
+    "05_own_sea_state", "06_own_load", "08_vector_env", "11_report", "13_resume", "15_record_video",
     "20_short_horizon_actor_critic",
 )  # fmt: skip
 SLOW = {"12_ray": [pytest.mark.slow], **dict.fromkeys(OTHERS, pytest.mark.nightly)}

@@ -174,7 +174,7 @@ def test_a_driven_line_has_the_tensions_of_moordyn():
     assert (np.sqrt(((ours - theirs) ** 2).mean(axis=0)) < 0.06 * theirs.std(axis=0)).all()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_run_starts_in_equilibrium():
     """Still water: nothing moves but by the difference of 20 segments from a catenary, and drag holds it."""
     scene = build_scene("oc3_hywind", mooring="dynamic")

@@ -71,6 +71,7 @@ def test_of_turbulence_the_part_in_the_plane_is_kept():
         planar.with_weather({"kind": "steady", "speed": 12.0, "direction": 10.0}, None, 4)
 
 
+@pytest.mark.nightly
 def test_trim_and_linear_model_stay_in_the_plane():
     scene = build_scene(wind=12.0, sea=SEA, planar=True, fidelity="fast")
     x, _ = initial_state(scene)

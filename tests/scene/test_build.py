@@ -99,7 +99,7 @@ def test_new_weather_is_that_of_a_scene_built_with_it():
     [
         # 60 components keep the exact run short
         (("reference", "standard"), {"wave_components": 60}, 200.0, 1e-3),
-        (("standard", "fast"), {}, 600.0, 2e-2),
+        pytest.param(("standard", "fast"), {}, 600.0, 2e-2, marks=pytest.mark.nightly),
     ],
 )
 def test_a_level_stays_near_the_one_before(levels, options, duration, most):

@@ -229,6 +229,7 @@ def test_motion_holds_what_its_names_say():
         assert np.allclose(shown[name], expected[name], rtol=1e-12, atol=1e-14), name
 
 
+@pytest.mark.nightly
 def test_wind_surface_rotor_and_body_axes_are_those_of_the_channels():
     hub = (-5.0191, 0.0, 89.563)
     names = ("WIND_X", "ELEVATION", "TIME", "ROTOR_SPEED", "WATER_AX")

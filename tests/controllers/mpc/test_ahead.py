@@ -244,6 +244,7 @@ def test_a_controller_prepared_by_hand_has_the_usual_lidar(gusty):
     assert law.information[-1] == "lidar" and law.preview_times == ()
 
 
+@pytest.mark.nightly
 def test_a_preview_that_is_off_for_good_ends_with_the_commands_of_the_true_one(gusty):
     """1 m/s too high, for 12 schedule times; almost without integral of the speed, which would hide it."""
     settings = MPCSettings(preview_time=3.0, schedule_time=10.0, mean_speed=1.0)

@@ -264,6 +264,7 @@ def test_every_key_that_is_read_moves_what_is_written_or_is_refused(tmp_path_fac
     assert len(moved) > 200
 
 
+@pytest.mark.nightly
 def test_the_other_names_of_a_key_mean_the_same(tmp_path_factory):
     unlike, ways = set(), 0
     for key, plain, deck in keys_read(tmp_path_factory):

@@ -103,7 +103,7 @@ def test_a_tilted_shaft_is_a_pitched_platform():
     ("kind", "blades"),
     # three blades in a sheared wind are taken together, two one by one
     [
-        ("sheared", 3),
+        pytest.param("sheared", 3, marks=pytest.mark.nightly),
         ("sheared", 2),
         pytest.param("box", 3, marks=pytest.mark.nightly),
         ("still lower edge", 3),
@@ -135,6 +135,7 @@ def test_states_outside_the_table_of_stations_are_solved():
         )
 
 
+@pytest.mark.nightly
 @compiled
 def test_the_table_of_the_rotor_gives_the_mean_over_a_turn():
     states, winds = moving(60, pitch=(6.0, 18.0), spread=0.0)
@@ -320,6 +321,7 @@ fields = pytest.mark.parametrize(
 )
 
 
+@pytest.mark.nightly
 @compiled
 @fields
 def test_equal_pitches_have_the_loads_of_one_pitch_for_all(rotors, field):

@@ -155,6 +155,7 @@ def test_a_skewed_wake_is_that_of_blade_element_momentum(name, wake):
     assert np.array_equal(solved, found)
 
 
+@pytest.mark.nightly
 def test_in_a_box_of_wind_too(rotor):
     states, winds = operating(100, rotor, seed=2)
     (solved, found), (exact, rates) = both(states, winds, rotor, rough_field(5, 14.0, 1.0, (-150.0, 5.0), 31))

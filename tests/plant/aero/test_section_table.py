@@ -183,6 +183,7 @@ def test_near_the_sea_and_far_from_it_the_wind_is_sampled_station_by_station():
         assert quick[0, 6:] == pytest.approx(exact[0, 6:], rel=1e-3)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("periodic", [False, True])
 def test_full_field_wind_is_sampled_at_every_station(periodic):
     """Also where a blade reaches beyond the grid."""

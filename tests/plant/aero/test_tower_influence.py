@@ -96,9 +96,10 @@ def test_loads_are_those_of_the_wind_with_the_tower_by_plain_vectors(potential, 
     "turbine",
     [
         pytest.param(STRAIGHT, id="straight"),
-        pytest.param(CURVED, id="curved", marks=pytest.mark.nightly),
+        pytest.param(CURVED, id="curved"),
     ],
 )
+@pytest.mark.nightly
 def test_the_look_up_has_the_same_influence(turbine):
     states, winds = moving(60)
     elements, tilt = with_tower(turbine, "bak", "powles"), turbine.rotor.shaft_tilt

@@ -119,6 +119,7 @@ def test_each_kernel_that_is_compiled_is_counted_once():
     assert len(said) == 2
 
 
+@pytest.mark.nightly
 def test_where_no_folder_can_be_made_kernels_are_compiled_in_each_process(tmp_path):
     """Beneath a file, which stops even the superuser; and for a user without a home, as in a container."""
     (tmp_path / "file").write_text("")
@@ -228,6 +229,7 @@ def test_a_file_that_others_can_write_is_not_read(ending, tmp_path):
     assert output(start(SMALL + HITS, tmp_path / "cache")) == ["0.25", "1"]
 
 
+@pytest.mark.nightly
 def test_a_folder_that_is_read_only_is_read(tmp_path):
     """As one that root has filled for all: what is there is used, and what is not is compiled."""
     output(start(SMALL, tmp_path / "cache"))
@@ -464,6 +466,7 @@ def test_the_hash_of_a_source_is_that_of_its_code(before, after, same, tmp_path)
     assert (hashes[0] == hashes[1]) is same
 
 
+@pytest.mark.nightly
 def test_a_broken_list_of_parsed_sources_is_made_anew_and_one_of_others_is_not_read(tmp_path):
     """A wrong hash in it would have kernels of other code loaded."""
     (used,) = output(start(WHERE, tmp_path / "cache"))

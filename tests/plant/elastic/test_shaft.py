@@ -164,7 +164,8 @@ def test_a_stiff_shaft_is_a_rigid_one(parts):
         assert y == pytest.approx(x, rel=1e-5, abs=1e-6)
 
 
-@pytest.mark.parametrize(("tower", "step"), [pytest.param("modes", 0.1, marks=NIGHTLY), ("modes2", 0.05)])
+@NIGHTLY
+@pytest.mark.parametrize(("tower", "step"), [("modes", 0.1), ("modes2", 0.05)])
 def test_a_tower_with_a_twisting_shaft_swings_no_further_at_the_default_step(tower, step):
     """At 0.1 s, 1.8 over the frequency, the second modes would grow without limit within two seconds."""
     scene = build_scene("oc3_hywind", **BARE, tower=tower)

@@ -133,10 +133,8 @@ LIMITS = {
 }
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "platform", ["oc3_hywind", *(pytest.param(name, marks=pytest.mark.nightly) for name in list(RATED)[1:])]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("platform", RATED)
 @pytest.mark.parametrize("case", LIMITS)
 def test_the_default_step_is_stable(platform, case):
     wind, over, pitch, share, held = LIMITS[case]

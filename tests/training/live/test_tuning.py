@@ -166,6 +166,7 @@ def test_the_linear_loop_says_why_there_is_none():
     assert with_one.note == "" and with_one.margins.stable and len(with_one.poles) > 10
 
 
+@pytest.mark.nightly
 def test_blades_that_follow_at_once_have_margins_and_the_least_damped_motion_is_named():
     """VolturnUS-S has no drag in still water, so heave decays by radiation alone."""
     loop = tuning.linear(Weather("iea15_volturnus_s", "15", "none"), Law("lqr"))

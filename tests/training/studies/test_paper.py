@@ -179,6 +179,7 @@ def test_case_names_are_checked():
         load_cases.wanted_cases("LC13")
 
 
+@pytest.mark.nightly
 def test_the_command_writes_series_statistics_claims_and_plots(tmp_path):
     pytest.importorskip("matplotlib")
     result = CliRunner().invoke(app, ["dev", "paper", "LC5", "--out", str(tmp_path)])
