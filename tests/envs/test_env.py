@@ -23,8 +23,6 @@ from fowt_env.registration import ENVIRONMENTS, LADDER
 SEA = {"kind": "jonswap", "Hs": 3.0, "Tp": 9.0}
 DRAWN = ("90%", "drawn")
 EASY = next(iter(LADDER))
-SEMI = "fowt_env/VolturnUS15MW-v1"
-OTHERS = [name for name in ENVIRONMENTS if name != SEMI]
 FIXED = {"wind": NTM, "sea": SEA, "weather_seed": 7, "offsets": {}}
 
 
@@ -62,7 +60,7 @@ def test_gymnasium_and_sb3_checkers_find_nothing(settings):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "name", [*ladder(), SEMI, *(pytest.param(name, marks=pytest.mark.nightly) for name in OTHERS)]
+    "name", [*ladder(), *(pytest.param(name, marks=pytest.mark.nightly) for name in ENVIRONMENTS)]
 )
 def test_the_checkers_find_nothing_in_any_name(name):
     check({"id": name})

@@ -47,10 +47,10 @@ NEEDS = {  # example: modules without which its claims are not met
 }
 # they start Ray, and torch; what the others show has tests of its own
 OTHERS = (
-    "05_own_sea_state", "06_own_load", "08_vector_env", "11_report", "13_resume", "15_record_video",
+    "05_own_sea_state", "06_own_load", "08_vector_env", "11_report", "12_ray", "13_resume", "15_record_video",
     "20_short_horizon_actor_critic",
 )  # fmt: skip
-SLOW = {"12_ray": [pytest.mark.slow], **dict.fromkeys(OTHERS, pytest.mark.nightly)}
+NIGHTLY = dict.fromkeys(OTHERS, pytest.mark.nightly)
 TRAINED = ("10_train_small_agent", "18_cleanrl_ppo")  # take minutes: tests/examples has a test of each
 
 
@@ -88,7 +88,7 @@ class Run(NamedTuple):
     seconds: float | None
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=SLOW.get(name, ())) for name in CLAIMS])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=NIGHTLY.get(name, ())) for name in CLAIMS])
 def test_an_example_runs_within_a_minute(name, run_of):
     for module in NEEDS.get(name, ()):
         pytest.importorskip(module, reason=f"{module} is not installed: its extra is missing")
@@ -99,6 +99,7 @@ def test_an_example_runs_within_a_minute(name, run_of):
     assert run.seconds is None or run.seconds < LIMIT  # compiling is the first run's alone
 
 
+@pytest.mark.nightly
 def test_the_plate_brakes_the_heave_as_quadratic_drag_does(run_of):
     """Averaged over a cycle the amplitude follows dA/dt = -s A - c A^2 with c = 4 k w/(3 pi M)."""
     run = run_of("06_own_load")

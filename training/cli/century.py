@@ -99,7 +99,9 @@ def _show_century(century, years, period, sample, folder, runs, *, dry_run, **ma
         f"{simulated:,} h simulated in {wall:.0f} s with {machine['jobs']} processes;"
         f" {found.hours:,} h in all, {found.lost} lost, {found.tripped} with a trip, which are left out"
     )
-    table = century_table(found, period, extrapolations(runs, period, century.climate) if runs else None)
+    with progress_bar("extrapolating") as update:
+        expected = extrapolations(runs, period, century.climate, update) if runs else None
+    table = century_table(found, period, expected)
     path = folder / FILE
     table.to_csv(path, index=False)
     shown = table[table["load"].isin(SHOWN) & table["value"].notna()]

@@ -83,8 +83,8 @@ def loads_command(
     fowt loads deck/model.fst --site mine.toml --dlc 1.2,6.1 --seeds 2 --wind rotor-averaged  # a first look
     fowt loads iea15_volturnus_s --site gulf_of_maine --fidelity elastic  # blades and tower that bend
     fowt loads --site mine.csv --plot-site site.png  # fit a site to a table, and look at it
-    fowt loads --century 100 --controllers pi --jobs 2  # 50-year values without extrapolation: core-days
-    fowt loads --century 100 --sample 20000 --controllers pi --jobs 2  # nearly as good, in core-hours
+    fowt loads --century 100 --controllers rosco --jobs 2  # 50-year values without extrapolation: core-days
+    fowt loads --century 100 --sample 20000 --controllers rosco --jobs 2  # nearly as good, in core-hours
 
     [bold]Files written[/bold]: manifest.json (the settings), runs/CONTROLLER/CONDITION_seedN.zip (statistics
     of each run), loads.html (the page), tables/ (CSV, and spreadsheets in the layout of IEA-22's design

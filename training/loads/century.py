@@ -562,13 +562,15 @@ def coverage_remarks(folder, labels):
     return tuple(remarks)
 
 
-def extrapolations(runs, years, climate):
+def extrapolations(runs, years, climate, progress=None):
     """Return {(load without unit, side): Extrapolation} of runs [(LoadCase, RunStatistics)] of DLC 1.1.
 
-    climate: site.Climate of the runs.
+    climate: site.Climate of the runs; progress(done, total, text) before each load.
     """
-    found = {}
-    for name in runs[0][1].peaks:
+    found, names = {}, list(runs[0][1].peaks)
+    for done, name in enumerate(names):
+        if progress:
+            progress(done, len(names), f"extrapolating {name}")
         for side in ("max", "min"):
             conditions = conditions_of_runs(runs, name, side)
             found[name.partition("_[")[0], side] = extrapolate(conditions, side, years, climate)

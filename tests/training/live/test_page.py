@@ -125,6 +125,7 @@ def test_an_axis_stays_while_its_curves_fill_it_and_is_set_anew_otherwise():
     assert low <= 43.1 <= high and 0.0 < high - low < 1e-3
 
 
+@pytest.mark.nightly
 def test_a_phone_scrolls_in_one_direction_and_both_themes_have_their_colours(browser, server):  # noqa: F811
     for scheme in ("light", "dark"):
         with page_of(browser, server, viewport={"width": 380, "height": 800}, color_scheme=scheme) as page:
