@@ -187,7 +187,7 @@ def test_a_picture_takes_less_than_a_thirtieth_of_a_second(scene):
         view.draw([ROW | {"Time": 0.1 * k}])
         view.array()
         times.append(time.process_time() - begin)
-    assert min(times) < 1.0 / 30.0  # the others beside other processes
+    assert np.median(times) < 1.0 / 30.0
 
 
 def test_the_human_mode_draws_in_a_window_at_reset_and_every_step():
