@@ -14,6 +14,7 @@ from pathlib import Path
 
 from fowt_env.controllers.bladed import library as program
 
+MISSING = "cannot open shared object file"  # of the loader, for a library that another one needs
 END_LIMIT = 5.0  # s in which the process must end once it is told to
 LONGEST_PRINTED = 20_000  # bytes of what a library prints that are kept, the last ones
 UNBUFFERED = {"GFORTRAN_UNBUFFERED_PRECONNECTED": "y"}  # so that a crash loses no line that Fortran printed
@@ -82,9 +83,10 @@ class LibraryProcess:
         if not answer:
             raise LibraryFailure(f"{what} ended its process {self._ending()}")
         if answer != program.DONE:
-            raise LibraryFailure(
-                f"cannot be loaded: {program.text_at(self.memory, program.MESSAGE_AT, program.MESSAGE_SIZE)}"
-            )
+            reason = program.text_at(self.memory, program.MESSAGE_AT, program.MESSAGE_SIZE)
+            if MISSING in reason:  # libraries of wheels have theirs in a folder beside them
+                reason += ". It needs this library: name it where it was installed, not a copy of it"
+            raise LibraryFailure(f"cannot be loaded: {reason}")
         self.waits = True
 
     def _ending(self):

@@ -134,6 +134,7 @@ class Swap:
         self._failure = np.frombuffer(memory, np.int32, 1, arguments.FAILURE_AT)
         self._efficiency = turbine.drivetrain.generator_efficiency
         self._individual = bool(individual)
+        self._control_dt, self._rate = control_dt, 0.0  # rad/s, of platform pitch at the last call
         names = [os.fsencode(name) for name in (input_file, output_name)]
         for name, start, size in (
             (names[0], arguments.INPUT_FILE_AT, arguments.INPUT_FILE_SIZE),
@@ -173,8 +174,17 @@ class Swap:
             self.records[INDEX[name]] = value
 
     def fill(self, status, measurement):
-        """Fill the records of a call with its status (START or STEP) from a Measurement."""
+        """Fill the records of a call with its status (START or STEP) from a Measurement.
+
+        A chain of sensors without the angular acceleration of the nacelle gives the slope of the measured
+        rate of platform pitch for it: with 0 there, ROSCO's floating feedback would do nothing.
+        """
         values = np.array([*measurement, *values_of_blades(measurement)], dtype=np.float64)
+        rate = values[Measure.PLATFORM_PITCH_RATE]
+        if np.isnan(values[Measure.NACELLE_PITCH_ACCELERATION]):
+            slope = 0.0 if status == START else (rate - self._rate) / self._control_dt
+            values[Measure.NACELLE_PITCH_ACCELERATION] = slope
+        self._rate = rate
         fill_records(self.records, values, N_MEASUREMENTS, float(status), self._efficiency)
         self.clear()
 

@@ -81,8 +81,9 @@ def _show_century(century, years, period, sample, folder, runs, *, dry_run, **ma
     hours = sum(each for each, _ in stages)
     with progress_bar("measuring the speed"):
         seconds = seconds_per_hour(century)
+    unit = "year" if years == 1.0 else "years"
     out.print(
-        f"{years:g} years: {total:,} h of production ({100.0 * century.production:.1f} % of the time);"
+        f"{years:g} {unit}: {total:,} h of production ({100.0 * century.production:.1f} % of the time);"
         f" {hours:,} h are simulated at {3600.0 / seconds:,.0f} times real time:"
         f" {hours * seconds / 3600.0:.2g} core-hours, all hours {total * seconds / 3600.0:.3g}"
     )

@@ -40,7 +40,8 @@ def check_dll(
 
     chosen = named_library(f"dll:{library}")
     result = check.check_dll(chosen, read_turbine(turbine), check_control_dt(control_dt), note)
-    print_table(("library", "result"), _rows(chosen, result), library, left=(0, 1))
+    rows = [("turbine", f"{turbine} (--turbine)"), *_rows(chosen, result)]
+    print_table(("library", "result"), rows, library, left=(0, 1))
     for title, records in (("reads", result.read), ("writes", result.written)):
         rows = [(record.number, record.name, record.unit, record.meaning) for record in records]
         if rows:

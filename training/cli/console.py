@@ -137,7 +137,7 @@ def version_option(
         width = max(len(command) for command, _ in NEXT)
         for command, text in NEXT:
             out.print(f"[cyan]{command:{width}}[/cyan]  # {text}", soft_wrap=True)
-        out.print("[dim]The first run of a kind of scene compiles for half a minute: fowt warmup.[/dim]")
+        out.print("[dim]A first run of a kind of scene compiles for half a minute to two: fowt warmup.[/dim]")
 
 
 def add_group(name, text, parent=app, **options):

@@ -1,6 +1,7 @@
 """Implements fowt loads: the design load table of a platform at a site."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated
 
 from rich.markup import escape
@@ -104,12 +105,18 @@ def loads_command(
     folder = Path(out_folder)
     check_whole_number("--driving", driving, 0)
     check_number("--years", years, 0.0, low_open=True)
-    if platform.lower().endswith(".fst"):
-        deck = platform if deck is None else deck
-        platform = _imported(platform, folder / "platform")
+    imported = platform if platform.lower().endswith(".fst") else None
+    if imported is not None:
+        deck = imported if deck is None else deck
+        trial = TemporaryDirectory(prefix="fowt-")  # options that are refused, and a dry run, leave nothing
+        platform, contradictions = _imported(imported, trial.name)
+        for contradiction, consequence in contradictions:
+            err.print(f"[yellow]deck: {escape(str(contradiction))}: {escape(str(consequence))}[/yellow]")
     if plot_site is not None:
         _plot_site(platform, site, plot_site)
         return
+    if sample is not None and century is None:
+        raise InputError("--sample chooses the hours of a century: only with --century")
     labels = controller_names(controllers)
     if baseline is not None and baseline not in labels:
         raise unknown("baseline among --controllers", baseline, labels)
@@ -119,6 +126,8 @@ def loads_command(
         for option, value in (("--dlc", dlc), ("--flood", flood), ("--retry-failed", retry_failed)):
             if value:
                 raise InputError(f"{option} is for the load cases: not with --century")
+        if imported is not None and not dry_run:
+            platform = _kept(imported, folder)
         settings = {"fidelity": fidelity, "sensors": sensors}
         table = {"seeds": seeds, "hours": hours, **settings}
         show_centuries(
@@ -126,10 +135,16 @@ def loads_command(
             jobs=jobs, engine=engine, address=address, time_limit=time_limit or None,
         )  # fmt: skip
         return
-    matrix = expanded(
-        platform, site, labels, dlc=dlc, seeds=seeds, hours=hours, wind=wind, fidelity=fidelity,
-        sensors=sensors, compartments=[_compartment(text) for text in flood or ()],
-    )  # fmt: skip
+    cases = {
+        "dlc": dlc,
+        "seeds": seeds,
+        "hours": hours,
+        "wind": wind,
+        "fidelity": fidelity,
+        "sensors": sensors,
+    }
+    cases["compartments"] = [_compartment(text) for text in flood or ()]
+    matrix = expanded(platform, site, labels, **cases)
     named = {label: label for label in labels}
     check_controllers(named, matrix)
     _print_matrix(matrix)
@@ -138,6 +153,8 @@ def loads_command(
     _print_expected(matrix, seconds, rates, per_box, jobs)
     if dry_run:
         return
+    if imported is not None:
+        matrix = expanded(_kept(imported, folder), site, labels, **cases)
     about = {"site": read_site(site).model_dump(mode="json")}
     where = f"in {folder}; the same command resumes the table"
     with resumable("running", lambda done: f"the {done} finished runs are {where}") as update:
@@ -163,14 +180,18 @@ def loads_command(
 
 
 def _imported(deck, folder):
-    """Return the path of the platform file of a deck, imported into a folder of the table."""
+    """Return the path of the platform file of a deck, imported into a folder, and its contradictions."""
     from fowt_env.files.openfast_deck.importer import import_deck
 
     report = import_deck(deck, str(folder), name="platform", replace_files=True)
-    for contradiction, consequence in report.contradictions:
-        err.print(f"[yellow]deck: {escape(str(contradiction))}: {escape(str(consequence))}[/yellow]")
-    note(f"imported {deck} into {folder}; what differs from the deck is in report.md there")
-    return str(folder / "platform.toml")
+    return str(Path(folder, "platform.toml")), report.contradictions
+
+
+def _kept(deck, folder):
+    """Return the path of the platform file of a deck, imported into the folder of the table."""
+    path, _ = _imported(deck, folder / "platform")
+    note(f"imported {deck} into {folder / 'platform'}; what differs from the deck is in report.md there")
+    return path
 
 
 def _compartment(text):

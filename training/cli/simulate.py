@@ -4,7 +4,7 @@ from typing import Annotated
 
 from typer import Option
 
-from fowt_env.descriptions.checks import parse_numbers
+from fowt_env.descriptions.checks import check_number, parse_numbers
 from fowt_env.descriptions.sea_state import sea_of
 from fowt_env.descriptions.wind import wind_of
 from fowt_env.errors import SimulationStopped
@@ -74,6 +74,7 @@ def simulate(
     import fowt_env
 
     output(out_path, endings=SERIES_SUFFIXES)  # before the run
+    check_number("duration", duration, 0.0, low_open=True)
     scene = scene_of(platform, wind, sea, duration, seed, fidelity, option, rotor)
     title = f"{platform} · wind {wind} · sea {sea} · controller {controller} · seed {seed}"
     with progress_bar("simulating", 1.0) as update:

@@ -20,6 +20,9 @@ from fowt_env.control import make
 from fowt_env.control.views import whole_view
 from fowt_env.controllers import controller_names
 from fowt_env.controllers.bladed.controller import BladedLibrary, named_library
+from fowt_env.controllers.bladed.library import MEMORY_SIZE
+from fowt_env.controllers.bladed.records import INDEX, START, STEP
+from fowt_env.controllers.bladed.swap import Swap
 from fowt_env.controllers.rosco import find_library
 from fowt_env.errors import ControllerError, InputError
 from fowt_env.plant.measurement import BladeMeasurement, Measurement
@@ -410,3 +413,17 @@ def test_openfasts_own_controller_of_the_spar_has_the_commands_of_openfast_oc3()
             self.theirs.finish()
 
     simulate(scene, Both, duration=100.0)
+
+
+def test_without_an_accelerometer_of_rotation_a_library_reads_the_slope_of_the_platform_s_pitch_rate(scene):
+    """As ROSCO inside the loop: with 0 there its floating feedback does nothing, and nobody sees why."""
+    swap = Swap(bytearray(MEMORY_SIZE), scene.turbine, 0.1)
+    record = INDEX["nacelle_nodding_acceleration"]
+    for status, rate, given, expected in (
+        (START, 0.02, np.nan, 0.0), (STEP, 0.03, np.nan, 0.1), (STEP, 0.01, np.nan, -0.2),
+        (STEP, 0.05, 0.7, 0.7), (STEP, 0.06, np.nan, 0.1),
+    ):  # fmt: skip
+        values = dict.fromkeys(Measurement._fields, 0.0)
+        values |= {"platform_pitch_rate": rate, "nacelle_pitch_acceleration": given}
+        swap.fill(status, Measurement(**values))
+        assert swap.records[record] == pytest.approx(expected, rel=1e-5)

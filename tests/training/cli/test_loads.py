@@ -1,6 +1,7 @@
 """The command fowt loads: the matrix first, a small table from end to end, and bad options."""
 
 import re
+from pathlib import Path
 
 import pytest
 from command_line import fowt
@@ -8,6 +9,9 @@ from command_line import fowt
 from fowt_env.files.tables import read_table
 from fowt_env.training.loads.records import read_run
 from fowt_env.training.loads.site import FOLDER
+
+DECKS = Path(__file__).parents[2] / "reference" / "decks" / "IEA-15-240-RWT" / "OpenFAST"
+DECK = str(DECKS / "IEA-15-240-RWT-UMaineSemi" / "IEA-15-240-RWT-UMaineSemi.fst")
 
 SHORT = ("--seeds", "1", "--hours", "0.05", "--wind", "rotor-averaged", "--controllers", "pi,pi_land")
 
@@ -72,6 +76,7 @@ def test_the_plot_of_a_site_is_written_with_its_extremes(tmp_path):
     ("--site", "nowhere", "unknown site 'nowhere'"),
     ("--dlc", "1.9", "unknown design load case '1.9'"),
     ("--seeds", "0", "seeds = 0: must be a whole number in"),
+    ("--sample", "500", "--sample chooses the hours of a century: only with --century"),
     ("--controllers", "pj", "pj"),
     ("--baseline", "rosco", "baseline among --controllers"),
     ("--wind", "steady", "unknown wind 'steady'"),
@@ -87,6 +92,16 @@ def test_bad_options_are_refused_before_anything_runs(tmp_path, option, value, m
 def test_a_deck_that_is_missing_is_refused(tmp_path):
     _, errors = fowt("loads", str(tmp_path / "none.fst"), "--out", str(tmp_path / "out"), code=2)
     assert "none.fst" in errors
+
+
+@pytest.mark.parametrize(
+    "options, code", [pytest.param(("--dry-run",), 0, marks=pytest.mark.nightly), (("--hours", "-1"), 2)]
+)
+def test_a_dry_run_and_a_refused_option_leave_nothing_of_a_deck(tmp_path, site, options, code):
+    words = ("loads", DECK, "--site", site, *SHORT, "--dlc", "6.1", "--out", str(tmp_path / "out"))
+    text, _ = fowt(*words, *options, code=code)
+    assert not (tmp_path / "out").exists()
+    assert ("runs, " in text) == (code == 0)
 
 
 def test_a_century_is_announced_sampled_and_resumed(tmp_path, site):
