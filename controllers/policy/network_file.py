@@ -22,6 +22,7 @@ from fowt_env.envs.observations import KNOWN, N_ACTIONS
 from fowt_env.errors import InputError
 
 FORMAT = 1
+MODES = tuple(name for name, mode in ACTION_MODES.items() if n_actions(mode) == N_ACTIONS)  # of an action
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 SQUASHES = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
 MAX_BYTES = 100_000_000  # of all arrays; typical policies have 200 kB
@@ -39,7 +40,7 @@ class PolicySettings(Record):
     clip_observation: Positive
     control_dt: Positive
     decisions: dict[str, Any]  # of DecisionSettings
-    action_mode: Literal[tuple(name for name, mode in ACTION_MODES.items() if n_actions(mode) == N_ACTIONS)]
+    action_mode: Literal[MODES]
     baseline: Literal[tuple(CONTROLLERS)]  # an import path would run code
     observation: Annotated[list[Literal[KNOWN]], Field(min_length=1, max_length=200)]
     wind_preview: Annotated[list[NonNegative], Field(max_length=200)]  # s

@@ -194,7 +194,8 @@ class FowtEnv(gymnasium.Env[np.ndarray, np.ndarray]):
                 raise unknown("render_mode", render_mode, self.metadata["render_modes"])
             from fowt_env.visual.rendering import check_size, load_pygame  # only for images
 
-            load_pygame()
+            if render_mode == "human":  # images may never be asked for: stable-baselines3 makes "rgb_array"
+                load_pygame()
             check_size("render_size", render_size)
         records = {"episode": episode, "plant": plant, "control": control, "interface": interface}
         settings = read_settings(records, keywords)

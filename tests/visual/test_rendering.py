@@ -226,7 +226,12 @@ def test_an_unrendered_run_never_loads_pygame():
 def test_a_missing_pygame_and_a_vector_environment_are_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
     with pytest.raises(InputError, match=r"fowt-env\[render\]"):
-        FowtEnv(render_mode="rgb_array", **QUICK)
+        FowtEnv(render_mode="human", **QUICK)
+    env = FowtEnv(render_mode="rgb_array", **QUICK)  # as stable-baselines3 makes one from a name
+    env.reset()
+    env.step(np.zeros(2))
+    with pytest.raises(InputError, match=r"fowt-env\[render\]"):
+        env.render()
     with pytest.raises(InputError, match="vector environment cannot render"):
         FowtVectorEnv(2, render_mode="rgb_array", **QUICK)
 

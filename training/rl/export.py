@@ -6,7 +6,7 @@ from dataclasses import asdict
 
 import numpy as np
 
-from fowt_env.controllers.policy.network_file import FORMAT
+from fowt_env.controllers.policy.network_file import FORMAT, MODES
 from fowt_env.errors import InputError
 from fowt_env.files.atomic import replacing
 
@@ -37,7 +37,21 @@ def export_policy(model, single, path, about, normalisation=None):
 
     single: a FowtEnv of the training with decisions, in the mode residual, direct or setpoint; normalisation:
     VecNormalize of the training, None without; about: dict of text and numbers on the origin of the model.
+    Raises: InputError for an environment or a network that a policy file cannot hold.
     """
+    single = single.unwrapped
+    if single.decisions is None or single.action_mode not in MODES:
+        which = "no decisions" if single.decisions is None else f"action_mode {single.action_mode!r}"
+        raise InputError(
+            f"export_policy: the environment has {which}: must have decisions, and a mode of"
+            f" {', '.join(MODES)}"
+        )
+    own, read = single.observation_space.shape, model.observation_space.shape
+    if own != read:
+        raise InputError(
+            f"export_policy: the model reads observations of shape {read}, the environment has {own}: must be"
+            " that of its training"
+        )
     linear, activation, squash = layers_of(model)
     task, decisions, features = single.task, single.decisions, single.features
     mean, scale, clip = features.mean, features.scale, features.bound

@@ -60,14 +60,15 @@ def members(algo, task, seeds, steps, changes=None, sweep=None, folder="runs"):
 def train_one(member):
     """Train a Member, or continue it; return its row of train_all.
 
-    Raises: InputError if its folder has a run of other settings.
+    Raises: InputError if its folder has a run of other settings; KeyboardInterrupt if it was stopped.
     """
     folder = Path(member.folder)
     begun = (folder / "settings.yml").exists()
     if begun and read_settings(folder / "settings.yml") != member.settings:
         raise InputError(f"{folder}: has a run of other settings: needs another folder")
     if not _ended(folder, member.settings["steps"]):
-        Training(None if begun else member.settings, folder, resume=begun).run()
+        if not Training(None if begun else member.settings, folder, resume=begun).run():
+            raise KeyboardInterrupt  # its checkpoint is written; the other trainings are not begun
     validations = read_table(folder / "validation.csv")
     best = validations.loc[validations["score"].idxmin()]
     own = {"folder": folder.name, "seed": member.settings["seed"]} | member.swept

@@ -1,5 +1,7 @@
 """Exported networks that were never trained answer as stable-baselines3 does; no kernel is needed."""
 
+import re
+
 import gymnasium
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 from fowt_env.controllers.policy.controller import read_policy
 from fowt_env.envs import FowtEnv
+from fowt_env.errors import InputError
 from fowt_env.training.rl.export import export_policy
 
 pytestmark = pytest.mark.installation
@@ -45,3 +48,15 @@ def test_an_exported_network_answers_as_stable_baselines3_does_before_any_traini
     answers = read_policy(path)[1](features)
     assert expected.min() < -0.9 and expected.max() > 0.9
     assert np.abs(answers - expected).max() < 1e-5
+
+
+@pytest.mark.parametrize("settings, width, message", [
+    ({}, None, "the environment has no decisions: must have decisions, and a mode of direct, "),
+    ({"decisions": {"hold": 2}}, 5, "the model reads observations of shape (5,), the environment has"),
+])  # fmt: skip
+def test_what_a_policy_file_cannot_hold_is_refused(settings, width, message, tmp_path):
+    single = FowtEnv("steady", **settings)
+    model = PPO("MlpPolicy", Shape(width or single.observation_space.shape[0]), device="cpu")
+    with pytest.raises(InputError, match=re.escape(message)):
+        export_policy(model, single, tmp_path / "policy.npz", {})
+    assert not (tmp_path / "policy.npz").exists()

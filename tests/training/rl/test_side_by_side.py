@@ -29,6 +29,7 @@ def calls(monkeypatch):
             rows = [(0, 9.0), (50, score), (settings["steps"], score + 0.1)]
             pd.DataFrame(rows, columns=["decisions", "score"]).to_csv(self.folder / "validation.csv")
             (self.folder / "last.npz").write_bytes(b"")
+            return True
 
     monkeypatch.setattr(side_by_side, "Training", Whole)
     return found
@@ -75,6 +76,13 @@ def test_a_repeated_call_keeps_what_has_ended_continues_the_rest_and_ranks_all(t
     (tmp_path / "gamma=0.98_pitch_travel=20_seed_0" / "last.npz").unlink()  # as an interrupt leaves it
     assert train_all(chosen).equals(table)
     assert calls[4:] == [(None, "gamma=0.98_pitch_travel=20_seed_0", True)]
+
+
+def test_after_one_that_was_stopped_no_other_training_begins(tmp_path, calls, monkeypatch):
+    monkeypatch.setattr(side_by_side.Training, "run", lambda self: False)  # with its checkpoint
+    with pytest.raises(KeyboardInterrupt):
+        train_all(members("ppo", "above_rated", [0, 1], 100, folder=tmp_path))
+    assert len(calls) == 1
 
 
 def test_a_folder_with_a_run_of_other_settings_is_refused(tmp_path, calls):
