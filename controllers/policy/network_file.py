@@ -22,7 +22,7 @@ from fowt_env.envs.observations import KNOWN, N_ACTIONS
 from fowt_env.errors import InputError
 
 FORMAT = 1
-MODES = tuple(name for name, mode in ACTION_MODES.items() if n_actions(mode) == N_ACTIONS)  # of an action
+MODES = tuple(name for name, mode in ACTION_MODES.items() if n_actions(mode) == N_ACTIONS)  # one pitch
 ACTIVATIONS = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0.0)}
 SQUASHES = {"clip": lambda x: np.clip(x, -1.0, 1.0), "tanh": np.tanh}
 MAX_BYTES = 100_000_000  # of all arrays; typical policies have 200 kB

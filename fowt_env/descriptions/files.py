@@ -51,8 +51,6 @@ def read_text(path, kind, largest=MAX_BYTES, fallback=None):
 
 def read_toml(path, kind):
     """Return the contents of a TOML file as nested dicts."""
-    if str(path).lower().endswith(".fst"):
-        raise InputError(f"{kind} file {str(path)!r} is an OpenFAST deck: `fowt import` it first")
     text = read_text(path, kind)
     deep = _DEEP_KEY.search(text)
     if deep:

@@ -26,6 +26,7 @@ from fowt_env.descriptions.records import (
 )
 from fowt_env.descriptions.tower_modes import TowerBending, mass_problem, read_tower_modes
 from fowt_env.descriptions.turbine import Inertia, Turbine, Vector3, read_turbine, turbine_names
+from fowt_env.errors import InputError
 
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 SixBySix = tuple[SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers, SixNumbers]
@@ -345,6 +346,8 @@ def read_platform(name_or_path: str | Path) -> Platform:
     """
     folder = DATA / "platforms"
     path = locate("platform", name_or_path, platform_names(), lambda name: folder / f"{name}.toml")
+    if path.suffix.lower() == ".fst":
+        raise InputError(f"platform file {str(path)!r} is an OpenFAST deck: `fowt import` it first")
     data = read_toml(path, "platform")
     problems = []
     free = {key: data.pop(key) for key in ("options", "published") if key in data}

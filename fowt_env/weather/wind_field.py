@@ -192,8 +192,8 @@ def mann_turbulence(n_time, n_side, dx, step, length, seed):
         from hipersim.turbgen.spectral_tensor import MannSpectralTensor, OnetimeMannSpectralTensor
     except ImportError:
         raise InputError(
-            "Mann boxes need hipersim, which is not installed: pip install 'fowt-env[mann]'; fowt loads also"
-            " runs with --wind rotor-averaged"
+            "Mann boxes need hipersim, which is not installed: pip install 'fowt-env[mann]', or take"
+            " rotor-averaged turbulence"
         ) from None
     settings = {"L": length, "Gamma": 3.9, "Nxyz": (n_time, n_side, n_side), "dxyz": (dx, step, step)}
     if TENSOR_BYTES * (n_time // 2 + 1) * (2 * n_side) ** 2 > LARGEST_TENSOR:

@@ -491,3 +491,10 @@ def test_a_wrong_sea_state_names_key_value_and_range(spec, parts):
     text = message(sea_state_of, spec)
     for part in parts:
         assert part in text
+
+
+def test_a_deck_in_place_of_a_platform_file_is_named(tmp_path):
+    deck = tmp_path / "model.fst"
+    deck.write_text("OpenFAST input file")
+    with pytest.raises(InputError, match="is an OpenFAST deck: `fowt import` it first"):
+        read_platform(deck)

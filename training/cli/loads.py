@@ -136,14 +136,9 @@ def loads_command(
         )  # fmt: skip
         return
     cases = {
-        "dlc": dlc,
-        "seeds": seeds,
-        "hours": hours,
-        "wind": wind,
-        "fidelity": fidelity,
-        "sensors": sensors,
-    }
-    cases["compartments"] = [_compartment(text) for text in flood or ()]
+        "dlc": dlc, "seeds": seeds, "hours": hours, "wind": wind, "fidelity": fidelity, "sensors": sensors,
+        "compartments": [_compartment(text) for text in flood or ()],
+    }  # fmt: skip
     matrix = expanded(platform, site, labels, **cases)
     named = {label: label for label in labels}
     check_controllers(named, matrix)
